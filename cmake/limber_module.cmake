@@ -1,0 +1,82 @@
+# Helpers that every module's CMakeLists.txt is written in. They refuse arguments they do not know.
+
+# Warnings, sanitizers and the language level: for our own targets only, never for those who link limber.
+function(limber_compile_options target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
+                                           -Woverloaded-virtual -Wunused)
+  if(LIMBER_WARNINGS_AS_ERRORS)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+endfunction()
+
+function(limber_sanitize target)
+  if(LIMBER_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${LIMBER_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=${LIMBER_SANITIZE}>)
+  endif()
+endfunction()
+
+# limber_add_module(name SOURCES ... [PUBLIC ...] [PRIVATE ...] [COMPONENT runtime|precompute|scene|...] [NO_SANITIZE])
+# makes target limber_<name>, alias limber::<name>, with include root <dir>/include and private headers in <dir>/src.
+function(limber_add_module name)
+  cmake_parse_arguments(arg "NO_SANITIZE" "COMPONENT" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "limber_add_module(${name}): unknown argument(s) ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT arg_COMPONENT)
+    message(FATAL_ERROR "limber_add_module(${name}): COMPONENT is missing")
+  endif()
+  add_library(limber_${name} ${arg_SOURCES})
+  add_library(limber::${name} ALIAS limber_${name})
+  set_target_properties(limber_${name} PROPERTIES EXPORT_NAME ${name} LIMBER_COMPONENT ${arg_COMPONENT})
+  target_include_directories(limber_${name}
+    PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>
+    PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
+  target_link_libraries(limber_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+  limber_compile_options(limber_${name})
+  if(NOT arg_NO_SANITIZE)
+    limber_sanitize(limber_${name})
+  endif()
+  set_property(GLOBAL APPEND PROPERTY LIMBER_MODULES ${name})
+endfunction()
+
+# limber_add_program(name SOURCES ... LINK ... [INSTALL]) makes an executable called <name> in build/<preset>/bin.
+function(limber_add_program name)
+  cmake_parse_arguments(arg "INSTALL" "" "SOURCES;LINK" ${ARGN})
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "limber_add_program(${name}): unknown argument(s) ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  add_executable(${name} ${arg_SOURCES})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+  target_link_libraries(${name} PRIVATE ${arg_LINK})
+  limber_compile_options(${name})
+  limber_sanitize(${name})
+  if(arg_INSTALL AND LIMBER_INSTALL)
+    install(TARGETS ${name} RUNTIME)
+  endif()
+endfunction()
+
+# limber_add_tests(module SOURCES ... LINK ... [TIMEOUT seconds]): one GoogleTest program per module, one CTest entry per test.
+function(limber_add_tests module)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK" ${ARGN})
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "limber_add_tests(${module}): unknown argument(s) ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  add_executable(test_${module} ${arg_SOURCES})
+  set_target_properties(test_${module} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+  target_link_libraries(test_${module} PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
+  target_include_directories(test_${module} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
+  # Tests that compare with files outside the repository look for them here, and skip where they are absent.
+  target_compile_definitions(test_${module} PRIVATE
+    LIMBER_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared" LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+    LIMBER_BIN_DIR="${PROJECT_BINARY_DIR}/bin")
+  limber_compile_options(test_${module})
+  limber_sanitize(test_${module})
+  gtest_discover_tests(test_${module} TEST_PREFIX "${module}." DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${arg_TIMEOUT} ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
+endfunction()

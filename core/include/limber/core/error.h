@@ -1,0 +1,36 @@
+/// @file limber/core/error.h
+/// What limber throws. `assert` is for limber's own slips; these are for what a caller or a file got wrong.
+///
+/// A message says where, which element, the value seen, what was expected and what to try, in one line.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace limber {
+
+/// Base of everything limber throws on purpose.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// An argument of a public function is outside its documented range. Programs exit with code 2.
+class InvalidArgument : public Error {
+ public:
+  using Error::Error;
+};
+
+/// A file cannot be read or written, or holds something wrong. Programs exit with code 1.
+class InputError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// The input was well formed but the computation cannot give a right answer. Programs exit with code 1.
+class ComputationError : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace limber

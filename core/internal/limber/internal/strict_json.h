@@ -1,0 +1,181 @@
+/// @file limber/internal/strict_json.h
+/// JSON documents read strictly: wrong types, missing keys and unknown keys are errors that name the place, what was seen
+/// and what was expected; an unknown key names the nearest known one. Private to limber's own sources.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/core/types.h"
+
+namespace limber::internal {
+
+/// Number of single-character insertions, removals and replacements between two words.
+inline std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, replaced});
+    }
+  }
+  return row.back();
+}
+
+/// The word of `known` that is nearest to `word`; empty if `known` is.
+inline std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
+  const auto best = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(word, a) < edit_distance(word, b);
+  });
+  return best == known.end() ? std::string() : *best;
+}
+
+/// Parses text as one JSON document. @param name shown in messages. @throws InputError with line and column; also for a
+/// key that stands twice in one object (a plain parser would silently keep the last).
+inline nlohmann::json parse_json(std::string_view text, const std::string& name) {
+  std::vector<std::set<std::string>> open;
+  std::string doubled;
+  const auto watch = [&](int, nlohmann::json::parse_event_t event, nlohmann::json& value) {
+    using E = nlohmann::json::parse_event_t;
+    if (event == E::object_start) open.emplace_back();
+    if (event == E::object_end && !open.empty()) open.pop_back();
+    if (event == E::key && !open.empty() && !open.back().insert(value.get<std::string>()).second && doubled.empty())
+      doubled = value.get<std::string>();
+    return true;
+  };
+  try {
+    auto document = nlohmann::json::parse(text, watch);
+    if (!doubled.empty()) throw InputError(name + ": the key \"" + doubled + "\" stands twice in one object");
+    return document;
+  } catch (const nlohmann::json::exception& e) {
+    std::string what = e.what();
+    // Keep the library's place and reason, drop its tag and anything that would break the one line.
+    if (const auto tag = what.find("] "); tag != std::string::npos) what.erase(0, tag + 2);
+    std::replace_if(what.begin(), what.end(), [](unsigned char c) { return c < 32 || c > 126; }, '?');
+    throw InputError(name + ": not valid JSON: " + what);
+  }
+}
+
+inline nlohmann::json read_json(const std::filesystem::path& path) {
+  return parse_json(read_file(path, std::size_t{256} << 20), "\"" + path.string() + "\"");
+}
+
+/// One JSON object, read key by key. Call finish() last: it refuses the keys that nobody asked for.
+class JsonObject {
+ public:
+  /// @param where the place for messages, such as `"scene.json" bodies[3]`
+  JsonObject(const nlohmann::json& value, std::string where) : value_(&value), where_(std::move(where)) {
+    if (!value.is_object()) throw InputError(where_ + ": is " + value.type_name() + ", expected an object { … }");
+  }
+
+  const std::string& where() const { return where_; }
+  std::string where(const std::string& key) const { return where_ + "." + key; }
+
+  bool has(const std::string& key) const {
+    known_.push_back(key);
+    return value_->contains(key);
+  }
+
+  const nlohmann::json& at(const std::string& key) const {
+    if (!has(key)) throw InputError(where_ + ": the key \"" + key + "\" is missing");
+    return (*value_)[key];
+  }
+
+  double number(const std::string& key) const { return number_of(at(key), where(key)); }
+  double number(const std::string& key, double otherwise) const { return has(key) ? number(key) : otherwise; }
+
+  /// An integer in [low, high].
+  std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high) const {
+    const auto& v = at(key);
+    if (!v.is_number_integer() || v < low || v > high)
+      throw InputError(where(key) + ": is " + shown(v) + ", expected an integer from " + std::to_string(low) + " to " +
+                       std::to_string(high));
+    return v.get<std::int64_t>();
+  }
+  std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high, std::int64_t otherwise) const {
+    return has(key) ? integer(key, low, high) : otherwise;
+  }
+
+  bool boolean(const std::string& key, bool otherwise) const {
+    if (!has(key)) return otherwise;
+    const auto& v = at(key);
+    if (!v.is_boolean()) throw InputError(where(key) + ": is " + shown(v) + ", expected true or false");
+    return v.get<bool>();
+  }
+
+  std::string text(const std::string& key) const {
+    const auto& v = at(key);
+    if (!v.is_string()) throw InputError(where(key) + ": is " + shown(v) + ", expected text");
+    return v.get<std::string>();
+  }
+  std::string text(const std::string& key, const std::string& otherwise) const {
+    return has(key) ? text(key) : otherwise;
+  }
+
+  /// `count` finite numbers.
+  std::vector<double> numbers(const std::string& key, std::size_t count) const {
+    const auto& v = at(key);
+    if (!v.is_array() || v.size() != count)
+      throw InputError(where(key) + ": is " + shown(v) + ", expected an array of " + std::to_string(count) + " numbers");
+    std::vector<double> out;
+    for (std::size_t i = 0; i < count; ++i) out.push_back(number_of(v[i], where(key) + "[" + std::to_string(i) + "]"));
+    return out;
+  }
+
+  Vec3 vec3(const std::string& key) const {
+    const auto n = numbers(key, 3);
+    return {n[0], n[1], n[2]};
+  }
+  Vec3 vec3(const std::string& key, const Vec3& otherwise) const { return has(key) ? vec3(key) : otherwise; }
+
+  /// The items of an array, each as (value, place).
+  template <class F>
+  void for_each(const std::string& key, F&& visit) const {
+    const auto& v = at(key);
+    if (!v.is_array()) throw InputError(where(key) + ": is " + shown(v) + ", expected an array [ … ]");
+    for (std::size_t i = 0; i < v.size(); ++i) visit(v[i], where(key) + "[" + std::to_string(i) + "]");
+  }
+
+  /// Refuses unknown keys, naming the nearest known one.
+  void finish() const {
+    for (const auto& [key, unused] : value_->items()) {
+      if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+      std::string message = where_ + ": the key \"" + key + "\" is unknown";
+      if (const auto near = nearest_word(key, known_); !near.empty()) message += "; did you mean \"" + near + "\"?";
+      throw InputError(message);
+    }
+  }
+
+  static std::string shown(const nlohmann::json& v) {
+    std::string s = v.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+    return s.size() > 60 ? s.substr(0, 57) + "..." : s;
+  }
+
+ private:
+  static double number_of(const nlohmann::json& v, const std::string& place) {
+    if (!v.is_number() || !std::isfinite(v.get<double>()))
+      throw InputError(place + ": is " + shown(v) + ", expected a finite number");
+    return v.get<double>();
+  }
+
+  const nlohmann::json* value_;
+  std::string where_;
+  mutable std::vector<std::string> known_;
+};
+
+}  // namespace limber::internal

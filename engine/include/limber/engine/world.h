@@ -1,0 +1,150 @@
+/// @file limber/engine/world.h
+/// What a game loop drives: bodies, forces, a fixed step.
+///
+///   World world({.step = 1.0 / 60.0});
+///   BodyId bell = world.add_body(model, {.pose = {.p = {0, 0, 2}}});
+///   while (running) {
+///     world.advance(frame_seconds);                  // 0, 1 or more fixed steps
+///     world.reconstruct(bell, positions, normals);   // only what is drawn costs
+///   }
+///
+/// Every body moves exactly over a step of any length: modes in closed form, the free rotation in closed form, translation
+/// under gravity as its parabola. Deterministic: same calls, same bits, for any Jobs. Once warm, a step allocates nothing.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "limber/core/jobs.h"
+#include "limber/core/rigid_transform.h"
+#include "limber/model/modal_model.h"
+
+namespace limber {
+
+/// Names a body of one world. Stays invalid for good once its body is removed.
+struct BodyId {
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;  ///< 0: no body
+  friend bool operator==(const BodyId&, const BodyId&) = default;
+};
+
+struct WorldOptions {
+  double step = 1.0 / 60.0;            ///< s; > 0
+  Vec3 gravity = {0.0, 0.0, -9.80665}; ///< m/s², world
+  int max_steps_per_advance = 8;       ///< ≥ 1; time beyond this is dropped (and counted), so a slow frame cannot snowball
+  void validate() const;               ///< @throws InvalidArgument naming the field and its value
+};
+
+/// How a body starts. Velocities are of the body origin (docs/notation.md), world axes.
+struct BodyPlacement {
+  RigidTransform pose;                     ///< X_WB
+  Vec3 velocity = Vec3::Zero();            ///< m/s; for bodies with fixed nodes: of the attachment
+  Vec3 angular_velocity = Vec3::Zero();    ///< rad/s; kLine: its part along the line counts
+};
+
+/// Motion of the frame of a body with fixed nodes, as its animated parent has it at the end of the coming step. Within the
+/// step the accelerations are held. Rotations that the fixing leaves free stay dynamic: kPoint reads the translation only.
+struct KinematicFrame {
+  RigidTransform pose;
+  Vec3 velocity = Vec3::Zero(), acceleration = Vec3::Zero();                   ///< world, m/s, m/s²
+  Vec3 angular_velocity = Vec3::Zero(), angular_acceleration = Vec3::Zero();   ///< world, rad/s, rad/s²
+};
+
+enum class Axes { kWorld, kBody };
+
+/// A point of a body's surface: triangle and barycentric weights. A vertex v is any triangle that has it, weight 1.
+struct SurfacePoint {
+  enum class Surface { kRender, kCollision } surface = Surface::kCollision;
+  Index triangle = 0;
+  std::array<double, 3> weight{1.0, 0.0, 0.0};  ///< sums to 1
+};
+
+/// The state of one body, for reading. Valid until the world changes.
+struct BodyView {
+  RigidTransform pose;              ///< X_WB
+  Vec3 velocity;                    ///< of the body origin, world, m/s
+  Vec3 angular_velocity;            ///< world, rad/s
+  std::span<const double> amplitudes;  ///< z, kg^½·m
+  std::span<const double> rates;       ///< ż, kg^½·m/s
+};
+
+/// Mechanical energy of one body, J.
+struct BodyEnergy {
+  double kinetic_rigid = 0.0;   ///< translation and rotation of the frame
+  double potential = 0.0;       ///< −m g·x of the centre of mass of the rest shape
+  double kinetic_modal = 0.0;   ///< ½ Σ ż²
+  double elastic = 0.0;         ///< ½ Σ λ z²
+  double total() const { return kinetic_rigid + potential + kinetic_modal + elastic; }
+};
+
+class World {
+ public:
+  explicit World(const WorldOptions& options = {}, Jobs& jobs = serial_jobs());
+  ~World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+
+  // Bodies -----------------------------------------------------------------------------------------------------------
+  BodyId add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement = {});
+  void remove_body(BodyId id);
+  bool contains(BodyId id) const;
+  std::size_t body_count() const;
+  const ModalModel& model(BodyId id) const;
+
+  // Time -------------------------------------------------------------------------------------------------------------
+  /// Adds real seconds to the accumulator and takes as many fixed steps as fit. @return steps taken.
+  int advance(double real_seconds);
+  /// Takes one step.
+  void step();
+  /// Fraction of a step left in the accumulator, in [0, 1): how far to draw between the last two states.
+  double interpolation_factor() const;
+  double time() const;              ///< s: steps × step length
+  std::uint64_t step_count() const;
+  double dropped_seconds() const;   ///< real time given up by max_steps_per_advance
+  const WorldOptions& options() const;
+
+  // Loads: forces are held over the next step, impulses act at its start, both at the deformed point -----------------
+  void apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, Axes axes = Axes::kWorld);
+  /// @param delay seconds after the step's start at which it acts; in [0, step). Exact for the modes; the frame gets it at the step's start.
+  void apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes = Axes::kWorld, double delay = 0.0);
+  void set_kinematic_frame(BodyId id, const KinematicFrame& target);
+
+  // State ------------------------------------------------------------------------------------------------------------
+  BodyView body(BodyId id) const;
+  void set_pose(BodyId id, const RigidTransform& pose);
+  void set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_velocity);
+  void set_amplitudes(BodyId id, std::span<const double> amplitudes, std::span<const double> rates);
+  /// Displacements and velocities of all nodes, body frame, 3 per node: z₀ = WᵀM d₀. What no kept mode can show is lost.
+  /// @throws InvalidArgument if the asset has no `volume` block (bake with --volume)
+  void set_node_displacements(BodyId id, std::span<const double> displacements, std::span<const double> velocities);
+  BodyEnergy energy(BodyId id) const;
+  Vec3 angular_momentum(BodyId id) const;  ///< world, about the body origin, kg·m²/s (rigid part)
+  Vec3 linear_momentum(BodyId id) const;   ///< world, kg·m/s
+
+  /// World position of a surface point, deformed.
+  Vec3 position(BodyId id, const SurfacePoint& at) const;
+  /// World velocity of a surface point, deformation included.
+  Vec3 velocity(BodyId id, const SurfacePoint& at) const;
+
+  // Drawing ----------------------------------------------------------------------------------------------------------
+  /// Deformed render surface: 3V floats, less `origin` (pass a point near the camera far from the world's origin).
+  /// @param normals empty, or 3V floats. @param interpolation s in [0, 1] between the last two states; 1: the newest.
+  void reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation = 1.0,
+                   const Vec3& origin = Vec3::Zero()) const;
+
+  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states.
+  RigidTransform interpolated_pose(BodyId id, double interpolation) const;
+  void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
+
+  /// Hash of the whole state (poses, momenta, amplitudes, time) for determinism checks.
+  std::uint64_t state_hash() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

@@ -1,0 +1,66 @@
+/// @file limber/mesh/tet_mesh.h
+/// A tetrahedral mesh with named regions and node groups, and what can be asked of its geometry alone.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "limber/core/types.h"
+
+namespace limber {
+
+/// A part of the body that may have a material of its own.
+struct Region {
+  std::string name;  ///< physical name, or the integer tag or reference as text where the file gives no name
+  int tag = 0;       ///< the file's number for it; 0 where it has none
+};
+
+/// A named set of nodes, such as a clamped face.
+struct NodeGroup {
+  std::string name;          ///< physical name, or its tag as text
+  std::vector<Index> nodes;  ///< ascending, no repeats
+};
+
+/// Linear tetrahedra. Lengths in metres.
+/// Invariant after a reader of limber or after validate(): all coordinates finite, all indices in range, every tet positive
+/// (right-handed, see `Tet`), nodes in the order of the file with unused ones still present.
+struct TetMesh {
+  std::vector<Vec3> nodes;
+  std::vector<Tet> tets;
+  std::vector<Index> tet_region;       ///< per tet, index into `regions`
+  std::vector<Region> regions;         ///< at least one if there are tets
+  std::vector<NodeGroup> node_groups;  ///< indices into `nodes`
+};
+
+/// Volume of a tetrahedron, positive if right-handed: (x1−x0)×(x2−x0)·(x3−x0)/6, m³.
+double signed_volume(const TetMesh& mesh, Index tet);
+
+/// Checks the invariant and repairs what may be repaired: negative tets are re-oriented, with one warning that counts
+/// them. @param name shown in messages, such as `"spoon.msh"`.
+/// @throws InputError naming the first wrong element: coordinate not finite, index out of range, a node twice in a tet, or
+///   a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off).
+void validate(TetMesh& mesh, const std::string& name, Warnings& warnings);
+
+/// Geometry of a solid of density 1.
+struct VolumeProperties {
+  double volume = 0.0;           ///< m³
+  Vec3 centroid = Vec3::Zero();  ///< m
+  Mat3 second_moment = Mat3::Zero();  ///< ∫ (x − c)(x − c)ᵀ dV about the centroid c, m⁵
+};
+VolumeProperties volume_properties(const TetMesh& mesh);
+
+/// Labels tets by body: tets that share a node are in one body. Numbers bodies by their first tet.
+/// @return per tet, the body's index; the number of bodies is 1 + the largest.
+std::vector<Index> connected_components(const TetMesh& mesh);
+
+/// The tets of one body with their nodes renumbered in order of appearance; unused nodes are left out.
+struct SubMesh {
+  TetMesh mesh;
+  std::vector<Index> node_of;  ///< per node of `mesh`, its index in the whole
+  std::vector<Index> tet_of;   ///< per tet of `mesh`, its index in the whole
+};
+/// @param component per tet, from connected_components(). @param which the body wanted.
+SubMesh extract_component(const TetMesh& mesh, std::span<const Index> component, Index which);
+
+}  // namespace limber

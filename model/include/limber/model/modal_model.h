@@ -1,0 +1,90 @@
+/// @file limber/model/modal_model.h
+/// One deformable body, baked: everything the runtime needs and nothing that changes.
+///
+///   K w_i = λ_i M w_i,  WᵀMW = I                    modes
+///   z̈_i + 2ξ_i ż_i + λ_i z_i = g_i = w_iᵀ f        their motion; ξ_i = (a₁λ_i + a₂)/2
+///   p_WP = X_WB · (r + Σ_i z_i w_i(r))              a material point in the world
+///
+/// The body frame B has the axes of the input mesh; its origin is the point the body turns about (see FrameMotion).
+/// Amplitudes z are in kg^½·m, shapes w in kg^−½. Source: [H03] sections 3.1–3.3.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "limber/core/types.h"
+#include "limber/model/modal_basis.h"
+
+namespace limber {
+
+/// How the body frame moves, decided by which nodes were fixed at bake time.
+enum class FrameMotion {
+  kFree,       ///< no fixed node: six degrees of freedom; origin at the centre of mass
+  kPoint,      ///< fixed at one point: turns about it; origin at that point
+  kLine,       ///< fixed along a line: turns about it; origin on the line, axis `line_axis`
+  kKinematic,  ///< fixed at three points or more: moves only as the caller says; origin at the centre of mass
+};
+
+/// Text of a FrameMotion in files and reports: "free", "point", "line", "kinematic".
+std::string_view to_string(FrameMotion motion);
+
+/// Optional: all nodes of the tetrahedral mesh, for initial states z₀ = WᵀM d₀, overlap normals and depth.
+struct ModalVolume {
+  std::vector<Vec3> rest;         ///< nodes, body frame, m
+  std::vector<Tet> tets;
+  ModalBasis basis;               ///< W at every node, kg^−½
+  ModalBasis mass_times_basis;    ///< M W at every node, kg^½: z₀ = (MW)ᵀ d₀
+};
+
+/// Where an asset came from; every field may be empty.
+struct Provenance {
+  std::string tool;        ///< "limber-precompute 0.1.0"
+  std::string input;       ///< file name of the input mesh, without folders
+  std::string input_hash;  ///< SHA-256 of its bytes, hexadecimal
+  std::string options;     ///< the options that made it, as one line
+};
+
+/// The plain data of a body. Fill it, then make a ModalModel of it, which checks it.
+struct ModalModelData {
+  std::string name;                    ///< of the body; not empty
+  FrameMotion motion = FrameMotion::kFree;
+  Vec3 line_axis = Vec3::UnitX();      ///< kLine: unit vector, body frame
+  double mass = 0.0;                   ///< kg; > 0
+  double volume = 0.0;                 ///< m³; > 0
+  Vec3 center_of_mass = Vec3::Zero();  ///< body frame, m; zero for kFree and kKinematic
+  Vec3 origin_in_input = Vec3::Zero(); ///< body origin in the input mesh's coordinates, m
+  Mat3 inertia = Mat3::Zero();         ///< of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite
+
+  std::vector<double> eigenvalues;     ///< λ, rad²/s², ascending, ≥ 0 (0: a mechanism)
+  std::vector<double> decays;          ///< ξ, 1/s, ≥ 0, per mode
+  std::vector<Vec3> participation;     ///< ∫ρ w_i dV, kg^½: zero for kFree
+  std::vector<Mat3> moments;           ///< ∫ρ x w_iᵀ dV, kg^½·m, x from the body origin: element (a, b) is ∫ρ x_a w_ib
+
+  ModalSurface render;                 ///< what is drawn; at least one triangle
+  std::optional<ModalSurface> collision;  ///< what touches; none: the render surface
+  std::optional<ModalVolume> volume_block;
+};
+
+/// Immutable and checked; shared by all instances through std::shared_ptr<const ModalModel>.
+class ModalModel {
+ public:
+  /// @throws InvalidArgument naming the field, the value seen and what was expected.
+  explicit ModalModel(ModalModelData data);
+
+  const ModalModelData& data() const { return data_; }
+  const std::string& name() const { return data_.name; }
+  Index modes() const { return static_cast<Index>(data_.eigenvalues.size()); }
+  const ModalSurface& render() const { return data_.render; }
+  const ModalSurface& collision() const { return data_.collision ? *data_.collision : data_.render; }
+
+  /// Undamped frequency of a mode, √λ/2π, Hz.
+  double frequency_hz(Index mode) const;
+
+ private:
+  ModalModelData data_;
+};
+
+}  // namespace limber

@@ -1,0 +1,61 @@
+/// @file limber/model/mode_selection.h
+/// Which modes a scene can show. A pure function of the modes and the scene's limits, used at bake time and per scene.
+///
+/// [H03] section 3.2 drops a mode whose answer to the largest force cannot be seen, or whose frequency cannot be shown.
+/// Here per node: the largest displacement that a force of size F anywhere loadable can make mode i show anywhere
+/// observable is  max_a |w_i(a)| · max_b |w_i(b)| · F · c / λ_i .
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "limber/core/types.h"
+
+namespace limber {
+
+/// What one mode needs to be judged.
+struct ModeStrength {
+  double eigenvalue = 0.0;      ///< λ, rad²/s²; ≥ 0
+  double decay = 0.0;           ///< ξ, 1/s; ≥ 0
+  double max_observable = 0.0;  ///< max |w_i(a)| over the vertices that can be seen, kg^−½
+  double max_loadable = 0.0;    ///< max |w_i(b)| over the points where forces can act, kg^−½
+};
+
+enum class LoadKind {
+  kStatic,    ///< c = 1
+  kSudden,    ///< c = 2, a force that starts at once
+  kResonant,  ///< c = 1/(2ζ√(1−ζ²)), at least 1: a force at the worst frequency
+};
+
+struct SceneLimits {
+  int max_modes = 64;             ///< the most modes kept, lowest first; ≥ 0. Step time grows linearly in it.
+  double max_force = 0.0;         ///< N, the largest force of the scene; 0: no limit is given
+  double min_displacement = 0.0;  ///< m, the smallest motion anyone can see; 0: no limit is given
+  double frame_rate = 0.0;        ///< Hz; modes whose damped frequency is above half of it are dropped; 0: no limit
+  LoadKind load = LoadKind::kSudden;
+  bool keep_all = false;          ///< switches off the limits on force and frame rate; max_modes stays
+  void validate() const;          ///< @throws InvalidArgument naming the field and its value
+};
+
+enum class DropReason { kTooSmall, kTooFast, kBeyondMaxModes };
+std::string_view to_string(DropReason reason);  ///< "below_min_displacement", "above_half_frame_rate", "beyond_max_modes"
+
+struct DroppedMode {
+  Index mode = 0;
+  DropReason reason = DropReason::kTooSmall;
+  double value = 0.0;  ///< what was compared: m, Hz or the mode's rank
+  double limit = 0.0;  ///< with what
+};
+
+struct ModeSelection {
+  std::vector<Index> kept;  ///< ascending
+  std::vector<DroppedMode> dropped;
+};
+
+/// @param modes ascending in λ. Modes with λ = 0 (mechanisms) are always kept and do not count towards max_modes.
+/// A cluster of equal eigenvalues (relative distance below 1e-6) is never cut in two by max_modes: it is dropped whole,
+/// or kept whole where nothing else would be kept.
+ModeSelection select_modes(std::span<const ModeStrength> modes, const SceneLimits& limits);
+
+}  // namespace limber
