@@ -1,0 +1,83 @@
+/// @file program.h
+/// What limber's command-line programs have in common: options, errors, exit codes, reports, output files, progress.
+///
+///   int main(int argc, char** argv) {
+///     Program program("limber-inspect", "Tells what is inside an asset.");
+///     std::string asset;
+///     program.options().add_option("ASSET", asset, "asset file (GLB)")->required();
+///     return program.run(argc, argv, [&] { inspect(program, asset); });
+///   }
+///
+/// Exit codes: 0 good; 1 failed work (InputError, ComputationError, out of memory, a full disk); 2 wrong usage
+/// (options, InvalidArgument). An error is one line on stderr. Results go to stdout.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "limber/core/file.h"
+#include "limber/core/types.h"
+#include "progress.h"
+
+namespace limber::tools {
+
+class Program {
+ public:
+  /// Declares --help, --version and --report FILE.json.
+  /// @param name of the executable. @param purpose one or two sentences for --help
+  Program(std::string name, const std::string& purpose);
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  /// Where the program declares its own options; give each value's unit as its type_name().
+  CLI::App& options() { return options_; }
+
+  /// Parses, works, then writes the report and lets every output file appear. @return the exit code
+  int run(int argc, const char* const* argv, const std::function<void()>& work);
+
+  // For use by the work ----------------------------------------------------------------------------------------------
+  /// "limber-inspect 0.1.0"
+  std::string name_and_version() const;
+
+  /// Text for people on stdout.
+  void print(std::string_view text);
+
+  /// Bytes are written beside `path` now; the file appears when all the work has succeeded, together with the others.
+  /// @throws InvalidArgument if two outputs of one run have the same path; InputError as OutputFiles::add()
+  void write_file(const std::filesystem::path& path, std::string_view bytes);
+
+  /// The machine-readable report, keys in the order they are set; starts with "program" and "version". What differs
+  /// between equal runs (times) belongs under the key "seconds". "warnings" is added at the end.
+  nlohmann::ordered_json& report() { return report_; }
+
+  /// Remarks: each becomes a line "NAME: warning: …" on stderr when the work is done, and stands in the report.
+  Warnings& warnings() { return warnings_; }
+
+  Progress& progress() { return progress_; }
+
+ private:
+  int fail(int code, std::string message);
+  int refuse_usage(const CLI::ParseError& error);
+  void finish();
+
+  std::string name_;
+  CLI::App options_;
+  std::string report_path_;
+  nlohmann::ordered_json report_;
+  Warnings warnings_;
+  Progress progress_;
+  OutputFiles outputs_;
+  std::vector<std::filesystem::path> output_paths_;
+};
+
+/// Validators for options: a finite number > 0, or ≥ 0. (CLI11 reads "nan" and "inf" as numbers.)
+CLI::Validator positive_number();
+CLI::Validator non_negative_number();
+
+}  // namespace limber::tools
