@@ -1,0 +1,27 @@
+#include "limber/model/sha256.h"
+
+#include <gtest/gtest.h>
+
+namespace limber {
+namespace {
+
+// FIPS 180-4's own examples, as published by NIST.
+TEST(Sha256, AgreesWithThePublishedExamples) {
+  EXPECT_EQ(sha256_hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256_hex("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+}
+
+TEST(Sha256, PiecesGiveTheHashOfTheWhole) {
+  const std::string whole(1000, 'x');
+  for (const std::size_t cut : {0, 1, 63, 64, 65, 999}) {
+    Sha256 hash;
+    hash.update(std::string_view(whole).substr(0, cut));
+    hash.update(std::string_view(whole).substr(cut));
+    EXPECT_EQ(hash.hex(), sha256_hex(whole)) << "cut at " << cut;
+  }
+}
+
+}  // namespace
+}  // namespace limber
