@@ -11,6 +11,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "limber/core/types.h"
 
@@ -36,7 +37,7 @@ struct ModePropagator {
   double zdot_g = 0.0;     ///< S, s
 };
 
-/// @param h step length, s; ≥ 0 and finite. @throws InvalidArgument if h, λ or ξ is negative or not finite.
+/// @param h step length, s; ≥ 0. @throws InvalidArgument if h, λ or ξ is not a number from 0 to 1e100.
 ModePropagator propagator(const Mode& mode, double h);
 
 /// One step of one mode under a force g held over it. Does not allocate or throw.
@@ -44,8 +45,8 @@ inline ModeState advance(const ModePropagator& p, ModeState s, double g = 0.0) {
   return {p.z_z * s.z + p.z_zdot * s.zdot + p.z_g * g, p.zdot_z * s.z + p.zdot_zdot * s.zdot + p.zdot_g * g};
 }
 
-/// The change of the state at the step's end by an impulse j given `remaining` seconds before it: the response is linear,
-/// so an impulse inside a step adds propagator(mode, remaining) applied to (0, j). @throws like propagator()
+/// The change of the state at the step's end by an impulse j given `remaining` seconds before it: the response is
+/// linear, so an impulse inside a step adds propagator(mode, remaining) applied to (0, j). @throws like propagator()
 ModeState impulse_response(const Mode& mode, double remaining, double j);
 
 /// Energy of one mode, ½(ż² + λz²), J.
@@ -70,10 +71,15 @@ class PropagatorTable {
   void advance_free(double* z, double* zdot) const;
 
  private:
+  /// The coefficients of kPad modes side by side (zdot_g is z_zdot again): one stream, read once per step.
+  struct alignas(64) Block {
+    double coefficients[5][kPad] = {};
+  };
+  const double* coefficients() const { return blocks_.empty() ? nullptr : blocks_.front().coefficients[0]; }
+
   Index modes_ = 0;
   double step_ = 0.0;
-  std::vector<double> storage_;
-  const double* row(int coefficient) const;
+  std::vector<Block> blocks_;
 };
 
 }  // namespace limber

@@ -1,0 +1,32 @@
+// The vector loops behind reconstruct(). Raw pointers only: the file that implements them is compiled for several
+// instruction sets, so neither Eigen nor a header that includes it may reach it.
+#pragma once
+
+#include <cstddef>
+
+namespace limber {
+
+inline constexpr std::size_t kTileVertices = 16;
+inline constexpr std::size_t kBlockInstances = 8;  ///< with AVX-512 their 24 accumulators leave room for the operands
+
+/// A rigid transform in single precision and where the vertices of one instance go.
+struct InstanceOutput {
+  float rotation[9];     ///< row-major
+  float translation[3];  ///< m
+  float* positions;      ///< xyz per vertex, of vertex 0
+};
+
+/// Vertices [16·first_tile, min(16·last_tile, vertices)) of up to kBlockInstances instances of one surface.
+struct TileRange {
+  const float* basis;  ///< `[tile][mode][x16|y16|z16]`, 64-byte aligned, of tile 0
+  const float* rest;   ///< xyz per vertex, of vertex 0
+  std::size_t vertices, modes, first_tile, last_tile;
+  const float* amplitudes;  ///< `[mode][instance]`
+  const InstanceOutput* outputs;
+  std::size_t instances;  ///< 1 … kBlockInstances
+};
+
+/// Each vertex gets the same operations in the same order whatever shares its block, so the same bits.
+void reconstruct_tiles(const TileRange& range);
+
+}  // namespace limber
