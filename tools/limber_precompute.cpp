@@ -1,0 +1,303 @@
+// limber-precompute: a mesh in, an asset out.
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <optional>
+
+#include "limber/core/error.h"
+#include "limber/core/version.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
+#include "limber/mesh/read_mesh.h"
+#include "limber/mesh_assimp/read_mesh.h"
+#include "limber/model/sha256.h"
+#include "limber/precompute/bake.h"
+#include "limber/precompute/tetrahedralise.h"
+#include "precompute_report.h"
+#include "program.h"
+
+namespace limber::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// What the user typed, before it means anything.
+struct Arguments {
+  std::string mesh, output;
+  std::string materials_file, material_name;
+  std::optional<double> youngs_modulus, poisson_ratio, density;
+  std::vector<std::string> fixes;
+  std::string mass = "lumped";
+  std::vector<double> rayleigh;
+  std::string damping_ratio;
+  std::string render_surface, collision_surface;
+  TetrahedralisationOptions tets;
+  SceneLimits limits;
+  std::string load = "sudden";
+  int modes = 64;
+  double scale = 1.0;
+  bool volume_block = false, no_certify = false, list_materials = false;
+};
+
+void declare_material_options(CLI::App& app, Arguments& a) {
+  app.add_option("--youngs-modulus", a.youngs_modulus, "Young's modulus E of the whole body")->type_name("PA");
+  app.add_option("--poisson-ratio", a.poisson_ratio, "Poisson's ratio, in (-1, 0.5)")->type_name("NU");
+  app.add_option("--density", a.density, "density of the whole body")->type_name("KG_M3");
+  app.add_option("--material", a.material_name, "a material by name, such as steel or rubber")->type_name("NAME");
+  app.add_option("--materials", a.materials_file,
+                 "materials by region: {\"REGION\": {\"youngs_modulus\", \"poisson_ratio\", \"density\"} or \"NAME\"}; "
+                 "\"*\" is the rest")
+      ->type_name("FILE.json");
+  app.add_flag("--list-materials", a.list_materials, "print the materials known by name and their sources, then stop");
+}
+
+void declare_mode_options(CLI::App& app, Arguments& a) {
+  app.add_option("--modes", a.modes, "elastic modes computed, and the most kept, lowest first")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--max-force", a.limits.max_force,
+                 "largest force of the scene; with --min-displacement, drops what it cannot show")
+      ->type_name("N")
+      ->check(positive_number());
+  app.add_option("--min-displacement", a.limits.min_displacement, "smallest motion that anyone can see")
+      ->type_name("M")
+      ->check(positive_number());
+  app.add_option("--load", a.load, "how the largest force comes")
+      ->check(CLI::IsMember({"static", "sudden", "resonant"}))
+      ->capture_default_str();
+  app.add_option("--frame-rate", a.limits.frame_rate, "drops modes whose damped frequency is above half of it")
+      ->type_name("HZ")
+      ->check(positive_number());
+  app.add_flag("--keep-all", a.limits.keep_all, "switches off the limits on force and frame rate");
+  app.add_option("--mass", a.mass, "mass matrix")
+      ->check(CLI::IsMember({"lumped", "consistent"}))
+      ->capture_default_str();
+  app.add_option("--rayleigh", a.rayleigh, "damping a1 K + a2 M: a1 in s, a2 in 1/s")
+      ->type_name("A1,A2")
+      ->delimiter(',')
+      ->expected(2);
+  app.add_option("--damping-ratio", a.damping_ratio, "damping ratio Z at two frequencies (1 is critical)")
+      ->type_name("Z@F1,F2");
+  app.add_flag("--no-certify", a.no_certify, "skip the proof that no mode was missed (for huge meshes)");
+}
+
+void declare_geometry_options(CLI::App& app, Arguments& a) {
+  app.add_option("--fix", a.fixes,
+                 "hold nodes: group:NAME, box:x0,y0,z0,x1,y1,z1 (m) or nodes:I,J,... (0-based); repeatable")
+      ->type_name("SELECTOR")
+      ->allow_extra_args(false);
+  app.add_option("--render-surface", a.render_surface,
+                 "surface to draw, embedded in the tets; default: the input surface, or the tets' boundary")
+      ->type_name("FILE");
+  app.add_option("--collision-surface", a.collision_surface, "surface that touches; default: the tets' boundary")
+      ->type_name("FILE");
+  app.add_option("--cell-size", a.tets.cell_size,
+                 "tets from a surface: largest circumradius; default: 1/40 of the diagonal")
+      ->type_name("M")
+      ->check(positive_number());
+  app.add_option("--alpha", a.tets.alpha, "wrap of a soup: smallest hole it enters; default: 1/50 of the diagonal")
+      ->type_name("M")
+      ->check(positive_number());
+  app.add_option("--scale", a.scale, "multiplies all input lengths first, for files that are not in metres")
+      ->type_name("FACTOR")
+      ->check(positive_number())
+      ->capture_default_str();
+  app.add_flag("--volume", a.volume_block,
+               "also bake all nodes, so that any initial deformation can be given to the runtime");
+}
+
+// Meaning -----------------------------------------------------------------------------------------------------------
+
+MaterialTable materials_of(const Arguments& a) {
+  const bool by_numbers = a.youngs_modulus || a.poisson_ratio || a.density;
+  const int ways = (by_numbers ? 1 : 0) + (a.material_name.empty() ? 0 : 1) + (a.materials_file.empty() ? 0 : 1);
+  if (ways != 1)
+    throw InvalidArgument(
+        std::string(ways == 0 ? "no material is given" : "the material is given twice") +
+        "; give --material NAME, or --youngs-modulus, --poisson-ratio and --density, or --materials FILE");
+  if (!a.materials_file.empty()) return read_materials(a.materials_file);
+  if (!a.material_name.empty()) return {{"*", material_preset(a.material_name)}};
+  if (!a.youngs_modulus || !a.poisson_ratio || !a.density)
+    throw InvalidArgument("--youngs-modulus, --poisson-ratio and --density go together: one of them is missing");
+  const Material material{*a.youngs_modulus, *a.poisson_ratio, *a.density};
+  material.validate("material");
+  return {{"*", material}};
+}
+
+RayleighDamping damping_of(const Arguments& a) {
+  if (!a.rayleigh.empty() && !a.damping_ratio.empty())
+    throw InvalidArgument("the damping is given twice: by --rayleigh and by --damping-ratio");
+  if (!a.rayleigh.empty()) return {.stiffness_proportional = a.rayleigh[0], .mass_proportional = a.rayleigh[1]};
+  if (a.damping_ratio.empty()) return {};
+  double ratio = 0.0, first = 0.0, second = 0.0;
+  char rest = 0;
+  if (std::sscanf(a.damping_ratio.c_str(), "%lf@%lf,%lf%c", &ratio, &first, &second, &rest) != 3)
+    throw InvalidArgument("--damping-ratio " + a.damping_ratio + ": expected Z@F1,F2, such as 0.02@100,1000");
+  return RayleighDamping::from_ratio(ratio, first, second);
+}
+
+LoadKind load_of(const std::string& text) {
+  return text == "static" ? LoadKind::kStatic : text == "resonant" ? LoadKind::kResonant : LoadKind::kSudden;
+}
+
+BakeOptions options_of(const Arguments& a) {
+  BakeOptions o;
+  o.materials = materials_of(a);
+  for (const std::string& text : a.fixes) o.fixed.push_back(parse_fix_selector(text));
+  o.damping = damping_of(a);
+  o.analysis = {.modes = a.modes,
+                .mass = a.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
+                .certify = !a.no_certify};
+  o.limits = a.limits;
+  o.limits.max_modes = a.modes;
+  o.limits.load = load_of(a.load);
+  o.volume_block = a.volume_block;
+  o.validate();
+  a.tets.validate();
+  return o;
+}
+
+// Work --------------------------------------------------------------------------------------------------------------
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(nlohmann::ordered_json& seconds) : seconds_(seconds) {}
+  template <class F>
+  auto time(const char* stage, F&& work) {
+    const auto start = Clock::now();
+    auto result = work();
+    seconds_[stage] = std::chrono::duration<double>(Clock::now() - start).count();
+    return result;
+  }
+
+ private:
+  nlohmann::ordered_json& seconds_;
+};
+
+double peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+void scale(std::vector<Vec3>& points, double factor) {
+  if (factor == 1.0) return;
+  for (Vec3& p : points) p *= factor;
+}
+
+SurfaceMesh read_surface(Program& program, const std::string& path, double factor) {
+  SurfaceMesh surface = read_any_surface_mesh(path, program.warnings());
+  scale(surface.vertices, factor);
+  return surface;
+}
+
+/// Reads what the file holds; a surface is filled with tets and stays the render surface.
+BakeInput read_input(Program& program, const Arguments& a, Stopwatch& stopwatch, nlohmann::ordered_json& seconds) {
+  BakeInput input;
+  input.name = fs::path(a.mesh).stem().string();
+  if (holds_tets(a.mesh)) {
+    input.mesh = stopwatch.time("read", [&] { return read_tet_mesh(a.mesh, program.warnings()); });
+    scale(input.mesh.nodes, a.scale);
+    return input;
+  }
+  if (!a.fixes.empty() && a.fixes.front().rfind("group:", 0) == 0)
+    throw InvalidArgument("--fix " + a.fixes.front() + ": a surface has no node groups; use box:");
+  input.render = stopwatch.time("read", [&] { return read_surface(program, a.mesh, a.scale); });
+  program.progress().stage("tetrahedra");
+  Tetrahedralisation t =
+      stopwatch.time("tetrahedralise", [&] { return tetrahedralise(*input.render, a.tets, program.warnings()); });
+  seconds["wrap"] = t.seconds_wrap;
+  seconds["mesh"] = t.seconds_mesh;
+  program.report()["surface"] = {{"vertices", input.render->vertices.size()},
+                                 {"triangles", input.render->triangles.size()},
+                                 {"wrapped", t.wrapped},
+                                 {"why_wrapped", t.why_wrapped},
+                                 {"volume_before", t.volume_before},
+                                 {"volume_after", t.volume_after}};
+  program.print(fmt::format("surface: {} triangles{}; volume {:.6g} m^3, of the tets {:.6g} m^3\n",
+                            input.render->triangles.size(), t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "",
+                            t.volume_before, t.volume_after));
+  input.mesh = std::move(t.mesh);
+  return input;
+}
+
+void print_materials(Program& program) {
+  for (const MaterialPreset& m : material_presets())
+    program.print(fmt::format("{:<12} E {:>8.3g} Pa  nu {:>5.3g}  rho {:>6.5g} kg/m^3  {}\n", m.name,
+                              m.material.youngs_modulus, m.material.poisson_ratio, m.material.density, m.source));
+}
+
+/// The options that shape the result, in the order of --help; names of files without their folders, so that equal bakes
+/// give equal bytes wherever they are run.
+std::string options_line(const CLI::App& app) {
+  std::string line;
+  for (const CLI::Option* o : app.get_options()) {
+    if (o->count() == 0 || o->get_name() == "--report" || o->get_name().rfind("--", 0) != 0 ||
+        o->get_name() == "--output")
+      continue;
+    for (const std::string& value : o->results())
+      line += o->get_name() + " " + fs::path(value).filename().string() + " ";
+  }
+  return line;
+}
+
+Provenance provenance_of(const Program& program, const Arguments& a, const CLI::App& app) {
+  Provenance p;
+  p.tool = program.name_and_version();
+  p.input = fs::path(a.mesh).filename().string();
+  p.input_hash = sha256_hex(read_file(a.mesh));
+  p.options = options_line(app);
+  return p;
+}
+
+void precompute(Program& program, const Arguments& a) {
+  if (a.list_materials) return print_materials(program);
+  if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
+  const BakeOptions options = options_of(a);
+  nlohmann::ordered_json seconds;
+  Stopwatch stopwatch(seconds);
+
+  program.progress().stage("reading");
+  BakeInput input = read_input(program, a, stopwatch, seconds);
+  if (!a.render_surface.empty()) input.render = read_surface(program, a.render_surface, a.scale);
+  if (!a.collision_surface.empty()) input.collision = read_surface(program, a.collision_surface, a.scale);
+  input.provenance = provenance_of(program, a, program.options());
+
+  program.progress().stage("modes");
+  TbbJobs jobs;
+  const BakeResult result = bake(input, options, program.warnings(), jobs);
+  program.progress().stage("writing");
+  const std::string bytes = stopwatch.time("encode", [&] { return asset_bytes(result.asset); });
+  program.write_file(a.output, bytes);
+
+  add_bake(program.report(), result.bodies);
+  add_bake_seconds(seconds, result.bodies);
+  program.report()["asset_bytes"] = bytes.size();
+  program.report()["peak_memory_bytes"] = peak_memory_bytes();
+  program.report()["seconds"] = std::move(seconds);
+  program.print(bake_summary(result.bodies));
+  program.print(fmt::format("{}: {:.2f} MB\n", a.output, 1e-6 * static_cast<double>(bytes.size())));
+}
+
+}  // namespace
+}  // namespace limber::tools
+
+int main(int argc, char** argv) {
+  using namespace limber::tools;
+  Program program(
+      "limber-precompute",
+      "Bakes a mesh into an asset: its vibration modes by linear finite elements, those of them that a scene "
+      "can show, and the surfaces that move with them. Lengths in metres.");
+  Arguments arguments;
+  program.options().add_option("MESH", arguments.mesh,
+                               "tetrahedra (Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk) or a surface "
+                               "(OBJ, STL, PLY, glTF, OFF, 3DS, ...), which is filled with tetrahedra first");
+  program.options().add_option("-o,--output", arguments.output, "asset to write")->type_name("ASSET.glb");
+  declare_material_options(program.options(), arguments);
+  declare_mode_options(program.options(), arguments);
+  declare_geometry_options(program.options(), arguments);
+  return program.run(argc, argv, [&] { precompute(program, arguments); });
+}

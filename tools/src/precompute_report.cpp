@@ -1,0 +1,178 @@
+#include "precompute_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+
+namespace limber::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+Json json(const Mat3& m) {
+  Json rows = Json::array();
+  for (int r = 0; r < 3; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2)});
+  return rows;
+}
+Json json(const EmbeddingReport& e) {
+  return {{"vertices", e.vertices}, {"outside", e.outside}, {"max_distance", e.max_distance}};
+}
+
+/// Mass, centre and inertia of all bodies together.
+struct Total {
+  double mass = 0.0, volume = 0.0;
+  Vec3 center = Vec3::Zero();
+  Mat3 inertia = Mat3::Zero();
+};
+
+Total total_of(const std::vector<BodyReport>& bodies) {
+  Total t;
+  for (const BodyReport& b : bodies) {
+    t.mass += b.mass;
+    t.volume += b.volume;
+    t.center += b.mass * b.center_of_mass;
+  }
+  t.center /= t.mass;
+  for (const BodyReport& b : bodies) {
+    const Vec3 d = b.center_of_mass - t.center;
+    t.inertia += b.inertia + b.mass * (d.squaredNorm() * Mat3::Identity() - d * d.transpose());
+  }
+  return t;
+}
+
+/// One elastic mode of one body, for merging.
+struct BodyMode {
+  double hz = 0.0;
+  Index body = 0, mode = 0;
+};
+
+/// Modes of all bodies, ascending, as far as the list has no holes.
+std::vector<BodyMode> merged_modes(const std::vector<BodyReport>& bodies) {
+  std::vector<BodyMode> modes;
+  double complete_to = std::numeric_limits<double>::infinity();
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const auto& hz = bodies[b].frequencies_hz;
+    for (std::size_t m = 0; m < hz.size(); ++m) modes.push_back({hz[m], static_cast<Index>(b), static_cast<Index>(m)});
+    if (!bodies[b].all_modes) complete_to = std::min(complete_to, hz.empty() ? 0.0 : hz.back());
+  }
+  std::stable_sort(modes.begin(), modes.end(), [](const BodyMode& a, const BodyMode& b) { return a.hz < b.hz; });
+  std::erase_if(modes, [&](const BodyMode& m) { return m.hz > complete_to; });
+  return modes;
+}
+
+Json discarded(Index index, const DroppedMode& d) {
+  return {{"index", index}, {"reason", to_string(d.reason)}, {"value", d.value}, {"limit", d.limit}};
+}
+
+void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
+  const auto modes = merged_modes(bodies);
+  Json hz = Json::array(), kept = Json::array(), dropped = Json::array(), owner = Json::array();
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const ModeSelection& s = bodies[modes[i].body].selection;
+    hz.push_back(modes[i].hz);
+    owner.push_back(modes[i].body);
+    if (std::binary_search(s.kept.begin(), s.kept.end(), modes[i].mode)) {
+      kept.push_back(i);
+      continue;
+    }
+    for (const DroppedMode& d : s.dropped)
+      if (d.mode == modes[i].mode) dropped.push_back(discarded(static_cast<Index>(i), d));
+  }
+  report["frequencies_hz"] = std::move(hz);
+  if (bodies.size() > 1) report["body_of_frequency"] = std::move(owner);
+  report["kept"] = std::move(kept);
+  report["discarded"] = std::move(dropped);
+}
+
+Json json(const BodyReport& b) {
+  Json dropped = Json::array();
+  for (const DroppedMode& d : b.selection.dropped) dropped.push_back(discarded(d.mode, d));
+  return {{"name", b.name},
+          {"motion", to_string(b.motion)},
+          {"nodes", b.nodes},
+          {"tets", b.tets},
+          {"mass", b.mass},
+          {"volume", b.volume},
+          {"center_of_mass", json(b.center_of_mass)},
+          {"inertia", json(b.inertia)},
+          {"zero_modes", b.zero_modes},
+          {"mechanisms", b.mechanisms},
+          {"frequencies_hz", b.frequencies_hz},
+          {"kept", b.selection.kept},
+          {"discarded", std::move(dropped)},
+          {"certified", b.certified},
+          {"residual_max", b.residual_max},
+          {"residual_bound", b.residual_bound},
+          {"backward_error_max", b.backward_error_max},
+          {"orthogonality_max", b.orthogonality_max},
+          {"solves", b.solves},
+          {"render_surface", json(b.render)},
+          {"collision_surface", json(b.collision)}};
+}
+
+template <class F>
+double largest(const std::vector<BodyReport>& bodies, F value) {
+  double most = 0.0;
+  for (const BodyReport& b : bodies) most = std::max(most, value(b));
+  return most;
+}
+
+template <class F>
+auto sum(const std::vector<BodyReport>& bodies, F value) {
+  decltype(value(bodies[0])) total{};
+  for (const BodyReport& b : bodies) total += value(b);
+  return total;
+}
+
+}  // namespace
+
+void add_bake(Json& report, const std::vector<BodyReport>& bodies) {
+  const Total total = total_of(bodies);
+  report["nodes"] = sum(bodies, [](const BodyReport& b) { return b.nodes; });
+  report["tets"] = sum(bodies, [](const BodyReport& b) { return b.tets; });
+  report["components"] = bodies.size();
+  report["mass"] = total.mass;
+  report["volume"] = total.volume;
+  report["center_of_mass"] = json(total.center);
+  report["inertia"] = json(total.inertia);
+  report["zero_modes"] = sum(bodies, [](const BodyReport& b) { return b.zero_modes; });
+  report["mechanisms"] = sum(bodies, [](const BodyReport& b) { return b.mechanisms; });
+  add_modes(report, bodies);
+  report["certified"] = std::all_of(bodies.begin(), bodies.end(), [](const BodyReport& b) { return b.certified; });
+  report["residual_max"] = largest(bodies, [](const BodyReport& b) { return b.residual_max; });
+  report["backward_error_max"] = largest(bodies, [](const BodyReport& b) { return b.backward_error_max; });
+  report["orthogonality_max"] = largest(bodies, [](const BodyReport& b) { return b.orthogonality_max; });
+  report["bodies"] = Json::array();
+  for (const BodyReport& b : bodies) report["bodies"].push_back(json(b));
+}
+
+void add_bake_seconds(Json& seconds, const std::vector<BodyReport>& bodies) {
+  seconds["assemble"] = sum(bodies, [](const BodyReport& b) { return b.seconds.assemble; });
+  seconds["order"] = sum(bodies, [](const BodyReport& b) { return b.seconds.order; });
+  seconds["factor"] = sum(bodies, [](const BodyReport& b) { return b.seconds.factor; });
+  seconds["iterate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.iterate; });
+  seconds["certify"] = sum(bodies, [](const BodyReport& b) { return b.seconds.certify; });
+  seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds_embed; });
+}
+
+std::string bake_summary(const std::vector<BodyReport>& bodies) {
+  std::string text;
+  for (const BodyReport& b : bodies) {
+    std::map<std::string_view, int> reasons;
+    for (const DroppedMode& d : b.selection.dropped) ++reasons[to_string(d.reason)];
+    std::string why;
+    for (const auto& [reason, count] : reasons) why += fmt::format(", {} {}", count, reason);
+    text += fmt::format("{}: {} nodes, {} tets, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.nodes, b.tets, b.mass,
+                        to_string(b.motion), b.zero_modes);
+    if (!b.frequencies_hz.empty())
+      text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
+                          b.frequencies_hz.front(), b.frequencies_hz.back(),
+                          b.certified ? ", none missed (certified)" : ", not certified", b.selection.kept.size(), why);
+  }
+  return text;
+}
+
+}  // namespace limber::tools
