@@ -15,7 +15,7 @@ foreach(module IN LISTS limber_modules)
   # Every include root is a folder that holds limber/<module>/*.h; generated headers come from the build tree's.
   get_target_property(roots limber_${module} INTERFACE_INCLUDE_DIRECTORIES)
   foreach(root IN LISTS roots)
-    if(root MATCHES "^\\$<BUILD_INTERFACE:(.*)>$" AND IS_DIRECTORY "${CMAKE_MATCH_1}/limber")
+    if(root MATCHES "^\\$<BUILD_INTERFACE:(.*)>$")
       install(DIRECTORY "${CMAKE_MATCH_1}/limber" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
     endif()
   endforeach()
