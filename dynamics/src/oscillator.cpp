@@ -34,10 +34,10 @@ ModePropagator oscillating(double lambda, double xi, double delta_squared, doubl
   return {C + xi * S, S, -lambda * S, C - xi * S, H, S};
 }
 
-// H of two real decay rates r₁ ≤ r₂ (x = rh), which is the integral of S. Three forms, each where it does not cancel.
-double held_response(double lambda, double xi, double delta_squared, double h, double x1, double x2, double z_z) {
-  if (x1 >= 1.0) return (1.0 - z_z) / lambda;  // z_z ≤ (1 + x₁)e^{−x₁} ≤ 0.74
-  if (x2 >= 3.0 * x1) return h * h * (x2 * decay_second(x2) - x1 * decay_second(x1)) / (x2 - x1);
+// H of two real decay rates r₁ < r₂, which is the integral of S. Three forms, each where it does not cancel.
+double held_response(double lambda, double xi, double delta_squared, double h, double r1, double r2, double z_z) {
+  if (r1 * h >= 1.0) return (1.0 - z_z) / lambda;  // z_z ≤ (1 + r₁h)e^{−r₁h} ≤ 0.74
+  if (r2 >= 3.0 * r1) return h * h * (r2 * decay_second(r2 * h) - r1 * decay_second(r1 * h)) / (r2 - r1);
   // Near critical, hence a = ξh < 2 and δh < 1: the oscillating form with θ² < 0.
   const double a = xi * h, y = -delta_squared * h * h;
   return h * h *
@@ -53,7 +53,7 @@ ModePropagator decaying(double lambda, double xi, double delta_squared, double h
   const double slow = std::exp(-r1 * h), fast = std::exp(-r2 * h);
   const double S = slow * h * decay_mean(2.0 * delta * h);
   const double z_z = slow + r1 * S;
-  return {z_z, S, -lambda * S, fast - r1 * S, held_response(lambda, xi, delta_squared, h, r1 * h, r2 * h, z_z), S};
+  return {z_z, S, -lambda * S, fast - r1 * S, held_response(lambda, xi, delta_squared, h, r1, r2, z_z), S};
 }
 
 }  // namespace
