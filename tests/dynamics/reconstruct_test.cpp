@@ -2,12 +2,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
-#include <limits>
+#include <functional>
+#include <numbers>
 #include <random>
+#include <span>
+#include <vector>
 
+#include "instruction_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -79,16 +82,191 @@ void expect_exact_within_rounding(const ModalSurface& surface, const Reconstruct
   }
 }
 
-TEST(Reconstruct, EqualsTheDoubleSumWithinFloatRounding) {
-  for (const Index vertices : {1, 3, 15, 16, 17, 100})
-    for (const Index modes : {0, 1, 7, 32, 300})
-      for (const int count : {1, 2, 3, 7, 8, 13}) {
-        SCOPED_TRACE(testing::Message() << vertices << " vertices, " << modes << " modes, " << count << " instances");
-        const ModalSurface surface = random_surface(vertices, modes);
-        const Instances instances(surface, count);
+TEST(Reconstruct, EqualsTheDoubleSumWithinFloatRoundingOnEveryInstructionSet) {
+  for_each_instruction_set([](std::int64_t target) {
+    for (const Index vertices : {1, 3, 15, 16, 17, 100})
+      for (const Index modes : {0, 1, 7, 32, 300})
+        for (const int count : {1, 2, 3, 7, 8, 13}) {
+          SCOPED_TRACE(testing::Message() << hwy::TargetName(target) << ": " << vertices << " vertices, " << modes
+                                          << " modes, " << count << " instances");
+          const ModalSurface surface = random_surface(vertices, modes);
+          const Instances instances(surface, count);
+          reconstruct(surface, instances.targets);
+          for (const auto& t : instances.targets) expect_exact_within_rounding(surface, t);
+        }
+  });
+}
+
+TEST(Reconstruct, WritesNothingPastTheLastVertex) {
+  for_each_instruction_set([](std::int64_t) {
+    for (Index vertices = 1; vertices <= 33; ++vertices)
+      for (const int count : {1, 8}) {
+        const ModalSurface surface = random_surface(vertices, 3);
+        const Instances instances(surface, count, true);
         reconstruct(surface, instances.targets);
-        for (const auto& target : instances.targets) expect_exact_within_rounding(surface, target);
+        for (const auto* arrays : {&instances.positions, &instances.normals})
+          for (const auto& array : *arrays) {
+            const std::span<const float> guard = std::span(array).last(Instances::kGuard);
+            EXPECT_THAT(guard, testing::Each(Instances::kUntouched)) << vertices << " vertices";
+            EXPECT_THAT(std::span(array).first(array.size() - guard.size()),
+                        testing::Each(testing::Ne(Instances::kUntouched)));
+          }
       }
+  });
+}
+
+TEST(Reconstruct, InstructionSetsWithFusedMultiplyAddGiveTheSameBits) {
+  const ModalSurface surface = random_surface(100, 20);
+  std::vector<std::vector<std::vector<float>>> results;
+  for_each_instruction_set([&](std::int64_t target) {
+    const Instances instances(surface, 13);
+    reconstruct(surface, instances.targets);
+    if (has_fused_multiply_add(target)) results.push_back(instances.positions);
+  });
+  for (const auto& result : results) EXPECT_EQ(result, results.front());
+}
+
+TEST(Reconstruct, MoreModesThanOneBlockHoldsAreExactToo) {
+  // 1,024 modes of 8 instances fill the stack buffer of amplitudes: beyond, blocks are of fewer.
+  const ModalSurface surface = random_surface(17, 3000);
+  const Instances instances(surface, 5);
+  reconstruct(surface, instances.targets);
+  for (const auto& target : instances.targets) expect_exact_within_rounding(surface, target);
+}
+
+TEST(Reconstruct, RestShapeOfNoModesIsMovedRigidly) {
+  ModalSurface surface = random_surface(20, 0);
+  std::vector<float> positions(60);
+  const double quarter = std::sqrt(0.5);
+  const ReconstructionTarget target{.X_OB = {{quarter, 0.0, 0.0, quarter}, {10.0, 0.0, 0.0}},
+                                    .positions = positions.data()};
+  reconstruct(surface, {&target, 1});
+  for (Index v = 0; v < 20; ++v) {  // a quarter turn about z: x → y, y → −x
+    EXPECT_FLOAT_EQ(positions[3 * v], 10.0f - surface.rest[v].y());
+    EXPECT_NEAR(positions[3 * v + 1], surface.rest[v].x(), 1e-6f);
+    EXPECT_EQ(positions[3 * v + 2], surface.rest[v].z());
+  }
+}
+
+TEST(Reconstruct, TinyDeformationOfALargeBodyKeepsItsDigits) {
+  // 64 modes that all but cancel at a point 1 m out: summed from the rest position each would round to 6e-8 m.
+  ModalSurface surface{.rest = {Vec3f(1.0f, 0.0f, 0.0f)}, .triangles = {}, .basis = ModalBasis(1, 64)};
+  for (Index m = 0; m < 64; ++m) surface.basis.set(0, m, Vec3f(1.0f, 0.0f, 0.0f));
+  std::vector<double> amplitudes(64, 0x1p-25);  // half an ulp of 1 each: lost one by one, 2⁻¹⁹ together
+  Vec3f position;
+  const ReconstructionTarget target{.X_OB = {}, .amplitudes = amplitudes.data(), .positions = position.data()};
+  reconstruct(surface, {&target, 1});
+  EXPECT_EQ(position.x(), 1.0f + 0x1p-19f);
+}
+
+/// Splits every loop to single indices and runs them last to first.
+class BackwardsJobs final : public Jobs {
+ public:
+  void parallel_for(std::size_t count, std::size_t,
+                    const std::function<void(std::size_t, std::size_t)>& body) override {
+    for (std::size_t i = count; i-- > 0;) body(i, i + 1);
+  }
+  int concurrency() const override { return 1; }
+};
+
+TEST(Batch, ManyEqualsOneByOne) {
+  for_each_instruction_set([](std::int64_t target) {
+    for (const Index modes : {0, 5, 40, 2000}) {
+      SCOPED_TRACE(testing::Message() << hwy::TargetName(target) << ", " << modes << " modes");
+      const ModalSurface surface = random_surface(777, modes);
+      const Instances together(surface, 23, true), alone(surface, 23, true), backwards(surface, 23, true);
+      reconstruct(surface, together.targets);
+      for (const auto& one : alone.targets) reconstruct(surface, {&one, 1});
+      BackwardsJobs jobs;
+      reconstruct(surface, backwards.targets, jobs);
+      EXPECT_EQ(together.positions, alone.positions);
+      EXPECT_EQ(together.normals, alone.normals);
+      EXPECT_EQ(together.positions, backwards.positions);
+      EXPECT_EQ(together.normals, backwards.normals);
+    }
+  });
+}
+
+TEST(Reconstruct, RejectsMissingArraysAndWrongSurfaces) {
+  const ModalSurface surface = random_surface(5, 2);
+  Instances instances(surface, 2, true);
+  auto targets = instances.targets;
+  targets[1].positions = nullptr;
+  EXPECT_THROW(reconstruct(surface, targets), InvalidArgument);
+  targets = instances.targets, targets[1].amplitudes = nullptr;
+  EXPECT_THROW(reconstruct(surface, targets), InvalidArgument);
+  ModalSurface wrong = random_surface(5, 2);
+  wrong.rest.pop_back();
+  EXPECT_THROW(reconstruct(wrong, instances.targets), InvalidArgument);
+  wrong = random_surface(5, 2), wrong.triangles[1][2] = 5;
+  EXPECT_THROW(reconstruct(wrong, instances.targets), InvalidArgument);
+  EXPECT_THROW(reconstruct(random_surface(1, 8193), instances.targets), InvalidArgument);
+  EXPECT_THAT(instances.positions, testing::Each(testing::Each(Instances::kUntouched)));
+  EXPECT_NO_THROW(reconstruct(surface, {}));
+}
+
+/// A sphere of radius 1 about `center`: `rings` circles of latitude between two poles.
+struct Sphere {
+  std::vector<float> positions;
+  std::vector<Triangle> triangles;
+
+  Sphere(Index rings, float radius) {
+    const Index sectors = 2 * rings;
+    const auto add = [&](double polar, double azimuth) {
+      positions.push_back(radius * static_cast<float>(std::sin(polar) * std::cos(azimuth)));
+      positions.push_back(radius * static_cast<float>(std::sin(polar) * std::sin(azimuth)));
+      positions.push_back(radius * static_cast<float>(std::cos(polar)));
+    };
+    add(0.0, 0.0);
+    for (Index ring = 1; ring <= rings; ++ring)
+      for (Index s = 0; s < sectors; ++s)
+        add(std::numbers::pi * ring / (rings + 1), 2.0 * std::numbers::pi * (s + 0.5 * ring) / sectors);
+    add(std::numbers::pi, 0.0);
+    const auto at = [&](Index ring, Index s) { return 1 + (ring - 1) * sectors + s % sectors; };
+    const Index south = 1 + rings * sectors;
+    for (Index s = 0; s < sectors; ++s) {
+      triangles.push_back({0, at(1, s), at(1, s + 1)});
+      triangles.push_back({south, at(rings, s + 1), at(rings, s)});
+      for (Index ring = 1; ring < rings; ++ring) {
+        triangles.push_back({at(ring, s), at(ring + 1, s), at(ring, s + 1)});
+        triangles.push_back({at(ring, s + 1), at(ring + 1, s), at(ring + 1, s + 1)});
+      }
+    }
+  }
+};
+
+TEST(VertexNormals, OfASphereArePositionsForAnySize) {
+  for (const float radius : {1e-6f, 1.0f, 1e6f}) {
+    const Sphere sphere(40, radius);
+    std::vector<float> normals(sphere.positions.size());
+    vertex_normals(sphere.triangles, sphere.positions, normals);
+    for (std::size_t i = 0; i < normals.size(); i += 3) {
+      const Eigen::Map<const Vec3f> n(&normals[i]), p(&sphere.positions[i]);
+      EXPECT_NEAR(n.norm(), 1.0f, 2e-7f);
+      // Facets are π/41 wide; the mean of those round a vertex leans by less than a facet's sagitta.
+      EXPECT_GT(n.dot(p) / radius, std::cos(std::numbers::pi / 41.0 / 2.0));
+    }
+  }
+}
+
+TEST(VertexNormals, WeighByAreaAndPointUpWhereThereIsNone) {
+  // A vertex at the corner of a 1 × 1 triangle facing z and one of twice the area facing x; the last vertex is free.
+  const std::vector<float> positions{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 2, 5, 5, 5};
+  const std::vector<Triangle> triangles{{0, 1, 2}, {0, 2, 3}};
+  std::vector<float> normals(15);
+  vertex_normals(triangles, positions, normals);
+  EXPECT_FLOAT_EQ(normals[0], 2.0f / std::sqrt(5.0f));
+  EXPECT_FLOAT_EQ(normals[1], 0.0f);
+  EXPECT_FLOAT_EQ(normals[2], 1.0f / std::sqrt(5.0f));
+  EXPECT_THAT(std::span(normals).last(3), testing::ElementsAre(0.0f, 0.0f, 1.0f));
+}
+
+TEST(VertexNormals, RejectArraysAndIndicesThatDoNotFit) {
+  std::vector<float> positions(9), normals(9), short_normals(6);
+  EXPECT_THROW(vertex_normals({}, positions, short_normals), InvalidArgument);
+  EXPECT_THROW(vertex_normals({}, std::span(positions).first(8), std::span(normals).first(8)), InvalidArgument);
+  EXPECT_THROW(vertex_normals(std::vector<Triangle>{{0, 1, 3}}, positions, normals), InvalidArgument);
+  EXPECT_THROW(vertex_normals(std::vector<Triangle>{{0, -1, 2}}, positions, normals), InvalidArgument);
 }
 
 }  // namespace

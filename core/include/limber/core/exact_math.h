@@ -1,9 +1,9 @@
 /// @file limber/core/exact_math.h
 /// Functions whose textbook form loses digits by cancellation, in a form that keeps them.
 ///
-/// Relative error of each: a few ε (ε = 2⁻⁵²) over the whole stated range, apart from the zeros of sin in sinc(), where
-/// the error is that of std::sin. Below |x| = 1 a power series is used, cut where the next term is under ε/4 of the
-/// sum; above, the closed form, which by then cancels two bits at most.
+/// Relative error of each: a few ε (ε = 2⁻⁵²), apart from the neighbourhood of the zeros of sin, where it is the
+/// rounding of the argument that shows (stumpff_c2 and sinc at large arguments). Below 1 a power series is used, cut
+/// where the next term is under ε/4 of the sum; above, the closed form, which by then cancels three bits at most.
 #pragma once
 
 #include <cmath>
@@ -35,7 +35,7 @@ inline double decay_mean(double x) { return x == 0.0 ? 1.0 : -std::expm1(-x) / x
 
 /// (x − 1 + e^{−x})/x², x ≥ −1; ½ at 0. Positive, falling.
 inline double decay_second(double x) {
-  return std::abs(x) < 1.0 ? detail::factorial_series<2, 1, 17>(-x) : (1.0 - decay_mean(x)) / x;
+  return x < 1.0 ? detail::factorial_series<2, 1, 17>(-x) : (1.0 - decay_mean(x)) / x;
 }
 
 /// (1 − (1 + x)e^{−x})/x², x ≥ 0; ½ at 0. Positive, falling.
@@ -45,14 +45,14 @@ inline double decay_ramp(double x) {
 
 /// Stumpff's c₂(y) = (1 − cos √y)/y, y ≥ −1; ½ at 0; (cosh √−y − 1)/−y below. Never negative.
 inline double stumpff_c2(double y) {
-  if (std::abs(y) < 1.0) return detail::factorial_series<2, 2, 9>(-y);
+  if (y < 1.0) return detail::factorial_series<2, 2, 9>(-y);
   const double s = std::sin(0.5 * std::sqrt(y));
   return 2.0 * s * s / y;  // 1 − cos would lose its digits near every multiple of 2π
 }
 
 /// Stumpff's c₃(y) = (√y − sin √y)/√y³, y ≥ −1; 1/6 at 0; (sinh √−y − √−y)/√−y³ below. Positive.
 inline double stumpff_c3(double y) {
-  return std::abs(y) < 1.0 ? detail::factorial_series<3, 2, 9>(-y) : (1.0 - sinc(std::sqrt(y))) / y;
+  return y < 1.0 ? detail::factorial_series<3, 2, 9>(-y) : (1.0 - sinc(std::sqrt(y))) / y;
 }
 
 }  // namespace limber
