@@ -51,10 +51,13 @@ AreaVectors area_vectors(std::span<const float> positions, std::span<const Trian
   return out;
 }
 
+/// What float32 would hold with fewer digits is 0.
+float whole_digits(float x) { return std::abs(x) >= kSmallestNormal ? x : 0.0f; }
+
 double largest_displacement(const ModalSurface& surface, Index mode) {
   double square = 0.0;
   for (Index v = 0; v < surface.vertices(); ++v)
-    square = std::max(square, surface.basis.shape(v, mode).cast<double>().squaredNorm());
+    square = std::max(square, surface.basis.shape(v, mode).unaryExpr(&whole_digits).cast<double>().squaredNorm());
   return std::sqrt(square);
 }
 
@@ -76,7 +79,7 @@ std::string mode_target_name(Index mode, Index modes, double frequency_hz) {
 
 double visible_mode_scale(const ModalSurface& surface, Index mode) {
   const double largest = largest_displacement(surface, mode), size = diagonal(surface);
-  if (!(largest >= static_cast<double>(kSmallestNormal)) || !(size > 0.0)) return 1.0;
+  if (!(largest > 0.0 && size > 0.0)) return 1.0;
   return std::exp2(std::round(std::log2(kVisibleFraction * size / largest)));
 }
 
@@ -93,9 +96,8 @@ std::vector<float> mode_displacements(const ModalSurface& surface, Index mode, d
   for (Index v = 0; v < surface.vertices(); ++v) {
     const Vec3f shape = surface.basis.shape(v, mode);
     for (int a = 0; a < 3; ++a) {
-      const float scaled = static_cast<float>(scale * static_cast<double>(shape[a]));
-      const bool keeps_digits = std::abs(shape[a]) >= kSmallestNormal && std::abs(scaled) >= kSmallestNormal;
-      out.push_back(keeps_digits ? scaled : 0.0f);
+      const auto scaled = static_cast<float>(scale * static_cast<double>(whole_digits(shape[a])));
+      out.push_back(whole_digits(scaled));
     }
   }
   return out;

@@ -1,12 +1,12 @@
 /// @file limber/internal/strict_json.h
-/// JSON documents read strictly: wrong types, missing keys and unknown keys are errors that name the place, what was seen
-/// and what was expected; an unknown key names the nearest known one. Private to limber's own sources.
+/// JSON documents read strictly: wrong types, missing keys and unknown keys are errors that name the place, what was
+/// seen and what was expected; an unknown key names the nearest known one. Private to limber's own sources.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
@@ -45,28 +45,39 @@ inline std::string nearest_word(std::string_view word, const std::vector<std::st
   return best == known.end() ? std::string() : *best;
 }
 
+/// Text from a file as messages show it: in quotes, on one line, not longer than a line.
+inline std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 60;
+  const bool cut = text.size() > kLongest;
+  const std::string kept(text.substr(0, cut ? kLongest : text.size()));
+  // Control characters and broken UTF-8 come out as escapes and replacement characters.
+  const std::string out = nlohmann::json(kept).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return cut ? out.substr(0, out.size() - 1) + "...\"" : out;
+}
+
 /// Parses text as one JSON document. @param name shown in messages. @throws InputError with line and column; also for a
 /// key that stands twice in one object (a plain parser would silently keep the last).
 inline nlohmann::json parse_json(std::string_view text, const std::string& name) {
   std::vector<std::set<std::string>> open;
-  std::string doubled;
+  std::optional<std::string> doubled;
   const auto watch = [&](int, nlohmann::json::parse_event_t event, nlohmann::json& value) {
     using E = nlohmann::json::parse_event_t;
     if (event == E::object_start) open.emplace_back();
     if (event == E::object_end && !open.empty()) open.pop_back();
-    if (event == E::key && !open.empty() && !open.back().insert(value.get<std::string>()).second && doubled.empty())
+    if (event == E::key && !open.empty() && !open.back().insert(value.get<std::string>()).second && !doubled)
       doubled = value.get<std::string>();
     return true;
   };
   try {
     auto document = nlohmann::json::parse(text, watch);
-    if (!doubled.empty()) throw InputError(name + ": the key \"" + doubled + "\" stands twice in one object");
+    if (doubled) throw InputError(name + ": the key " + in_quotes(*doubled) + " stands twice in one object");
     return document;
   } catch (const nlohmann::json::exception& e) {
     std::string what = e.what();
     // Keep the library's place and reason, drop its tag and anything that would break the one line.
     if (const auto tag = what.find("] "); tag != std::string::npos) what.erase(0, tag + 2);
-    std::replace_if(what.begin(), what.end(), [](unsigned char c) { return c < 32 || c > 126; }, '?');
+    std::replace_if(
+        what.begin(), what.end(), [](unsigned char c) { return c < 32 || c > 126; }, '?');
     throw InputError(name + ": not valid JSON: " + what);
   }
 }
@@ -80,7 +91,7 @@ class JsonObject {
  public:
   /// @param where the place for messages, such as `"scene.json" bodies[3]`
   JsonObject(const nlohmann::json& value, std::string where) : value_(&value), where_(std::move(where)) {
-    if (!value.is_object()) throw InputError(where_ + ": is " + value.type_name() + ", expected an object { … }");
+    if (!value.is_object()) throw InputError(where_ + ": is " + shown(value) + ", expected an object { … }");
   }
 
   const std::string& where() const { return where_; }
@@ -102,7 +113,9 @@ class JsonObject {
   /// An integer in [low, high].
   std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high) const {
     const auto& v = at(key);
-    if (!v.is_number_integer() || v < low || v > high)
+    // The library compares an unsigned number beyond 2⁶³ as if it were negative.
+    const bool too_large = v.is_number_unsigned() && v.get<std::uint64_t>() > std::uint64_t{INT64_MAX};
+    if (!v.is_number_integer() || too_large || v < low || v > high)
       throw InputError(where(key) + ": is " + shown(v) + ", expected an integer from " + std::to_string(low) + " to " +
                        std::to_string(high));
     return v.get<std::int64_t>();
@@ -131,8 +144,10 @@ class JsonObject {
   std::vector<double> numbers(const std::string& key, std::size_t count) const {
     const auto& v = at(key);
     if (!v.is_array() || v.size() != count)
-      throw InputError(where(key) + ": is " + shown(v) + ", expected an array of " + std::to_string(count) + " numbers");
+      throw InputError(where(key) + ": is " + shown(v) + ", expected an array of " + std::to_string(count) +
+                       " numbers");
     std::vector<double> out;
+    out.reserve(count);
     for (std::size_t i = 0; i < count; ++i) out.push_back(number_of(v[i], where(key) + "[" + std::to_string(i) + "]"));
     return out;
   }
@@ -151,18 +166,31 @@ class JsonObject {
     for (std::size_t i = 0; i < v.size(); ++i) visit(v[i], where(key) + "[" + std::to_string(i) + "]");
   }
 
+  /// The members of an object whose keys are names that the user chose, each as (key, value). Instead of finish().
+  template <class F>
+  void for_each_member(F&& visit) const {
+    for (const auto& [key, value] : value_->items()) visit(key, value);
+  }
+
   /// Refuses unknown keys, naming the nearest known one.
   void finish() const {
     for (const auto& [key, unused] : value_->items()) {
       if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-      std::string message = where_ + ": the key \"" + key + "\" is unknown";
+      std::string message = where_ + ": the key " + in_quotes(key) + " is unknown";
       if (const auto near = nearest_word(key, known_); !near.empty()) message += "; did you mean \"" + near + "\"?";
       throw InputError(message);
     }
   }
 
+  /// A value as messages show it. Nested values are only counted: printing them would recurse as deep as a file asks.
   static std::string shown(const nlohmann::json& v) {
-    std::string s = v.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+    constexpr std::size_t kFew = 8;
+    const bool flat =
+        v.size() <= kFew && std::none_of(v.begin(), v.end(), [](const auto& i) { return i.is_structured(); });
+    if (v.is_object()) return "an object of " + std::to_string(v.size()) + " keys";
+    if (v.is_array() && !flat) return "an array of " + std::to_string(v.size()) + " items";
+    if (v.is_string()) return in_quotes(v.get_ref<const std::string&>());
+    const std::string s = v.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
     return s.size() > 60 ? s.substr(0, 57) + "..." : s;
   }
 

@@ -1,0 +1,183 @@
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "asset_format.h"
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/model/asset.h"
+#include "limber/model/glb.h"
+#include "limber/model/morph_targets.h"
+
+namespace limber {
+namespace {
+
+using asset_format::ContentHash;
+using nlohmann::json;
+
+/// Text as JSON can hold it: bytes that are not UTF-8 (file names may have them) become replacement characters.
+std::string utf8(const std::string& text) {
+  return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace)).get<std::string>();
+}
+
+Provenance utf8(const Provenance& p) { return {utf8(p.tool), utf8(p.input), utf8(p.input_hash), utf8(p.options)}; }
+
+json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+void append(json& list, const Mat3& m) {
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) list.push_back(m(row, column));
+}
+
+json list_of(const std::vector<Vec3>& vectors) {
+  json list = json::array();
+  for (const Vec3& v : vectors)
+    for (int a = 0; a < 3; ++a) list.push_back(v[a]);
+  return list;
+}
+
+json list_of(const std::vector<Mat3>& matrices) {
+  json list = json::array();
+  for (const Mat3& m : matrices) append(list, m);
+  return list;
+}
+
+template <class T>
+int add_raw(GlbBuilder& glb, const std::vector<T>& items) {
+  return glb.add_raw(std::as_bytes(std::span(items)));
+}
+
+/// All shapes of a basis, mode after mode, 3 floats per vertex. @pre there is at least one mode
+int add_shapes(GlbBuilder& glb, const ModalBasis& basis) {
+  std::vector<float> shapes;
+  shapes.reserve(3 * static_cast<std::size_t>(basis.vertices()) * static_cast<std::size_t>(basis.modes()));
+  for (Index mode = 0; mode < basis.modes(); ++mode)
+    for (Index v = 0; v < basis.vertices(); ++v) {
+      const Vec3f u = basis.shape(v, mode);
+      shapes.insert(shapes.end(), {u.x(), u.y(), u.z()});
+    }
+  return add_raw(glb, shapes);
+}
+
+json collision_block(GlbBuilder& glb, const ModalSurface& surface) {
+  json block = {{"vertices", surface.rest.size()}, {"triangles", surface.triangles.size()}};
+  block["rest"] = add_raw(glb, rest_positions(surface));
+  block["faces"] = add_raw(glb, surface.triangles);
+  if (surface.basis.modes() > 0) block["shapes"] = add_shapes(glb, surface.basis);
+  return block;
+}
+
+json volume_block(GlbBuilder& glb, const ModalVolume& volume) {
+  std::vector<double> rest;
+  for (const Vec3& p : volume.rest) rest.insert(rest.end(), {p.x(), p.y(), p.z()});
+  json block = {{"nodes", volume.rest.size()}, {"tets", volume.tets.size()}};
+  block["rest"] = add_raw(glb, rest);
+  block["elements"] = add_raw(glb, volume.tets);
+  if (volume.basis.modes() > 0) {
+    block["shapes"] = add_shapes(glb, volume.basis);
+    block["mass_times_shapes"] = add_shapes(glb, volume.mass_times_basis);
+  }
+  return block;
+}
+
+/// The LIMBER_modal block of a mesh, but for the parts that lie in the binary chunk.
+json body_block(const ModalModelData& body, const std::vector<double>& scales) {
+  json block = {{"motion", to_string(body.motion)},
+                {"mass", body.mass},
+                {"volume", body.volume},
+                {"center_of_mass", numbers(body.center_of_mass)},
+                {"origin_in_input", numbers(body.origin_in_input)},
+                {"inertia", json::array()},
+                {"vertices", body.render.rest.size()},
+                {"triangles", body.render.triangles.size()},
+                {"modes", body.eigenvalues.size()},
+                {"eigenvalues", body.eigenvalues},
+                {"decays", body.decays},
+                {"participation", list_of(body.participation)},
+                {"moments", list_of(body.moments)},
+                {"mode_scales", scales}};
+  append(block["inertia"], body.inertia);
+  if (body.motion == FrameMotion::kLine) block["line_axis"] = numbers(body.line_axis);
+  return block;
+}
+
+/// For people who open the file in a viewer; the reader does not look at it.
+std::string extras_for_people(const ModalModel& model) {
+  json frequencies = json::array();
+  for (Index i = 0; i < model.modes(); ++i) frequencies.push_back(model.frequency_hz(i));
+  return json{{"limber", {{"frequencies_hz", frequencies}, {"mass_kg", model.data().mass}}}}.dump();
+}
+
+/// The render surface with its modes as morph targets. @return the mesh, but for extras and extensions
+GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& scales, int material) {
+  const ModalSurface& surface = model.render();
+  const std::vector<float> rest = rest_positions(surface);
+  GlbMesh mesh{.name = model.name(), .material = material};
+  mesh.position = glb.add_vertex_vectors(rest);
+  mesh.normal = glb.add_vertex_vectors(unit_normals(rest, surface.triangles));
+  mesh.triangles = glb.add_triangles(surface.triangles);
+  for (Index i = 0; i < model.modes(); ++i) {
+    const std::vector<float> moved = mode_displacements(surface, i, scales[static_cast<std::size_t>(i)]);
+    GlbMorphTarget target{.name = mode_target_name(i, model.modes(), model.frequency_hz(i))};
+    target.position = glb.add_vertex_vectors(moved);
+    if (model.modes() <= kMaxTargetsWithNormals)
+      target.normal = glb.add_vertex_vectors(normal_changes(rest, moved, surface.triangles));
+    mesh.targets.push_back(std::move(target));
+  }
+  return mesh;
+}
+
+void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHash& hash) {
+  const ModalModelData& body = model.data();
+  std::vector<double> scales;
+  for (Index i = 0; i < model.modes(); ++i) scales.push_back(visible_mode_scale(model.render(), i));
+
+  GlbMesh mesh = surface_mesh(glb, model, scales, material);
+  json block = body_block(body, scales);
+  if (body.collision) block["collision"] = collision_block(glb, *body.collision);
+  if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
+  mesh.extras = extras_for_people(model);
+  mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
+  // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.
+  glb.add_node({.name = body.name, .mesh = glb.add_mesh(mesh), .translation = body.origin_in_input});
+  hash.add_body(body, scales);
+}
+
+void check(const Asset& asset) {
+  if (asset.bodies.empty()) throw InvalidArgument("asset_bytes: there is no body, expected at least one");
+  std::set<std::string> names;
+  for (const auto& body : asset.bodies) {
+    if (!body) throw InvalidArgument("asset_bytes: a body is null");
+    if (!names.insert(body->name()).second)
+      throw InvalidArgument("asset_bytes: two bodies are called \"" + body->name() + "\", expected different names");
+    if (body->modes() > kMaxMorphTargets)
+      throw InvalidArgument("asset_bytes: body \"" + body->name() + "\" has " + std::to_string(body->modes()) +
+                            " modes, expected at most " + std::to_string(kMaxMorphTargets) +
+                            ", as viewers take no more morph targets; keep fewer (--modes)");
+  }
+}
+
+}  // namespace
+
+std::string asset_bytes(const Asset& asset) {
+  check(asset);
+  const Provenance provenance = utf8(asset.provenance);
+  GlbBuilder glb;
+  ContentHash hash(provenance, asset.bodies.size());
+  // Double-sided, because a render surface may be open.
+  const int material = glb.add_material(
+      {.name = "limber", .base_color = {0.62f, 0.70f, 0.78f, 1.0f}, .roughness = 0.55f, .double_sided = true});
+  for (const auto& body : asset.bodies) add_body(glb, *body, material, hash);
+  const json block = {{"version", asset_format::kFormatVersion},
+                      {"content_hash", hash.finish(glb.binary())},
+                      {"provenance",
+                       {{"tool", provenance.tool},
+                        {"input", provenance.input},
+                        {"input_hash", provenance.input_hash},
+                        {"options", provenance.options}}}};
+  glb.set_extension(asset_format::kExtension, block.dump());
+  return glb.bytes();
+}
+
+void write_asset(const std::filesystem::path& path, const Asset& asset) { write_file(path, asset_bytes(asset)); }
+
+}  // namespace limber

@@ -1,0 +1,363 @@
+#include "limber/model/asset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "example_model.h"
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/model/glb.h"
+
+namespace limber {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The message of the InputError that reading gives; "accepted" if it gives none. Any other exception fails the test.
+std::string reading(const std::string& bytes) {
+  try {
+    (void)asset_from_bytes(bytes, "\"test.glb\"");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+/// A GLB of a document and a binary chunk, with lengths that fit.
+std::string glb_of(const std::string& text, std::string_view binary) {
+  std::string padded = text;
+  padded.resize((text.size() + 3) / 4 * 4, ' ');
+  const auto word = [](std::size_t n) {
+    const auto v = static_cast<std::uint32_t>(n);
+    return std::string(reinterpret_cast<const char*>(&v), 4);
+  };
+  return "glTF" + word(2) + word(12 + 8 + padded.size() + 8 + binary.size()) + word(padded.size()) + "JSON" + padded +
+         word(binary.size()) + std::string("BIN\0", 4) + std::string(binary);
+}
+
+/// The example's bytes with its document changed.
+std::string with_document(const std::function<void(json&)>& change) {
+  const std::string bytes = asset_bytes(example::asset());
+  const GlbChunks chunks = glb_chunks(bytes, "test");
+  json document = json::parse(chunks.json);
+  change(document);
+  return glb_of(document.dump(), chunks.binary);
+}
+
+json& block_of(json& document, std::size_t mesh) { return document["meshes"][mesh]["extensions"]["LIMBER_modal"]; }
+
+/// Tells where two files differ, rather than print both.
+void expect_same_bytes(const std::string& a, const std::string& b) {
+  EXPECT_EQ(a.size(), b.size());
+  const auto place =
+      std::mismatch(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(std::min(a.size(), b.size())), b.begin());
+  EXPECT_TRUE(a == b) << "at byte " << place.first - a.begin();
+}
+
+void expect_same_surface(const ModalSurface& a, const ModalSurface& b) {
+  ASSERT_EQ(a.vertices(), b.vertices());
+  EXPECT_EQ(a.rest, b.rest);
+  EXPECT_EQ(a.triangles, b.triangles);
+  ASSERT_EQ(a.basis.modes(), b.basis.modes());
+  for (Index v = 0; v < a.vertices(); ++v)
+    for (Index i = 0; i < a.basis.modes(); ++i)
+      ASSERT_EQ(a.basis.shape(v, i), b.basis.shape(v, i)) << v << ", mode " << i;
+}
+
+void expect_same_body(const ModalModelData& a, const ModalModelData& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.motion, b.motion);
+  EXPECT_EQ(a.line_axis, b.line_axis);
+  EXPECT_EQ(a.mass, b.mass);
+  EXPECT_EQ(a.volume, b.volume);
+  EXPECT_EQ(a.center_of_mass, b.center_of_mass);
+  EXPECT_EQ(a.origin_in_input, b.origin_in_input);
+  EXPECT_EQ(a.inertia, b.inertia);
+  EXPECT_EQ(a.eigenvalues, b.eigenvalues);
+  EXPECT_EQ(a.decays, b.decays);
+  EXPECT_EQ(a.participation, b.participation);
+  EXPECT_EQ(a.moments, b.moments);
+  expect_same_surface(a.render, b.render);
+  ASSERT_EQ(a.collision.has_value(), b.collision.has_value());
+  if (a.collision) expect_same_surface(*a.collision, *b.collision);
+  ASSERT_EQ(a.volume_block.has_value(), b.volume_block.has_value());
+  if (!a.volume_block) return;
+  EXPECT_EQ(a.volume_block->rest, b.volume_block->rest);
+  EXPECT_EQ(a.volume_block->tets, b.volume_block->tets);
+  for (Index v = 0; v < a.volume_block->basis.vertices(); ++v)
+    for (Index i = 0; i < a.volume_block->basis.modes(); ++i) {
+      EXPECT_EQ(a.volume_block->basis.shape(v, i), b.volume_block->basis.shape(v, i));
+      EXPECT_EQ(a.volume_block->mass_times_basis.shape(v, i), b.volume_block->mass_times_basis.shape(v, i));
+    }
+}
+
+TEST(Asset, WhatIsWrittenIsReadBitForBit) {
+  const Asset written = example::asset();
+  const Asset read = asset_from_bytes(asset_bytes(written), "test");
+  ASSERT_EQ(read.bodies.size(), written.bodies.size());
+  for (std::size_t i = 0; i < read.bodies.size(); ++i)
+    expect_same_body(read.bodies[i]->data(), written.bodies[i]->data());
+  EXPECT_EQ(read.provenance.tool, written.provenance.tool);
+  EXPECT_EQ(read.provenance.input, written.provenance.input);
+  EXPECT_EQ(read.provenance.input_hash, written.provenance.input_hash);
+  EXPECT_EQ(read.provenance.options, written.provenance.options);
+}
+
+TEST(Asset, EqualAssetsGiveEqualBytesAndReadingKeepsThem) {
+  const std::string bytes = asset_bytes(example::asset());
+  expect_same_bytes(asset_bytes(example::asset()), bytes);
+  expect_same_bytes(asset_bytes(asset_from_bytes(bytes, "test")), bytes);
+}
+
+TEST(Asset, ShapesOfAnySizeKeepTheirBytesThroughFile) {
+  // A mode scale multiplies each shape: where float32 runs out of digits, the second writing must not differ from the
+  // first.
+  for (const float size : {1e-44f, 1.1e-38f, 1e-30f, 1e-6f, 1e6f, 1e30f, 3e38f}) {
+    ModalModelData d = example::box("bar", 2);
+    for (Index v = 0; v < d.render.vertices(); ++v)
+      for (Index i = 0; i < 2; ++i) d.render.basis.set(v, i, size * Vec3f(1.0f, 1e-3f * static_cast<float>(v), -0.7f));
+    const std::string bytes = asset_bytes({.bodies = {example::model(std::move(d))}, .provenance = {}});
+    expect_same_bytes(asset_bytes(asset_from_bytes(bytes, "test")), bytes);
+  }
+}
+
+TEST(Asset, GoesThroughAFile) {
+  const auto path = std::filesystem::path(testing::TempDir()) / "limber_asset_test.glb";
+  write_asset(path, example::asset());
+  expect_same_bytes(asset_bytes(read_asset(path)), asset_bytes(example::asset()));
+  std::filesystem::remove(path);
+  EXPECT_THROW(read_asset(path), InputError);
+}
+
+TEST(Asset, RigidBodyHasNoMorphTargets) {
+  const std::string bytes = asset_bytes({.bodies = {example::model(example::full_box("stone", 0))}, .provenance = {}});
+  const json document = json::parse(glb_chunks(bytes, "test").json);
+  EXPECT_FALSE(document["meshes"][0]["primitives"][0].contains("targets"));
+  EXPECT_EQ(asset_from_bytes(bytes, "test").bodies[0]->modes(), 0);
+}
+
+TEST(Asset, WeightOneIsAVisibleShapeOfKnownScale) {
+  const Asset asset = example::asset();
+  const std::string bytes = asset_bytes(asset);
+  const GlbChunks chunks = glb_chunks(bytes, "test");
+  json document = json::parse(chunks.json);
+  const ModalModelData& body = asset.bodies[0]->data();
+  const double diagonal = 2.0 * Vec3(0.5, 0.1, 0.15).norm();
+  const json& targets = document["meshes"][0]["primitives"][0]["targets"];
+  ASSERT_EQ(targets.size(), 7u);
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const double scale = block_of(document, 0)["mode_scales"][i];
+    const json& accessor = document["accessors"][targets[i]["POSITION"].get<std::size_t>()];
+    const json& view = document["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    double largest = 0.0;
+    for (Index v = 0; v < body.render.vertices(); ++v) {
+      float moved[3];
+      std::memcpy(moved,
+                  chunks.binary.data() + view["byteOffset"].get<std::size_t>() + 12 * static_cast<std::size_t>(v), 12);
+      const Vec3f expected = static_cast<float>(scale) * body.render.basis.shape(v, static_cast<Index>(i));
+      EXPECT_EQ(Vec3f(moved[0], moved[1], moved[2]), expected);
+      largest = std::max(largest, static_cast<double>(expected.norm()));
+    }
+    // The nearest power of two is off by a factor of √2 at most.
+    EXPECT_LE(largest, 0.1 * diagonal * 1.4143);
+    EXPECT_GE(largest, 0.1 * diagonal / 1.4143);
+  }
+}
+
+TEST(Asset, NormalsComeWithUpTo32ModesOnly) {
+  for (const Index modes : {32, 33}) {
+    const std::string bytes = asset_bytes({.bodies = {example::model(example::box("bar", modes))}, .provenance = {}});
+    const json document = json::parse(glb_chunks(bytes, "test").json);
+    EXPECT_EQ(document["meshes"][0]["primitives"][0]["targets"][0].contains("NORMAL"), modes <= 32);
+    expect_same_bytes(asset_bytes(asset_from_bytes(bytes, "test")), bytes);
+  }
+}
+
+TEST(Asset, MoreModesThanViewersTakeAreRefused) {
+  const auto bytes_with = [](Index modes) {
+    return asset_bytes({.bodies = {example::model(example::box("bar", modes, 1))}, .provenance = {}});
+  };
+  EXPECT_EQ(reading(bytes_with(256)), "accepted");
+  EXPECT_THROW(bytes_with(257), InvalidArgument);
+}
+
+TEST(Asset, BodiesNeedNamesOfTheirOwn) {
+  EXPECT_THROW(asset_bytes({}), InvalidArgument);
+  EXPECT_THROW(asset_bytes({.bodies = {example::model(example::box("a", 1)), example::model(example::box("a", 2))},
+                            .provenance = {}}),
+               InvalidArgument);
+}
+
+TEST(Asset, FileNamesOfAnyBytesAreKeptAsText) {
+  Asset asset = example::asset();
+  asset.provenance.input = "b\xe4r.msh";  // Latin-1
+  const std::string bytes = asset_bytes(asset);
+  EXPECT_EQ(asset_from_bytes(bytes, "test").provenance.input, "b\xef\xbf\xbdr.msh");
+  expect_same_bytes(asset_bytes(asset_from_bytes(bytes, "test")), bytes);
+}
+
+// What is not our asset ---------------------------------------------------------------------------------------------
+
+TEST(AssetReader, AFileCutAnywhereIsRefused) {
+  const std::string bytes = asset_bytes(example::asset());
+  for (std::size_t size = 0; size < bytes.size(); size += size < 64 ? 1 : 97)
+    EXPECT_NE(reading(bytes.substr(0, size)), "accepted") << size;
+}
+
+TEST(AssetReader, AChangedByteOfTheBinaryChunkIsRefused) {
+  std::string bytes = asset_bytes(example::asset());
+  const std::size_t binary = bytes.size() - glb_chunks(bytes, "test").binary.size();
+  for (std::size_t i = binary; i < bytes.size(); i += 131) {
+    bytes[i] = static_cast<char>(bytes[i] ^ 0x10);
+    EXPECT_THAT(reading(bytes), HasSubstr("content_hash")) << i;
+    bytes[i] = static_cast<char>(bytes[i] ^ 0x10);
+  }
+}
+
+TEST(AssetReader, AChangedByteAnywhereIsRefusedOrChangesNothingThatIsRead) {
+  const std::string bytes = asset_bytes(example::asset());
+  const std::size_t binary = bytes.size() - glb_chunks(bytes, "test").binary.size();
+  std::mt19937 random(7);
+  int accepted = 0;
+  for (int n = 0; n < 1500; ++n) {
+    std::string changed = bytes;
+    changed[random() % binary] = static_cast<char>(random());
+    if (reading(changed) != "accepted") continue;
+    ++accepted;
+    expect_same_bytes(asset_bytes(asset_from_bytes(changed, "test")), bytes);
+  }
+  EXPECT_LT(accepted, 900);  // names of scenes, materials and the like, and bytes that were the same already
+}
+
+TEST(AssetReader, LayoutOfTheJsonDoesNotMatter) {
+  const std::string bytes = asset_bytes(example::asset());
+  const GlbChunks chunks = glb_chunks(bytes, "test");
+  const std::string indented = glb_of(json::parse(chunks.json).dump(3), chunks.binary);
+  EXPECT_FALSE(indented == bytes);
+  expect_same_bytes(asset_bytes(asset_from_bytes(indented, "test")), bytes);
+}
+
+TEST(AssetReader, EveryNumberThatTheRuntimeUsesIsUnderTheHash) {
+  for (const char* field : {"mass", "volume"})
+    EXPECT_THAT(reading(with_document([&](json& d) { block_of(d, 0)[field] = 2.5; })), HasSubstr("content_hash"))
+        << field;
+  for (const char* field :
+       {"center_of_mass", "origin_in_input", "inertia", "eigenvalues", "decays", "participation", "moments"})
+    EXPECT_THAT(reading(with_document([&](json& d) { block_of(d, 0)[field][0] = 0.125; })), HasSubstr("content_hash"))
+        << field;
+  EXPECT_THAT(reading(with_document([](json& d) { block_of(d, 0)["mode_scales"][0] = 1024.0; })),
+              HasSubstr("content_hash"));
+  EXPECT_THAT(reading(with_document([](json& d) { block_of(d, 0)["motion"] = "point"; })), HasSubstr("content_hash"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"][0]["name"] = "rod"; })), HasSubstr("content_hash"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["extensions"]["LIMBER_modal"]["provenance"]["input"] = "x"; })),
+              HasSubstr("content_hash"));
+}
+
+TEST(AssetReader, WrongCountsAndTypesNameTheirPlace) {
+  const auto change = [](const char* field, const json& value) {
+    return reading(with_document([&](json& d) { block_of(d, 1)[field] = value; }));
+  };
+  const std::string place = "\"test.glb\".meshes[1].extensions.LIMBER_modal.";
+  EXPECT_THAT(change("modes", 6), HasSubstr(place + "eigenvalues"));
+  EXPECT_THAT(change("modes", -1), HasSubstr(place + "modes: is -1"));
+  EXPECT_THAT(change("modes", 1e300), HasSubstr(place + "modes"));
+  EXPECT_THAT(change("modes", 18446744073709551615u), HasSubstr(place + "modes"));
+  EXPECT_THAT(change("modes", 2000000000), HasSubstr("expected an integer from 0 to 256"));
+  EXPECT_THAT(change("vertices", 2000000000), HasSubstr("expected 2000000000"));
+  EXPECT_THAT(change("triangles", 1), HasSubstr("expected 3 for"));
+  EXPECT_THAT(change("mass", "heavy"), HasSubstr(place + "mass: is \"heavy\", expected a finite number"));
+  EXPECT_THAT(change("mass", nullptr), HasSubstr("expected a finite number"));
+  EXPECT_THAT(change("motion", "loose"), HasSubstr("expected \"free\", \"point\", \"line\" or \"kinematic\""));
+  EXPECT_THAT(change("mode_scales", json(std::vector<double>(5, 0.3))), HasSubstr("power of two"));
+  EXPECT_THAT(change("surprise", 1), HasSubstr("\"surprise\" is unknown"));
+  EXPECT_THAT(change("collision", json::array()), HasSubstr("expected an object"));
+}
+
+TEST(AssetReader, ViewsThatOverlapLeaveGapsOrEndBeyondAreRefused) {
+  const auto view = [](const char* field, std::int64_t value) {
+    return reading(with_document([&](json& d) { d["bufferViews"][3][field] = value; }));
+  };
+  EXPECT_THAT(view("byteOffset", 0), HasSubstr("where the bufferView before it ends"));
+  EXPECT_THAT(view("byteLength", 8), Not(HasSubstr("accepted")));
+  EXPECT_THAT(view("byteLength", 4000000000), HasSubstr("bufferViews[3]: ends at byte"));
+  EXPECT_THAT(view("byteLength", -4), HasSubstr("expected an integer"));
+  EXPECT_THAT(view("buffer", 1), HasSubstr("expected an integer from 0 to 0"));
+  EXPECT_THAT(view("byteStride", 16), HasSubstr("\"byteStride\" is unknown"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["buffers"][0]["byteLength"] = 4; })),
+              HasSubstr("byteLength: is 4"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["bufferViews"].erase(5); })), Not(HasSubstr("accepted")));
+}
+
+TEST(AssetReader, PiecesInAnotherOrderAreRefused) {
+  const auto swap_targets = [](json& d) {
+    json& targets = d["meshes"][0]["primitives"][0]["targets"];
+    std::swap(targets[0], targets[1]);
+  };
+  EXPECT_THAT(reading(with_document(swap_targets)), HasSubstr("another accessor than the next one"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"][0]["primitives"][0]["targets"].erase(6); })),
+              HasSubstr("there are 6 morph targets, expected one per mode, 7"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"][0]["primitives"][0]["indices"] = 999999; })),
+              HasSubstr("another accessor"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"].erase(1); })), HasSubstr("of which its bodies use"));
+}
+
+TEST(AssetReader, NumbersThatAreWrongUnderARightHashAreRefused) {
+  // Someone who writes assets of his own can put anything under a hash: the model's own checks stand behind it.
+  ModalModelData d = example::box("bar", 1);
+  const std::string bytes = asset_bytes({.bodies = {example::model(std::move(d))}, .provenance = {}});
+  std::string binary(glb_chunks(bytes, "test").binary);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(binary.data(), &nan, 4);
+  const std::string changed = glb_of(std::string(glb_chunks(bytes, "test").json), binary);
+  EXPECT_THAT(reading(changed), Not(HasSubstr("accepted")));
+}
+
+TEST(AssetReader, OtherGlbFilesAreToldThatTheyAreNoAssets) {
+  GlbBuilder glb;
+  const int position = glb.add_vertex_vectors(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const int faces = glb.add_triangles(std::vector<Triangle>{{0, 1, 2}});
+  glb.add_node({.mesh = glb.add_mesh({.position = position, .triangles = faces})});
+  EXPECT_THAT(reading(glb.bytes()), HasSubstr("has no LIMBER_modal block"));
+  EXPECT_THAT(reading("{\"asset\": {\"version\": \"2.0\"}}"), HasSubstr("is not a GLB file"));
+  EXPECT_THAT(reading(glb_of("[]", "1234")), HasSubstr("expected an object"));
+  EXPECT_THAT(reading(glb_of("{", "1234")), HasSubstr("not valid JSON"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["extensionsRequired"] = {"KHR_mesh_quantization"}; })),
+              HasSubstr("\"extensionsRequired\" is unknown"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["extensions"]["LIMBER_modal"]["version"] = 2; })),
+              HasSubstr("this limber reads version 1"));
+}
+
+TEST(AssetReader, HostileJsonIsRefusedWithoutHarm) {
+  const std::string deep(200000, '[');
+  EXPECT_NE(reading(glb_of(deep + std::string(200000, ']'), "1234")), "accepted");
+  EXPECT_NE(reading(glb_of("{\"extensions\":" + deep + std::string(200000, ']') + "}", "1234")), "accepted");
+  EXPECT_THAT(reading(glb_of("{\"a\":1e999}", "1234")), HasSubstr("not valid JSON"));
+  EXPECT_THAT(reading(glb_of("{\"asset\":1,\"asset\":2}", "1234")), HasSubstr("stands twice"));
+  EXPECT_THAT(reading(glb_of("{\"a\":\"\xff\"}", "1234")), HasSubstr("not valid JSON"));
+  EXPECT_THAT(reading(with_document([&](json& d) { block_of(d, 0)["mass"] = json::array({json::array({1})}); })),
+              HasSubstr("mass: is an array of 1 items"));
+}
+
+TEST(AssetReader, EveryMessageIsOneLine) {
+  const std::string bytes = asset_bytes(example::asset());
+  const std::size_t binary = bytes.size() - glb_chunks(bytes, "test").binary.size();
+  std::mt19937 random(11);
+  for (int n = 0; n < 500; ++n) {
+    std::string changed = bytes;
+    changed[20 + random() % (binary - 28)] = static_cast<char>(random() % 32);
+    EXPECT_THAT(reading(changed), Not(HasSubstr("\n")));
+  }
+}
+
+}  // namespace
+}  // namespace limber
