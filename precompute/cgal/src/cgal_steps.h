@@ -1,0 +1,35 @@
+// The three steps that need CGAL, one source file each, so that they compile side by side and no CGAL header spreads.
+#pragma once
+
+#include <span>
+
+#include "limber/mesh/surface_mesh.h"
+#include "limber/mesh/tet_mesh.h"
+
+namespace limber::cgal {
+
+/// Pairs of triangles that cross or touch other than at the vertices and edges they share, and vertices at which the
+/// surface is not one fan. @pre every edge has two triangles that run through it in opposite directions
+struct Crossings {
+  Index triangle_pairs = 0;
+  Index pinched_vertices = 0;
+};
+Crossings find_crossings(const SurfaceMesh& surface);
+
+/// A closed, oriented, manifold surface around any triangles, `offset` away from them; enters no gap narrower than
+/// `alpha`.
+SurfaceMesh wrap(const SurfaceMesh& soup, double alpha, double offset);
+
+struct BodyMeshing {
+  double cell_size = 0.0;         ///< bound on the circumradius of tets and of boundary triangles' surface balls
+  double facet_distance = 0.0;    ///< bound on the distance between a boundary triangle and the surface
+  bool keep_sharp_edges = false;  ///< sharp edges of the surface become edges of the mesh
+  std::size_t max_nodes = 0;      ///< more are not made: an error
+};
+
+/// Tets inside one body: nodes and tets only. @param boundary clean; its shells bound the body by the even-odd rule
+/// @param seeds points on the boundary, a few of each shell, where the refinement starts
+/// @throws ComputationError
+TetMesh mesh_body(const SurfaceMesh& boundary, std::span<const Vec3> seeds, const BodyMeshing& options);
+
+}  // namespace limber::cgal

@@ -1,0 +1,28 @@
+// Which shells of a clean surface bound which body.
+#pragma once
+
+#include <vector>
+
+#include "limber/mesh/surface_mesh.h"
+
+namespace limber {
+
+/// One body: an outer shell and the cavities directly inside it.
+struct Body {
+  SurfaceMesh boundary;     ///< outer shell outward, cavities inward
+  std::vector<Vec3> seeds;  ///< a few well-spread vertices of each shell
+  double volume = 0.0;      ///< m³; > 0
+  double diagonal = 0.0;    ///< of its bounding box, m
+};
+
+struct Bodies {
+  std::vector<Body> bodies;  ///< in the order of their outer shells in the input
+  Index cavities = 0;
+  Index turned = 0;  ///< shells whose triangles ran the wrong way round
+};
+
+/// Splits a closed, oriented, manifold surface without self-intersections by the even-odd rule: a shell inside a shell
+/// is a cavity, a shell inside a cavity is a body again, whichever way their triangles run.
+Bodies split_into_bodies(const SurfaceMesh& surface);
+
+}  // namespace limber
