@@ -1,0 +1,11 @@
+# cmake -P install.cmake, in the folder of package.json: npm ci, unless what lies there is that of the lock file already.
+file(SHA256 package-lock.json wanted)
+set(installed "")
+if(EXISTS node_modules/.installed)
+  file(READ node_modules/.installed installed)
+endif()
+if(installed STREQUAL wanted)
+  return()
+endif()
+execute_process(COMMAND npm ci --ignore-scripts --no-audit --no-fund --loglevel=error COMMAND_ERROR_IS_FATAL ANY)
+file(WRITE node_modules/.installed ${wanted})
