@@ -23,7 +23,8 @@ enum class MassKind { kLumped, kConsistent };
 /// Row-major 12 × 12 stiffness of one tet, N/m. @param x its four corners, right-handed
 std::array<double, 144> tet_stiffness(const std::array<Vec3, 4>& x, const Material& material);
 
-/// K, 3n × 3n, N/m. @param materials one per region of the mesh
+/// K, 3n × 3n, N/m. @param materials one per region of the mesh; of a region without tets it is not looked at
+/// @throws InvalidArgument if the counts differ or a material is outside its range
 SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> materials, Jobs& jobs = serial_jobs());
 
 /// M on the node graph, n × n, kg (the same for the three axes). Lumped: a diagonal.

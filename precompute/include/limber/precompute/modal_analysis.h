@@ -1,12 +1,12 @@
 /// @file limber/precompute/modal_analysis.h
 /// The lowest vibration modes of one connected body: K w = λ M w, WᵀMW = I, none missed.
 ///
-/// Null space. K w = 0 exactly for motions that are rigid on every set of face-connected tets and agree at shared nodes.
-/// That is a small dense problem in six unknowns per set, so rigid motions and mechanisms are found from geometry, not by
-/// a threshold on eigenvalues; the inertia of K − σM just above zero confirms the count.
-/// Elastic modes. ARPACK, shift-invert in the M inner product, on CHOLMOD's supernodal LLᵀ, the null space deflated.
-/// Certificate. The number of eigenvalues below a σ just above the last one, by Sylvester's law of inertia from a pivoted
-/// LDLᵀ (MUMPS), equals the number found. docs/modal-analysis.md tells what was measured and why it is done so.
+/// Null space. K w = 0 exactly for motions that are rigid on every set of face-connected tets and agree at shared
+/// nodes. That is a small dense problem in six unknowns per set, so rigid motions and mechanisms are found from
+/// geometry, not by a threshold on eigenvalues; the inertia of K − σM just above zero confirms the count. Elastic
+/// modes. ARPACK, shift-invert in the M inner product, on CHOLMOD's supernodal LLᵀ, the null space deflated.
+/// Certificate. The number of eigenvalues below a σ just above the last one, by Sylvester's law of inertia from a
+/// pivoted LDLᵀ (MUMPS), equals the number found. docs/modal-analysis.md tells what was measured and why it is done so.
 #pragma once
 
 #include <optional>
@@ -23,10 +23,10 @@
 namespace limber {
 
 struct ModalAnalysisOptions {
-  int modes = 64;                      ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
+  int modes = 64;  ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
   MassKind mass = MassKind::kLumped;
-  bool certify = true;                 ///< prove by inertia that no mode is missed
-  int blas_threads = 0;                ///< 0: one below about 15,000 nodes, else all; set explicitly on the BLAS
+  bool certify = true;   ///< prove by inertia that no mode is missed
+  int blas_threads = 0;  ///< 0: one below about 15,000 nodes, else all; set explicitly on the BLAS
   void validate() const;
 };
 
@@ -37,28 +37,31 @@ struct ModalAnalysis {
   int rigid_modes = 0;                      ///< 6, 3, 1 or 0: dimension of the rigid motions that are free
   int mechanisms = 0;                       ///< further zero modes
 
-  std::vector<double> eigenvalues;          ///< mechanisms (λ = 0 exactly) first, then elastic, ascending; rad²/s²
-  std::vector<double> shapes;               ///< W, column-major 3n × k, kg^−½, zero at fixed nodes
-  std::vector<double> mass_times_shapes;    ///< M W, the same shape, kg^½
+  std::vector<double> eigenvalues;        ///< mechanisms (λ = 0 exactly) first, then elastic, ascending; rad²/s²
+  std::vector<double> shapes;             ///< W, column-major 3n × k, kg^−½, zero at fixed nodes
+  std::vector<double> mass_times_shapes;  ///< M W, the same shape, kg^½
   Index nodes = 0;
 
-  double residual_max = 0.0;       ///< max over elastic of ‖Kw − λMw‖ / ‖λMw‖
-  double residual_bound = 0.0;     ///< what residual_max was allowed: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖) of that mode
-  double backward_error_max = 0.0; ///< max of ‖Kw − λMw‖ / ((‖K‖ + λ‖M‖)‖w‖)
-  double orthogonality_max = 0.0;  ///< max |WᵀMW − I|, rigid motions included
+  double residual_max = 0.0;    ///< max over elastic of ‖Kw − λMw‖ / ‖λMw‖
+  double residual_bound = 0.0;  ///< what residual_max was allowed: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖) of that mode
+  double backward_error_max = 0.0;  ///< max of ‖Kw − λMw‖ / ((‖K‖ + λ‖M‖)‖w‖)
+  double orthogonality_max = 0.0;   ///< max |WᵀMW − I|, rigid motions included
   bool certified = false;
 
   struct Seconds {
     double assemble = 0.0, order = 0.0, factor = 0.0, iterate = 0.0, certify = 0.0;
   } seconds;
-  int solves = 0;                  ///< right-hand sides solved
+  int solves = 0;  ///< right-hand sides solved
 };
 
 /// @param mesh one connected body (connected_components), every node used, validated.
 /// @param materials one per region. @param fixed_nodes all three components held; may be empty; indices into mesh.nodes
-/// Repeated runs give the same bits: fixed start vector, canonical rotation inside clusters of equal eigenvalues, canonical sign.
-/// @throws ComputationError if the certificate fails after another try, or the factorisation does (naming the likely cause)
-ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> materials, std::span<const Index> fixed_nodes,
-                            const ModalAnalysisOptions& options, Warnings& warnings, Jobs& jobs = serial_jobs());
+/// Repeated runs give the same bits: fixed start vector, canonical rotation inside clusters of equal eigenvalues,
+/// canonical sign.
+/// @throws ComputationError if the certificate fails after another try, or the factorisation does (naming the likely
+/// cause)
+ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> materials,
+                            std::span<const Index> fixed_nodes, const ModalAnalysisOptions& options, Warnings& warnings,
+                            Jobs& jobs = serial_jobs());
 
 }  // namespace limber

@@ -1,0 +1,12 @@
+# SuiteSparse's sparse Cholesky factorisation (Debian: libsuitesparse-dev), which brings no CMake package of its own.
+# Defines CHOLMOD::cholmod.
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse)
+find_library(CHOLMOD_LIBRARY cholmod)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(CHOLMOD REQUIRED_VARS CHOLMOD_LIBRARY CHOLMOD_INCLUDE_DIR)
+if(CHOLMOD_FOUND AND NOT TARGET CHOLMOD::cholmod)
+  add_library(CHOLMOD::cholmod UNKNOWN IMPORTED)
+  set_target_properties(CHOLMOD::cholmod PROPERTIES IMPORTED_LOCATION "${CHOLMOD_LIBRARY}")
+  target_include_directories(CHOLMOD::cholmod SYSTEM INTERFACE "${CHOLMOD_INCLUDE_DIR}")
+endif()
+mark_as_advanced(CHOLMOD_INCLUDE_DIR CHOLMOD_LIBRARY)

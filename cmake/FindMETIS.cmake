@@ -1,0 +1,12 @@
+# METIS, graph partitioning and nested dissection (Debian: libmetis-dev).
+# Defines METIS::metis.
+find_path(METIS_INCLUDE_DIR metis.h)
+find_library(METIS_LIBRARY metis)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(METIS REQUIRED_VARS METIS_LIBRARY METIS_INCLUDE_DIR)
+if(METIS_FOUND AND NOT TARGET METIS::metis)
+  add_library(METIS::metis UNKNOWN IMPORTED)
+  set_target_properties(METIS::metis PROPERTIES IMPORTED_LOCATION "${METIS_LIBRARY}")
+  target_include_directories(METIS::metis SYSTEM INTERFACE "${METIS_INCLUDE_DIR}")
+endif()
+mark_as_advanced(METIS_INCLUDE_DIR METIS_LIBRARY)
