@@ -24,7 +24,7 @@ std::vector<T> parse_list(std::string_view text, std::string_view list) {
     T value{};
     const auto [end, error] = std::from_chars(item.data(), item.data() + item.size(), value);
     if (item.empty() || error != std::errc() || end != item.data() + item.size())
-      refuse(text, "\"" + std::string(item) + "\" is not a number in range");
+      refuse(text, std::string(item) + " is not a number in range");
     values.push_back(value);
     if (comma == std::string_view::npos) return values;
     list.remove_prefix(comma + 1);
@@ -76,7 +76,7 @@ FixSelector parse_fix_selector(std::string_view text) {
   if (kind == "group") return FixGroup{std::string(rest)};
   if (kind == "box") return parse_box(text, rest);
   if (kind == "nodes") return FixNodes{parse_list<Index>(text, rest)};
-  refuse(text, "\"" + std::string(kind) + "\" is not a kind of selector");
+  refuse(text, std::string(kind) + " is not a kind of selector");
 }
 
 std::vector<Index> select_nodes(const TetMesh& mesh, const FixSelector& selector) {
