@@ -1,6 +1,8 @@
 #include "limber/mesh/surface_mesh.h"
 
 #include <algorithm>
+#include <bit>
+#include <unordered_map>
 #include <utility>
 
 #include "limber/core/error.h"
@@ -53,17 +55,47 @@ Index count_components(const SurfaceMesh& surface) {
 void validate(SurfaceMesh& surface, const std::string& name, Warnings& warnings) {
   for (std::size_t i = 0; i < surface.vertices.size(); ++i)
     if (!surface.vertices[i].allFinite())
-      throw InputError(name + ": vertex " + std::to_string(i) + " (counted from 0) has a coordinate that is not finite");
+      throw InputError(name + ": vertex " + std::to_string(i) +
+                       " (counted from 0) has a coordinate that is not finite");
   for (std::size_t i = 0; i < surface.triangles.size(); ++i)
     for (const Index v : surface.triangles[i])
       if (v < 0 || static_cast<std::size_t>(v) >= surface.vertices.size())
-        throw InputError(name + ": triangle " + std::to_string(i) + " (counted from 0) names vertex " + std::to_string(v) +
-                         ", expected 0 to " + std::to_string(static_cast<std::int64_t>(surface.vertices.size()) - 1));
-  const auto dropped = std::erase_if(
-      surface.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+        throw InputError(name + ": triangle " + std::to_string(i) + " (counted from 0) names vertex " +
+                         std::to_string(v) + ", expected 0 to " +
+                         std::to_string(static_cast<std::int64_t>(surface.vertices.size()) - 1));
+  const auto dropped =
+      std::erase_if(surface.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
   if (dropped > 0)
     warnings.push_back(name + ": " + std::to_string(dropped) + " triangles name a vertex twice and have been dropped");
   if (surface.triangles.empty()) throw InputError(name + ": holds no triangles");
+}
+
+Index weld(SurfaceMesh& surface) {
+  struct Hash {
+    std::size_t operator()(const std::array<std::uint64_t, 3>& bits) const {
+      std::uint64_t h = 0;
+      for (const auto b : bits)
+        h = (h ^ b ^ (b >> 29)) * 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio: spreads bits
+      return static_cast<std::size_t>(h ^ (h >> 32));
+    }
+  };
+  std::unordered_map<std::array<std::uint64_t, 3>, Index, Hash> index_at;
+  index_at.reserve(surface.vertices.size());
+  std::vector<Index> new_index;
+  std::vector<Vec3> kept;
+  for (const Vec3& x : surface.vertices) {
+    const Vec3 positive_zero = x.array() + 0.0;
+    const auto bits =
+        std::bit_cast<std::array<std::uint64_t, 3>>(std::array{positive_zero[0], positive_zero[1], positive_zero[2]});
+    const auto [place, is_new] = index_at.try_emplace(bits, static_cast<Index>(kept.size()));
+    if (is_new) kept.push_back(x);
+    new_index.push_back(place->second);
+  }
+  const auto gone = static_cast<Index>(surface.vertices.size() - kept.size());
+  for (Triangle& t : surface.triangles)
+    for (Index& v : t) v = new_index[v];
+  surface.vertices = std::move(kept);
+  return gone;
 }
 
 BoundarySurface boundary_surface(const TetMesh& mesh) {
@@ -110,7 +142,8 @@ double enclosed_volume(const SurfaceMesh& surface) {
   const Vec3 base = surface.vertices.front();
   double six_volumes = 0.0;
   for (const Triangle& t : surface.triangles)
-    six_volumes += (surface.vertices[t[0]] - base).cross(surface.vertices[t[1]] - base).dot(surface.vertices[t[2]] - base);
+    six_volumes +=
+        (surface.vertices[t[0]] - base).cross(surface.vertices[t[1]] - base).dot(surface.vertices[t[2]] - base);
   return six_volumes / 6.0;
 }
 

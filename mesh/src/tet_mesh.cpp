@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 
 #include "limber/core/error.h"
@@ -13,9 +14,7 @@ std::array<Vec3, 4> corners(const TetMesh& mesh, const Tet& t) {
   return {mesh.nodes[t[0]], mesh.nodes[t[1]], mesh.nodes[t[2]], mesh.nodes[t[3]]};
 }
 
-double signed_volume(const std::array<Vec3, 4>& x) {
-  return (x[1] - x[0]).cross(x[2] - x[0]).dot(x[3] - x[0]) / 6.0;
-}
+double signed_volume(const std::array<Vec3, 4>& x) { return (x[1] - x[0]).cross(x[2] - x[0]).dot(x[3] - x[0]) / 6.0; }
 
 double longest_edge(const std::array<Vec3, 4>& x) {
   double longest = 0.0;
@@ -25,8 +24,8 @@ double longest_edge(const std::array<Vec3, 4>& x) {
 }
 
 std::string described(const std::string& name, std::size_t tet, const Tet& t) {
-  return name + ": tetrahedron " + std::to_string(tet) + " (nodes " + std::to_string(t[0]) + " " + std::to_string(t[1]) +
-         " " + std::to_string(t[2]) + " " + std::to_string(t[3]) + ", counted from 0)";
+  return name + ": tetrahedron " + std::to_string(tet) + " (nodes " + std::to_string(t[0]) + " " +
+         std::to_string(t[1]) + " " + std::to_string(t[2]) + " " + std::to_string(t[3]) + ", counted from 0)";
 }
 
 void check_nodes(const TetMesh& mesh, const std::string& name) {
@@ -60,6 +59,42 @@ void check_regions_and_groups(const TetMesh& mesh, const std::string& name) {
                          std::to_string(mesh.nodes.size()));
 }
 
+/// std::to_string would show a volume of 1e-20 as 0.
+std::string in_short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// Turns marks (negative: unused) into new indices in the old order. @return the old index of each new one
+std::vector<Index> number_used(std::vector<Index>& mark) {
+  std::vector<Index> old_index;
+  for (std::size_t n = 0; n < mark.size(); ++n) {
+    if (mark[n] < 0) continue;
+    mark[n] = static_cast<Index>(old_index.size());
+    old_index.push_back(static_cast<Index>(n));
+  }
+  return old_index;
+}
+
+std::vector<NodeGroup> renumbered(const std::vector<NodeGroup>& groups, const std::vector<Index>& new_index) {
+  std::vector<NodeGroup> out;
+  for (const NodeGroup& g : groups) {
+    NodeGroup part{g.name, {}};
+    for (const Index n : g.nodes)
+      if (new_index[n] >= 0) part.nodes.push_back(new_index[n]);
+    if (!part.nodes.empty()) out.push_back(std::move(part));
+  }
+  return out;
+}
+
+std::vector<Vec3> picked(const std::vector<Vec3>& points, const std::vector<Index>& which) {
+  std::vector<Vec3> out;
+  out.reserve(which.size());
+  for (const Index n : which) out.push_back(points[n]);
+  return out;
+}
+
 /// Roots of a union–find forest with path halving.
 class DisjointSets {
  public:
@@ -91,8 +126,8 @@ void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
     const double longest = longest_edge(x);
     // Written so that an overflow to inf or NaN fails too.
     if (!(6.0 * std::abs(volume) > 1e-12 * longest * longest * longest))
-      throw InputError(described(name, i, t) + " is flat: volume " + std::to_string(volume) +
-                       " m^3, expected more; remove it or remesh");
+      throw InputError(described(name, i, t) + " is flat: volume " + in_short(volume) + " m^3 with a longest edge of " +
+                       in_short(longest) + " m, expected more; remove it or remesh");
     if (volume < 0.0) {
       std::swap(t[2], t[3]);
       ++turned;
@@ -101,6 +136,18 @@ void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
   if (turned > 0)
     warnings.push_back(name + ": " + std::to_string(turned) + " of " + std::to_string(mesh.tets.size()) +
                        " tetrahedra were left-handed and have been re-oriented");
+}
+
+std::vector<Index> drop_unused_nodes(TetMesh& mesh) {
+  std::vector<Index> new_index(mesh.nodes.size(), -1);
+  for (const Tet& t : mesh.tets)
+    for (const Index n : t) new_index[n] = 0;
+  auto node_of = number_used(new_index);
+  mesh.nodes = picked(mesh.nodes, node_of);
+  mesh.node_groups = renumbered(mesh.node_groups, new_index);
+  for (Tet& t : mesh.tets)
+    for (Index& n : t) n = new_index[n];
+  return node_of;
 }
 
 VolumeProperties volume_properties(const TetMesh& mesh) {
@@ -151,12 +198,8 @@ SubMesh extract_component(const TetMesh& mesh, std::span<const Index> component,
   for (std::size_t i = 0; i < mesh.tets.size(); ++i)
     if (component[i] == which)
       for (const Index n : mesh.tets[i]) new_index[n] = 0;
-  for (std::size_t n = 0; n < mesh.nodes.size(); ++n) {
-    if (new_index[n] < 0) continue;
-    new_index[n] = static_cast<Index>(sub.node_of.size());
-    sub.node_of.push_back(static_cast<Index>(n));
-    sub.mesh.nodes.push_back(mesh.nodes[n]);
-  }
+  sub.node_of = number_used(new_index);
+  sub.mesh.nodes = picked(mesh.nodes, sub.node_of);
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     if (component[i] != which) continue;
     const Tet& t = mesh.tets[i];
@@ -164,12 +207,7 @@ SubMesh extract_component(const TetMesh& mesh, std::span<const Index> component,
     sub.mesh.tet_region.push_back(mesh.tet_region[i]);
     sub.tet_of.push_back(static_cast<Index>(i));
   }
-  for (const NodeGroup& g : mesh.node_groups) {
-    NodeGroup part{g.name, {}};
-    for (const Index n : g.nodes)
-      if (new_index[n] >= 0) part.nodes.push_back(new_index[n]);
-    if (!part.nodes.empty()) sub.mesh.node_groups.push_back(std::move(part));
-  }
+  sub.mesh.node_groups = renumbered(mesh.node_groups, new_index);
   return sub;
 }
 

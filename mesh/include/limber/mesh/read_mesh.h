@@ -1,12 +1,26 @@
 /// @file limber/mesh/read_mesh.h
-/// Meshes from files. The format is told by the content where it has a signature, else by the extension.
+/// Meshes from files. The format is told by the content where it has a signature, else by the extension; what each
+/// format gives is in docs/formats/meshes.md.
 ///
-/// Strict about meaning, lenient about form: comments, blank lines, CRLF, 0-based or 1-based numbering and polygons with
-/// more than three sides are all read; a wrong count, index or number is one error naming file, place, seen and expected.
+/// | format | holds | signature or extension |
+/// |---|---|---|
+/// | Gmsh MSH 2.x, 4.1, text and binary | tets or surface | `$MeshFormat`, .msh |
+/// | MEDIT, text | tets or surface | `MeshVersionFormatted`, .mesh |
+/// | VTK legacy 1 to 5.1, text and binary | tets or surface | `# vtk DataFile`, .vtk |
+/// | TetGen | tets | .node, .ele (name either; both must be there) |
+/// | PLY, text and binary | surface | `ply`, .ply |
+/// | OBJ | surface | .obj |
+/// | STL, text and binary | surface | .stl |
+///
+/// Strict about meaning, lenient about form: comments, blank lines, CRLF, 0-based or 1-based numbering and polygons
+/// with more than three sides are all read; a wrong count, index or number is one error naming file, place, seen and
+/// expected. Errors and warnings are one line each. Lengths are taken as metres. The results are validated (see
+/// validate()).
 #pragma once
 
 #include <filesystem>
 #include <string>
+#include <variant>
 
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
@@ -15,16 +29,24 @@ namespace limber {
 
 enum class MeshKind { kTets, kSurface };
 
-/// What is in a file, from its signature and extension; reads only what it must.
-/// @throws InputError if the file cannot be read or its format is not known (the message lists the known ones).
+/// Whether limber reads the file's format itself; says nothing about whether the content is right.
+/// @throws InputError if the file cannot be read
+bool is_known_mesh_format(const std::filesystem::path& path);
+
+/// What is in a file. Formats that can hold both are read whole: to read next, read_mesh() does both at once.
+/// @throws InputError if the file cannot be read or its format is not known (the message lists the known ones)
 MeshKind mesh_kind(const std::filesystem::path& path);
 
-/// Gmsh MSH 2.2 and 4.1 (ASCII and binary), MEDIT .mesh, TetGen .node/.ele (name either), VTK legacy (ASCII and binary).
-/// The result is validated. @throws InputError
+/// Whatever the file holds: tets if there are any, else the surface. @throws InputError
+std::variant<TetMesh, SurfaceMesh> read_mesh(const std::filesystem::path& path, Warnings& warnings);
+
+/// Tetrahedra with their regions and node groups. Node groups come sorted by name; every region whose name no group has
+/// is a group too. @throws InputError, also for a file that holds a surface only
 TetMesh read_tet_mesh(const std::filesystem::path& path, Warnings& warnings);
 
-/// OBJ, STL and PLY (text and binary). STL, a soup of triangles, is welded at equal coordinates. The result is validated.
-/// Other formats: limber::mesh_assimp. @throws InputError
+/// A surface, polygons cut into triangles. Vertices in the order of the file, but for STL, a soup of triangles, which
+/// is welded (see weld()). Other formats: limber::mesh_assimp. @throws InputError, also for a file that holds
+/// tetrahedra
 SurfaceMesh read_surface_mesh(const std::filesystem::path& path, Warnings& warnings);
 
 }  // namespace limber

@@ -17,13 +17,18 @@ struct SurfaceMesh {
 };
 
 /// Checks coordinates and indices; drops triangles that name a vertex twice, with one warning that counts them.
-/// Zero-area triangles of three distinct vertices stay. @throws InputError naming the first wrong element, or if nothing is left.
+/// Zero-area triangles of three distinct vertices stay. @throws InputError naming the first wrong element, or if
+/// nothing is left.
 void validate(SurfaceMesh& surface, const std::string& name, Warnings& warnings);
+
+/// Joins vertices at equal coordinates (exactly; −0 equals 0), in order of first appearance. Triangles keep their
+/// order. Unused vertices stay unless they are joined. @return how many vertices went. @pre indices are in range
+Index weld(SurfaceMesh& surface);
 
 /// The boundary of a tetrahedral mesh: faces that belong to one tet, seen from outside.
 struct BoundarySurface {
-  SurfaceMesh surface;          ///< vertices in ascending order of their node
-  std::vector<Index> node_of;   ///< per vertex, its node in the tet mesh
+  SurfaceMesh surface;         ///< vertices in ascending order of their node
+  std::vector<Index> node_of;  ///< per vertex, its node in the tet mesh
 };
 BoundarySurface boundary_surface(const TetMesh& mesh);
 

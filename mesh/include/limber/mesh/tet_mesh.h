@@ -23,14 +23,14 @@ struct NodeGroup {
 };
 
 /// Linear tetrahedra. Lengths in metres.
-/// Invariant after a reader of limber or after validate(): all coordinates finite, all indices in range, every tet positive
-/// (right-handed, see `Tet`), nodes in the order of the file with unused ones still present.
+/// Invariant after a reader of limber or after validate(): all coordinates finite, all indices in range, every tet
+/// positive (right-handed, see `Tet`), nodes in the order of the file with unused ones still present.
 struct TetMesh {
   std::vector<Vec3> nodes;
   std::vector<Tet> tets;
   std::vector<Index> tet_region;       ///< per tet, index into `regions`
   std::vector<Region> regions;         ///< at least one if there are tets
-  std::vector<NodeGroup> node_groups;  ///< indices into `nodes`
+  std::vector<NodeGroup> node_groups;  ///< indices into `nodes`; from a reader sorted by name
 };
 
 /// Volume of a tetrahedron, positive if right-handed: (x1−x0)×(x2−x0)·(x3−x0)/6, m³.
@@ -38,14 +38,20 @@ double signed_volume(const TetMesh& mesh, Index tet);
 
 /// Checks the invariant and repairs what may be repaired: negative tets are re-oriented, with one warning that counts
 /// them. @param name shown in messages, such as `"spoon.msh"`.
-/// @throws InputError naming the first wrong element: coordinate not finite, index out of range, a node twice in a tet, or
+/// @throws InputError naming the first wrong element: coordinate not finite, index out of range, a node twice in a tet,
+/// or
 ///   a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off).
 void validate(TetMesh& mesh, const std::string& name, Warnings& warnings);
 
+/// Drops the nodes that no tet uses, from the groups too; groups left empty go. The order of the others stays.
+/// @return per node that stayed, its index before; the number dropped is the difference of the sizes. @pre mesh is
+/// valid
+std::vector<Index> drop_unused_nodes(TetMesh& mesh);
+
 /// Geometry of a solid of density 1.
 struct VolumeProperties {
-  double volume = 0.0;           ///< m³
-  Vec3 centroid = Vec3::Zero();  ///< m
+  double volume = 0.0;                ///< m³
+  Vec3 centroid = Vec3::Zero();       ///< m
   Mat3 second_moment = Mat3::Zero();  ///< ∫ (x − c)(x − c)ᵀ dV about the centroid c, m⁵
 };
 VolumeProperties volume_properties(const TetMesh& mesh);
@@ -54,7 +60,7 @@ VolumeProperties volume_properties(const TetMesh& mesh);
 /// @return per tet, the body's index; the number of bodies is 1 + the largest.
 std::vector<Index> connected_components(const TetMesh& mesh);
 
-/// The tets of one body with their nodes renumbered in order of appearance; unused nodes are left out.
+/// The tets of one body with its nodes in the order of the whole; unused nodes and groups without a node are left out.
 struct SubMesh {
   TetMesh mesh;
   std::vector<Index> node_of;  ///< per node of `mesh`, its index in the whole

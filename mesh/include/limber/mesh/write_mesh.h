@@ -1,0 +1,22 @@
+/// @file limber/mesh/write_mesh.h
+/// Meshes to files. Numbers are written so that reading gives the same bits back; a file appears whole or not at all.
+#pragma once
+
+#include <filesystem>
+
+#include "limber/mesh/surface_mesh.h"
+#include "limber/mesh/tet_mesh.h"
+
+namespace limber {
+
+/// Gmsh MSH 2.2, text: regions as physical volumes with their names and tags (a fresh tag where one is 0 or taken),
+/// node groups as physical points. read_tet_mesh() gives the same mesh back, and each region as a node group besides.
+/// @throws InvalidArgument if an index is out of range or a name holds a quote or a line end. @throws InputError (see
+/// write_file())
+void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
+
+/// Wavefront OBJ: positions and triangles.
+/// @throws InvalidArgument if an index is out of range. @throws InputError (see write_file())
+void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface);
+
+}  // namespace limber
