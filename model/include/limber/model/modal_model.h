@@ -33,10 +33,10 @@ std::string_view to_string(FrameMotion motion);
 
 /// Optional: all nodes of the tetrahedral mesh, for initial states z₀ = WᵀM d₀, overlap normals and depth.
 struct ModalVolume {
-  std::vector<Vec3> rest;         ///< nodes, body frame, m
+  std::vector<Vec3> rest;  ///< nodes, body frame, m
   std::vector<Tet> tets;
-  ModalBasis basis;               ///< W at every node, kg^−½
-  ModalBasis mass_times_basis;    ///< M W at every node, kg^½: z₀ = (MW)ᵀ d₀
+  ModalBasis basis;             ///< W at every node, kg^−½
+  ModalBasis mass_times_basis;  ///< M W at every node, kg^½: z₀ = (MW)ᵀ d₀
 };
 
 /// Where an asset came from; every field may be empty.
@@ -47,23 +47,26 @@ struct Provenance {
   std::string options;     ///< the options that made it, as one line
 };
 
-/// The plain data of a body. Fill it, then make a ModalModel of it, which checks it.
+/// The plain data of a body. Fill it, then make a ModalModel of it, which checks it: beside counts, ranges and indices
+/// what every solid fulfils (a principal moment is at most the sum of the others) and what mass-normalised modes do
+/// (|∫ρ w_i| ≤ √mass, and like it for the moments), so that a wrong unit is told at once.
 struct ModalModelData {
-  std::string name;                    ///< of the body; not empty
+  std::string name;  ///< of the body; not empty, at most 200 bytes, no control characters
   FrameMotion motion = FrameMotion::kFree;
-  Vec3 line_axis = Vec3::UnitX();      ///< kLine: unit vector, body frame
-  double mass = 0.0;                   ///< kg; > 0
-  double volume = 0.0;                 ///< m³; > 0
-  Vec3 center_of_mass = Vec3::Zero();  ///< body frame, m; zero for kFree and kKinematic
-  Vec3 origin_in_input = Vec3::Zero(); ///< body origin in the input mesh's coordinates, m
-  Mat3 inertia = Mat3::Zero();         ///< of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite
+  Vec3 line_axis = Vec3::UnitX();       ///< kLine: unit vector, body frame
+  double mass = 0.0;                    ///< kg; > 0
+  double volume = 0.0;                  ///< m³; > 0
+  Vec3 center_of_mass = Vec3::Zero();   ///< body frame, m; zero for kFree and kKinematic
+  Vec3 origin_in_input = Vec3::Zero();  ///< body origin in the input mesh's coordinates, m
+  Mat3 inertia =
+      Mat3::Zero();  ///< of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite
 
-  std::vector<double> eigenvalues;     ///< λ, rad²/s², ascending, ≥ 0 (0: a mechanism)
-  std::vector<double> decays;          ///< ξ, 1/s, ≥ 0, per mode
-  std::vector<Vec3> participation;     ///< ∫ρ w_i dV, kg^½: zero for kFree
-  std::vector<Mat3> moments;           ///< ∫ρ x w_iᵀ dV, kg^½·m, x from the body origin: element (a, b) is ∫ρ x_a w_ib
+  std::vector<double> eigenvalues;  ///< λ, rad²/s², ascending, ≥ 0 (0: a mechanism)
+  std::vector<double> decays;       ///< ξ, 1/s, ≥ 0, per mode
+  std::vector<Vec3> participation;  ///< ∫ρ w_i dV, kg^½: zero for kFree
+  std::vector<Mat3> moments;  ///< ∫ρ x w_iᵀ dV, kg^½·m, x from the body origin: element (a, b) is ∫ρ x_a w_ib
 
-  ModalSurface render;                 ///< what is drawn; at least one triangle
+  ModalSurface render;                    ///< what is drawn; at least one triangle
   std::optional<ModalSurface> collision;  ///< what touches; none: the render surface
   std::optional<ModalVolume> volume_block;
 };

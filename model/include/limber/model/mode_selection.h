@@ -34,18 +34,20 @@ struct SceneLimits {
   double min_displacement = 0.0;  ///< m, the smallest motion anyone can see; 0: no limit is given
   double frame_rate = 0.0;        ///< Hz; modes whose damped frequency is above half of it are dropped; 0: no limit
   LoadKind load = LoadKind::kSudden;
-  bool keep_all = false;          ///< switches off the limits on force and frame rate; max_modes stays
-  void validate() const;          ///< @throws InvalidArgument naming the field and its value
+  bool keep_all = false;  ///< switches off the limits on force and frame rate; max_modes stays
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
 enum class DropReason { kTooSmall, kTooFast, kBeyondMaxModes };
-std::string_view to_string(DropReason reason);  ///< "below_min_displacement", "above_half_frame_rate", "beyond_max_modes"
+std::string_view to_string(
+    DropReason reason);  ///< "below_min_displacement", "above_half_frame_rate", "beyond_max_modes"
 
 struct DroppedMode {
   Index mode = 0;
   DropReason reason = DropReason::kTooSmall;
-  double value = 0.0;  ///< what was compared: m, Hz or the mode's rank
-  double limit = 0.0;  ///< with what
+  double value = 0.0;  ///< what was compared, of its cluster: the largest displacement, m; the lowest damped frequency,
+                       ///< Hz; or the rank of its last mode among the elastic ones that the scene can show, from 1
+  double limit = 0.0;  ///< with what: min_displacement, half the frame rate or max_modes
 };
 
 struct ModeSelection {
@@ -54,8 +56,10 @@ struct ModeSelection {
 };
 
 /// @param modes ascending in λ. Modes with λ = 0 (mechanisms) are always kept and do not count towards max_modes.
-/// A cluster of equal eigenvalues (relative distance below 1e-6) is never cut in two by max_modes: it is dropped whole,
-/// or kept whole where nothing else would be kept.
+/// A cluster of equal eigenvalues (relative distance of neighbours below 1e-6) is never cut in two, as any rotation of
+/// its modes among each other is as good a basis: it goes only if none of its modes can be seen, and max_modes drops it
+/// whole, or keeps it whole where nothing else would be kept. After a cluster beyond max_modes no higher mode is kept.
+/// @throws InvalidArgument naming the mode or limit and its value
 ModeSelection select_modes(std::span<const ModeStrength> modes, const SceneLimits& limits);
 
 }  // namespace limber
