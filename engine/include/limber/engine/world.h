@@ -8,8 +8,13 @@
 ///     world.reconstruct(bell, positions, normals);   // only what is drawn costs
 ///   }
 ///
-/// Every body moves exactly over a step of any length: modes in closed form, the free rotation in closed form, translation
-/// under gravity as its parabola. Deterministic: same calls, same bits, for any Jobs. Once warm, a step allocates nothing.
+/// Every body moves exactly over a step of any length: modes in closed form, the free rotation in closed form,
+/// translation under gravity as its parabola; held torques and the swing of bodies hung from a point or line are second
+/// order in the step (limber/dynamics/rigid_frame.h). Deterministic: same calls, same bits, for any Jobs. Once warm, a
+/// step allocates nothing. A World is used by one thread at a time; it spreads the work over its Jobs itself.
+///
+/// All functions throw InvalidArgument, and then change nothing, for an id that names no body, for numbers that are not
+/// finite, and for arrays of the wrong length.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +25,8 @@
 
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/dynamics/rigid_frame.h"
+#include "limber/dynamics/surface_point.h"
 #include "limber/model/modal_model.h"
 
 namespace limber {
@@ -32,51 +39,37 @@ struct BodyId {
 };
 
 struct WorldOptions {
-  double step = 1.0 / 60.0;            ///< s; > 0
-  Vec3 gravity = {0.0, 0.0, -9.80665}; ///< m/s², world
-  int max_steps_per_advance = 8;       ///< ≥ 1; time beyond this is dropped (and counted), so a slow frame cannot snowball
-  void validate() const;               ///< @throws InvalidArgument naming the field and its value
+  double step = 1.0 / 60.0;             ///< s; > 0
+  Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s², world
+  int max_steps_per_advance = 8;  ///< ≥ 1; time beyond this is dropped (and counted), so a slow frame cannot snowball
+  void validate() const;          ///< @throws InvalidArgument naming the field and its value
 };
 
 /// How a body starts. Velocities are of the body origin (docs/notation.md), world axes.
 struct BodyPlacement {
-  RigidTransform pose;                     ///< X_WB
-  Vec3 velocity = Vec3::Zero();            ///< m/s; for bodies with fixed nodes: of the attachment
-  Vec3 angular_velocity = Vec3::Zero();    ///< rad/s; kLine: its part along the line counts
-};
-
-/// Motion of the frame of a body with fixed nodes, as its animated parent has it at the end of the coming step. Within the
-/// step the accelerations are held. Rotations that the fixing leaves free stay dynamic: kPoint reads the translation only.
-struct KinematicFrame {
-  RigidTransform pose;
-  Vec3 velocity = Vec3::Zero(), acceleration = Vec3::Zero();                   ///< world, m/s, m/s²
-  Vec3 angular_velocity = Vec3::Zero(), angular_acceleration = Vec3::Zero();   ///< world, rad/s, rad/s²
+  RigidTransform pose{};         ///< X_WB
+  Vec3 velocity = Vec3::Zero();  ///< m/s; for bodies with fixed nodes: of what carries them
+  Vec3 angular_velocity =
+      Vec3::Zero();  ///< rad/s; kLine: its part along the line counts; kKinematic: of what carries it
 };
 
 enum class Axes { kWorld, kBody };
 
-/// A point of a body's surface: triangle and barycentric weights. A vertex v is any triangle that has it, weight 1.
-struct SurfacePoint {
-  enum class Surface { kRender, kCollision } surface = Surface::kCollision;
-  Index triangle = 0;
-  std::array<double, 3> weight{1.0, 0.0, 0.0};  ///< sums to 1
-};
-
 /// The state of one body, for reading. Valid until the world changes.
 struct BodyView {
-  RigidTransform pose;              ///< X_WB
-  Vec3 velocity;                    ///< of the body origin, world, m/s
-  Vec3 angular_velocity;            ///< world, rad/s
+  RigidTransform pose;                 ///< X_WB
+  Vec3 velocity;                       ///< of the body origin, world, m/s
+  Vec3 angular_velocity;               ///< world, rad/s
   std::span<const double> amplitudes;  ///< z, kg^½·m
   std::span<const double> rates;       ///< ż, kg^½·m/s
 };
 
 /// Mechanical energy of one body, J.
 struct BodyEnergy {
-  double kinetic_rigid = 0.0;   ///< translation and rotation of the frame
-  double potential = 0.0;       ///< −m g·x of the centre of mass of the rest shape
-  double kinetic_modal = 0.0;   ///< ½ Σ ż²
-  double elastic = 0.0;         ///< ½ Σ λ z²
+  double kinetic_rigid = 0.0;  ///< translation and rotation of the frame
+  double potential = 0.0;      ///< −m g·x of the centre of mass, deformed; 0 at the world's origin
+  double kinetic_modal = 0.0;  ///< ½ Σ ż²
+  double elastic = 0.0;        ///< ½ Σ λ z²
   double total() const { return kinetic_rigid + potential + kinetic_modal + elastic; }
 };
 
@@ -101,23 +94,32 @@ class World {
   void step();
   /// Fraction of a step left in the accumulator, in [0, 1): how far to draw between the last two states.
   double interpolation_factor() const;
-  double time() const;              ///< s: steps × step length
+  double time() const;  ///< s: steps × step length
   std::uint64_t step_count() const;
-  double dropped_seconds() const;   ///< real time given up by max_steps_per_advance
+  double dropped_seconds() const;  ///< real time given up by max_steps_per_advance
   const WorldOptions& options() const;
 
-  // Loads: forces are held over the next step, impulses act at its start, both at the deformed point -----------------
+  // Loads, all at the deformed point ----------------------------------------------------------------------------------
+  /// Held over the next step; several add up. World axes once applied: a force in body axes does not turn with the body
+  /// within the step.
   void apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, Axes axes = Axes::kWorld);
-  /// @param delay seconds after the step's start at which it acts; in [0, step). Exact for the modes; the frame gets it at the step's start.
-  void apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes = Axes::kWorld, double delay = 0.0);
+  /// Acts now, at the start of the next step: velocities change at once. @param delay seconds into the next step at
+  /// which the modes get it, in [0, step): exact for the modes; the frame gets it now.
+  void apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes = Axes::kWorld,
+                     double delay = 0.0);
+  /// Where the parent of a body with fixed nodes is at the end of the coming step. A body that is not told goes on at
+  /// its parent's velocity and angular velocity without acceleration; at rest unless told otherwise.
+  /// @throws InvalidArgument for a free body
   void set_kinematic_frame(BodyId id, const KinematicFrame& target);
 
   // State ------------------------------------------------------------------------------------------------------------
   BodyView body(BodyId id) const;
+  // What is set is the state before the last step too: nothing is drawn between. Velocities as in BodyPlacement.
   void set_pose(BodyId id, const RigidTransform& pose);
   void set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_velocity);
   void set_amplitudes(BodyId id, std::span<const double> amplitudes, std::span<const double> rates);
-  /// Displacements and velocities of all nodes, body frame, 3 per node: z₀ = WᵀM d₀. What no kept mode can show is lost.
+  /// Displacements and velocities of all nodes, body frame, 3 per node: z₀ = WᵀM d₀. What no kept mode can show is
+  /// lost.
   /// @throws InvalidArgument if the asset has no `volume` block (bake with --volume)
   void set_node_displacements(BodyId id, std::span<const double> displacements, std::span<const double> velocities);
   BodyEnergy energy(BodyId id) const;

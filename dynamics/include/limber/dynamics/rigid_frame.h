@@ -1,0 +1,116 @@
+/// @file limber/dynamics/rigid_frame.h
+/// How the frame of one body moves. Which law holds is decided by the nodes that were fixed at bake time (FrameMotion):
+///
+///   kFree       m v̇ = m g + F (exact parabola);  L̇ = τ (free rotation in closed form, torque by kicks)
+///   kPoint      L̇ = τ + R s × (g − a)            L about the pivot, which moves as the parent says
+///   kLine       eᵀIe θ̈ = eᵀ(Rᵀτ + s × Rᵀ(g − a) − I α − ω × I ω)    θ about the line, which the parent carries
+///   kKinematic  moves with the parent only
+///
+/// with R = R_WB, a, ω, α the parent's acceleration, angular velocity and acceleration (ω, α in body axes), and
+/// s = m c + Σ z_i p_i the first mass moment of the deformed body about its origin, body axes, kg·m.
+/// Torques are applied by Strang splitting, half a kick, the exact free motion, half a kick: second order in the step,
+/// symplectic, and |L| and the kinetic energy of an unloaded body are kept by the exact flow itself. A step without
+/// torque is exact for any length. Derivation: docs/derivations/rigid-frame.md.
+#pragma once
+
+#include <cstdint>
+
+#include "limber/core/rigid_transform.h"
+#include "limber/dynamics/free_rotation.h"
+#include "limber/model/modal_model.h"
+
+namespace limber {
+
+/// Motion of what carries a body with fixed nodes (its animated parent), as it is at the end of the coming step. Within
+/// the step its accelerations are held. kPoint reads the translation only: its rotation is dynamic. kLine turns about
+/// the line as the parent carries it. kFree has no parent.
+struct KinematicFrame {
+  RigidTransform pose{};                                                      ///< X_WK; K = B where θ = 0
+  Vec3 velocity = Vec3::Zero(), acceleration = Vec3::Zero();                  ///< of the body origin; world, m/s, m/s²
+  Vec3 angular_velocity = Vec3::Zero(), angular_acceleration = Vec3::Zero();  ///< world, rad/s, rad/s²
+};
+
+/// The part of a model that its frame needs; never changes, shared by all instances.
+struct FrameConstants {
+  FrameMotion motion = FrameMotion::kFree;
+  double mass = 1.0;                   ///< kg
+  Vec3 center_of_mass = Vec3::Zero();  ///< body frame, m
+  Mat3 inertia = Mat3::Identity();     ///< about the body origin, body axes, kg·m²
+  Vec3 line_axis = Vec3::UnitX();      ///< e, body frame
+  PrincipalInertia principal;          ///< of `inertia`
+
+  explicit FrameConstants(const ModalModelData& body);
+};
+
+/// What acts on a frame over one step, held.
+struct FrameLoad {
+  Vec3 gravity = Vec3::Zero();  ///< world, m/s²
+  Vec3 force = Vec3::Zero();    ///< world, N
+  Vec3 torque = Vec3::Zero();   ///< about the body origin, world, N·m
+};
+
+/// What the modes of a body with fixed nodes feel of its frame over one step, in body axes: the mean of the values at
+/// the step's two ends.
+struct FrameExcitation {
+  Vec3 field = Vec3::Zero();                 ///< Rᵀ(g − a), m/s²
+  Vec3 angular_acceleration = Vec3::Zero();  ///< α, rad/s²
+  Mat3 spin = Mat3::Zero();                  ///< ω ωᵀ of the parent, rad²/s²
+};
+
+/// The state of one frame. Plain data of fixed size; nothing allocates or throws. Arguments are finite (the caller's
+/// care) and the same constants are passed in every call.
+class RigidFrame {
+ public:
+  /// @param velocity of the body origin; for a body with fixed nodes of its parent, which keeps it until told otherwise
+  /// @param angular_velocity kFree, kPoint: of the body; kLine: its part along the line, as θ̇; kKinematic: of the
+  /// parent
+  RigidFrame(const FrameConstants& c, const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity);
+
+  const RigidTransform& pose() const { return pose_; }
+  const Vec3& velocity() const { return velocity_; }     ///< of the body origin, world
+  Vec3 angular_velocity(const FrameConstants& c) const;  ///< world
+  Vec3 angular_momentum(const FrameConstants& c) const;  ///< R I Rᵀω, world, about the body origin
+  Vec3 linear_momentum(const FrameConstants& c) const;   ///< m (v + ω × R c), world
+  double kinetic_energy(const FrameConstants& c) const;  ///< ½m v² + m v·(ω × R c) + ½ωᵀR I Rᵀω, J
+
+  /// Moves the body; momenta stay. For kLine, θ = 0 there.
+  void set_pose(const RigidTransform& X_WB);
+  /// Arguments as in the constructor.
+  void set_velocity(const FrameConstants& c, const Vec3& velocity, const Vec3& angular_velocity);
+  /// Where the parent is at the end of the coming step. Without a new one it goes on at its velocity and angular
+  /// velocity.
+  void set_parent(const KinematicFrame& at_step_end);
+
+  /// @param impulse N·s, world @param moment about the body origin, N·m·s, world. What the fixing takes up has no
+  /// effect.
+  void apply_impulse(const FrameConstants& c, const Vec3& impulse, const Vec3& moment);
+
+  /// One step is begin_step(), the modes' own step, end_step(): the modes are shaken by what begin_step() returns and
+  /// move the first moment s that the second kick sees.
+  FrameExcitation begin_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h);
+  void end_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h);
+
+ private:
+  void kick(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double seconds);
+  void rotate_freely(const FrameConstants& c, double h);
+  void hold_parent_accelerations();
+  void move_parent(double h);
+  void add_excitation(const FrameConstants& c, const Vec3& gravity, FrameExcitation& sum) const;
+  Vec3 line_in_world(const FrameConstants& c) const { return pose_.q * c.line_axis; }
+
+  RigidTransform pose_;
+  Vec3 velocity_;
+  // kFree, kPoint: the momentum is the state; attitudes come from the rotation since the last disturbance.
+  Vec3 momentum_ = Vec3::Zero();  // world
+  FreeRotation rotation_;
+  double rotation_step_ = 0.0;
+  std::int64_t rotation_steps_ = 0;
+  bool disturbed_ = true;
+  // Bodies with fixed nodes: their parent now and, where it was told, at the end of the coming step; kLine's angle in
+  // it.
+  KinematicFrame parent_, next_parent_;
+  bool parent_was_set_ = false;
+  double angle_ = 0.0, angle_rate_ = 0.0;
+};
+
+}  // namespace limber

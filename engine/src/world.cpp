@@ -1,0 +1,423 @@
+#include "limber/engine/world.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "limber/core/error.h"
+#include "limber/dynamics/body_group.h"
+#include "limber/dynamics/reconstruct.h"
+
+namespace limber {
+namespace {
+
+// Bodies advanced as one job: about 10 µs of work, so that handing it out costs little.
+constexpr Index kBodiesPerJob = 64;
+
+bool finite(const Quaternion& q) { return std::isfinite(q.w + q.x + q.y + q.z); }
+
+void require_finite(const Vec3& v, const char* function, const char* what) {
+  if (!v.allFinite())
+    throw InvalidArgument(std::string("World::") + function + ": " + what + " is (" + std::to_string(v.x()) + ", " +
+                          std::to_string(v.y()) + ", " + std::to_string(v.z()) + "), expected finite numbers");
+}
+
+void require_finite(std::span<const double> values, const char* function, const char* what) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw InvalidArgument(std::string("World::") + function + ": " + what + "[" + std::to_string(i) + "] is " +
+                            std::to_string(values[i]) + ", expected a finite number");
+}
+
+void require_pose(const RigidTransform& X, const char* function) {
+  require_finite(X.p, function, "the pose's position");
+  if (!finite(X.q) || !(std::abs(X.q.norm() - 1.0) <= 1e-3))
+    throw InvalidArgument(std::string("World::") + function + ": the pose's quaternion has norm " +
+                          std::to_string(X.q.norm()) + ", expected 1; call normalized() on it");
+}
+
+void require_count(std::size_t seen, std::size_t expected, const char* function, const char* what) {
+  if (seen != expected)
+    throw InvalidArgument(std::string("World::") + function + ": " + what + " has " + std::to_string(seen) +
+                          " elements, expected " + std::to_string(expected));
+}
+
+void require_fraction(double s, const char* function) {
+  if (!(s >= 0.0 && s <= 1.0))
+    throw InvalidArgument(std::string("World::") + function + ": interpolation is " + std::to_string(s) +
+                          ", expected 0 to 1");
+}
+
+/// FNV-1a over the bits of doubles.
+class Hash {
+ public:
+  void add(double x) { add(std::bit_cast<std::uint64_t>(x)); }
+  void add(std::uint64_t bits) {
+    for (int byte = 0; byte < 8; ++byte) value_ = (value_ ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3ull;
+  }
+  void add(const Vec3& v) { add(v.x()), add(v.y()), add(v.z()); }
+  void add(const Quaternion& q) { add(q.w), add(q.x), add(q.y), add(q.z); }
+  void add(std::span<const double> values) {
+    for (const double x : values) add(x);
+  }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325ull;
+};
+
+}  // namespace
+
+void WorldOptions::validate() const {
+  if (!(step > 0.0 && step <= 1e100))
+    throw InvalidArgument("WorldOptions: step is " + std::to_string(step) + " s, expected more than 0, at most 1e100");
+  if (!gravity.allFinite()) throw InvalidArgument("WorldOptions: gravity is not finite");
+  if (max_steps_per_advance < 1)
+    throw InvalidArgument("WorldOptions: max_steps_per_advance is " + std::to_string(max_steps_per_advance) +
+                          ", expected at least 1");
+}
+
+struct World::Impl {
+  /// What a BodyId's index names.
+  struct Entry {
+    std::uint32_t generation = 1;
+    bool alive = false;
+    Index group = 0, slot = 0;
+  };
+  /// Slots [begin, end) of a group: what one job advances.
+  struct Range {
+    Index group, begin, end;
+  };
+
+  WorldOptions options;
+  Jobs* jobs;
+  std::vector<Entry> entries;
+  std::vector<std::uint32_t> vacant_entries;
+  std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
+  std::vector<Range> ranges;                       // covers all slots of all groups
+  std::size_t alive = 0;
+  std::uint64_t steps = 0;
+  double accumulator = 0.0, dropped = 0.0;
+  mutable std::vector<double> drawn_amplitudes;  // scratch of interpolated drawing
+
+  const Entry& entry(BodyId id, const char* function) const {
+    if (!contains(id))
+      throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) + " (generation " +
+                            std::to_string(id.generation) +
+                            ") does not exist; it was removed or belongs to another world");
+    return entries[id.index];
+  }
+  bool contains(BodyId id) const {
+    return id.index < entries.size() && entries[id.index].alive && entries[id.index].generation == id.generation;
+  }
+  BodyGroup& group(const Entry& e) const { return *groups[static_cast<std::size_t>(e.group)]; }
+
+  Index group_of(const std::shared_ptr<const ModalModel>& model);
+  void make_ranges();
+  void advance_all();
+  std::span<const double> drawn(const BodyGroup& group, Index slot, double s) const;
+};
+
+/// The group of a model's instances, a new one if it has none.
+Index World::Impl::group_of(const std::shared_ptr<const ModalModel>& model) {
+  const auto same = [&](const auto& g) { return g && &g->model() == model.get(); };
+  auto found = std::find_if(groups.begin(), groups.end(), same);
+  if (found == groups.end()) {
+    auto made = std::make_unique<BodyGroup>(model, options.step);
+    found = std::find(groups.begin(), groups.end(), nullptr);
+    if (found == groups.end()) found = groups.insert(groups.end(), nullptr);
+    *found = std::move(made);
+  }
+  return static_cast<Index>(found - groups.begin());
+}
+
+void World::Impl::make_ranges() {
+  ranges.clear();
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (Index begin = 0; groups[g] && begin < groups[g]->slots(); begin += kBodiesPerJob)
+      ranges.push_back({static_cast<Index>(g), begin, std::min(begin + kBodiesPerJob, groups[g]->slots())});
+}
+
+void World::Impl::advance_all() {
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  jobs->parallel_for(ranges.size(), 1, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r)
+      groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
+  });
+}
+
+/// Amplitudes between the last two states. Valid until the next call.
+std::span<const double> World::Impl::drawn(const BodyGroup& g, Index slot, double s) const {
+  const std::span<const double> newest = g.amplitudes(slot), previous = g.previous_amplitudes(slot);
+  if (s == 1.0) return newest;
+  if (drawn_amplitudes.size() < newest.size()) drawn_amplitudes.resize(newest.size());
+  for (std::size_t i = 0; i < newest.size(); ++i) drawn_amplitudes[i] = previous[i] + s * (newest[i] - previous[i]);
+  return {drawn_amplitudes.data(), newest.size()};
+}
+
+World::World(const WorldOptions& options, Jobs& jobs) : impl_(std::make_unique<Impl>()) {
+  options.validate();
+  impl_->options = options;
+  impl_->jobs = &jobs;
+}
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+// Bodies --------------------------------------------------------------------------------------------------------------
+
+BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement) {
+  if (!model) throw InvalidArgument("World::add_body: the model is null");
+  require_pose(placement.pose, "add_body");
+  require_finite(placement.velocity, "add_body", "velocity");
+  require_finite(placement.angular_velocity, "add_body", "angular velocity");
+  const Index group = impl_->group_of(model);
+  const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
+                                                                         placement.angular_velocity);
+  if (impl_->vacant_entries.empty()) {
+    impl_->entries.emplace_back();
+    impl_->vacant_entries.reserve(impl_->entries.size());  // so that remove_body() cannot fail
+    impl_->vacant_entries.push_back(static_cast<std::uint32_t>(impl_->entries.size() - 1));
+  }
+  const std::uint32_t index = impl_->vacant_entries.back();
+  impl_->vacant_entries.pop_back();
+  Impl::Entry& entry = impl_->entries[index];
+  entry.alive = true, entry.group = group, entry.slot = slot;
+  ++impl_->alive;
+  impl_->make_ranges();
+  return {index, entry.generation};
+}
+
+void World::remove_body(BodyId id) {
+  const Impl::Entry& known = impl_->entry(id, "remove_body");
+  BodyGroup& group = impl_->group(known);
+  group.remove(known.slot);
+  if (group.count() == 0) {  // lets go of the model
+    impl_->groups[static_cast<std::size_t>(known.group)].reset();
+    impl_->make_ranges();
+  }
+  Impl::Entry& entry = impl_->entries[id.index];
+  entry.alive = false;
+  --impl_->alive;
+  // An index whose generations are used up is never given again.
+  if (++entry.generation != 0) impl_->vacant_entries.push_back(id.index);
+}
+
+bool World::contains(BodyId id) const { return impl_->contains(id); }
+std::size_t World::body_count() const { return impl_->alive; }
+const ModalModel& World::model(BodyId id) const { return impl_->group(impl_->entry(id, "model")).model(); }
+
+// Time ----------------------------------------------------------------------------------------------------------------
+
+int World::advance(double real_seconds) {
+  if (!(real_seconds >= 0.0 && std::isfinite(real_seconds)))
+    throw InvalidArgument("World::advance: real_seconds is " + std::to_string(real_seconds) +
+                          ", expected a finite number of at least 0");
+  const double h = impl_->options.step;
+  impl_->accumulator += real_seconds;
+  const double wanted = std::floor(impl_->accumulator / h);
+  const double taken = std::min(wanted, static_cast<double>(impl_->options.max_steps_per_advance));
+  impl_->accumulator = std::clamp(std::fmod(impl_->accumulator, h), 0.0, std::nextafter(h, 0.0));
+  impl_->dropped += (wanted - taken) * h;
+  for (int i = 0; i < static_cast<int>(taken); ++i) step();
+  return static_cast<int>(taken);
+}
+
+void World::step() {
+  impl_->advance_all();
+  ++impl_->steps;
+}
+
+double World::interpolation_factor() const { return impl_->accumulator / impl_->options.step; }
+double World::time() const { return static_cast<double>(impl_->steps) * impl_->options.step; }
+std::uint64_t World::step_count() const { return impl_->steps; }
+double World::dropped_seconds() const { return impl_->dropped; }
+const WorldOptions& World::options() const { return impl_->options; }
+
+// Loads ---------------------------------------------------------------------------------------------------------------
+
+void World::apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, Axes axes) {
+  const Impl::Entry& e = impl_->entry(id, "apply_force");
+  BodyGroup& group = impl_->group(e);
+  validate(group.model(), at);
+  require_finite(newtons, "apply_force", "the force");
+  group.apply_force(e.slot, at, axes == Axes::kWorld ? newtons : group.frame(e.slot).pose().q * newtons);
+}
+
+void World::apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes, double delay) {
+  const Impl::Entry& e = impl_->entry(id, "apply_impulse");
+  BodyGroup& group = impl_->group(e);
+  validate(group.model(), at);
+  require_finite(newton_seconds, "apply_impulse", "the impulse");
+  if (!(delay >= 0.0 && delay < impl_->options.step))
+    throw InvalidArgument("World::apply_impulse: delay is " + std::to_string(delay) +
+                          " s, expected from 0 to less than " + std::to_string(impl_->options.step));
+  const Vec3 impulse_W = axes == Axes::kWorld ? newton_seconds : group.frame(e.slot).pose().q * newton_seconds;
+  group.apply_impulse(e.slot, at, impulse_W, delay);
+}
+
+void World::set_kinematic_frame(BodyId id, const KinematicFrame& target) {
+  const Impl::Entry& e = impl_->entry(id, "set_kinematic_frame");
+  BodyGroup& group = impl_->group(e);
+  if (group.frame_constants().motion == FrameMotion::kFree)
+    throw InvalidArgument("World::set_kinematic_frame: body " + std::to_string(id.index) + " (\"" +
+                          group.model().name() +
+                          "\") has no fixed nodes and moves freely; use set_pose and set_velocity");
+  require_pose(target.pose, "set_kinematic_frame");
+  require_finite(target.velocity, "set_kinematic_frame", "velocity");
+  require_finite(target.acceleration, "set_kinematic_frame", "acceleration");
+  require_finite(target.angular_velocity, "set_kinematic_frame", "angular velocity");
+  require_finite(target.angular_acceleration, "set_kinematic_frame", "angular acceleration");
+  group.set_parent(e.slot, target);
+}
+
+// State ---------------------------------------------------------------------------------------------------------------
+
+BodyView World::body(BodyId id) const {
+  const Impl::Entry& e = impl_->entry(id, "body");
+  const BodyGroup& group = impl_->group(e);
+  const RigidFrame& frame = group.frame(e.slot);
+  return {frame.pose(), frame.velocity(), frame.angular_velocity(group.frame_constants()), group.amplitudes(e.slot),
+          group.rates(e.slot)};
+}
+
+void World::set_pose(BodyId id, const RigidTransform& pose) {
+  const Impl::Entry& e = impl_->entry(id, "set_pose");
+  require_pose(pose, "set_pose");
+  impl_->group(e).set_pose(e.slot, pose);
+}
+
+void World::set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_velocity) {
+  const Impl::Entry& e = impl_->entry(id, "set_velocity");
+  require_finite(velocity, "set_velocity", "velocity");
+  require_finite(angular_velocity, "set_velocity", "angular velocity");
+  impl_->group(e).set_velocity(e.slot, velocity, angular_velocity);
+}
+
+void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::span<const double> rates) {
+  const Impl::Entry& e = impl_->entry(id, "set_amplitudes");
+  const auto modes = static_cast<std::size_t>(impl_->group(e).model().modes());
+  require_count(amplitudes.size(), modes, "set_amplitudes", "amplitudes");
+  require_count(rates.size(), modes, "set_amplitudes", "rates");
+  require_finite(amplitudes, "set_amplitudes", "amplitudes");
+  require_finite(rates, "set_amplitudes", "rates");
+  impl_->group(e).set_amplitudes(e.slot, amplitudes, rates);
+}
+
+void World::set_node_displacements(BodyId id, std::span<const double> displacements,
+                                   std::span<const double> velocities) {
+  const Impl::Entry& e = impl_->entry(id, "set_node_displacements");
+  const ModalModel& model = impl_->group(e).model();
+  if (!model.data().volume_block)
+    throw InvalidArgument("World::set_node_displacements: \"" + model.name() +
+                          "\" has no volume block; bake it with --volume");
+  const ModalBasis& MW = model.data().volume_block->mass_times_basis;
+  const std::size_t numbers = 3 * static_cast<std::size_t>(MW.vertices());
+  require_count(displacements.size(), numbers, "set_node_displacements", "displacements");
+  require_count(velocities.size(), numbers, "set_node_displacements", "velocities");
+  require_finite(displacements, "set_node_displacements", "displacements");
+  require_finite(velocities, "set_node_displacements", "velocities");
+  const auto project = [&](std::span<const double> d) {  // (MW)ᵀ d
+    std::vector<double> z(static_cast<std::size_t>(model.modes()), 0.0);
+    for (Index node = 0; node < MW.vertices(); ++node) {
+      const Vec3 d_node = Eigen::Map<const Vec3>(d.data() + 3 * static_cast<std::size_t>(node));
+      for (std::size_t i = 0; i < z.size(); ++i)
+        z[i] += MW.shape(node, static_cast<Index>(i)).cast<double>().dot(d_node);
+    }
+    return z;
+  };
+  impl_->group(e).set_amplitudes(e.slot, project(displacements), project(velocities));
+}
+
+BodyEnergy World::energy(BodyId id) const {
+  const Impl::Entry& e = impl_->entry(id, "energy");
+  const BodyGroup& group = impl_->group(e);
+  const FrameConstants& c = group.frame_constants();
+  const RigidFrame& frame = group.frame(e.slot);
+  const std::span<const double> z = group.amplitudes(e.slot), rates = group.rates(e.slot);
+  const Vec3 mass_times_center = c.mass * frame.pose().p + frame.pose().q * group.first_moment(e.slot);
+  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(c),
+                    .potential = -impl_->options.gravity.dot(mass_times_center)};
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    energy.kinetic_modal += 0.5 * rates[i] * rates[i];
+    energy.elastic += 0.5 * group.model().data().eigenvalues[i] * z[i] * z[i];
+  }
+  return energy;
+}
+
+Vec3 World::angular_momentum(BodyId id) const {
+  const Impl::Entry& e = impl_->entry(id, "angular_momentum");
+  return impl_->group(e).frame(e.slot).angular_momentum(impl_->group(e).frame_constants());
+}
+
+Vec3 World::linear_momentum(BodyId id) const {
+  const Impl::Entry& e = impl_->entry(id, "linear_momentum");
+  return impl_->group(e).frame(e.slot).linear_momentum(impl_->group(e).frame_constants());
+}
+
+Vec3 World::position(BodyId id, const SurfacePoint& at) const {
+  const Impl::Entry& e = impl_->entry(id, "position");
+  validate(impl_->group(e).model(), at);
+  return impl_->group(e).position(e.slot, at);
+}
+
+Vec3 World::velocity(BodyId id, const SurfacePoint& at) const {
+  const Impl::Entry& e = impl_->entry(id, "velocity");
+  validate(impl_->group(e).model(), at);
+  return impl_->group(e).velocity(e.slot, at);
+}
+
+// Drawing -------------------------------------------------------------------------------------------------------------
+
+void World::reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation,
+                        const Vec3& origin) const {
+  const Impl::Entry& e = impl_->entry(id, "reconstruct");
+  const BodyGroup& group = impl_->group(e);
+  const std::size_t numbers = 3 * static_cast<std::size_t>(group.model().render().vertices());
+  require_count(positions.size(), numbers, "reconstruct", "positions");
+  if (!normals.empty()) require_count(normals.size(), numbers, "reconstruct", "normals");
+  require_finite(origin, "reconstruct", "origin");
+  RigidTransform X_OB = interpolated_pose(id, interpolation);
+  X_OB.p -= origin;
+  const ReconstructionTarget target{X_OB, impl_->drawn(group, e.slot, interpolation).data(), positions.data(),
+                                    normals.empty() ? nullptr : normals.data()};
+  limber::reconstruct(group.model().render(), {&target, 1}, *impl_->jobs);
+}
+
+RigidTransform World::interpolated_pose(BodyId id, double interpolation) const {
+  const Impl::Entry& e = impl_->entry(id, "interpolated_pose");
+  require_fraction(interpolation, "interpolated_pose");
+  const RigidTransform& newest = impl_->group(e).frame(e.slot).pose();
+  if (interpolation == 1.0) return newest;
+  const RigidTransform& previous = impl_->group(e).previous_pose(e.slot);
+  return {slerp(previous.q, newest.q, interpolation), previous.p + interpolation * (newest.p - previous.p)};
+}
+
+void World::interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const {
+  const Impl::Entry& e = impl_->entry(id, "interpolated_amplitudes");
+  require_fraction(interpolation, "interpolated_amplitudes");
+  const std::span<const double> z = impl_->drawn(impl_->group(e), e.slot, interpolation);
+  require_count(amplitudes.size(), z.size(), "interpolated_amplitudes", "amplitudes");
+  std::transform(z.begin(), z.end(), amplitudes.begin(), [](double x) { return static_cast<float>(x); });
+}
+
+std::uint64_t World::state_hash() const {
+  Hash hash;
+  hash.add(impl_->steps);
+  for (const Impl::Entry& e : impl_->entries) {
+    hash.add(std::uint64_t{e.generation});
+    if (!e.alive) continue;
+    const BodyGroup& group = impl_->group(e);
+    const RigidFrame& frame = group.frame(e.slot);
+    hash.add(frame.pose().q);
+    hash.add(frame.pose().p);
+    hash.add(frame.linear_momentum(group.frame_constants()));
+    hash.add(frame.angular_momentum(group.frame_constants()));
+    hash.add(group.amplitudes(e.slot));
+    hash.add(group.rates(e.slot));
+  }
+  return hash.value();
+}
+
+}  // namespace limber
