@@ -1,6 +1,7 @@
 #include "reconstruct_kernels.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reconstruct_kernels.cpp"
@@ -27,33 +28,79 @@ constexpr std::size_t kGroup = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 
 constexpr std::size_t kPrefetch = 2048 / sizeof(float);
 constexpr std::size_t kLine = 64 / sizeof(float);
 
-// p = R (rest + u) + t for kLanes vertices from `vertex` on; the surface's last vertices go through a buffer, so that
-// nothing is written (or read) past the end.
-HWY_INLINE HWY_ATTR void StoreTransformed(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
-                                          Vector ux, Vector uy, Vector uz) {
-  const Floats d;
-  const float* rest = range.rest + 3 * vertex;
-  float* positions = out.positions + 3 * vertex;
-  const bool partial = vertex + kLanes > range.vertices;
-  HWY_ALIGN float buffer[3 * kLanes] = {};
-  if (HWY_UNLIKELY(partial)) {
-    std::copy_n(rest, 3 * (range.vertices - vertex), buffer);
-    rest = buffer;
-  }
+struct Points {
   Vector x, y, z;
-  hn::LoadInterleaved3(d, rest, x, y, z);
-  x = hn::Add(x, ux), y = hn::Add(y, uy), z = hn::Add(z, uz);
-  const auto row = [&](const float* r, float t) HWY_ATTR {
-    return hn::MulAdd(hn::Set(d, r[0]), x,
-                      hn::MulAdd(hn::Set(d, r[1]), y, hn::MulAdd(hn::Set(d, r[2]), z, hn::Set(d, t))));
-  };
-  const Vector px = row(out.rotation, out.translation[0]);
-  const Vector py = row(out.rotation + 3, out.translation[1]);
-  const Vector pz = row(out.rotation + 6, out.translation[2]);
-  if (HWY_LIKELY(!partial)) {
-    hn::StoreInterleaved3(px, py, pz, d, positions);
+};
+
+// kLanes rest positions from `vertex` on; past the surface's last vertex nothing is read.
+HWY_INLINE HWY_ATTR Points LoadRest(const TileRange& range, std::size_t vertex) {
+  const Floats d;
+  Points p;
+  if (HWY_LIKELY(vertex + kLanes <= range.vertices)) {
+    hn::LoadInterleaved3(d, range.rest + 3 * vertex, p.x, p.y, p.z);
   } else {
-    hn::StoreInterleaved3(px, py, pz, d, buffer);
+    HWY_ALIGN float buffer[3 * kLanes] = {};
+    std::copy_n(range.rest + 3 * vertex, 3 * (range.vertices - vertex), buffer);
+    hn::LoadInterleaved3(d, buffer, p.x, p.y, p.z);
+  }
+  return p;
+}
+
+// Stores kLanes points as x y z x y z … in three vectors. Component c of point e belongs to lane (3e + c) mod kLanes of
+// one of them, and as kLanes is no multiple of 3, the points of one component all belong to different lanes: so one
+// permutation per component, and selections by lane. (Highway's own takes three times as many shuffles at 512 bits.)
+class Interleave {
+ public:
+  HWY_INLINE HWY_ATTR Interleave() : order_{Order(0), Order(1), Order(2)}, first_(Lanes(0)), second_(Lanes(1)) {}
+
+  HWY_INLINE HWY_ATTR void Store(const Points& p, float* to) const {
+    const Floats d;
+    const Vector part[3] = {hn::TableLookupLanes(p.x, order_[0]), hn::TableLookupLanes(p.y, order_[1]),
+                            hn::TableLookupLanes(p.z, order_[2])};
+    for (std::size_t v = 0; v < 3; ++v) {
+      const std::size_t c = v * kLanes;  // lane i holds component (c + i) mod 3
+      hn::StoreU(hn::IfThenElse(first_, part[c % 3], hn::IfThenElse(second_, part[(c + 1) % 3], part[(c + 2) % 3])), d,
+                 to + v * kLanes);
+    }
+  }
+
+ private:
+  using Indices = decltype(hn::SetTableIndices(Floats(), static_cast<const std::int32_t*>(nullptr)));
+  using LaneMask = hn::Mask<Floats>;
+
+  static HWY_INLINE HWY_ATTR Indices Order(std::size_t component) {
+    HWY_ALIGN std::int32_t point_of_lane[kLanes];
+    for (std::size_t e = 0; e < kLanes; ++e) point_of_lane[(3 * e + component) % kLanes] = static_cast<std::int32_t>(e);
+    return hn::SetTableIndices(Floats(), point_of_lane);
+  }
+  // The lanes whose number is `remainder` modulo 3.
+  static HWY_INLINE HWY_ATTR LaneMask Lanes(std::size_t remainder) {
+    const Floats d;
+    HWY_ALIGN float is[kLanes];
+    for (std::size_t i = 0; i < kLanes; ++i) is[i] = i % 3 == remainder ? 1.0f : 0.0f;
+    return hn::Gt(hn::Load(d, is), hn::Zero(d));
+  }
+
+  Indices order_[3];
+  LaneMask first_, second_;
+};
+
+// R p + t → positions of kLanes vertices from `vertex` on; past the surface's last vertex nothing is written.
+HWY_INLINE HWY_ATTR void StoreTransformed(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
+                                          const Points& p, const Interleave& interleave) {
+  const Floats d;
+  const auto row = [&](const float* r, float t) HWY_ATTR {
+    return hn::MulAdd(hn::Set(d, r[0]), p.x,
+                      hn::MulAdd(hn::Set(d, r[1]), p.y, hn::MulAdd(hn::Set(d, r[2]), p.z, hn::Set(d, t))));
+  };
+  const Points q{row(out.rotation, out.translation[0]), row(out.rotation + 3, out.translation[1]),
+                 row(out.rotation + 6, out.translation[2])};
+  float* positions = out.positions + 3 * vertex;
+  if (HWY_LIKELY(vertex + kLanes <= range.vertices)) {
+    interleave.Store(q, positions);
+  } else {
+    HWY_ALIGN float buffer[3 * kLanes];
+    interleave.Store(q, buffer);
     std::copy_n(buffer, 3 * (range.vertices - vertex), positions);
   }
 }
@@ -77,9 +124,13 @@ HWY_INLINE HWY_ATTR void ManyInstances(const TileRange& range, std::size_t tile,
       u[3 * i + 2] = hn::MulAdd(z, a, u[3 * i + 2]);
     }
   }
+  const std::size_t vertex = tile * kTileVertices + lane;
+  const Points rest = LoadRest(range, vertex);
+  const Interleave interleave;
   for (std::size_t i = 0; i < N; ++i)
-    StoreTransformed(range, range.outputs[first + i], tile * kTileVertices + lane, u[3 * i], u[3 * i + 1],
-                     u[3 * i + 2]);
+    StoreTransformed(range, range.outputs[first + i], vertex,
+                     {hn::Add(rest.x, u[3 * i]), hn::Add(rest.y, u[3 * i + 1]), hn::Add(rest.z, u[3 * i + 2])},
+                     interleave);
 }
 
 // A whole tile of one instance: bound by the stream of shapes, which is prefetched.
@@ -95,10 +146,15 @@ HWY_INLINE HWY_ATTR void OneInstance(const TileRange& range, std::size_t tile, s
     const Vector a = hn::Set(d, *amplitude);
     for (std::size_t i = 0; i < 3 * kParts; ++i) u[i] = hn::MulAdd(hn::Load(d, shape + i * kLanes), a, u[i]);
   }
+  const Interleave interleave;
   for (std::size_t part = 0; part < kParts; ++part) {
     const std::size_t vertex = tile * kTileVertices + part * kLanes;
-    if (vertex < range.vertices)
-      StoreTransformed(range, range.outputs[instance], vertex, u[part], u[kParts + part], u[2 * kParts + part]);
+    if (vertex >= range.vertices) break;
+    const Points rest = LoadRest(range, vertex);
+    StoreTransformed(
+        range, range.outputs[instance], vertex,
+        {hn::Add(rest.x, u[part]), hn::Add(rest.y, u[kParts + part]), hn::Add(rest.z, u[2 * kParts + part])},
+        interleave);
   }
 }
 
