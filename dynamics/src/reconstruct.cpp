@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
 #include <string>
 
@@ -114,19 +113,10 @@ void add_area_normals(std::span<const Triangle> triangles, const float* p, float
   }
 }
 
-void normalize(float* n) {
-  // In double, where the squares of a small mesh's areas do not vanish.
-  const double x = n[0], y = n[1], z = n[2], squared = x * x + y * y + z * z;
-  const double scale = 1.0 / std::sqrt(squared);
-  n[0] = squared > 0.0 ? static_cast<float>(x * scale) : 0.0f;
-  n[1] = squared > 0.0 ? static_cast<float>(y * scale) : 0.0f;
-  n[2] = squared > 0.0 ? static_cast<float>(z * scale) : 1.0f;
-}
-
 void unchecked_vertex_normals(std::span<const Triangle> triangles, const float* positions, std::span<float> normals) {
   std::fill(normals.begin(), normals.end(), 0.0f);
   add_area_normals(triangles, positions, normals.data());
-  for (std::size_t i = 0; i < normals.size(); i += 3) normalize(&normals[i]);
+  normalize_vectors(normals.data(), normals.size() / 3);
 }
 
 /// The normals of the targets that want them, one target after another.

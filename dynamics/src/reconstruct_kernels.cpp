@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reconstruct_kernels.cpp"
@@ -174,6 +175,30 @@ HWY_ATTR void ReconstructTiles(const TileRange& range) {
   }
 }
 
+HWY_INLINE HWY_ATTR void NormalizeLanes(const Interleave& interleave, float* vectors) {
+  const Floats d;
+  Points n;
+  hn::LoadInterleaved3(d, vectors, n.x, n.y, n.z);
+  const Vector squared = hn::MulAdd(n.x, n.x, hn::MulAdd(n.y, n.y, hn::Mul(n.z, n.z)));
+  const auto some = hn::Ge(squared, hn::Set(d, std::numeric_limits<float>::min()));
+  const Vector one = hn::Set(d, 1.0f);
+  const Vector scale = hn::Div(one, hn::Sqrt(hn::IfThenElse(some, squared, one)));
+  interleave.Store({hn::IfThenElseZero(some, hn::Mul(n.x, scale)), hn::IfThenElseZero(some, hn::Mul(n.y, scale)),
+                    hn::IfThenElse(some, hn::Mul(n.z, scale), one)},
+                   vectors);
+}
+
+HWY_ATTR void NormalizeVectors(float* vectors, std::size_t count) {
+  const Interleave interleave;
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) NormalizeLanes(interleave, vectors + 3 * i);
+  if (i == count) return;
+  HWY_ALIGN float buffer[3 * kLanes] = {};
+  std::copy_n(vectors + 3 * i, 3 * (count - i), buffer);
+  NormalizeLanes(interleave, buffer);
+  std::copy_n(buffer, 3 * (count - i), vectors + 3 * i);
+}
+
 }  // namespace limber::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -181,8 +206,11 @@ HWY_AFTER_NAMESPACE();
 namespace limber {
 
 HWY_EXPORT(ReconstructTiles);
+HWY_EXPORT(NormalizeVectors);
 
 void reconstruct_tiles(const TileRange& range) { HWY_DYNAMIC_DISPATCH(ReconstructTiles)(range); }
+
+void normalize_vectors(float* vectors, std::size_t count) { HWY_DYNAMIC_DISPATCH(NormalizeVectors)(vectors, count); }
 
 }  // namespace limber
 #endif  // HWY_ONCE

@@ -29,4 +29,7 @@ struct TileRange {
 /// Each vertex gets the same operations in the same order whatever shares its block, so the same bits.
 void reconstruct_tiles(const TileRange& range);
 
+/// n ← n/|n| for xyz vectors in a row; (0, 0, 1) where |n|² vanishes in single precision.
+void normalize_vectors(float* vectors, std::size_t count);
+
 }  // namespace limber

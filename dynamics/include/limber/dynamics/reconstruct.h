@@ -19,17 +19,24 @@ namespace limber {
 /// One instance to reconstruct.
 struct ReconstructionTarget {
   RigidTransform X_OB;  ///< body in the output frame O (world less an origin, or identity for body frame)
-  const double* amplitudes = nullptr;  ///< k, z
+  const double* amplitudes = nullptr;  ///< k, z, kg^½·m; may be null where k = 0
   float* positions = nullptr;          ///< out: 3V, xyz per vertex; m
   float* normals = nullptr;  ///< out, optional: 3V unit normals of the deformed surface, area-weighted; null: none
 };
 
-/// @throws InvalidArgument if a required pointer is null.
+/// Writes the vertices (and normals) of every target; arrays of different targets must not overlap. Does not allocate
+/// but in what `jobs` does. The result has the same bits however targets are grouped and whatever `jobs` does.
+///
+/// Error against real arithmetic, with u = 2⁻²⁴: (k + 4) u Σ|z_m||shape_m| of the sum, and 8u (|rest| +
+/// Σ|z_m||shape_m|) + 2u|t| of the rigid motion. The displacement is summed by itself and the rest position added last.
+/// @throws InvalidArgument if a required pointer is null, basis and rest shape differ in their vertices, the basis has
+/// more than 8192 modes, or normals are asked for and a triangle names a vertex that is not there.
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets,
                  Jobs& jobs = serial_jobs());
 
-/// Area-weighted unit vertex normals of triangles over 3V positions; (0, 0, 1) where a vertex has no area. Does not
-/// allocate.
+/// Area-weighted unit vertex normals of triangles over 3V positions; (0, 0, 1) where the triangles of a vertex have no
+/// area (in all, under 1e-19 m²). Does not allocate. @throws InvalidArgument if the arrays differ in size or a triangle
+/// names a vertex that is not there.
 void vertex_normals(std::span<const Triangle> triangles, std::span<const float> positions, std::span<float> normals);
 
 }  // namespace limber
