@@ -40,7 +40,11 @@ std::string GroupCollector::name(int dim, int tag) const {
 bool GroupCollector::finish(TetMesh& mesh) const {
   struct Named {
     std::vector<Index> nodes;
-    bool by_user = false;
+    int dim;
+    bool by_user;
+  };
+  const auto join = [](Named& to, const std::vector<Index>& more) {
+    to.nodes.insert(to.nodes.end(), more.begin(), more.end());
   };
   std::map<std::string, Named> groups;
   bool shared_number = false;
@@ -48,16 +52,19 @@ bool GroupCollector::finish(TetMesh& mesh) const {
     for (const auto& [key, nodes] : groups_) {
       if (key.first != dim || nodes.empty()) continue;
       const bool by_user = names_.contains(key);
-      const auto [place, is_new] = groups.try_emplace(name(dim, key.second), Named{nodes, by_user});
+      const auto [place, is_new] = groups.try_emplace(name(dim, key.second), Named{nodes, dim, by_user});
       if (is_new) continue;
       if (by_user && place->second.by_user && dim < 3)
-        place->second.nodes.insert(place->second.nodes.end(), nodes.begin(), nodes.end());
+        join(place->second, nodes);
       else
         shared_number = true;
     }
-  auto of_region = nodes_by_region(mesh);
-  for (std::size_t r = 0; r < of_region.size(); ++r)
-    groups.try_emplace(mesh.regions[r].name, Named{std::move(of_region[r]), false});
+  // A region's nodes join the group that other tets of the same volume group have made.
+  const auto of_region = nodes_by_region(mesh);
+  for (std::size_t r = 0; r < of_region.size(); ++r) {
+    const auto [place, is_new] = groups.try_emplace(mesh.regions[r].name, Named{of_region[r], 3, false});
+    if (!is_new && place->second.dim == 3) join(place->second, of_region[r]);
+  }
 
   Deduplicator deduplicator(mesh.nodes.size());
   mesh.node_groups.clear();

@@ -1,0 +1,24 @@
+/// @file limber/mesh_assimp/read_surface_mesh.h
+/// Surfaces from every format that the Assimp library reads: glTF, OFF, 3DS, COLLADA, FBX and some forty more. A target
+/// of its own (limber::mesh_assimp), so that only those who ask for it link Assimp.
+#pragma once
+
+#include <filesystem>
+
+#include "limber/mesh/read_mesh.h"
+
+namespace limber {
+
+/// Every mesh of the file in one surface: placed by the transforms of the nodes that show it, triangulated, welded (see
+/// weld(); vertices that differ in normal or texture alone become one). A node that mirrors keeps the outside out.
+/// Points and lines are left out, with a warning. The coordinates are the file's own: no unit or axis is converted.
+/// Nothing is logged. The result is validated. @throws InputError in one line, with Assimp's reason
+SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings);
+
+/// The door for programs: limber's own reader where is_known_mesh_format(), else Assimp's. @throws InputError
+SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings);
+
+/// Tets or a surface, whatever the file holds, by limber's own reader or Assimp's. @throws InputError
+std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings);
+
+}  // namespace limber

@@ -1,0 +1,112 @@
+#include "limber/mesh_assimp/read_surface_mesh.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <exception>
+
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+
+namespace limber {
+namespace {
+
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }, ' ');
+  return text;
+}
+
+std::string shown_path(const std::filesystem::path& path) {
+  std::string name = one_line(path.string());
+  return name.insert(0, 1, '"') + '"';
+}
+
+/// Collects the meshes of a scene as its nodes show them.
+class Collector {
+ public:
+  explicit Collector(const aiScene& scene, std::string name) : scene_(scene), name_(std::move(name)) {}
+
+  void add(const aiNode& node, const aiMatrix4x4t<double>& parent) {
+    const aiMatrix4x4t<double> pose = parent * aiMatrix4x4t<double>(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) add(*scene_.mMeshes[node.mMeshes[i]], pose);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) add(*node.mChildren[i], pose);
+  }
+
+  SurfaceMesh surface;
+  std::size_t points_and_lines = 0;
+
+ private:
+  void add(const aiMesh& mesh, const aiMatrix4x4t<double>& pose) {
+    const auto first = surface.vertices.size();
+    if (first + mesh.mNumVertices > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
+      throw InputError(name_ + ": holds more than 2147483647 vertices");
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      const aiVector3t<double> p =
+          pose * aiVector3t<double>(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
+      surface.vertices.emplace_back(p.x, p.y, p.z);
+    }
+    const bool mirrored = pose.Determinant() < 0.0;
+    for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+      const aiFace& face = mesh.mFaces[i];
+      if (face.mNumIndices != 3) {
+        ++points_and_lines;
+        continue;
+      }
+      Triangle t{};
+      for (int a = 0; a < 3; ++a) {
+        if (face.mIndices[a] >= mesh.mNumVertices)
+          throw InputError(name_ + ": a face names vertex " + std::to_string(face.mIndices[a]) + " of " +
+                           std::to_string(mesh.mNumVertices));
+        t[a] = static_cast<Index>(first + face.mIndices[a]);
+      }
+      if (mirrored) std::swap(t[1], t[2]);
+      surface.triangles.push_back(t);
+    }
+  }
+
+  const aiScene& scene_;
+  std::string name_;
+};
+
+}  // namespace
+
+SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings) {
+  const std::string name = shown_path(path);
+  read_file(path);  // for its clear errors: missing, a directory, unreadable, empty
+
+  Assimp::Importer importer;
+  // Without it a file of bones alone would come back as little diamonds around each bone.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  const aiScene* scene = nullptr;
+  try {
+    scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
+  } catch (const std::exception& e) {
+    throw InputError(name + ": Assimp cannot read it: " + one_line(e.what()));
+  }
+  if (scene == nullptr || scene->mRootNode == nullptr)
+    throw InputError(name + ": Assimp cannot read it: " + one_line(importer.GetErrorString()));
+
+  Collector collector(*scene, name);
+  collector.add(*scene->mRootNode, aiMatrix4x4t<double>());
+  if (collector.points_and_lines > 0)
+    warnings.push_back(name + ": " + std::to_string(collector.points_and_lines) +
+                       " points and lines are no surface and have been left out");
+  weld(collector.surface);
+  validate(collector.surface, name, warnings);
+  return std::move(collector.surface);
+}
+
+SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings) {
+  return is_known_mesh_format(path) ? read_surface_mesh(path, warnings) : read_surface_mesh_with_assimp(path, warnings);
+}
+
+std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings) {
+  if (is_known_mesh_format(path)) return read_mesh(path, warnings);
+  return read_surface_mesh_with_assimp(path, warnings);
+}
+
+}  // namespace limber
