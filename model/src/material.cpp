@@ -68,9 +68,9 @@ constexpr std::array kPresets = {
     MaterialPreset{
         "silicone",
         {2e6, 0.49, 1030.0},
-        "Sylgard 184: modulus from Johnston and others, Journal of Micromechanics and Microengineering 24 "
-        "(2014), cured near 100 C, density from the maker's data sheet; Poisson's ratio lowered from nearly 0.5, "
-        "where linear tetrahedra lock"},
+        "Sylgard 184: modulus within the 1.32 to 2.97 MPa that Johnston and others measured after cures at 25 to "
+        "200 C, Journal of Micromechanics and Microengineering 24 (2014); density from the maker's data sheet; "
+        "Poisson's ratio lowered from nearly 0.5, where linear tetrahedra lock"},
     MaterialPreset{"silver", {74e9, 0.37, 10490.0}, kCallister},
     MaterialPreset{"spruce", {10.8e9, 0.37, 448.0}, kWoodHandbook},
     MaterialPreset{"steel", {207e9, 0.30, 7850.0}, kCallister},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 
@@ -80,6 +81,23 @@ TEST(Material, PresetsCarrySoundAtTheSpeedsOfAnotherHandbook) {
     const Material& m = material_preset(name);
     EXPECT_NEAR(std::sqrt(m.youngs_modulus / m.density), speed, kHandbooksDiffer * speed) << name;
   }
+}
+
+TEST(Material, TheManualHasThePresetsAsTheyAre) {
+  const std::string manual = read_file(LIMBER_SOURCE_DIR "/docs/formats/materials.md");
+  std::size_t rows = 0;
+  for (const MaterialPreset& p : material_presets()) {
+    const std::string row = "| `" + std::string(p.name) + "` |";
+    const std::size_t at = manual.find(row);
+    ASSERT_NE(at, std::string::npos) << p.name;
+    double e = 0.0, nu = 0.0, rho = 0.0;
+    ASSERT_EQ(std::sscanf(manual.c_str() + at + row.size(), " %lf | %lf | %lf |", &e, &nu, &rho), 3) << p.name;
+    EXPECT_EQ(e, p.material.youngs_modulus) << p.name;
+    EXPECT_EQ(nu, p.material.poisson_ratio) << p.name;
+    EXPECT_EQ(rho, p.material.density) << p.name;
+  }
+  for (std::size_t at = 0; (at = manual.find("\n| `", at)) != std::string::npos; ++at) ++rows;
+  EXPECT_EQ(rows, material_presets().size() + 3) << "three more rows describe the keys of the file";
 }
 
 TEST(Material, UnknownPresetSuggestsTheNearest) {
