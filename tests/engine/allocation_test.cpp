@@ -1,0 +1,70 @@
+// Counts every call of operator new in this program.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "limber/engine/world.h"
+#include "sample_models.h"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size, std::size_t alignment) {
+  ++allocations;
+  const std::size_t rounded = (size + alignment - 1) / alignment * alignment;
+  if (void* p = std::aligned_alloc(alignment, rounded > 0 ? rounded : alignment)) return p;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size, alignof(std::max_align_t)); }
+void* operator new[](std::size_t size) { return counted(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t a) { return counted(size, static_cast<std::size_t>(a)); }
+void* operator new[](std::size_t size, std::align_val_t a) { return counted(size, static_cast<std::size_t>(a)); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace limber {
+namespace {
+
+TEST(World, StepDoesNotAllocateOnceWarm) {
+  World world;
+  std::vector<BodyId> bodies;
+  for (const FrameMotion motion :
+       {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic}) {
+    const auto model = testing::sample_model({.motion = motion});
+    for (int i = 0; i < 100; ++i) bodies.push_back(world.add_body(model, {.angular_velocity = {1, 2, 3}}));
+  }
+  std::vector<float> positions(24), normals(24), amplitudes(4);
+  const SurfacePoint at{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+  const auto frame = [&] {
+    for (const BodyId id : bodies) {
+      world.apply_force(id, at, {1, 2, 3});
+      world.apply_impulse(id, at, {0.1, 0.2, 0.3}, Axes::kBody, 0.01);
+    }
+    world.set_kinematic_frame(bodies.back(), {.velocity = {1, 0, 0}});
+    world.advance(1.0 / 60.0);
+    for (const BodyId id : bodies) {
+      world.reconstruct(id, positions, normals, 0.5);
+      world.interpolated_amplitudes(id, 0.5, amplitudes);
+    }
+    EXPECT_GT(world.energy(bodies[0]).kinetic_rigid, 0.0);
+  };
+  frame();
+  const long before = allocations;
+  for (int i = 0; i < 100; ++i) frame();
+  EXPECT_EQ(allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace limber
