@@ -239,6 +239,48 @@ TEST(AssetReader, AChangedByteAnywhereIsRefusedOrChangesNothingThatIsRead) {
   EXPECT_LT(accepted, 900);  // names of scenes, materials and the like, and bytes that were the same already
 }
 
+TEST(AssetReader, AnyValueOfTheDocumentMayBeAnyOtherWithoutHarm) {
+  const std::string bytes = asset_bytes(example::asset());
+  const GlbChunks chunks = glb_chunks(bytes, "test");
+  const json original = json::parse(chunks.json);
+  std::vector<std::string> places;
+  const json flat = original.flatten();
+  for (const auto& [place, unused] : flat.items())
+    for (std::string p = place; !p.empty(); p.erase(p.rfind('/')))
+      places.push_back(p);  // the values, and what holds them
+  const std::vector<json> others{nullptr,
+                                 true,
+                                 -1,
+                                 0,
+                                 1,
+                                 7,
+                                 255,
+                                 4294967295u,
+                                 18446744073709551615u,
+                                 -2.5,
+                                 1e308,
+                                 4.9e-324,
+                                 "",
+                                 "free",
+                                 json::array(),
+                                 json::object(),
+                                 json::array({1, 2, 3}),
+                                 {{"LIMBER_modal", 1}}};
+  std::mt19937 random(3);
+  int refused = 0;
+  constexpr int kTries = 1000;
+  for (int n = 0; n < kTries; ++n) {
+    json document = original;
+    document[json::json_pointer(places[random() % places.size()])] = others[random() % others.size()];
+    const std::string changed = glb_of(document.dump(), chunks.binary);
+    if (reading(changed) == "accepted")
+      expect_same_bytes(asset_bytes(asset_from_bytes(changed, "test")), bytes);
+    else
+      ++refused;
+  }
+  EXPECT_GT(refused, kTries / 2);
+}
+
 TEST(AssetReader, LayoutOfTheJsonDoesNotMatter) {
   const std::string bytes = asset_bytes(example::asset());
   const GlbChunks chunks = glb_chunks(bytes, "test");
