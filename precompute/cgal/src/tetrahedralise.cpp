@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <sstream>
 
 #include "cgal_steps.h"
@@ -23,7 +24,10 @@ constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many c
 constexpr double kTetsPerCubicCell = 6.0;   ///< tets in a volume of cell_size³
 constexpr double kMostTets = 20e6;
 constexpr double kNodesPerExpected =
-    20.0;                            ///< refinement that makes this many times the nodes expected is running away
+    20.0;                             ///< refinement that makes this many times the nodes expected is running away
+constexpr double kWorstShape = 0.01;  ///< a mesh with a flatter tet (see worst_shape) is made again, finer
+constexpr double kFiner = 0.8;        ///< cells of the next try
+constexpr int kTries = 4;
 constexpr double kStrayPart = 0.01;  ///< of its body's volume: a smaller loose piece is dropped
 constexpr double kWorrisomeVolumeError = 0.1;
 
@@ -223,15 +227,41 @@ std::size_t most_nodes(const Body& body, double cell_size) {
          1000;
 }
 
+/// Volume of the flattest tet over that of the regular tet with the same mean squared edge: 1 is best, 0 flat.
+double worst_shape(const TetMesh& mesh) {
+  double worst = 1.0;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    double squared = 0.0;
+    for (int a = 0; a < 4; ++a)
+      for (int b = a + 1; b < 4; ++b)
+        squared += (mesh.nodes[mesh.tets[i][a]] - mesh.nodes[mesh.tets[i][b]]).squaredNorm();
+    const double regular = std::pow(squared / 6.0, 1.5) / (6.0 * std::numbers::sqrt2);
+    worst = std::min(worst, signed_volume(mesh, static_cast<Index>(i)) / regular);
+  }
+  return worst;
+}
+
+/// Tets of a body, none so flat that it spoils the stiffness. Where all nodes lie on sharp edges, as in a rod one cell
+/// thick, flat tets cannot be helped: smaller cells can, and the last resort is to let the edges go.
+TetMesh mesh_well(const Body& body, double cell_size, bool keep_sharp_edges) {
+  const auto attempt = [&](double size, bool edges) {
+    return cgal::mesh_body(body.boundary, body.seeds,
+                           {.cell_size = size,
+                            .facet_distance = kFacetDistancePerCell * size,
+                            .keep_sharp_edges = edges,
+                            .max_nodes = most_nodes(body, size)});
+  };
+  double size = cell_size;
+  for (int i = 0; i < kTries; ++i, size *= kFiner)
+    if (TetMesh mesh = attempt(size, keep_sharp_edges); worst_shape(mesh) >= kWorstShape) return mesh;
+  return attempt(cell_size, false);
+}
+
 /// Meshes one body and adds it to the whole.
 void add_body(const Body& body, double wanted_cell_size, bool keep_sharp_edges, const std::string& which, TetMesh& mesh,
               Warnings& warnings) {
   const double cell_size = cell_size_of(body, wanted_cell_size);
-  TetMesh tets = cgal::mesh_body(body.boundary, body.seeds,
-                                 {.cell_size = cell_size,
-                                  .facet_distance = kFacetDistancePerCell * cell_size,
-                                  .keep_sharp_edges = keep_sharp_edges,
-                                  .max_nodes = most_nodes(body, cell_size)});
+  TetMesh tets = mesh_well(body, cell_size, keep_sharp_edges);
   if (tets.tets.empty())
     throw ComputationError("tetrahedralise: " + which + " (diagonal " + text(body.diagonal) +
                            " m) gave no tetrahedron at "

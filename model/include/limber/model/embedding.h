@@ -1,6 +1,6 @@
 /// @file limber/model/embedding.h
-/// A surface embedded in a tetrahedral mesh: each vertex gets a tet and four barycentric weights, so that its modal
-/// displacement is the exact interpolation of the nodes' ([H03] section 3.5).
+/// A surface embedded in a tetrahedral mesh: each vertex gets a tet and four weights, so that its modal displacement is
+/// u = Σ_a weight[a] · u(node a of the tet): inside, the finite elements' own interpolation ([H03] section 3.5).
 #pragma once
 
 #include <array>
@@ -12,24 +12,36 @@
 
 namespace limber {
 
-/// Where one vertex sits: p = Σ_a weight[a] · node[tet[a]].
+/// What a vertex moves with.
 struct EmbeddedVertex {
   Index tet = 0;
-  std::array<double, 4> weight{};  ///< sums to 1; negative for a vertex outside every tet (linear extrapolation of the nearest)
+  std::array<double, 4> weight{};  ///< sums to 1; size at most kMaxEmbeddingWeight; some negative outside the mesh
 };
+
+/// Bound on the size of a weight outside the mesh.
+inline constexpr double kMaxEmbeddingWeight = 2.0;
 
 struct Embedding {
   std::vector<EmbeddedVertex> vertices;
   Index outside = 0;          ///< how many lie outside every tet
+  Index limited = 0;          ///< how many of these are too far out for the whole linear field
   double max_distance = 0.0;  ///< the farthest of these from the mesh, m
 };
 
-/// Finds for each point the tet that holds it, else the nearest. Ties (shared faces) go to the lowest tet index.
-/// Barycentric weights outside are clamped to the nearest tet's linear field at distances up to its size: weights stay
-/// bounded, so a far vertex is not flung about.
+/// Finds for each point the tet that holds it, else the nearest (ties as in TetLocator::locate).
+///
+/// A render surface lies partly outside the tets that approximate it. There the nearest tet's linear displacement field
+/// is continued, not held at its boundary value: a vertex at distance d from the tets must turn with them, and a held
+/// value would err by d times the rotation. Where the tet is too flat or the point too far for that, weights of
+/// size above kMaxEmbeddingWeight would fling the vertex about: then the field is followed only part of the way, on the
+/// line from the nearest point of the mesh (weights in [0, 1]) to the vertex, as far as the bound allows. So always Σ
+/// weight = 1, hence translations are exact everywhere, and any linear field is exact inside and for every vertex not
+/// counted as `limited`; for all but those Σ weight · node is the vertex itself.
+/// @throws InvalidArgument if a point is not finite, or if the mesh has no tets. @pre the mesh is validated
 Embedding embed(std::span<const Vec3> points, const TetMesh& mesh);
 
-/// The exact embedding of boundary vertices that are nodes themselves.
+/// Nodes of the mesh as embedded vertices: each has weight 1 in the first tet that uses it.
+/// @throws InvalidArgument naming a node that is out of range or in no tet
 Embedding embed_nodes(std::span<const Index> nodes, const TetMesh& mesh);
 
 }  // namespace limber
