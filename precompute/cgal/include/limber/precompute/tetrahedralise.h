@@ -1,6 +1,12 @@
 /// @file limber/precompute/tetrahedralise.h
 /// A tetrahedral mesh from a surface: a clean closed surface is meshed as it is, anything else (holes, crossing or
-/// non-manifold pieces, several shells, flipped faces) is wrapped first.
+/// non-manifold pieces, flipped faces) is wrapped first. docs/tetrahedralisation.md tells how and what was measured.
+///
+/// Clean means: closed, manifold, oriented, no flat triangles, no self-intersections; vertices at equal coordinates
+/// count as one. Its shells bound bodies by the even-odd rule: a shell inside another is a cavity, a shell inside that
+/// is a body again, whichever way their triangles run; disjoint shells are several bodies, and all are kept. Sharp
+/// edges (normals that differ by more than 60°) become edges of the mesh. A wrap is the outside of the soup: what lies
+/// inside it, cavities too, is filled, and so are holes, whatever their size.
 #pragma once
 
 #include "limber/mesh/surface_mesh.h"
@@ -9,21 +15,26 @@
 namespace limber {
 
 struct TetrahedralisationOptions {
-  double cell_size = 0.0;  ///< largest tet circumradius, m; 0: 1/40 of the bounding box's diagonal
-  double alpha = 0.0;      ///< smallest hole or gap that the wrap enters, m; 0: 1/50 of the diagonal
-  void validate() const;   ///< @throws InvalidArgument naming the field
+  /// Largest tet circumradius, m, which the last step (exudation of slivers) may exceed by a few per cent; 0: 1/40 of
+  /// the bounding box's diagonal. A body less than eight cells across gets smaller ones.
+  double cell_size = 0.0;
+  double alpha = 0.0;     ///< narrowest gap that the wrap enters, m; 0: 1/50 of the diagonal. Clean surfaces ignore it.
+  void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
 struct Tetrahedralisation {
-  TetMesh mesh;                ///< one region named "*"
+  TetMesh mesh;                ///< one region named "*"; every node used
   bool wrapped = false;        ///< the surface was not clean, so a wrap of it was meshed
-  std::string why_wrapped;     ///< "12 boundary edges, 3 self-intersections", empty if not wrapped
+  std::string why_wrapped;     ///< "12 boundary edges, 3 pairs of crossing triangles", empty if not wrapped
   double volume_before = 0.0;  ///< enclosed by the surface as given, m³ (for a soup: of its wrap)
   double volume_after = 0.0;   ///< of the tets, m³
   double seconds_wrap = 0.0, seconds_mesh = 0.0;
 };
 
-/// Deterministic. @throws ComputationError if no tet comes out (surface too thin for the cell size, say), with what to try
-Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const TetrahedralisationOptions& options, Warnings& warnings);
+/// Deterministic: fixed seeds, one thread, no time limits.
+/// @throws InvalidArgument for wrong options, InputError if the surface is not valid (see validate()), ComputationError
+/// if no tet comes out (too thin for the cell size, say) or more than 20 million would, with what to try
+Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const TetrahedralisationOptions& options,
+                                  Warnings& warnings);
 
 }  // namespace limber
