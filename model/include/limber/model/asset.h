@@ -1,6 +1,6 @@
 /// @file limber/model/asset.h
-/// The asset file: a GLB that any glTF 2.0 viewer opens, with modes as morph targets, and an extension block with what the
-/// runtime needs. Reader and writer live together; docs/formats/asset.md describes the file byte by byte.
+/// The asset file: a GLB that any glTF 2.0 viewer opens, with modes as morph targets, and an extension block with what
+/// the runtime needs. Reader and writer live together; docs/formats/asset.md describes the file byte by byte.
 #pragma once
 
 #include <filesystem>
@@ -19,7 +19,8 @@ struct Asset {
   Provenance provenance;
 };
 
-/// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this version.
+/// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this
+/// version.
 /// @throws InvalidArgument if there is no body, a name repeats or is not UTF-8, a body has more modes than viewers take
 /// (kMaxMorphTargets), or the file would have more than 4 GiB
 std::string asset_bytes(const Asset& asset);
