@@ -18,7 +18,7 @@ namespace {
 constexpr double kInside = 1e-10;
 // Distances that differ by less, relative to themselves, are equal.
 constexpr double kSameDistance = 1e-9;
-constexpr std::size_t kLeafSize = 4;
+constexpr std::size_t kLeafSize = 2;
 
 using Corners = std::array<Vec3, 4>;
 using Weights = std::array<double, 4>;
@@ -179,6 +179,7 @@ TetLocation TetLocator::locate(const Vec3& p) const {
   TetLocation found;
   bool inside = false;
   double least = std::numeric_limits<double>::infinity();  // squared distance
+  double smallest_weight = least;                          // largest weight of `found`, outside
   const auto bound = [&] { return inside ? 0.0 : least * (1.0 + kSameDistance); };
   tree.search(p, bound, [&](Index i) {
     const Weights w = barycentric(tree.corners[i], p);
@@ -188,18 +189,12 @@ TetLocation TetLocator::locate(const Vec3& p) const {
       return;
     }
     if (inside) return;
-    least = std::min(least, nearest_on_tet(tree.corners[i], w, p).squared_distance);
-  });
-  if (inside) return found;
-
-  // The distance is known; now the best of the tets that share it.
-  double smallest_weight = std::numeric_limits<double>::infinity();
-  tree.search(p, bound, [&](Index i) {
-    const Weights w = barycentric(tree.corners[i], p);
     const Nearest n = nearest_on_tet(tree.corners[i], w, p);
     if (n.squared_distance > bound()) return;
     const double weight = largest(w);
-    if (weight > smallest_weight || (weight == smallest_weight && tree.tet[i] > found.tet)) return;
+    const bool as_near = n.squared_distance >= least * (1.0 - kSameDistance);
+    least = std::min(least, n.squared_distance);
+    if (as_near && std::pair(weight, tree.tet[i]) > std::pair(smallest_weight, found.tet)) return;
     smallest_weight = weight;
     found = {tree.tet[i], std::sqrt(n.squared_distance), w, n.weight};
   });
