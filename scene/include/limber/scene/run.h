@@ -1,0 +1,84 @@
+/// @file limber/scene/run.h
+/// Plays a scene: builds a world, lets every load act at its time, and keeps the states at regular times.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limber/core/jobs.h"
+#include "limber/engine/world.h"
+#include "limber/scene/scene_file.h"
+#include "limber/scene/scene_model.h"
+
+namespace limber {
+
+struct RunOptions {
+  std::int64_t steps = -1;  ///< −1: as the scene says. Loads after the end do not act.
+  /// Hz, keys kept per second of the simulation: every n-th step, n = max(1, round(1 / (key_rate · step))), the start
+  /// and the end always. 0: keys are kept at the start and the end only. ≥ 0.
+  double key_rate = 60.0;
+  bool reconstruct = false;                         ///< also reconstruct every body at every key, to time it
+  std::function<void(double fraction)> progress{};  ///< called now and then; may be empty
+  Jobs* jobs = nullptr;                             ///< null: serial
+  void validate() const;                            ///< @throws InvalidArgument naming the field and its value
+};
+
+/// The states of one body at the keys of a trajectory. k modes; array i holds key i.
+struct BodyTrack {
+  std::string name;
+  std::shared_ptr<const ModalModel> model;
+  std::vector<RigidTransform> poses;     ///< X_WB
+  std::vector<Vec3> angular_velocities;  ///< world, rad/s
+  std::vector<double> amplitudes;        ///< z, kg^½·m; k per key
+  std::vector<double> rates;             ///< ż, kg^½·m/s; k per key
+  std::vector<BodyEnergy> energies;      ///< J
+
+  std::span<const double> amplitudes_at(std::size_t key) const;
+  std::span<const double> rates_at(std::size_t key) const;
+};
+
+struct Trajectory {
+  std::string scene;          ///< name
+  double step = 0.0;          ///< s, of the simulation
+  double key_interval = 0.0;  ///< s between keys: a multiple of the step (the last interval may be shorter)
+  std::vector<double> times;  ///< s, of the keys: ascending from 0, each a whole number of steps
+  std::vector<BodyTrack> bodies;
+};
+
+/// What a load hit.
+struct LoadReport {
+  std::string body;
+  std::int64_t step = 0;      ///< 0-based step in which it began
+  double delay = 0.0;         ///< s after that step's start (strikes)
+  Vec3 point = Vec3::Zero();  ///< where it acted, world, m
+};
+
+struct RunResult {
+  Trajectory trajectory;
+  std::int64_t steps = 0;
+  std::uint64_t state_hash = 0;  ///< World::state_hash() at the end
+  std::vector<LoadReport> strikes,
+      forces;  ///< those that acted, in the order of the scene's lists (then of the bodies)
+  double energy_before = 0.0, energy_after = 0.0;  ///< total of all bodies at the first and last key, J
+  double seconds_advance = 0.0;                    ///< wall clock, World::step() alone
+  double seconds_reconstruct = 0.0;                ///< wall clock, with RunOptions::reconstruct
+  std::int64_t reconstructed_vertices = 0;         ///< vertices times keys
+};
+
+/// @throws InputError naming the place in the scene file: a triangle or vertex that the surface does not have, a ray
+/// that misses, a motion for a body without fixed nodes. InvalidArgument for options.
+RunResult run_scene(const Scene& scene, const SceneModels& models, const RunOptions& options = {});
+
+/// Energies as CSV: a row per key and body with time_s, body, kinetic_rigid_J, potential_J, kinetic_modal_J, elastic_J,
+/// total_J.
+std::string energies_csv(const Trajectory& trajectory);
+
+/// Energy of every mode, ½(ż² + λz²), as CSV: a row per key; a column time_s, one "BODY elastic+kinetic_J" with the sum
+/// over the body's modes, and one "BODY modeNN FREQUENCYHz_J" per mode.
+std::string mode_energies_csv(const Trajectory& trajectory);
+
+}  // namespace limber

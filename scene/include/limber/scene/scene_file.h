@@ -1,0 +1,124 @@
+/// @file limber/scene/scene_file.h
+/// Scenes: which bodies there are, how they start, what acts on them and when. Written as JSON; docs/formats/scene.md
+/// describes the file, docs/formats/scene.schema.json is its JSON Schema.
+///
+///   {"step": 0.001, "duration": 2,
+///    "assets": {"bunny": "bunny.glb"},
+///    "bodies": [{"name": "bunny", "asset": "bunny", "position": [0, 0, 1], "angular_velocity": [0, 0, 2]}],
+///    "strikes": [{"body": "bunny", "time": 0.1, "at": {"ray": {"from": [1, 0, 1], "direction": [-1, 0, 0]}},
+///                 "impulse": [-0.5, 0, 0]}]}
+///
+/// SI units throughout: m, s, kg, N, N·s; angles in degrees in the file only. World axes: z up.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "limber/core/rigid_transform.h"
+#include "limber/engine/world.h"
+#include "limber/model/mode_selection.h"
+
+namespace limber {
+
+/// Axes in which a place on a body is given.
+enum class PlaceFrame {
+  kWorld,  ///< world, at the start of the step in which the load begins, the body as it is then
+  kBody,   ///< body frame (origin at the centre of mass for a free body), rest shape
+  kInput,  ///< coordinates of the mesh that the asset was baked from, rest shape
+};
+
+/// A place on the render surface of a body. A load stays on the material point that is found when it begins.
+struct OnTriangle {
+  Index triangle = 0;
+  std::array<double, 3> weights{1.0, 0.0, 0.0};  ///< barycentric, ≥ 0, sum 1
+};
+struct AtVertex {
+  Index vertex = 0;  ///< in the order of the asset's POSITION accessor
+};
+struct NearestTo {
+  Vec3 point = Vec3::Zero();  ///< m
+  PlaceFrame frame = PlaceFrame::kWorld;
+};
+/// The first point that a ray from outside meets.
+struct AlongRay {
+  Vec3 from = Vec3::Zero();        ///< m
+  Vec3 direction = Vec3::UnitZ();  ///< any length > 0
+  PlaceFrame frame = PlaceFrame::kWorld;
+};
+using SurfacePlace = std::variant<OnTriangle, AtVertex, NearestTo, AlongRay>;
+
+/// An impulse at an exact time, also inside a step.
+struct Strike {
+  std::string body;
+  double time = 0.0;  ///< s; in [0, duration)
+  SurfacePlace at;
+  Vec3 impulse = Vec3::Zero();  ///< N·s
+  Axes axes = Axes::kWorld;
+  std::string where;  ///< place in the file, for messages
+};
+
+/// A force held over whole steps: every step whose start lies in [start, start + duration).
+struct HeldForce {
+  std::string body;
+  double start = 0.0, duration = 0.0;  ///< s; the duration may be infinite
+  SurfacePlace at;
+  Vec3 force = Vec3::Zero();  ///< N
+  Axes axes = Axes::kWorld;
+  std::string where;
+};
+
+/// Motion of the frame of a body with fixed nodes: x(t) = x₀ + axis · amplitude · sin(2πf (t − start)) within
+/// [start, start + duration), at x₀ outside. The velocity that it starts and ends with is reached within one step.
+struct Shake {
+  Vec3 axis = Vec3::UnitX();           ///< world, unit
+  double amplitude = 0.0;              ///< m
+  double frequency = 0.0;              ///< Hz; > 0
+  double start = 0.0, duration = 0.0;  ///< s; the duration may be infinite
+};
+
+/// A pose to be reached at a time. Between keys the frame moves along a straight line and turns about one axis, with
+/// position and angle following 10u³ − 15u⁴ + 6u⁵: at rest, and without acceleration, at every key.
+struct PoseKey {
+  double time = 0.0;  ///< s
+  RigidTransform pose;
+};
+using FrameMovement = std::variant<std::monostate, Shake, std::vector<PoseKey>>;
+
+struct SceneBody {
+  std::string name;   ///< unique; copy i of a grid is called "name[i]"
+  std::string group;  ///< the name in the file: shared by all copies, equal to `name` without them
+  std::string asset;  ///< key of Scene::assets
+  std::variant<Index, std::string> part = Index{0};  ///< which body of the asset: index or name
+  BodyPlacement placement;
+  FrameMovement movement;
+  std::string where;
+};
+
+struct Scene {
+  std::string name;                                     ///< the file's name without folder and extension
+  double step = 1.0 / 60.0;                             ///< s
+  std::int64_t steps = 0;                               ///< whole steps
+  Vec3 gravity = {0.0, 0.0, -9.80665};                  ///< m/s²
+  std::map<std::string, std::filesystem::path> assets;  ///< name → file, resolved
+  std::optional<SceneLimits> limits;                    ///< leaves out the modes that this scene cannot show
+  std::vector<SceneBody> bodies;
+  std::vector<Strike> strikes;
+  std::vector<HeldForce> forces;
+
+  double duration() const { return step * static_cast<double>(steps); }
+};
+
+/// Reads and checks everything that can be checked without the assets. Unknown keys are errors that name the nearest
+/// known one. @throws InputError in one line: file, place, seen, expected
+Scene read_scene(const std::filesystem::path& path);
+
+/// The same from text. @param name shown in messages. @param folder that asset files are relative to
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+}  // namespace limber

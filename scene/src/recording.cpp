@@ -1,0 +1,322 @@
+#include "limber/scene/recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "limber/core/error.h"
+#include "limber/model/glb.h"
+#include "limber/model/morph_targets.h"
+
+namespace limber {
+namespace {
+
+/// Linear colours that stay apart from each other, one per model in turn.
+constexpr std::array<std::array<float, 4>, 6> kPalette{{{0.80f, 0.52f, 0.25f, 1.0f},
+                                                        {0.22f, 0.45f, 0.69f, 1.0f},
+                                                        {0.35f, 0.60f, 0.30f, 1.0f},
+                                                        {0.70f, 0.27f, 0.27f, 1.0f},
+                                                        {0.50f, 0.38f, 0.62f, 1.0f},
+                                                        {0.62f, 0.62f, 0.58f, 1.0f}}};
+
+float narrow(double x) { return static_cast<float>(x); }
+
+double diagonal(const ModalSurface& surface) {
+  Vec3f low = surface.rest.front(), high = low;
+  for (const Vec3f& p : surface.rest) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  return (high - low).cast<double>().norm();
+}
+
+double largest_shape(const ModalSurface& surface, Index mode) {
+  double largest = 0.0;
+  for (Index v = 0; v < surface.vertices(); ++v)
+    largest = std::max(largest, surface.basis.shape(v, mode).cast<double>().norm());
+  return largest;
+}
+
+/// All bodies of one model.
+struct Cast {
+  std::shared_ptr<const ModalModel> model;
+  std::vector<std::size_t> bodies;  // of the trajectory
+  RecordedModel record;
+  int mesh = -1;
+};
+
+std::vector<Cast> group_by_model(const Trajectory& trajectory) {
+  std::vector<Cast> casts;
+  for (std::size_t b = 0; b < trajectory.bodies.size(); ++b) {
+    const auto& model = trajectory.bodies[b].model;
+    auto found = std::find_if(casts.begin(), casts.end(), [&](const Cast& c) { return c.model == model; });
+    if (found == casts.end()) {
+      casts.push_back({.model = model, .bodies = {}, .record = {}});
+      found = casts.end() - 1;
+    }
+    found->bodies.push_back(b);
+  }
+  return casts;
+}
+
+double largest_amplitude(const Trajectory& trajectory, const Cast& cast, Index mode) {
+  double largest = 0.0;
+  const auto k = static_cast<std::size_t>(cast.model->modes());
+  for (const std::size_t b : cast.bodies) {
+    const auto& z = trajectory.bodies[b].amplitudes;
+    for (std::size_t i = static_cast<std::size_t>(mode); i < z.size(); i += k)
+      largest = std::max(largest, std::abs(z[i]));
+  }
+  return largest;
+}
+
+/// Half the key rate is the fastest that keys can follow.
+bool too_fast(const ModalModelData& model, std::size_t mode, double key_interval) {
+  const double square = model.eigenvalues[mode] - model.decays[mode] * model.decays[mode];
+  return square > 0.0 && std::sqrt(square) / (2.0 * std::numbers::pi) > 0.5 / key_interval;
+}
+
+RecordedModel choose_modes(const Trajectory& trajectory, const Cast& cast, const RecordingOptions& options) {
+  RecordedModel record;
+  record.name = cast.model->name();
+  record.modes = cast.model->modes();
+  const double visible = options.invisible * diagonal(cast.model->render());
+  for (Index m = 0; m < cast.model->modes(); ++m) {
+    const double largest = largest_amplitude(trajectory, cast, m);
+    if (!(largest * largest_shape(cast.model->render(), m) > visible)) continue;
+    record.recorded.push_back(m);
+    record.scales.push_back(largest);
+    if (too_fast(cast.model->data(), static_cast<std::size_t>(m), trajectory.key_interval))
+      record.too_fast.push_back(m);
+  }
+  return record;
+}
+
+/// A mesh's numbers before they go into the file: signed or unsigned, the same shapes and the same shading directions.
+struct MorphedSurface {
+  std::vector<float> position, normal;
+  std::vector<std::vector<float>> target_position, target_normal;  // the latter empty: targets without normals
+};
+
+MorphedSurface signed_targets(const ModalSurface& surface, const RecordedModel& record) {
+  MorphedSurface out;
+  out.position = rest_positions(surface);
+  out.normal = unit_normals(out.position, surface.triangles);
+  const bool with_normals = record.recorded.size() <= static_cast<std::size_t>(kMaxTargetsWithNormals);
+  for (std::size_t i = 0; i < record.recorded.size(); ++i) {
+    out.target_position.push_back(mode_displacements(surface, record.recorded[i], record.scales[i]));
+    if (with_normals)
+      out.target_normal.push_back(normal_changes(out.position, out.target_position.back(), surface.triangles));
+  }
+  return out;
+}
+
+/// base − Σ targets, with weights ½ ± ½ on doubled targets.
+std::vector<float> shifted(const std::vector<float>& base, std::vector<std::vector<float>>& targets) {
+  std::vector<double> sum(base.begin(), base.end());
+  for (auto& target : targets)
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      sum[i] -= static_cast<double>(target[i]);
+      target[i] *= 2.0f;
+    }
+  return {sum.begin(), sum.end()};
+}
+
+/// A base normal must be of length 1 in the file. A viewer normalises base plus targets, so dividing all of a vertex by
+/// the same number changes nothing that is seen. The length is at least 1: changes of a unit normal are across it.
+void make_base_normals_unit(MorphedSurface& s) {
+  for (std::size_t i = 0; i + 2 < s.normal.size(); i += 3) {
+    const double length = Vec3(s.normal[i], s.normal[i + 1], s.normal[i + 2]).norm();
+    const auto divide = [&](float& x) { x = narrow(static_cast<double>(x) / length); };
+    for (std::size_t a = i; a < i + 3; ++a) {
+      divide(s.normal[a]);
+      for (auto& target : s.target_normal) divide(target[a]);
+    }
+  }
+}
+
+MorphedSurface unsigned_targets(const ModalSurface& surface, const RecordedModel& record) {
+  MorphedSurface s = signed_targets(surface, record);
+  s.position = shifted(s.position, s.target_position);
+  if (s.target_normal.empty()) return s;  // lit as at rest
+  s.normal = shifted(s.normal, s.target_normal);
+  make_base_normals_unit(s);
+  return s;
+}
+
+int add_mesh(GlbBuilder& glb, const Cast& cast, std::size_t number, const RecordingOptions& options) {
+  const ModalSurface& surface = cast.model->render();
+  const MorphedSurface s =
+      options.unsigned_weights ? unsigned_targets(surface, cast.record) : signed_targets(surface, cast.record);
+  GlbMesh mesh{.name = cast.model->name()};
+  mesh.material = glb.add_material({.name = cast.model->name(),
+                                    .base_color = kPalette[number % kPalette.size()],
+                                    .roughness = 0.6f,
+                                    .double_sided = true});
+  mesh.position = glb.add_vertex_vectors(s.position);
+  mesh.normal = glb.add_vertex_vectors(s.normal);
+  mesh.triangles = glb.add_triangles(surface.triangles);
+  for (std::size_t i = 0; i < s.target_position.size(); ++i) {
+    const Index mode = cast.record.recorded[i];
+    GlbMorphTarget target{.name = mode_target_name(mode, cast.model->modes(), cast.model->frequency_hz(mode))};
+    target.position = glb.add_vertex_vectors(s.target_position[i]);
+    if (!s.target_normal.empty()) target.normal = glb.add_vertex_vectors(s.target_normal[i]);
+    mesh.targets.push_back(std::move(target));
+    mesh.weights.push_back(options.unsigned_weights ? 0.5f : 0.0f);
+  }
+  return glb.add_mesh(mesh);
+}
+
+std::vector<float> translations(const BodyTrack& body) {
+  std::vector<float> out;
+  for (const RigidTransform& X : body.poses)
+    for (int a = 0; a < 3; ++a) out.push_back(narrow(X.p[a]));
+  return out;
+}
+
+/// q and −q are one attitude; neighbours take the signs between which linear interpolation goes the short way.
+std::vector<float> rotations(const BodyTrack& body) {
+  std::vector<float> out;
+  Quaternion last;
+  for (const RigidTransform& X : body.poses) {
+    Quaternion q = normalized(X.q);
+    if (q.w * last.w + q.x * last.x + q.y * last.y + q.z * last.z < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
+    out.insert(out.end(), {narrow(q.x), narrow(q.y), narrow(q.z), narrow(q.w)});
+    last = q;
+  }
+  return out;
+}
+
+std::vector<float> weights(const BodyTrack& body, const RecordedModel& record, bool unsigned_weights) {
+  std::vector<float> out;
+  for (std::size_t key = 0; key < body.poses.size(); ++key) {
+    const auto z = body.amplitudes_at(key);
+    for (std::size_t i = 0; i < record.recorded.size(); ++i) {
+      const double w = z[static_cast<std::size_t>(record.recorded[i])] / record.scales[i];
+      out.push_back(narrow(unsigned_weights ? 0.5 + 0.5 * w : w));
+    }
+  }
+  return out;
+}
+
+std::vector<float> shown_times(const Trajectory& trajectory, double slow_motion) {
+  std::vector<float> out;
+  for (const double t : trajectory.times) out.push_back(narrow(t * slow_motion));
+  return out;
+}
+
+/// World axes have z up, glTF has y up: a quarter turn about x.
+int add_root(GlbBuilder& glb, const std::string& name, std::vector<int> children) {
+  const double half = std::numbers::sqrt2 / 2.0;
+  return glb.add_node({.name = name.empty() ? "scene" : name,
+                       .children = std::move(children),
+                       .rotation = Quaternion{half, -half, 0.0, 0.0}});
+}
+
+std::string extras_of(const Trajectory& trajectory, const std::vector<Cast>& casts, const RecordingOptions& options) {
+  nlohmann::ordered_json models = nlohmann::ordered_json::array();
+  for (const Cast& cast : casts)
+    models.push_back({{"name", cast.record.name}, {"modes", cast.record.recorded}, {"scales", cast.record.scales}});
+  const nlohmann::ordered_json recording{{"scene", trajectory.scene},
+                                         {"step", trajectory.step},
+                                         {"key_interval", trajectory.key_interval},
+                                         {"slow_motion", options.slow_motion},
+                                         {"weights", options.unsigned_weights ? "unsigned" : "signed"},
+                                         {"models", models}};
+  return nlohmann::ordered_json{{"limber_recording", recording}}.dump(-1, ' ', false,
+                                                                      nlohmann::json::error_handler_t::replace);
+}
+
+std::string hertz(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g Hz", x);
+  return text;
+}
+
+void warn_of_fast_modes(const Trajectory& trajectory, const RecordedModel& record, Warnings& warnings) {
+  if (record.too_fast.empty()) return;
+  warnings.push_back(
+      "Recording of \"" + record.name + "\": " + std::to_string(record.too_fast.size()) + " of " +
+      std::to_string(record.recorded.size()) + " modes are faster than " + hertz(0.5 / trajectory.key_interval) +
+      ", half the key rate: right at the keys, they look slower or flicker between them; raise "
+      "--slow-motion (and lower the scene's step) to see them, or set limits.frame_rate to leave them out.");
+}
+
+void warn_of_many_targets(const RecordedModel& record, Warnings& warnings) {
+  if (record.recorded.size() <= static_cast<std::size_t>(kMaxMorphTargets)) return;
+  warnings.push_back("Recording of \"" + record.name + "\": " + std::to_string(record.recorded.size()) +
+                     " morph targets, but many viewers hold at most " + std::to_string(kMaxMorphTargets) + ".");
+}
+
+void warn_of_fast_turns(const Trajectory& trajectory, Warnings& warnings) {
+  for (const BodyTrack& body : trajectory.bodies) {
+    double fastest = 0.0;
+    for (const Vec3& omega : body.angular_velocities) fastest = std::max(fastest, omega.norm());
+    if (fastest * trajectory.key_interval < std::numbers::pi) continue;
+    warnings.push_back(
+        "Recording of \"" + body.name +
+        "\": turns more than half a turn between keys, so a viewer shows it turning the wrong way; raise "
+        "--record-frame-rate or --slow-motion.");
+  }
+}
+
+void check(const Trajectory& trajectory) {
+  if (trajectory.times.empty() || trajectory.bodies.empty())
+    throw InvalidArgument("make_recording: the trajectory has no keys or no bodies, expected at least one of each");
+  for (const BodyTrack& body : trajectory.bodies) {
+    const auto keys = trajectory.times.size();
+    if (!body.model || body.poses.size() != keys ||
+        body.amplitudes.size() != keys * static_cast<std::size_t>(body.model->modes()))
+      throw InvalidArgument("make_recording: the track of \"" + body.name + "\" does not have a state per key");
+  }
+}
+
+}  // namespace
+
+void RecordingOptions::validate() const {
+  if (!(slow_motion > 0.0) || !std::isfinite(slow_motion))
+    throw InvalidArgument("RecordingOptions.slow_motion: is " + std::to_string(slow_motion) +
+                          ", expected a finite number > 0");
+  if (!(invisible >= 0.0) || !std::isfinite(invisible))
+    throw InvalidArgument("RecordingOptions.invisible: is " + std::to_string(invisible) +
+                          ", expected a finite number >= 0");
+}
+
+Recording make_recording(const Trajectory& trajectory, const RecordingOptions& options) {
+  options.validate();
+  check(trajectory);
+  Recording recording;
+  GlbBuilder glb;
+  std::vector<Cast> casts = group_by_model(trajectory);
+  std::vector<int> nodes;
+  GlbAnimation animation{.name = trajectory.scene.empty() ? "simulation" : trajectory.scene};
+  const int times = glb.add_times(shown_times(trajectory, options.slow_motion));
+  for (std::size_t c = 0; c < casts.size(); ++c) {
+    Cast& cast = casts[c];
+    cast.record = choose_modes(trajectory, cast, options);
+    cast.mesh = add_mesh(glb, cast, c, options);
+    for (const std::size_t b : cast.bodies) {
+      const BodyTrack& body = trajectory.bodies[b];
+      const int node = glb.add_node({.name = body.name,
+                                     .mesh = cast.mesh,
+                                     .translation = body.poses.front().p,
+                                     .rotation = normalized(body.poses.front().q)});
+      nodes.push_back(node);
+      const auto add = [&](GlbPath path, const std::vector<float>& values) {
+        animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
+      };
+      add(GlbPath::kTranslation, translations(body));
+      add(GlbPath::kRotation, rotations(body));
+      if (!cast.record.recorded.empty()) add(GlbPath::kWeights, weights(body, cast.record, options.unsigned_weights));
+    }
+    warn_of_fast_modes(trajectory, cast.record, recording.warnings);
+    warn_of_many_targets(cast.record, recording.warnings);
+    recording.models.push_back(cast.record);
+  }
+  warn_of_fast_turns(trajectory, recording.warnings);
+  glb.add_animation(animation);
+  add_root(glb, trajectory.scene, std::move(nodes));
+  glb.set_extras(extras_of(trajectory, casts, options));
+  recording.glb = glb.bytes();
+  return recording;
+}
+
+}  // namespace limber

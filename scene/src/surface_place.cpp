@@ -1,0 +1,158 @@
+#include "surface_place.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+using Weights = std::array<double, 3>;
+
+/// The render surface of a body in the axes in which a place is told.
+struct PlacedSurface {
+  std::vector<float> positions;  // 3 per vertex, less `origin`
+  Vec3 origin = Vec3::Zero();
+  const std::vector<Triangle>* triangles = nullptr;
+
+  Vec3 vertex(Index v) const {
+    const float* p = positions.data() + 3 * static_cast<std::size_t>(v);
+    return {p[0], p[1], p[2]};
+  }
+  std::array<Vec3, 3> corners(const Triangle& t) const { return {vertex(t[0]), vertex(t[1]), vertex(t[2])}; }
+};
+
+PlacedSurface place_surface(const World& world, BodyId body, PlaceFrame frame) {
+  const ModalModel& model = world.model(body);
+  PlacedSurface s;
+  s.triangles = &model.render().triangles;
+  s.positions.resize(3 * static_cast<std::size_t>(model.render().vertices()));
+  if (frame == PlaceFrame::kWorld) {
+    s.origin = world.body(body).pose.p;
+    world.reconstruct(body, s.positions, {}, 1.0, s.origin);
+    return s;
+  }
+  std::size_t i = 0;
+  for (const Vec3f& p : model.render().rest)
+    for (int a = 0; a < 3; ++a) s.positions[i++] = p[a];
+  if (frame == PlaceFrame::kInput) s.origin = model.data().origin_in_input;  // the axes are the same
+  return s;
+}
+
+/// Barycentric weights of the point of a triangle nearest to p: of the plane's foot if it lies inside, else of the
+/// nearest point of the nearest edge.
+Weights nearest_on_triangle(const std::array<Vec3, 3>& x, const Vec3& p) {
+  const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], d = p - x[0];
+  const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), r = d.dot(e1), s = d.dot(e2);
+  if (const double det = a * c - b * b; det > 0.0) {
+    const double v = (c * r - b * s) / det, w = (a * s - b * r) / det;
+    if (v >= 0.0 && w >= 0.0 && v + w <= 1.0) return {1.0 - v - w, v, w};
+  }
+  Weights best{1.0, 0.0, 0.0};
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const Vec3 edge = x[j] - x[i];
+    const double length2 = edge.squaredNorm();
+    const double t = length2 > 0.0 ? std::clamp((p - x[i]).dot(edge) / length2, 0.0, 1.0) : 0.0;
+    const double distance2 = (x[i] + t * edge - p).squaredNorm();
+    if (distance2 >= nearest) continue;
+    nearest = distance2;
+    best = {0.0, 0.0, 0.0};
+    best[static_cast<std::size_t>(i)] = 1.0 - t;
+    best[static_cast<std::size_t>(j)] = t;
+  }
+  return best;
+}
+
+Vec3 at(const std::array<Vec3, 3>& x, const Weights& w) { return w[0] * x[0] + w[1] * x[1] + w[2] * x[2]; }
+
+SurfacePoint render_point(std::size_t triangle, const Weights& w) {
+  return {.surface = SurfacePoint::Surface::kRender, .triangle = static_cast<Index>(triangle), .weight = w};
+}
+
+SurfacePoint find(const NearestTo& place, const World& world, BodyId body, const std::string&) {
+  const PlacedSurface s = place_surface(world, body, place.frame);
+  const Vec3 p = place.point - s.origin;
+  SurfacePoint best;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < s.triangles->size(); ++t) {
+    const auto x = s.corners((*s.triangles)[t]);
+    const Weights w = nearest_on_triangle(x, p);
+    const double distance2 = (at(x, w) - p).squaredNorm();
+    if (distance2 >= nearest) continue;
+    nearest = distance2;
+    best = render_point(t, w);
+  }
+  return best;
+}
+
+/// Where a ray meets a triangle, seen from either side: its parameter, negative if it does not.
+struct Hit {
+  double parameter = -1.0;
+  Weights weights{};
+};
+
+Hit meet(const std::array<Vec3, 3>& x, const Vec3& from, const Vec3& direction) {
+  // Cramer's rule for  from + t d = x0 + v e1 + w e2.
+  const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], n = direction.cross(e2);
+  const double det = e1.dot(n);
+  if (det == 0.0) return {};
+  const Vec3 d = from - x[0];
+  const Vec3 m = d.cross(e1);
+  const double v = d.dot(n) / det, w = direction.dot(m) / det;
+  // A ray through a shared edge must not slip between its two triangles.
+  constexpr double kEdge = 1e-9;
+  if (v < -kEdge || w < -kEdge || v + w > 1.0 + kEdge) return {};
+  const double vi = std::max(v, 0.0), wi = std::max(w, 0.0), scale = 1.0 / std::max(1.0, vi + wi);
+  return {e2.dot(m) / det, {1.0 - scale * (vi + wi), scale * vi, scale * wi}};
+}
+
+SurfacePoint find(const AlongRay& place, const World& world, BodyId body, const std::string& where) {
+  const PlacedSurface s = place_surface(world, body, place.frame);
+  const Vec3 from = place.from - s.origin;
+  SurfacePoint best;
+  double first = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < s.triangles->size(); ++t) {
+    const Hit hit = meet(s.corners((*s.triangles)[t]), from, place.direction);
+    if (hit.parameter < 0.0 || hit.parameter >= first) continue;
+    first = hit.parameter;
+    best = render_point(t, hit.weights);
+  }
+  if (std::isfinite(first)) return best;
+  throw InputError(where + ".at.ray: misses the body \"" + world.model(body).name() + "\" as it is at " +
+                   std::to_string(world.time()) + " s, expected a ray that meets its surface");
+}
+
+SurfacePoint find(const OnTriangle& place, const World& world, BodyId body, const std::string& where) {
+  const auto count = world.model(body).render().triangles.size();
+  if (static_cast<std::size_t>(place.triangle) >= count)
+    throw InputError(where + ".at.triangle: is " + std::to_string(place.triangle) + ", but the body's surface has " +
+                     std::to_string(count) + " triangles, counted from 0");
+  return render_point(static_cast<std::size_t>(place.triangle), place.weights);
+}
+
+SurfacePoint find(const AtVertex& place, const World& world, BodyId body, const std::string& where) {
+  const ModalSurface& render = world.model(body).render();
+  for (std::size_t t = 0; t < render.triangles.size(); ++t)
+    for (std::size_t i = 0; i < 3; ++i)
+      if (render.triangles[t][i] == place.vertex) {
+        Weights w{};
+        w[i] = 1.0;
+        return render_point(t, w);
+      }
+  throw InputError(where + ".at.vertex: is " + std::to_string(place.vertex) +
+                   ", expected a vertex of a triangle of the body's surface, which has " +
+                   std::to_string(render.vertices()) + " vertices, counted from 0");
+}
+
+}  // namespace
+
+SurfacePoint find_place(const SurfacePlace& place, const World& world, BodyId body, const std::string& where) {
+  return std::visit([&](const auto& told) { return find(told, world, body, where); }, place);
+}
+
+}  // namespace limber

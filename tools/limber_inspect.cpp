@@ -1,0 +1,212 @@
+// limber-inspect: what is inside an asset.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "limber/mesh/surface_mesh.h"
+#include "limber/model/asset.h"
+#include "limber/model/morph_targets.h"
+#include "limber/scene/scene_model.h"
+#include "program.h"
+
+namespace limber::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string asset, frequencies;
+};
+
+/// One mode as people and tables want it.
+struct ModeLine {
+  Index mode = 0;
+  double eigenvalue = 0.0;     // rad²/s²
+  double frequency_hz = 0.0;   // undamped
+  double damped_hz = 0.0;      // 0: it creeps back without swinging
+  double damping_ratio = 0.0;  // infinite for a damped mechanism
+  double decay = 0.0;          // 1/s
+  double largest_shape = 0.0;  // kg^−½, over the render surface
+};
+
+std::vector<ModeLine> mode_lines(const ModalModel& model) {
+  std::vector<ModeLine> lines;
+  for (Index i = 0; i < model.modes(); ++i) {
+    const double lambda = model.data().eigenvalues[static_cast<std::size_t>(i)];
+    const double decay = model.data().decays[static_cast<std::size_t>(i)];
+    double largest = 0.0;
+    for (Index v = 0; v < model.render().vertices(); ++v)
+      largest = std::max(largest, model.render().basis.shape(v, i).cast<double>().norm());
+    lines.push_back({.mode = i,
+                     .eigenvalue = lambda,
+                     .frequency_hz = model.frequency_hz(i),
+                     .damped_hz = std::sqrt(std::max(lambda - decay * decay, 0.0)) / (2.0 * std::numbers::pi),
+                     .damping_ratio = decay > 0.0 ? decay / std::sqrt(lambda) : 0.0,
+                     .decay = decay,
+                     .largest_shape = largest});
+  }
+  return lines;
+}
+
+struct Box {
+  Vec3 low, high;
+};
+
+Box box_of(const ModalSurface& surface) {
+  Box box{surface.rest.front().cast<double>(), surface.rest.front().cast<double>()};
+  for (const Vec3f& p : surface.rest) {
+    box.low = box.low.cwiseMin(p.cast<double>());
+    box.high = box.high.cwiseMax(p.cast<double>());
+  }
+  return box;
+}
+
+Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
+
+Json body_report(const ModalModel& model) {
+  const ModalModelData& d = model.data();
+  const Box box = box_of(d.render);
+  Json inertia = Json::array();
+  for (int r = 0; r < 3; ++r) inertia.push_back(vector(d.inertia.row(r).transpose()));
+  Json modes = Json::array();
+  for (const ModeLine& m : mode_lines(model))
+    modes.push_back({{"mode", m.mode},
+                     {"frequency_hz", m.frequency_hz},
+                     {"damped_frequency_hz", m.damped_hz},
+                     {"damping_ratio", m.damping_ratio},
+                     {"decay", m.decay},
+                     {"eigenvalue", m.eigenvalue},
+                     {"largest_shape", m.largest_shape}});
+  return {
+      {"name", d.name},
+      {"motion", to_string(d.motion)},
+      {"mass", d.mass},
+      {"volume", d.volume},
+      {"center_of_mass", vector(d.center_of_mass + d.origin_in_input)},
+      {"inertia", inertia},
+      {"origin_in_input", vector(d.origin_in_input)},
+      {"box", {{"low", vector(box.low + d.origin_in_input)}, {"high", vector(box.high + d.origin_in_input)}}},
+      {"render_surface", surface_report(d.render)},
+      {"collision_surface", d.collision ? surface_report(*d.collision) : Json()},
+      {"volume_block",
+       d.volume_block ? Json{{"nodes", d.volume_block->rest.size()}, {"tets", d.volume_block->tets.size()}} : Json()},
+      {"memory_bytes", shape_bytes(d)},
+      {"modes", modes}};
+}
+
+/// What a user of the asset should know before it surprises.
+void warn(const ModalModel& model, Warnings& warnings) {
+  const std::string body = "Body \"" + model.name() + "\"";
+  const auto lines = mode_lines(model);
+  const auto mechanisms =
+      std::count_if(lines.begin(), lines.end(), [](const ModeLine& m) { return m.eigenvalue == 0.0; });
+  if (mechanisms > 0)
+    warnings.push_back(fmt::format("{}: {} of its modes are mechanisms: parts that turn freely about shared nodes.",
+                                   body, mechanisms));
+  const auto unseen =
+      std::count_if(lines.begin(), lines.end(), [](const ModeLine& m) { return m.largest_shape == 0.0; });
+  if (unseen > 0) warnings.push_back(fmt::format("{}: {} of its modes do not move the render surface.", body, unseen));
+  if (model.modes() > kMaxMorphTargets)
+    warnings.push_back(fmt::format("{}: has {} modes, but many viewers hold at most {} morph targets.", body,
+                                   model.modes(), kMaxMorphTargets));
+  SurfaceMesh surface;
+  for (const Vec3f& p : model.render().rest) surface.vertices.push_back(p.cast<double>());
+  surface.triangles = model.render().triangles;
+  if (const SurfaceQuality q = surface_quality(surface); q.boundary_edges > 0)
+    warnings.push_back(fmt::format("{}: its render surface is open, with {} boundary edges.", body, q.boundary_edges));
+}
+
+std::string surfaces_text(const ModalModelData& d) {
+  std::string text =
+      fmt::format("  drawn surface   {} vertices, {} triangles\n", d.render.vertices(), d.render.triangles.size());
+  if (d.collision)
+    text += fmt::format("  touched surface {} vertices, {} triangles\n", d.collision->vertices(),
+                        d.collision->triangles.size());
+  if (d.volume_block)
+    text +=
+        fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
+  return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
+}
+
+std::string body_text(const ModalModel& model, std::size_t number) {
+  const ModalModelData& d = model.data();
+  const Box box = box_of(d.render);
+  const Vec3 size = box.high - box.low, center = d.center_of_mass + d.origin_in_input;
+  std::string text =
+      fmt::format("body {} \"{}\": {} frame, {} modes\n", number, d.name, to_string(d.motion), model.modes());
+  text += fmt::format("  mass            {:.6g} kg, volume {:.6g} m^3\n", d.mass, d.volume);
+  text += fmt::format("  size            {:.4g} x {:.4g} x {:.4g} m\n", size.x(), size.y(), size.z());
+  text += fmt::format("  centre of mass  ({:.6g}, {:.6g}, {:.6g}) m in the input mesh\n", center.x(), center.y(),
+                      center.z());
+  text += surfaces_text(d);
+  text += fmt::format("  {:>5} {:>14} {:>14} {:>14} {:>14}\n", "mode", "frequency Hz", "damped Hz", "damping ratio",
+                      "decay 1/s");
+  for (const ModeLine& m : mode_lines(model))
+    text += fmt::format("  {:>5} {:>14.6g} {:>14.6g} {:>14.6g} {:>14.6g}\n", m.mode, m.frequency_hz, m.damped_hz,
+                        m.damping_ratio, m.decay);
+  return text;
+}
+
+std::string provenance_text(const Provenance& p) {
+  if (p.input.empty() && p.tool.empty()) return "";
+  return fmt::format("baked from {} by {}{}\n", p.input.empty() ? "?" : p.input, p.tool.empty() ? "?" : p.tool,
+                     p.options.empty() ? "" : ": " + p.options);
+}
+
+std::string csv_field(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string frequencies_csv(const Asset& asset) {
+  std::string csv = "body,mode,frequency_hz,damped_frequency_hz,damping_ratio,decay_per_s,eigenvalue_rad2_per_s2\n";
+  for (const auto& body : asset.bodies)
+    for (const ModeLine& m : mode_lines(*body))
+      csv += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.17g}\n", csv_field(body->name()), m.mode, m.frequency_hz,
+                         m.damped_hz, m.damping_ratio, m.decay, m.eigenvalue);
+  return csv;
+}
+
+void inspect(Program& program, const Arguments& a) {
+  program.progress().stage("reading the asset");
+  const Asset asset = read_asset(a.asset);
+  const auto file_bytes = std::filesystem::file_size(a.asset);
+  program.print(fmt::format("{}: {} {}, {:.2f} MB\n", a.asset, asset.bodies.size(),
+                            asset.bodies.size() == 1 ? "body" : "bodies", 1e-6 * static_cast<double>(file_bytes)));
+  program.print(provenance_text(asset.provenance));
+  Json& report = program.report();
+  report["file"] = std::filesystem::path(a.asset).filename().string();
+  report["file_bytes"] = file_bytes;
+  report["provenance"] = {{"tool", asset.provenance.tool},
+                          {"input", asset.provenance.input},
+                          {"input_hash", asset.provenance.input_hash},
+                          {"options", asset.provenance.options}};
+  report["bodies"] = Json::array();
+  for (std::size_t i = 0; i < asset.bodies.size(); ++i) {
+    program.print(body_text(*asset.bodies[i], i));
+    report["bodies"].push_back(body_report(*asset.bodies[i]));
+    warn(*asset.bodies[i], program.warnings());
+  }
+  if (!a.frequencies.empty()) program.write_file(a.frequencies, frequencies_csv(asset));
+}
+
+}  // namespace
+}  // namespace limber::tools
+
+int main(int argc, char** argv) {
+  using namespace limber::tools;
+  Program program("limber-inspect", "Tells what is inside an asset: bodies, modes, frequencies, mass, sizes, memory.");
+  Arguments arguments;
+  program.options().add_option("ASSET.glb", arguments.asset, "asset file, as limber-precompute makes it")->required();
+  program.options()
+      .add_option("--frequencies", arguments.frequencies, "write all frequencies as a table (Hz, 1/s)")
+      ->type_name("FILE.csv");
+  return program.run(argc, argv, [&] { inspect(program, arguments); });
+}

@@ -1,0 +1,223 @@
+// limber-simulate: plays a scene at a fixed step; records it, samples its energies, reports.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "limber/scene/recording.h"
+#include "limber/scene/run.h"
+#include "limber/scene/scene_file.h"
+#include "limber/scene/scene_model.h"
+#include "program.h"
+
+namespace limber::tools {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string scene;
+  std::int64_t steps = -1;
+  std::string record, energies, mode_energies;
+  double record_frame_rate = 60.0;
+  RecordingOptions recording;
+  bool reconstruct = false;
+};
+
+void declare(CLI::App& app, Arguments& a) {
+  app.add_option("SCENE.json", a.scene, "scene file (docs/formats/scene.md)")->required();
+  app.add_option("--steps", a.steps, "steps to take; default: as the scene says")
+      ->type_name("N")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000}));
+  app.add_option("--record", a.record, "write the motion as an animated GLB")->type_name("OUT.glb");
+  app.add_option("--record-frame-rate", a.record_frame_rate,
+                 "keys per second shown, at most one per step; for the energies too")
+      ->type_name("HZ")
+      ->check(positive_number())
+      ->capture_default_str();
+  app.add_option("--slow-motion", a.recording.slow_motion,
+                 "seconds shown per second simulated, with as many more keys: 100 shows what rings at 1 kHz as 10 Hz")
+      ->type_name("FACTOR")
+      ->check(positive_number())
+      ->capture_default_str();
+  app.add_flag("--unsigned-weights", a.recording.unsigned_weights,
+               "keep morph weights in [0, 1], for viewers that clamp them (Blender, Assimp)");
+  app.add_option("--energies", a.energies, "write each body's energies over time")->type_name("FILE.csv");
+  app.add_option("--mode-energies", a.mode_energies, "write each mode's energy over time")->type_name("FILE.csv");
+  app.add_flag("--reconstruct", a.reconstruct, "also make positions and normals at every key, to time it");
+}
+
+Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json energy(const BodyEnergy& e) {
+  return {{"kinetic_rigid", e.kinetic_rigid},
+          {"potential", e.potential},
+          {"kinetic_modal", e.kinetic_modal},
+          {"elastic", e.elastic},
+          {"total", e.total()}};
+}
+
+Json manifest(const ModelManifest& m) {
+  Json dropped = Json::array();
+  for (const DroppedMode& d : m.dropped)
+    dropped.push_back({{"mode", d.mode}, {"reason", to_string(d.reason)}, {"value", d.value}, {"limit", d.limit}});
+  return {{"asset", m.asset},
+          {"file", m.file},
+          {"body", m.body},
+          {"modes_in_asset", m.modes_in_asset},
+          {"modes", m.modes},
+          {"dropped", dropped},
+          {"volume_block_dropped", m.volume_block_dropped},
+          {"bytes_in_asset", m.bytes_in_asset},
+          {"bytes", m.bytes},
+          {"multiply_adds_in_asset", m.multiply_adds_in_asset},
+          {"multiply_adds", m.multiply_adds}};
+}
+
+Json bodies(const Trajectory& trajectory) {
+  Json all = Json::array();
+  for (const BodyTrack& b : trajectory.bodies) {
+    const RigidTransform& end = b.poses.back();
+    all.push_back({{"name", b.name},
+                   {"model", b.model->name()},
+                   {"modes", b.model->modes()},
+                   {"mass", b.model->data().mass},
+                   {"position", vector(end.p)},
+                   {"orientation", Json::array({end.q.w, end.q.x, end.q.y, end.q.z})},
+                   {"angular_velocity", vector(b.angular_velocities.back())},
+                   {"energy_before", energy(b.energies.front())},
+                   {"energy_after", energy(b.energies.back())}});
+  }
+  return all;
+}
+
+Json loads(const std::vector<LoadReport>& reports) {
+  Json all = Json::array();
+  for (const LoadReport& l : reports)
+    all.push_back({{"body", l.body}, {"step", l.step}, {"delay", l.delay}, {"point", vector(l.point)}});
+  return all;
+}
+
+Json recording_report(const Arguments& a, const Trajectory& trajectory, const Recording& recording) {
+  Json models = Json::array();
+  for (const RecordedModel& m : recording.models)
+    models.push_back({{"name", m.name},
+                      {"modes", m.modes},
+                      {"recorded", m.recorded},
+                      {"scales", m.scales},
+                      {"faster_than_half_the_key_rate", m.too_fast}});
+  return {{"file", std::filesystem::path(a.record).filename().string()},
+          {"bytes", recording.glb.size()},
+          {"keys", trajectory.times.size()},
+          {"key_interval", trajectory.key_interval},
+          {"slow_motion", a.recording.slow_motion},
+          {"weights", a.recording.unsigned_weights ? "unsigned" : "signed"},
+          {"models", models}};
+}
+
+void report_run(Json& report, const Scene& scene, const SceneModels& models, const RunResult& result) {
+  report["scene"] = scene.name;
+  report["step"] = scene.step;
+  report["steps"] = result.steps;
+  report["gravity"] = vector(scene.gravity);
+  report["models"] = Json::array();
+  for (const ModelManifest& m : models.manifest) report["models"].push_back(manifest(m));
+  report["bodies"] = bodies(result.trajectory);
+  report["strikes"] = loads(result.strikes);
+  report["forces"] = loads(result.forces);
+  report["energy_before"] = result.energy_before;
+  report["energy_after"] = result.energy_after;
+  report["state_hash"] = fmt::format("{:016x}", result.state_hash);
+}
+
+double per(double total, double count) { return count > 0.0 ? total / count : 0.0; }
+
+double body_steps(const RunResult& r) {
+  return static_cast<double>(r.steps) * static_cast<double>(r.trajectory.bodies.size());
+}
+
+std::string models_text(const SceneModels& models) {
+  std::string text;
+  for (const ModelManifest& m : models.manifest) {
+    text += fmt::format("  {}: {} modes", m.body, m.modes);
+    if (m.modes != m.modes_in_asset)
+      text += fmt::format(" of {}; what the scene does not need saves {:.0f} % of {:.1f} MB", m.modes_in_asset,
+                          100.0 * (1.0 - per(static_cast<double>(m.bytes), static_cast<double>(m.bytes_in_asset))),
+                          1e-6 * static_cast<double>(m.bytes_in_asset));
+    text += "\n";
+  }
+  return text;
+}
+
+std::string loads_text(const Scene& scene, const RunResult& result) {
+  std::string text;
+  for (const LoadReport& l : result.strikes)
+    text += fmt::format("  strike  {} at {:.6g} s, point ({:.4g}, {:.4g}, {:.4g}) m\n", l.body,
+                        static_cast<double>(l.step) * scene.step + l.delay, l.point.x(), l.point.y(), l.point.z());
+  for (const LoadReport& l : result.forces)
+    text += fmt::format("  force   {} from {:.6g} s, point ({:.4g}, {:.4g}, {:.4g}) m\n", l.body,
+                        static_cast<double>(l.step) * scene.step, l.point.x(), l.point.y(), l.point.z());
+  return text;
+}
+
+std::string summary(const Scene& scene, const SceneModels& models, const RunResult& r) {
+  std::string text = fmt::format("{}: {} steps of {:.6g} s, {} {}\n", scene.name, r.steps, scene.step,
+                                 r.trajectory.bodies.size(), r.trajectory.bodies.size() == 1 ? "body" : "bodies");
+  text += models_text(models) + loads_text(scene, r);
+  text += fmt::format("  energy  {:.9g} J before, {:.9g} J after\n", r.energy_before, r.energy_after);
+  text += fmt::format("  advance {:.1f} ns per step and body\n", 1e9 * per(r.seconds_advance, body_steps(r)));
+  if (r.reconstructed_vertices > 0)
+    text += fmt::format("  draw    {:.2f} ns per vertex, positions and normals\n",
+                        1e9 * per(r.seconds_reconstruct, static_cast<double>(r.reconstructed_vertices)));
+  return text + fmt::format("  state   {:016x}\n", r.state_hash);
+}
+
+void record(Program& program, const Arguments& a, const Trajectory& trajectory) {
+  if (a.record.empty()) return;
+  program.progress().stage("recording");
+  const Recording recording = make_recording(trajectory, a.recording);
+  program.write_file(a.record, recording.glb);
+  program.report()["recording"] = recording_report(a, trajectory, recording);
+  program.warnings().insert(program.warnings().end(), recording.warnings.begin(), recording.warnings.end());
+  program.print(fmt::format("  {}: {} keys every {:.6g} s, {:.1f} MB\n", a.record, trajectory.times.size(),
+                            trajectory.key_interval, 1e-6 * static_cast<double>(recording.glb.size())));
+}
+
+void simulate(Program& program, const Arguments& a) {
+  const auto began = Clock::now();
+  program.progress().stage("reading the scene");
+  const Scene scene = read_scene(a.scene);
+  const SceneModels models = load_models(scene);
+  program.progress().stage("simulating");
+  const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
+  const RunResult result = run_scene(scene, models,
+                                     {.steps = a.steps,
+                                      .key_rate = sampled ? a.record_frame_rate * a.recording.slow_motion : 0.0,
+                                      .reconstruct = a.reconstruct,
+                                      .progress = [&](double done) { program.progress().fraction(done); }});
+  program.print(summary(scene, models, result));
+  report_run(program.report(), scene, models, result);
+  record(program, a, result.trajectory);
+  if (!a.energies.empty()) program.write_file(a.energies, energies_csv(result.trajectory));
+  if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
+  program.report()["seconds"] = {
+      {"total", std::chrono::duration<double>(Clock::now() - began).count()},
+      {"advance", result.seconds_advance},
+      {"advance_per_step_and_body", per(result.seconds_advance, body_steps(result))},
+      {"reconstruct", result.seconds_reconstruct},
+      {"reconstruct_per_vertex", per(result.seconds_reconstruct, static_cast<double>(result.reconstructed_vertices))}};
+}
+
+}  // namespace
+}  // namespace limber::tools
+
+int main(int argc, char** argv) {
+  using namespace limber::tools;
+  Program program("limber-simulate",
+                  "Plays a scene at a fixed step. Every body moves exactly over a step of any length.");
+  Arguments arguments;
+  declare(program.options(), arguments);
+  return program.run(argc, argv, [&] { simulate(program, arguments); });
+}
