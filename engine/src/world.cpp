@@ -99,7 +99,14 @@ struct World::Impl {
   std::size_t alive = 0;
   std::uint64_t steps = 0;
   double accumulator = 0.0, dropped = 0.0;
-  mutable std::vector<double> drawn_amplitudes;  // scratch of interpolated drawing
+  // Scratch of drawing, kept so that it is not allocated again.
+  struct Drawn {
+    Index group;
+    std::size_t target;
+  };
+  std::vector<Drawn> drawn;
+  std::vector<double> drawn_amplitudes;
+  std::vector<ReconstructionTarget> reconstruction;
 
   const Entry& entry(BodyId id, const char* function) const {
     if (!contains(id))
@@ -116,7 +123,9 @@ struct World::Impl {
   Index group_of(const std::shared_ptr<const ModalModel>& model);
   void make_ranges();
   void advance_all();
-  std::span<const double> drawn(const BodyGroup& group, Index slot, double s) const;
+  template <class Real>
+  void interpolate(BodyId id, double s, Real* amplitudes) const;
+  void prepare_drawing(std::span<const DrawTarget> targets);
 };
 
 /// The group of a model's instances, a new one if it has none.
@@ -147,13 +156,28 @@ void World::Impl::advance_all() {
   });
 }
 
-/// Amplitudes between the last two states. Valid until the next call.
-std::span<const double> World::Impl::drawn(const BodyGroup& g, Index slot, double s) const {
-  const std::span<const double> newest = g.amplitudes(slot), previous = g.previous_amplitudes(slot);
-  if (s == 1.0) return newest;
-  if (drawn_amplitudes.size() < newest.size()) drawn_amplitudes.resize(newest.size());
-  for (std::size_t i = 0; i < newest.size(); ++i) drawn_amplitudes[i] = previous[i] + s * (newest[i] - previous[i]);
-  return {drawn_amplitudes.data(), newest.size()};
+/// Amplitudes between the last two states.
+template <class Real>
+void World::Impl::interpolate(BodyId id, double s, Real* amplitudes) const {
+  const Entry& e = entries[id.index];
+  const std::span<const double> newest = group(e).amplitudes(e.slot), previous = group(e).previous_amplitudes(e.slot);
+  for (std::size_t i = 0; i < newest.size(); ++i)
+    amplitudes[i] = static_cast<Real>(s == 1.0 ? newest[i] : previous[i] + s * (newest[i] - previous[i]));
+}
+
+/// Checks what is to be drawn and orders it by model.
+void World::Impl::prepare_drawing(std::span<const DrawTarget> targets) {
+  drawn.clear();
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const Entry& e = entry(targets[i].id, "reconstruct");
+    const std::size_t numbers = 3 * static_cast<std::size_t>(group(e).model().render().vertices());
+    require_count(targets[i].positions.size(), numbers, "reconstruct", "positions");
+    if (!targets[i].normals.empty()) require_count(targets[i].normals.size(), numbers, "reconstruct", "normals");
+    drawn.push_back({e.group, i});
+  }
+  std::sort(drawn.begin(), drawn.end(), [](const Drawn& a, const Drawn& b) {
+    return a.group != b.group ? a.group < b.group : a.target < b.target;
+  });
 }
 
 World::World(const WorldOptions& options, Jobs& jobs) : impl_(std::make_unique<Impl>()) {
@@ -370,19 +394,38 @@ Vec3 World::velocity(BodyId id, const SurfacePoint& at) const {
 
 // Drawing -------------------------------------------------------------------------------------------------------------
 
+void World::reconstruct(std::span<const DrawTarget> targets, double interpolation, const Vec3& origin) const {
+  require_fraction(interpolation, "reconstruct");
+  require_finite(origin, "reconstruct", "origin");
+  impl_->prepare_drawing(targets);
+  std::size_t numbers = 0;
+  for (const Impl::Drawn& d : impl_->drawn)
+    numbers += static_cast<std::size_t>(impl_->groups[static_cast<std::size_t>(d.group)]->model().modes());
+  if (impl_->drawn_amplitudes.size() < numbers) impl_->drawn_amplitudes.resize(numbers);
+
+  impl_->reconstruction.clear();
+  double* amplitudes = impl_->drawn_amplitudes.data();
+  for (const Impl::Drawn& d : impl_->drawn) {
+    const DrawTarget& target = targets[d.target];
+    RigidTransform X_OB = interpolated_pose(target.id, interpolation);
+    X_OB.p -= origin;
+    impl_->interpolate(target.id, interpolation, amplitudes);
+    impl_->reconstruction.push_back(
+        {X_OB, amplitudes, target.positions.data(), target.normals.empty() ? nullptr : target.normals.data()});
+    amplitudes += model(target.id).modes();
+  }
+  const auto& drawn = impl_->drawn;
+  for (std::size_t begin = 0, end = 0; begin < drawn.size(); begin = end) {
+    while (end < drawn.size() && drawn[end].group == drawn[begin].group) ++end;
+    limber::reconstruct(impl_->groups[static_cast<std::size_t>(drawn[begin].group)]->model().render(),
+                        std::span(impl_->reconstruction).subspan(begin, end - begin), *impl_->jobs);
+  }
+}
+
 void World::reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation,
                         const Vec3& origin) const {
-  const Impl::Entry& e = impl_->entry(id, "reconstruct");
-  const BodyGroup& group = impl_->group(e);
-  const std::size_t numbers = 3 * static_cast<std::size_t>(group.model().render().vertices());
-  require_count(positions.size(), numbers, "reconstruct", "positions");
-  if (!normals.empty()) require_count(normals.size(), numbers, "reconstruct", "normals");
-  require_finite(origin, "reconstruct", "origin");
-  RigidTransform X_OB = interpolated_pose(id, interpolation);
-  X_OB.p -= origin;
-  const ReconstructionTarget target{X_OB, impl_->drawn(group, e.slot, interpolation).data(), positions.data(),
-                                    normals.empty() ? nullptr : normals.data()};
-  limber::reconstruct(group.model().render(), {&target, 1}, *impl_->jobs);
+  const DrawTarget target{id, positions, normals};
+  reconstruct({&target, 1}, interpolation, origin);
 }
 
 RigidTransform World::interpolated_pose(BodyId id, double interpolation) const {
@@ -397,9 +440,9 @@ RigidTransform World::interpolated_pose(BodyId id, double interpolation) const {
 void World::interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const {
   const Impl::Entry& e = impl_->entry(id, "interpolated_amplitudes");
   require_fraction(interpolation, "interpolated_amplitudes");
-  const std::span<const double> z = impl_->drawn(impl_->group(e), e.slot, interpolation);
-  require_count(amplitudes.size(), z.size(), "interpolated_amplitudes", "amplitudes");
-  std::transform(z.begin(), z.end(), amplitudes.begin(), [](double x) { return static_cast<float>(x); });
+  require_count(amplitudes.size(), static_cast<std::size_t>(impl_->group(e).model().modes()), "interpolated_amplitudes",
+                "amplitudes");
+  impl_->interpolate(id, interpolation, amplitudes.data());
 }
 
 std::uint64_t World::state_hash() const {

@@ -37,6 +37,35 @@ double inertial_force(const Particles& body, std::size_t mode, const KinematicFr
   return sum;
 }
 
+TEST(SampleModels, ShapesAreMassOrthonormalAndFreeOfTheMotionsLeftFree) {
+  for (const FrameMotion motion :
+       {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic}) {
+    const Particles body = sample_particles({.motion = motion, .modes = 40});
+    for (std::size_t i = 0; i < 40; ++i) {
+      Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+      for (std::size_t a = 0; a < body.mass.size(); ++a) {
+        linear += body.mass[a] * body.shape[i][a];
+        angular += body.mass[a] * body.rest[a].cross(body.shape[i][a]);
+      }
+      if (motion == FrameMotion::kFree) {
+        EXPECT_LT(linear.norm(), 1e-14);
+      }
+      if (motion == FrameMotion::kFree || motion == FrameMotion::kPoint) {
+        EXPECT_LT(angular.norm(), 1e-14);
+      }
+      if (motion == FrameMotion::kLine) {
+        EXPECT_LT(std::abs(angular.x()), 1e-14);
+      }
+      for (std::size_t j = 0; j <= i; ++j) {
+        double inner = 0.0;
+        for (std::size_t a = 0; a < body.mass.size(); ++a)
+          inner += body.mass[a] * body.shape[i][a].dot(body.shape[j][a]);
+        EXPECT_NEAR(inner, i == j ? 1.0 : 0.0, 1e-14);
+      }
+    }
+  }
+}
+
 TEST(BodyGroup, ModesFeelTheInertialForcesThatTheParticlesFeel) {
   const SampleOptions options{.motion = FrameMotion::kKinematic};
   const Particles body = sample_particles(options);

@@ -45,7 +45,10 @@ TEST(World, StepDoesNotAllocateOnceWarm) {
     const auto model = testing::sample_model({.motion = motion});
     for (int i = 0; i < 100; ++i) bodies.push_back(world.add_body(model, {.angular_velocity = {1, 2, 3}}));
   }
-  std::vector<float> positions(24), normals(24), amplitudes(4);
+  std::vector<float> positions(24 * bodies.size()), normals(24 * bodies.size()), amplitudes(4);
+  std::vector<DrawTarget> targets;
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    targets.push_back({bodies[i], std::span(positions).subspan(24 * i, 24), std::span(normals).subspan(24 * i, 24)});
   const SurfacePoint at{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
   const auto frame = [&] {
     for (const BodyId id : bodies) {
@@ -54,10 +57,8 @@ TEST(World, StepDoesNotAllocateOnceWarm) {
     }
     world.set_kinematic_frame(bodies.back(), {.velocity = {1, 0, 0}});
     world.advance(1.0 / 60.0);
-    for (const BodyId id : bodies) {
-      world.reconstruct(id, positions, normals, 0.5);
-      world.interpolated_amplitudes(id, 0.5, amplitudes);
-    }
+    world.reconstruct(targets, 0.5);
+    for (const BodyId id : bodies) world.interpolated_amplitudes(id, 0.5, amplitudes);
     EXPECT_GT(world.energy(bodies[0]).kinetic_rigid, 0.0);
   };
   frame();

@@ -27,16 +27,23 @@ struct SampleOptions {
   Vec3 half_extent{0.3, 0.2, 0.1};
 };
 
-/// A box of unequal masses at its corners. Free and kinematic bodies have their origin at the centre of mass; kPoint
-/// and kLine ones hang from above it (the line is the body's x axis).
+/// A box of unequal masses, its 8 corners first, then the centres of edges and faces and its own: 81 degrees of
+/// freedom, so up to 75 modes. Free and kinematic bodies have their origin at the centre of mass; kPoint and kLine ones
+/// hang from above it (the line is the body's x axis).
 inline Particles sample_particles(const SampleOptions& o) {
   Particles body;
   double total = 0.0;
   Vec3 center = Vec3::Zero();
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 r{(corner & 1) ? 1.0 : -1.0, (corner & 2) ? 1.0 : -1.0, (corner & 4) ? 1.0 : -1.0};
-    body.rest.push_back(r.cwiseProduct(o.half_extent));
-    body.mass.push_back(0.2 + 0.05 * corner);
+  std::vector<Vec3> places;
+  for (int corner = 0; corner < 8; ++corner)
+    places.push_back({(corner & 1) ? 1.0 : -1.0, (corner & 2) ? 1.0 : -1.0, (corner & 4) ? 1.0 : -1.0});
+  for (int i = 0; i < 27; ++i) {
+    const Vec3 place(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    if (place.cwiseAbs().sum() < 3.0) places.push_back(place);
+  }
+  for (const Vec3& place : places) {
+    body.rest.push_back(place.cwiseProduct(o.half_extent));
+    body.mass.push_back(0.1 + 0.01 * static_cast<double>(body.mass.size()));
     total += body.mass.back();
     center += body.mass.back() * body.rest.back();
   }
@@ -74,7 +81,7 @@ inline Particles sample_particles(const SampleOptions& o) {
   const std::size_t rigid_count = basis.size();
   for (int mode = 0; mode < o.modes; ++mode) {
     std::vector<Vec3> u;
-    for (std::size_t i = 0; i < 8; ++i) {
+    for (std::size_t i = 0; i < body.mass.size(); ++i) {
       const double x = static_cast<double>(i) + 0.5;
       u.push_back(
           {std::sin(1.3 * x * (mode + 1)), std::cos(0.7 * x + mode * x), std::sin(2.1 * x + 1.0 + 0.9 * mode * x)});
@@ -92,12 +99,12 @@ inline ModalModelData sample_model_data(const SampleOptions& o) {
   data.name = "corners";
   data.motion = o.motion;
   data.volume = 8.0 * o.half_extent.prod();
-  for (std::size_t i = 0; i < 8; ++i) {
+  for (std::size_t i = 0; i < body.mass.size(); ++i) {
     const Vec3& r = body.rest[i];
     data.mass += body.mass[i];
     data.center_of_mass += body.mass[i] * r;
     data.inertia += body.mass[i] * (r.squaredNorm() * Mat3::Identity() - r * r.transpose());
-    data.render.rest.push_back(r.cast<float>());
+    if (i < 8) data.render.rest.push_back(r.cast<float>());
   }
   data.center_of_mass /= data.mass;
   const bool at_center = o.motion == FrameMotion::kFree || o.motion == FrameMotion::kKinematic;
@@ -108,20 +115,20 @@ inline ModalModelData sample_model_data(const SampleOptions& o) {
   ModalVolume volume;
   volume.rest = body.rest;
   volume.tets = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
-  volume.basis = ModalBasis(8, o.modes);
-  volume.mass_times_basis = ModalBasis(8, o.modes);
+  volume.basis = ModalBasis(static_cast<Index>(body.mass.size()), o.modes);
+  volume.mass_times_basis = ModalBasis(static_cast<Index>(body.mass.size()), o.modes);
   for (int mode = 0; mode < o.modes; ++mode) {
     const double omega = 2.0 * std::numbers::pi * o.lowest_hz * (1.0 + 0.7 * mode);
     data.eigenvalues.push_back(omega * omega);
     data.decays.push_back(o.decay);
     Vec3 participation = Vec3::Zero();
     Mat3 moment = Mat3::Zero();
-    for (std::size_t i = 0; i < 8; ++i) {
+    for (std::size_t i = 0; i < body.mass.size(); ++i) {
       const Vec3& w = body.shape[static_cast<std::size_t>(mode)][i];
       const auto vertex = static_cast<Index>(i);
       participation += body.mass[i] * w;
       moment += body.mass[i] * body.rest[i] * w.transpose();
-      data.render.basis.set(vertex, mode, w.cast<float>());
+      if (vertex < 8) data.render.basis.set(vertex, mode, w.cast<float>());
       volume.basis.set(vertex, mode, w.cast<float>());
       volume.mass_times_basis.set(vertex, mode, (body.mass[i] * w).cast<float>());
     }

@@ -13,9 +13,9 @@
 /// docs/derivations/rigid-frame.md. That the angle about L is a theta function is due to Jacobi (1850); see R. van Zon
 /// and J. Schofield, J. Comput. Phys. 225 (2007) 145, for another modern form.
 ///
-/// Accuracy: the attitude is that of a body whose initial momentum and moments differ by a few ε from those given, so
-/// its error is a few ε at first and grows like ε·|ω|t: far from the separatrix as 4ε|ω|t at most in what was measured.
-/// Near the separatrix (rotation about the intermediate axis) (1) itself amplifies such a difference by 1/√(1−m).
+/// Accuracy: the attitude is that of a body whose momentum and moments differ by a few ε from those given. Its error is
+/// a few ε at first and then at most 4ε (|L|/I_min) t/√(1−m): near the separatrix (rotation about the intermediate
+/// axis) the equations themselves amplify round-off. Momentum and energy do not drift.
 #pragma once
 
 #include <array>

@@ -73,6 +73,13 @@ struct BodyEnergy {
   double total() const { return kinetic_rigid + potential + kinetic_modal + elastic; }
 };
 
+/// Where the vertices of one body go.
+struct DrawTarget {
+  BodyId id;
+  std::span<float> positions;  ///< 3V floats of the render surface
+  std::span<float> normals{};  ///< empty, or 3V floats
+};
+
 class World {
  public:
   explicit World(const WorldOptions& options = {}, Jobs& jobs = serial_jobs());
@@ -132,8 +139,13 @@ class World {
   Vec3 velocity(BodyId id, const SurfacePoint& at) const;
 
   // Drawing ----------------------------------------------------------------------------------------------------------
-  /// Deformed render surface: 3V floats, less `origin` (pass a point near the camera far from the world's origin).
-  /// @param normals empty, or 3V floats. @param interpolation s in [0, 1] between the last two states; 1: the newest.
+  /// Deformed render surfaces, less `origin` (pass a point near the camera far from the world's origin). Instances of
+  /// one model are made together: their basis is read once, so one call for all that is drawn is faster than one for
+  /// each.
+  /// @param interpolation s in [0, 1] between the last two states; 1: the newest.
+  void reconstruct(std::span<const DrawTarget> targets, double interpolation = 1.0,
+                   const Vec3& origin = Vec3::Zero()) const;
+  /// The same for one body.
   void reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation = 1.0,
                    const Vec3& origin = Vec3::Zero()) const;
 

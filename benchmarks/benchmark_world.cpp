@@ -1,0 +1,79 @@
+// Time of a step of World without reconstruction, per body: in undisturbed free flight, under a force in every step,
+// and hung from a point; and of the free rotation alone. See README.md.
+#include <benchmark/benchmark.h>
+
+#include <memory>
+#include <vector>
+
+#include "cpu_time.h"
+#include "limber/dynamics/free_rotation.h"
+#include "limber/engine/world.h"
+#include "sample_models.h"
+
+namespace limber {
+namespace {
+
+enum class Flight { kUndisturbed, kForced, kHung };
+
+/// range(0) modes, range(1) bodies.
+void world_step(benchmark::State& state, Flight flight) {
+  const auto modes = static_cast<int>(state.range(0)), bodies = static_cast<int>(state.range(1));
+  const auto motion = flight == Flight::kHung ? FrameMotion::kPoint : FrameMotion::kFree;
+  const auto model = testing::sample_model({.motion = motion, .modes = modes});
+  World world;
+  std::vector<BodyId> ids;
+  const SurfacePoint at{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+  for (int i = 0; i < bodies; ++i) {
+    ids.push_back(world.add_body(model, {.angular_velocity = {0.1, 3.0 + 0.01 * i, 0.2}}));
+    world.apply_impulse(ids.back(), at, {0.1, 0.2, 0.3});
+  }
+  const int repeats = 1 + 1000 / bodies;  // a pass of 100 µs or more
+  LeastTime time;
+  for (auto _ : state)
+    time.measure([&] {
+      for (int r = 0; r < repeats; ++r) {
+        if (flight == Flight::kForced)
+          for (const BodyId id : ids) world.apply_force(id, at, {0.01, 0.02, -0.01});
+        world.step();
+      }
+    });
+  state.counters["ns_per_body"] = 1e9 * time.seconds() / repeats / bodies;
+}
+BENCHMARK_CAPTURE(world_step, undisturbed, Flight::kUndisturbed)
+    ->ArgNames({"modes", "bodies"})
+    ->ArgsProduct({{0, 10, 40}, {1, 100, 1000}});
+BENCHMARK_CAPTURE(world_step, forced, Flight::kForced)->ArgNames({"modes", "bodies"})->Args({40, 1000});
+BENCHMARK_CAPTURE(world_step, hung, Flight::kHung)->ArgNames({"modes", "bodies"})->Args({40, 1000});
+
+const PrincipalInertia kBody{{1.0, 2.0, 3.0}, {}};
+/// range(0) 0: far from the separatrix (series in q), 1: next to it (in q').
+Vec3 momentum(int which) { return which == 0 ? Vec3(0.3, 0.4, 2.0) : Vec3(0.3, 2.0, 0.2); }
+
+void rotation_attitude(benchmark::State& state) {
+  const FreeRotation rotation(kBody, {}, momentum(static_cast<int>(state.range(0))));
+  LeastTime time;
+  double t = 0.0;
+  for (auto _ : state)
+    time.measure([&] {
+      for (int i = 0; i < 1000; ++i) benchmark::DoNotOptimize(rotation.attitude(t += 1.0 / 60.0));
+    });
+  state.counters["ns"] = 1e9 * time.seconds() / 1000;
+}
+BENCHMARK(rotation_attitude)->ArgName("near_separatrix")->Arg(0)->Arg(1);
+
+void rotation_set_up(benchmark::State& state) {
+  Vec3 L = momentum(static_cast<int>(state.range(0)));
+  LeastTime time;
+  for (auto _ : state)
+    time.measure([&] {
+      for (int i = 0; i < 1000; ++i) {
+        L.x() += 1e-9;
+        benchmark::DoNotOptimize(FreeRotation(kBody, {}, L));
+      }
+    });
+  state.counters["ns"] = 1e9 * time.seconds() / 1000;
+}
+BENCHMARK(rotation_set_up)->ArgName("near_separatrix")->Arg(0)->Arg(1);
+
+}  // namespace
+}  // namespace limber
