@@ -11,19 +11,19 @@ namespace limber {
 /// Polygons over some vertices, one behind the other.
 struct Polygons {
   std::vector<Index> corners;
-  std::vector<Index> ends;  ///< per polygon, one past its last corner in `corners`
+  std::vector<std::size_t> ends;  ///< per polygon, one past its last corner in `corners`
 
   std::size_t size() const { return ends.size(); }
   std::span<const Index> operator[](std::size_t i) const {
-    const auto begin = static_cast<std::size_t>(i == 0 ? 0 : ends[i - 1]);
-    return std::span(corners).subspan(begin, static_cast<std::size_t>(ends[i]) - begin);
+    const std::size_t begin = i == 0 ? 0 : ends[i - 1];
+    return std::span(corners).subspan(begin, ends[i] - begin);
   }
   void push(std::span<const Index> polygon) {
     corners.insert(corners.end(), polygon.begin(), polygon.end());
     close();
   }
   /// Ends the polygon whose corners have been pushed.
-  void close() { ends.push_back(static_cast<Index>(corners.size())); }
+  void close() { ends.push_back(corners.size()); }
 };
 
 /// Triangles in the polygons' order, same sense of rotation. Convex polygons become fans, concave ones are cut ear by

@@ -1,5 +1,4 @@
 // TetGen's .node and .ele, as its manual describes them.
-#include <charconv>
 #include <cmath>
 
 #include "file_scanner.h"

@@ -146,7 +146,7 @@ class VtkReader {
                       in_.fail("seen offset " + std::to_string(end) + ", expected " +
                                std::to_string(std::max<std::int64_t>(last, 0)) + " to " +
                                std::to_string(last < 0 ? 0 : points));
-                    if (last >= 0) cells.ends.push_back(static_cast<Index>(end));
+                    if (last >= 0) cells.ends.push_back(static_cast<std::size_t>(end));
                     last = end;
                   });
     if (std::max<std::int64_t>(last, 0) != points)
