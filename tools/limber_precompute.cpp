@@ -10,8 +10,7 @@
 #include "limber/core/error.h"
 #include "limber/core/version.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
-#include "limber/mesh/read_mesh.h"
-#include "limber/mesh_assimp/read_mesh.h"
+#include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/model/sha256.h"
 #include "limber/precompute/bake.h"
 #include "limber/precompute/tetrahedralise.h"
@@ -169,9 +168,10 @@ class Stopwatch {
   auto time(const char* stage, F&& work) {
     const auto start = Clock::now();
     auto result = work();
-    seconds_[stage] = std::chrono::duration<double>(Clock::now() - start).count();
+    add(stage, std::chrono::duration<double>(Clock::now() - start).count());
     return result;
   }
+  void add(const char* stage, double seconds) { seconds_[stage] = seconds; }
 
  private:
   nlohmann::ordered_json& seconds_;
@@ -194,33 +194,39 @@ SurfaceMesh read_surface(Program& program, const std::string& path, double facto
   return surface;
 }
 
-/// Reads what the file holds; a surface is filled with tets and stays the render surface.
-BakeInput read_input(Program& program, const Arguments& a, Stopwatch& stopwatch, nlohmann::ordered_json& seconds) {
-  BakeInput input;
-  input.name = fs::path(a.mesh).stem().string();
-  if (holds_tets(a.mesh)) {
-    input.mesh = stopwatch.time("read", [&] { return read_tet_mesh(a.mesh, program.warnings()); });
-    scale(input.mesh.nodes, a.scale);
-    return input;
-  }
-  if (!a.fixes.empty() && a.fixes.front().rfind("group:", 0) == 0)
-    throw InvalidArgument("--fix " + a.fixes.front() + ": a surface has no node groups; use box:");
-  input.render = stopwatch.time("read", [&] { return read_surface(program, a.mesh, a.scale); });
+/// Fills a surface with tets; it stays what is drawn.
+void fill_with_tets(Program& program, const Arguments& a, BakeInput& input, Stopwatch& stopwatch) {
   program.progress().stage("tetrahedra");
   Tetrahedralisation t =
       stopwatch.time("tetrahedralise", [&] { return tetrahedralise(*input.render, a.tets, program.warnings()); });
-  seconds["wrap"] = t.seconds_wrap;
-  seconds["mesh"] = t.seconds_mesh;
+  stopwatch.add("wrap", t.seconds_wrap);
+  stopwatch.add("mesh", t.seconds_mesh);
+  const std::size_t triangles = input.render->triangles.size();
   program.report()["surface"] = {{"vertices", input.render->vertices.size()},
-                                 {"triangles", input.render->triangles.size()},
+                                 {"triangles", triangles},
                                  {"wrapped", t.wrapped},
                                  {"why_wrapped", t.why_wrapped},
                                  {"volume_before", t.volume_before},
                                  {"volume_after", t.volume_after}};
-  program.print(fmt::format("surface: {} triangles{}; volume {:.6g} m^3, of the tets {:.6g} m^3\n",
-                            input.render->triangles.size(), t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "",
-                            t.volume_before, t.volume_after));
+  program.print(fmt::format("surface: {} triangles{}; it encloses {:.6g} m^3, its tets {:.6g} m^3\n", triangles,
+                            t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "", t.volume_before, t.volume_after));
   input.mesh = std::move(t.mesh);
+}
+
+BakeInput read_input(Program& program, const Arguments& a, Stopwatch& stopwatch) {
+  BakeInput input;
+  input.name = fs::path(a.mesh).stem().string();
+  auto read = stopwatch.time("read", [&] { return read_any_mesh(a.mesh, program.warnings()); });
+  if (auto* mesh = std::get_if<TetMesh>(&read)) {
+    input.mesh = std::move(*mesh);
+    scale(input.mesh.nodes, a.scale);
+  } else {
+    input.render = std::get<SurfaceMesh>(std::move(read));
+    scale(input.render->vertices, a.scale);
+    fill_with_tets(program, a, input, stopwatch);
+  }
+  if (!a.render_surface.empty()) input.render = read_surface(program, a.render_surface, a.scale);
+  if (!a.collision_surface.empty()) input.collision = read_surface(program, a.collision_surface, a.scale);
   return input;
 }
 
@@ -261,9 +267,7 @@ void precompute(Program& program, const Arguments& a) {
   Stopwatch stopwatch(seconds);
 
   program.progress().stage("reading");
-  BakeInput input = read_input(program, a, stopwatch, seconds);
-  if (!a.render_surface.empty()) input.render = read_surface(program, a.render_surface, a.scale);
-  if (!a.collision_surface.empty()) input.collision = read_surface(program, a.collision_surface, a.scale);
+  BakeInput input = read_input(program, a, stopwatch);
   input.provenance = provenance_of(program, a, program.options());
 
   program.progress().stage("modes");
