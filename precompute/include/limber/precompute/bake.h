@@ -52,19 +52,19 @@ struct RayleighDamping {
 };
 
 struct BakeInput {
-  std::string name;                      ///< of the body; several bodies become NAME_1, NAME_2, …
-  TetMesh mesh;                          ///< validated
-  std::optional<SurfaceMesh> render;     ///< what is drawn; none: the boundary of the mesh
-  std::optional<SurfaceMesh> collision;  ///< what touches; none: the boundary of the mesh
-  Provenance provenance;
+  std::string name = {};                      ///< of the body; several bodies become NAME_1, NAME_2, …
+  TetMesh mesh = {};                          ///< validated
+  std::optional<SurfaceMesh> render = {};     ///< what is drawn; none: the boundary of the mesh
+  std::optional<SurfaceMesh> collision = {};  ///< what touches; none: the boundary of the mesh
+  Provenance provenance = {};
 };
 
 struct BakeOptions {
-  MaterialTable materials;         ///< by region; "*" is the rest
-  std::vector<FixSelector> fixed;  ///< their union is held
-  RayleighDamping damping;
-  ModalAnalysisOptions analysis;
-  SceneLimits limits;
+  MaterialTable materials = {};         ///< by region; "*" is the rest
+  std::vector<FixSelector> fixed = {};  ///< their union is held
+  RayleighDamping damping = {};
+  ModalAnalysisOptions analysis = {};
+  SceneLimits limits = {};
   bool volume_block = false;  ///< bake all nodes, so that any initial deformation can be given to the runtime
   void validate() const;      ///< @throws InvalidArgument naming the field
 };
