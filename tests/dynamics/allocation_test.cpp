@@ -1,25 +1,10 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
+#include "counted_new.h"
 #include "limber/dynamics/oscillator.h"
 #include "limber/dynamics/reconstruct.h"
-
-namespace {
-std::atomic<int> allocations{0};
-}
-
-// Counting forms for the whole test program.
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size > 0 ? size : 1)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 namespace limber {
 namespace {
@@ -28,10 +13,10 @@ TEST(Allocation, AStepOfModesMakesNone) {
   const std::vector<double> lambda{1.0, 100.0, 1e4}, decay(3, 0.1);
   const PropagatorTable table(lambda, decay, 0.01);
   alignas(64) double z[8] = {1.0}, zdot[8] = {}, g[8] = {2.0};
-  const int before = allocations;
+  const long before = testing::allocations();
   table.advance(z, zdot, g);
   table.advance_free(z, zdot);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(testing::allocations(), before);
 }
 
 TEST(Allocation, VerticesAndNormalsOfManyInstancesMakeNone) {
@@ -44,10 +29,10 @@ TEST(Allocation, VerticesAndNormalsOfManyInstancesMakeNone) {
   std::vector<ReconstructionTarget> targets;
   for (std::size_t i = 0; i < positions.size(); ++i)
     targets.push_back({{}, amplitudes.data(), positions[i].data(), normals[i].data()});
-  const int before = allocations;
+  const long before = testing::allocations();
   reconstruct(surface, targets);
   vertex_normals(surface.triangles, positions[0], normals[0]);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(testing::allocations(), before);
   EXPECT_GT(before, 0);
 }
 
