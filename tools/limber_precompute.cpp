@@ -245,7 +245,7 @@ std::string options_line(const CLI::App& app) {
         o->get_name() == "--output")
       continue;
     for (const std::string& value : o->results())
-      line += o->get_name() + " " + fs::path(value).filename().string() + " ";
+      line += (line.empty() ? "" : " ") + o->get_name() + " " + fs::path(value).filename().string();
   }
   return line;
 }
