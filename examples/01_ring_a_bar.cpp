@@ -1,7 +1,7 @@
 // 01_ring_a_bar: what does a struck steel bar do?
-//   bake: scripts/make-bar 0.5 0.02 0.01 120 8 6 > bar.mesh && limber-precompute bar.mesh --material steel --modes 5 -o
-//   bar.glb run:  01_ring_a_bar bar.glb see:  five frequencies, each beside its value from beam theory, and the energy
-//   that a strike on one end gave it next: 02_picture_of_a_flight
+//   bake: scripts/make-bar 0.5 0.02 0.01 150 10 10 > bar.mesh && limber-precompute bar.mesh --material steel --modes 5
+//   -o bar.glb run:  01_ring_a_bar bar.glb see:  five frequencies, each beside its value from beam theory, and the
+//   energy that a strike on one end gave it next: 02_picture_of_a_flight
 #include <cstdio>
 #include <numbers>
 
@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 
   limber::World world({.step = 1.0 / 60.0});
   const limber::BodyId id = world.add_body(bar);
-  world.apply_impulse(id, {.triangle = 0}, {0.0, 0.0, 0.1});  // N·s, on a corner
+  world.apply_impulse(id, {.triangle = 0}, {0.0, 0.1, 0.1});  // N·s, on a corner
   world.step();
 
   // Euler-Bernoulli, free ends: f = (β L)²/(2π L²) √(E/ρ) t/√12, bending across t = 1 cm or 2 cm; L = 0.5 m.

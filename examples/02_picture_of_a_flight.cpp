@@ -18,7 +18,7 @@ using limber::Vec3;
 
 constexpr int kInstants = 6, kColours = 32;
 constexpr double kStep = 1.0 / 1000.0, kFlight = 0.5;  // s
-constexpr double kBend = 0.12;                         // largest displacement wanted, as a part of the body's size
+constexpr double kBend = 0.2;                          // largest displacement wanted, as a part of the body's size
 
 /// A world with one body that has just been thrown and struck.
 struct Flight {
@@ -51,12 +51,13 @@ limber::SurfacePoint highest_point(const limber::ModalSurface& surface) {
 /// The throw is chosen so that, strike included, the centre of mass flies from side to side across 1.25 sizes an
 /// instant.
 Flight launch(const std::shared_ptr<const limber::ModalModel>& model, const Vec3& strike) {
-  const double across = 1.25 * size_of(*model) * (kInstants - 1);
+  const double across = size_of(*model) * (kInstants - 1);
   const Vec3 velocity(across / kFlight, 0.0, 0.5 * 9.80665 * kFlight);
   const limber::Quaternion upright = limber::quaternion_from_rotation_vector({0.5 * std::numbers::pi, 0.0, 0.0});
   Flight flight;
   flight.body = flight.world.add_body(model, {.pose = {.q = upright, .p = {-0.5 * across, 0.0, 0.0}},
-                                              .velocity = velocity - strike / model->data().mass});
+                                              .velocity = velocity - strike / model->data().mass,
+                                              .angular_velocity = Vec3(0.0, 2.0, 1.5)});
   flight.world.apply_impulse(flight.body, highest_point(model->render()), strike);
   return flight;
 }
@@ -129,12 +130,13 @@ std::string stage(double size) {
   std::string text = "#version 3.7;\nglobal_settings { assumed_gamma 1.0 }\nbackground { rgb <0.93, 0.95, 0.97> }\n";
   add(text, "#declare Size = %.6g;\n", size);
   text += R"(camera {
-  perspective sky z right <-2, 0, 0> up <0, 1, 0> angle 42
-  location <0, -9.5, 2.2> * Size look_at <0, 0, 0.35> * Size
+  perspective sky z right <-2, 0, 0> up <0, 1, 0> angle 36
+  location <0, -9.5, 2.4> * Size look_at <0, 0, 0.45> * Size
 }
 light_source { <-6, -9, 12> * Size rgb 0.95 area_light <3, 0, 0> * Size, <0, 3, 0> * Size, 5, 5 adaptive 1 jitter }
 light_source { <9, -6, 5> * Size rgb 0.30 shadowless }
-plane { z, -0.75 * Size pigment { rgb <0.87, 0.89, 0.92> } finish { diffuse 0.75 ambient 0.12 } }
+plane { z, -0.9 * Size pigment { rgb <0.87, 0.89, 0.92> } finish { diffuse 0.6 ambient 0.3 } }
+fog { fog_type 1 distance 110 * Size rgb <0.93, 0.95, 0.97> }
 #macro Shade(s)
   pigment { rgb (1 - s) * <0.86, 0.80, 0.70> + s * <0.80, 0.14, 0.08> }
   finish { diffuse 0.75 ambient 0.14 specular 0.25 roughness 0.03 }
@@ -152,7 +154,7 @@ int main(int argc, char** argv) try {
   }
   const auto model = limber::read_asset(argv[1]).bodies.at(0);
   // Modes are linear: one flight tells how hard to strike for the bend that is wanted.
-  const Vec3 trial = Vec3(0.0, 1e-3, 0.0) * model->data().mass;
+  const Vec3 trial = Vec3(-1e-3, 0.0, -1e-3) * model->data().mass;
   const double bend = kBend * size_of(*model);
   const double harder = bend / largest_displacement(fly(launch(model, trial)));
   const auto instants = fly(launch(model, harder * trial));

@@ -23,10 +23,13 @@ std::string one_line(std::string text) {
   return text;
 }
 
+/// Of the options that may be given: the program's own and those of the subcommand in use.
 std::vector<std::string> long_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* subcommand : app.get_subcommands())
+    for (const std::string& name : long_names(*subcommand)) names.push_back(name);
   return names;
 }
 
@@ -112,7 +115,7 @@ int Program::refuse_usage(const CLI::ParseError& error) {
     return options_.exit(error);
   std::string message = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
-    const std::string stranger = options_.remaining().empty() ? "" : options_.remaining().front();
+    const std::string stranger = options_.remaining(true).empty() ? "" : options_.remaining(true).front();
     message = "\"" + stranger + "\" was not expected";
     if (stranger.starts_with("--"))
       message = "the option \"" + stranger + "\" is unknown; did you mean \"" +

@@ -1,4 +1,5 @@
-// limber-simulate and limber-inspect as a user runs them: exit codes, one line per error, whole files or none.
+// limber-simulate, limber-inspect and limber-benchmark as a user runs them: exit codes, one line per error, whole files
+// or none.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -220,6 +221,28 @@ TEST_F(Programs, InspectWarnsOfWhatMaySurprise) {
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_THAT(r.err, HasSubstr("mechanisms"));
   EXPECT_THAT(r.err, HasSubstr("3 boundary edges"));
+}
+
+TEST_F(Programs, BenchmarkStepTablesEveryCaseAndKeepsTheEnergy) {
+  const ProgramResult r = run("limber-benchmark", {"step", "--seconds", "0.001", "--modes", "0,8", "--bodies", "1,3",
+                                                   "--vertices", "100", "--csv", "b.csv", "--report", "b.json"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const std::string csv = bytes("b.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 4);
+  for (const auto& row : json("b.json").at("seconds").at("rows")) {
+    EXPECT_GT(row.at("step_median").get<double>(), 0.0);
+    EXPECT_LE(row.at("step_median"), row.at("step_p99"));
+    EXPECT_GT(row.at("positions_and_normals_per_vertex"), 0.0);
+    EXPECT_LT(row.at("energy_drift").get<double>(), 1e-9);  // exact motion: round-off only
+  }
+}
+
+TEST_F(Programs, BenchmarkRefusesWhatItCannotMeasure) {
+  expect_one_line(run("limber-benchmark", {}), 2, "subcommand");
+  expect_one_line(run("limber-benchmark", {"step", "--bodies", "0"}), 2, "--bodies");
+  expect_one_line(run("limber-benchmark", {"step", "--mdoes", "3"}), 2, "did you mean \"--modes\"");
+  expect_one_line(run("limber-benchmark", {"step", "--asset", "missing.glb"}), 1, "missing.glb");
+  EXPECT_EQ(files(), given_);
 }
 
 }  // namespace
