@@ -10,6 +10,10 @@
 namespace limber {
 namespace {
 
+constexpr int kMaxRefinements = 8;
+constexpr double kRefined = 1e-12;     // a correction this small, relative to the answer, was the last
+constexpr double kContraction = 0.25;  // a correction must be this much smaller than the one before
+
 /// As many degrees of freedom as N has columns, such that N cannot move without moving them.
 std::vector<Index> choose_pins(const Eigen::MatrixXd& N) {
   if (N.cols() == 0) return {};
@@ -74,6 +78,26 @@ Eigen::MatrixXd ElasticInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& F
   Eigen::MatrixXd U = Eigen::MatrixXd::Zero(F.rows(), F.cols());
   U(kept_, Eigen::all) = solver_.solve(balanced(kept_, Eigen::all));
   U -= N * (MN.transpose() * U);
+  return U;
+}
+
+Eigen::MatrixXd ElasticInverse::apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F) {
+  const Eigen::MatrixXd& MN = problem_.MN;
+  Eigen::MatrixXd U = apply(F);
+  const auto lengths = [&](const Eigen::MatrixXd& X) -> Eigen::ArrayXd {
+    return X.cwiseProduct(problem_.mass_times(X)).colwise().sum().cwiseSqrt().transpose();
+  };
+  double change_before = 1.0;
+  for (int step = 0; step < kMaxRefinements; ++step) {
+    Eigen::MatrixXd residual = F - MN * (problem_.N.transpose() * F) - problem_.stiffness_times(U);
+    if (shift_ > 0.0) residual -= shift_ * problem_.mass_times(U);
+    const Eigen::MatrixXd correction = apply(residual);
+    const double change = (lengths(correction) / lengths(U)).maxCoeff();
+    if (change > kContraction * change_before) break;  // no longer improves
+    U += correction;
+    if (change < kRefined) break;
+    change_before = change;
+  }
   return U;
 }
 

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "cholesky_solver.h"
@@ -27,6 +28,8 @@ struct ScaledProblem {
   SparseMatrix node_mass;  ///< n × n, acts alike on the three axes
   Eigen::MatrixXd N;       ///< null space of K, NᵀMN = I; may have no columns
   Eigen::MatrixXd MN;
+  /// K X for a few columns, tet by tet: without the round-off of K's entries (see elastic_forces).
+  std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)> stiffness_times;
 
   Index size() const { return K.size; }
   Eigen::MatrixXd mass_times(const Eigen::Ref<const Eigen::MatrixXd>& X) const;
@@ -40,6 +43,10 @@ class ElasticInverse {
 
   /// K⁺ F, or P (K + sM)⁻¹ Pᵀ F.
   Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& F);
+
+  /// The same, improved by residuals that stiffness_times() gives, as long as that changes it: for loads that are all
+  /// of size F_i ~ M w_i, and bodies so slender or of such different stiffnesses that round-off of K shows.
+  Eigen::MatrixXd apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F);
 
   double shift() const { return shift_; }  ///< s; 0 unless K_pin would not factor
   int solves() const { return solves_; }   ///< right-hand sides so far

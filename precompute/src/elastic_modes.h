@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "elastic_inverse.h"
 #include "limber/precompute/eigenvalue_count.h"
@@ -22,8 +23,9 @@ struct EigenPairs {
 EigenPairs refined(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& X);
 
 /// The lowest pairs: `wanted` at least, as far as there are so many, and as many more as it takes to end at a gap.
+/// @param seed of the start vector
 /// @param[out] pairs_to_keep how many of them were asked for, a cluster at the end completed
-EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted,
+EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted, std::uint64_t seed,
                         Eigen::Index& pairs_to_keep);
 
 /// Makes sure that no eigenvalue below the last pair is missing: counts those below a number in the widest gap at the

@@ -242,6 +242,31 @@ SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> m
   return K;
 }
 
+void elastic_forces(const TetMesh& mesh, std::span<const Material> materials, std::span<const double> displacements,
+                    std::span<double> forces) {
+  check(mesh, materials, "elastic_forces");
+  if (displacements.size() != 3 * mesh.nodes.size() || forces.size() != displacements.size())
+    throw InvalidArgument("elastic_forces: " + std::to_string(displacements.size()) + " displacements and " +
+                          std::to_string(forces.size()) + " forces, expected three each for " +
+                          std::to_string(mesh.nodes.size()) + " nodes");
+  std::fill(forces.begin(), forces.end(), 0.0);
+  const auto u = [&](Index node) { return Eigen::Map<const Vec3>(displacements.data() + 3 * node); };
+  const auto f = [&](Index node) { return Eigen::Map<Vec3>(forces.data() + 3 * node); };
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    const Tet& t = mesh.tets[i];
+    const Element e = make_element(corners(mesh, t), materials[mesh.tet_region[i]]);
+    Mat3 gradient = Mat3::Zero();
+    for (int a = 1; a < 4; ++a) gradient += (u(t[a]) - u(t[0])) * e.gradient[a].transpose();
+    const Mat3 stress_volume =
+        e.lambda_volume * gradient.trace() * Mat3::Identity() + e.mu_volume * (gradient + gradient.transpose());
+    for (int a = 1; a < 4; ++a) {
+      const Vec3 force = stress_volume * e.gradient[a];
+      f(t[a]) += force;
+      f(t[0]) -= force;
+    }
+  }
+}
+
 SparseMatrix assemble_mass(const TetMesh& mesh, std::span<const Material> materials, MassKind kind, Jobs& jobs) {
   check(mesh, materials, "assemble_mass");
   return kind == MassKind::kLumped ? lumped_mass(mesh, materials) : consistent_mass(mesh, materials, jobs);

@@ -12,7 +12,7 @@ namespace limber {
 struct LanczosOptions {
   int count = 1;            ///< eigenpairs wanted; ≥ 1
   int subspace = 0;         ///< Lanczos vectors, count < subspace ≤ size
-  double tolerance = 1e-9;  ///< relative, on 1/λ
+  double tolerance = 1e-8;  ///< relative, on 1/λ; a step of inverse iteration follows
   std::uint64_t seed = 0;   ///< of the start vector: the same seed, the same bits
 };
 

@@ -27,6 +27,13 @@ std::array<double, 144> tet_stiffness(const std::array<Vec3, 4>& x, const Materi
 /// @throws InvalidArgument if the counts differ or a material is outside its range
 SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> materials, Jobs& jobs = serial_jobs());
 
+/// K u tet by tet, from differences of displacements, N. In exact arithmetic the same as the assembled product. In
+/// floating point the forces on every tet balance, so a stiff part that moves rigidly feels no net force, whereas the
+/// rounded entries of an assembled K resist its motion a little: enough to drown a part 1e10 times softer.
+/// @param displacements, forces 3n each, node-major; forces is overwritten
+void elastic_forces(const TetMesh& mesh, std::span<const Material> materials, std::span<const double> displacements,
+                    std::span<double> forces);
+
 /// M on the node graph, n × n, kg (the same for the three axes). Lumped: a diagonal.
 SparseMatrix assemble_mass(const TetMesh& mesh, std::span<const Material> materials, MassKind kind,
                            Jobs& jobs = serial_jobs());

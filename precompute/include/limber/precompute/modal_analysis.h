@@ -25,8 +25,9 @@ namespace limber {
 struct ModalAnalysisOptions {
   int modes = 64;  ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
   MassKind mass = MassKind::kLumped;
-  bool certify = true;   ///< prove by inertia that no mode is missed
-  int blas_threads = 0;  ///< 0: one below about 15,000 nodes, else all; set explicitly on the BLAS
+  bool certify = true;     ///< prove by inertia that no mode is missed
+  int blas_threads = 0;    ///< 0: one below about 15,000 nodes, else all; set explicitly on the BLAS
+  std::uint64_t seed = 0;  ///< of Lanczos's start vector: modes agree for all seeds to about 1e-6, bits do not
   void validate() const;
 };
 
