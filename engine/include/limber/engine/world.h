@@ -149,7 +149,8 @@ class World {
   void reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation = 1.0,
                    const Vec3& origin = Vec3::Zero()) const;
 
-  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states.
+  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states. The rotation between them is
+  /// the shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
   RigidTransform interpolated_pose(BodyId id, double interpolation) const;
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
 
