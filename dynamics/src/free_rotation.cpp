@@ -36,19 +36,20 @@ double complete_integral(double complement) {
 
 /// Carlson's R_F(x, y, 1) by duplication; x, y ≥ 0, not both 0. [DLMF 19.36.1]
 double carlson_rf(double x, double y) {
-  double z = 1.0;
-  for (;;) {
-    const double mean = (x + y + z) / 3.0;
-    const double dx = 1.0 - x / mean, dy = 1.0 - y / mean, dz = -dx - dy;
-    if (std::max({std::abs(dx), std::abs(dy), std::abs(dz)}) < 2e-3) {
-      const double e2 = dx * dy - dz * dz, e3 = dx * dy * dz;
-      const double series = 1.0 - e2 / 10 + e3 / 14 + e2 * e2 / 24 - 3 * e2 * e3 / 44 - 5 * e2 * e2 * e2 / 208 +
-                            3 * e3 * e3 / 104 + e2 * e2 * e3 / 16;
-      return series / std::sqrt(mean);
-    }
+  double z = 1.0, mean, dx, dy, dz;
+  const auto measure = [&] {
+    mean = (x + y + z) / 3.0;
+    dx = 1.0 - x / mean, dy = 1.0 - y / mean, dz = -dx - dy;
+    return std::max({std::abs(dx), std::abs(dy), std::abs(dz)});
+  };
+  while (measure() > 2e-3) {  // false for NaN, which then goes through
     const double shift = std::sqrt(x * y) + std::sqrt(x * z) + std::sqrt(y * z);
     x = 0.25 * (x + shift), y = 0.25 * (y + shift), z = 0.25 * (z + shift);
   }
+  const double e2 = dx * dy - dz * dz, e3 = dx * dy * dz;
+  const double series = 1.0 - e2 / 10 + e3 / 14 + e2 * e2 / 24 - 3 * e2 * e3 / 44 - 5 * e2 * e2 * e2 / 208 +
+                        3 * e3 * e3 / 104 + e2 * e2 * e3 / 16;
+  return series / std::sqrt(mean);
 }
 
 /// The amplitude integral u of given s = sn u ≥ 0 and c² = cn² u on the quarter period, for parameter m and 1 − m.

@@ -153,6 +153,14 @@ TEST(FreeRotation, HugeTurnsPerStepStayUnitAndFinite) {
   }
 }
 
+TEST(FreeRotation, MomentumThatOverflowedReturnsInsteadOfHanging) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const Vec3& L : {Vec3(infinity, 0, 1), Vec3(std::nan(""), 1, 1), Vec3(1e308, 1e308, 1e308)}) {
+    const Quaternion q = FreeRotation({{1, 2, 3}, {}}, {}, L).attitude(1.0);
+    EXPECT_FALSE(q.norm() < 0.9);  // not a number, or a unit quaternion
+  }
+}
+
 // 10⁶ steps: momentum and energy are those of the attitude, E = ½ lᵀI⁻¹l with l = Rᵀ L.
 TEST(FreeRotation, AMillionStepsKeepMomentumEnergyAndAttitude) {
   constexpr long kSteps = 1000000;
