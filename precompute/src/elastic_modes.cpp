@@ -7,7 +7,6 @@
 #include <string>
 
 #include "canonical_modes.h"
-#include "lanczos.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -49,13 +48,13 @@ Eigen::MatrixXd all_modes(const ScaledProblem& problem, ElasticInverse& inverse)
 }
 
 Eigen::MatrixXd first_guess(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index count,
-                            std::uint64_t seed) {
-  const Eigen::Index subspace = subspace_for(count);
-  if (problem.size() <= kDenseSize || subspace > available(problem) / 2)
+                            LanczosOptions options) {
+  options.count = static_cast<int>(count);
+  options.subspace = static_cast<int>(subspace_for(count));
+  if (problem.size() <= kDenseSize || options.subspace > available(problem) / 2)
     return all_modes(problem, inverse).leftCols(count);
   const Eigen::MatrixXd none(problem.size(), 0);
-  return lanczos(problem, inverse, none, none,
-                 {.count = static_cast<int>(count), .subspace = static_cast<int>(subspace), .seed = seed});
+  return lanczos(problem, inverse, none, none, options);
 }
 
 /// Modes orthogonal to the pairs, lowest first.
@@ -102,12 +101,13 @@ EigenPairs refined(const ScaledProblem& problem, ElasticInverse& inverse, const 
   return pairs;
 }
 
-EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted, std::uint64_t seed,
-                        Eigen::Index& pairs_to_keep) {
+EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted,
+                        LanczosOptions options, Eigen::Index& pairs_to_keep) {
   const Eigen::Index most = available(problem);
   wanted = std::min(wanted, most);
   for (Eigen::Index extra = 6 + wanted / 16;; extra *= 2) {
-    EigenPairs pairs = refined(problem, inverse, first_guess(problem, inverse, std::min(wanted + extra, most), seed));
+    EigenPairs pairs =
+        refined(problem, inverse, first_guess(problem, inverse, std::min(wanted + extra, most), options));
     pairs_to_keep = end_of_cluster(pairs.lambda, wanted, most);
     if (pairs_to_keep >= 0) return pairs;
     if (pairs.count() == most) throw ComputationError("the eigenvalues found are not in order");

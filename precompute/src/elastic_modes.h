@@ -3,9 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 
 #include "elastic_inverse.h"
+#include "lanczos.h"
 #include "limber/precompute/eigenvalue_count.h"
 
 namespace limber {
@@ -23,10 +23,10 @@ struct EigenPairs {
 EigenPairs refined(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& X);
 
 /// The lowest pairs: `wanted` at least, as far as there are so many, and as many more as it takes to end at a gap.
-/// @param seed of the start vector
+/// @param options tolerance and seed; its counts are set here
 /// @param[out] pairs_to_keep how many of them were asked for, a cluster at the end completed
-EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted, std::uint64_t seed,
-                        Eigen::Index& pairs_to_keep);
+EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted,
+                        LanczosOptions options, Eigen::Index& pairs_to_keep);
 
 /// Makes sure that no eigenvalue below the last pair is missing: counts those below a number in the widest gap at the
 /// end of the list. Where the count says that some are, looks for them orthogonally to those found and counts again.

@@ -43,8 +43,8 @@ struct ModalAnalysis {
   std::vector<double> mass_times_shapes;  ///< M W, the same shape, kg^½
   Index nodes = 0;
 
-  double residual_max = 0.0;    ///< max over elastic of ‖Kw − λMw‖ / ‖λMw‖
-  double residual_bound = 0.0;  ///< what residual_max was allowed: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖) of that mode
+  double residual_max = 0.0;        ///< ‖Kw − λMw‖ / ‖λMw‖ of the elastic mode that is nearest to its bound
+  double residual_bound = 0.0;      ///< its bound: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖)
   double backward_error_max = 0.0;  ///< max of ‖Kw − λMw‖ / ((‖K‖ + λ‖M‖)‖w‖)
   double orthogonality_max = 0.0;   ///< max |WᵀMW − I|, rigid motions included
   bool certified = false;
