@@ -23,11 +23,11 @@ namespace fs = std::filesystem;
 class Folder {
  public:
   Folder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
     std::string name = std::string("limber_mesh_") + test->test_suite_name() + "_" + test->name();
     std::replace(name.begin(), name.end(), '/', '_');
     // In memory where the system has it: thousands of small files take half a minute on some disks.
-    path_ = (fs::is_directory("/dev/shm") ? fs::path("/dev/shm") : fs::path(testing::TempDir())) /
+    path_ = (fs::is_directory("/dev/shm") ? fs::path("/dev/shm") : fs::path(::testing::TempDir())) /
             (name + "_" + std::to_string(::getpid()));
     fs::remove_all(path_);
     fs::create_directories(path_);

@@ -1,0 +1,266 @@
+// limber-precompute as a user runs it: reference frequencies, soups, wrong input.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "broken_meshes.h"
+#include "limber/core/file.h"
+#include "limber/mesh/write_mesh.h"
+#include "limber/model/asset.h"
+#include "run_program.h"
+#include "soup.h"
+#include "tet_box.h"
+
+namespace limber {
+namespace {
+
+namespace fs = std::filesystem;
+using limber::testing::ProgramResult;
+using limber::testing::run_program;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using Json = nlohmann::json;
+
+const std::vector<std::string> kSteel = {"--youngs-modulus", "2e11", "--poisson-ratio", "0.3", "--density", "7850"};
+
+class Precompute : public ::testing::Test {
+ protected:
+  ProgramResult run(std::vector<std::string> arguments, std::optional<rlim_t> largest_file = {}) const {
+    return run_program("limber-precompute", arguments, folder / "", largest_file);
+  }
+  /// Bakes and returns the report.
+  Json report(std::vector<std::string> arguments) const {
+    for (const char* a : {"-o", "asset.glb", "--report", "report.json"}) arguments.emplace_back(a);
+    const ProgramResult r = run(arguments);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.exit_code == 0 ? Json::parse(read_file(folder / "report.json")) : Json();
+  }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder / ""), fs::directory_iterator()));
+  }
+  const samples::Folder folder;
+};
+
+bool is_one_line(const std::string& text) {
+  return !text.empty() && text.find('\n') == text.size() - 1 &&
+         std::all_of(text.begin(), text.end() - 1, [](unsigned char c) { return c >= 32; });
+}
+
+// Reference cases ---------------------------------------------------------------------------------------------------
+
+/// The options that make limber-precompute solve a reference case.
+std::vector<std::string> options_of(const Json& reference, const fs::path& folder) {
+  Json materials;
+  for (const Json& m : reference["materials"]) {
+    const std::string region = m["region"] == "*" ? "*" : std::to_string(m["tag"].get<int>());
+    materials[region] = {{"youngs_modulus", m["E"]}, {"poisson_ratio", m["nu"]}, {"density", m["rho"]}};
+  }
+  write_file(folder / "materials.json", materials.dump());
+  std::vector<std::string> options = {"--materials", "materials.json", "--modes", "30"};
+  if (reference["fixed"].is_object()) {
+    std::string nodes;
+    for (const Json& n : reference["fixed"]["nodes_index0"])
+      nodes += (nodes.empty() ? "nodes:" : ",") + std::to_string(n.get<int>());
+    options.insert(options.end(), {"--fix", nodes});
+  }
+  return options;
+}
+
+class ReferenceCase : public Precompute, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(ReferenceCase, AgreesWithThreeIndependentPrograms) {
+  const fs::path shared = fs::path(LIMBER_SHARED_DIR) / "reference-modal";
+  if (!fs::exists(shared)) GTEST_SKIP() << "the reference cases are not here";
+  const Json reference = Json::parse(read_file(shared / (std::string(GetParam()) + ".json")));
+  for (const auto& [mass, key] : {std::pair("consistent", "freqs_hz"), std::pair("lumped", "freqs_hz_lumped")}) {
+    auto arguments = options_of(reference, folder / "");
+    arguments.insert(arguments.begin(), (shared / reference["mesh"].get<std::string>()).string());
+    arguments.insert(arguments.end(), {"--mass", mass});
+    const Json r = report(arguments);
+    ASSERT_TRUE(r.is_object());
+    EXPECT_EQ(r["nodes"], reference["nodes_used"]);
+    EXPECT_EQ(r["zero_modes"], reference["zero_modes"]);
+    EXPECT_EQ(r["components"], reference["components"]);
+    EXPECT_NEAR(r["mass"].get<double>(), reference["total_mass"].get<double>(),
+                1e-12 * reference["total_mass"].get<double>());
+    EXPECT_TRUE(r["certified"]);
+    const auto expected = reference[key].get<std::vector<double>>();
+    const auto found = r["frequencies_hz"].get<std::vector<double>>();
+    ASSERT_GE(found.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      EXPECT_NEAR(found[i], expected[i], 1e-6 * expected[i]) << mass << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, ReferenceCase,
+                         ::testing::Values("small_300", "composite_medit", "pinned_node", "two_bodies",
+                                           "bar_cantilever"),
+                         [](const auto& info) { return std::string(info.param); });
+
+// Ordinary use ------------------------------------------------------------------------------------------------------
+
+TEST_F(Precompute, BarAtZeroPoissonRatioRingsAtTheExactAxialFrequencies) {
+  // ν = 0: the axial modes of a free bar, f_n = n/(2L) √(E/ρ), are one-dimensional. Consistent mass overestimates the
+  // n-th by (nπ/N)²/24 to leading order with N elements along the bar.
+  constexpr int kCells = 20;
+  constexpr double kLength = 1.0, kModulus = 1e8, kDensity = 1000.0;
+  write_gmsh(folder / "bar.msh", testing::tet_box(kCells, 2, 2, {kLength, 0.1, 0.1}));
+  const Json r = report({"bar.msh", "--youngs-modulus", "1e8", "--poisson-ratio", "0", "--density", "1000", "--modes",
+                         "40", "--mass", "consistent"});
+  const auto hz = r["frequencies_hz"].get<std::vector<double>>();
+  for (int n = 1; n <= 3; ++n) {
+    const double exact = n / (2.0 * kLength) * std::sqrt(kModulus / kDensity);
+    const double excess = std::pow(n * std::numbers::pi / kCells, 2) / 24.0;
+    const auto near = *std::min_element(hz.begin(), hz.end(), [&](double a, double b) {
+      return std::abs(a - exact * (1 + excess)) < std::abs(b - exact * (1 + excess));
+    });
+    EXPECT_NEAR(near, exact * (1 + excess), exact * excess * excess * 10) << n;
+  }
+}
+
+TEST_F(Precompute, EqualRunsGiveEqualBytes) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(3, 1.0));  // a cube has double and triple modes
+  std::vector<std::string> arguments = {"cube.msh", "--modes", "12", "-o", "a.glb"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  ASSERT_EQ(run(arguments).exit_code, 0);
+  arguments[4] = "b.glb";
+  ASSERT_EQ(run(arguments).exit_code, 0);
+  EXPECT_EQ(read_file(folder / "a.glb"), read_file(folder / "b.glb"));
+}
+
+TEST_F(Precompute, SoupIsWrappedBakedAndMoved) {
+  write_obj(folder / "soup.obj", shapes::soup());
+  const Json r = report({"soup.obj", "--material", "rubber", "--modes", "6", "--cell-size", "0.25", "--alpha", "0.1"});
+  ASSERT_TRUE(r.is_object());
+  EXPECT_TRUE(r["surface"]["wrapped"]);
+  // Wrap and tets stay within about the wrap's offset and the cell's sagitta of the union of the two balls.
+  EXPECT_NEAR(r["volume"].get<double>(), shapes::soup_volume(), 0.1 * shapes::soup_volume());
+  EXPECT_EQ(r["zero_modes"], 6);
+  write_file(folder / "scene.json",
+             R"({"step": 0.01, "steps": 50, "gravity": [0, 0, 0], "assets": {"soup": "asset.glb"},
+                 "bodies": [{"name": "soup", "asset": "soup", "angular_velocity": [1, 2, 3]}],
+                 "strikes": [{"body": "soup", "time": 0.1, "at": {"vertex": 0}, "impulse": [10, 0, 0]}]})");
+  const ProgramResult moved = run_program("limber-simulate", {"scene.json", "--record", "moved.glb"}, folder / "");
+  EXPECT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_TRUE(fs::exists(folder / "moved.glb"));
+}
+
+TEST_F(Precompute, ScaleMultipliesLengthsFirst) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(2, 1000.0));  // millimetres
+  std::vector<std::string> arguments = {"cube.msh", "--modes", "3", "--scale", "0.001"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  EXPECT_NEAR(report(arguments)["mass"].get<double>(), 7850.0, 1e-9 * 7850.0);
+}
+
+TEST_F(Precompute, TooSmallAndTooFastModesAreDroppedWithTheirReason) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(3, 0.1));
+  const Json all = report({"cube.msh", "--material", "rubber", "--modes", "20"});
+  const double middle = all["frequencies_hz"][10];
+  const Json fast = report(
+      {"cube.msh", "--material", "rubber", "--modes", "20", "--frame-rate", std::to_string(2 * middle * 1.0001)});
+  EXPECT_EQ(fast["kept"].size() + fast["discarded"].size(), fast["frequencies_hz"].size());
+  ASSERT_FALSE(fast["discarded"].empty());
+  EXPECT_EQ(fast["discarded"][0]["reason"], "above_half_frame_rate");
+  const Json small =
+      report({"cube.msh", "--material", "rubber", "--modes", "20", "--max-force", "1e-3", "--min-displacement", "1"});
+  EXPECT_TRUE(small["kept"].empty());
+  EXPECT_EQ(small["discarded"][0]["reason"], "below_min_displacement");
+  const Json kept = report({"cube.msh", "--material", "rubber", "--modes", "20", "--max-force", "1e-3",
+                            "--min-displacement", "1", "--keep-all"});
+  EXPECT_EQ(kept["kept"].size(), kept["frequencies_hz"].size());
+}
+
+// Wrong input -------------------------------------------------------------------------------------------------------
+
+TEST_F(Precompute, EveryBrokenMeshGivesOneLineAndNoOutput) {
+  const auto all = samples::broken_meshes();
+  ASSERT_GE(all.size(), 60u);
+  for (const samples::Broken& b : all) {
+    SCOPED_TRACE(b.name);
+    folder.write(b.name, b.bytes);
+    std::vector<std::string> arguments = {b.name, "-o", "asset.glb", "--report", "report.json"};
+    arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+    const ProgramResult r = run(arguments);
+    EXPECT_EQ(r.exit_code, 1) << r.err;
+    EXPECT_TRUE(is_one_line(r.err)) << r.err;
+    EXPECT_THAT(r.err, StartsWith("limber-precompute: "));
+    EXPECT_THAT(r.err, HasSubstr(b.name));
+    fs::remove(folder / b.name);
+    EXPECT_EQ(files(), 0u) << "something was written";
+  }
+}
+
+TEST_F(Precompute, WhatIsNoMeshGivesOneLine) {
+  fs::create_directory(folder / "folder.msh");
+  folder.write("empty.obj", "");
+  folder.write("text.xyz", "not a mesh");
+  for (const char* name : {"folder.msh", "empty.obj", "text.xyz", "missing.msh"}) {
+    std::vector<std::string> arguments = {name, "-o", "asset.glb"};
+    arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+    const ProgramResult r = run(arguments);
+    EXPECT_EQ(r.exit_code, 1) << name;
+    EXPECT_TRUE(is_one_line(r.err)) << r.err;
+    EXPECT_FALSE(fs::exists(folder / "asset.glb"));
+  }
+}
+
+TEST_F(Precompute, WrongUseIsToldWithExitCodeTwo) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(1, 1.0));
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"cube.msh"},
+      {"cube.msh", "-o", "a.glb"},
+      {"cube.msh", "-o", "a.glb", "--material", "stel"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--density", "1000"},
+      {"cube.msh", "-o", "a.glb", "--youngs-modulus", "1e9", "--density", "1000"},
+      {"cube.msh", "-o", "a.glb", "--youngs-modulus", "1e9", "--density", "1000", "--poisson-ratio", "0.5"},
+      {"cube.msh", "-o", "a.glb", "--youngs-modulus", "-1", "--density", "1000", "--poisson-ratio", "0.3"},
+      {"cube.msh", "-o", "a.glb", "--youngs-modulus", "nan", "--density", "1000", "--poisson-ratio", "0.3"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--modes", "-1"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--modes", "many"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "group:clamped"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "nodes:8"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "box:5,5,5,6,6,6"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--damping-ratio", "0.1"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--damping-ratio", "0.1@5,0"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--rayleigh", "1,-1"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--mass", "heavy"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--scale", "0"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--unknown"},
+  };
+  for (const auto& arguments : wrong) {
+    SCOPED_TRACE(arguments.empty() ? "no arguments" : arguments.back());
+    const ProgramResult r = run(arguments);
+    EXPECT_EQ(r.exit_code, 2) << r.err;
+    EXPECT_TRUE(is_one_line(r.err)) << r.err;
+    EXPECT_FALSE(fs::exists(folder / "a.glb"));
+  }
+}
+
+TEST_F(Precompute, DiskThatFillsLeavesNothing) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(3, 1.0));
+  std::vector<std::string> arguments = {"cube.msh", "-o", "asset.glb", "--report", "report.json"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  const ProgramResult r = run(arguments, 2000);
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_TRUE(is_one_line(r.err)) << r.err;
+  EXPECT_EQ(files(), 1u) << "more than the input is left";
+}
+
+TEST_F(Precompute, FlatTetsAreRefusedAndNegativeOnesTurned) {
+  TetMesh mesh = testing::tet_box(2, 1.0);
+  std::swap(mesh.tets[3][0], mesh.tets[3][1]);
+  write_gmsh(folder / "turned.msh", mesh);
+  std::vector<std::string> arguments = {"turned.msh", "--modes", "3"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  const Json r = report(arguments);
+  ASSERT_EQ(r["warnings"].size(), 1u);
+  EXPECT_THAT(r["warnings"][0].get<std::string>(), HasSubstr("1 of 48 tetrahedra were left-handed"));
+  EXPECT_NEAR(r["volume"].get<double>(), 1.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace limber
