@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -31,22 +32,17 @@ std::vector<Edge> sorted_edges(const SurfaceMesh& surface) {
 }
 
 Index count_components(const SurfaceMesh& surface) {
-  std::vector<Index> parent(surface.vertices.size());
-  for (std::size_t i = 0; i < parent.size(); ++i) parent[i] = static_cast<Index>(i);
-  const auto root = [&](Index i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(surface.vertices.size());
   for (const Triangle& t : surface.triangles) {
-    parent[root(t[1])] = root(t[0]);
-    parent[root(t[2])] = root(t[0]);
+    sets.join(t[1], t[0]);
+    sets.join(t[2], t[0]);
   }
   std::vector<char> used(surface.vertices.size(), 0);
   for (const Triangle& t : surface.triangles)
     for (const Index v : t) used[v] = 1;
   Index count = 0;
-  for (std::size_t i = 0; i < parent.size(); ++i)
-    if (used[i] && parent[i] == static_cast<Index>(i)) ++count;
+  for (std::size_t i = 0; i < used.size(); ++i)
+    if (used[i] && sets.root(static_cast<Index>(i)) == static_cast<Index>(i)) ++count;
   return count;
 }
 

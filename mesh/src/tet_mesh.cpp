@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
+#include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -95,20 +95,6 @@ std::vector<Vec3> picked(const std::vector<Vec3>& points, const std::vector<Inde
   return out;
 }
 
-/// Roots of a union–find forest with path halving.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-  Index root(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(Index a, Index b) { parent_[root(a)] = root(b); }
-
- private:
-  std::vector<Index> parent_;
-};
-
 }  // namespace
 
 double signed_volume(const TetMesh& mesh, Index tet) { return signed_volume(corners(mesh, mesh.tets[tet])); }
@@ -186,6 +172,28 @@ std::vector<Index> connected_components(const TetMesh& mesh) {
     component[i] = label;
   }
   return component;
+}
+
+std::vector<Index> face_connected_parts(const TetMesh& mesh) {
+  struct Face {
+    Triangle nodes;  // sorted
+    Index tet;
+  };
+  std::vector<Face> faces;
+  faces.reserve(4 * mesh.tets.size());
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (int opposite = 0; opposite < 4; ++opposite) {
+      Face f{.nodes = {}, .tet = static_cast<Index>(t)};
+      for (int a = 0, b = 0; a < 4; ++a)
+        if (a != opposite) f.nodes[b++] = mesh.tets[t][a];
+      std::sort(f.nodes.begin(), f.nodes.end());
+      faces.push_back(f);
+    }
+  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.nodes < b.nodes; });
+  DisjointSets sets(mesh.tets.size());
+  for (std::size_t f = 1; f < faces.size(); ++f)
+    if (faces[f].nodes == faces[f - 1].nodes) sets.join(faces[f].tet, faces[f - 1].tet);
+  return sets.labels();
 }
 
 SubMesh extract_component(const TetMesh& mesh, std::span<const Index> component, Index which) {

@@ -3,9 +3,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <string>
 
+#include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -14,24 +14,6 @@ namespace {
 constexpr double kInLine = 1e-9;     // of the body's size
 constexpr double kDependent = 1e-9;  // pivots below this, relative to the largest, are round-off
 constexpr int kMaxParts = 300;       // 1,800 unknowns, dense: seconds
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-  Index root(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  /// @return whether they were apart
-  bool join(Index a, Index b) {
-    a = root(a), b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-    return a != b;
-  }
-
- private:
-  std::vector<Index> parent_;
-};
 
 /// Coordinates centred on the body and scaled to about one, so that t and r weigh alike.
 struct Scaled {
@@ -74,31 +56,6 @@ Span span_of(std::span<const Vec3> places) {
     if (const double d = (places[i] - places[0]).cross(span.direction).norm(); d > distance) distance = d, off = i;
   if (off != 0) span.chosen.push_back(off);
   return span;
-}
-
-/// Labels tets by the part they belong to: those connected through faces.
-std::vector<Index> face_connected_parts(const TetMesh& mesh) {
-  struct Face {
-    std::array<Index, 3> nodes;
-    Index tet;
-  };
-  std::vector<Face> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (std::size_t e = 0; e < mesh.tets.size(); ++e)
-    for (int opposite = 0; opposite < 4; ++opposite) {
-      Face f{.nodes = {}, .tet = static_cast<Index>(e)};
-      for (int a = 0, i = 0; a < 4; ++a)
-        if (a != opposite) f.nodes[i++] = mesh.tets[e][a];
-      std::sort(f.nodes.begin(), f.nodes.end());
-      faces.push_back(f);
-    }
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.nodes < b.nodes; });
-  DisjointSets sets(mesh.tets.size());
-  for (std::size_t i = 1; i < faces.size(); ++i)
-    if (faces[i].nodes == faces[i - 1].nodes) sets.join(faces[i].tet, faces[i - 1].tet);
-  std::vector<Index> part(mesh.tets.size());
-  for (std::size_t e = 0; e < part.size(); ++e) part[e] = sets.root(static_cast<Index>(e));
-  return part;
 }
 
 /// Which parts touch each node, each once, ascending.

@@ -100,6 +100,16 @@ TEST(Components, AreTetsThatShareANode) {
   EXPECT_THAT(connected_components(mesh), testing::Each(0));
 }
 
+TEST(Components, PartsJoinedAtANodeOrAnEdgeAreOneBodyButTwoParts) {
+  TetMesh mesh;
+  mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}, {1, 1, 1}};
+  mesh.tets = {{0, 1, 2, 3}, {0, 4, 5, 6}, {1, 2, 3, 7}};  // the second shares a node with the first, the third a face
+  EXPECT_THAT(connected_components(mesh), testing::ElementsAre(0, 0, 0));
+  EXPECT_THAT(face_connected_parts(mesh), testing::ElementsAre(0, 1, 0));
+  mesh.tets[1] = {0, 1, 5, 6};  // now an edge
+  EXPECT_THAT(face_connected_parts(mesh), testing::ElementsAre(0, 1, 0));
+}
+
 TEST(Components, TakenOutCarryTheirRegionsAndGroups) {
   TetMesh mesh = two_cubes();
   std::vector<Index> upper(mesh.tets.size());

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "disjoint_sets.h"
+#include "limber/core/disjoint_sets.h"
 
 namespace limber {
 namespace {

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "cgal_steps.h"
-#include "disjoint_sets.h"
+#include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "shells.h"
 
@@ -159,33 +159,10 @@ void refuse_huge_mesh(const Bodies& bodies, double cell_size) {
                            text(cell_size * std::cbrt(expected / kMostTets) * 1.1));
 }
 
-/// Per tet, the number of its piece: tets joined through faces, numbered by their first tet.
-std::vector<Index> face_connected_pieces(const TetMesh& mesh) {
-  struct Face {
-    Triangle key;
-    Index tet;
-  };
-  std::vector<Face> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
-    for (int skipped = 0; skipped < 4; ++skipped) {
-      Triangle key;
-      for (int a = 0, b = 0; a < 4; ++a)
-        if (a != skipped) key[b++] = mesh.tets[i][a];
-      std::sort(key.begin(), key.end());
-      faces.push_back({key, static_cast<Index>(i)});
-    }
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
-  DisjointSets sets(mesh.tets.size());
-  for (std::size_t f = 1; f < faces.size(); ++f)
-    if (faces[f].key == faces[f - 1].key) sets.join(faces[f].tet, faces[f - 1].tet);
-  return sets.labels();
-}
-
 /// Drops pieces that are no more than a splinter of the body: they hang on by a node or an edge, or not at all, and
 /// each would swing or fly as a body of its own.
 Index drop_stray_pieces(TetMesh& mesh, Index& pieces_left) {
-  const std::vector<Index> piece = face_connected_pieces(mesh);
+  const std::vector<Index> piece = face_connected_parts(mesh);
   std::vector<double> volume(1 + *std::max_element(piece.begin(), piece.end()), 0.0);
   double whole = 0.0;
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {

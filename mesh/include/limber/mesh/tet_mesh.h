@@ -60,6 +60,10 @@ VolumeProperties volume_properties(const TetMesh& mesh);
 /// @return per tet, the body's index; the number of bodies is 1 + the largest.
 std::vector<Index> connected_components(const TetMesh& mesh);
 
+/// Labels tets by part: tets that share a face are in one part, those that share a node or an edge need not be. Numbers
+/// parts by their first tet.
+std::vector<Index> face_connected_parts(const TetMesh& mesh);
+
 /// The tets of one body with its nodes in the order of the whole; unused nodes and groups without a node are left out.
 struct SubMesh {
   TetMesh mesh;

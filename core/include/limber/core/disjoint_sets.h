@@ -1,6 +1,8 @@
-// Sets of indices that grow together (union–find with path halving).
+/// @file limber/core/disjoint_sets.h
+/// Sets of indices that grow together: connected parts of meshes (union–find with path halving).
 #pragma once
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -10,22 +12,29 @@ namespace limber {
 
 class DisjointSets {
  public:
+  /// Every index a set of its own.
   explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
 
+  /// The lowest index of the set that holds i. @pre 0 ≤ i < count
   Index root(Index i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
-  void join(Index a, Index b) { parent_[root(a)] = root(b); }
+
+  /// Makes one set of two. @return whether they were apart
+  bool join(Index a, Index b) {
+    a = root(a), b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+    return a != b;
+  }
 
   /// Per index the number of its set; sets are numbered by their first index.
   std::vector<Index> labels() {
-    std::vector<Index> label_of_root(parent_.size(), -1), label(parent_.size());
+    std::vector<Index> label(parent_.size());
     Index count = 0;
     for (std::size_t i = 0; i < parent_.size(); ++i) {
-      Index& of_root = label_of_root[root(static_cast<Index>(i))];
-      if (of_root < 0) of_root = count++;
-      label[i] = of_root;
+      const Index r = root(static_cast<Index>(i));
+      label[i] = r == static_cast<Index>(i) ? count++ : label[r];
     }
     return label;
   }
