@@ -38,6 +38,7 @@ struct Arguments {
   std::string load = "sudden";
   int modes = 64;
   double scale = 1.0;
+  int blas_threads = 1;
   bool volume_block = false, no_certify = false, list_materials = false;
 };
 
@@ -80,6 +81,11 @@ void declare_mode_options(CLI::App& app, Arguments& a) {
       ->expected(2);
   app.add_option("--damping-ratio", a.damping_ratio, "damping ratio Z at two frequencies (1 is critical)")
       ->type_name("Z@F1,F2");
+  app.add_option("--blas-threads", a.blas_threads,
+                 "threads of the linear algebra, 0 for all; more than one pays on huge meshes on a quiet machine")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_flag("--no-certify", a.no_certify, "skip the proof that no mode was missed (for huge meshes)");
 }
 
@@ -149,7 +155,8 @@ BakeOptions options_of(const Arguments& a) {
   o.damping = damping_of(a);
   o.analysis = {.modes = a.modes,
                 .mass = a.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
-                .certify = !a.no_certify};
+                .certify = !a.no_certify,
+                .blas_threads = a.blas_threads};
   o.limits = a.limits;
   o.limits.max_modes = a.modes;
   o.limits.load = load_of(a.load);

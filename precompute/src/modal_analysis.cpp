@@ -21,8 +21,6 @@
 namespace limber {
 namespace {
 
-// Below so many nodes the BLAS's threads cost more than they gain (docs/modal-analysis.md).
-constexpr std::size_t kNodesForThreads = 15000;
 constexpr double kNearlyLoose = 1e-6;
 constexpr double kResidual = 1e-8;  // relative to ‖λMw‖, unless round-off of K forbids it
 constexpr double kRoundOffFactor = 100.0;
@@ -280,8 +278,7 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   options.validate();
   ModalAnalysis analysis;
   analysis.nodes = static_cast<Index>(mesh.nodes.size());
-  const bool few = mesh.nodes.size() < kNodesForThreads;
-  const BlasThreads threads(options.blas_threads > 0 ? options.blas_threads : (few ? 1 : 0));
+  const BlasThreads threads(options.blas_threads);
   Stopwatch watch;
 
   const Body body = make_body(mesh, materials, fixed_nodes, options.mass, jobs);

@@ -25,8 +25,11 @@ namespace limber {
 struct ModalAnalysisOptions {
   int modes = 64;  ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
   MassKind mass = MassKind::kLumped;
-  bool certify = true;     ///< prove by inertia that no mode is missed
-  int blas_threads = 0;    ///< 0: one below about 15,000 nodes, else all; set explicitly on the BLAS
+  bool certify = true;  ///< prove by inertia that no mode is missed
+  /// Threads of the BLAS, set for the length of a call; 0: one per processor. More than one pays on meshes of tens of
+  /// thousands of nodes on a quiet machine; on a busy one their waiting can cost twenty times what they save. The last
+  /// bits of the modes depend on it.
+  int blas_threads = 1;
   std::uint64_t seed = 0;  ///< of Lanczos's start vector: modes agree for all seeds to about 1e-6, bits do not
   void validate() const;
 };
