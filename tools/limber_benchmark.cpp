@@ -221,6 +221,7 @@ void benchmark_step(Program& program, const Arguments& a) {
   check(a);
   program.print(fmt::format("{:>6} {:>7} {:>9} {:>14} {:>14} {:>18} {:>13}\n", "modes", "bodies", "vertices",
                             "step ns/body", "positions ns/v", "with normals ns/v", "energy drift"));
+  if (!a.asset.empty()) program.add_input(a.asset);
   std::vector<Row> rows;
   for (const auto& model : models(a))
     for (const int bodies : a.bodies) {

@@ -176,6 +176,7 @@ std::string frequencies_csv(const Asset& asset) {
 
 void inspect(Program& program, const Arguments& a) {
   program.progress().stage("reading the asset");
+  program.add_input(a.asset);
   const Asset asset = read_asset(a.asset);
   const auto file_bytes = std::filesystem::file_size(a.asset);
   program.print(fmt::format("{}: {} {}, {:.2f} MB\n", a.asset, asset.bodies.size(),

@@ -97,6 +97,9 @@ void OutputFiles::add(const std::filesystem::path& path, std::string_view bytes)
   if (path.empty()) throw InputError("write \"\": the file name is empty");
   if (std::filesystem::is_directory(path, ignored))
     throw InputError("write \"" + path.string() + "\": is a directory, expected a file name");
+  // The rename would put a plain file in the place of a device.
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    throw InputError("write \"" + path.string() + "\": is not a regular file, expected a file name");
   const auto temporary = temporary_beside(path);
   write_all(path, temporary, bytes);
   pending_.push_back({temporary, path});

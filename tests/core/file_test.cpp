@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 #include <filesystem>
@@ -69,6 +70,13 @@ TEST_F(FileTest, WriteThatCannotFinishLeavesTheOldFileAndNoOther) {
   EXPECT_THAT(message, HasSubstr("nothing was written"));
   EXPECT_EQ(read_file(folder / "x"), "old");
   EXPECT_EQ(files_in_folder(), 1u);
+}
+
+TEST_F(FileTest, ADeviceIsNotReplacedByAFile) {
+  const auto pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(message_of([&] { write_file(pipe, "x"); }), HasSubstr("is not a regular file"));
+  EXPECT_TRUE(fs::is_fifo(pipe));
 }
 
 TEST_F(FileTest, FilesThatBelongTogetherAppearTogetherOrNotAtAll) {

@@ -132,6 +132,31 @@ TEST_F(ProgramTest, TwoOutputsMayNotShareAName) {
   EXPECT_FALSE(fs::exists(in_folder("same")));
 }
 
+TEST_F(ProgramTest, TwoSpellingsOfOnePathAreOneOutput) {
+  const auto here = fs::current_path();
+  fs::current_path(folder_);
+  fs::create_directory("inner");
+  EXPECT_EQ(run({"--report", "inner/../same"}, [&] { program_.write_file("same", "x"); }), 2);
+  fs::current_path(here);
+  expect_one_line_error("two outputs have the same name");
+  EXPECT_FALSE(fs::exists(in_folder("same")));
+}
+
+TEST_F(ProgramTest, AnInputIsNeverOverwritten) {
+  limber::write_file(in_folder("input"), "precious");
+  fs::create_symlink("input", in_folder("link"));
+  for (const char* output : {"input", "link", "./input"}) {
+    EXPECT_EQ(run({},
+                  [&] {
+                    program_.add_input(in_folder("input"));
+                    program_.write_file(in_folder(output), "x");
+                  }),
+              2);
+    expect_one_line_error("is an input too");
+    EXPECT_EQ(read_file(in_folder("input")), "precious");
+  }
+}
+
 TEST_F(ProgramTest, AReportThatCannotBeWrittenKeepsTheOtherOutputsBack) {
   EXPECT_EQ(run({"--report", in_folder("missing/r.json")}, [&] { program_.write_file(in_folder("first.bin"), "x"); }),
             1);

@@ -84,7 +84,12 @@ void Program::print(std::string_view text) {
 }
 
 void Program::write_file(const std::filesystem::path& path, std::string_view bytes) {
-  const auto same = std::filesystem::weakly_canonical(path);
+  std::error_code ignored;
+  for (const auto& input : input_paths_)
+    if (std::filesystem::equivalent(path, input, ignored))
+      throw InvalidArgument("the output \"" + path.string() + "\" is an input too, expected another name");
+  // Absolute first: a relative path whose file does not exist yet would stay relative.
+  const auto same = std::filesystem::weakly_canonical(std::filesystem::absolute(path));
   if (std::find(output_paths_.begin(), output_paths_.end(), same) != output_paths_.end())
     throw InvalidArgument("two outputs have the same name \"" + path.string() + "\", expected one name each");
   output_paths_.push_back(same);

@@ -48,8 +48,12 @@ class Program {
   /// Text for people on stdout.
   void print(std::string_view text);
 
+  /// Tells of a file that the work reads: no output may take its place.
+  void add_input(const std::filesystem::path& path) { input_paths_.push_back(path); }
+
   /// Bytes are written beside `path` now; the file appears when all the work has succeeded, together with the others.
-  /// @throws InvalidArgument if two outputs of one run have the same path; InputError as OutputFiles::add()
+  /// @throws InvalidArgument if two outputs of one run have the same path, or one is an input; InputError as
+  /// OutputFiles::add()
   void write_file(const std::filesystem::path& path, std::string_view bytes);
 
   /// The machine-readable report, keys in the order they are set; starts with "program" and "version". What differs
@@ -73,7 +77,7 @@ class Program {
   Warnings warnings_;
   Progress progress_;
   OutputFiles outputs_;
-  std::vector<std::filesystem::path> output_paths_;
+  std::vector<std::filesystem::path> input_paths_, output_paths_;
 };
 
 /// Validators for options: a finite number > 0, or ≥ 0. (CLI11 reads "nan" and "inf" as numbers.)

@@ -15,11 +15,12 @@ namespace limber {
 std::string read_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{8} << 30);
 
 /// Writes bytes beside `path` (same folder) and renames: a reader never sees half a file, and a failure (full disk, no
-/// permission) leaves what was there before and no temporary. @throws InputError naming the file and the system's reason.
+/// permission) leaves what was there before and no temporary. Devices and pipes are refused: they would be replaced.
+/// @throws InputError naming the file and the system's reason.
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
-/// Several output files that appear together: bytes are written beside their names by add(), and all renamed by commit().
-/// Destroyed without commit(), it removes what it wrote.
+/// Several output files that appear together: bytes are written beside their names by add(), and all renamed by
+/// commit(). Destroyed without commit(), it removes what it wrote.
 class OutputFiles {
  public:
   OutputFiles() = default;
