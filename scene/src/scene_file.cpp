@@ -286,8 +286,8 @@ void require_known_body(const Scene& scene, const std::string& name, const std::
 void read_time(const JsonObject& o, Scene& scene) {
   scene.step = positive(o, "step");
   if (o.has("steps") == o.has("duration"))
-    throw InputError(o.where() + ": has " + (o.has("steps") ? "both" : "neither") +
-                     " \"steps\" and \"duration\", expected one of them");
+    throw InputError(o.where() + ": has " + (o.has("steps") ? "both \"steps\" and" : "neither \"steps\" nor") +
+                     " \"duration\", expected one of them");
   if (o.has("steps")) {
     scene.steps = o.integer("steps", 1, kMaxSteps);
     return;

@@ -73,6 +73,14 @@ TEST(StrictJson, MissingKeysAreNamed) {
   EXPECT_THAT(said_of("1", [](const JsonObject& o) { o.number("y"); }), HasSubstr("\"f\": the key \"y\" is missing"));
 }
 
+TEST(StrictJson, AMissingKeyTellsWhatStandsThereInstead) {
+  const auto document = parse_json(R"({"youngs_moduls": 1, "density": 2})", "f");
+  EXPECT_THAT(message_of([&] { JsonObject(document, "f").number("youngs_modulus"); }),
+              HasSubstr("\"youngs_modulus\" is missing; what stands there is \"youngs_moduls\""));
+  EXPECT_THAT(message_of([&] { JsonObject(document, "f").number("poisson_ratio"); }),
+              testing::EndsWith("\"poisson_ratio\" is missing"));
+}
+
 TEST(StrictJson, WrongTypesTellWhatWasSeenAndExpected) {
   EXPECT_THAT(said_of("\"1\"", [](const JsonObject& o) { o.number("x"); }),
               HasSubstr("\"f\".x: is \"1\", expected a finite number"));

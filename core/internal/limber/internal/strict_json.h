@@ -103,7 +103,7 @@ class JsonObject {
   }
 
   const nlohmann::json& at(const std::string& key) const {
-    if (!has(key)) throw InputError(where_ + ": the key \"" + key + "\" is missing");
+    if (!has(key)) throw InputError(where_ + ": the key \"" + key + "\" is missing" + similar_key(key));
     return (*value_)[key];
   }
 
@@ -195,6 +195,17 @@ class JsonObject {
   }
 
  private:
+  /// For a key that is missing, perhaps because it is misspelt: what stands there that is like it and not known yet.
+  std::string similar_key(const std::string& key) const {
+    constexpr std::size_t kFewEdits = 2;
+    std::vector<std::string> others;
+    for (const auto& [other, unused] : value_->items())
+      if (std::find(known_.begin(), known_.end(), other) == known_.end()) others.push_back(other);
+    const auto near = nearest_word(key, others);
+    if (near.empty() || edit_distance(key, near) > kFewEdits) return "";
+    return "; what stands there is " + in_quotes(near);
+  }
+
   static double number_of(const nlohmann::json& v, const std::string& place) {
     if (!v.is_number() || !std::isfinite(v.get<double>()))
       throw InputError(place + ": is " + shown(v) + ", expected a finite number");
