@@ -66,6 +66,22 @@ std::string in_short(double value) {
   return text;
 }
 
+void check_doubles(const TetMesh& mesh, const std::string& name) {
+  std::vector<std::pair<Tet, std::size_t>> sorted;
+  sorted.reserve(mesh.tets.size());
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    sorted.emplace_back(mesh.tets[i], i);
+    std::sort(sorted.back().first.begin(), sorted.back().first.end());
+  }
+  std::sort(sorted.begin(), sorted.end());
+  const auto twin =
+      std::adjacent_find(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.first == b.first; });
+  if (twin != sorted.end())
+    throw InputError(described(name, std::next(twin)->second, mesh.tets[std::next(twin)->second]) +
+                     " has the nodes of tetrahedron " + std::to_string(twin->second) +
+                     " again, expected each once; remove one");
+}
+
 /// Turns marks (negative: unused) into new indices in the old order. @return the old index of each new one
 std::vector<Index> number_used(std::vector<Index>& mark) {
   std::vector<Index> old_index;
@@ -119,6 +135,7 @@ void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
       ++turned;
     }
   }
+  check_doubles(mesh, name);
   if (turned > 0)
     warnings.push_back(name + ": " + std::to_string(turned) + " of " + std::to_string(mesh.tets.size()) +
                        " tetrahedra were left-handed and have been re-oriented");

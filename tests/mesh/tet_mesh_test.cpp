@@ -175,6 +175,10 @@ TEST(Validate, NamesTheFirstWrongElement) {
   mesh.nodes[7][2] = mesh.nodes[7][1] = 0.0;  // (h, 0, 0): on node 1
   EXPECT_THAT(message_of(mesh), HasSubstr("is flat: volume 0 m^3"));
   mesh = two_cubes();
+  mesh.tets.push_back({mesh.tets[7][1], mesh.tets[7][2], mesh.tets[7][0], mesh.tets[7][3]});
+  mesh.tet_region.push_back(mesh.tet_region[7]);
+  EXPECT_THAT(message_of(mesh), HasSubstr("has the nodes of tetrahedron 7 again"));
+  mesh = two_cubes();
   mesh.tet_region.pop_back();
   EXPECT_THAT(message_of(mesh), HasSubstr("11 region indices for 12 tetrahedra"));
   mesh = two_cubes();

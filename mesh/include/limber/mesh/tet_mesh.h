@@ -40,7 +40,7 @@ double signed_volume(const TetMesh& mesh, Index tet);
 /// them. @param name shown in messages, such as `"spoon.msh"`.
 /// @throws InputError naming the first wrong element: coordinate not finite, index out of range, a node twice in a tet,
 /// or
-///   a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off).
+///   a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off), a tet that stands twice.
 void validate(TetMesh& mesh, const std::string& name, Warnings& warnings);
 
 /// Drops the nodes that no tet uses, from the groups too; groups left empty go. The order of the others stays.
