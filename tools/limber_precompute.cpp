@@ -57,6 +57,7 @@ void declare_material_options(CLI::App& app, Arguments& a) {
 void declare_mode_options(CLI::App& app, Arguments& a) {
   app.add_option("--modes", a.modes, "elastic modes computed, and the most kept, lowest first")
       ->type_name("N")
+      ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   app.add_option("--max-force", a.limits.max_force,
                  "largest force of the scene; with --min-displacement, drops what it cannot show")
@@ -84,7 +85,7 @@ void declare_mode_options(CLI::App& app, Arguments& a) {
   app.add_option("--blas-threads", a.blas_threads,
                  "threads of the linear algebra, 0 for all; more than one pays on huge meshes on a quiet machine")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_flag("--no-certify", a.no_certify, "skip the proof that no mode was missed (for huge meshes)");
 }
@@ -160,6 +161,8 @@ BakeOptions options_of(const Arguments& a) {
   o.limits = a.limits;
   o.limits.max_modes = a.modes;
   o.limits.load = load_of(a.load);
+  if ((a.limits.max_force > 0.0) != (a.limits.min_displacement > 0.0))
+    throw InvalidArgument("--max-force and --min-displacement go together: one of them is missing");
   o.volume_block = a.volume_block;
   o.validate();
   a.tets.validate();
@@ -227,6 +230,8 @@ BakeInput read_input(Program& program, const Arguments& a, Stopwatch& stopwatch)
   if (auto* mesh = std::get_if<TetMesh>(&read)) {
     input.mesh = std::move(*mesh);
     scale(input.mesh.nodes, a.scale);
+    if (a.tets.cell_size > 0.0 || a.tets.alpha > 0.0)
+      program.warnings().push_back("--cell-size and --alpha have no effect: the input is made of tetrahedra already");
   } else {
     input.render = std::get<SurfaceMesh>(std::move(read));
     scale(input.render->vertices, a.scale);
@@ -251,8 +256,9 @@ std::string options_line(const CLI::App& app) {
     if (o->count() == 0 || o->get_name() == "--report" || o->get_name().rfind("--", 0) != 0 ||
         o->get_name() == "--output")
       continue;
+    const bool is_flag = o->get_items_expected_max() == 0;
     for (const std::string& value : o->results())
-      line += (line.empty() ? "" : " ") + o->get_name() + " " + fs::path(value).filename().string();
+      line += (line.empty() ? "" : " ") + o->get_name() + (is_flag ? "" : " " + fs::path(value).filename().string());
   }
   return line;
 }
@@ -290,6 +296,8 @@ void precompute(Program& program, const Arguments& a) {
   nlohmann::ordered_json seconds;
   Stopwatch stopwatch(seconds);
 
+  for (const std::string& input : {a.mesh, a.materials_file, a.render_surface, a.collision_surface})
+    if (!input.empty()) program.add_input(input);
   program.progress().stage("reading");
   BakeInput input = read_input(program, a, stopwatch);
   input.provenance = provenance_of(program, a, program.options());

@@ -189,6 +189,8 @@ void simulate(Program& program, const Arguments& a) {
   const auto began = Clock::now();
   program.progress().stage("reading the scene");
   const Scene scene = read_scene(a.scene);
+  program.add_input(a.scene);
+  for (const auto& [name, file] : scene.assets) program.add_input(file);
   const SceneModels models = load_models(scene);
   program.progress().stage("simulating");
   const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
@@ -216,7 +218,7 @@ void simulate(Program& program, const Arguments& a) {
 int main(int argc, char** argv) {
   using namespace limber::tools;
   Program program("limber-simulate",
-                  "Plays a scene at a fixed step. Every body moves exactly over a step of any length.");
+                  "Plays a scene at a fixed step. Vibration and free flight are exact over a step of any length.");
   Arguments arguments;
   declare(program.options(), arguments);
   return program.run(argc, argv, [&] { simulate(program, arguments); });

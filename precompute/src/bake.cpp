@@ -182,6 +182,20 @@ BodySurfaces place_surfaces(const BodyInput& in) {
   return s;
 }
 
+/// A surface that lies elsewhere follows extrapolated modes: likely another unit or another origin than the mesh's.
+void warn_of_far_surface(const PlacedSurface& placed, const TetMesh& mesh, const std::string& which,
+                         Warnings& warnings) {
+  constexpr double kFar = 0.1;  // of the diagonal of the mesh
+  Eigen::AlignedBox3d box;
+  for (const Vec3& x : mesh.nodes) box.extend(x);
+  const double part = placed.embedding.max_distance / box.diagonal().norm();
+  if (part <= kFar) return;
+  warnings.push_back(which + " surface: " + std::to_string(placed.embedding.outside) + " of " +
+                     std::to_string(placed.surface.vertices.size()) + " vertices lie outside the tetrahedra, up to " +
+                     std::to_string(std::lround(100.0 * part)) +
+                     " % of the mesh's diagonal away; are its unit and origin those of the mesh?");
+}
+
 double decay_of(const RayleighDamping& d, double lambda) {
   return 0.5 * (d.stiffness_proportional * lambda + d.mass_proportional);
 }
@@ -264,6 +278,8 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
 
   const auto start = Clock::now();
   const BodySurfaces surfaces = place_surfaces(in);
+  warn_of_far_surface(surfaces.render, mesh, "render", warnings);
+  if (in.collision) warn_of_far_surface(*surfaces.collision, mesh, "collision", warnings);
   const auto kept = choose_modes(a, mesh, surfaces, options, report);
   ModalModelData data;
   data.name = in.name;

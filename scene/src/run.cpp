@@ -201,6 +201,9 @@ class Run {
       track.amplitudes.insert(track.amplitudes.end(), view.amplitudes.begin(), view.amplitudes.end());
       track.rates.insert(track.rates.end(), view.rates.begin(), view.rates.end());
       track.energies.push_back(world_.energy(ids_[i]));
+      if (!std::isfinite(track.energies.back().total()))
+        throw ComputationError(scene_.bodies[i].where + ": the body's energy is not finite after " + std::to_string(n) +
+                               " steps, its place, its velocity, gravity or a load is too large");
     }
     if (options_.reconstruct) reconstruct_all();
     if (options_.progress && steps_ > 0) options_.progress(static_cast<double>(n) / static_cast<double>(steps_));

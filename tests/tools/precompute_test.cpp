@@ -220,6 +220,12 @@ TEST_F(Precompute, WrongUseIsToldWithExitCodeTwo) {
       {"cube.msh", "-o", "a.glb", "--youngs-modulus", "nan", "--density", "1000", "--poisson-ratio", "0.3"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--modes", "-1"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--modes", "many"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--modes", "0"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--max-force", "5"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--min-displacement", "1e-3"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--blas-threads", "-1"},
+      {"cube.msh", "-o", "cube.msh", "--material", "steel", "--modes", "1"},
+      {"cube.msh", "-o", "a.glb", "--report", "cube.msh", "--material", "steel", "--modes", "1"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "group:clamped"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "nodes:8"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--fix", "box:5,5,5,6,6,6"},
@@ -237,6 +243,25 @@ TEST_F(Precompute, WrongUseIsToldWithExitCodeTwo) {
     EXPECT_TRUE(is_one_line(r.err)) << r.err;
     EXPECT_FALSE(fs::exists(folder / "a.glb"));
   }
+}
+
+TEST_F(Precompute, SurfaceFarFromTheMeshAndOptionsWithoutEffectAreToldOf) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(1, 1.0));
+  SurfaceMesh far = boundary_surface(testing::tet_box(1, 1.0)).surface;
+  for (Vec3& x : far.vertices) x.x() += 100.0;
+  write_obj(folder / "far.obj", far);
+  std::vector<std::string> arguments = {"cube.msh", "--modes", "3", "--render-surface", "far.obj", "--cell-size", "1"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  const Json r = report(arguments);
+  ASSERT_EQ(r["warnings"].size(), 2u);
+  EXPECT_THAT(r["warnings"][0].get<std::string>(), HasSubstr("--cell-size and --alpha have no effect"));
+  EXPECT_THAT(r["warnings"][1].get<std::string>(), HasSubstr("8 of 8 vertices lie outside the tetrahedra"));
+}
+
+TEST_F(Precompute, ProvenanceHoldsOptionsAsTheyAreTyped) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(1, 1.0));
+  report({"cube.msh", "--material", "steel", "--modes", "2", "--no-certify", "--volume"});
+  EXPECT_EQ(read_asset(folder / "asset.glb").provenance.options, "--material steel --modes 2 --no-certify --volume");
 }
 
 TEST_F(Precompute, DiskThatFillsLeavesNothing) {

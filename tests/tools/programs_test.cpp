@@ -140,7 +140,10 @@ TEST_F(Programs, WrongUsageIsExitCodeTwoInOneLine) {
   expect_one_line(simulate({"--record-frame-rate", "nan"}), 2, "--record-frame-rate");
   expect_one_line(simulate({"--slow-motion", "0"}), 2, "--slow-motion");
   expect_one_line(simulate({"--record", "same", "--report", "same"}), 2, "two outputs");
+  expect_one_line(simulate({"--report", "scene.json"}), 2, "is an input too");
+  expect_one_line(simulate({"--record", "block.glb"}), 2, "is an input too");
   expect_one_line(run("limber-inspect", {}), 2, "ASSET.glb");
+  expect_one_line(run("limber-inspect", {"block.glb", "--frequencies", "block.glb"}), 2, "is an input too");
   EXPECT_EQ(files(), given_);
 }
 
@@ -163,6 +166,12 @@ TEST_F(Programs, WrongFilesAreExitCodeOneInOneLineAndNothingIsWritten) {
   replace_in_scene("\"vertex\": 3", "\"vertex\": 3000");
   expect_one_line(with("scene.json"), 1, "strikes[1].at.vertex");
   expect_one_line(run("limber-inspect", {"scene.json", "--report", "r.json"}), 1, "scene.json");
+  EXPECT_EQ(files(), given_);
+}
+
+TEST_F(Programs, MotionBeyondTheNumbersIsOneLineAndNothingIsWritten) {
+  replace_in_scene("\"gravity\": [0, 0, -1]", "\"gravity\": [0, 0, 1e300]");
+  expect_one_line(simulate({"--report", "r.json", "--energies", "e.csv"}), 1, "energy is not finite");
   EXPECT_EQ(files(), given_);
 }
 
