@@ -65,7 +65,7 @@ Quaternion turn_to_z(double l1, double l2, double l3) { return {1.0 + l3, l2, -l
 PrincipalInertia principal_inertia(const Mat3& inertia) {
   if (!inertia.allFinite()) throw InvalidArgument("principal_inertia: the inertia tensor is not finite");
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia);
-  const Vec3 moments = solver.eigenvalues();
+  const Vec3& moments = solver.eigenvalues();
   if (!(moments[0] > 0.0))
     throw InvalidArgument("principal_inertia: smallest principal moment is " + std::to_string(moments[0]) +
                           " kg m^2, expected > 0");

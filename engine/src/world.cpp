@@ -120,7 +120,7 @@ struct World::Impl {
   }
   BodyGroup& group(const Entry& e) const { return *groups[static_cast<std::size_t>(e.group)]; }
 
-  Index group_of(const std::shared_ptr<const ModalModel>& model);
+  Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
   void advance_all();
   template <class Real>
@@ -129,11 +129,11 @@ struct World::Impl {
 };
 
 /// The group of a model's instances, a new one if it has none.
-Index World::Impl::group_of(const std::shared_ptr<const ModalModel>& model) {
+Index World::Impl::group_of(std::shared_ptr<const ModalModel> model) {
   const auto same = [&](const auto& g) { return g && &g->model() == model.get(); };
   auto found = std::find_if(groups.begin(), groups.end(), same);
   if (found == groups.end()) {
-    auto made = std::make_unique<BodyGroup>(model, options.step);
+    auto made = std::make_unique<BodyGroup>(std::move(model), options.step);
     found = std::find(groups.begin(), groups.end(), nullptr);
     if (found == groups.end()) found = groups.insert(groups.end(), nullptr);
     *found = std::move(made);
@@ -196,7 +196,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_pose(placement.pose, "add_body");
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
-  const Index group = impl_->group_of(model);
+  const Index group = impl_->group_of(std::move(model));
   const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
                                                                          placement.angular_velocity);
   if (impl_->vacant_entries.empty()) {

@@ -59,8 +59,8 @@ class FileScanner {
   void need_on_line(const char* expected);  ///< fails if none does
   std::string_view rest_of_line();          ///< without blanks at its ends; moves behind the line end
   void end_line(const char* after);         ///< passes the line end that must follow, and nothing more
-  bool skip_to_line(
-      std::string_view start);  ///< moves to the next line that begins so; false (at the end) if none does
+  /// Moves to the next line that begins so; false (at the end) if none does.
+  bool skip_to_line(std::string_view start);
 
   // Numbers. A number is read whole or refused: no "12abc", no NaN, no infinity.
   double real(const char* expected = "a number");

@@ -17,7 +17,7 @@ double turn(const Point& a, const Point& b, const Point& c) {
 /// The polygon seen along the coordinate axis nearest to its normal (Newell's), counter-clockwise.
 std::vector<Point> flattened(std::span<const Index> polygon, std::span<const Vec3> vertices) {
   Vec3 normal = Vec3::Zero();
-  const Vec3 base = vertices[static_cast<std::size_t>(polygon[0])];
+  const Vec3& base = vertices[static_cast<std::size_t>(polygon[0])];
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vec3 a = vertices[static_cast<std::size_t>(polygon[i])] - base;
     const Vec3 b = vertices[static_cast<std::size_t>(polygon[(i + 1) % polygon.size()])] - base;
@@ -68,6 +68,7 @@ void push_ears(std::span<const Index> polygon, const std::vector<Point>& flat, s
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(ear));
   }
   std::vector<Index> rest;
+  rest.reserve(left.size());
   for (const std::size_t i : left) rest.push_back(polygon[i]);
   push_fan(rest, out);
 }

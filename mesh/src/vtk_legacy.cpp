@@ -378,12 +378,12 @@ class VtkReader {
 
   /// A data type; the data begin on the next line.
   std::string data_type() {
-    const std::string type = lower(in_.word("a data type"));
+    std::string type = lower(in_.word("a data type"));
     start_data_line("a data type");
     return type;
   }
   std::string integer_type() {
-    const auto type = data_type();
+    std::string type = data_type();
     if (type == "float" || type == "double") in_.fail("seen " + shown(type) + ", expected a type of whole numbers");
     return type;
   }

@@ -45,8 +45,9 @@ int main() {
   world.reconstruct(body, positions, normals);
   const double momentum_error = (world.linear_momentum(body) - impulse).norm() / impulse.norm();
   const double energy_error = std::abs(world.energy(body).total() / energy - 1.0);
-  std::printf("limber %s: %d steps in the first 0.1 s, momentum error %.1e, energy drift over 6000 steps %.1e, vertex 0 at %g %g %g\n",
-              LIMBER_VERSION_STRING, steps, momentum_error, energy_error, positions[0], positions[1], positions[2]);
+  std::printf("limber %s: %d steps in the first 0.1 s, momentum error %.1e, energy drift over 6000 steps %.1e\n",
+              LIMBER_VERSION_STRING, steps, momentum_error, energy_error);
+  std::printf("vertex 0 at %g %g %g\n", positions[0], positions[1], positions[2]);
   const bool finite = std::isfinite(positions[0] + positions[4] + positions[8] + normals[0]);
   return finite && steps == 6 && momentum_error < 1e-12 && energy_error < 1e-9 ? 0 : 1;
 }

@@ -23,8 +23,8 @@ constexpr double kFacetDistancePerCell = 0.1;
 constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many cells gets smaller ones
 constexpr double kTetsPerCubicCell = 6.0;   ///< tets in a volume of cell_size³
 constexpr double kMostTets = 20e6;
-constexpr double kNodesPerExpected =
-    20.0;                             ///< refinement that makes this many times the nodes expected is running away
+/// Refinement that makes this many times the nodes expected is running away.
+constexpr double kNodesPerExpected = 20.0;
 constexpr double kWorstShape = 0.01;  ///< a mesh with a flatter tet (see worst_shape) is made again, finer
 constexpr double kFiner = 0.8;        ///< cells of the next try
 constexpr int kTries = 4;

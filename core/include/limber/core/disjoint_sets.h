@@ -10,6 +10,7 @@
 
 namespace limber {
 
+/// A partition of the indices 0 … count − 1.
 class DisjointSets {
  public:
   /// Every index a set of its own.

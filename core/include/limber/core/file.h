@@ -28,7 +28,9 @@ class OutputFiles {
   OutputFiles(const OutputFiles&) = delete;
   OutputFiles& operator=(const OutputFiles&) = delete;
 
+  /// @throws InputError naming the file and the system's reason
   void add(const std::filesystem::path& path, std::string_view bytes);
+  /// @throws InputError, like add()
   void commit();
 
  private:

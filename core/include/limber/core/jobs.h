@@ -8,8 +8,8 @@
 
 namespace limber {
 
-/// Runs loop bodies. An implementation may run ranges at the same time and in any order, so a caller writes only to what
-/// its own indices own; results then cannot depend on the thread count.
+/// Runs loop bodies. An implementation may run ranges at the same time and in any order, so a caller writes only to
+/// what its own indices own; results then cannot depend on the thread count.
 class Jobs {
  public:
   virtual ~Jobs() = default;

@@ -1,5 +1,6 @@
 /// @file limber/core/quaternion.h
-/// Unit quaternions as a plain struct of four doubles (Eigen's Quaterniond is over-aligned and may not cross a boundary).
+/// Unit quaternions as a plain struct of four doubles (Eigen's Quaterniond is over-aligned and may not cross a
+/// boundary).
 #pragma once
 
 #include <cmath>

@@ -8,8 +8,8 @@ namespace limber {
 
 /// X_AB: pose of frame B in frame A; p_AP = X_AB * p_BP.
 struct RigidTransform {
-  Quaternion q{};          ///< R_AB
-  Vec3 p = Vec3::Zero();   ///< p_AB, origin of B in A, m
+  Quaternion q{};         ///< R_AB
+  Vec3 p = Vec3::Zero();  ///< p_AB, origin of B in A, m
 
   friend Vec3 operator*(const RigidTransform& X, const Vec3& p_BP) { return X.q * p_BP + X.p; }
   friend RigidTransform operator*(const RigidTransform& X_AB, const RigidTransform& X_BC) {

@@ -61,9 +61,9 @@ class BodyGroup {
   // Loads, at the deformed point.
   /// Held over the next step. @param newtons world axes
   void apply_force(Index slot, const SurfacePoint& at, const Vec3& newtons);
-  /// Changes the velocities of frame and modes at once; the modes' only `delay` seconds into the next step if that is >
-  /// 0 (exactly: the response to an impulse at that time is added). @param newton_seconds world axes @param delay in
-  /// [0, step)
+  /// Changes the velocities of frame and modes at once; the modes' only `delay` seconds into the next step if that is
+  /// positive (exactly: the response to an impulse at that time is added).
+  /// @param newton_seconds world axes. @param delay in [0, step), s
   void apply_impulse(Index slot, const SurfacePoint& at, const Vec3& newton_seconds, double delay);
 
   /// One step of the occupied slots in [begin, end). Allocates and throws nothing.

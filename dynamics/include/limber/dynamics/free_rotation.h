@@ -45,7 +45,7 @@ class FreeRotation {
   /// @param momentum_W angular momentum, world axes, kg·m²/s; zero: at rest. Any finite size.
   FreeRotation(const PrincipalInertia& body, const Quaternion& q_WB, const Vec3& momentum_W);
 
-  /// R_WB at time t (s, finite, negative for the past), to sign. Does not allocate or throw.
+  /// R_WB at time t (s, finite, negative for the past), up to its sign. Does not allocate or throw.
   Quaternion attitude(double t) const;
 
   /// Elliptic parameter m in [0, 1]: 0 for a symmetric body or a steady turn, 1 on the separatrix.

@@ -57,6 +57,8 @@ inline double energy(const Mode& mode, const ModeState& s) { return 0.5 * (s.zdo
 class PropagatorTable {
  public:
   static constexpr Index kPad = 8;
+  /// @param lambda, decay as in Mode, one per mode. @param h step length, s; ≥ 0
+  /// @throws InvalidArgument if the two differ in length, and as propagator()
   PropagatorTable(std::span<const double> lambda, std::span<const double> decay, double h);
 
   Index modes() const { return modes_; }

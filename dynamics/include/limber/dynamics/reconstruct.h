@@ -18,7 +18,7 @@ namespace limber {
 
 /// One instance to reconstruct.
 struct ReconstructionTarget {
-  RigidTransform X_OB;  ///< body in the output frame O (world less an origin, or identity for body frame)
+  RigidTransform X_OB{};  ///< body in the output frame O (world less an origin, or identity for body frame)
   const double* amplitudes = nullptr;  ///< k, z, kg^½·m; may be null where k = 0
   float* positions = nullptr;          ///< out: 3V, xyz per vertex; m
   float* normals = nullptr;  ///< out, optional: 3V unit normals of the deformed surface, area-weighted; null: none

@@ -61,16 +61,17 @@ struct FrameExcitation {
 /// care) and the same constants are passed in every call.
 class RigidFrame {
  public:
-  /// @param velocity of the body origin; for a body with fixed nodes of its parent, which keeps it until told otherwise
-  /// @param angular_velocity kFree, kPoint: of the body; kLine: its part along the line, as θ̇; kKinematic: of the
-  /// parent
+  /// @param velocity of the body origin, world, m/s; for a body with fixed nodes: of its parent, which keeps it until
+  /// told otherwise
+  /// @param angular_velocity world, rad/s. kFree, kPoint: of the body; kLine: its part along the line, as θ̇;
+  /// kKinematic: of the parent
   RigidFrame(const FrameConstants& c, const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity);
 
   const RigidTransform& pose() const { return pose_; }
-  const Vec3& velocity() const { return velocity_; }     ///< of the body origin, world
-  Vec3 angular_velocity(const FrameConstants& c) const;  ///< world
-  Vec3 angular_momentum(const FrameConstants& c) const;  ///< R I Rᵀω, world, about the body origin
-  Vec3 linear_momentum(const FrameConstants& c) const;   ///< m (v + ω × R c), world
+  const Vec3& velocity() const { return velocity_; }     ///< of the body origin, world, m/s
+  Vec3 angular_velocity(const FrameConstants& c) const;  ///< world, rad/s
+  Vec3 angular_momentum(const FrameConstants& c) const;  ///< R I Rᵀω, world, about the body origin, kg·m²/s
+  Vec3 linear_momentum(const FrameConstants& c) const;   ///< m (v + ω × R c), world, kg·m/s
   double kinetic_energy(const FrameConstants& c) const;  ///< ½m v² + m v·(ω × R c) + ½ωᵀR I Rᵀω, J
 
   /// Moves the body; momenta stay. For kLine, θ = 0 there.
@@ -81,7 +82,7 @@ class RigidFrame {
   /// velocity.
   void set_parent(const KinematicFrame& at_step_end);
 
-  /// @param impulse N·s, world @param moment about the body origin, N·m·s, world. What the fixing takes up has no
+  /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. What the fixing takes up has no
   /// effect.
   void apply_impulse(const FrameConstants& c, const Vec3& impulse, const Vec3& moment);
 
@@ -106,11 +107,10 @@ class RigidFrame {
   double rotation_step_ = 0.0;
   std::int64_t rotation_steps_ = 0;
   bool disturbed_ = true;
-  // Bodies with fixed nodes: their parent now and, where it was told, at the end of the coming step; kLine's angle in
-  // it.
+  // Bodies with fixed nodes: their parent now and, where it was told, at the end of the coming step.
   KinematicFrame parent_, next_parent_;
   bool parent_was_set_ = false;
-  double angle_ = 0.0, angle_rate_ = 0.0;
+  double angle_ = 0.0, angle_rate_ = 0.0;  // kLine: θ, rad, and θ̇
 };
 
 }  // namespace limber

@@ -49,8 +49,8 @@ struct WorldOptions {
 struct BodyPlacement {
   RigidTransform pose{};         ///< X_WB
   Vec3 velocity = Vec3::Zero();  ///< m/s; for bodies with fixed nodes: of what carries them
-  Vec3 angular_velocity =
-      Vec3::Zero();  ///< rad/s; kLine: its part along the line counts; kKinematic: of what carries it
+  /// rad/s; kLine: its part along the line counts; kKinematic: of what carries it
+  Vec3 angular_velocity = Vec3::Zero();
 };
 
 enum class Axes { kWorld, kBody };
@@ -82,6 +82,7 @@ struct DrawTarget {
 
 class World {
  public:
+  /// @param jobs must outlive the world
   explicit World(const WorldOptions& options = {}, Jobs& jobs = serial_jobs());
   ~World();
   World(World&&) noexcept;
@@ -121,12 +122,13 @@ class World {
 
   // State ------------------------------------------------------------------------------------------------------------
   BodyView body(BodyId id) const;
-  // What is set is the state before the last step too: nothing is drawn between. Velocities as in BodyPlacement.
+  // What is set is the state before the last step too: nothing is drawn between. Velocities as in BodyPlacement;
+  // amplitudes z in kg^½·m and rates ż in kg^½·m/s, one per mode.
   void set_pose(BodyId id, const RigidTransform& pose);
   void set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_velocity);
   void set_amplitudes(BodyId id, std::span<const double> amplitudes, std::span<const double> rates);
-  /// Displacements and velocities of all nodes, body frame, 3 per node: z₀ = WᵀM d₀. What no kept mode can show is
-  /// lost.
+  /// Displacements (m) and velocities (m/s) of all nodes, body frame, 3 per node: z₀ = WᵀM d₀. What no kept mode can
+  /// show is lost.
   /// @throws InvalidArgument if the asset has no `volume` block (bake with --volume)
   void set_node_displacements(BodyId id, std::span<const double> displacements, std::span<const double> velocities);
   BodyEnergy energy(BodyId id) const;
@@ -149,8 +151,8 @@ class World {
   void reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation = 1.0,
                    const Vec3& origin = Vec3::Zero()) const;
 
-  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states. The rotation between them is
-  /// the shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
+  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states. The rotation between them
+  /// is the shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
   RigidTransform interpolated_pose(BodyId id, double interpolation) const;
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
 

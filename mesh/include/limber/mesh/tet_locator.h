@@ -15,9 +15,10 @@ namespace limber {
 struct TetLocation {
   Index tet = 0;
   double distance = 0.0;  ///< to the mesh, m; 0 inside and on the boundary
-  std::array<double, 4>
-      weight{};  ///< of the point itself: Σ weight·corner is the point; some negative outside, unbounded
-  std::array<double, 4> nearest{};  ///< of the mesh's point nearest to it: all ≥ 0; the same as `weight` inside
+  /// Of the point itself: Σ weight·corner is the point; some negative outside, unbounded.
+  std::array<double, 4> weight{};
+  /// Of the mesh's point nearest to it: all ≥ 0; the same as `weight` inside.
+  std::array<double, 4> nearest{};
 };
 
 /// A tree of boxes over the tets of a mesh, of which it keeps what it needs. Queries are exact searches, run in time

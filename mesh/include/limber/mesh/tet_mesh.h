@@ -12,13 +12,13 @@ namespace limber {
 
 /// A part of the body that may have a material of its own.
 struct Region {
-  std::string name;  ///< physical name, or the integer tag or reference as text where the file gives no name
-  int tag = 0;       ///< the file's number for it; 0 where it has none
+  std::string name{};  ///< physical name, or the integer tag or reference as text where the file gives no name
+  int tag = 0;         ///< the file's number for it; 0 where it has none
 };
 
 /// A named set of nodes, such as a clamped face.
 struct NodeGroup {
-  std::string name;          ///< physical name, or its tag as text
+  std::string name{};        ///< physical name, or its tag as text
   std::vector<Index> nodes;  ///< ascending, no repeats
 };
 
@@ -26,11 +26,11 @@ struct NodeGroup {
 /// Invariant after a reader of limber or after validate(): all coordinates finite, all indices in range, every tet
 /// positive (right-handed, see `Tet`), nodes in the order of the file with unused ones still present.
 struct TetMesh {
-  std::vector<Vec3> nodes;
-  std::vector<Tet> tets;
-  std::vector<Index> tet_region;       ///< per tet, index into `regions`
-  std::vector<Region> regions;         ///< at least one if there are tets
-  std::vector<NodeGroup> node_groups;  ///< indices into `nodes`; from a reader sorted by name
+  std::vector<Vec3> nodes{};
+  std::vector<Tet> tets{};
+  std::vector<Index> tet_region{};       ///< per tet, index into `regions`
+  std::vector<Region> regions{};         ///< at least one if there are tets
+  std::vector<NodeGroup> node_groups{};  ///< indices into `nodes`; from a reader sorted by name
 };
 
 /// Volume of a tetrahedron, positive if right-handed: (x1−x0)×(x2−x0)·(x3−x0)/6, m³.
@@ -39,13 +39,12 @@ double signed_volume(const TetMesh& mesh, Index tet);
 /// Checks the invariant and repairs what may be repaired: negative tets are re-oriented, with one warning that counts
 /// them. @param name shown in messages, such as `"spoon.msh"`.
 /// @throws InputError naming the first wrong element: coordinate not finite, index out of range, a node twice in a tet,
-/// or
-///   a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off), a tet that stands twice.
+/// a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off), or a tet that stands twice.
 void validate(TetMesh& mesh, const std::string& name, Warnings& warnings);
 
 /// Drops the nodes that no tet uses, from the groups too; groups left empty go. The order of the others stays.
-/// @return per node that stayed, its index before; the number dropped is the difference of the sizes. @pre mesh is
-/// valid
+/// @return per node that stayed, its index before; the number dropped is the difference of the sizes.
+/// @pre mesh is valid
 std::vector<Index> drop_unused_nodes(TetMesh& mesh);
 
 /// Geometry of a solid of density 1.

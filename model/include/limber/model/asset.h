@@ -15,8 +15,8 @@ namespace limber {
 
 /// One or more bodies baked from one input.
 struct Asset {
-  std::vector<std::shared_ptr<const ModalModel>> bodies;
-  Provenance provenance;
+  std::vector<std::shared_ptr<const ModalModel>> bodies{};
+  Provenance provenance{};
 };
 
 /// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this

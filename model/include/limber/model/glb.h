@@ -3,10 +3,11 @@
 /// and extensions. The asset file and recordings are made with it.
 ///
 ///   GlbBuilder glb;
-///   const int position = glb.add_vertex_vectors(xyz), normal = glb.add_vertex_vectors(n), faces =
-///   glb.add_triangles(t); const int mesh = glb.add_mesh({.name = "bell", .position = position, .normal = normal,
-///   .triangles = faces}); const int node = glb.add_node({.name = "bell", .mesh = mesh}); write_file("bell.glb",
-///   glb.bytes());
+///   const int position = glb.add_vertex_vectors(xyz), normal = glb.add_vertex_vectors(n);
+///   const int faces = glb.add_triangles(t);
+///   const int mesh = glb.add_mesh({.name = "bell", .position = position, .normal = normal, .triangles = faces});
+///   glb.add_node({.name = "bell", .mesh = mesh});
+///   write_file("bell.glb", glb.bytes());
 ///
 /// Everything added gets the next index of its kind, from 0, in the order of the calls; what refers to something else
 /// names its index, which must exist already. -1 means none. The same calls give the same bytes. Binary data lies in
@@ -119,7 +120,7 @@ class GlbBuilder {
   int add_node(const GlbNode& node);
   int add_animation(const GlbAnimation& animation);
 
-  /// An extension of the file as a whole. @param name such as "LIMBER_modal" @param json an object as text
+  /// An extension of the file as a whole. @param name such as "LIMBER_modal". @param json an object as text
   void set_extension(const std::string& name, const std::string& json);
   /// Extras of the file as a whole. @param json an object as text
   void set_extras(const std::string& json);

@@ -22,8 +22,8 @@ struct Material {
   }
   double shear_modulus() const { return youngs_modulus / (2.0 * (1.0 + poisson_ratio)); }
 
-  /// @param where the place for the message, such as `region "legs"`. @throws InvalidArgument naming the field and
-  /// value
+  /// @param where the place for the message, such as `region "legs"`.
+  /// @throws InvalidArgument naming the field and its value
   void validate(const std::string& where) const;
 };
 

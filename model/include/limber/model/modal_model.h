@@ -41,10 +41,10 @@ struct ModalVolume {
 
 /// Where an asset came from; every field may be empty.
 struct Provenance {
-  std::string tool;        ///< "limber-precompute 0.1.0"
-  std::string input;       ///< file name of the input mesh, without folders
-  std::string input_hash;  ///< SHA-256 of its bytes, hexadecimal
-  std::string options;     ///< the options that made it, as one line
+  std::string tool{};        ///< "limber-precompute 0.1.0"
+  std::string input{};       ///< file name of the input mesh, without folders
+  std::string input_hash{};  ///< SHA-256 of its bytes, hexadecimal
+  std::string options{};     ///< the options that made it, as one line
 };
 
 /// The plain data of a body. Fill it, then make a ModalModel of it, which checks it: beside counts, ranges and indices
@@ -58,8 +58,8 @@ struct ModalModelData {
   double volume = 0.0;                  ///< m³; > 0
   Vec3 center_of_mass = Vec3::Zero();   ///< body frame, m; zero for kFree and kKinematic
   Vec3 origin_in_input = Vec3::Zero();  ///< body origin in the input mesh's coordinates, m
-  Mat3 inertia =
-      Mat3::Zero();  ///< of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite
+  /// Of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite.
+  Mat3 inertia = Mat3::Zero();
 
   std::vector<double> eigenvalues;  ///< λ, rad²/s², ascending, ≥ 0 (0: a mechanism)
   std::vector<double> decays;       ///< ξ, 1/s, ≥ 0, per mode

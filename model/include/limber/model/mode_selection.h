@@ -39,14 +39,15 @@ struct SceneLimits {
 };
 
 enum class DropReason { kTooSmall, kTooFast, kBeyondMaxModes };
-std::string_view to_string(
-    DropReason reason);  ///< "below_min_displacement", "above_half_frame_rate", "beyond_max_modes"
+/// "below_min_displacement", "above_half_frame_rate", "beyond_max_modes".
+std::string_view to_string(DropReason reason);
 
 struct DroppedMode {
   Index mode = 0;
   DropReason reason = DropReason::kTooSmall;
-  double value = 0.0;  ///< what was compared, of its cluster: the largest displacement, m; the lowest damped frequency,
-                       ///< Hz; or the rank of its last mode among the elastic ones that the scene can show, from 1
+  /// What was compared, of its cluster: the largest displacement, m; the lowest damped frequency, Hz; or the rank of
+  /// its last mode among the elastic ones that the scene can show, from 1.
+  double value = 0.0;
   double limit = 0.0;  ///< with what: min_displacement, half the frame rate or max_modes
 };
 

@@ -8,6 +8,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct FixGroup {
   std::string name;  ///< a node group of the mesh
 };
 struct FixBox {
-  Vec3 low, high;  ///< m, mesh coordinates, faces included
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< m, mesh coordinates, faces included
 };
 struct FixNodes {
   std::vector<Index> nodes;  ///< 0-based, in order of appearance in the file

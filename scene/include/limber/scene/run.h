@@ -4,8 +4,8 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
-#include <optional>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -61,8 +61,8 @@ struct RunResult {
   Trajectory trajectory;
   std::int64_t steps = 0;
   std::uint64_t state_hash = 0;  ///< World::state_hash() at the end
-  std::vector<LoadReport> strikes,
-      forces;  ///< those that acted, in the order of the scene's lists (then of the bodies)
+  /// Those that acted, in the order of the scene's lists (then of the bodies).
+  std::vector<LoadReport> strikes, forces;
   double energy_before = 0.0, energy_after = 0.0;  ///< total of all bodies at the first and last key, J
   double seconds_advance = 0.0;                    ///< wall clock, World::step() alone
   double seconds_reconstruct = 0.0;                ///< wall clock, with RunOptions::reconstruct

@@ -55,22 +55,22 @@ using SurfacePlace = std::variant<OnTriangle, AtVertex, NearestTo, AlongRay>;
 
 /// An impulse at an exact time, also inside a step.
 struct Strike {
-  std::string body;
+  std::string body{};
   double time = 0.0;  ///< s; in [0, duration)
-  SurfacePlace at;
+  SurfacePlace at{};
   Vec3 impulse = Vec3::Zero();  ///< N·s
   Axes axes = Axes::kWorld;
-  std::string where;  ///< place in the file, for messages
+  std::string where{};  ///< place in the file, for messages
 };
 
 /// A force held over whole steps: every step whose start lies in [start, start + duration).
 struct HeldForce {
-  std::string body;
+  std::string body{};
   double start = 0.0, duration = 0.0;  ///< s; the duration may be infinite
-  SurfacePlace at;
+  SurfacePlace at{};
   Vec3 force = Vec3::Zero();  ///< N
   Axes axes = Axes::kWorld;
-  std::string where;
+  std::string where{};
 };
 
 /// Motion of the frame of a body with fixed nodes: x(t) = x₀ + axis · amplitude · sin(2πf (t − start)) within
@@ -86,30 +86,30 @@ struct Shake {
 /// position and angle following 10u³ − 15u⁴ + 6u⁵: at rest, and without acceleration, at every key.
 struct PoseKey {
   double time = 0.0;  ///< s
-  RigidTransform pose;
+  RigidTransform pose{};
 };
 using FrameMovement = std::variant<std::monostate, Shake, std::vector<PoseKey>>;
 
 struct SceneBody {
-  std::string name;   ///< unique; copy i of a grid is called "name[i]"
-  std::string group;  ///< the name in the file: shared by all copies, equal to `name` without them
-  std::string asset;  ///< key of Scene::assets
+  std::string name{};   ///< unique; copy i of a grid is called "name[i]"
+  std::string group{};  ///< the name in the file: shared by all copies, equal to `name` without them
+  std::string asset{};  ///< key of Scene::assets
   std::variant<Index, std::string> part = Index{0};  ///< which body of the asset: index or name
-  BodyPlacement placement;
-  FrameMovement movement;
-  std::string where;
+  BodyPlacement placement{};
+  FrameMovement movement{};
+  std::string where{};
 };
 
 struct Scene {
-  std::string name;                                     ///< the file's name without folder and extension
-  double step = 1.0 / 60.0;                             ///< s
-  std::int64_t steps = 0;                               ///< whole steps
-  Vec3 gravity = {0.0, 0.0, -9.80665};                  ///< m/s²
-  std::map<std::string, std::filesystem::path> assets;  ///< name → file, resolved
-  std::optional<SceneLimits> limits;                    ///< leaves out the modes that this scene cannot show
-  std::vector<SceneBody> bodies;
-  std::vector<Strike> strikes;
-  std::vector<HeldForce> forces;
+  std::string name{};                                     ///< the file's name without folder and extension
+  double step = 1.0 / 60.0;                               ///< s
+  std::int64_t steps = 0;                                 ///< whole steps
+  Vec3 gravity = {0.0, 0.0, -9.80665};                    ///< m/s²
+  std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
+  std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
+  std::vector<SceneBody> bodies{};
+  std::vector<Strike> strikes{};
+  std::vector<HeldForce> forces{};
 
   double duration() const { return step * static_cast<double>(steps); }
 };

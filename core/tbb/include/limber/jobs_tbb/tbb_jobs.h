@@ -10,7 +10,8 @@ namespace limber {
 
 class TbbJobs final : public Jobs {
  public:
-  /// @param threads number of threads including the caller's; 0: as many as the machine has. @throws InvalidArgument if < 0
+  /// @param threads number of threads including the caller's; 0: as many as the machine has
+  /// @throws InvalidArgument if threads < 0
   explicit TbbJobs(int threads = 0);
   ~TbbJobs() override;
 

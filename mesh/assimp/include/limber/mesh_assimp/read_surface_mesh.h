@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <variant>
 
 #include "limber/mesh/read_mesh.h"
 
