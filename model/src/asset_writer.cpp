@@ -129,6 +129,7 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, const std::vector
 void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHash& hash) {
   const ModalModelData& body = model.data();
   std::vector<double> scales;
+  scales.reserve(static_cast<std::size_t>(model.modes()));
   for (Index i = 0; i < model.modes(); ++i) scales.push_back(visible_mode_scale(model.render(), i));
 
   GlbMesh mesh = surface_mesh(glb, model, scales, material);

@@ -80,6 +80,7 @@ constexpr std::array kPresets = {
 
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
+  names.reserve(std::size(kPresets));
   for (const MaterialPreset& p : kPresets) names.emplace_back(p.name);
   return names;
 }

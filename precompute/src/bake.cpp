@@ -214,6 +214,7 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
   }
   report.selection = select_modes(strengths, options.limits);
   std::vector<Index> columns;
+  columns.reserve(static_cast<std::size_t>(a.mechanisms) + report.selection.kept.size());
   for (Index m = 0; m < a.mechanisms; ++m) columns.push_back(m);
   for (const Index m : report.selection.kept) columns.push_back(a.mechanisms + m);
   return columns;
