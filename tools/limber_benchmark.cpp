@@ -132,7 +132,7 @@ std::vector<double> time(double seconds, F&& work) {
 }
 
 double quantile(const std::vector<double>& sorted, double q) {
-  return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1) + 0.5)];
+  return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
 }
 
 Row measure(const std::shared_ptr<const ModalModel>& model, Index bodies, const Arguments& a) {

@@ -34,7 +34,7 @@ std::vector<T> parse_list(std::string_view text, std::string_view list) {
 FixBox parse_box(std::string_view text, std::string_view list) {
   const auto v = parse_list<double>(text, list);
   if (v.size() != 6) refuse(text, "has " + std::to_string(v.size()) + " numbers for the box, expected 6");
-  const FixBox box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+  FixBox box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   // Written so that NaN fails too.
   if (!(box.low.array() <= box.high.array()).all()) refuse(text, "the box's first corner is not below its second");
   return box;

@@ -125,6 +125,7 @@ std::vector<Index> sufficient_nodes(const TetMesh& mesh, const Scaled& scaled, c
   for (const auto& nodes : fixed_of_part) {
     if (nodes.empty()) continue;
     std::vector<Vec3> places;
+    places.reserve(nodes.size());
     for (const Index node : nodes) places.push_back(scaled(mesh.nodes[node]));
     for (const std::size_t i : span_of(places).chosen) sufficient.push_back(nodes[i]);
   }

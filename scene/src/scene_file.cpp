@@ -224,7 +224,7 @@ std::variant<Index, std::string> read_part(const JsonObject& o) {
 }
 
 std::string known_asset(const JsonObject& o, const Scene& scene) {
-  const std::string name = o.text("asset");
+  std::string name = o.text("asset");
   if (scene.assets.contains(name)) return name;
   std::vector<std::string> known;
   for (const auto& [key, unused] : scene.assets) known.push_back(key);

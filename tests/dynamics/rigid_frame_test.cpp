@@ -142,6 +142,21 @@ TEST_P(Pendulum, EnergyStaysBoundedForAThousandPeriods) {
   EXPECT_NEAR(std::log2(short_run / worst(120, 10)), 2.0, 0.1);
 }
 
+TEST_P(Pendulum, EnergyStaysBoundedAtStepsOfManyPeriods) {
+  // Strang splitting keeps H + h²(p²V''/12I² − V'²/24I) to higher order (Hairer, Lubich, Wanner, section IX.3), with
+  // p²/2I ≤ mgl (1 − cos θ₀) and parts of a step of at most a quarter of a radian of the swing, Ωh ≤ 1/4.
+  const double allowed = ((1.0 - std::cos(2.0)) / 6.0 + 1.0 / 24.0) / 16.0 * c.mass * kGravity * kLength;
+  for (const double h : {0.1, 1.0, 10.0}) {
+    RigidFrame frame = let_go(2.0);
+    const double start = energy(frame);
+    for (int i = 0; i < 2000; ++i) {
+      frame.begin_step(c, load, c.mass * c.center_of_mass, h);
+      frame.end_step(c, load, c.mass * c.center_of_mass, h);
+      ASSERT_NEAR(energy(frame), start, allowed) << h << " s, step " << i;
+    }
+  }
+}
+
 TEST_P(Pendulum, AnAcceleratedPivotIsGravityTilted) {
   // Let go from the same pose: in a lift that falls at a, gravity is g − a.
   const Vec3 acceleration{0.0, 2.0, -1.0};

@@ -10,7 +10,9 @@
 /// s = m c + Σ z_i p_i the first mass moment of the deformed body about its origin, body axes, kg·m.
 /// Torques are applied by Strang splitting, half a kick, the exact free motion, half a kick: second order in the step,
 /// symplectic, and |L| and the kinetic energy of an unloaded body are kept by the exact flow itself. A step without
-/// torque is exact for any length. Derivation: docs/derivations/rigid-frame.md.
+/// torque is exact for any length. A hanging body's step is cut into parts short beside its swing (a quarter of a
+/// radian of √(‖I⁻¹[m c]ₓ‖ |g − a|), 4096 parts at most), so that its energy stays bounded for any step too.
+/// Derivation: docs/derivations/rigid-frame.md.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +40,7 @@ struct FrameConstants {
   Mat3 inertia = Mat3::Identity();     ///< about the body origin, body axes, kg·m²
   Vec3 line_axis = Vec3::UnitX();      ///< e, body frame
   PrincipalInertia principal;          ///< of `inertia`
+  double swing = 0.0;                  ///< kPoint, kLine: largest angular acceleration per m/s² of field, 1/m
 
   explicit FrameConstants(const ModalModelData& body);
 };
@@ -49,8 +52,8 @@ struct FrameLoad {
   Vec3 torque = Vec3::Zero();   ///< about the body origin, world, N·m
 };
 
-/// What the modes of a body with fixed nodes feel of its frame over one step, in body axes: the mean of the values at
-/// the step's two ends.
+/// What the modes of a body with fixed nodes feel of its frame over one step, in body axes: the mean over the step, by
+/// the trapezoidal rule on its parts.
 struct FrameExcitation {
   Vec3 field = Vec3::Zero();                 ///< Rᵀ(g − a), m/s²
   Vec3 angular_acceleration = Vec3::Zero();  ///< α, rad/s²
@@ -96,7 +99,9 @@ class RigidFrame {
   void rotate_freely(const FrameConstants& c, double h);
   void hold_parent_accelerations();
   void move_parent(double h);
-  void add_excitation(const FrameConstants& c, const Vec3& gravity, FrameExcitation& sum) const;
+  int substeps(const FrameConstants& c, const FrameLoad& load, double h) const;
+  void place_parent_between(const KinematicFrame& before, const KinematicFrame& after, double part);
+  void add_excitation(const FrameConstants& c, const Vec3& gravity, double weight, FrameExcitation& sum) const;
   Vec3 line_in_world(const FrameConstants& c) const { return pose_.q * c.line_axis; }
 
   RigidTransform pose_;
