@@ -1,0 +1,55 @@
+#include "limber/model/joint_spec.h"
+
+#include <cmath>
+#include <string>
+
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+constexpr std::array<std::string_view, 6> kNames = {"ball", "revolute", "cylindrical", "prismatic", "planar", "fixed"};
+
+void require_ordered(const Interval& interval, const char* what) {
+  if (!(interval.low <= interval.high))  // false for NaN too
+    throw InvalidArgument(std::string("JointSpec: limits of ") + what + " are " + std::to_string(interval.low) +
+                          " to " + std::to_string(interval.high) + ", expected the lower one first");
+}
+
+}  // namespace
+
+std::string_view to_string(JointType type) { return kNames[static_cast<std::size_t>(type)]; }
+
+std::optional<JointType> joint_type_of(std::string_view text) {
+  for (std::size_t i = 0; i < kNames.size(); ++i)
+    if (kNames[i] == text) return static_cast<JointType>(i);
+  return std::nullopt;
+}
+
+JointFreedoms freedoms(JointType type) {
+  switch (type) {
+    case JointType::kBall: return {3, 0};
+    case JointType::kRevolute: return {1, 0};
+    case JointType::kCylindrical: return {1, 1};
+    case JointType::kPrismatic: return {0, 1};
+    case JointType::kPlanar: return {1, 2};
+    case JointType::kFixed: break;
+  }
+  return {0, 0};
+}
+
+void JointSpec::validate() const {
+  constexpr double kTolerance = 1e-6;
+  if (!frame.origin.allFinite()) throw InvalidArgument("JointSpec: the frame's origin is not finite");
+  if (!frame.axes.allFinite() ||
+      !((frame.axes.transpose() * frame.axes - Mat3::Identity()).cwiseAbs().maxCoeff() <= kTolerance) ||
+      !(frame.axes.determinant() > 0.0))
+    throw InvalidArgument("JointSpec: the frame's axes are not orthonormal and right-handed");
+  require_ordered(limits.rotation, "the rotation");
+  for (const Interval& along : limits.translation) require_ordered(along, "the translation");
+  for (const Interval& angle : limits.euler) require_ordered(angle, "the Euler angles");
+  if (!(limits.cone >= 0.0)) throw InvalidArgument("JointSpec: the cone's half-angle is negative or not a number");
+  if (!std::isfinite(pitch)) throw InvalidArgument("JointSpec: the pitch is not finite");
+}
+
+}  // namespace limber
