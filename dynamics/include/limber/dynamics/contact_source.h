@@ -1,0 +1,103 @@
+/// @file limber/dynamics/contact_source.h
+/// The door between those who find contacts (collision/, or your own) and those who answer them (constraints/,
+/// engine/). Neither knows the other: poses, shapes and amplitudes go in, contact points come out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/core/jobs.h"
+#include "limber/core/rigid_transform.h"
+#include "limber/model/modal_model.h"
+#include "limber/model/shape.h"
+
+namespace limber {
+
+class ExactMotion;
+
+/// What a body shows to others: exactly one of the two.
+struct BodyGeometry {
+  std::shared_ptr<const ModalModel> model{};  ///< its collision surface, which deforms with the amplitudes
+  std::shared_ptr<const Shape> shape{};       ///< a rigid shape, in the body frame
+};
+
+/// Two bodies meet only if each one's layers have a bit in common with the other's mask.
+struct CollisionFilter {
+  std::uint32_t layers = 1;
+  std::uint32_t mask = 0xffffffffu;
+  bool self = false;  ///< also find where the body touches itself (modal bodies)
+
+  friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
+};
+
+/// Where one body is, at one instant.
+struct BodyState {
+  RigidTransform pose{};                 ///< X_WB
+  std::span<const double> amplitudes{};  ///< z, k numbers; none for a rigid shape
+  /// How far any of its points may come beyond this state, m, ≥ 0: contacts up to the sum of both bodies' reaches (and
+  /// the query's margin) are found, so what a step may bring together is there before it.
+  double reach = 0.0;
+  bool asleep = false;  ///< has not moved since the last query; two that sleep are not tested with each other
+};
+
+struct ContactQuery {
+  std::span<const BodyState> states{};  ///< by body index; entries of indices that hold no body are not read
+  double margin = 0.0;                  ///< m, ≥ 0: gaps up to here are contacts
+  Vec3 origin = Vec3::Zero();           ///< world; positions come out relative to it
+};
+
+/// One body's side of a contact.
+struct ContactSide {
+  Index body = -1;
+  /// Of the body's collision surface (SurfacePoint::Surface::kCollision); −1 for a rigid shape, which has no modal row.
+  Index triangle = -1;
+  std::array<double, 3> weight{0.0, 0.0, 0.0};  ///< barycentric, sums to 1; zeros for a rigid shape
+  Vec3 point_B = Vec3::Zero();                  ///< the point, deformed, in the body frame, m
+};
+
+/// Two points that are, or may come, together:  gap = normal · (p_a − p_b), negative where the bodies overlap.
+/// To first order the gap changes by normal · (u_a − u_b), u the displacements of the two points.
+struct ContactPoint {
+  ContactSide a, b;              ///< a.body ≤ b.body; equal where a body touches itself
+  Vec3 normal = Vec3::Zero();    ///< unit, world, out of b into a: a is pushed along it, b against it
+  Vec3 position = Vec3::Zero();  ///< midway between both points, world, less the query's origin
+  double gap = 0.0;              ///< m
+  /// The same features of the same bodies have the same id in every query; different ones differ within a query.
+  std::uint64_t id = 0;
+};
+
+/// Two bodies that come together within a step.
+struct Impact {
+  Index a = -1, b = -1;  ///< a < b
+  double time = 0.0;     ///< s from the start of the step: not touching before, within `margin` there
+  /// The approach did not end within the bounded number of advancements: touching from `time` on.
+  bool resting = false;
+};
+
+/// Finds contacts. Same calls, same contacts in the same order, for any Jobs. Once warm, a query allocates nothing.
+class ContactSource {
+ public:
+  virtual ~ContactSource() = default;
+
+  /// @param body any index ≥ 0 that holds none. @throws InvalidArgument for one that does, or a bad geometry
+  virtual void add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) = 0;
+  virtual void remove_body(Index body) = 0;
+  virtual void set_filter(Index body, const CollisionFilter& filter) = 0;
+  /// Bodies that never meet each other, such as neighbours at a joint. Forgotten when either is removed.
+  virtual void exclude_pair(Index a, Index b, bool excluded) = 0;
+
+  /// Replaces `contacts`, ordered by (a.body, b.body, id).
+  /// @throws InvalidArgument for a state that is not finite or has the wrong number of amplitudes; nothing changes then
+  virtual void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) = 0;
+
+  /// First times within [0, step] at which bodies that are farther apart than `margin` come within it, by conservative
+  /// advancement on the exact motion; ordered by (time, a, b).
+  /// @param motions by body index; null: no such body, or one that does not move (`states` has its place)
+  virtual void find_impacts(std::span<const BodyState> states, std::span<const ExactMotion* const> motions, double step,
+                            double margin, std::vector<Impact>& impacts, Jobs& jobs) = 0;
+};
+
+}  // namespace limber
