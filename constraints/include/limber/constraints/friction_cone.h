@@ -1,0 +1,89 @@
+/// @file limber/constraints/friction_cone.h
+/// Contacts with Coulomb friction: forces in cones, speeds in their duals.
+///
+/// Contact i has the force f_i = (n, t₁, t₂) along its normal and two tangents, and the relative velocity
+/// u = A f + b. With K_μ = {|f_t| ≤ μ f_n}, K*_μ = {μ|u_t| ≤ u_n} its dual and De Saxcé's correction
+///
+///   û_i = u_i + μ_i |u_t,i| e_n,      K_μ ∋ f_i ⊥ û_i ∈ K*_μ                                              (1)
+///
+/// says: apart (f = 0, u_n ≥ 0), sticking (u = 0, f inside the cone) or sliding (u_n = 0, f_t = −μ f_n u_t/|u_t|)
+/// (De Saxcé and Feng 1998; Acary and Brogliato 2008). At gap level the normal rows of b and A may be gaps over Δt.
+/// μ = 0 is a contact without friction.
+///
+/// Methods, all with (1) as fixed point where they converge:
+/// - kBlockGaussSeidel: one contact after the other, each solved exactly; memory and time linear in contacts × bodies.
+/// - kExact: the same sweeps to find which contacts stick, slide and part, then Newton steps on those equations.
+/// - kStaggered: alternates the normal problem under fixed friction and the friction problem under fixed normal forces
+///   (Kaufman et al. 2008); each half is convex.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "limber/constraints/solve_status.h"
+
+namespace limber {
+
+/// All rows in full: for islands of tens of contacts.
+struct FrictionProblem {
+  int contacts = 0;            ///< m ≥ 0
+  std::span<const double> A;   ///< 3m × 3m, symmetric positive semidefinite; row 3i + (0 normal, 1, 2 tangents)
+  std::span<const double> b;   ///< 3m, velocity without the forces
+  std::span<const double> mu;  ///< m, friction coefficients, each ≥ 0
+};
+
+/// The rows of a contact that belong to one body: 3 × columns of J M^{−½}.
+struct FrictionBlock {
+  int first_column = 0;            ///< of the body's degrees of freedom among all
+  int columns = 0;                 ///< the body's degrees of freedom
+  const double* values = nullptr;  ///< 3 × columns, row-major; null: no body here
+};
+
+/// A = G Gᵀ + diag(D) with few blocks per row of G: for islands of hundreds of contacts; A is never formed.
+struct BlockFrictionProblem {
+  int contacts = 0;                       ///< m ≥ 0
+  int columns = 0;                        ///< degrees of freedom of all bodies
+  std::span<const FrictionBlock> blocks;  ///< 2m: of contact i, 2i and 2i + 1
+  std::span<const double> D;              ///< 3m, each ≥ 0; empty: all 0
+  std::span<const double> b;              ///< 3m
+  std::span<const double> mu;             ///< m
+};
+
+enum class FrictionMethod { kExact, kBlockGaussSeidel, kStaggered };
+
+struct FrictionOptions {
+  FrictionMethod method = FrictionMethod::kExact;
+  double tolerance = 1e-9;  ///< of the residual below; > 0
+  int max_sweeps = 500;     ///< sweeps over all contacts, or alternations; ≥ 1
+};
+
+struct FrictionResult {
+  SolveStatus status = SolveStatus::kSolved;
+  int sweeps = 0;        ///< sweeps or alternations
+  int newton_steps = 0;  ///< kExact: those that were taken
+  double residual = 0.0;  ///< max_i |f_i − P_K(f_i − û_i/a_i)|·√a_i over max_i(|b_i|/√a_i), a_i = trace A_ii / 3
+};
+
+/// The solver and its memory, which grows to the largest problem seen; after that a solve allocates nothing. One thread
+/// at a time. The same call gives the same bits.
+class FrictionSolver {
+ public:
+  FrictionSolver();
+  ~FrictionSolver();
+  FrictionSolver(FrictionSolver&&) noexcept;
+  FrictionSolver& operator=(FrictionSolver&&) noexcept;
+
+  /// @param f 3m; on entry a guess, such as the last step's forces, or zero; on return the solution (in its cones
+  /// whatever the status), or zero for kInvalidInput.
+  /// @throws InvalidArgument if a span's length does not fit, or an option is out of range
+  FrictionResult solve(const FrictionProblem& problem, std::span<double> f, const FrictionOptions& options = {});
+  /// Always by block Gauss–Seidel. @throws InvalidArgument as above, or for another method than kBlockGaussSeidel
+  FrictionResult solve(const BlockFrictionProblem& problem, std::span<double> f,
+                       const FrictionOptions& options = {.method = FrictionMethod::kBlockGaussSeidel});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber
