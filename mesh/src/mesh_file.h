@@ -18,10 +18,17 @@
 
 namespace limber {
 
+/// Polygons from `first` on carry these names, until the next group begins.
+struct PolygonGroup {
+  std::string name, material;
+  std::size_t first = 0;
+};
+
 /// The content of one file, not yet validated. Without tets it is a surface.
 struct MeshFile {
   TetMesh tets;
-  Polygons polygons;  ///< over tets.nodes
+  Polygons polygons;                 ///< over tets.nodes
+  std::vector<PolygonGroup> groups;  ///< ascending; polygons before the first have no names
 };
 
 /// A file in memory, its name quoted for messages.

@@ -1,4 +1,5 @@
-// Wavefront OBJ: positions and faces; groups, normals, texture coordinates, curves and materials are passed over.
+// Wavefront OBJ: positions, faces, and the names of objects, groups and materials; normals, texture coordinates and
+// curves are passed over.
 #include <charconv>
 
 #include "file_scanner.h"
@@ -9,10 +10,10 @@ namespace {
 
 /// Statements that carry no vertex and no face.
 constexpr std::string_view kPassedOver[] = {
-    "vn",     "vt",         "vp",        "g",      "o",     "s",    "mg",   "usemtl", "mtllib",   "usemap",
-    "maplib", "l",          "p",         "cstype", "deg",   "bmat", "step", "curv",   "curv2",    "surf",
-    "parm",   "trim",       "hole",      "scrv",   "sp",    "end",  "con",  "bevel",  "c_interp", "d_interp",
-    "lod",    "shadow_obj", "trace_obj", "ctech",  "stech", "call", "csh"};
+    "vn",   "vt",         "vp",        "s",     "mg",    "mtllib", "usemap", "maplib",   "l",
+    "p",    "cstype",     "deg",       "bmat",  "step",  "curv",   "curv2",  "surf",     "parm",
+    "trim", "hole",       "scrv",      "sp",    "end",   "con",    "bevel",  "c_interp", "d_interp",
+    "lod",  "shadow_obj", "trace_obj", "ctech", "stech", "call",   "csh"};
 
 class ObjReader {
  public:
@@ -33,9 +34,23 @@ class ObjReader {
     const auto keyword = in_.word("a statement");
     if (keyword == "v") return read_vertex();
     if (keyword == "f" || keyword == "fo") return read_face();
+    if (keyword == "o" || keyword == "g") return begin_group(&PolygonGroup::name);
+    if (keyword == "usemtl") return begin_group(&PolygonGroup::material);
     for (const auto known : kPassedOver)
       if (keyword == known) return pass_over();
     in_.fail("seen " + shown(keyword) + ", expected a statement of OBJ such as v or f");
+  }
+
+  void begin_group(std::string PolygonGroup::*which) {
+    PolygonGroup group = mesh_.groups.empty() ? PolygonGroup{} : mesh_.groups.back();
+    group.first = mesh_.polygons.size();
+    std::string name;
+    while (in_.more_on_line()) {
+      if (!name.empty()) name += ' ';
+      name += in_.word("a name");
+    }
+    group.*which = std::move(name);
+    mesh_.groups.push_back(std::move(group));
   }
 
   void read_vertex() {

@@ -7,6 +7,7 @@
 #include "file_scanner.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/mesh/grouped_surface.h"
 #include "mesh_file.h"
 
 namespace limber {
@@ -89,6 +90,30 @@ SurfaceMesh surface_of(ReadFile file, const std::string& name, Warnings& warning
   return surface;
 }
 
+/// Per triangle of triangulated(), its polygon: one of n corners gives n − 2.
+std::vector<Index> polygon_of_triangles(const Polygons& polygons) {
+  std::vector<Index> of;
+  for (std::size_t i = 0; i < polygons.size(); ++i)
+    for (std::size_t c = 2; c < polygons[i].size(); ++c) of.push_back(static_cast<Index>(i));
+  return of;
+}
+
+/// Groups of polygons as groups of the triangles that are cut from them.
+std::vector<SurfaceGroup> groups_of_triangles(const std::vector<PolygonGroup>& groups,
+                                              const std::vector<Index>& face_of) {
+  std::vector<SurfaceGroup> out;
+  const auto push = [&](const std::string& name, const std::string& material, std::size_t begin, std::size_t end) {
+    const auto first = std::lower_bound(face_of.begin(), face_of.end(), static_cast<Index>(begin)) - face_of.begin();
+    const auto last = std::lower_bound(face_of.begin(), face_of.end(), static_cast<Index>(end)) - face_of.begin();
+    if (last > first) out.push_back({name, material, static_cast<Index>(first), static_cast<Index>(last - first)});
+  };
+  const std::size_t polygons = face_of.empty() ? 0 : static_cast<std::size_t>(face_of.back()) + 1;
+  push("", "", 0, groups.empty() ? polygons : groups.front().first);
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    push(groups[g].name, groups[g].material, groups[g].first, g + 1 < groups.size() ? groups[g + 1].first : polygons);
+  return out;
+}
+
 TetMesh tets_of(ReadFile file, const std::string& name, Warnings& warnings) {
   validate(file.content.tets, name, warnings);
   return std::move(file.content.tets);
@@ -132,6 +157,18 @@ SurfaceMesh read_surface_mesh(const std::filesystem::path& path, Warnings& warni
   auto file = read_any(path, warnings);
   if (has_tets(file)) throw InputError(shown_path(path) + ": holds tetrahedra, expected a surface");
   return surface_of(std::move(file), shown_path(path), warnings);
+}
+
+GroupedSurface read_grouped_surface(const std::filesystem::path& path, Warnings& warnings) {
+  auto file = read_any(path, warnings);
+  if (has_tets(file)) throw InputError(shown_path(path) + ": holds tetrahedra, expected a surface");
+  GroupedSurface out;
+  out.surface.triangles = triangulated(file.content.polygons, file.content.tets.nodes);
+  out.surface.vertices = std::move(file.content.tets.nodes);
+  out.face_of = polygon_of_triangles(file.content.polygons);
+  out.groups = groups_of_triangles(file.content.groups, out.face_of);
+  validate(out, shown_path(path), warnings);
+  return out;
 }
 
 }  // namespace limber

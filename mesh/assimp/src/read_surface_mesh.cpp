@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <exception>
+#include <unordered_map>
 
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -25,23 +26,32 @@ std::string shown_path(const std::filesystem::path& path) {
   return name.insert(0, 1, '"') + '"';
 }
 
+/// A file as Assimp gives it: neither welded nor validated.
+struct RawSurface {
+  GroupedSurface grouped;              ///< a group per mesh of a node
+  std::vector<std::size_t> node_ends;  ///< per node, one past its last triangle
+};
+
 /// Collects the meshes of a scene as its nodes show them.
 class Collector {
  public:
-  explicit Collector(const aiScene& scene, std::string name) : scene_(scene), name_(std::move(name)) {}
+  Collector(const aiScene& scene, std::string name) : scene_(scene), name_(std::move(name)) {}
 
   void add(const aiNode& node, const aiMatrix4x4t<double>& parent) {
     const aiMatrix4x4t<double> pose = parent * aiMatrix4x4t<double>(node.mTransformation);
-    for (unsigned i = 0; i < node.mNumMeshes; ++i) add(*scene_.mMeshes[node.mMeshes[i]], pose);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) add(*scene_.mMeshes[node.mMeshes[i]], pose, node.mName.C_Str());
+    read.node_ends.push_back(read.grouped.surface.triangles.size());
     for (unsigned i = 0; i < node.mNumChildren; ++i) add(*node.mChildren[i], pose);
   }
 
-  SurfaceMesh surface;
+  RawSurface read;
   std::size_t points_and_lines = 0;
 
  private:
-  void add(const aiMesh& mesh, const aiMatrix4x4t<double>& pose) {
+  void add(const aiMesh& mesh, const aiMatrix4x4t<double>& pose, const char* node) {
+    SurfaceMesh& surface = read.grouped.surface;
     const auto first = surface.vertices.size();
+    read.grouped.groups.push_back({node, material_of(mesh), static_cast<Index>(surface.triangles.size()), 0});
     if (first + mesh.mNumVertices > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
       throw InputError(name_ + ": holds more than 2147483647 vertices");
     for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
@@ -65,17 +75,22 @@ class Collector {
       }
       if (mirrored) std::swap(t[1], t[2]);
       surface.triangles.push_back(t);
+      read.grouped.face_of.push_back(static_cast<Index>(read.grouped.face_of.size()));
+      ++read.grouped.groups.back().count;
     }
+  }
+
+  std::string material_of(const aiMesh& mesh) const {
+    aiString name;
+    if (mesh.mMaterialIndex < scene_.mNumMaterials) scene_.mMaterials[mesh.mMaterialIndex]->Get(AI_MATKEY_NAME, name);
+    return name.C_Str();
   }
 
   const aiScene& scene_;
   std::string name_;
 };
 
-}  // namespace
-
-SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings) {
-  const std::string name = shown_path(path);
+RawSurface read_raw(const std::filesystem::path& path, const std::string& name, Warnings& warnings) {
   read_file(path);  // for its clear errors: missing, a directory, unreadable, empty
 
   Assimp::Importer importer;
@@ -95,9 +110,50 @@ SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, War
   if (collector.points_and_lines > 0)
     warnings.push_back(name + ": " + std::to_string(collector.points_and_lines) +
                        " points and lines are no surface and have been left out");
-  weld(collector.surface);
-  validate(collector.surface, name, warnings);
-  return std::move(collector.surface);
+  return std::move(collector.read);
+}
+
+/// Joins equal vertices within each node.
+void weld_nodes(SurfaceMesh& surface, const std::vector<std::size_t>& node_ends) {
+  SurfaceMesh all;
+  std::size_t begin = 0;
+  for (const std::size_t end : node_ends) {
+    SurfaceMesh part;
+    std::unordered_map<Index, Index> local;
+    for (; begin < end; ++begin) {
+      Triangle t = surface.triangles[begin];
+      for (Index& v : t) {
+        const auto [place, is_new] = local.try_emplace(v, static_cast<Index>(part.vertices.size()));
+        if (is_new) part.vertices.push_back(surface.vertices[v]);
+        v = place->second;
+      }
+      part.triangles.push_back(t);
+    }
+    weld(part);
+    const auto offset = static_cast<Index>(all.vertices.size());
+    for (const Triangle& t : part.triangles) all.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+  }
+  surface = std::move(all);
+}
+
+}  // namespace
+
+SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings) {
+  const std::string name = shown_path(path);
+  SurfaceMesh surface = read_raw(path, name, warnings).grouped.surface;
+  weld(surface);
+  validate(surface, name, warnings);
+  return surface;
+}
+
+GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings) {
+  if (is_known_mesh_format(path)) return read_grouped_surface(path, warnings);
+  const std::string name = shown_path(path);
+  RawSurface read = read_raw(path, name, warnings);
+  weld_nodes(read.grouped.surface, read.node_ends);
+  validate(read.grouped, name, warnings);
+  return std::move(read.grouped);
 }
 
 SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings) {

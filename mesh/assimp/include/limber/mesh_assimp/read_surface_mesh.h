@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <variant>
 
+#include "limber/mesh/grouped_surface.h"
 #include "limber/mesh/read_mesh.h"
 
 namespace limber {
@@ -21,5 +22,10 @@ SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& w
 
 /// Tets or a surface, whatever the file holds, by limber's own reader or Assimp's. @throws InputError
 std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings);
+
+/// A surface with the names of nodes and materials: by read_grouped_surface() where is_known_mesh_format(), else by
+/// Assimp. Assimp splits vertices that differ in normal or texture; they are joined again within each node, not
+/// across. @throws InputError
+GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings);
 
 }  // namespace limber

@@ -1,0 +1,55 @@
+/// @file limber/articulation/contact_region.h
+/// Where two components touch: the part of each surface that faces the other across a small gap.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "limber/articulation/assembly.h"
+#include "limber/core/jobs.h"
+
+namespace limber {
+
+/// A point of one surface that faces the other.
+struct ContactSample {
+  Vec3 point;          ///< on its own surface
+  Vec3 normal;         ///< outward, smooth across edges blunter than the crease angle; unit
+  Vec3 facing_point;   ///< nearest facing point of the other surface
+  Vec3 facing_normal;  ///< the other surface's outward normal there; unit
+  double area = 0.0;   ///< of the surface that this sample stands for
+  double gap = 0.0;    ///< distance to the other surface along −facing_normal; negative where the surfaces overlap
+};
+
+/// The contact of two components: samples of both sides.
+struct ContactRegion {
+  Index a = 0, b = 0;                     ///< components, a < b
+  std::vector<ContactSample> on_a, on_b;  ///< either may be empty (a pin drawn through a solid block has only itself)
+  double gap = 0.0;                       ///< median distance
+  double normal_spread = 0.0;  ///< mean squared sine of the angle between a normal and the opposed one it faces
+  double chord_error = 0.0;    ///< how far the facets are from the smooth surface they stand for
+  double extent = 0.0;         ///< diagonal of the box around the samples
+  bool overlapping = false;    ///< found as surface inside the other solid, not as surfaces that face each other
+};
+
+enum class ContactMethod {
+  kFacingSamples,  ///< area-uniform samples, facing normals, a cluster grown from the smallest gaps
+  kConvexParts,  ///< [X09] 3.1: triangles where the convex hulls of convex parts intersect, filtered by facing normals
+};
+
+struct ContactOptions {
+  ContactMethod method = ContactMethod::kFacingSamples;
+  int samples = 3000;            ///< wanted on each side; 100 … 100,000
+  double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
+  double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
+  double search = 0.04;          ///< largest gap, of the smaller component's diagonal; > 0
+  double largest_gap = 0.05;     ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
+  double hull_margin = 0.01;     ///< kConvexParts: growth of the hulls, of the smaller component's diagonal; ≥ 0
+  void validate() const;         ///< @throws InvalidArgument naming the field
+};
+
+/// Contacts of all pairs of components, ordered by (a, b). Pairs without a contact are absent.
+/// Parallel over pairs and over components; the same bits for any thread count.
+std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactOptions& options = {},
+                                                Jobs& jobs = serial_jobs());
+
+}  // namespace limber

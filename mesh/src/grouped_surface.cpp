@@ -1,0 +1,27 @@
+#include "limber/mesh/grouped_surface.h"
+
+namespace limber {
+
+void validate(GroupedSurface& surface, const std::string& name, Warnings& warnings) {
+  const auto names_one_twice = [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; };
+  const auto& triangles = surface.surface.triangles;
+  std::vector<Index> kept_before(triangles.size() + 1, 0), face_of;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const bool kept = !names_one_twice(triangles[i]);
+    kept_before[i + 1] = kept_before[i] + (kept ? 1 : 0);
+    if (kept) face_of.push_back(surface.face_of[i]);
+  }
+  validate(surface.surface, name, warnings);
+
+  surface.face_of = std::move(face_of);
+  std::vector<SurfaceGroup> groups;
+  for (SurfaceGroup& group : surface.groups) {
+    const Index first = kept_before[static_cast<std::size_t>(group.first)];
+    const Index last = kept_before[static_cast<std::size_t>(group.first + group.count)];
+    group.first = first, group.count = last - first;
+    if (group.count > 0) groups.push_back(std::move(group));
+  }
+  surface.groups = std::move(groups);
+}
+
+}  // namespace limber

@@ -1,0 +1,101 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "limber/articulation/assembly.h"
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+/// Twelve triangles from corner to corner.
+SurfaceMesh box(const Vec3& low, const Vec3& high) {
+  SurfaceMesh out;
+  for (int i = 0; i < 8; ++i)
+    out.vertices.emplace_back(i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]);
+  out.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                   {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return out;
+}
+
+GroupedSurface together(const std::vector<std::pair<std::string, SurfaceMesh>>& parts) {
+  GroupedSurface out;
+  for (const auto& [name, part] : parts) {
+    const auto offset = static_cast<Index>(out.surface.vertices.size());
+    out.groups.push_back(
+        {name, "", static_cast<Index>(out.surface.triangles.size()), static_cast<Index>(part.triangles.size())});
+    out.surface.vertices.insert(out.surface.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const Triangle& t : part.triangles) {
+      out.face_of.push_back(static_cast<Index>(out.face_of.size()));
+      out.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+    }
+  }
+  return out;
+}
+
+GroupedSurface as_soup(GroupedSurface input) {
+  SurfaceMesh soup;
+  for (const Triangle& t : input.surface.triangles) {
+    const auto first = static_cast<Index>(soup.vertices.size());
+    for (const Index v : t) soup.vertices.push_back(input.surface.vertices[static_cast<std::size_t>(v)]);
+    soup.triangles.push_back({first, first + 1, first + 2});
+  }
+  input.surface = std::move(soup);
+  return input;
+}
+
+std::vector<std::string> names(const Assembly& assembly) {
+  std::vector<std::string> out;
+  for (const Component& c : assembly.components) out.push_back(c.name);
+  return out;
+}
+
+// Two boxes whose faces coincide, vertex by vertex.
+GroupedSurface touching_boxes() { return together({{"", box({0, 0, 0}, {1, 1, 1})}, {"", box({0, 0, 1}, {1, 1, 2})}}); }
+
+TEST(Components, PartsThatTouchExactlyStayApart) {
+  const Assembly assembly = find_components(touching_boxes());
+  ASSERT_EQ(assembly.components.size(), 2u);
+  EXPECT_THAT(names(assembly), testing::ElementsAre("part 1", "part 2"));
+  EXPECT_THAT(assembly.components[1].faces, testing::ElementsAre(FaceRange{12, 12}));
+  EXPECT_TRUE(assembly.components[0].closed);
+  EXPECT_DOUBLE_EQ(assembly.components[0].diagonal, std::sqrt(3.0));
+}
+
+TEST(Components, SoupIsJoinedWithinPartsButNotAcrossATouchingFace) {
+  const Assembly assembly = find_components(as_soup(touching_boxes()));
+  ASSERT_EQ(assembly.components.size(), 2u);
+  for (const Component& c : assembly.components) {
+    EXPECT_EQ(c.triangles.size(), 12u);
+    EXPECT_TRUE(c.closed);
+  }
+}
+
+TEST(Components, ShellsUnderOneNameAreProposedForMerging) {
+  const Assembly assembly = find_components(together({{"bolt", box({0, 0, 0}, {1, 1, 1})},
+                                                      {"bolt", box({3, 0, 0}, {4, 1, 1})},
+                                                      {"plate", box({6, 0, 0}, {7, 1, 1})}}));
+  EXPECT_THAT(names(assembly), testing::ElementsAre("bolt", "bolt 2", "plate"));
+  ASSERT_EQ(assembly.proposals.size(), 1u);
+  EXPECT_THAT(assembly.proposals[0].components, testing::ElementsAre(0, 1));
+}
+
+TEST(Components, MergedAndRenamedPartsKeepAllTheirFaces) {
+  const auto input =
+      together({{"a", box({0, 0, 0}, {1, 1, 1})}, {"b", box({3, 0, 0}, {4, 1, 1})}, {"c", box({6, 0, 0}, {7, 1, 1})}});
+  const Assembly assembly = find_components(input, {.merge = {{"c", "a"}}, .rename = {{"c", "frame"}}});
+  EXPECT_THAT(names(assembly), testing::ElementsAre("frame", "b"));
+  EXPECT_THAT(assembly.components[0].faces, testing::ElementsAre(FaceRange{0, 12}, FaceRange{24, 12}));
+  EXPECT_THROW(find_components(input, {.merge = {{"a", "d"}}}), InvalidArgument);
+  EXPECT_THROW(find_components(input, {.rename = {{"a", "b"}}}), InvalidArgument);
+}
+
+TEST(Components, GroupsAndMaterialsCanRule) {
+  auto input =
+      together({{"a", box({0, 0, 0}, {1, 1, 1})}, {"b", box({3, 0, 0}, {4, 1, 1})}, {"a", box({6, 0, 0}, {7, 1, 1})}});
+  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kGroups})), testing::ElementsAre("a", "b"));
+  for (auto& group : input.groups) group.material = "steel";
+  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kMaterials})), testing::ElementsAre("steel"));
+}
+
+}  // namespace
+}  // namespace limber
