@@ -1,0 +1,127 @@
+/// @file limber/collision/narrow_phase.h
+/// All contacts of two bodies that are near each other.
+///
+/// What is a contact, for features (vertices, edges, faces) of two surfaces A and B and gaps up to the margin:
+///
+///  - vertex–surface: a vertex v of A and a point q of B that is a local minimum of the distance from v, on a face, an
+///    edge or a vertex of B (v lies in that feature's Voronoi region), and the same with A and B exchanged;
+///  - edge–edge: the nearest points of two edges, inside both, where the direction between them lies in the normal cone
+///    of each edge; for creases the cone is widened by up to about 12°, so that bodies that rest on each other face to
+///    face keep the crossings of their outlines while they rock.
+///
+/// Every local minimum of the distance between the two surfaces is among these, so a pair that is within the margin has
+/// at least one. Of closed surfaces only the outer side counts, of open modal sheets both, of open rigid ones the
+/// front.
+///
+/// Where surfaces intersect, the vertices of each inside the other are contacts too, of negative gap, with the nearest
+/// point of the other surface (see OverlapMethod): they are found by spreading over the mesh from where triangles
+/// intersect, so deep ones are found as well, and whole bodies that lie within others. Inside and outside are told by
+/// angle-weighted pseudonormals (Bærentzen and Aanæs, IEEE TVCG 11(3), 2005). Edges that cross without a vertex inside
+/// give an edge–edge contact of negative gap.
+///
+/// Balls and capsules are a point and a segment with a radius: their gaps are those of the core less the radius.
+/// Against a half-space all vertices (of a ball or capsule: centres) count. Convex rigid shapes against each other have
+/// one normal, of the nearest points or of least penetration, and the contacts of the two faces clipped against each
+/// other.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "limber/collision/aabb.h"
+#include "limber/core/rigid_transform.h"
+#include "limber/dynamics/contact_source.h"
+#include "limber/model/shape.h"
+
+namespace limber {
+
+class CollisionSurface;
+class DeformedSurface;
+
+/// A rigid shape made ready to touch others. Immutable; shared by all bodies and threads.
+class RigidGeometry {
+ public:
+  /// @throws InvalidArgument if the shape is not valid (see validate(Shape))
+  explicit RigidGeometry(const Shape& shape);
+  ~RigidGeometry();
+  RigidGeometry(RigidGeometry&&) noexcept;
+  RigidGeometry& operator=(RigidGeometry&&) noexcept;
+
+  const Shape& shape() const;
+  /// In the body frame, m. A half-space's is infinite, but on the side of its normal if that is an axis.
+  Aabb bounds() const;
+  /// The triangles of a box, hull, mesh or height field; null for the other shapes.
+  const std::shared_ptr<const CollisionSurface>& surface() const;
+
+ private:
+  friend class NarrowPhase;
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
+};
+
+/// The volume block of a modal body made ready for OverlapMethod::kRestDepth. Immutable; shared by all its instances.
+class RestVolume {
+ public:
+  /// @throws InvalidArgument if the model has no volume block
+  explicit RestVolume(std::shared_ptr<const ModalModel> model);
+  ~RestVolume();
+  RestVolume(RestVolume&&) noexcept;
+  RestVolume& operator=(RestVolume&&) noexcept;
+
+ private:
+  friend class NarrowPhase;
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
+};
+
+/// A body as the narrow phase sees it: either a surface that deforms, bound to its amplitudes, or a rigid geometry.
+struct CollisionBody {
+  Index index = -1;  ///< for ContactSide::body
+  RigidTransform X_WB{};
+  DeformedSurface* surface = nullptr;
+  const RigidGeometry* geometry = nullptr;
+  const RestVolume* volume = nullptr;  ///< optional, of the surface's model
+};
+
+/// Depth and normal of a vertex that is inside another modal body.
+enum class OverlapMethod {
+  kNearestPoint,  ///< of the deformed surface: exact, but jumps where two sides are equally near
+  /// In the rest shape: the vertex is carried back through the tetrahedron that holds it, and the direction to the
+  /// nearest point of the rest surface forward again, n ∝ F⁻ᵀN. As steady as the rest shape allows however deep the
+  /// overlap; bodies without a volume block take kNearestPoint.
+  kRestDepth,
+};
+
+struct NarrowPhaseOptions {
+  OverlapMethod overlap = OverlapMethod::kRestDepth;
+};
+
+/// Finds contacts; holds the scratch of one thread, and allocates nothing once warm. Contacts are appended, in an order
+/// that depends on nothing but the arguments; ids are made of the two features, so that they are the same in every
+/// query and differ among the contacts of one pair.
+///
+/// All is computed in the frame of one of the two bodies: bodies far from the world's origin lose no digits but those
+/// of their poses.
+class NarrowPhase {
+ public:
+  explicit NarrowPhase(const NarrowPhaseOptions& options = {});
+  ~NarrowPhase();
+  NarrowPhase(NarrowPhase&&) noexcept;
+  NarrowPhase& operator=(NarrowPhase&&) noexcept;
+
+  /// All contacts of a and b with gap ≤ margin. Two half-spaces have none.
+  /// @param origin positions come out relative to it, world @pre a.index < b.index, poses finite
+  void find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
+                     std::vector<ContactPoint>& contacts);
+
+  /// Where a modal body touches itself: vertex–surface and edge–edge contacts of triangles that have no vertex in
+  /// common and were farther apart than the margin at rest.
+  void find_self_contacts(const CollisionBody& body, double margin, const Vec3& origin,
+                          std::vector<ContactPoint>& contacts);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

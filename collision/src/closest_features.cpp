@@ -1,0 +1,255 @@
+#include "limber/collision/closest_features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace limber {
+namespace {
+
+using Kind = Feature::Kind;
+
+// Lines whose angle has a sine below this are taken as parallel: the ends decide then, and what is lost is their length
+// times this.
+constexpr double kParallelSine = 1e-13;
+
+// Where the foot of p falls on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
+double line_parameter(const Vec3& p, const Vec3& s0, const Vec3& s1) {
+  const Vec3 d = s1 - s0;
+  const double length2 = d.squaredNorm();
+  if (length2 == 0.0) return 0.0;
+  return (p - s0).dot(d) / length2;
+}
+
+// Measured from the nearer end, so that a point close to an end keeps its digits.
+Vec3 between(const Vec3& a, const Vec3& b, double t) {
+  if (t <= 0.5) return a + t * (b - a);
+  return b + (1.0 - t) * (a - b);
+}
+
+SurfaceFoot foot_at(const SegmentPoints& s, double t) {
+  if (!(t > 0.0)) return {s[0], {1.0, 0.0, 0.0}, {Kind::kVertex, 0}};
+  if (t >= 1.0) return {s[1], {0.0, 1.0, 0.0}, {Kind::kVertex, 1}};
+  return {between(s[0], s[1], t), {1.0 - t, t, 0.0}, {Kind::kEdge, 0}};
+}
+
+SegmentPoints edge_of(const TrianglePoints& t, int edge) {
+  return {t[static_cast<std::size_t>(edge)], t[static_cast<std::size_t>((edge + 1) % 3)]};
+}
+
+// A foot on edge `edge` of a triangle, renamed from the segment's names to the triangle's.
+SurfaceFoot on_edge(const SurfaceFoot& foot, int edge) {
+  const auto first = static_cast<std::size_t>(edge), second = static_cast<std::size_t>((edge + 1) % 3);
+  SurfaceFoot r{foot.point, {0.0, 0.0, 0.0}, {}};
+  r.weight[first] = foot.weight[0], r.weight[second] = foot.weight[1];
+  if (foot.feature.kind == Kind::kEdge)
+    r.feature = {Kind::kEdge, static_cast<std::uint8_t>(first)};
+  else
+    r.feature = {Kind::kVertex, static_cast<std::uint8_t>(foot.feature.index == 0 ? first : second)};
+  return r;
+}
+
+SurfaceFoot at_vertex(const SegmentPoints& s, int i) { return foot_at(s, i); }
+
+SurfaceFoot at_vertex(const TrianglePoints& t, int i) {
+  const auto v = static_cast<std::size_t>(i);
+  SurfaceFoot r{t[v], {0.0, 0.0, 0.0}, {Kind::kVertex, static_cast<std::uint8_t>(i)}};
+  r.weight[v] = 1.0;
+  return r;
+}
+
+void keep_nearer(ClosestPoints& best, const SurfaceFoot& a, const SurfaceFoot& b) {
+  const double d = (a.point - b.point).norm();
+  if (d < best.distance) best = {a, b, d};
+}
+
+ClosestPoints none_yet() { return {{}, {}, std::numeric_limits<double>::infinity()}; }
+
+// The common point of a segment and a triangle that it pierces, or crosses at its rim; none if it lies in the plane.
+struct Piercing {
+  bool pierces = false;
+  double parameter = 0.0;  // along the segment
+  SurfaceFoot foot{};      // on the triangle
+};
+
+Piercing pierce(const SegmentPoints& s, const TrianglePoints& t) {
+  const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double h0 = n.dot(s[0] - t[0]), h1 = n.dot(s[1] - t[0]);
+  if (h0 == h1 || (h0 > 0.0 && h1 > 0.0) || (h0 < 0.0 && h1 < 0.0)) return {};
+  const double parameter = h0 / (h0 - h1);
+  const Vec3 p = between(s[0], s[1], parameter);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (n.dot((t[(i + 1) % 3] - t[i]).cross(p - t[i])) < 0.0) return {};
+  return {true, parameter, closest_on_triangle(p, t)};
+}
+
+SurfaceFoot foot_on_face(const Vec3& point, double v, double w) {
+  return {point, {1.0 - v - w, v, w}, {Kind::kFace, 0}};
+}
+
+}  // namespace
+
+SurfaceFoot closest_on_segment(const Vec3& p, const SegmentPoints& s) {
+  return foot_at(s, line_parameter(p, s[0], s[1]));
+}
+
+SurfaceFoot closest_on_triangle(const Vec3& p, const TrianglePoints& t) {
+  const Vec3 e1 = t[1] - t[0], e2 = t[2] - t[0], r = p - t[0];
+  const Vec3 n = e1.cross(e2);
+  const double area2 = n.squaredNorm();
+  // A triangle thinner than round-off has no inside that could be told from its edges.
+  const double longest2 = std::max({e1.squaredNorm(), e2.squaredNorm(), (t[2] - t[1]).squaredNorm()});
+  if (area2 > kParallelSine * kParallelSine * longest2 * longest2) {
+    const double v = n.dot(r.cross(e2)) / area2, w = n.dot(e1.cross(r)) / area2;
+    if (v > 0.0 && w > 0.0 && v + w < 1.0) return foot_on_face(p - (n.dot(r) / area2) * n, v, w);
+  }
+  SurfaceFoot best{};
+  double best2 = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const SurfaceFoot foot = on_edge(closest_on_segment(p, edge_of(t, i)), i);
+    const double d2 = (p - foot.point).squaredNorm();
+    if (d2 < best2) best = foot, best2 = d2;
+  }
+  return best;
+}
+
+ClosestPoints closest_points(const SegmentPoints& a, const SegmentPoints& b) {
+  const Vec3 u = a[1] - a[0], v = b[1] - b[0], r = b[0] - a[0];
+  const Vec3 n = u.cross(v);
+  const double n2 = n.squaredNorm();
+  if (n2 > kParallelSine * kParallelSine * u.squaredNorm() * v.squaredNorm()) {
+    const double s = r.cross(v).dot(n) / n2, t = r.cross(u).dot(n) / n2;
+    if (s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0) {
+      const SurfaceFoot foot_b = closest_on_segment(between(a[0], a[1], s), b);
+      const SurfaceFoot foot_a = closest_on_segment(foot_b.point, a);
+      return {foot_a, foot_b, (foot_a.point - foot_b.point).norm()};
+    }
+  }
+  ClosestPoints best = none_yet();
+  for (int i = 0; i < 2; ++i) {
+    keep_nearer(best, at_vertex(a, i), closest_on_segment(a[static_cast<std::size_t>(i)], b));
+    keep_nearer(best, closest_on_segment(b[static_cast<std::size_t>(i)], a), at_vertex(b, i));
+  }
+  return best;
+}
+
+ClosestOrCrossing closest_points(const SegmentPoints& a, const TrianglePoints& b) {
+  if (const Piercing hit = pierce(a, b); hit.pierces) {
+    ClosestOrCrossing r;
+    r.a = foot_at(a, hit.parameter), r.b = hit.foot;
+    r.b.point = r.a.point;
+    r.intersecting = true, r.crossing = {r.a.point, r.a.point};
+    return r;
+  }
+  ClosestOrCrossing best{none_yet()};
+  for (int i = 0; i < 2; ++i)
+    keep_nearer(best, at_vertex(a, i), closest_on_triangle(a[static_cast<std::size_t>(i)], b));
+  for (int i = 0; i < 3; ++i) {
+    const ClosestPoints pair = closest_points(a, edge_of(b, i));
+    keep_nearer(best, pair.a, on_edge(pair.b, i));
+  }
+  best.intersecting = best.distance == 0.0;
+  best.crossing = {best.a.point, best.a.point};
+  return best;
+}
+
+ClosestOrCrossing closest_points(const TrianglePoints& a, const TrianglePoints& b) {
+  ClosestOrCrossing best{none_yet()};
+  // What two crossing triangles share is a segment, whose ends are where an edge of one pierces the other.
+  double longest = -1.0;
+  std::array<ClosestPoints, 6> hits;
+  std::size_t count = 0;
+  for (int i = 0; i < 3; ++i) {
+    if (const Piercing hit = pierce(edge_of(a, i), b); hit.pierces)
+      hits[count++] = {on_edge(foot_at(edge_of(a, i), hit.parameter), i), hit.foot, 0.0};
+    if (const Piercing hit = pierce(edge_of(b, i), a); hit.pierces)
+      hits[count++] = {hit.foot, on_edge(foot_at(edge_of(b, i), hit.parameter), i), 0.0};
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = i; j < count; ++j) {
+      const double length = (hits[i].a.point - hits[j].a.point).norm();
+      if (length <= longest) continue;
+      longest = length;
+      static_cast<ClosestPoints&>(best) = hits[i];
+      best.crossing = {hits[i].a.point, hits[j].a.point};
+    }
+  if (count > 0) {
+    best.b.point = best.a.point;
+    best.intersecting = true;
+    return best;
+  }
+  for (int i = 0; i < 3; ++i) {
+    keep_nearer(best, at_vertex(a, i), closest_on_triangle(a[static_cast<std::size_t>(i)], b));
+    keep_nearer(best, closest_on_triangle(b[static_cast<std::size_t>(i)], a), at_vertex(b, i));
+    for (int j = 0; j < 3; ++j) {
+      const ClosestPoints pair = closest_points(edge_of(a, i), edge_of(b, j));
+      keep_nearer(best, on_edge(pair.a, i), on_edge(pair.b, j));
+    }
+  }
+  best.intersecting = best.distance == 0.0;
+  best.crossing = {best.a.point, best.a.point};
+  return best;
+}
+
+SignedDistance signed_distance(const Vec3& p, const HalfSpace& shape) {
+  const double height = shape.normal.dot(p) - shape.offset;
+  return {height, p - height * shape.normal, shape.normal};
+}
+
+namespace {
+
+// Of the ball of `radius` about the point c of a core; `otherwise` is the normal at the core itself.
+SignedDistance about_core(const Vec3& p, const Vec3& c, double radius, const Vec3& otherwise) {
+  const double r = (p - c).norm();
+  const Vec3 n = r > 0.0 ? Vec3((p - c) / r) : otherwise;
+  return {r - radius, c + radius * n, n};
+}
+
+ConvexDistance of_core(const Vec3& a, const Vec3& b, double radius) {
+  const double d = (a - b).norm();
+  if (d == 0.0) return {a, b, Vec3::Zero(), -radius, true};
+  const Vec3 n = (a - b) / d;
+  return {a, b + radius * n, n, d - radius, false};
+}
+
+}  // namespace
+
+SignedDistance signed_distance(const Vec3& p, const Sphere& shape) {
+  return about_core(p, Vec3::Zero(), shape.radius, Vec3::UnitZ());
+}
+
+SignedDistance signed_distance(const Vec3& p, const Capsule& shape) {
+  const Vec3 c(0.0, 0.0, std::clamp(p.z(), -shape.half_length, shape.half_length));
+  return about_core(p, c, shape.radius, Vec3::UnitX());
+}
+
+SignedDistance signed_distance(const Vec3& p, const Box& shape) {
+  const Vec3& h = shape.half_extents;
+  const Vec3 inside = p.cwiseMax(-h).cwiseMin(h);
+  if (const double d = (p - inside).norm(); d > 0.0) return {d, inside, (p - inside) / d};
+  int axis = 0;
+  const Vec3 depth = h - p.cwiseAbs();
+  depth.minCoeff(&axis);
+  const Vec3 n = Vec3::Unit(axis) * (p[axis] < 0.0 ? -1.0 : 1.0);
+  return {-depth[axis], p + depth[axis] * n, n};
+}
+
+ConvexDistance distance(const TrianglePoints& t, const Sphere& shape) {
+  return of_core(closest_on_triangle(Vec3::Zero(), t).point, Vec3::Zero(), shape.radius);
+}
+
+ConvexDistance distance(const TrianglePoints& t, const Capsule& shape) {
+  const SegmentPoints axis{-shape.half_length * Vec3::UnitZ(), shape.half_length * Vec3::UnitZ()};
+  const ClosestOrCrossing c = closest_points(axis, t);
+  return of_core(c.b.point, c.a.point, shape.radius);
+}
+
+ConvexDistance distance(const TrianglePoints& t, const Box& shape) {
+  std::array<Vec3, 8> corners;
+  for (int i = 0; i < 8; ++i)
+    corners[static_cast<std::size_t>(i)] =
+        shape.half_extents.cwiseProduct(Vec3(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0));
+  return distance(ConvexSolid{t, 0.0}, ConvexSolid{corners, 0.0});
+}
+
+}  // namespace limber

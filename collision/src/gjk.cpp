@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "limber/collision/closest_features.h"
+
+namespace limber {
+namespace {
+
+// Polytopes end after as many steps as they have features; round-off may make the last of them repeat.
+constexpr int kMaxIterations = 128;
+// A step that brings the point nearer by less than this part of its squared distance brings nothing but round-off.
+constexpr double kNoProgress = 1e-15;
+
+// A vertex of the difference of two hulls, A − B, and where it comes from.
+struct Vertex {
+  Vec3 point;
+  std::size_t a, b;
+};
+
+struct Simplex {
+  std::array<Vertex, 4> vertices;
+  std::size_t size = 0;
+
+  bool has(const Vertex& v) const {
+    return std::any_of(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(size),
+                       [&](const Vertex& w) { return w.a == v.a && w.b == v.b; });
+  }
+};
+
+std::size_t farthest(std::span<const Vec3> points, const Vec3& direction) {
+  std::size_t best = 0;
+  double value = points[0].dot(direction);
+  for (std::size_t i = 1; i < points.size(); ++i)
+    if (const double d = points[i].dot(direction); d > value) best = i, value = d;
+  return best;
+}
+
+// Of the simplex's at most three vertices, by `foot`'s weights; returns the point itself.
+Vec3 reduce_to(Simplex& simplex, const std::array<std::size_t, 3>& of, const SurfaceFoot& foot) {
+  Simplex kept;
+  for (std::size_t i = 0; i < 3; ++i)
+    if (foot.weight[i] > 0.0) kept.vertices[kept.size++] = simplex.vertices[of[i]];
+  simplex = kept;
+  return foot.point;
+}
+
+SurfaceFoot nearest_to_origin(const Simplex& s, const std::array<std::size_t, 3>& of) {
+  return closest_on_triangle(Vec3::Zero(), {s.vertices[of[0]].point, s.vertices[of[1]].point, s.vertices[of[2]].point});
+}
+
+// Whether the origin is on the same side of the face opposite `apex` as the apex; a flat tetrahedron has no inside.
+bool on_inner_side(const Simplex& s, const std::array<std::size_t, 3>& face, std::size_t apex) {
+  const Vec3& p = s.vertices[face[0]].point;
+  const Vec3 n = (s.vertices[face[1]].point - p).cross(s.vertices[face[2]].point - p);
+  const double height = n.dot(s.vertices[apex].point - p), origin = -n.dot(p);
+  return (height > 0.0 && origin >= 0.0) || (height < 0.0 && origin <= 0.0);
+}
+
+// The simplex's point nearest to the origin; leaves only the vertices it depends on. All four are left, and the origin
+// itself is returned, where the origin is inside.
+Vec3 shrink_to_nearest(Simplex& s) {
+  if (s.size < 4) {
+    const std::array<std::size_t, 3> of{0, s.size > 1 ? std::size_t{1} : 0, s.size > 2 ? std::size_t{2} : 0};
+    return reduce_to(s, of, nearest_to_origin(s, of));
+  }
+  constexpr std::array<std::array<std::size_t, 3>, 4> kFaces{{{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}};
+  bool inside = true;
+  std::size_t best = 0;
+  SurfaceFoot best_foot{};
+  double best_distance = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 4; ++i) {
+    inside = inside && on_inner_side(s, kFaces[i], i);
+    const SurfaceFoot foot = nearest_to_origin(s, kFaces[i]);
+    if (const double d = foot.point.norm(); d < best_distance) best = i, best_foot = foot, best_distance = d;
+  }
+  if (inside) return Vec3::Zero();
+  return reduce_to(s, kFaces[best], best_foot);
+}
+
+// The different vertices of one side of a simplex of up to three, the last repeated to make a triangle.
+TrianglePoints corners(const Simplex& s, std::span<const Vec3> points, std::size_t Vertex::*side) {
+  TrianglePoints t;
+  std::array<std::size_t, 3> used{};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < s.size; ++i) {
+    const std::size_t v = s.vertices[i].*side;
+    if (std::find(used.begin(), used.begin() + static_cast<std::ptrdiff_t>(count), v) ==
+        used.begin() + static_cast<std::ptrdiff_t>(count))
+      used[count++] = v;
+  }
+  for (std::size_t i = 0; i < 3; ++i) t[i] = points[used[std::min(i, count - 1)]];
+  return t;
+}
+
+ConvexDistance intersecting(const Vec3& common, double radii) { return {common, common, Vec3::Zero(), -radii, true}; }
+
+}  // namespace
+
+ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b) {
+  const double radii = a.radius + b.radius;
+  Simplex simplex;
+  simplex.vertices[simplex.size++] = {a.points[0] - b.points[0], 0, 0};
+  Vec3 nearest = simplex.vertices[0].point;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    const double squared = nearest.squaredNorm();
+    if (squared == 0.0) return intersecting(a.points[simplex.vertices[0].a], radii);
+    Vertex next{Vec3::Zero(), farthest(a.points, -nearest), farthest(b.points, nearest)};
+    next.point = a.points[next.a] - b.points[next.b];
+    if (simplex.has(next) || squared - nearest.dot(next.point) <= kNoProgress * squared) break;
+    Simplex larger = simplex;
+    larger.vertices[larger.size++] = next;
+    const Vec3 nearer = shrink_to_nearest(larger);
+    if (larger.size < 4 && nearer.squaredNorm() >= squared) break;
+    simplex = larger, nearest = nearer;
+  }
+  const ClosestOrCrossing pair =
+      closest_points(corners(simplex, a.points, &Vertex::a), corners(simplex, b.points, &Vertex::b));
+  if (pair.intersecting) return intersecting(pair.a.point, radii);
+  const Vec3 n = (pair.a.point - pair.b.point) / pair.distance;
+  return {pair.a.point - a.radius * n, pair.b.point + b.radius * n, n, pair.distance - radii, false};
+}
+
+}  // namespace limber

@@ -1,0 +1,1 @@
+#include "limber/collision/narrow_phase.h"
