@@ -24,23 +24,23 @@ namespace limber {
 
 /// The problem with A in full.
 struct ContactQp {
-  int size = 0;                   ///< m ≥ 0
-  std::span<const double> A;      ///< m × m, symmetric positive semidefinite
-  std::span<const double> b;      ///< m
-  std::span<const double> lower;  ///< m, may hold −∞; empty: all 0
-  std::span<const double> upper;  ///< m, may hold +∞; empty: all +∞
+  int size = 0;                        ///< m ≥ 0
+  std::span<const double> A = {};      ///< m × m, symmetric positive semidefinite
+  std::span<const double> b = {};      ///< m
+  std::span<const double> lower = {};  ///< m, may hold −∞; empty: all 0
+  std::span<const double> upper = {};  ///< m, may hold +∞; empty: all +∞
 };
 
 /// The problem with A = G Gᵀ + diag(D): cheaper where there are more rows than degrees of freedom. For contacts G is
 /// J M^{−½} and D the residual compliance.
 struct FactoredContactQp {
-  int size = 0;                   ///< m ≥ 0
-  int dimension = 0;              ///< d ≥ 0, degrees of freedom
-  std::span<const double> G;      ///< m × d, row-major
-  std::span<const double> D;      ///< m, each ≥ 0; empty: all 0
-  std::span<const double> b;      ///< m
-  std::span<const double> lower;  ///< as in ContactQp
-  std::span<const double> upper;
+  int size = 0;                        ///< m ≥ 0
+  int dimension = 0;                   ///< d ≥ 0, degrees of freedom
+  std::span<const double> G = {};      ///< m × d, row-major
+  std::span<const double> D = {};      ///< m, each ≥ 0; empty: all 0
+  std::span<const double> b = {};      ///< m
+  std::span<const double> lower = {};  ///< as in ContactQp
+  std::span<const double> upper = {};
 };
 
 struct ContactQpOptions {

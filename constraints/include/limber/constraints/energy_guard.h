@@ -15,18 +15,18 @@ namespace limber {
 
 /// ΔE of velocity level, (1).
 struct VelocityLevelEnergy {
-  std::span<const double> A;  ///< m × m, symmetric
-  std::span<const double> b;  ///< m, relative speeds before, m/s
+  std::span<const double> A = {};  ///< m × m, symmetric
+  std::span<const double> b = {};  ///< m, relative speeds before, m/s
 };
 
 /// ΔE of gap level, (2).
 struct GapLevelEnergy {
-  std::span<const double> A;           ///< m × m, symmetric: gap per impulse, s/kg
-  std::span<const double> b;           ///< m, gaps predicted at the step's end, m
-  std::span<const double> gap_before;  ///< g₀, m, m
-  std::span<const double> A_rigid;     ///< A_r, m × m, symmetric, 1/kg; empty: 0
-  double step = 0.0;                   ///< Δt, s; > 0
-  double theta = 1.0;                  ///< θ: 1 impulse at the step's start, ½ force held over it
+  std::span<const double> A = {};           ///< m × m, symmetric: gap per impulse, s/kg
+  std::span<const double> b = {};           ///< m, gaps predicted at the step's end, m
+  std::span<const double> gap_before = {};  ///< g₀, m, m
+  std::span<const double> A_rigid = {};     ///< A_r, m × m, symmetric, 1/kg; empty: 0
+  double step = 0.0;                        ///< Δt, s; > 0
+  double theta = 1.0;                       ///< θ: 1 impulse at the step's start, ½ force held over it
 };
 
 /// What the guard did to one solve.

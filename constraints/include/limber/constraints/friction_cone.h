@@ -26,10 +26,10 @@ namespace limber {
 
 /// All rows in full: for islands of tens of contacts.
 struct FrictionProblem {
-  int contacts = 0;            ///< m ≥ 0
-  std::span<const double> A;   ///< 3m × 3m, symmetric positive semidefinite; row 3i + (0 normal, 1, 2 tangents)
-  std::span<const double> b;   ///< 3m, velocity without the forces
-  std::span<const double> mu;  ///< m, friction coefficients, each ≥ 0
+  int contacts = 0;                 ///< m ≥ 0
+  std::span<const double> A = {};   ///< 3m × 3m, symmetric positive semidefinite; row 3i + (0 normal, 1, 2 tangents)
+  std::span<const double> b = {};   ///< 3m, velocity without the forces
+  std::span<const double> mu = {};  ///< m, friction coefficients, each ≥ 0
 };
 
 /// The rows of a contact that belong to one body: 3 × columns of J M^{−½}.
@@ -41,12 +41,12 @@ struct FrictionBlock {
 
 /// A = G Gᵀ + diag(D) with few blocks per row of G: for islands of hundreds of contacts; A is never formed.
 struct BlockFrictionProblem {
-  int contacts = 0;                       ///< m ≥ 0
-  int columns = 0;                        ///< degrees of freedom of all bodies
-  std::span<const FrictionBlock> blocks;  ///< 2m: of contact i, 2i and 2i + 1
-  std::span<const double> D;              ///< 3m, each ≥ 0; empty: all 0
-  std::span<const double> b;              ///< 3m
-  std::span<const double> mu;             ///< m
+  int contacts = 0;                            ///< m ≥ 0
+  int columns = 0;                             ///< degrees of freedom of all bodies
+  std::span<const FrictionBlock> blocks = {};  ///< 2m: of contact i, 2i and 2i + 1
+  std::span<const double> D = {};              ///< 3m, each ≥ 0; empty: all 0
+  std::span<const double> b = {};              ///< 3m
+  std::span<const double> mu = {};             ///< m
 };
 
 enum class FrictionMethod { kExact, kBlockGaussSeidel, kStaggered };

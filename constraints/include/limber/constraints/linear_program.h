@@ -23,10 +23,10 @@ namespace limber {
 
 /// Rows are the contacts' gaps or speeds, columns the impulses. Units are the caller's.
 struct LinearProgram {
-  int rows = 0, columns = 0;  ///< ≥ 0
-  std::span<const double> A;  ///< rows × columns, row-major
-  std::span<const double> b;  ///< rows
-  std::span<const double> c;  ///< columns, each ≥ 0; empty: all 1
+  int rows = 0, columns = 0;       ///< ≥ 0
+  std::span<const double> A = {};  ///< rows × columns, row-major
+  std::span<const double> b = {};  ///< rows
+  std::span<const double> c = {};  ///< columns, each ≥ 0; empty: all 1
 };
 
 struct LinearProgramOptions {

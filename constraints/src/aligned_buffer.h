@@ -1,0 +1,40 @@
+// Memory for the kernels: 64-byte aligned, padded, growing only.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "dense_kernels.h"
+
+namespace limber {
+
+class AlignedBuffer {
+ public:
+  /// At least n numbers. What was there is lost if the buffer grows; new memory is zero.
+  double* need(std::size_t n) {
+    if (padded(n) > kPad * blocks_.size()) blocks_.assign(padded(n) / kPad, Block{});
+    return data();
+  }
+  double* data() { return blocks_.empty() ? nullptr : blocks_.front().values; }
+  const double* data() const { return blocks_.empty() ? nullptr : blocks_.front().values; }
+
+ private:
+  struct alignas(64) Block {
+    double values[kPad] = {};
+  };
+  std::vector<Block> blocks_;
+};
+
+/// A matrix of `rows` padded rows.
+class MatrixBuffer {
+ public:
+  MatrixView need(std::size_t rows, std::size_t columns) {
+    const std::size_t stride = padded(columns);
+    return {memory_.need(rows * stride), stride};
+  }
+
+ private:
+  AlignedBuffer memory_;
+};
+
+}  // namespace limber

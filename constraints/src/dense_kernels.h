@@ -1,0 +1,63 @@
+// The vector loops of the dense solvers. Raw pointers only: the file that implements them is compiled for several
+// instruction sets, so neither Eigen nor a header that includes it may reach it.
+//
+// Arrays are 64-byte aligned and lengths and strides multiples of kPad (aligned_buffer.h): no loop has a tail. What is
+// behind the last number is read and written, so it must be finite. Every result is the same bits on every instruction
+// set that has fused multiply-add: sums run over rows in order, and dot products over eight partial sums.
+#pragma once
+
+#include <cstddef>
+
+namespace limber {
+
+inline constexpr std::size_t kPad = 8;  ///< doubles in 64 bytes
+
+constexpr std::size_t padded(std::size_t n) { return (n + kPad - 1) / kPad * kPad; }
+
+/// A row-major matrix with padded rows.
+struct MatrixView {
+  double* values;
+  std::size_t stride;
+  double* row(std::size_t i) const { return values + i * stride; }
+};
+
+/// Whether x[0 … n) holds neither an infinity nor a NaN. x may have any alignment, n any value.
+bool all_finite(const double* x, std::size_t n);
+
+double dot(const double* x, const double* y, std::size_t n);
+
+/// y += a x
+void add_scaled(double* y, double a, const double* x, std::size_t n);
+
+/// out = init + Σ_i coefficients[i]·M.row(rows[i]) over n columns. `rows` null: 0, 1, …; out may be init.
+void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
+                  std::size_t count, std::size_t n);
+
+/// (x, y) ← (c x + s y, c y − s x)
+void rotate(double* x, double* y, double c, double s, std::size_t n);
+
+/// Solves Rᵀx = x, R upper triangular: its rows above the diagonal, zero at and below it; `inverse_diagonal` apart.
+/// The first `first` numbers of the right-hand side are known to be zero.
+void substitute_forward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first, std::size_t n);
+
+/// Solves R x = x with the same R given as L = Rᵀ: its rows below the diagonal, zero at and above it.
+void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n);
+
+/// One exchange of a condensed simplex tableau: T(i, ·) −= T(i, q)·T(p, ·)/T(p, q) for i ≠ p, row p over the pivot,
+/// column q over the negative pivot, the pivot inverted.
+void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q);
+
+/// C = XᵀX for the `rows` rows of X, n columns. All of C is written.
+void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n);
+
+/// C(i, ·) −= x_i·x for rows i in [first, n), columns from first − first mod kPad on: a step of a Cholesky
+/// factorisation.
+void subtract_outer(MatrixView C, const double* x, std::size_t first, std::size_t n);
+
+/// out[i] = M.row(rows[i])·x over n columns. `rows` null: 0, 1, …
+void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n);
+
+/// T = Mᵀ for `rows` × n numbers of M, with zeros in the padding of T.
+void transpose(MatrixView T, MatrixView M, std::size_t rows, std::size_t n);
+
+}  // namespace limber
