@@ -14,13 +14,12 @@ namespace limber {
 namespace {
 
 constexpr std::size_t kRowsPerChunk = 256;
+constexpr double kLargestSide = 1e37;  ///< boxes that reach farther count as endless: single precision ends soon after
 
 enum class Bounds : std::uint8_t { kNone, kBox, kHalfSpace };
 
 struct Body {
-  Aabb box{};
   HalfSpace half_space{};
-  CollisionFilter filter{};
   std::vector<Index> excluded{};  ///< ascending
   Index leaf = -1;                ///< in the tree of those that sleep
   Bounds bounds = Bounds::kNone;
@@ -28,6 +27,11 @@ struct Body {
   bool bounded = false;          ///< its box is finite
   bool in_awake_list = false;    ///< has an entry in `awake`, which may be out of date
   bool in_endless_list = false;  ///< the same for `endless`
+};
+
+struct Filter {
+  std::uint32_t layers = 0, mask = 0;
+  bool exclusions = false;  ///< whether the body's list has any
 };
 
 /// What one chunk of rows finds, in arrays of its own so that chunks may run at once.
@@ -41,13 +45,11 @@ std::uint64_t pair_key(Index a, Index b) {
   return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
 }
 
-/// The largest float at most x, but none without end. Single precision must not lose an overlap.
+/// A float at most x, for |x| ≤ kLargestSide: single precision must not lose an overlap. The conversion errs by half an
+/// ulp and two are taken off: without a branch, which would be taken every other time.
 float rounded_down(double x) {
-  constexpr auto kLargest = std::numeric_limits<float>::max();
-  const auto f = static_cast<float>(std::clamp(x, -1.0 * kLargest, 1.0 * kLargest));
-  if (static_cast<double>(f) <= x || f == -kLargest) return f;
-  const auto bits = std::bit_cast<std::uint32_t>(f);
-  return f == 0.0f ? -std::numeric_limits<float>::denorm_min() : std::bit_cast<float>(f > 0.0f ? bits - 1 : bits + 1);
+  const auto f = static_cast<float>(x);
+  return f - (std::abs(f) * std::numeric_limits<float>::epsilon() + std::numeric_limits<float>::min());
 }
 float rounded_up(double x) { return -rounded_down(-x); }
 
@@ -86,6 +88,9 @@ void sort_nearly_sorted(std::vector<std::uint64_t>& keys) {
 
 struct BroadPhase::Impl {
   std::vector<Body> bodies;
+  // By body index too, and apart from the rest, as a query reads those of all that are awake.
+  std::vector<Aabb> boxes;
+  std::vector<Filter> filters;
   BoxTree sleeping;
   std::vector<std::uint64_t> awake;  ///< ordered_bits(low along `axis`) << 32 | body
   std::vector<Index> endless;        ///< half-spaces and boxes without end, awake or not
@@ -106,6 +111,8 @@ struct BroadPhase::Impl {
   }
   Body& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
   const Body& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  const Aabb& box(Index body) const { return boxes[static_cast<std::size_t>(body)]; }
+  Index awake_body(std::size_t row) const { return static_cast<Index>(awake[row] & 0xffffffffu); }
 
   void place(Index index);
   void unplace(Body& body);
@@ -130,7 +137,7 @@ void BroadPhase::Impl::place(Index index) {
     if (!body.in_endless_list) endless.push_back(index);
     body.in_endless_list = true;
   } else if (body.asleep) {
-    body.leaf = sleeping.insert(index, body.box);
+    body.leaf = sleeping.insert(index, box(index));
   } else {
     if (!body.in_awake_list) awake.push_back(static_cast<std::uint32_t>(index));
     body.in_awake_list = true;
@@ -143,9 +150,11 @@ void BroadPhase::Impl::unplace(Body& body) {
 }
 
 bool BroadPhase::Impl::may_meet(Index a, Index b) const {
-  const Body &A = at(a), &B = at(b);
-  if ((A.filter.layers & B.filter.mask) == 0 || (B.filter.layers & A.filter.mask) == 0) return false;
-  return A.excluded.empty() || !std::binary_search(A.excluded.begin(), A.excluded.end(), b);
+  const Filter &A = filters[static_cast<std::size_t>(a)], &B = filters[static_cast<std::size_t>(b)];
+  if ((A.layers & B.mask) == 0 || (B.layers & A.mask) == 0) return false;
+  if (!A.exclusions || !B.exclusions) return true;
+  const std::vector<Index>& excluded = at(a).excluded;
+  return !std::binary_search(excluded.begin(), excluded.end(), b);
 }
 
 /// Entries of bodies that fell asleep, were removed or changed their kind since the last query.
@@ -166,10 +175,10 @@ void BroadPhase::Impl::drop_outdated_entries() {
 /// list must then be sorted anew.
 void BroadPhase::Impl::choose_axis() {
   if (awake.empty()) return;
-  const Vec3 base = at(static_cast<Index>(awake.front() & 0xffffffffu)).box.low;
+  const Vec3 base = box(awake_body(0)).low;
   Vec3 sum = Vec3::Zero(), squares = Vec3::Zero();
-  for (const std::uint64_t entry : awake) {
-    const Vec3 x = at(static_cast<Index>(entry & 0xffffffffu)).box.low - base;
+  for (std::size_t row = 0; row < awake.size(); ++row) {
+    const Vec3 x = box(awake_body(row)).low - base;
     sum += x;
     squares += x.cwiseProduct(x);
   }
@@ -183,7 +192,7 @@ void BroadPhase::Impl::sort_awake() {
   for (std::uint64_t& entry : awake) {
     const std::uint64_t body = entry & 0xffffffffu;
     entry =
-        static_cast<std::uint64_t>(ordered_bits(rounded_down(at(static_cast<Index>(body)).box.low[axis]))) << 32 | body;
+        static_cast<std::uint64_t>(ordered_bits(rounded_down(box(static_cast<Index>(body)).low[axis]))) << 32 | body;
   }
   sort_nearly_sorted(awake);
 }
@@ -191,30 +200,27 @@ void BroadPhase::Impl::sort_awake() {
 void BroadPhase::Impl::fill_sides() {
   for (auto& side : sides) side.resize(awake.size() + kSweepPadding);
   for (std::size_t i = 0; i < awake.size(); ++i) {
-    const Aabb& box = at(static_cast<Index>(awake[i] & 0xffffffffu)).box;
+    const Aabb& body = box(awake_body(i));
     for (int d = 0; d < 3; ++d) {
       const int along = (axis + d) % 3;
-      sides[2 * d][i] = rounded_down(box.low[along]);
-      sides[2 * d + 1][i] = rounded_up(box.high[along] + margin);
+      sides[2 * d][i] = rounded_down(body.low[along]);
+      sides[2 * d + 1][i] = rounded_up(body.high[along] + margin);
     }
   }
   std::fill(sides[0].end() - kSweepPadding, sides[0].end(), std::numeric_limits<float>::infinity());
 }
 
 void BroadPhase::Impl::sweep_rows(Chunk& chunk, std::size_t first, std::size_t last) const {
-  const SweepBoxes boxes{{sides[0].data(), sides[2].data(), sides[4].data()},
-                         {sides[1].data(), sides[3].data(), sides[5].data()},
-                         awake.size()};
-  std::uint32_t hits[kSweepPiece + kSweepPadding];
-  for (std::size_t row = first; row < last; ++row) {
-    const auto a = static_cast<Index>(awake[row] & 0xffffffffu);
-    for (std::size_t from = row + 1; from < boxes.count;) {
-      const auto [count, next] = sweep_row(boxes, row, from, hits);
-      for (std::size_t h = 0; h < count; ++h) {
-        const auto b = static_cast<Index>(awake[hits[h]] & 0xffffffffu);
-        if (near(at(a).box, at(b).box, margin) && may_meet(a, b)) chunk.pairs.push_back(pair_key(a, b));
-      }
-      from = next;
+  const SweepBoxes boxes_of_rows{{sides[0].data(), sides[2].data(), sides[4].data()},
+                                 {sides[1].data(), sides[3].data(), sides[5].data()},
+                                 awake.size()};
+  SweepHit hits[kSweepHits];
+  SweepCursor cursor{first, first + 1};
+  while (cursor.row < last) {
+    const std::size_t count = sweep_rows_on(boxes_of_rows, last, cursor, hits);
+    for (std::size_t h = 0; h < count; ++h) {
+      const Index a = awake_body(hits[h].row), b = awake_body(hits[h].column);
+      if (near(box(a), box(b), margin) && may_meet(a, b)) chunk.pairs.push_back(pair_key(a, b));
     }
   }
 }
@@ -222,8 +228,8 @@ void BroadPhase::Impl::sweep_rows(Chunk& chunk, std::size_t first, std::size_t l
 void BroadPhase::Impl::meet_sleeping(Chunk& chunk, std::size_t first, std::size_t last) const {
   if (sleeping.empty()) return;
   for (std::size_t row = first; row < last; ++row) {
-    const auto a = static_cast<Index>(awake[row] & 0xffffffffu);
-    sleeping.visit([&](const Aabb& box) { return near(at(a).box, box, margin); },
+    const auto a = awake_body(row);
+    sleeping.visit([&](const Aabb& node) { return near(box(a), node, margin); },
                    [&](Index b, const Aabb&) {
                      if (may_meet(a, b)) chunk.pairs.push_back(pair_key(a, b));
                    },
@@ -235,9 +241,9 @@ void BroadPhase::Impl::meet_endless(Chunk& chunk, std::size_t first, std::size_t
   for (const Index e : endless) {
     const Body& body = at(e);
     for (std::size_t row = first; row < last; ++row) {
-      const auto a = static_cast<Index>(awake[row] & 0xffffffffu);
-      const bool meet = body.bounds == Bounds::kHalfSpace ? near(body.half_space, at(a).box, margin)
-                                                          : near(body.box, at(a).box, margin);
+      const auto a = awake_body(row);
+      const bool meet =
+          body.bounds == Bounds::kHalfSpace ? near(body.half_space, box(a), margin) : near(box(e), box(a), margin);
       if (meet && may_meet(a, e)) chunk.pairs.push_back(pair_key(a, e));
     }
   }
@@ -248,15 +254,15 @@ void BroadPhase::Impl::endless_meet_the_rest(Chunk& chunk) const {
   for (std::size_t i = 0; i < endless.size(); ++i) {
     const Index e = endless[i];
     const Body& body = at(e);
-    const auto meets = [&](const Aabb& box) {
-      return body.bounds == Bounds::kHalfSpace ? near(body.half_space, box, margin) : near(body.box, box, margin);
+    const auto meets = [&](const Aabb& other) {
+      return body.bounds == Bounds::kHalfSpace ? near(body.half_space, other, margin) : near(box(e), other, margin);
     };
     for (std::size_t j = 0; j < i; ++j) {
       const Body& other = at(endless[j]);
       if (body.asleep && other.asleep) continue;
       if (body.bounds == Bounds::kHalfSpace && other.bounds == Bounds::kHalfSpace) continue;
       const bool meet =
-          other.bounds == Bounds::kHalfSpace ? near(other.half_space, body.box, margin) : meets(other.box);
+          other.bounds == Bounds::kHalfSpace ? near(other.half_space, box(e), margin) : meets(box(endless[j]));
       if (meet && may_meet(e, endless[j])) chunk.pairs.push_back(pair_key(e, endless[j]));
     }
     if (body.asleep) continue;
@@ -305,17 +311,19 @@ void BroadPhase::add(Index body, const CollisionFilter& filter) {
   if (body < 0) throw InvalidArgument("BroadPhase::add: index is " + std::to_string(body) + ", expected 0 or more");
   auto& bodies = impl_->bodies;
   if (static_cast<std::size_t>(body) >= bodies.size()) bodies.resize(static_cast<std::size_t>(body) + 1);
+  impl_->boxes.resize(bodies.size());
+  impl_->filters.resize(bodies.size());
   Body& fresh = impl_->at(body);
   if (fresh.present)
     throw InvalidArgument("BroadPhase::add: index " + std::to_string(body) + " holds a body, expected a free index");
   fresh.present = true;
-  fresh.filter = filter;
+  set_filter(body, filter);
 }
 
 void BroadPhase::remove(Index body) {
   Body& gone = impl_->present(body, "remove");
   impl_->unplace(gone);
-  for (const Index other : gone.excluded) std::erase(impl_->at(other).excluded, body);
+  while (!gone.excluded.empty()) exclude_pair(body, gone.excluded.back(), false);
   const bool in_awake_list = gone.in_awake_list, in_endless_list = gone.in_endless_list;
   gone = {};
   gone.in_awake_list = in_awake_list;
@@ -323,7 +331,10 @@ void BroadPhase::remove(Index body) {
 }
 
 void BroadPhase::set_filter(Index body, const CollisionFilter& filter) {
-  impl_->present(body, "set_filter").filter = filter;
+  impl_->present(body, "set_filter");
+  Filter& f = impl_->filters[static_cast<std::size_t>(body)];
+  f.layers = filter.layers;
+  f.mask = filter.mask;
 }
 
 void BroadPhase::exclude_pair(Index a, Index b, bool excluded) {
@@ -337,6 +348,7 @@ void BroadPhase::exclude_pair(Index a, Index b, bool excluded) {
     const bool listed = where != list.end() && *where == other;
     if (excluded && !listed) list.insert(where, other);
     if (!excluded && listed) list.erase(where);
+    impl_->filters[static_cast<std::size_t>(of)].exclusions = !list.empty();
   }
 }
 
@@ -345,8 +357,8 @@ void BroadPhase::set_box(Index body, const Aabb& box) {
   if (!(box.low.array() <= box.high.array()).all())
     throw InvalidArgument("BroadPhase::set_box: box of body " + std::to_string(body) +
                           " is empty or no number, expected low <= high");
-  moved.box = box;
-  const bool bounded = box.low.allFinite() && box.high.allFinite();
+  impl_->boxes[static_cast<std::size_t>(body)] = box;
+  const bool bounded = (box.low.array() >= -kLargestSide).all() && (box.high.array() <= kLargestSide).all();
   if (moved.in_awake_list && moved.bounds == Bounds::kBox && moved.bounded && bounded && !moved.asleep) return;
   impl_->unplace(moved);
   moved.bounds = Bounds::kBox;

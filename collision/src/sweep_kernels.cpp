@@ -10,29 +10,38 @@ HWY_BEFORE_NAMESPACE();
 namespace limber::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-HWY_ATTR SweepPiece SweepRow(const SweepBoxes& boxes, std::size_t row, std::size_t from,
-                             std::uint32_t* HWY_RESTRICT hits) {
+HWY_ATTR std::size_t SweepRowsOn(const SweepBoxes& boxes, std::size_t last, SweepCursor& cursor,
+                                 SweepHit* HWY_RESTRICT hits) {
   const hn::CappedTag<float, kSweepPadding> d;
-  const hn::RebindToUnsigned<decltype(d)> du;
-  const std::size_t end = from + kSweepPiece < boxes.count ? from + kSweepPiece : boxes.count;
-  const auto high0 = hn::Set(d, boxes.high[0][row]), high1 = hn::Set(d, boxes.high[1][row]),
-             high2 = hn::Set(d, boxes.high[2][row]);
-  const auto low1 = hn::Set(d, boxes.low[1][row]), low2 = hn::Set(d, boxes.low[2][row]);
-  std::size_t found = 0;
-  for (std::size_t j = from; j < end; j += hn::Lanes(d)) {
-    const auto starts = hn::Le(hn::LoadU(d, boxes.low[0] + j), high0);
-    const auto along1 =
-        hn::And(hn::Le(hn::LoadU(d, boxes.low[1] + j), high1), hn::Le(low1, hn::LoadU(d, boxes.high[1] + j)));
-    const auto along2 =
-        hn::And(hn::Le(hn::LoadU(d, boxes.low[2] + j), high2), hn::Le(low2, hn::LoadU(d, boxes.high[2] + j)));
-    const auto overlaps = hn::And(starts, hn::And(along1, along2));
-    if (!hn::AllFalse(d, overlaps)) {
-      const auto columns = hn::Iota(du, static_cast<std::uint32_t>(j));
-      found += hn::CompressStore(columns, hn::RebindMask(du, overlaps), du, hits + found);
+  std::size_t found = 0, column = cursor.column;
+  for (std::size_t row = cursor.row; row < last; ++row, column = row + 1) {
+    const auto high0 = hn::Set(d, boxes.high[0][row]), high1 = hn::Set(d, boxes.high[1][row]),
+               high2 = hn::Set(d, boxes.high[2][row]);
+    const auto low1 = hn::Set(d, boxes.low[1][row]), low2 = hn::Set(d, boxes.low[2][row]);
+    for (bool more = true; more; column += hn::Lanes(d)) {
+      if (found + kSweepPadding > kSweepHits) {
+        cursor = {row, column};
+        return found;
+      }
+      const auto starts = hn::Le(hn::LoadU(d, boxes.low[0] + column), high0);
+      const auto along1 = hn::And(hn::Le(hn::LoadU(d, boxes.low[1] + column), high1),
+                                  hn::Le(low1, hn::LoadU(d, boxes.high[1] + column)));
+      const auto along2 = hn::And(hn::Le(hn::LoadU(d, boxes.low[2] + column), high2),
+                                  hn::Le(low2, hn::LoadU(d, boxes.high[2] + column)));
+      const auto overlaps = hn::And(starts, hn::And(along1, along2));
+      if (!hn::AllFalse(d, overlaps)) {
+        std::uint8_t bytes[8] = {};
+        hn::StoreMaskBits(d, overlaps, bytes);
+        for (unsigned lanes = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; lanes != 0; lanes &= lanes - 1) {
+          const auto lane = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(lanes));
+          hits[found++] = {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(column) + lane};
+        }
+      }
+      more = hn::AllTrue(d, starts);
     }
-    if (!hn::AllTrue(d, starts)) return {found, boxes.count};
   }
-  return {found, end};
+  cursor = {last, last + 1};
+  return found;
 }
 
 }  // namespace limber::HWY_NAMESPACE
@@ -41,10 +50,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace limber {
 
-HWY_EXPORT(SweepRow);
+HWY_EXPORT(SweepRowsOn);
 
-SweepPiece sweep_row(const SweepBoxes& boxes, std::size_t row, std::size_t from, std::uint32_t* hits) {
-  return HWY_DYNAMIC_DISPATCH(SweepRow)(boxes, row, from, hits);
+std::size_t sweep_rows_on(const SweepBoxes& boxes, std::size_t last, SweepCursor& cursor, SweepHit* hits) {
+  return HWY_DYNAMIC_DISPATCH(SweepRowsOn)(boxes, last, cursor, hits);
 }
 
 }  // namespace limber

@@ -8,7 +8,7 @@
 namespace limber {
 
 inline constexpr std::size_t kSweepPadding = 16;  ///< entries behind the last, of low[0] = infinity
-inline constexpr std::size_t kSweepPiece = 1024;  ///< columns tested by one call at most; a multiple of kSweepPadding
+inline constexpr std::size_t kSweepHits = 1024;   ///< room for what one call finds
 
 /// Boxes in single precision, ascending in low[0].
 struct SweepBoxes {
@@ -17,13 +17,17 @@ struct SweepBoxes {
   std::size_t count;
 };
 
-struct SweepPiece {
-  std::size_t hits;  ///< how many were written
-  std::size_t next;  ///< the column to go on from; `count` where the row is done
+struct SweepHit {
+  std::uint32_t row, column;  ///< row < column
 };
 
-/// Which of the boxes from column `from` on overlap box `row`: their numbers, ascending, into `hits` (room for
-/// kSweepPiece + kSweepPadding). Stops where low[0] exceeds the row's high[0].
-SweepPiece sweep_row(const SweepBoxes& boxes, std::size_t row, std::size_t from, std::uint32_t* hits);
+/// Where a sweep stands.
+struct SweepCursor {
+  std::size_t row, column;
+};
+
+/// Finds overlaps of rows before `last` with later boxes and moves the cursor on behind them, until its row is `last`
+/// or there may be no room for more: call again then. @return how many hits were written
+std::size_t sweep_rows_on(const SweepBoxes& boxes, std::size_t last, SweepCursor& cursor, SweepHit* hits);
 
 }  // namespace limber
