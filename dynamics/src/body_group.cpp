@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "limber/core/error.h"
 
@@ -42,7 +43,19 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
       previous_amplitudes_(model_->modes()),
       forces_(model_->modes()),
       delayed_z_(model_->modes()),
-      delayed_rates_(model_->modes()) {
+      delayed_rates_(model_->modes()),
+      static_amplitudes_(model_->modes()),
+      predicted_amplitudes_(model_->modes()),
+      predicted_rates_(model_->modes()),
+      predicted_forces_(model_->modes()),
+      predicted_static_(model_->modes()) {
+  for (Index i = 0; i < table_.modes(); ++i) {
+    const double lambda = model_->data().eigenvalues[static_cast<std::size_t>(i)];
+    const double xi = model_->data().decays[static_cast<std::size_t>(i)];
+    const bool answers_statically = std::sqrt(std::max(lambda - xi * xi, 0.0)) * step > std::numbers::pi;
+    position_response_.push_back(answers_statically ? 1.0 / (lambda * step) : table_.at(i).z_g / step);
+    velocity_response_.push_back(answers_statically ? 0.0 : 1.0);
+  }
   if (constants_.motion == FrameMotion::kFree) return;
   const ModalModelData& data = model_->data();
   for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
@@ -60,8 +73,8 @@ Index BodyGroup::add(const RigidTransform& X_WB, const Vec3& velocity, const Vec
     return slot;
   }
   bodies_.push_back(body);
-  for (ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_, &forces_, &delayed_z_, &delayed_rates_})
-    rows->resize(bodies_.size());
+  predictions_.push_back({.frame = body.frame});
+  for (ModeRows* rows : mode_rows()) rows->resize(bodies_.size());
   vacant_.reserve(bodies_.size());  // so that remove() cannot fail
   return slots() - 1;
 }
@@ -73,8 +86,7 @@ void BodyGroup::remove(Index slot) {
 }
 
 void BodyGroup::clear_modes(Index slot) {
-  for (ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_, &forces_, &delayed_z_, &delayed_rates_})
-    rows->clear(slot);
+  for (ModeRows* rows : mode_rows()) rows->clear(slot);
 }
 
 void BodyGroup::set_pose(Index slot, const RigidTransform& X_WB) {
@@ -90,6 +102,8 @@ void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, s
   std::copy(amplitudes.begin(), amplitudes.end(), amplitudes_.modes(slot).begin());
   std::copy(rates.begin(), rates.end(), rates_.modes(slot).begin());
   previous_amplitudes_.copy_from(amplitudes_, slot);
+  static_amplitudes_.clear(slot);
+  body(slot).modes_static = false;
 }
 
 void BodyGroup::set_parent(Index slot, const KinematicFrame& at_step_end) { body(slot).frame.set_parent(at_step_end); }
@@ -144,45 +158,134 @@ void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
 
   const FrameLoad load{gravity, b.force, b.torque};
   const double h = table_.step();
+  const ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
   const FrameExcitation excitation = b.frame.begin_step(constants_, load, first_moment(slot), h);
-  if (!couplings_.empty()) excite_modes(slot, excitation);
-  advance_modes(slot, b);
+  if (!couplings_.empty()) excite_modes(modes.forces, excitation);
+  if (b.modes_static) leave_static_answer(slot, modes.z);
+  advance_modes(slot, modes, b.modes_loaded || !couplings_.empty());
   b.frame.end_step(constants_, load, first_moment(slot), h);
-  b.force = b.torque = Vec3::Zero();
+  clear_loads(slot);
 }
 
-void BodyGroup::advance_modes(Index slot, Body& b) {
+void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& load) {
+  const Body& b = body(slot);
+  Prediction& p = predictions_[static_cast<std::size_t>(slot)];
+  p.frame = b.frame;
+  predicted_amplitudes_.copy_from(amplitudes_, slot);
+  predicted_rates_.copy_from(rates_, slot);
+  predicted_forces_.copy_from(forces_, slot);
+
+  const FrameLoad frame_load{gravity, b.force + load.force, b.torque + load.torque};
+  const double h = table_.step();
+  const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
+  // An impulse of zero would still set the closed rotation up anew, and cost it its last bits.
+  if (!load.impulse.isZero(0.0) || !load.moment.isZero(0.0))
+    p.frame.apply_impulse(constants_, load.impulse, load.moment);
+  const FrameExcitation excitation = p.frame.begin_step(constants_, frame_load, first_moment(slot), h);
+  if (!couplings_.empty()) excite_modes(modes.forces, excitation);
+  const bool constrained = add_modal_load(load.modal, modes.forces);
+  if (b.modes_static) leave_static_answer(slot, modes.z);
+  advance_modes(slot, modes, b.modes_loaded || constrained || !couplings_.empty());
+  p.modes_static = constrained && answer_statically(slot, load.modal);
+  p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
+}
+
+void BodyGroup::commit(Index slot) {
+  Body& b = body(slot);
+  const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
+  b.previous_pose = b.frame.pose();
+  previous_amplitudes_.copy_from(amplitudes_, slot);
+  b.frame = p.frame;
+  amplitudes_.copy_from(predicted_amplitudes_, slot);
+  rates_.copy_from(predicted_rates_, slot);
+  if (p.modes_static) static_amplitudes_.copy_from(predicted_static_, slot);
+  if (b.modes_static && !p.modes_static) static_amplitudes_.clear(slot);
+  b.modes_static = p.modes_static;
+  clear_loads(slot);
+}
+
+void BodyGroup::apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment,
+                                          std::span<const double> modal) {
+  body(slot).frame.apply_impulse(constants_, impulse, moment);
+  const std::span<double> rates = rates_.modes(slot);
+  for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += velocity_response_[i] * modal[i];
+}
+
+void BodyGroup::apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque,
+                                        std::span<const double> modal) {
+  Body& b = body(slot);
+  b.force += force;
+  b.torque += torque;
+  const std::span<double> g = forces_.modes(slot);
+  for (std::size_t i = 0; i < modal.size(); ++i) g[i] += modal[i];
+  b.modes_loaded = b.modes_loaded || !modal.empty();
+}
+
+void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded) const {
   if (table_.modes() == 0) return;
-  if (b.modes_loaded) {
-    table_.advance(amplitudes_.row(slot), rates_.row(slot), forces_.row(slot));
-    forces_.clear(slot);
-    b.modes_loaded = false;
-  } else {
-    table_.advance_free(amplitudes_.row(slot), rates_.row(slot));
+  if (loaded)
+    table_.advance(modes.z, modes.rates, modes.forces);
+  else
+    table_.advance_free(modes.z, modes.rates);
+  if (!bodies_[static_cast<std::size_t>(slot)].modes_delayed) return;
+  const std::span<const double> delayed_z = delayed_z_.modes(slot), delayed_rates = delayed_rates_.modes(slot);
+  for (std::size_t i = 0; i < delayed_z.size(); ++i) {
+    modes.z[i] += delayed_z[i];
+    modes.rates[i] += delayed_rates[i];
   }
+}
+
+/// What answered the last step's constraints statically does not vibrate when they let go.
+void BodyGroup::leave_static_answer(Index slot, double* z) const {
+  const std::span<const double> answer = static_amplitudes_.modes(slot);
+  for (std::size_t i = 0; i < answer.size(); ++i) z[i] -= answer[i];
+}
+
+/// @return whether there is any
+bool BodyGroup::add_modal_load(std::span<const double> modal, double* forces) const {
+  bool any = false;
+  for (std::size_t i = 0; i < modal.size(); ++i) {
+    any = any || modal[i] != 0.0;
+    forces[i] += velocity_response_[i] * modal[i] / table_.step();
+  }
+  return any;
+}
+
+/// @return whether a mode did
+bool BodyGroup::answer_statically(Index slot, std::span<const double> modal) {
+  const std::span<double> z = predicted_amplitudes_.modes(slot), answer = predicted_static_.modes(slot);
+  bool any = false;
+  for (std::size_t i = 0; i < modal.size(); ++i) {
+    answer[i] = velocity_response_[i] == 0.0 ? position_response_[i] * modal[i] : 0.0;
+    z[i] += answer[i];
+    any = any || answer[i] != 0.0;
+  }
+  return any;
+}
+
+void BodyGroup::excite_modes(double* forces, const FrameExcitation& excitation) const {
+  for (std::size_t i = 0; i < couplings_.size(); ++i) {
+    const Coupling& c = couplings_[i];
+    forces[i] += c.field.dot(excitation.field) + c.angular_acceleration.dot(excitation.angular_acceleration) +
+                 c.spin.cwiseProduct(excitation.spin).sum();
+  }
+}
+
+void BodyGroup::clear_loads(Index slot) {
+  Body& b = body(slot);
+  b.force = b.torque = Vec3::Zero();
+  if (b.modes_loaded || !couplings_.empty()) forces_.clear(slot);
+  b.modes_loaded = false;
   if (!b.modes_delayed) return;
-  for (Index i = 0; i < table_.modes(); ++i) {
-    amplitudes_.row(slot)[i] += delayed_z_.row(slot)[i];
-    rates_.row(slot)[i] += delayed_rates_.row(slot)[i];
-  }
   delayed_z_.clear(slot);
   delayed_rates_.clear(slot);
   b.modes_delayed = false;
 }
 
-void BodyGroup::excite_modes(Index slot, const FrameExcitation& excitation) {
-  const std::span<double> g = forces_.modes(slot);
-  for (std::size_t i = 0; i < g.size(); ++i) {
-    const Coupling& c = couplings_[i];
-    g[i] += c.field.dot(excitation.field) + c.angular_acceleration.dot(excitation.angular_acceleration) +
-            c.spin.cwiseProduct(excitation.spin).sum();
-  }
-  body(slot).modes_loaded = true;
-}
+Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }
 
-Vec3 BodyGroup::first_moment(Index slot) const {
+Vec3 BodyGroup::first_moment_of(std::span<const double> z) const {
   Vec3 s = constants_.mass * constants_.center_of_mass;
-  const std::span<const double> z = amplitudes(slot);
   for (std::size_t i = 0; i < couplings_.size(); ++i) s += z[i] * couplings_[i].field;
   return s;
 }

@@ -9,6 +9,7 @@
 /// without its reaction on the rotation it would not conserve energy. Free bodies feel none of it: p_i = 0.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -19,6 +20,21 @@
 #include "limber/model/modal_model.h"
 
 namespace limber {
+
+/// What constraints do to one body over one step. Forces act on the deformed body; angular quantities are about the
+/// body origin. World axes.
+///
+/// The frame gets impulses at the step's start (θ = 1: what stands stays, docs/derivations/constraints.md) and held
+/// forces on top (θ = ½). The modes get both as one force held over the step: `modal`/Δt. A mode above the step's
+/// Nyquist rate, √(λ − ξ²) Δt > π, answers by its static displacement g/λ instead, which lasts for that step alone: the
+/// gain H of a held force would come to nothing at every √λ Δt = 2πn, and a constraint on it would whip the mode.
+struct ConstraintLoad {
+  Vec3 impulse = Vec3::Zero();      ///< N·s, at the step's start
+  Vec3 moment = Vec3::Zero();       ///< N·m·s, at the step's start
+  Vec3 force = Vec3::Zero();        ///< N, held over the step
+  Vec3 torque = Vec3::Zero();       ///< N·m, held over the step
+  std::span<const double> modal{};  ///< Σ Uᵀ Rᵀ (impulse + Δt force), k numbers, kg^½·m/s; empty: none
+};
 
 /// Slots 0 … slots() − 1 hold bodies or are vacant; a removed body's slot is used again. All functions that take a slot
 /// expect one that is occupied, and finite numbers: World checks its callers' and gives ids that cannot go stale.
@@ -69,6 +85,35 @@ class BodyGroup {
   /// One step of the occupied slots in [begin, end). Allocates and throws nothing.
   void advance(Index begin, Index end, const Vec3& gravity);
 
+  // One step in two phases, for bodies under constraints: predict as often as wanted, then commit the last prediction.
+  // predict() and commit() without a load come to the same bits as advance(). Neither allocates nor throws.
+  /// Finds the state at the step's end under the body's own loads and `load`; the body itself does not change.
+  void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load = {});
+  const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
+  std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
+  std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }
+  /// Makes the last prediction the state, and clears the loads, as advance() does.
+  void commit(Index slot);
+
+  /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
+  /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none; modes above the step's Nyquist rate stay as they are
+  void apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
+  /// Lasts for the next step. @param modal k numbers, kg^½·m/s², or none
+  void apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque, std::span<const double> modal);
+  /// What apply_force() has summed up for the next step: world, N, and about the body origin, N·m.
+  const Vec3& held_force(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].force; }
+  const Vec3& held_torque(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].torque; }
+  std::span<const double> held_modal_forces(Index slot) const { return forces_.modes(slot); }
+
+  // The modes' answers to a constraint, one number per mode.
+  /// End-of-step displacement per unit of ConstraintLoad::modal, s: H/Δt, or 1/(λΔt) above the Nyquist rate. > 0.
+  std::span<const double> position_response() const { return position_response_; }
+  /// Velocity per unit impulse: 1, or 0 above the Nyquist rate.
+  std::span<const double> velocity_response() const { return velocity_response_; }
+  /// The part of amplitudes() that is the static answer to the last step's constraints; zero for modes below the
+  /// Nyquist rate. The mode's energy is ½(ż² + λ(z − c)²) + ½λc².
+  std::span<const double> static_amplitudes(Index slot) const { return static_amplitudes_.modes(slot); }
+
   /// First mass moment about the body origin, deformed: m c + Σ z_i p_i, body axes, kg·m.
   Vec3 first_moment(Index slot) const;
 
@@ -99,13 +144,38 @@ class BodyGroup {
     bool occupied = true;
     bool modes_loaded = false;   // forces_ is not zero
     bool modes_delayed = false;  // delayed_z_, delayed_rates_ are not zero
+    bool modes_static = false;   // static_amplitudes_ are not zero
+  };
+
+  /// The frame at the end of a step that was predicted.
+  struct Prediction {
+    RigidFrame frame;
+    bool modes_static = false;
+  };
+
+  /// The modes of one body during a step: rows of its own, or those of its prediction.
+  struct ModeArrays {
+    double *z = nullptr, *rates = nullptr, *forces = nullptr;
   };
 
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
-  void advance_modes(Index slot, Body& body);
-  void excite_modes(Index slot, const FrameExcitation& excitation);
+  void advance_modes(Index slot, const ModeArrays& modes, bool loaded) const;
+  void excite_modes(double* forces, const FrameExcitation& excitation) const;
+  void leave_static_answer(Index slot, double* z) const;
+  bool add_modal_load(std::span<const double> modal, double* forces) const;
+  bool answer_statically(Index slot, std::span<const double> modal);
+  void clear_loads(Index slot);
   void clear_modes(Index slot);
+  Vec3 first_moment_of(std::span<const double> z) const;
+  std::array<ModeRows*, 11> mode_rows() {
+    return {&amplitudes_,          &rates_,
+            &previous_amplitudes_, &forces_,
+            &delayed_z_,           &delayed_rates_,
+            &static_amplitudes_,   &predicted_amplitudes_,
+            &predicted_rates_,     &predicted_forces_,
+            &predicted_static_};
+  }
 
   std::shared_ptr<const ModalModel> model_;
   FrameConstants constants_;
@@ -122,6 +192,11 @@ class BodyGroup {
   ModeRows amplitudes_, rates_, previous_amplitudes_;
   ModeRows forces_;                     // g, held over the next step
   ModeRows delayed_z_, delayed_rates_;  // added at the end of the next step
+  ModeRows static_amplitudes_;          // c, of amplitudes_: the static answer to the last step's constraints
+
+  std::vector<Prediction> predictions_;
+  ModeRows predicted_amplitudes_, predicted_rates_, predicted_forces_, predicted_static_;
+  std::vector<double> position_response_, velocity_response_;  // per mode
 };
 
 }  // namespace limber
