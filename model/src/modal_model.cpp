@@ -201,6 +201,7 @@ std::string_view to_string(FrameMotion motion) {
 ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   (void)to_string(data_.motion);
   Checker(data_).check();
+  collision_rows_ = VertexRows(collision().basis);
 }
 
 double ModalModel::frequency_hz(Index mode) const {

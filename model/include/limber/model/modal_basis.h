@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <vector>
 
+#include "limber/core/aligned_array.h"
 #include "limber/core/types.h"
 
 namespace limber {
@@ -28,27 +28,25 @@ class ModalBasis {
 
   /// Displacement of a vertex per unit amplitude of a mode.
   Vec3f shape(Index vertex, Index mode) const {
-    const float* p = at(vertex, mode);
+    const float* p = data_.data() + offset(vertex, mode);
     return {p[0], p[kTile], p[2 * kTile]};
   }
   void set(Index vertex, Index mode, const Vec3f& u) {
-    float* p = const_cast<float*>(at(vertex, mode));
+    float* p = data_.data() + offset(vertex, mode);
     p[0] = u.x(), p[kTile] = u.y(), p[2 * kTile] = u.z();
   }
 
   /// Start of a tile: modes() blocks of 3·kTile floats.
-  const float* tile(Index t) const { return data_.get() + static_cast<std::size_t>(t) * modes_ * 3 * kTile; }
+  const float* tile(Index t) const { return data_.data() + static_cast<std::size_t>(t) * modes_ * 3 * kTile; }
 
  private:
-  struct Free {
-    void operator()(float* p) const;
-  };
-  const float* at(Index vertex, Index mode) const {
-    return tile(vertex / kTile) + static_cast<std::size_t>(mode) * 3 * kTile + vertex % kTile;
+  std::size_t offset(Index vertex, Index mode) const {
+    const std::size_t tile = static_cast<std::size_t>(vertex / kTile);
+    return (tile * modes_ + mode) * 3 * kTile + vertex % kTile;
   }
 
   Index vertices_ = 0, modes_ = 0;
-  std::unique_ptr<float[], Free> data_;
+  AlignedArray<float> data_;
 };
 
 /// A triangulated surface that moves with the modes, in the body frame.

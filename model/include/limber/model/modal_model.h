@@ -17,6 +17,7 @@
 
 #include "limber/core/types.h"
 #include "limber/model/modal_basis.h"
+#include "limber/model/vertex_rows.h"
 
 namespace limber {
 
@@ -82,12 +83,15 @@ class ModalModel {
   Index modes() const { return static_cast<Index>(data_.eigenvalues.size()); }
   const ModalSurface& render() const { return data_.render; }
   const ModalSurface& collision() const { return data_.collision ? *data_.collision : data_.render; }
+  /// The basis of collision() once more, vertex by vertex.
+  const VertexRows& collision_rows() const { return collision_rows_; }
 
   /// Undamped frequency of a mode, √λ/2π, Hz.
   double frequency_hz(Index mode) const;
 
  private:
   ModalModelData data_;
+  VertexRows collision_rows_;
 };
 
 }  // namespace limber

@@ -1,0 +1,155 @@
+/// @file limber/collision/collision_surface.h
+/// What touches, of one geometry: triangles, their neighbours, the rows of U, and a tree over them. Nothing in it
+/// changes; all bodies of one geometry share it. Where a body is and how it is bent is DeformedSurface's part.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/collision/aabb.h"
+#include "limber/core/aligned_array.h"
+#include "limber/core/types.h"
+#include "limber/model/modal_model.h"
+#include "limber/model/shape.h"
+
+namespace limber {
+
+/// An undirected edge between two (canonical) vertices.
+struct SurfaceEdge {
+  std::array<Index, 2> vertices{-1, -1};   ///< ascending; equal where a triangle has two corners at one place
+  std::array<Index, 2> triangles{-1, -1};  ///< the first two that share it, ascending; −1: none
+  Index triangle_count = 0;  ///< 1: boundary; 2: inside a surface; more: not a manifold. 0: equal vertices
+
+  bool boundary() const { return triangle_count == 1; }
+};
+
+/// A node of the tree over a surface's triangles. Both children of a node lie side by side and after their parent.
+struct TreeNode {
+  Index child = -1;            ///< first child, the second is child + 1; −1: a leaf
+  Index first = 0, count = 0;  ///< of its triangles in CollisionSurface::triangle_order()
+  bool leaf() const { return child < 0; }
+};
+
+struct CollisionSurfaceOptions {
+  int leaf_triangles = 4;  ///< most triangles of a leaf, 1 to 64
+};
+
+/// Immutable, checked, shared through std::shared_ptr<const CollisionSurface>.
+///
+/// A vertex of the body is at p_BP = r + Σ_i z_i u_i(r), r in double, u in float as the asset stores it; all else that
+/// collision/ says about a deformed body is meant to the last bits of that. Vertices at equal places with equal shapes
+/// (a seam of a render surface) are one: canonical_vertex() is the lowest of them, and triangles name that one only.
+class CollisionSurface {
+ public:
+  /// The model's collision surface, k modes.
+  explicit CollisionSurface(std::shared_ptr<const ModalModel> model, const CollisionSurfaceOptions& options = {});
+  /// Rigid surfaces: no modes. @throws InvalidArgument what validate(Shape) throws, or where the options are out of
+  /// range or a coordinate is beyond 1e30 m; the same above.
+  explicit CollisionSurface(const TriangleMesh& mesh, const CollisionSurfaceOptions& options = {});
+  explicit CollisionSurface(const HeightField& field, const CollisionSurfaceOptions& options = {});
+  explicit CollisionSurface(const Box& box, const CollisionSurfaceOptions& options = {});
+
+  /// Null for a rigid surface.
+  const std::shared_ptr<const ModalModel>& model() const { return model_; }
+  Index modes() const { return modes_; }
+  Index vertices() const { return static_cast<Index>(rest_.size()); }
+  Index triangles() const { return static_cast<Index>(triangles_.size()); }
+
+  const Vec3& rest(Index vertex) const { return rest_[static_cast<std::size_t>(vertex)]; }
+  const Aabb& rest_bounds() const { return rest_bounds_; }
+  /// modes() floats (and zeros up to VertexRows::stride()): u along a body axis per unit amplitude; null for k = 0.
+  const float* row(Index vertex, int axis) const {
+    return modes_ > 0 ? model_->collision_rows().row(vertex, axis) : nullptr;
+  }
+  /// Largest |u_i| of any vertex, rounded up, kg^−½: no vertex moves by more than Σ_i |z_i| of these.
+  double largest_shape(Index mode) const { return largest_shape_[static_cast<std::size_t>(mode)]; }
+
+  // -- Topology ------------------------------------------------------------------------------------------------------
+  /// Canonical vertices, counter-clockwise seen from outside. Triangle t is triangle t of the asset or shape.
+  const Triangle& triangle(Index t) const { return triangles_[static_cast<std::size_t>(t)]; }
+  Index canonical_vertex(Index v) const { return canonical_[static_cast<std::size_t>(v)]; }
+  Index edges() const { return static_cast<Index>(edges_.size()); }
+  const SurfaceEdge& edge(Index e) const { return edges_[static_cast<std::size_t>(e)]; }
+  /// The edge from corner `corner` to the next one of a triangle.
+  Index edge_of(Index t, int corner) const {
+    return triangle_edges_[static_cast<std::size_t>(t)][static_cast<std::size_t>(corner)];
+  }
+  /// The other triangle at edge_of(t, corner); −1 where there is none, or more than one.
+  Index neighbour(Index t, int corner) const;
+  /// Triangles that have a canonical vertex as a corner, ascending; none for any other vertex.
+  std::span<const Index> vertex_triangles(Index v) const {
+    return range(vertex_triangles_, vertex_triangles_start_, v);
+  }
+  /// Canonical vertices joined to one by an edge, ascending.
+  std::span<const Index> vertex_neighbours(Index v) const {
+    return range(vertex_neighbours_, vertex_neighbours_start_, v);
+  }
+  /// At rest, no area to speak of: twice its area is at most 1e-12 of its longest edge squared. Kept, as it may be bent
+  /// into one that has.
+  bool degenerate(Index t) const { return degenerate_[static_cast<std::size_t>(t)] != 0; }
+  /// Bounds a solid: every edge between distinct vertices lies in two triangles that run through it in opposite ways.
+  bool closed() const { return closed_; }
+  /// Whether two triangles have a (canonical) vertex in common.
+  bool adjacent(Index t, Index u) const;
+
+  // -- Tree ----------------------------------------------------------------------------------------------------------
+  /// Node 0 is the root. The tree is balanced: no deeper than kMaxDepth.
+  std::span<const TreeNode> nodes() const { return nodes_; }
+  const TreeNode& node(Index n) const { return nodes_[static_cast<std::size_t>(n)]; }
+  static constexpr int kMaxDepth = 32;
+  std::span<const Index> triangle_order() const { return triangle_order_; }
+  /// Triangles below a node.
+  std::span<const Index> node_triangles(Index n) const {
+    return std::span(triangle_order_)
+        .subspan(static_cast<std::size_t>(node(n).first), static_cast<std::size_t>(node(n).count));
+  }
+
+ private:
+  friend class DeformedSurface;
+
+  /// Bounds of one node as a function of the amplitudes, see docs/collision.md:
+  ///   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
+  /// c, h, e here; rows of C and d in coefficients_. Every one is rounded so that the box, evaluated in single
+  /// precision, encloses the vertices evaluated in double.
+  struct alignas(64) NodeShape {
+    float center[3] = {}, half[3] = {}, energy[3] = {};
+  };
+
+  static std::span<const Index> range(const std::vector<Index>& all, const std::vector<Index>& start, Index v) {
+    const auto begin = static_cast<std::size_t>(start[static_cast<std::size_t>(v)]);
+    return std::span(all).subspan(begin, static_cast<std::size_t>(start[static_cast<std::size_t>(v) + 1]) - begin);
+  }
+
+  void build(std::vector<Triangle> triangles, const CollisionSurfaceOptions& options);
+  void check_range() const;
+  void find_canonical_vertices();
+  void build_edges();
+  void build_vertex_adjacency();
+  void mark_degenerate();
+  void build_tree(int leaf_triangles);
+  void build_bounds();
+
+  std::shared_ptr<const ModalModel> model_;
+  Index modes_ = 0;
+  std::vector<Vec3> rest_;
+  Aabb rest_bounds_;
+  std::vector<double> largest_shape_;
+  std::vector<Triangle> triangles_;
+  std::vector<Index> canonical_;
+  std::vector<SurfaceEdge> edges_;
+  std::vector<std::array<Index, 3>> triangle_edges_;
+  std::vector<Index> vertex_triangles_, vertex_triangles_start_, vertex_neighbours_, vertex_neighbours_start_;
+  std::vector<std::uint8_t> degenerate_;
+  bool closed_ = false;
+
+  std::vector<TreeNode> nodes_;
+  std::vector<Index> triangle_order_;
+  std::vector<double> weights_;  ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
+  AlignedArray<NodeShape> node_shapes_;
+  AlignedArray<float> coefficients_;  ///< per node six rows of VertexRows' stride: C x, y, z, d x, y, z
+};
+
+}  // namespace limber

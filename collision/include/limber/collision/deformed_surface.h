@@ -1,0 +1,72 @@
+/// @file limber/collision/deformed_surface.h
+/// One body's surface in one state: boxes and vertices made when someone asks for them, and kept until the next state.
+///
+///   DeformedSurface body;
+///   body.bind(surface, z);                 // O(k)
+///   const Aabb box = body.bounds(0);       // of the whole body, from the amplitudes alone
+///   const Vec3& p = body.vertex(17);       // r + U z, of this vertex only
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "limber/collision/aabb.h"
+#include "limber/collision/collision_surface.h"
+#include "limber/core/aligned_array.h"
+#include "limber/core/types.h"
+
+namespace limber {
+
+/// How the boxes of a tree are made; all enclose, and none changes which triangles touch.
+enum class BoundsChoice {
+  kAmplitudes,  ///< each box when it is asked for, from the amplitudes alone (James and Pai's BD-tree, with boxes)
+  kRefit,       ///< all vertices, then all boxes from the leaves up (van den Bergen): tighter boxes
+  kAutomatic,   ///< kAmplitudes until so many boxes were asked for that a refit would have been cheaper, then kRefit
+};
+
+/// Scratch of one thread: reuse it, a warm one allocates nothing. All points are in the body frame, in m.
+class DeformedSurface {
+ public:
+  /// Work since the last bind().
+  struct Counters {
+    long boxes = 0;     ///< made from amplitudes
+    long vertices = 0;  ///< made one by one, in double
+    long refits = 0;    ///< of the whole tree
+  };
+
+  DeformedSurface();
+  ~DeformedSurface();
+  DeformedSurface(DeformedSurface&&) noexcept;
+  DeformedSurface& operator=(DeformedSurface&&) noexcept;
+
+  /// A new state; forgets the last one. O(k). Allocates only for a surface larger than any before.
+  /// @param surface not null; kept until the next bind()  @param z its k amplitudes, read here only
+  /// @throws InvalidArgument if z has another size, is not finite, or moves a vertex by more than 1e30 m
+  void bind(std::shared_ptr<const CollisionSurface> surface, std::span<const double> z,
+            BoundsChoice choice = BoundsChoice::kAmplitudes);
+
+  const CollisionSurface& surface() const { return *surface_; }
+  std::span<const double> amplitudes() const;
+
+  /// Encloses all triangles below a node, in whichever precision vertex() has. @pre bound; node exists
+  Aabb bounds(Index node);
+  /// r + Σ z_i u_i, in double. @pre bound; the vertex exists. The reference holds until the next bind().
+  const Vec3& vertex(Index v);
+  /// Corners of a triangle.
+  std::array<Vec3, 3> triangle(Index t);
+
+  /// All vertices are to be used anyway: makes the tree's boxes from them, now.
+  void refit();
+
+  const Counters& counters() const { return counters_; }
+
+ private:
+  struct Scratch;
+  std::shared_ptr<const CollisionSurface> surface_;
+  std::unique_ptr<Scratch> scratch_;
+  Counters counters_;
+};
+
+}  // namespace limber

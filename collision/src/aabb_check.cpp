@@ -1,1 +1,0 @@
-#include "limber/collision/aabb.h"

@@ -1,0 +1,223 @@
+#include "limber/collision/collision_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <string>
+#include <utility>
+
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+constexpr double kLargest =
+    1e30;  ///< m; squares of what is made of it stay finite in single precision's exponent range
+constexpr double kFlat = 1e-12;
+
+std::vector<Triangle> grid_triangles(Index columns, Index rows) {
+  std::vector<Triangle> triangles;
+  for (Index j = 0; j + 1 < rows; ++j)
+    for (Index i = 0; i + 1 < columns; ++i) {
+      const Index v = j * columns + i;
+      triangles.push_back({v, v + 1, v + columns + 1});
+      triangles.push_back({v, v + columns + 1, v + columns});
+    }
+  return triangles;
+}
+
+/// For items sorted by key: where each key's items start, and their end behind the last.
+std::vector<Index> starts(const std::vector<std::pair<Index, Index>>& sorted, Index keys) {
+  std::vector<Index> start(static_cast<std::size_t>(keys) + 1, 0);
+  for (const auto& [key, item] : sorted) ++start[static_cast<std::size_t>(key) + 1];
+  for (std::size_t i = 1; i < start.size(); ++i) start[i] += start[i - 1];
+  return start;
+}
+
+/// Adjacency lists of pairs (key, item), ascending and without repetition.
+std::pair<std::vector<Index>, std::vector<Index>> lists(std::vector<std::pair<Index, Index>> pairs, Index keys) {
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  std::vector<Index> items;
+  items.reserve(pairs.size());
+  for (const auto& pair : pairs) items.push_back(pair.second);
+  return {std::move(items), starts(pairs, keys)};
+}
+
+}  // namespace
+
+CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, const CollisionSurfaceOptions& options)
+    : model_(std::move(model)) {
+  if (!model_) throw InvalidArgument("CollisionSurface: the model is null, expected one");
+  modes_ = model_->modes();
+  const ModalSurface& surface = model_->collision();
+  for (const Vec3f& r : surface.rest) rest_.push_back(r.cast<double>());
+  for (Index m = 0; m < modes_; ++m) {
+    double largest = 0.0;
+    for (Index v = 0; v < surface.vertices(); ++v)
+      largest = std::max(largest, surface.basis.shape(v, m).cast<double>().norm());
+    largest_shape_.push_back(largest * (1.0 + 1e-15));
+  }
+  double positive = 1.0;
+  for (const double lambda : model_->data().eigenvalues)
+    if (lambda > 0.0) {
+      positive = lambda;  // ascending: the first is the least
+      break;
+    }
+  for (const double lambda : model_->data().eigenvalues) weights_.push_back(lambda > 0.0 ? lambda : positive);
+  build(surface.triangles, options);
+}
+
+CollisionSurface::CollisionSurface(const TriangleMesh& mesh, const CollisionSurfaceOptions& options)
+    : rest_(mesh.vertices) {
+  validate(Shape(mesh));
+  build(mesh.triangles, options);
+}
+
+CollisionSurface::CollisionSurface(const HeightField& field, const CollisionSurfaceOptions& options) {
+  validate(Shape(field));
+  for (Index j = 0; j < field.rows; ++j)
+    for (Index i = 0; i < field.columns; ++i)
+      rest_.emplace_back(i * field.spacing_x, j * field.spacing_y,
+                         field.heights[static_cast<std::size_t>(j) * static_cast<std::size_t>(field.columns) +
+                                       static_cast<std::size_t>(i)]);
+  build(grid_triangles(field.columns, field.rows), options);
+}
+
+CollisionSurface::CollisionSurface(const Box& box, const CollisionSurfaceOptions& options) {
+  validate(Shape(box));
+  const Vec3& h = box.half_extents;
+  for (int i = 0; i < 8; ++i)
+    rest_.emplace_back(i & 1 ? h.x() : -h.x(), i & 2 ? h.y() : -h.y(), i & 4 ? h.z() : -h.z());
+  build({{0, 2, 3},
+         {0, 3, 1},
+         {4, 5, 7},
+         {4, 7, 6},
+         {0, 1, 5},
+         {0, 5, 4},
+         {2, 6, 7},
+         {2, 7, 3},
+         {0, 4, 6},
+         {0, 6, 2},
+         {1, 3, 7},
+         {1, 7, 5}},
+        options);
+}
+
+void CollisionSurface::build(std::vector<Triangle> triangles, const CollisionSurfaceOptions& options) {
+  if (options.leaf_triangles < 1 || options.leaf_triangles > 64)
+    throw InvalidArgument("CollisionSurface: leaf_triangles is " + std::to_string(options.leaf_triangles) +
+                          ", expected 1 to 64");
+  triangles_ = std::move(triangles);
+  check_range();
+  find_canonical_vertices();
+  build_edges();
+  build_vertex_adjacency();
+  mark_degenerate();
+  build_tree(options.leaf_triangles);
+  build_bounds();
+}
+
+void CollisionSurface::check_range() const {
+  for (std::size_t v = 0; v < rest_.size(); ++v)
+    if (!(rest_[v].cwiseAbs().maxCoeff() <= kLargest))
+      throw InvalidArgument("CollisionSurface: vertex " + std::to_string(v) + " lies beyond 1e30 m, expected nearer");
+}
+
+void CollisionSurface::find_canonical_vertices() {
+  const auto before = [&](Index a, Index b) {
+    const Vec3 &r = rest(a), &s = rest(b);
+    for (int axis = 0; axis < 3; ++axis)
+      if (r[axis] != s[axis]) return r[axis] < s[axis];
+    if (modes_ > 0)
+      for (int axis = 0; axis < 3; ++axis) {
+        const float *u = row(a, axis), *w = row(b, axis);
+        const auto [p, q] = std::mismatch(u, u + modes_, w);
+        if (p != u + modes_) return *p < *q;
+      }
+    return false;
+  };
+  std::vector<Index> order(rest_.size());
+  for (std::size_t v = 0; v < order.size(); ++v) order[v] = static_cast<Index>(v);
+  std::stable_sort(order.begin(), order.end(), before);
+  canonical_.resize(rest_.size());
+  for (std::size_t i = 0, first = 0; i < order.size(); ++i) {
+    if (before(order[first], order[i])) first = i;
+    canonical_[static_cast<std::size_t>(order[i])] = order[first];  // stable: the first of equals is the lowest
+  }
+  for (Triangle& t : triangles_)
+    for (Index& v : t) v = canonical_vertex(v);
+}
+
+void CollisionSurface::build_edges() {
+  struct HalfEdge {
+    std::array<Index, 2> vertices;
+    Index triangle;
+    int corner;
+    bool reversed;
+  };
+  std::vector<HalfEdge> half_edges;
+  for (Index t = 0; t < triangles(); ++t)
+    for (int corner = 0; corner < 3; ++corner) {
+      const Index a = triangle(t)[static_cast<std::size_t>(corner)],
+                  b = triangle(t)[static_cast<std::size_t>((corner + 1) % 3)];
+      half_edges.push_back({{std::min(a, b), std::max(a, b)}, t, corner, b < a});
+    }
+  std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& x, const HalfEdge& y) {
+    return std::tie(x.vertices, x.triangle, x.corner) < std::tie(y.vertices, y.triangle, y.corner);
+  });
+  triangle_edges_.resize(triangles_.size());
+  closed_ = true;
+  for (std::size_t first = 0, last; first < half_edges.size(); first = last) {
+    SurfaceEdge edge{.vertices = half_edges[first].vertices};
+    Index reversed = 0;
+    for (last = first; last < half_edges.size() && half_edges[last].vertices == edge.vertices; ++last) {
+      const HalfEdge& half = half_edges[last];
+      triangle_edges_[static_cast<std::size_t>(half.triangle)][static_cast<std::size_t>(half.corner)] = edges();
+      const auto& [a, b, c] = triangle(half.triangle);
+      if (a == b || b == c || c == a) continue;  // a needle without inside connects nothing
+      if (edge.triangle_count < 2) edge.triangles[static_cast<std::size_t>(edge.triangle_count)] = half.triangle;
+      ++edge.triangle_count;
+      reversed += half.reversed ? 1 : 0;
+    }
+    if (edge.triangle_count > 0 && (edge.triangle_count != 2 || reversed != 1)) closed_ = false;
+    edges_.push_back(edge);
+  }
+}
+
+void CollisionSurface::build_vertex_adjacency() {
+  std::vector<std::pair<Index, Index>> of_triangles, of_vertices;
+  for (Index t = 0; t < triangles(); ++t)
+    for (const Index v : triangle(t)) of_triangles.emplace_back(v, t);
+  for (const SurfaceEdge& e : edges_)
+    if (e.vertices[0] != e.vertices[1]) {
+      of_vertices.emplace_back(e.vertices[0], e.vertices[1]);
+      of_vertices.emplace_back(e.vertices[1], e.vertices[0]);
+    }
+  std::tie(vertex_triangles_, vertex_triangles_start_) = lists(std::move(of_triangles), vertices());
+  std::tie(vertex_neighbours_, vertex_neighbours_start_) = lists(std::move(of_vertices), vertices());
+}
+
+void CollisionSurface::mark_degenerate() {
+  for (const auto& [a, b, c] : triangles_) {
+    const Vec3 ab = rest(b) - rest(a), ac = rest(c) - rest(a), bc = rest(c) - rest(b);
+    const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), bc.squaredNorm()});
+    degenerate_.push_back(ab.cross(ac).norm() <= kFlat * longest ? 1 : 0);
+  }
+}
+
+Index CollisionSurface::neighbour(Index t, int corner) const {
+  const SurfaceEdge& e = edge(edge_of(t, corner));
+  if (e.triangle_count != 2) return -1;
+  if (e.triangles[0] == t) return e.triangles[1];
+  return e.triangles[1] == t ? e.triangles[0] : -1;
+}
+
+bool CollisionSurface::adjacent(Index t, Index u) const {
+  for (const Index v : triangle(t))
+    for (const Index w : triangle(u))
+      if (v == w) return true;
+  return false;
+}
+
+}  // namespace limber

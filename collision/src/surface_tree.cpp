@@ -1,0 +1,120 @@
+// The tree of a CollisionSurface and the bounds of its nodes as functions of the amplitudes; see docs/collision.md.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "limber/collision/collision_surface.h"
+
+namespace limber {
+namespace {
+
+constexpr double kUnitRoundOff = 0x1p-24;
+/// What single precision may lose to underflow, per term, with flush-to-zero.
+constexpr double kUnderflow = 0x1p-126;
+
+/// Relative error of a sum of k + 1 rounded products of rounded factors, in any order; a few terms to spare.
+double sum_error(Index modes) {
+  const double n = static_cast<double>(modes) + 16.0;
+  return n * kUnitRoundOff / (1.0 - n * kUnitRoundOff);
+}
+
+float rounded_up(double x) {
+  const float f = static_cast<float>(x);
+  return static_cast<double>(f) < x ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
+}
+
+}  // namespace
+
+void CollisionSurface::build_tree(int leaf_triangles) {
+  std::vector<Vec3> centers;
+  for (const auto& [a, b, c] : triangles_) centers.push_back((rest(a) + rest(b) + rest(c)) / 3.0);
+  triangle_order_.resize(triangles_.size());
+  std::iota(triangle_order_.begin(), triangle_order_.end(), 0);
+  nodes_.push_back({.child = -1, .first = 0, .count = triangles()});
+  std::vector<Index> open{0};
+  while (!open.empty()) {
+    const auto n = static_cast<std::size_t>(open.back());
+    open.pop_back();
+    const auto [child, first, count] = nodes_[n];
+    if (count <= leaf_triangles) continue;
+    const auto begin = triangle_order_.begin() + first;
+    Aabb box;
+    for (auto t = begin; t != begin + count; ++t) box.include(centers[static_cast<std::size_t>(*t)]);
+    int axis = 0;
+    box.half_extents().maxCoeff(&axis);
+    // Halves of whole leaves, so that most leaves are full.
+    const Index leaves = (count + leaf_triangles - 1) / leaf_triangles;
+    const Index left = (leaves + 1) / 2 * leaf_triangles;
+    std::nth_element(begin, begin + left, begin + count, [&](Index t, Index u) {
+      const double x = centers[static_cast<std::size_t>(t)][axis], y = centers[static_cast<std::size_t>(u)][axis];
+      return x != y ? x < y : t < u;
+    });
+    nodes_[n].child = static_cast<Index>(nodes_.size());
+    nodes_.push_back({.child = -1, .first = first, .count = left});
+    nodes_.push_back({.child = -1, .first = first + left, .count = count - left});
+    open.push_back(nodes_[n].child + 1);
+    open.push_back(nodes_[n].child);
+  }
+  for (const TreeNode& node : nodes_)  // ascending within a leaf, whatever nth_element left
+    if (node.leaf()) std::sort(triangle_order_.begin() + node.first, triangle_order_.begin() + node.first + node.count);
+  for (const Vec3& r : rest_) rest_bounds_.include(r);
+}
+
+void CollisionSurface::build_bounds() {
+  const auto stride = static_cast<std::size_t>(modes_ > 0 ? model_->collision_rows().stride() : 0);
+  const auto k = static_cast<std::size_t>(modes_);
+  const double error = sum_error(modes_);
+  node_shapes_ = AlignedArray<NodeShape>(nodes_.size());
+  coefficients_ = AlignedArray<float>(nodes_.size() * 6 * stride);
+  std::vector<Index> node_vertices;
+  std::vector<std::size_t> seen(rest_.size(), nodes_.size());
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    node_vertices.clear();
+    for (const Index t : node_triangles(static_cast<Index>(n)))
+      for (const Index v : triangle(t))
+        if (std::exchange(seen[static_cast<std::size_t>(v)], n) != n) node_vertices.push_back(v);
+    Aabb box;
+    for (const Index v : node_vertices) box.include(rest(v));
+    NodeShape& shape = node_shapes_[n];
+    float* C = coefficients_.data() + n * 6 * stride;
+    for (int axis = 0; axis < 3; ++axis) {
+      float *c = C + static_cast<std::size_t>(axis) * stride, *d = c + 3 * stride;
+      shape.center[axis] = static_cast<float>(box.center()[axis]);
+      const double center = shape.center[axis];
+      const double half = std::max(box.high[axis] - center, center - box.low[axis]);
+      double underflow = (static_cast<double>(modes_) + 8.0) * kUnderflow, center_energy = 0.0, energy = 0.0;
+      if (k > 0) {
+        std::vector<float> low(k, std::numeric_limits<float>::infinity()),
+            high(k, -std::numeric_limits<float>::infinity());
+        for (const Index v : node_vertices) {
+          const float* u = row(v, axis);
+          for (std::size_t i = 0; i < k; ++i) low[i] = std::min(low[i], u[i]), high[i] = std::max(high[i], u[i]);
+        }
+        for (std::size_t i = 0; i < k; ++i) {
+          c[i] = static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])));
+          const double middle = c[i];
+          const double spread = std::max(high[i] - middle, middle - low[i]) + error * std::abs(middle);
+          d[i] = rounded_up(spread * (1.0 + error));
+          center_energy += middle * middle / weights_[i];
+          underflow += kUnderflow * (std::abs(middle) + spread);
+        }
+        for (const Index v : node_vertices) {
+          const float* u = row(v, axis);
+          double sum = 0.0;
+          for (std::size_t i = 0; i < k; ++i) {
+            const double difference = static_cast<double>(u[i]) - static_cast<double>(c[i]);
+            sum += difference * difference / weights_[i];
+          }
+          energy = std::max(energy, sum);
+        }
+      }
+      shape.half[axis] = rounded_up((half + error * (std::abs(center) + half)) * (1.0 + error) + underflow);
+      shape.energy[axis] = rounded_up((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));
+    }
+  }
+}
+
+}  // namespace limber
