@@ -67,6 +67,15 @@ Box box_of(const ModalSurface& surface) {
 
 Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
+std::string residual_form(const ResidualCompliance& r) {
+  return r.form() == ResidualCompliance::Form::kFull ? "full" : "local";
+}
+
+Json residual_report(const ModalModelData& d) {
+  if (!d.residual_compliance) return {};
+  return {{"form", residual_form(*d.residual_compliance)}, {"vertices", d.residual_compliance->vertices()}};
+}
+
 Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
 
 Json body_report(const ModalModel& model) {
@@ -96,6 +105,7 @@ Json body_report(const ModalModel& model) {
       {"collision_surface", d.collision ? surface_report(*d.collision) : Json()},
       {"volume_block",
        d.volume_block ? Json{{"nodes", d.volume_block->rest.size()}, {"tets", d.volume_block->tets.size()}} : Json()},
+      {"residual_compliance", residual_report(d)},
       {"memory_bytes", shape_bytes(d)},
       {"modes", modes}};
 }
@@ -131,6 +141,8 @@ std::string surfaces_text(const ModalModelData& d) {
   if (d.volume_block)
     text +=
         fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
+  if (const auto& r = d.residual_compliance)
+    text += fmt::format("  residual        {}, of {} vertices\n", residual_form(*r), r->vertices());
   return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
 }
 

@@ -28,7 +28,9 @@ struct Arguments {
   std::string mesh, output;
   std::string materials_file, material_name;
   std::optional<double> youngs_modulus, poisson_ratio, density;
-  std::vector<std::string> fixes;
+  std::vector<std::string> fixes, residuals;
+  double residual_megabytes = 32.0;
+  int collision_triangles = 0;
   std::string mass = "lumped";
   std::vector<double> rayleigh;
   std::string damping_ratio;
@@ -100,6 +102,10 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
       ->type_name("FILE");
   app.add_option("--collision-surface", a.collision_surface, "surface that touches; default: the tets' boundary")
       ->type_name("FILE");
+  app.add_option("--collision-triangles", a.collision_triangles,
+                 "most triangles of the surface that touches, by edge collapse; default: as many as it has")
+      ->type_name("N")
+      ->check(CLI::Range(4, 100'000'000));
   app.add_option("--cell-size", a.tets.cell_size,
                  "tets from a surface: largest circumradius; default: 1/40 of the diagonal")
       ->type_name("M")
@@ -110,6 +116,17 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
   app.add_option("--scale", a.scale, "multiplies all input lengths first, for files that are not in metres")
       ->type_name("FACTOR")
       ->check(positive_number())
+      ->capture_default_str();
+  app.add_option(
+         "--residual", a.residuals,
+         "what dropped modes still answer statically: at nodes (as --fix names them), three further modes each, "
+         "or of the whole 'surface' that touches, stored beside the modes; repeatable")
+      ->type_name("SELECTOR|surface")
+      ->allow_extra_args(false);
+  app.add_option("--residual-max-mb", a.residual_megabytes,
+                 "largest table of --residual surface between all pairs of vertices; above, single vertices alone")
+      ->type_name("MB")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_flag("--volume", a.volume_block,
                "also bake all nodes, so that any initial deformation can be given to the runtime");
@@ -145,6 +162,18 @@ RayleighDamping damping_of(const Arguments& a) {
   return RayleighDamping::from_ratio(ratio, first, second);
 }
 
+ResidualOptions residual_of(const Arguments& a) {
+  ResidualOptions residual;
+  for (const std::string& text : a.residuals) {
+    if (text == "surface")
+      residual.surface = true;
+    else
+      residual.nodes.push_back(parse_node_selector(text));
+  }
+  residual.max_full_bytes = 1e6 * a.residual_megabytes;
+  return residual;
+}
+
 LoadKind load_of(const std::string& text) {
   return text == "static" ? LoadKind::kStatic : text == "resonant" ? LoadKind::kResonant : LoadKind::kSudden;
 }
@@ -152,7 +181,7 @@ LoadKind load_of(const std::string& text) {
 BakeOptions options_of(const Arguments& a) {
   BakeOptions o;
   o.materials = materials_of(a);
-  for (const std::string& text : a.fixes) o.fixed.push_back(parse_fix_selector(text));
+  for (const std::string& text : a.fixes) o.fixed.push_back(parse_node_selector(text));
   o.damping = damping_of(a);
   o.analysis = {.modes = a.modes,
                 .mass = a.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
@@ -163,6 +192,8 @@ BakeOptions options_of(const Arguments& a) {
   o.limits.load = load_of(a.load);
   if ((a.limits.max_force > 0.0) != (a.limits.min_displacement > 0.0))
     throw InvalidArgument("--max-force and --min-displacement go together: one of them is missing");
+  o.residual = residual_of(a);
+  o.collision_triangles = a.collision_triangles;
   o.volume_block = a.volume_block;
   o.validate();
   a.tets.validate();

@@ -166,6 +166,7 @@ class BodyReader {
     read_render_surface();
     if (block_.has("collision")) read_collision_surface();
     if (block_.has("volume_block")) read_volume();
+    if (block_.has("residual_compliance")) read_residual();
     block_.finish();
     for (const char* unread : {"weights", "extras"}) (void)mesh_.has(unread);
     mesh_.finish();
@@ -270,6 +271,22 @@ class BodyReader {
     volume.mass_times_basis = shapes(block, "mass_times_shapes", nodes);
     block.finish();
     data_.volume_block = std::move(volume);
+  }
+
+  void read_residual() {
+    using Form = ResidualCompliance::Form;
+    const JsonObject block(block_.at("residual_compliance"), block_.where("residual_compliance"));
+    const std::string form = block.text("form");
+    if (form != "full" && form != "local")
+      throw InputError(block.where("form") + ": is \"" + form + "\", expected \"full\" or \"local\"");
+    const Form kind = form == "full" ? Form::kFull : Form::kLocal;
+    const auto vertices = static_cast<Index>(count_of(block, "vertices"));
+    const std::string_view bytes =
+        pieces_.raw(block, "blocks", sizeof(float) * ResidualCompliance::value_count(kind, vertices));
+    ResidualCompliance residual(kind, vertices);
+    std::memcpy(residual.values().data(), bytes.data(), bytes.size());
+    block.finish();
+    data_.residual_compliance = std::move(residual);
   }
 
   std::string_view vectors(const JsonObject& attributes, const std::string& key, std::size_t vertices) {

@@ -79,6 +79,12 @@ json volume_block(GlbBuilder& glb, const ModalVolume& volume) {
   return block;
 }
 
+json residual_block(GlbBuilder& glb, const ResidualCompliance& residual) {
+  json block = {{"form", asset_format::form_name(residual.form())}, {"vertices", residual.vertices()}};
+  block["blocks"] = glb.add_raw(std::as_bytes(residual.values()));
+  return block;
+}
+
 /// The LIMBER_modal block of a mesh, but for the parts that lie in the binary chunk.
 json body_block(const ModalModelData& body, const std::vector<double>& scales) {
   json block = {{"motion", to_string(body.motion)},
@@ -136,6 +142,7 @@ void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHas
   json block = body_block(body, scales);
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
+  if (body.residual_compliance) block["residual_compliance"] = residual_block(glb, *body.residual_compliance);
   mesh.extras = extras_for_people(model);
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
   // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.

@@ -33,6 +33,7 @@ class Checker {
     check_surface(d_.render, "render");
     if (d_.collision) check_surface(*d_.collision, "collision");
     if (d_.volume_block) check_volume(*d_.volume_block);
+    if (d_.residual_compliance) check_residual(*d_.residual_compliance);
   }
 
  private:
@@ -173,6 +174,27 @@ class Checker {
     }
     check_basis(volume.basis, volume.rest.size(), "volume_block.basis");
     check_basis(volume.mass_times_basis, volume.rest.size(), "volume_block.mass_times_basis");
+  }
+
+  void check_residual(const ResidualCompliance& residual) const {
+    const auto vertices = (d_.collision ? *d_.collision : d_.render).rest.size();
+    if (static_cast<std::size_t>(residual.vertices()) != vertices)
+      refuse("residual_compliance", "is for " + std::to_string(residual.vertices()) + " vertices",
+             std::to_string(vertices) + ", those of the collision surface");
+    for (const float value : residual.values())
+      if (!std::isfinite(value)) refuse("residual_compliance", "holds a number that is not finite", "finite numbers");
+    for (Index v = 0; v < residual.vertices(); ++v) check_residual_block(residual.block(v, v), v);
+  }
+
+  /// A vertex yields to a force, never against it.
+  void check_residual_block(const Mat3& G, Index vertex) const {
+    const Mat3 symmetric = 0.5 * (G + G.transpose());
+    const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(symmetric, Eigen::EigenvaluesOnly).eigenvalues();
+    if (!((G - symmetric).cwiseAbs().maxCoeff() <= kShapeError * principal.z()) && principal.z() != 0.0)
+      refuse(at("residual_compliance", static_cast<std::size_t>(vertex)), "is not symmetric", "a symmetric block");
+    if (principal.x() < -kShapeError * std::abs(principal.z()))
+      refuse(at("residual_compliance", static_cast<std::size_t>(vertex)),
+             "has the principal compliance " + shown(principal.x()) + " m/N", "0 or more");
   }
 
   /// Radius of gyration about the origin, m: ∫ρ|x|² = tr(I)/2.

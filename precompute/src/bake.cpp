@@ -8,6 +8,8 @@
 #include "limber/core/error.h"
 #include "limber/model/embedding.h"
 #include "mass_properties.h"
+#include "residual.h"
+#include "simplify_surface.h"
 
 namespace limber {
 namespace {
@@ -109,6 +111,16 @@ PlacedSurface place_boundary(const TetMesh& mesh) {
   return {std::move(boundary.surface), std::move(embedding)};
 }
 
+/// A coarser surface on some of the vertices of a finer one.
+PlacedSurface simplified(const PlacedSurface& fine, std::size_t triangles, double& error) {
+  SimplifiedSurface coarse = simplify_surface(fine.surface, triangles);
+  error = coarse.error;
+  PlacedSurface placed{std::move(coarse.surface), fine.embedding};
+  placed.embedding.vertices.clear();
+  for (const Index v : coarse.vertex_of) placed.embedding.vertices.push_back(fine.embedding.vertices[v]);
+  return placed;
+}
+
 // Modes at nodes and surfaces ---------------------------------------------------------------------------------------
 
 /// Column `mode` of W or M W at a node.
@@ -162,7 +174,8 @@ ModalVolume modal_volume(const ModalAnalysis& a, const TetMesh& mesh, std::span<
 struct BodyInput {
   std::string name;
   SubMesh part;
-  std::vector<Index> fixed;  // of part.mesh
+  std::vector<Index> fixed;           // of part.mesh
+  std::vector<Index> residual_nodes;  // of part.mesh
   std::optional<SurfaceMesh> render, collision;
 };
 
@@ -173,12 +186,16 @@ struct BodySurfaces {
 };
 
 /// A given render surface is often far finer than the tets, so what touches is then their boundary.
-BodySurfaces place_surfaces(const BodyInput& in) {
+BodySurfaces place_surfaces(const BodyInput& in, const BakeOptions& options, BodyReport& report) {
   const TetMesh& mesh = in.part.mesh;
   BodySurfaces s;
   s.render = in.render ? place(*in.render, mesh) : place_boundary(mesh);
   if (in.collision) s.collision = place(*in.collision, mesh);
   if (!in.collision && in.render) s.collision = place_boundary(mesh);
+  if (const auto most = static_cast<std::size_t>(options.collision_triangles);
+      most > 0 && s.touching().surface.triangles.size() > most)
+    s.collision = simplified(s.touching(), most, report.collision_error);
+  report.collision_triangles = static_cast<Index>(s.touching().surface.triangles.size());
   return s;
 }
 
@@ -218,6 +235,29 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
   for (Index m = 0; m < a.mechanisms; ++m) columns.push_back(m);
   for (const Index m : report.selection.kept) columns.push_back(a.mechanisms + m);
   return columns;
+}
+
+/// Modes at the chosen nodes join the analysis and those kept, which stay in order of frequency.
+void add_residual_modes(ModalAnalysis& a, std::span<const Index> nodes, std::vector<Index>& kept,
+                        ResidualReport& report) {
+  if (nodes.empty() || !a.compliance) return;
+  const auto first = static_cast<Index>(a.eigenvalues.size());
+  report.modes = append_residual_modes(a, kept, nodes);
+  for (Index m = 0; m < report.modes; ++m) kept.push_back(first + m);
+  std::stable_sort(kept.begin(), kept.end(), [&](Index i, Index j) { return a.eigenvalues[i] < a.eigenvalues[j]; });
+}
+
+std::optional<ResidualCompliance> surface_compliance(const ModalAnalysis& a, std::span<const Index> kept,
+                                                     const TetMesh& mesh, const PlacedSurface& surface,
+                                                     const ResidualOptions& options, ResidualReport& report) {
+  if (!options.surface || !a.compliance) return std::nullopt;
+  using Form = ResidualCompliance::Form;
+  report.vertices = static_cast<Index>(surface.surface.vertices.size());
+  const auto bytes = [&](Form form) { return sizeof(float) * ResidualCompliance::value_count(form, report.vertices); };
+  const bool fits = static_cast<double>(bytes(Form::kFull)) <= options.max_full_bytes;
+  report.form = fits ? Form::kFull : Form::kLocal;
+  report.bytes = bytes(*report.form);
+  return residual_compliance(a, kept, mesh, surface.embedding, *report.form);
 }
 
 void add_inertial_integrals(ModalModelData& data, const ModalAnalysis& a, const TetMesh& mesh,
@@ -274,14 +314,24 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
                                             Jobs& jobs) {
   const TetMesh& mesh = in.part.mesh;
   const MassProperties mass = mass_properties(mesh, materials);
-  const ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, options.analysis, warnings, jobs);
+  ModalAnalysisOptions wanted = options.analysis;
+  wanted.keep_compliance = options.residual.surface || !in.residual_nodes.empty();
+  ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
   fill_report(report, in, a, mass);
 
   const auto start = Clock::now();
-  const BodySurfaces surfaces = place_surfaces(in);
+  const BodySurfaces surfaces = place_surfaces(in, options, report);
   warn_of_far_surface(surfaces.render, mesh, "render", warnings);
   if (in.collision) warn_of_far_surface(*surfaces.collision, mesh, "collision", warnings);
-  const auto kept = choose_modes(a, mesh, surfaces, options, report);
+  std::vector<Index> kept = choose_modes(a, mesh, surfaces, options, report);
+  report.seconds_embed = seconds_since(start);
+
+  const auto residual_start = Clock::now();
+  add_residual_modes(a, in.residual_nodes, kept, report.residual);
+  auto residual = surface_compliance(a, kept, mesh, surfaces.touching(), options.residual, report.residual);
+  report.residual.seconds = seconds_since(residual_start);
+
+  const auto store_start = Clock::now();
   ModalModelData data;
   data.name = in.name;
   add_frame(data, a, mass);
@@ -293,20 +343,21 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   data.render = modal_surface(surfaces.render, a, mesh, kept, data.origin_in_input);
   if (surfaces.collision) data.collision = modal_surface(*surfaces.collision, a, mesh, kept, data.origin_in_input);
   if (options.volume_block) data.volume_block = modal_volume(a, mesh, kept, data.origin_in_input);
+  data.residual_compliance = std::move(residual);
   auto model = std::make_shared<const ModalModel>(std::move(data));
   report.render = surfaces.render.report();
   report.collision = surfaces.touching().report();
-  report.seconds_embed = seconds_since(start);
+  report.seconds_embed += seconds_since(store_start);
   return model;
 }
 
 // The whole ---------------------------------------------------------------------------------------------------------
 
-std::vector<char> fixed_flags(const TetMesh& mesh, std::span<const FixSelector> selectors) {
-  std::vector<char> fixed(mesh.nodes.size(), 0);
-  for (const FixSelector& s : selectors)
-    for (const Index n : select_nodes(mesh, s)) fixed[n] = 1;
-  return fixed;
+std::vector<char> selected_flags(const TetMesh& mesh, std::span<const NodeSelector> selectors) {
+  std::vector<char> selected(mesh.nodes.size(), 0);
+  for (const NodeSelector& s : selectors)
+    for (const Index n : select_nodes(mesh, s)) selected[n] = 1;
+  return selected;
 }
 
 void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warnings& warnings) {
@@ -346,11 +397,21 @@ void RayleighDamping::validate() const {
   check(mass_proportional, "a2 (mass-proportional, 1/s)");
 }
 
+void ResidualOptions::validate() const {
+  if (!(max_full_bytes >= 0.0))
+    throw InvalidArgument("ResidualOptions::max_full_bytes is " + std::to_string(max_full_bytes) +
+                          ", expected 0 or more");
+}
+
 void BakeOptions::validate() const {
   if (materials.empty()) throw InvalidArgument("bake: no material is given");
   damping.validate();
   analysis.validate();
   limits.validate();
+  residual.validate();
+  if (collision_triangles < 0)
+    throw InvalidArgument("BakeOptions::collision_triangles is " + std::to_string(collision_triangles) +
+                          ", expected 0 or more");
 }
 
 BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
@@ -358,7 +419,8 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
   if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
   const auto materials = materials_by_region(input.mesh, options.materials);
   warn_of_unknown_regions(input.mesh, options.materials, warnings);
-  const auto fixed = fixed_flags(input.mesh, options.fixed);
+  const auto fixed = selected_flags(input.mesh, options.fixed);
+  const auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);
 
   const auto component = connected_components(input.mesh);
@@ -372,8 +434,12 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
     BodyInput body;
     body.name = bodies == 1 ? input.name : input.name + "_" + std::to_string(b + 1);
     body.part = extract_component(input.mesh, component, b);
-    for (std::size_t n = 0; n < body.part.node_of.size(); ++n)
-      if (fixed[body.part.node_of[n]]) body.fixed.push_back(static_cast<Index>(n));
+    for (std::size_t n = 0; n < body.part.node_of.size(); ++n) {
+      if (fixed[body.part.node_of[n]])
+        body.fixed.push_back(static_cast<Index>(n));
+      else if (loaded[body.part.node_of[n]])
+        body.residual_nodes.push_back(static_cast<Index>(n));
+    }
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
     result.asset.bodies.push_back(bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));

@@ -262,6 +262,41 @@ LanczosOptions lanczos_options(const ModalAnalysisOptions& options) {
   return {.tolerance = options.certify ? 1e-8 : 1e-12, .seed = options.seed};
 }
 
+/// A body and the factor that refers to it, at one place in memory for as long as either is used.
+class FactoredBody final : public ElasticCompliance {
+ public:
+  FactoredBody(Body body, Index nodes) : body_(std::move(body)), nodes_(nodes) {}
+
+  const Body& body() const { return body_; }
+  ElasticInverse& factor(const std::vector<Index>& order) { return inverse_.emplace(body_.problem, order); }
+
+  std::vector<double> displacements(std::span<const double> forces) override {
+    return on_all_nodes(inverse_->apply(on_free_nodes(forces)), 1.0 / body_.stiffness_unit);
+  }
+  std::vector<double> mass_times(std::span<const double> displacements) const override {
+    return on_all_nodes(body_.problem.mass_times(on_free_nodes(displacements)), body_.mass_unit);
+  }
+
+ private:
+  Eigen::MatrixXd on_free_nodes(std::span<const double> all) const {
+    const auto rows = 3 * static_cast<Eigen::Index>(nodes_);
+    if (all.size() % static_cast<std::size_t>(rows) != 0)
+      throw InvalidArgument("ElasticCompliance: " + std::to_string(all.size()) + " numbers, expected a multiple of " +
+                            std::to_string(rows));
+    const Eigen::Map<const Eigen::MatrixXd> columns(all.data(), rows, static_cast<Eigen::Index>(all.size()) / rows);
+    return columns(dofs_of(body_.free_nodes), Eigen::all);
+  }
+  std::vector<double> on_all_nodes(const Eigen::MatrixXd& columns, double unit) const {
+    std::vector<double> all;
+    append_columns(body_, nodes_, columns, unit, all);
+    return all;
+  }
+
+  Body body_;
+  Index nodes_;
+  std::optional<ElasticInverse> inverse_;
+};
+
 }  // namespace
 
 void ModalAnalysisOptions::validate() const {
@@ -281,7 +316,9 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   const BlasThreads threads(options.blas_threads);
   Stopwatch watch;
 
-  const Body body = make_body(mesh, materials, fixed_nodes, options.mass, jobs);
+  const auto factored =
+      std::make_shared<FactoredBody>(make_body(mesh, materials, fixed_nodes, options.mass, jobs), analysis.nodes);
+  const Body& body = factored->body();
   describe_freedom(body, analysis, warnings);
   watch.lap(analysis.seconds.assemble);
   if (body.free_nodes.empty()) {
@@ -291,7 +328,7 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
 
   const std::vector<Index> order = order_nodes(body.problem.K);
   watch.lap(analysis.seconds.order);
-  ElasticInverse inverse(body.problem, order);
+  ElasticInverse& inverse = factored->factor(order);
   watch.lap(analysis.seconds.factor);
 
   Eigen::Index kept = 0;
@@ -312,6 +349,7 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   analysis.solves = inverse.solves();
   write_modes(body, pairs, analysis);
   warn_of_shortfalls(analysis, options, kept, inverse.shift(), warnings);
+  if (options.keep_compliance) analysis.compliance = factored;
   watch.lap(analysis.seconds.iterate);
   return analysis;
 }

@@ -107,6 +107,23 @@ std::shared_ptr<const ModalModel> leave_out(const std::shared_ptr<const ModalMod
   return lean;
 }
 
+/// The residual compliance with what the dropped modes answered statically: G_ab + Σ u_a u_bᵀ/λ.
+ResidualCompliance with_statics_of_dropped(const ModalModel& model, std::span<const Index> kept) {
+  ResidualCompliance residual = *model.data().residual_compliance;
+  const ModalBasis& basis = model.collision().basis;
+  const bool full = residual.form() == ResidualCompliance::Form::kFull;
+  for (const Index mode : all_modes(model)) {
+    const double lambda = model.data().eigenvalues[static_cast<std::size_t>(mode)];
+    if (lambda == 0.0 || std::binary_search(kept.begin(), kept.end(), mode)) continue;
+    for (Index a = 0; a < residual.vertices(); ++a) {
+      const Vec3 u_a = basis.shape(a, mode).cast<double>() / lambda;
+      for (Index b = full ? 0 : a; b <= a; ++b)
+        residual.set(a, b, residual.block(a, b) + u_a * basis.shape(b, mode).cast<double>().transpose());
+    }
+  }
+  return residual;
+}
+
 }  // namespace
 
 std::size_t shape_bytes(const ModalModelData& data) {
@@ -115,6 +132,7 @@ std::size_t shape_bytes(const ModalModelData& data) {
   if (const auto& v = data.volume_block)
     bytes += v->rest.size() * sizeof(Vec3) + v->tets.size() * sizeof(Tet) + bytes_of(v->basis) +
              bytes_of(v->mass_times_basis);
+  if (data.residual_compliance) bytes += data.residual_compliance->values().size_bytes();
   return bytes;
 }
 
@@ -139,6 +157,7 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   lean.moments = pick(all.moments, kept);
   lean.render = pick(all.render, kept);
   if (all.collision) lean.collision = pick(*all.collision, kept);
+  if (all.residual_compliance) lean.residual_compliance = with_statics_of_dropped(model, kept);
   return std::make_shared<const ModalModel>(std::move(lean));
 }
 

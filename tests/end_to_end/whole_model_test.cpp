@@ -92,7 +92,7 @@ struct Pair {
       : whole(mesh, fixed, damping), world({.step = step, .gravity = gravity}) {
     BakeOptions options;
     options.materials = {{"*", kJelly}};
-    if (!fixed.empty()) options.fixed = {FixNodes{fixed}};
+    if (!fixed.empty()) options.fixed = {NodesByIndex{fixed}};
     options.damping = damping;
     options.analysis.modes = options.limits.max_modes = 1000;
     Warnings warnings;

@@ -90,6 +90,11 @@ void expect_same_body(const ModalModelData& a, const ModalModelData& b) {
   expect_same_surface(a.render, b.render);
   ASSERT_EQ(a.collision.has_value(), b.collision.has_value());
   if (a.collision) expect_same_surface(*a.collision, *b.collision);
+  ASSERT_EQ(a.residual_compliance.has_value(), b.residual_compliance.has_value());
+  if (a.residual_compliance) {
+    EXPECT_EQ(a.residual_compliance->form(), b.residual_compliance->form());
+    EXPECT_TRUE(std::ranges::equal(a.residual_compliance->values(), b.residual_compliance->values()));
+  }
   ASSERT_EQ(a.volume_block.has_value(), b.volume_block.has_value());
   if (!a.volume_block) return;
   EXPECT_EQ(a.volume_block->rest, b.volume_block->rest);

@@ -94,6 +94,10 @@ inline ModalModelData full_box(const std::string& name, Index modes) {
       volume.mass_times_basis.set(v, i, (0.5 * w).cast<float>());
     }
   d.volume_block = std::move(volume);
+  ResidualCompliance residual(ResidualCompliance::Form::kFull, d.collision->vertices());
+  for (Index a = 0; a < residual.vertices(); ++a)
+    for (Index b = 0; b <= a; ++b) residual.set(a, b, Mat3(Vec3(3.0, 2.0, 1.0).asDiagonal()) * (1e-7 / (1.0 + a - b)));
+  d.residual_compliance = std::move(residual);
   return d;
 }
 

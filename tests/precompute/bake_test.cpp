@@ -48,7 +48,7 @@ std::string message_of(F&& action) {
   return "no error";
 }
 
-FixBox face_at_zero_x() { return {{-1e-9, -1.0, -1.0}, {1e-9, 1.0, 1.0}}; }
+NodesInBox face_at_zero_x() { return {{-1e-9, -1.0, -1.0}, {1e-9, 1.0, 1.0}}; }
 
 TEST(Bake, FreeBoxHasTheMassCentreAndInertiaOfABox) {
   const BakeResult r = bake_box(rubber());
@@ -93,7 +93,7 @@ TEST(Bake, FreeModesCarryNoAngularMomentum) {
 TEST(Bake, OneHeldNodeIsAPivotTwoAreAHingeThreeAreAClamp) {
   const TetMesh mesh = tet_box(3, 2, 2, kSize);
   BakeOptions o = rubber(4);
-  o.fixed = {FixNodes{{0}}};
+  o.fixed = {NodesByIndex{{0}}};
   const auto pivot_body = only_body(bake_box(o, mesh));
   const ModalModelData& pivot = pivot_body->data();
   EXPECT_EQ(pivot.motion, FrameMotion::kPoint);
@@ -103,13 +103,13 @@ TEST(Bake, OneHeldNodeIsAPivotTwoAreAHingeThreeAreAClamp) {
   const double expected = pivot.mass / 3.0 * (kSize.y() * kSize.y() + kSize.z() * kSize.z());
   EXPECT_NEAR(pivot.inertia(0, 0), expected, kRoundOff * expected);
 
-  o.fixed = {FixNodes{{0, 3}}};  // both on the x axis
+  o.fixed = {NodesByIndex{{0, 3}}};  // both on the x axis
   const auto hinge_body = only_body(bake_box(o, mesh));
   const ModalModelData& hinge = hinge_body->data();
   EXPECT_EQ(hinge.motion, FrameMotion::kLine);
   EXPECT_NEAR(std::abs(hinge.line_axis.x()), 1.0, kRoundOff);
 
-  o.fixed = {FixNodes{{0}}, FixNodes{{3, 4}}};
+  o.fixed = {NodesByIndex{{0}}, NodesByIndex{{3, 4}}};
   EXPECT_EQ(only_body(bake_box(o, mesh))->data().motion, FrameMotion::kKinematic);
 }
 
@@ -226,23 +226,23 @@ TEST(RayleighDamping, HasTheRatioAskedForAtBothFrequencies) {
   EXPECT_THROW(RayleighDamping::from_ratio(0.1, 0.0, 300.0), InvalidArgument);
 }
 
-TEST(FixSelector, SelectsByGroupBoxAndNumber) {
+TEST(NodeSelector, SelectsByGroupBoxAndNumber) {
   TetMesh mesh = tet_box(2, 1, 1, kSize);
   mesh.node_groups = {{.name = "end", .nodes = {2, 5}}};
-  EXPECT_THAT(select_nodes(mesh, parse_fix_selector("group:end")), ElementsAre(2, 5));
-  EXPECT_THAT(select_nodes(mesh, parse_fix_selector("nodes:7,0,7")), ElementsAre(0, 7));
-  EXPECT_EQ(select_nodes(mesh, parse_fix_selector("box:-1e-9,-1,-1,1e-9,1,1")),
+  EXPECT_THAT(select_nodes(mesh, parse_node_selector("group:end")), ElementsAre(2, 5));
+  EXPECT_THAT(select_nodes(mesh, parse_node_selector("nodes:7,0,7")), ElementsAre(0, 7));
+  EXPECT_EQ(select_nodes(mesh, parse_node_selector("box:-1e-9,-1,-1,1e-9,1,1")),
             nodes_where(mesh, [](const Vec3& x) { return x.x() == 0.0; }));
 }
 
-TEST(FixSelector, RefusesWhatItCannotRead) {
+TEST(NodeSelector, RefusesWhatItCannotRead) {
   for (const char* text : {"", "end", "group:", "box:1,2,3", "box:0,0,0,1,1,x", "box:1,0,0,0,1,1", "box:nan,0,0,1,1,1",
                            "nodes:", "nodes:1,,2", "nodes:1.5", "nodes:99999999999", "sphere:1"})
-    EXPECT_THAT(message_of([&] { parse_fix_selector(text); }), HasSubstr("expected group:NAME")) << text;
+    EXPECT_THAT(message_of([&] { parse_node_selector(text); }), HasSubstr("expected group:NAME")) << text;
   const TetMesh mesh = tet_box(1, 1, 1, kSize);
-  EXPECT_THAT(message_of([&] { select_nodes(mesh, FixGroup{"end"}); }), HasSubstr("it has none"));
-  EXPECT_THAT(message_of([&] { select_nodes(mesh, FixNodes{{8}}); }), HasSubstr("expected 0 to 7"));
-  EXPECT_THAT(message_of([&] { select_nodes(mesh, FixBox{{5, 5, 5}, {6, 6, 6}}); }), HasSubstr("no node"));
+  EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesOfGroup{"end"}); }), HasSubstr("it has none"));
+  EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesByIndex{{8}}); }), HasSubstr("expected 0 to 7"));
+  EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesInBox{{5, 5, 5}, {6, 6, 6}}); }), HasSubstr("no node"));
 }
 
 }  // namespace

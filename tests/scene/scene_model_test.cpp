@@ -68,6 +68,29 @@ TEST(SceneModel, AReducedModelKeepsTheRestBitForBit) {
   EXPECT_THROW(reduce_model(*model, std::vector<Index>{5}), InvalidArgument);
 }
 
+TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidual) {
+  ModalModelData data = testing::block_model(5)->data();
+  ResidualCompliance residual(ResidualCompliance::Form::kFull, data.render.vertices());
+  for (Index v = 0; v < residual.vertices(); ++v) residual.set(v, v, 1e-6 * Mat3::Identity());
+  data.residual_compliance = residual;
+  const ModalModel model(std::move(data));
+  const auto lean = reduce_model(model, std::vector<Index>{0, 3});
+  const auto statics = [](const ModalModel& m, Index a, Index b) {
+    Mat3 sum = m.data().residual_compliance->block(a, b);
+    for (Index i = 0; i < m.modes(); ++i)
+      sum += m.collision().basis.shape(a, i).cast<double>() *
+             m.collision().basis.shape(b, i).cast<double>().transpose() /
+             m.data().eigenvalues[static_cast<std::size_t>(i)];
+    return sum;
+  };
+  for (Index a = 0; a < model.render().vertices(); ++a)
+    for (Index b = 0; b < model.render().vertices(); ++b) {
+      constexpr double kFloat = 1e-6;  // single precision of both
+      const Mat3 before = statics(model, a, b);
+      EXPECT_LE((statics(*lean, a, b) - before).norm(), kFloat * (statics(model, a, a).norm() + before.norm()));
+    }
+}
+
 TEST(SceneModel, BodiesOfOneAssetShareOneModelAndPartsAreFoundByName) {
   Asset two = block_asset(2, "first");
   two.bodies.push_back(testing::block_model(3, "second"));

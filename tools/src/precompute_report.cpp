@@ -21,6 +21,12 @@ Json json(const EmbeddingReport& e) {
   return {{"vertices", e.vertices}, {"outside", e.outside}, {"max_distance", e.max_distance}};
 }
 
+Json json(const ResidualReport& r) {
+  Json form;
+  if (r.form) form = *r.form == ResidualCompliance::Form::kFull ? "full" : "local";
+  return {{"modes", r.modes}, {"form", form}, {"vertices", r.vertices}, {"bytes", r.bytes}};
+}
+
 /// Mass, centre and inertia of all bodies together.
 struct Total {
   double mass = 0.0, volume = 0.0;
@@ -110,7 +116,10 @@ Json json(const BodyReport& b) {
           {"orthogonality_max", b.orthogonality_max},
           {"solves", b.solves},
           {"render_surface", json(b.render)},
-          {"collision_surface", json(b.collision)}};
+          {"collision_surface", json(b.collision)},
+          {"collision_triangles", b.collision_triangles},
+          {"collision_error", b.collision_error},
+          {"residual_compliance", json(b.residual)}};
 }
 
 template <class F>
@@ -155,6 +164,7 @@ void add_bake_seconds(Json& seconds, const std::vector<BodyReport>& bodies) {
   seconds["factor"] = sum(bodies, [](const BodyReport& b) { return b.seconds.factor; });
   seconds["iterate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.iterate; });
   seconds["certify"] = sum(bodies, [](const BodyReport& b) { return b.seconds.certify; });
+  seconds["residual"] = sum(bodies, [](const BodyReport& b) { return b.residual.seconds; });
   seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds_embed; });
 }
 
@@ -171,6 +181,11 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
       text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
                           b.frequencies_hz.front(), b.frequencies_hz.back(),
                           b.certified ? ", none missed (certified)" : ", not certified", b.selection.kept.size(), why);
+    if (b.residual.modes > 0) text += fmt::format("  {} residual modes at chosen nodes\n", b.residual.modes);
+    if (b.residual.form)
+      text += fmt::format("  residual compliance of {} vertices, {}: {:.2f} MB, {:.2g} s\n", b.residual.vertices,
+                          *b.residual.form == ResidualCompliance::Form::kFull ? "all pairs" : "single vertices",
+                          1e-6 * static_cast<double>(b.residual.bytes), b.residual.seconds);
   }
   return text;
 }

@@ -2,8 +2,9 @@
 /// What a joint between two parts is: its type, where it sits, and how far it may go. Shared by detection, posing,
 /// dynamics and the joints file (docs/formats/joints.md).
 ///
-/// A joint has a right-handed frame J. Part b moves, part a stays; where the parts are as read (the reference pose), J is
-/// the same in both, all coordinates are 0. Lengths are in m (or the file's own unit before it is scaled), angles in rad.
+/// A joint has a right-handed frame J. Part b moves, part a stays; where the parts are as read (the reference pose), J
+/// is the same in both, all coordinates are 0. Lengths are in m (or the file's own unit before it is scaled), angles in
+/// rad.
 ///
 ///   type         freedoms of b relative to a, along and about the axes of J
 ///   ball         three rotations about the origin
@@ -48,8 +49,8 @@ struct Interval {
 
 /// How far each freedom goes; members that the type does not have stay open.
 struct JointLimits {
-  Interval rotation;                       ///< revolute, cylindrical: about x; planar: about z; rad
-  std::array<Interval, 2> translation;     ///< prismatic, cylindrical: [0] along x; planar: along x and y; m
+  Interval rotation;                    ///< revolute, cylindrical: about x; planar: about z; rad
+  std::array<Interval, 2> translation;  ///< prismatic, cylindrical: [0] along x; planar: along x and y; m
   double cone = std::numeric_limits<double>::infinity();  ///< ball: largest angle of b's x axis from a's, rad
   /// ball: intrinsic x-y-z Euler angles, rad
   std::array<Interval, 3> euler;

@@ -17,6 +17,7 @@
 
 #include "limber/core/types.h"
 #include "limber/model/modal_basis.h"
+#include "limber/model/residual_compliance.h"
 #include "limber/model/vertex_rows.h"
 
 namespace limber {
@@ -70,6 +71,8 @@ struct ModalModelData {
   ModalSurface render;                    ///< what is drawn; at least one triangle
   std::optional<ModalSurface> collision;  ///< what touches; none: the render surface
   std::optional<ModalVolume> volume_block;
+  /// Optional: of the collision surface's vertices (of the render surface's where that is what touches).
+  std::optional<ResidualCompliance> residual_compliance;
 };
 
 /// Immutable and checked; shared by all instances through std::shared_ptr<const ModalModel>.

@@ -22,24 +22,24 @@
 
 namespace limber {
 
-/// Which nodes to hold.
-struct FixGroup {
+/// Which nodes of a mesh are meant: to be held, or to be loaded.
+struct NodesOfGroup {
   std::string name;  ///< a node group of the mesh
 };
-struct FixBox {
+struct NodesInBox {
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< m, mesh coordinates, faces included
 };
-struct FixNodes {
+struct NodesByIndex {
   std::vector<Index> nodes;  ///< 0-based, in order of appearance in the file
 };
-using FixSelector = std::variant<FixGroup, FixBox, FixNodes>;
+using NodeSelector = std::variant<NodesOfGroup, NodesInBox, NodesByIndex>;
 
 /// Reads "group:NAME", "box:x0,y0,z0,x1,y1,z1" or "nodes:I,J,…". @throws InvalidArgument showing the three forms
-FixSelector parse_fix_selector(std::string_view text);
+NodeSelector parse_node_selector(std::string_view text);
 
 /// Nodes that a selector names, ascending. @throws InvalidArgument if a group is unknown (naming the nearest), an index
 /// is out of range, or nothing is selected
-std::vector<Index> select_nodes(const TetMesh& mesh, const FixSelector& selector);
+std::vector<Index> select_nodes(const TetMesh& mesh, const NodeSelector& selector);
 
 /// Rayleigh damping: 2ξ_i = mass_proportional + stiffness_proportional · λ_i.
 struct RayleighDamping {
@@ -60,12 +60,26 @@ struct BakeInput {
   Provenance provenance = {};
 };
 
+/// What the modes that are not kept still answer, statically (limber/model/residual_compliance.h).
+struct ResidualOptions {
+  /// At these nodes static loads are answered exactly: up to three further modes per node join the basis.
+  std::vector<NodeSelector> nodes = {};
+  /// Store the residual compliance of the collision surface: three solves per vertex.
+  bool surface = false;
+  /// Bytes up to which all pairs of the surface's vertices are stored; above, single vertices alone.
+  double max_full_bytes = 32e6;
+  void validate() const;  ///< @throws InvalidArgument naming the field
+};
+
 struct BakeOptions {
-  MaterialTable materials = {};         ///< by region; "*" is the rest
-  std::vector<FixSelector> fixed = {};  ///< their union is held
+  MaterialTable materials = {};          ///< by region; "*" is the rest
+  std::vector<NodeSelector> fixed = {};  ///< their union is held
   RayleighDamping damping = {};
   ModalAnalysisOptions analysis = {};
   SceneLimits limits = {};
+  ResidualOptions residual = {};
+  /// Most triangles of the collision surface, by edge collapse; 0: as it is.
+  Index collision_triangles = 0;
   bool volume_block = false;  ///< bake all nodes, so that any initial deformation can be given to the runtime
   void validate() const;      ///< @throws InvalidArgument naming the field
 };
@@ -74,6 +88,15 @@ struct EmbeddingReport {
   Index vertices = 0;
   Index outside = 0;          ///< vertices outside every tet, moved by the nearest
   double max_distance = 0.0;  ///< the farthest of these, m
+};
+
+/// What was made of ResidualOptions.
+struct ResidualReport {
+  Index modes = 0;                                 ///< joined the basis; among the kept, not among frequencies_hz
+  std::optional<ResidualCompliance::Form> form{};  ///< of the stored compliance; none: not asked for
+  Index vertices = 0;
+  std::size_t bytes = 0;
+  double seconds = 0.0;
 };
 
 /// What was made of one body. Masses in kg, lengths in m, input coordinates.
@@ -93,6 +116,9 @@ struct BodyReport {
   bool certified = false;
   int solves = 0;
   EmbeddingReport render, collision;
+  Index collision_triangles = 0;
+  double collision_error = 0.0;  ///< what leaving out triangles moved the collision surface by, estimated, m
+  ResidualReport residual;
   ModalAnalysis::Seconds seconds;
   double seconds_embed = 0.0;
 };

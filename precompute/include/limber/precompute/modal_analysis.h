@@ -9,6 +9,7 @@
 /// pivoted LDLᵀ (MUMPS), equals the number found. docs/modal-analysis.md tells what was measured and why it is done so.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 #include "limber/mesh/tet_mesh.h"
 #include "limber/model/material.h"
 #include "limber/model/modal_model.h"
+#include "limber/precompute/elastic_compliance.h"
 #include "limber/precompute/fem.h"
 
 namespace limber {
@@ -25,7 +27,8 @@ namespace limber {
 struct ModalAnalysisOptions {
   int modes = 64;  ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
   MassKind mass = MassKind::kLumped;
-  bool certify = true;  ///< prove by inertia that no mode is missed
+  bool certify = true;           ///< prove by inertia that no mode is missed
+  bool keep_compliance = false;  ///< also return K⁺, at the memory of its factor
   /// Threads of the BLAS, set for the length of a call; 0: one per processor. More than one pays on meshes of tens of
   /// thousands of nodes on a quiet machine; on a busy one their waiting can cost twenty times what they save. The last
   /// bits of the modes depend on it.
@@ -45,6 +48,7 @@ struct ModalAnalysis {
   std::vector<double> shapes;             ///< W, column-major 3n × k, kg^−½, zero at fixed nodes
   std::vector<double> mass_times_shapes;  ///< M W, the same shape, kg^½
   Index nodes = 0;
+  std::shared_ptr<ElasticCompliance> compliance;  ///< where it was asked for and a node is free, else null
 
   double residual_max = 0.0;        ///< ‖Kw − λMw‖ / ‖λMw‖ of the elastic mode that is nearest to its bound
   double residual_bound = 0.0;      ///< its bound: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖)
