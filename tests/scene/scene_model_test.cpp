@@ -69,7 +69,7 @@ TEST(SceneModel, AReducedModelKeepsTheRestBitForBit) {
 }
 
 TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidual) {
-  ModalModelData data = testing::block_model(5)->data();
+  ModalModelData data = testing::block_data(5);
   ResidualCompliance residual(ResidualCompliance::Form::kFull, data.render.vertices());
   for (Index v = 0; v < residual.vertices(); ++v) residual.set(v, v, 1e-6 * Mat3::Identity());
   data.residual_compliance = residual;
