@@ -31,9 +31,8 @@ struct LinearProgram {
 
 struct LinearProgramOptions {
   double tolerance = 1e-10;  ///< of A f + b ≥ 0, relative to |b| + |A||f| of the row; > 0
-  double slack_price =
-      1e6;             ///< of slack, in units of the largest c over the largest |A|; > 0. Infeasible programs only
-  int max_pivots = 0;  ///< ≥ 0; 0: 100 + 20 (rows + columns)
+  double slack_price = 1e6;  ///< of slack, in units of the largest c, rows scaled to 1; > 0. Infeasible programs only
+  int max_pivots = 0;        ///< ≥ 0; 0: 100 + 20 (rows + columns)
 };
 
 struct LinearProgramResult {
