@@ -1,0 +1,425 @@
+#include "limber/articulation/free_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "limber/core/error.h"
+#include "orbit_index.h"
+#include "orbit_samples.h"
+
+namespace limber {
+namespace {
+
+using internal::Orbit;
+using internal::OrbitIndex;
+using internal::OrbitPiece;
+using internal::PathFrame;
+using internal::SampledSurface;
+using internal::Span;
+using internal::Spans;
+using internal::SurfacePoint;
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kDefaultTolerance = 2e-4;       // of the smaller body's diagonal
+constexpr double kDefaultLargestOverlap = 2e-2;  // the same
+/// The steepest slope (see OrbitPiece) at which a surface is a stop; beyond it, it slides.
+constexpr double kSlope = 2.0;
+
+double diagonal(std::span<const MotionBody> bodies) {
+  Vec3 low = Vec3::Constant(kInfinity), high = -low;
+  for (const MotionBody& b : bodies)
+    for (const Vec3& p : b.surface->vertices) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  return (high - low).allFinite() ? (high - low).norm() : 0.0;
+}
+
+internal::OrbitBox box_of_all(const std::vector<OrbitIndex::Face>& faces) {
+  internal::OrbitBox box;
+  for (const auto& f : faces) box.add(f.box);
+  return box;
+}
+
+/// Leaves only the faces that an orbit through `reach` can meet.
+void keep_in_reach(std::vector<OrbitIndex::Face>& faces, internal::OrbitBox reach, double margin) {
+  reach.grow(margin);
+  std::erase_if(faces, [&](const auto& f) { return !f.box.overlaps(reach); });
+}
+
+/// One side: its triangles in reach of the other, and points on them.
+struct Side {
+  OrbitIndex index;
+  SampledSurface surface;
+};
+
+/// The faces of one side that meet a face of the other in the orbit plane: points elsewhere are of no use.
+std::vector<OrbitIndex::Face> that_meet(const OrbitIndex& own, const OrbitIndex& other, double margin) {
+  std::vector<OrbitIndex::Face> faces;
+  for (const auto& f : own.faces()) {
+    internal::OrbitBox box = f.box;
+    box.grow(margin);
+    if (other.meets(box)) faces.push_back(f);
+  }
+  return faces;
+}
+
+/// A blocked piece and the point that told of it.
+struct Witness {
+  OrbitPiece piece{};
+  SurfacePoint point{};
+  bool moving = true;  ///< whose point
+};
+
+struct Tolerances {
+  double across = 0.0;           ///< δ, length
+  double largest_overlap = 0.0;  ///< length
+  double nudge = 0.0;            ///< length, far below both
+};
+
+/// All blocked positions along one path, by (1) of the header.
+class Search {
+ public:
+  Search(const PathFrame& frame, const Side& moving, const Side& fixed, const Tolerances& tolerances)
+      : frame_(frame), moving_(moving), fixed_(fixed), tolerances_(tolerances) {}
+
+  FreeMotion run() {
+    settle_tolerance();
+    collect();
+    refine();
+    return result();
+  }
+
+ private:
+  void settle_tolerance();
+  void collect();
+  void refine();
+  FreeMotion result() const;
+
+  void raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const;
+  void wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const;
+  void blocked_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const;
+  void clip_at_start(std::vector<OrbitPiece>& pieces, double speed) const;
+  bool holds_start(const OrbitPiece& piece, double speed) const;
+  Witness descend(Witness start, bool low, const Span& gap) const;
+  void refine_end(Span& span, bool low, const Span& gap, Witness& end);
+  MotionStop stop_of(const Witness& witness) const;
+  double speed(const SurfacePoint& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
+  const SampledSurface& surface(bool moving) const { return (moving ? moving_ : fixed_).surface; }
+
+  const PathFrame& frame_;
+  const Side& moving_;
+  const Side& fixed_;
+  Tolerances tolerances_;
+  bool overlapping_ = false;
+  std::vector<Witness> witnesses_;
+  Spans blocked_;                                  ///< B
+  std::vector<std::pair<Witness, Witness>> ends_;  ///< what blocks at the low and high end of each span of B
+};
+
+// A moving point meets the fixed side at t; a fixed point meets the moving side as if that stood still, at −t.
+void Search::raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const {
+  (moving ? fixed_ : moving_).index.pieces(orbit, tolerances_.nudge, out);
+  if (moving) return;
+  for (OrbitPiece& p : out) p = {-p.high, -p.low, p.body, -p.sheet, p.slope_high, p.slope_low};
+  std::reverse(out.begin(), out.end());
+}
+
+/// Pieces made longer by `by` on both sides, as a set.
+Spans dilated(const std::vector<OrbitPiece>& pieces, double by) {
+  Spans spans;
+  for (const OrbitPiece& p : pieces) spans.push_back({p.low - by, p.high + by});
+  normalise(spans);
+  return spans;
+}
+
+/// The parts of `pieces` that the set `wide` confirms, which is dilated by kSlope · δ. An orbit beside this one meets a
+/// sloping stop later: where the slope explains the difference, the stop begins where this orbit meets it.
+/// @param delta δ as a length of t
+void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double delta) {
+  constexpr double kMargin = 1.1;  // surfaces curve
+  const double by = kSlope * delta;
+  const auto explains = [&](double slope, double later) {
+    return slope <= kSlope && later <= kMargin * slope * delta + (kMargin - 1.0) * delta;
+  };
+  std::vector<OrbitPiece> kept;
+  for (const OrbitPiece& p : pieces)
+    for (const Span& s : wide) {
+      if (s.high < p.low - by || s.low > p.high + by) continue;
+      Span core{s.low + by, s.high - by};
+      if (core.low > core.high) core.low = core.high = 0.5 * (core.low + core.high);
+      if (core.low < p.low || explains(p.slope_low, core.low - p.low)) core.low = p.low;
+      if (core.high > p.high || explains(p.slope_high, p.high - core.high)) core.high = p.high;
+      if (core.low <= core.high) kept.push_back({core.low, core.high, p.body, p.sheet, p.slope_low, p.slope_high});
+    }
+  pieces = std::move(kept);
+}
+
+// Overlap wider than δ: orbits moved by δ in eight directions across meet the other side as well.
+void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
+  constexpr double kDiagonal = std::numbers::sqrt2 / 2.0;
+  constexpr std::array<std::array<double, 2>, 8> kAcross{{{1, 0},
+                                                          {-1, 0},
+                                                          {0, 1},
+                                                          {0, -1},
+                                                          {kDiagonal, kDiagonal},
+                                                          {-kDiagonal, -kDiagonal},
+                                                          {kDiagonal, -kDiagonal},
+                                                          {-kDiagonal, kDiagonal}}};
+  const Orbit orbit = frame_.orbit_of(at.p);
+  const double v = frame_.speed(orbit), delta = tolerances_.across;
+  raw_pieces(orbit, moving, out);
+  if (out.empty()) return;
+  // So near to the axis that δ is a good part of a turn, nothing can be told.
+  const double by = kSlope * delta / v;
+  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < 0.5)) return out.clear();
+  Spans wide = dilated(out, by);
+  thread_local std::vector<OrbitPiece> beside;
+  for (const auto& direction : kAcross) {
+    Orbit moved = orbit;
+    for (std::size_t i = 0; i < 2; ++i) moved.plane[i] += delta * direction[i];
+    raw_pieces(moved, moving, beside);
+    wide = intersection(wide, dilated(beside, by));
+    if (wide.empty()) return out.clear();
+  }
+  keep_confirmed(out, wide, delta / v);
+}
+
+bool Search::holds_start(const OrbitPiece& piece, double v) const {
+  return piece.sheet == 0 && std::min(-piece.low, piece.high) * v > tolerances_.across;
+}
+
+// What touches as read, or overlaps by less than δ along the motion, blocks the way in and not the way out.
+void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
+  constexpr double kInstant = 1e-12;
+  for (OrbitPiece& p : pieces) {
+    if (p.sheet != 0 && std::abs(p.low) * v <= tolerances_.across) {
+      p.low = p.sheet > 0 ? std::max(p.low, 0.0) : std::min(p.low, 0.0) - kInstant;
+      p.high = p.low + kInstant;
+    } else if (p.low < 0.0 && p.high > 0.0) {
+      (-p.low < p.high ? p.low : p.high) = 0.0;
+    }
+  }
+}
+
+void Search::blocked_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
+  const double v = speed(at);
+  wide_pieces(at, moving, out);
+  std::erase_if(out, [&](const OrbitPiece& p) { return holds_start(p, v); });
+  clip_at_start(out, v);
+}
+
+// Overlap as read is a matter of drawing, not of motion: δ grows until none is left that is wider, as far as it may.
+void Search::settle_tolerance() {
+  constexpr double kGrowth = 1.5;
+  std::vector<OrbitPiece> pieces;
+  std::vector<std::pair<SurfacePoint, bool>> deep;
+  const auto is_deep = [&](const SurfacePoint& at, bool moving, bool wide) {
+    if (wide)
+      wide_pieces(at, moving, pieces);
+    else
+      raw_pieces(frame_.orbit_of(at.p), moving, pieces);
+    const double v = speed(at);
+    return std::any_of(pieces.begin(), pieces.end(), [&](const OrbitPiece& p) { return holds_start(p, v); });
+  };
+  for (const bool moving : {true, false})
+    for (const SurfacePoint& at : surface(moving).points())
+      if (is_deep(at, moving, false) && is_deep(at, moving, true)) deep.emplace_back(at, moving);
+  while (!deep.empty() && tolerances_.across < tolerances_.largest_overlap) {
+    tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
+    std::erase_if(deep, [&](const auto& d) { return !is_deep(d.first, d.second, true); });
+  }
+  overlapping_ = !deep.empty();
+}
+
+void Search::collect() {
+  std::vector<OrbitPiece> pieces;
+  for (const bool moving : {true, false})
+    for (const SurfacePoint& at : surface(moving).points()) {
+      raw_pieces(frame_.orbit_of(at.p), moving, pieces);
+      // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
+      if (std::all_of(pieces.begin(), pieces.end(),
+                      [&](const OrbitPiece& p) { return covers(blocked_, p.low, p.high); }))
+        continue;
+      blocked_pieces(at, moving, pieces);
+      for (const OrbitPiece& p : pieces) {
+        if (covers(blocked_, p.low, p.high)) continue;
+        witnesses_.push_back({p, at, moving});
+        blocked_.push_back({p.low, p.high});
+        normalise(blocked_);
+      }
+    }
+}
+
+// Over the surface downhill: the point whose orbit is blocked first, by a pattern of steps that halve where none helps.
+Witness Search::descend(Witness best, bool low, const Span& gap) const {
+  constexpr int kDirections = 6, kMostSteps = 400;
+  constexpr double kTurn = 0.4;  // rad; from pattern to pattern, so that the directions do not stay the same
+  std::vector<OrbitPiece> pieces;
+  const SampledSurface& over = surface(best.moving);
+  const double finest = 0.1 * tolerances_.across;
+  double step = over.spacing();
+  int steps = 0;
+  for (int level = 0; step > finest && steps < kMostSteps; ++level) {
+    const auto& c = over.faces()[static_cast<std::size_t>(best.point.face)].corners;
+    const Vec3 e = (c[1] - c[0]).stableNormalized(), n = e.cross(c[2] - c[0]).stableNormalized(), f = n.cross(e);
+    bool better = false;
+    for (int k = 0; k < kDirections && !better; ++k, ++steps) {
+      const double angle = kTurn * level + 2.0 * kPi * k / kDirections;
+      const SurfacePoint next =
+          over.walk(best.point, best.point.p + step * (std::cos(angle) * e + std::sin(angle) * f));
+      blocked_pieces(next, best.moving, pieces);
+      for (const OrbitPiece& p : pieces)
+        if (low ? p.low < best.piece.low && p.low > gap.low : p.high > best.piece.high && p.high < gap.high) {
+          best = {p, next, best.moving};
+          better = true;
+        }
+    }
+    if (!better) step *= 0.5;
+  }
+  return best;
+}
+
+void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
+  constexpr std::size_t kSeeds = 8;
+  std::vector<Witness> seeds;
+  for (const Witness& w : witnesses_)
+    if (w.piece.low >= span.low && w.piece.high <= span.high) seeds.push_back(w);
+  const auto first = [&](const Witness& a, const Witness& b) {
+    return low ? a.piece.low < b.piece.low : a.piece.high > b.piece.high;
+  };
+  std::stable_sort(seeds.begin(), seeds.end(), first);
+  if (seeds.size() > kSeeds) seeds.resize(kSeeds);
+  end = seeds.front();
+  for (const Witness& seed : seeds)
+    if (const Witness found = descend(seed, low, gap); first(found, end)) end = found;
+  (low ? span.low : span.high) = low ? end.piece.low : end.piece.high;
+}
+
+void Search::refine() {
+  ends_.resize(blocked_.size());
+  for (std::size_t i = 0; i < blocked_.size(); ++i) {
+    const double before = i > 0 ? blocked_[i - 1].high : -kInfinity;
+    const double after = i + 1 < blocked_.size() ? blocked_[i + 1].low : kInfinity;
+    const Span whole = blocked_[i];
+    refine_end(blocked_[i], true, {before, whole.high}, ends_[i].first);
+    Span high = whole;
+    refine_end(high, false, {whole.low, after}, ends_[i].second);
+    blocked_[i].high = high.high;
+  }
+}
+
+MotionStop Search::stop_of(const Witness& w) const {
+  const auto& face = surface(w.moving).faces()[static_cast<std::size_t>(w.point.face)];
+  return {w.moving ? w.piece.body : face.body, frame_.from_path(w.point.p)};
+}
+
+FreeMotion Search::result() const {
+  FreeMotion out;
+  out.tolerance = tolerances_.across;
+  out.overlapping = overlapping_;
+  const std::size_t count = blocked_.size();
+  if (count == 0) return out;
+  const bool circle = frame_.kind() == MotionPath::Kind::kRotation;
+  // Free gaps between blocked spans; on a circle the last leads to the first.
+  for (std::size_t i = circle ? 1 : 0; i <= count; ++i) {
+    const std::size_t after = i < count ? i : 0;
+    Interval gap{i > 0 ? blocked_[i - 1].high : -kInfinity, i < count ? blocked_[i].low : kInfinity};
+    if (circle && i == count) gap.high = blocked_[0].low + 2.0 * kPi;
+    if (!(gap.low < gap.high)) continue;
+    const bool turned = circle && i == count && gap.low > 0.0;  // 0 may lie at the end that was moved by a turn
+    if (turned && gap.high >= 2.0 * kPi) gap = {gap.low - 2.0 * kPi, gap.high - 2.0 * kPi};
+    if (gap.low > 0.0 || gap.high < 0.0) {
+      out.others.push_back(gap);
+      continue;
+    }
+    out.reachable = gap;
+    if (i > 0) out.low = stop_of(ends_[i - 1].second);
+    if (circle || i < count) out.high = stop_of(ends_[after].first);
+  }
+  return out;
+}
+
+void validate(std::span<const MotionBody> bodies, const char* which) {
+  if (bodies.empty()) throw InvalidArgument(std::string("free_motion: there is no ") + which + " body");
+  for (const MotionBody& b : bodies)
+    if (b.surface == nullptr) throw InvalidArgument(std::string("free_motion: a ") + which + " surface is null");
+}
+
+void validate(const MotionPath& path) {
+  constexpr double kUnit = 1e-6;
+  if (!path.origin.allFinite() || !(std::abs(path.axis.norm() - 1.0) <= kUnit))
+    throw InvalidArgument("free_motion: the path's axis has length " + std::to_string(path.axis.norm()) +
+                          ", expected 1, and a finite origin");
+  if (path.kind == MotionPath::Kind::kScrew && (!std::isfinite(path.pitch) || path.pitch == 0.0))
+    throw InvalidArgument("free_motion: a screw needs a pitch that is not 0");
+}
+
+}  // namespace
+
+void FreeMotionOptions::validate() const {
+  if (!(tolerance >= 0.0) || !(largest_overlap >= 0.0))
+    throw InvalidArgument("FreeMotionOptions: tolerance is " + std::to_string(tolerance) + " and largest_overlap " +
+                          std::to_string(largest_overlap) + ", expected numbers >= 0");
+  if (samples < 100 || samples > 1'000'000)
+    throw InvalidArgument("FreeMotionOptions: samples is " + std::to_string(samples) + ", expected 100 to 1000000");
+}
+
+FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const MotionBody> fixed, const MotionPath& path,
+                       const FreeMotionOptions& options, double sagitta) {
+  options.validate();
+  validate(moving, "moving");
+  validate(fixed, "fixed");
+  validate(path);
+  const double size = std::min(diagonal(moving), diagonal(fixed));
+  const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
+  const double least = given(options.tolerance, kDefaultTolerance * size);
+  Tolerances t{.across = least + sagitta,
+               .largest_overlap = given(options.largest_overlap, kDefaultLargestOverlap * size)};
+  t.largest_overlap = std::max(t.largest_overlap, t.across);
+  t.nudge = 1e-2 * least;
+
+  const PathFrame frame(path);
+  auto moving_faces = orbit_faces(frame, moving), fixed_faces = orbit_faces(frame, fixed);
+  keep_in_reach(fixed_faces, box_of_all(moving_faces), t.largest_overlap);
+  keep_in_reach(moving_faces, box_of_all(fixed_faces), t.largest_overlap);
+  OrbitIndex moving_index(frame, moving, std::move(moving_faces)), fixed_index(frame, fixed, std::move(fixed_faces));
+  auto moving_met = that_meet(moving_index, fixed_index, t.largest_overlap);
+  auto fixed_met = that_meet(fixed_index, moving_index, t.largest_overlap);
+  const Side moving_side{std::move(moving_index), SampledSurface(moving, std::move(moving_met), options.samples)};
+  const Side fixed_side{std::move(fixed_index), SampledSurface(fixed, std::move(fixed_met), options.samples)};
+  return Search(frame, moving_side, fixed_side, t).run();
+}
+
+double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high, double crease) {
+  struct Bend {
+    Vec3 normal;
+    double width;
+  };
+  const auto within = [&](const Vec3& p) {
+    return (p.array() >= low.array()).all() && (p.array() <= high.array()).all();
+  };
+  double largest = 0.0;
+  std::map<std::pair<Index, Index>, Bend> open;
+  for (const Triangle& t : surface.triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [a, b] = std::minmax(t[i], t[(i + 1) % 3]);
+      const Vec3 &pa = surface.vertices[a], &pb = surface.vertices[b], &pc = surface.vertices[t[(i + 2) % 3]];
+      if (!within(pa) && !within(pb)) continue;
+      const Vec3 area =
+          (surface.vertices[t[1]] - surface.vertices[t[0]]).cross(surface.vertices[t[2]] - surface.vertices[t[0]]);
+      const double length = (pb - pa).norm();
+      if (!(length > 0.0) || !(area.norm() > 0.0)) continue;
+      const Bend bend{area.normalized(), (pc - pa).cross(pb - pa).norm() / length};
+      const auto [entry, fresh] = open.try_emplace({a, b}, bend);
+      if (fresh) continue;
+      const double angle =
+          std::atan2(entry->second.normal.cross(bend.normal).norm(), entry->second.normal.dot(bend.normal));
+      if (angle < crease)
+        largest = std::max(largest, 0.5 * std::max(entry->second.width, bend.width) * std::tan(0.25 * angle));
+    }
+  return largest;
+}
+
+}  // namespace limber

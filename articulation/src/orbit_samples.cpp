@@ -1,0 +1,162 @@
+#include "orbit_samples.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace limber::internal {
+namespace {
+
+Vec3 unit_normal(const OrbitIndex::Face& f) {
+  return (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
+}
+
+double area(const OrbitIndex::Face& f) {
+  return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
+}
+
+/// The point of a triangle nearest to q: that of its plane if it lies inside, else the nearest of its sides.
+Vec3 nearest_point(const OrbitIndex::Face& f, const Vec3& q) {
+  const Vec3 n = unit_normal(f);
+  bool inside = n.squaredNorm() > 0.0;
+  Vec3 best = f.corners[0];
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3 &a = f.corners[i], d = f.corners[(i + 1) % 3] - a;
+    if (d.cross(q - a).dot(n) < 0.0) inside = false;
+    const double length2 = d.squaredNorm();
+    const Vec3 p = a + (length2 > 0.0 ? std::clamp(d.dot(q - a) / length2, 0.0, 1.0) : 0.0) * d;
+    if (const double distance = (q - p).squaredNorm(); distance < least) least = distance, best = p;
+  }
+  return inside ? Vec3(q - n.dot(q - f.corners[0]) * n) : best;
+}
+
+/// Running sums of a measure, for points at even distances along it.
+template <class Items, class Measure>
+std::vector<double> running_sums(const Items& items, Measure&& measure) {
+  std::vector<double> sums;
+  sums.reserve(items.size());
+  double sum = 0.0;
+  for (const auto& item : items) sums.push_back(sum += measure(item));
+  return sums;
+}
+
+std::size_t at_measure(const std::vector<double>& sums, double measure) {
+  const auto found = std::upper_bound(sums.begin(), sums.end(), measure);
+  return std::min(static_cast<std::size_t>(found - sums.begin()), sums.size() - 1);
+}
+
+}  // namespace
+
+SampledSurface::SampledSurface(std::span<const MotionBody> bodies, std::vector<OrbitIndex::Face> faces, int count)
+    : faces_(std::move(faces)) {
+  if (faces_.empty()) return;
+  number_vertices(bodies);
+  add_face_points(count);
+  add_edge_points(sharp_edges(), count);
+}
+
+void SampledSurface::number_vertices(std::span<const MotionBody> bodies) {
+  std::vector<Index> base{0};
+  for (const MotionBody& b : bodies) base.push_back(base.back() + static_cast<Index>(b.surface->vertices.size()));
+  vertices_.reserve(faces_.size());
+  for (const auto& f : faces_) {
+    Triangle v = bodies[static_cast<std::size_t>(f.body)].surface->triangles[static_cast<std::size_t>(f.triangle)];
+    for (Index& i : v) i += base[static_cast<std::size_t>(f.body)];
+    vertices_.push_back(v);
+  }
+  first_around_.assign(static_cast<std::size_t>(base.back()) + 1, 0);
+  for (const Triangle& t : vertices_)
+    for (const Index v : t) ++first_around_[static_cast<std::size_t>(v) + 1];
+  std::partial_sum(first_around_.begin(), first_around_.end(), first_around_.begin());
+  around_.resize(3 * vertices_.size());
+  std::vector<Index> next(first_around_.begin(), first_around_.end() - 1);
+  for (std::size_t f = 0; f < vertices_.size(); ++f)
+    for (const Index v : vertices_[f])
+      around_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
+}
+
+Vec3 SampledSurface::corner(Index face, Index vertex) const {
+  const Triangle& v = vertices_[static_cast<std::size_t>(face)];
+  const auto found = static_cast<std::size_t>(std::find(v.begin(), v.end(), vertex) - v.begin());
+  const OrbitIndex::Face& f = faces_[static_cast<std::size_t>(face)];
+  return f.corners[f.flipped && found > 0 ? 3 - found : found];
+}
+
+// Sharp: the two faces bend by more than 20 degrees, or there are not two of them.
+std::vector<SampledSurface::Edge> SampledSurface::sharp_edges() const {
+  constexpr double kFlat = 0.94;
+  std::vector<Edge> all;
+  for (std::size_t f = 0; f < vertices_.size(); ++f)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [a, b] = std::minmax(vertices_[f][i], vertices_[f][(i + 1) % 3]);
+      all.push_back({a, b, static_cast<Index>(f)});
+    }
+  std::sort(all.begin(), all.end(),
+            [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.face) < std::tie(y.a, y.b, y.face); });
+  std::vector<Edge> sharp;
+  for (std::size_t i = 0; i < all.size();) {
+    std::size_t end = i;
+    while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
+    const auto normal = [&](std::size_t k) { return unit_normal(faces_[static_cast<std::size_t>(all[k].face)]); };
+    if (end - i != 2 || normal(i).dot(normal(i + 1)) < kFlat) sharp.push_back(all[i]);
+    i = end;
+  }
+  return sharp;
+}
+
+void SampledSurface::add_face_points(int count) {
+  const std::vector<double> sums = running_sums(faces_, area);
+  const double total = sums.back();
+  spacing_ = std::sqrt(total / count);
+  // The plastic number's additive recurrence covers a square evenly; folding the square covers a triangle.
+  constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;
+  for (int i = 0; i < count && total > 0.0; ++i) {
+    const std::size_t f = at_measure(sums, total * (i + 0.5) / count);
+    double u = std::fmod((i + 1) * kFirst, 1.0), v = std::fmod((i + 1) * kSecond, 1.0);
+    if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+    const auto& c = faces_[f].corners;
+    points_.push_back({c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]), static_cast<Index>(f)});
+  }
+}
+
+void SampledSurface::add_edge_points(const std::vector<Edge>& edges, int count) {
+  if (edges.empty()) return;
+  const auto ends = [&](const Edge& e) { return std::pair(corner(e.face, e.a), corner(e.face, e.b)); };
+  const std::vector<double> sums = running_sums(edges, [&](const Edge& e) {
+    const auto [a, b] = ends(e);
+    return (b - a).norm();
+  });
+  for (int i = 0; i < count; ++i) {
+    const double along = sums.back() * (i + 0.5) / count;
+    const std::size_t k = at_measure(sums, along);
+    const auto [a, b] = ends(edges[k]);
+    const double length = (b - a).norm();
+    points_.push_back({length > 0.0 ? Vec3(b + (along - sums[k]) / length * (b - a)) : a, edges[k].face});
+  }
+  const std::size_t stride = 1 + edges.size() / static_cast<std::size_t>(count);
+  for (std::size_t k = 0; k < edges.size(); k += stride) {
+    const auto [a, b] = ends(edges[k]);
+    points_.push_back({a, edges[k].face});
+    points_.push_back({b, edges[k].face});
+  }
+}
+
+SurfacePoint SampledSurface::walk(const SurfacePoint& start, const Vec3& target) const {
+  constexpr int kMostFaces = 16;
+  SurfacePoint here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
+  for (int step = 0; step < kMostFaces; ++step) {
+    SurfacePoint best = here;
+    for (const Index v : vertices_[static_cast<std::size_t>(here.face)])
+      for (Index k = first_around_[v]; k < first_around_[v + 1]; ++k) {
+        const Index f = around_[static_cast<std::size_t>(k)];
+        const Vec3 p = nearest_point(faces_[static_cast<std::size_t>(f)], target);
+        if ((p - target).squaredNorm() < (best.p - target).squaredNorm()) best = {p, f};
+      }
+    if (best.face == here.face) break;
+    here = best;
+  }
+  return here;
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,52 @@
+/// @file orbit_samples.h
+/// Points that stand for a surface when it is tested against another, and steps from point to point over it. Private to
+/// the articulation module.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "orbit_index.h"
+
+namespace limber::internal {
+
+/// A point of a surface, in path coordinates.
+struct SurfacePoint {
+  Vec3 p = Vec3::Zero();
+  Index face = 0;  ///< of SampledSurface::faces()
+};
+
+/// The faces of one side: points on them, and their neighbours.
+class SampledSurface {
+ public:
+  /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, and as many on sharp edges and
+  /// at most as many on the ends of these
+  SampledSurface(std::span<const MotionBody> bodies, std::vector<OrbitIndex::Face> faces, int count);
+
+  const std::vector<OrbitIndex::Face>& faces() const { return faces_; }
+  const std::vector<SurfacePoint>& points() const { return points_; }
+  double spacing() const { return spacing_; }  ///< typical distance between points on faces
+
+  /// A point of the surface near `target`, reached from `start` over neighbouring faces.
+  SurfacePoint walk(const SurfacePoint& start, const Vec3& target) const;
+
+ private:
+  struct Edge {
+    Index a = 0, b = 0;  ///< joint vertex numbers, a < b
+    Index face = 0;
+  };
+
+  void number_vertices(std::span<const MotionBody> bodies);
+  std::vector<Edge> sharp_edges() const;
+  void add_face_points(int count);
+  void add_edge_points(const std::vector<Edge>& edges, int count);
+  Vec3 corner(Index face, Index vertex) const;
+
+  std::vector<OrbitIndex::Face> faces_;
+  std::vector<Triangle> vertices_;            ///< per face, numbers of its corners over all bodies
+  std::vector<Index> first_around_, around_;  ///< faces around each vertex
+  std::vector<SurfacePoint> points_;
+  double spacing_ = 0.0;
+};
+
+}  // namespace limber::internal

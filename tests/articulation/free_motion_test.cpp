@@ -1,0 +1,163 @@
+// Motions whose ends are known on paper: bars that hit stops, drawers, wheels, screws.
+#include "limber/articulation/free_motion.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <numbers>
+
+#include "limber/core/error.h"
+#include "parts.h"
+
+namespace limber {
+namespace {
+
+using Kind = MotionPath::Kind;
+constexpr double kPi = std::numbers::pi;
+constexpr double kDegree = kPi / 180.0;
+constexpr double kRightAngle = kPi / 2.0;
+/// Ends are followed down to a tenth of the tolerance across, which is 2e-4 of the smaller body's diagonal.
+constexpr double kEnd = 1e-4;
+
+FreeMotion turn(const SurfaceMesh& moving, const SurfaceMesh& fixed, const MotionPath& path, double sagitta = 0.0) {
+  const MotionBody m{&moving, surface_quality(moving).closed_manifold()},
+      f{&fixed, surface_quality(fixed).closed_manifold()};
+  return free_motion({&m, 1}, {&f, 1}, path, {}, sagitta);
+}
+
+const MotionPath kAboutZ{.kind = Kind::kRotation, .axis = Vec3::UnitZ()};
+const MotionPath kAlongX{.kind = Kind::kTranslation, .axis = Vec3::UnitX()};
+
+/// A bar along x from the z axis, 2 wide.
+SurfaceMesh bar() { return shapes::box({0, -1, -1}, {10, 1, 1}); }
+
+TEST(FreeMotion, BarStopsWhereItsFaceMeetsTheBlock) {
+  // The block's edge at (8, 5) meets the bar's upper face, which is 1 from the axis: atan2(5, 8) − asin(1/√89).
+  const SurfaceMesh block = shapes::box({5, 5, -1}, {8, 9, 1});
+  const FreeMotion m = turn(bar(), block, kAboutZ);
+  EXPECT_NEAR(m.reachable.high, std::atan2(5.0, 8.0) - std::asin(1.0 / std::sqrt(89.0)), kEnd);
+  EXPECT_EQ(m.high.body, 0);
+  EXPECT_TRUE(m.others.empty());
+  EXPECT_FALSE(m.overlapping);
+}
+
+TEST(FreeMotion, BothEndsAndWhatLiesBehindAnObstacleAreFound) {
+  // Two thin posts, at 60° and −100°, radius 6: the bar is free between them on either side.
+  SurfaceMesh posts =
+      parts::cylinder({6 * std::cos(60 * kDegree), 6 * std::sin(60 * kDegree), 0}, Vec3::UnitZ(), 0.1, 4, 64);
+  shapes::append(
+      parts::cylinder({6 * std::cos(100 * kDegree), -6 * std::sin(100 * kDegree), 0}, Vec3::UnitZ(), 0.1, 4, 64),
+      posts);
+  const FreeMotion m = turn(bar(), posts, kAboutZ);
+  const double half = std::asin(1.1 / 6.0);  // the bar's half width and the post's radius, seen from the axis
+  EXPECT_NEAR(m.reachable.high, 60 * kDegree - half, 1e-3);
+  EXPECT_NEAR(m.reachable.low, -100 * kDegree + half, 1e-3);
+  ASSERT_EQ(m.others.size(), 1u);
+  EXPECT_NEAR(m.others[0].low, 60 * kDegree + half, 1e-3);
+  EXPECT_NEAR(m.others[0].high, 260 * kDegree - half, 1e-3);
+}
+
+TEST(FreeMotion, WheelOnItsAxleTurnsForEver) {
+  for (const int segments : {8, 16, 32, 64})
+    for (const double clearance : {0.0, 0.01, -0.01}) {
+      const SurfaceMesh wheel = parts::tube({0, 0, 0}, Vec3::UnitZ(), 1.0, 5.0, 2.0, segments);
+      const SurfaceMesh axle = parts::cylinder({0, 0, 0}, Vec3::UnitZ(), 1.0 - clearance, 6.0, segments);
+      const double sagitta = facet_sagitta(axle, Vec3::Constant(-10), Vec3::Constant(10));
+      EXPECT_NEAR(sagitta, (1.0 - clearance) * (1.0 - std::cos(kPi / segments)), 1e-9);
+      const FreeMotion m = turn(wheel, axle, kAboutZ, sagitta);
+      EXPECT_TRUE(m.reachable.open()) << segments << " segments, clearance " << clearance << ": " << m.reachable.low
+                                      << " to " << m.reachable.high;
+      EXPECT_FALSE(m.overlapping);
+    }
+}
+
+TEST(FreeMotion, PinSlidesInItsHoleUntilItsHeadMeetsTheBlock) {
+  for (const int segments : {8, 16, 32}) {
+    const SurfaceMesh block = parts::tube({0, 0, 0}, Vec3::UnitX(), 1.0, 3.0, 4.0, segments);
+    SurfaceMesh pin = parts::cylinder({1, 0, 0}, Vec3::UnitX(), 1.0, 8.0, segments);       // x from −3 to 5
+    shapes::append(parts::cylinder({5.5, 0, 0}, Vec3::UnitX(), 2.0, 1.0, segments), pin);  // head from 5 to 6
+    const FreeMotion m = turn(pin, block, kAlongX, facet_sagitta(block, Vec3::Constant(-10), Vec3::Constant(10)));
+    EXPECT_NEAR(m.reachable.low, 2.0 - 5.0, kEnd) << segments;
+    EXPECT_EQ(m.reachable.high, std::numeric_limits<double>::infinity());
+  }
+}
+
+TEST(FreeMotion, DrawerGoesFromItsBackToItsLip) {
+  // A drawer that lies on the floor of its case and touches both sides; closed, it is 0.5 from the back.
+  SurfaceMesh shell = shapes::box({0, -6, -1}, {20, 6, 0});     // floor
+  shapes::append(shapes::box({0, -6, 0}, {20, -5, 5}), shell);  // sides
+  shapes::append(shapes::box({0, 5, 0}, {20, 6, 5}), shell);
+  shapes::append(shapes::box({-1, -6, -1}, {0, 6, 5}), shell);  // back
+  shapes::append(shapes::box({17, -6, 3}, {20, 6, 5}), shell);  // lip at the top
+  SurfaceMesh drawer = shapes::box({0.5, -5, 0}, {18, 5, 2.5});
+  shapes::append(shapes::box({0.5, -5, 2.5}, {1.5, 5, 4}), drawer);  // its tall back meets the lip
+  const FreeMotion m = turn(drawer, shell, kAlongX);
+  EXPECT_NEAR(m.reachable.low, -0.5, kEnd);
+  EXPECT_NEAR(m.reachable.high, 17.0 - 1.5, kEnd);
+}
+
+TEST(FreeMotion, WhatTouchesAsReadBlocksOneWayOnly) {
+  for (const double overlap : {0.0, 1e-3, -1e-3}) {
+    const SurfaceMesh wall = shapes::box({-1, -5, -5}, {0, 5, 5}), block = shapes::box({-overlap, -1, -1}, {2, 1, 1});
+    const FreeMotion m = turn(block, wall, kAlongX);
+    EXPECT_NEAR(m.reachable.low, std::min(overlap, 0.0), 1e-9) << overlap;
+    EXPECT_EQ(m.reachable.high, std::numeric_limits<double>::infinity());
+  }
+}
+
+TEST(FreeMotion, SheetsStopWhatCrossesThem) {
+  SurfaceMesh sheet;
+  sheet.vertices = {{4, -5, -5}, {4, 5, -5}, {4, 0, 9}};
+  sheet.triangles = {{0, 2, 1}};
+  const SurfaceMesh block = shapes::box({0, -1, -1}, {2, 1, 1});
+  const FreeMotion m = turn(block, sheet, kAlongX);
+  EXPECT_NEAR(m.reachable.high, 2.0, kEnd);
+  EXPECT_EQ(m.reachable.low, -std::numeric_limits<double>::infinity());
+  const FreeMotion back = turn(sheet, block, kAlongX);
+  EXPECT_NEAR(back.reachable.low, -2.0, kEnd);
+}
+
+TEST(FreeMotion, ScrewStopsWhereItsHeadArrives) {
+  const SurfaceMesh block = parts::tube({0, 0, 0}, Vec3::UnitX(), 1.0, 3.0, 4.0, 32);
+  SurfaceMesh screw = parts::cylinder({1, 0, 0}, Vec3::UnitX(), 1.0, 8.0, 32);
+  shapes::append(parts::cylinder({5.5, 0, 0}, Vec3::UnitX(), 2.0, 1.0, 32), screw);
+  const MotionPath path{.kind = Kind::kScrew, .axis = Vec3::UnitX(), .pitch = 0.5};
+  const FreeMotion m = turn(screw, block, path, facet_sagitta(block, Vec3::Constant(-10), Vec3::Constant(10)));
+  EXPECT_NEAR(m.reachable.low, (2.0 - 5.0) / 0.5, 10 * kEnd) << m.low.point.transpose();
+  EXPECT_EQ(m.reachable.high, std::numeric_limits<double>::infinity());
+}
+
+TEST(FreeMotion, ThinWiresThatCrossAreNotMissed) {
+  // Neither wire has a corner near the crossing: edge meets edge.
+  const SurfaceMesh wire = shapes::box({0, -0.05, -0.05}, {20, 0.05, 0.05});
+  const SurfaceMesh other = shapes::box({14 * std::cos(1.0) - 0.05, 14 * std::sin(1.0) - 0.05, -30},
+                                        {14 * std::cos(1.0) + 0.05, 14 * std::sin(1.0) + 0.05, 30});
+  const FreeMotion m = turn(wire, other, kAboutZ);
+  EXPECT_NEAR(m.reachable.high, 1.0 - (0.05 + 0.05 * (std::cos(1.0) + std::sin(1.0))) / 14.0, 1e-3);
+}
+
+TEST(FreeMotion, ScaleAndPlaceDoNotMatter) {
+  const SurfaceMesh block = shapes::box({5, 5, -1}, {8, 9, 1});
+  const double expected = std::atan2(5.0, 8.0) - std::asin(1.0 / std::sqrt(89.0));
+  for (const double scale : {1e-3, 1.0, 1e3}) {
+    const auto place = parts::placed({1.0, 2.0, 3.0}, Vec3(0.3, -1.1, 0.7), scale);
+    const SurfaceMesh m = place(bar()), f = place(block);
+    const MotionPath path{
+        .kind = Kind::kRotation, .origin = place(Vec3::Zero()), .axis = place.direction(Vec3::UnitZ())};
+    EXPECT_NEAR(turn(m, f, path).reachable.high, expected, kEnd) << scale;
+    EXPECT_NEAR(turn(f, m, path).reachable.low, -expected, kEnd) << scale;
+  }
+}
+
+TEST(FreeMotion, WrongArgumentsAreToldInOneLine) {
+  const SurfaceMesh b = bar();
+  const MotionBody body{&b, true};
+  EXPECT_THROW(free_motion({}, {&body, 1}, kAboutZ), InvalidArgument);
+  EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, {.axis = {0, 0, 2}}), InvalidArgument);
+  EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, {.kind = Kind::kScrew}), InvalidArgument);
+  EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, kAboutZ, {.samples = 3}), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace limber
