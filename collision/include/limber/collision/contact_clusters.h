@@ -1,0 +1,59 @@
+/// @file limber/collision/contact_clusters.h
+/// Many contacts of two bodies, thinned to the few that carry the same forces and torques.
+///
+/// Contacts of like normals that lie near each other are a *patch*. A patch is pushed by forces along its normal, and
+/// whatever pressure acts within a convex region, some forces at the corners of that region have the same sum and the
+/// same torque. So of each patch the corners are kept:
+///
+///  1. The *deep* contacts are those whose gap is within `depth_tolerance` times the patch's extent of its smallest
+///     gap. Of the corners of their convex hull, seen along the normal, those n are kept that span the largest area. It
+///     is at least (n/2π) sin(2π/n) of the hull's: 0.63 for n = 4 (E. Sas, *Über eine Extremumeigenschaft der Ellipsen*,
+///     1939), and exactly the hull where this has no more than n corners. (For n > 4, corners are added to the largest
+///     quadrilateral one by one.)
+///  2. Where fewer than n are deep, such as where an edge rests, others are added one by one, each the one that the
+///     area of all grows by most.
+///
+/// Contacts that were kept last time are kept again as long as their areas are at least `hysteresis` times those of the
+/// best choice, so that warm starts find them again. Two cylinders that touch along a line keep the line's ends.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/dynamics/contact_source.h"
+
+namespace limber {
+
+struct ContactClusterOptions {
+  int max_points = 4;              ///< n, most contacts of a patch, ≥ 1; 0: all are kept
+  double max_normal_angle = 0.35;  ///< rad, between a contact and its patch's first, (0, π/2]; 0.35: 20°
+  double depth_tolerance = 1e-3;   ///< of the patch's extent; ≥ 0
+  double hysteresis = 0.9;         ///< in [0, 1]; 1: last time's only where nothing is better
+  void validate() const;           ///< @throws InvalidArgument naming the field and its value
+};
+
+/// Holds the scratch of one thread; a warm one allocates nothing.
+class ContactClusters {
+ public:
+  /// @throws InvalidArgument see ContactClusterOptions::validate()
+  explicit ContactClusters(const ContactClusterOptions& options = {});
+  ~ContactClusters();
+  ContactClusters(ContactClusters&&) noexcept;
+  ContactClusters& operator=(ContactClusters&&) noexcept;
+
+  /// Thins contacts[first …], all of one pair of bodies, and leaves them ascending in id. The outcome does not depend
+  /// on their order before.
+  /// @param patch_radius m: no contact of a patch is farther from the patch's first, that of the lowest id; > 0,
+  ///   infinity allowed
+  /// @param previous ids that were kept for this pair last time, ascending
+  void reduce(std::vector<ContactPoint>& contacts, std::size_t first, double patch_radius,
+              std::span<const std::uint64_t> previous);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber
