@@ -63,8 +63,9 @@ void solve_by_orthogonal_decomposition(std::span<const double> J, std::span<cons
 ///   [w_e]   [A_ee A_ec] [f_e]   [b_e]                    A' = A_cc − A_ce A_ee⁺ A_ec
 ///   [w_c] = [A_ce A_cc] [f_c] + [b_c],   w_e = 0:        b' = b_c − A_ce A_ee⁺ b_e,     f_e = −A_ee⁺ (b_e + A_ec f_c)
 ///
-/// A_ee may have any rank (kinematic loops): w_e = 0 then holds in the least-squares sense. A is symmetric positive
-/// semidefinite, so A' is too.
+/// A_ee may have any rank (kinematic loops): w_e = 0 then holds in the least-squares sense, and f_e is the smallest,
+/// both with the rows scaled to A_ii = 1, so that metres and radians mix. A is symmetric positive semidefinite, so A'
+/// is too.
 class EqualityElimination {
  public:
   EqualityElimination();
