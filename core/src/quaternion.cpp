@@ -12,6 +12,13 @@ Quaternion quaternion_from_rotation_vector(const Vec3& r) {
   return {std::cos(half), s * r.x(), s * r.y(), s * r.z()};
 }
 
+Vec3 rotation_vector(const Quaternion& q) {
+  const Vec3 v = q.w < 0.0 ? Vec3(-q.vector()) : q.vector();
+  const double sine = v.norm();
+  if (sine == 0.0) return Vec3::Zero();
+  return 2.0 * std::atan2(sine, std::abs(q.w)) / sine * v;
+}
+
 Mat3 to_matrix(const Quaternion& q) {
   return Eigen::Quaternion<double, Eigen::DontAlign>(q.w, q.x, q.y, q.z).toRotationMatrix();
 }

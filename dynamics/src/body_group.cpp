@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "limber/core/error.h"
+#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 namespace {
@@ -42,8 +43,6 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
       rates_(model_->modes()),
       previous_amplitudes_(model_->modes()),
       forces_(model_->modes()),
-      delayed_z_(model_->modes()),
-      delayed_rates_(model_->modes()),
       static_amplitudes_(model_->modes()),
       predicted_amplitudes_(model_->modes()),
       predicted_rates_(model_->modes()),
@@ -87,6 +86,7 @@ void BodyGroup::remove(Index slot) {
 
 void BodyGroup::clear_modes(Index slot) {
   for (ModeRows* rows : mode_rows()) rows->clear(slot);
+  body(slot).delayed.clear();
 }
 
 void BodyGroup::set_pose(Index slot, const RigidTransform& X_WB) {
@@ -134,16 +134,7 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
                         (q_WB * deformed_point(*model_, at, amplitudes(slot))).cross(newton_seconds));
   const Vec3 impulse_B = q_WB.conjugate() * newton_seconds;
   if (delay == 0.0) return add_modal_force(*model_, at, impulse_B, rates_.modes(slot));
-  const ModalModelData& data = model_->data();
-  const std::span<double> z = delayed_z_.modes(slot), rates = delayed_rates_.modes(slot);
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const Mode mode{data.eigenvalues[i], data.decays[i]};
-    const double j = shape_at(*model_, at, static_cast<Index>(i)).dot(impulse_B);
-    const ModeState change = impulse_response(mode, table_.step() - delay, j);
-    z[i] += change.z;
-    rates[i] += change.zdot;
-  }
-  b.modes_delayed = true;
+  if (table_.modes() > 0) b.delayed.push_back({at, impulse_B, delay});
 }
 
 void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
@@ -227,12 +218,38 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded) 
     table_.advance(modes.z, modes.rates, modes.forces);
   else
     table_.advance_free(modes.z, modes.rates);
-  if (!bodies_[static_cast<std::size_t>(slot)].modes_delayed) return;
-  const std::span<const double> delayed_z = delayed_z_.modes(slot), delayed_rates = delayed_rates_.modes(slot);
-  for (std::size_t i = 0; i < delayed_z.size(); ++i) {
-    modes.z[i] += delayed_z[i];
-    modes.rates[i] += delayed_rates[i];
-  }
+  const ModalModelData& data = model_->data();
+  for (const DelayedImpulse& impulse : body(slot).delayed)
+    for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
+      const double j = shape_at(*model_, impulse.at, static_cast<Index>(i)).dot(impulse.impulse_B);
+      const Mode mode{data.eigenvalues[i], data.decays[i]};
+      const ModeState change = impulse_response(mode, table_.step() - impulse.time, j);
+      modes.z[i] += change.z;
+      modes.rates[i] += change.zdot;
+    }
+}
+
+void BodyGroup::predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
+  const Body& b = body(slot);
+  const FrameLoad load{gravity, b.force, b.torque};
+  const double h = table_.step();
+  const ModalModelData& data = model_->data();
+  RigidFrame frame = b.frame;
+  const FrameExcitation excitation = frame.begin_step(constants_, load, first_moment(slot), h, &motion.path());
+  motion.set_modes(data.eigenvalues, data.decays, amplitudes(slot), rates(slot));
+  if (b.modes_loaded) std::ranges::copy(forces_.modes(slot), motion.forces().begin());
+  if (!couplings_.empty()) excite_modes(motion.forces().data(), excitation);
+  if (b.modes_static) motion.release(static_amplitudes(slot));
+  for (const DelayedImpulse& impulse : b.delayed)
+    add_modal_force(*model_, impulse.at, impulse.impulse_B, motion.add_impulse(impulse.time));
+  frame.end_step(constants_, load, first_moment_at_end(motion), h, &motion.path());
+}
+
+Vec3 BodyGroup::first_moment_at_end(const ExactMotion& motion) const {
+  Vec3 s = constants_.mass * constants_.center_of_mass;
+  for (std::size_t i = 0; i < couplings_.size(); ++i)
+    s += motion.amplitude(static_cast<Index>(i), motion.step()) * couplings_[i].field;
+  return s;
 }
 
 /// What answered the last step's constraints statically does not vibrate when they let go.
@@ -276,10 +293,7 @@ void BodyGroup::clear_loads(Index slot) {
   b.force = b.torque = Vec3::Zero();
   if (b.modes_loaded || !couplings_.empty()) forces_.clear(slot);
   b.modes_loaded = false;
-  if (!b.modes_delayed) return;
-  delayed_z_.clear(slot);
-  delayed_rates_.clear(slot);
-  b.modes_delayed = false;
+  b.delayed.clear();
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }

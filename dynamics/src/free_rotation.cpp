@@ -57,6 +57,12 @@ double inverse_sn(double s, double c2, double m, double complement) {
   return s == 0.0 ? 0.0 : s * carlson_rf(c2, complement + m * c2);
 }
 
+/// |v| of any finite v. Eigen's stableNorm() sums in an order that depends on where v lies in memory.
+double safe_norm(const Vec3& v) {
+  const double largest = v.cwiseAbs().maxCoeff();
+  return largest == 0.0 ? 0.0 : largest * (v / largest).norm();
+}
+
 /// The shortest turn that takes the unit vector l (l₃ > −1) to e₃, times √(2 + 2 l₃).
 Quaternion turn_to_z(double l1, double l2, double l3) { return {1.0 + l3, l2, -l1, 0.0}; }
 
@@ -86,7 +92,7 @@ struct FreeRotation::Orbit {
 };
 
 FreeRotation::FreeRotation(const PrincipalInertia& body, const Quaternion& q_WB, const Vec3& momentum_W) {
-  const double L = momentum_W.stableNorm();
+  const double L = safe_norm(momentum_W);
   q_WF_ = q_WB;
   if (L == 0.0) return;
 

@@ -126,14 +126,16 @@ void RigidFrame::rotate_freely(const FrameConstants& c, double h) {
 }
 
 FrameExcitation RigidFrame::begin_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment,
-                                       double h) {
+                                       double h, FramePath* path) {
   FrameExcitation excitation;
   if (c.motion == FrameMotion::kFree) {
     const Vec3 acceleration = load.gravity + load.force / c.mass;
     kick(c, load, first_moment, 0.5 * h);
+    if (path) path->start_free({.pose = pose_, .velocity = velocity_, .acceleration = acceleration}, h, c.principal);
     pose_.p += h * velocity_ + 0.5 * h * h * acceleration;
     velocity_ += h * acceleration;
     rotate_freely(c, h);
+    if (path) path->add_free(0.0, rotation_, static_cast<double>(rotation_steps_ - 1) * h, momentum_);
     return excitation;
   }
   hold_parent_accelerations();
@@ -141,6 +143,8 @@ FrameExcitation RigidFrame::begin_step(const FrameConstants& c, const FrameLoad&
   const double part = h / n;
   add_excitation(c, load.gravity, 0.5 / n, excitation);
   if (c.motion != FrameMotion::kKinematic) kick(c, load, first_moment, 0.5 * part);
+  if (path && c.motion == FrameMotion::kPoint) path->start_free(parent_path(h), h, c.principal);
+  if (path && c.motion != FrameMotion::kPoint) path->start_carried(parent_path(h), h, c.line_axis);
   const KinematicFrame before = parent_;
   move_parent(h);
   const KinematicFrame after = parent_;
@@ -148,7 +152,9 @@ FrameExcitation RigidFrame::begin_step(const FrameConstants& c, const FrameLoad&
     place_parent_between(before, after, static_cast<double>(i) / n);
     if (c.motion == FrameMotion::kPoint) {
       rotate_freely(c, part);
+      if (path) path->add_free((i - 1) * part, rotation_, static_cast<double>(rotation_steps_ - 1) * part, momentum_);
     } else {
+      if (path) path->add_carried((i - 1) * part, angle_, angle_rate_);
       angle_ += part * angle_rate_;
       pose_.q = normalized(parent_.pose.q * quaternion_from_rotation_vector(angle_ * c.line_axis));
     }
@@ -158,8 +164,10 @@ FrameExcitation RigidFrame::begin_step(const FrameConstants& c, const FrameLoad&
   return excitation;
 }
 
-void RigidFrame::end_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h) {
+void RigidFrame::end_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h,
+                          FramePath* path) {
   if (c.motion != FrameMotion::kKinematic) kick(c, load, first_moment, 0.5 * h / substeps(c, load, h));
+  if (path) path->finish({.pose = pose_, .velocity = velocity_, .angular_velocity = angular_velocity(c)});
 }
 
 /// Parts of a step in which a hanging body cannot swing far. Given by the model and the field, not by the motion, so
@@ -195,6 +203,18 @@ void RigidFrame::move_parent(double h) {
   }
   pose_.p = parent_.pose.p;
   velocity_ = parent_.velocity;
+}
+
+/// From the parent's pose now to that at the step's end: the parabola of its held acceleration through both, and a
+/// steady turn.
+RigidMotion RigidFrame::parent_path(double h) const {
+  if (!parent_was_set_)
+    return {.pose = parent_.pose, .velocity = parent_.velocity, .angular_velocity = parent_.angular_velocity};
+  const Vec3& a = next_parent_.acceleration;
+  return {.pose = parent_.pose,
+          .velocity = (next_parent_.pose.p - parent_.pose.p) / h - 0.5 * h * a,
+          .acceleration = a,
+          .angular_velocity = rotation_vector(next_parent_.pose.q * parent_.pose.q.conjugate()) / h};
 }
 
 void RigidFrame::add_excitation(const FrameConstants& c, const Vec3& gravity, double weight,

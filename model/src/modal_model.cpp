@@ -204,6 +204,18 @@ class Checker {
   std::size_t modes_;
 };
 
+SurfaceExtent extent(const ModalSurface& surface) {
+  SurfaceExtent e;
+  for (const Vec3f& r : surface.rest) e.radius = std::max(e.radius, r.cast<double>().norm());
+  for (Index i = 0; i < surface.basis.modes(); ++i) {
+    double most = 0.0;
+    for (Index v = 0; v < surface.vertices(); ++v)
+      most = std::max(most, surface.basis.shape(v, i).cast<double>().norm());
+    e.shape.push_back(most);
+  }
+  return e;
+}
+
 }  // namespace
 
 std::string_view to_string(FrameMotion motion) {
@@ -224,6 +236,7 @@ ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   (void)to_string(data_.motion);
   Checker(data_).check();
   collision_rows_ = VertexRows(collision().basis);
+  collision_extent_ = extent(collision());
 }
 
 double ModalModel::frequency_hz(Index mode) const {

@@ -207,5 +207,22 @@ TEST(PrincipalInertia, RefusesWhatIsNoInertia) {
   EXPECT_THROW(principal_inertia(Mat3::Constant(std::nan(""))), InvalidArgument);
 }
 
+// Libraries that sum three numbers in pairs start where an address is a multiple of 16.
+TEST(FreeRotation, DoesNotDependOnWhereTheMomentumLies) {
+  struct {
+    alignas(16) Vec3 even;
+    Vec3 odd;
+  } momentum{{0.3, 1.7, -0.9}, {0.3, 1.7, -0.9}};
+  const PrincipalInertia body = principal_inertia(Vec3(0.3, 0.7, 0.9).asDiagonal());
+  for (int i = 0; i < 100; ++i) {
+    momentum.even *= 1.01 + 0.001 * i;
+    momentum.odd = momentum.even;
+    const Quaternion a = FreeRotation(body, {}, momentum.even).attitude(1.0);
+    const Quaternion b = FreeRotation(body, {}, momentum.odd).attitude(1.0);
+    EXPECT_EQ(a.w, b.w);
+    EXPECT_EQ(a.vector(), b.vector());
+  }
+}
+
 }  // namespace
 }  // namespace limber

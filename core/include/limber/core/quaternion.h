@@ -38,6 +38,10 @@ inline Quaternion normalized(const Quaternion& q) {
 /// Rotation by |r| radians about r (right hand); exact to round-off for any |r|, identity at r = 0.
 Quaternion quaternion_from_rotation_vector(const Vec3& r);
 
+/// The inverse: the shortest turn that a unit quaternion makes, 0 ≤ |r| ≤ π; exact to round-off. q and −q give the
+/// same.
+Vec3 rotation_vector(const Quaternion& q);
+
 /// The rotation matrix of a unit quaternion.
 Mat3 to_matrix(const Quaternion& q);
 

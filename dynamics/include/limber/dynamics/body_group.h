@@ -21,6 +21,8 @@
 
 namespace limber {
 
+class ExactMotion;
+
 /// What constraints do to one body over one step. Forces act on the deformed body; angular quantities are about the
 /// body origin. World axes.
 ///
@@ -78,12 +80,16 @@ class BodyGroup {
   /// Held over the next step. @param newtons world axes
   void apply_force(Index slot, const SurfacePoint& at, const Vec3& newtons);
   /// Changes the velocities of frame and modes at once; the modes' only `delay` seconds into the next step if that is
-  /// positive (exactly: the response to an impulse at that time is added).
+  /// positive (exactly: the response to an impulse at that time is added). Allocates nothing but the body's first
+  /// places for delayed impulses.
   /// @param newton_seconds world axes. @param delay in [0, step), s
   void apply_impulse(Index slot, const SurfacePoint& at, const Vec3& newton_seconds, double delay);
 
   /// One step of the occupied slots in [begin, end). Allocates and throws nothing.
   void advance(Index begin, Index end, const Vec3& gravity);
+
+  /// What advance() would do to one body, at any time within the step. The body stays as it is.
+  void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const;
 
   // One step in two phases, for bodies under constraints: predict as often as wanted, then commit the last prediction.
   // predict() and commit() without a load come to the same bits as advance(). Neither allocates nor throws.
@@ -137,14 +143,20 @@ class BodyGroup {
     std::vector<Block> storage_;
   };
 
+  struct DelayedImpulse {
+    SurfacePoint at;
+    Vec3 impulse_B;  // N·s
+    double time;     // s into the next step
+  };
+
   struct Body {
     RigidFrame frame;
     RigidTransform previous_pose;
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // held over the next step, world
     bool occupied = true;
-    bool modes_loaded = false;   // forces_ is not zero
-    bool modes_delayed = false;  // delayed_z_, delayed_rates_ are not zero
-    bool modes_static = false;   // static_amplitudes_ are not zero
+    bool modes_loaded = false;              // forces_ is not zero
+    bool modes_static = false;              // static_amplitudes_ are not zero
+    std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
   };
 
   /// The frame at the end of a step that was predicted.
@@ -159,6 +171,7 @@ class BodyGroup {
   };
 
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
+  const Body& body(Index slot) const { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
   void advance_modes(Index slot, const ModeArrays& modes, bool loaded) const;
   void excite_modes(double* forces, const FrameExcitation& excitation) const;
@@ -168,13 +181,10 @@ class BodyGroup {
   void clear_loads(Index slot);
   void clear_modes(Index slot);
   Vec3 first_moment_of(std::span<const double> z) const;
-  std::array<ModeRows*, 11> mode_rows() {
-    return {&amplitudes_,          &rates_,
-            &previous_amplitudes_, &forces_,
-            &delayed_z_,           &delayed_rates_,
-            &static_amplitudes_,   &predicted_amplitudes_,
-            &predicted_rates_,     &predicted_forces_,
-            &predicted_static_};
+  Vec3 first_moment_at_end(const ExactMotion& motion) const;
+  std::array<ModeRows*, 9> mode_rows() {
+    return {&amplitudes_,           &rates_,           &previous_amplitudes_, &forces_,          &static_amplitudes_,
+            &predicted_amplitudes_, &predicted_rates_, &predicted_forces_,    &predicted_static_};
   }
 
   std::shared_ptr<const ModalModel> model_;
@@ -190,9 +200,8 @@ class BodyGroup {
   std::vector<Body> bodies_;
   std::vector<Index> vacant_;
   ModeRows amplitudes_, rates_, previous_amplitudes_;
-  ModeRows forces_;                     // g, held over the next step
-  ModeRows delayed_z_, delayed_rates_;  // added at the end of the next step
-  ModeRows static_amplitudes_;          // c, of amplitudes_: the static answer to the last step's constraints
+  ModeRows forces_;             // g, held over the next step
+  ModeRows static_amplitudes_;  // c, of amplitudes_: the static answer to the last step's constraints
 
   std::vector<Prediction> predictions_;
   ModeRows predicted_amplitudes_, predicted_rates_, predicted_forces_, predicted_static_;

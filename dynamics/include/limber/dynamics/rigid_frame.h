@@ -18,6 +18,7 @@
 #include <cstdint>
 
 #include "limber/core/rigid_transform.h"
+#include "limber/dynamics/frame_path.h"
 #include "limber/dynamics/free_rotation.h"
 #include "limber/model/modal_model.h"
 
@@ -91,14 +92,18 @@ class RigidFrame {
 
   /// One step is begin_step(), the modes' own step, end_step(): the modes are shaken by what begin_step() returns and
   /// move the first moment s that the second kick sees.
-  FrameExcitation begin_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h);
-  void end_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h);
+  /// @param path if given, both together write there how the frame moves within the step
+  FrameExcitation begin_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h,
+                             FramePath* path = nullptr);
+  void end_step(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double h,
+                FramePath* path = nullptr);
 
  private:
   void kick(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double seconds);
   void rotate_freely(const FrameConstants& c, double h);
   void hold_parent_accelerations();
   void move_parent(double h);
+  RigidMotion parent_path(double h) const;
   int substeps(const FrameConstants& c, const FrameLoad& load, double h) const;
   void place_parent_between(const KinematicFrame& before, const KinematicFrame& after, double part);
   void add_excitation(const FrameConstants& c, const Vec3& gravity, double weight, FrameExcitation& sum) const;

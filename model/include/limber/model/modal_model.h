@@ -75,6 +75,12 @@ struct ModalModelData {
   std::optional<ResidualCompliance> residual_compliance;
 };
 
+/// How far a surface's vertices lie from the body origin and how far a mode can take them.
+struct SurfaceExtent {
+  double radius = 0.0;        ///< max over vertices of |rest|, m
+  std::vector<double> shape;  ///< per mode the max over vertices of |U_i|, kg^−½
+};
+
 /// Immutable and checked; shared by all instances through std::shared_ptr<const ModalModel>.
 class ModalModel {
  public:
@@ -89,12 +95,15 @@ class ModalModel {
   /// The basis of collision() once more, vertex by vertex.
   const VertexRows& collision_rows() const { return collision_rows_; }
 
+  const SurfaceExtent& collision_extent() const { return collision_extent_; }
+
   /// Undamped frequency of a mode, √λ/2π, Hz.
   double frequency_hz(Index mode) const;
 
  private:
   ModalModelData data_;
   VertexRows collision_rows_;
+  SurfaceExtent collision_extent_;
 };
 
 }  // namespace limber

@@ -1,0 +1,87 @@
+/// @file limber/dynamics/exact_motion.h
+/// The motion of one body over the coming step, evaluated anywhere within it in closed form, without changing the body.
+///
+///   ExactMotion motion;
+///   group.predict_motion(slot, gravity, motion);  // or set_frame() for a mover without modes
+///   motion.at(0.3 * motion.step(), pose, amplitudes);
+///
+/// Under the loads that the body has now: forces held, impulses with a delay from their time on. What it says at the
+/// step's end is what BodyGroup::advance() commits (to round-off: 1e-13 of the state); constraints are not part of it.
+/// Frames: FramePath. Modes: the exact flow of each oscillator (oscillator.h) over t. A motion is a copy: the body may
+/// change, its model must live. Setting a motion again allocates nothing once it has held as many modes, parts and
+/// impulses; all else never does.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/dynamics/frame_path.h"
+#include "limber/dynamics/motion_bounds.h"
+#include "limber/dynamics/oscillator.h"
+
+namespace limber {
+
+/// A body's state at one time within a step; scratch that its owner keeps.
+struct MotionState {
+  double time = 0.0;  ///< s from the step's start
+  RigidTransform pose{};
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();  ///< of the origin; world
+  std::vector<double> amplitudes{}, rates{};                      ///< z, ż
+};
+
+class ExactMotion {
+ public:
+  /// At rest in the world's origin, without modes; step 0.
+  ExactMotion() = default;
+
+  /// A mover without modes. @throws InvalidArgument for numbers that are not finite or a step < 0
+  void set_frame(const RigidMotion& motion, double step);
+
+  double step() const { return path_.step(); }
+  Index modes() const { return static_cast<Index>(z_.size()); }
+  const FramePath& path() const { return path_; }
+
+  /// @param t in [0, step]; no check, here and below. @param amplitudes modes() numbers
+  void at(double t, RigidTransform& pose, std::span<double> amplitudes) const;
+  /// @param rates modes() numbers; where an impulse acts at t: after it
+  void rates_at(double t, Vec3& velocity, Vec3& angular_velocity, std::span<double> rates) const;
+  double amplitude(Index mode, double t) const { return mode_at(static_cast<std::size_t>(mode), t).z; }
+  /// Both at once.
+  void evaluate(double t, MotionState& state) const;
+
+  /// Up to when, from t on, no kick or impulse acts: there the bounds of second order hold (FrameBounds::bend,
+  /// ModeBound::acceleration). > t for t < step
+  double smooth_until(double t) const;
+
+  /// Bounds over [from.time, until]. O(k). @param from what evaluate() gave. @pre from.time ≤ until ≤ step
+  void bounds(const MotionState& from, double until, MotionBounds& bounds) const;
+
+  /// How far any point with |r| ≤ distance, |U_i| ≤ shape_i may be from its place at the start within the step, m: with
+  /// the numbers of ModalModel::collision_extent(), BodyState::reach. O(k).
+  double reach(double distance, std::span<const double> shape) const;
+
+  // For those who make one by hand: the frame first, then its modes, then the impulses on them.
+  FramePath& path() { return path_; }
+  /// @param lambda, decay as in Mode; kept by reference. @param z, rates at the step's start; as many of each
+  void set_modes(std::span<const double> lambda, std::span<const double> decay, std::span<const double> z,
+                 std::span<const double> rates);
+  std::span<double> forces() { return force_; }  ///< g, held over the step; zero after set_modes()
+  /// Takes a part off the amplitudes at the step's start: what held it lets go. reach() still counts from before.
+  void release(std::span<const double> part);
+  /// @param time in [0, step), s. @returns the modal impulse w_iᵀj of every mode, zeros to be filled
+  std::span<double> add_impulse(double time);
+
+ private:
+  Mode mode(std::size_t i) const { return {lambda_[i], decay_[i]}; }
+  ModeState mode_at(std::size_t i, double t) const;
+  ModeBound bound(std::size_t i, const ModeState& from, double t0, double t1) const;
+  std::span<const double> impulses_at(std::size_t n) const { return {impulses_.data() + n * z_.size(), z_.size()}; }
+
+  FramePath path_;
+  std::span<const double> lambda_, decay_;
+  std::vector<double> z_, rates_, force_;
+  std::vector<double> released_;                  // empty, or by mode
+  std::vector<double> impulse_times_, impulses_;  // impulses_: a row of modes for each
+};
+
+}  // namespace limber

@@ -1,0 +1,136 @@
+#include "limber/dynamics/frame_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace limber {
+namespace {
+
+/// sup |ω| and sup |ω̇| over a free rotation, from one point of it.
+struct RotationBounds {
+  double angular_speed, angular_acceleration;
+};
+
+/// With x_i = l_i², the polhode is the segment x + s (α, −(α+γ), γ), α = 1/I₂ − 1/I₃, γ = 1/I₁ − 1/I₂: on it |ω|² grows
+/// with s up to where x₂ = 0, and each x_i is largest at one of its ends.
+RotationBounds rotation_bounds(const Vec3& moments, const Vec3& momentum_P) {
+  const Vec3 inverse = moments.cwiseInverse(), x = momentum_P.cwiseAbs2();
+  const double alpha = std::max(inverse.y() - inverse.z(), 0.0), gamma = std::max(inverse.x() - inverse.y(), 0.0);
+  const double sum = alpha + gamma;
+  const double speed = std::sqrt(momentum_P.cwiseProduct(inverse).squaredNorm() + x.y() * alpha * gamma);
+  if (sum == 0.0) return {speed, 0.0};
+  const double back = std::min(alpha > 0.0 ? x.x() / alpha : std::numeric_limits<double>::infinity(),
+                               gamma > 0.0 ? x.z() / gamma : std::numeric_limits<double>::infinity());
+  const Vec3 most(x.x() + alpha / sum * x.y(), x.y() + sum * back, x.z() + gamma / sum * x.y());
+  const Vec3 gain = Vec3(alpha, sum, gamma).cwiseProduct(inverse);  // I_i ω̇_i = l_j l_k (1/I_k − 1/I_j)
+  const Vec3 products(most.y() * most.z(), most.z() * most.x(), most.x() * most.y());
+  return {speed, std::sqrt(gain.cwiseAbs2().dot(products))};
+}
+
+}  // namespace
+
+void FramePath::start(const RigidMotion& motion, double step) {
+  step_ = step;
+  start_ = end_ = motion;
+  acceleration_ = motion.acceleration;
+  parts_.clear();
+}
+
+void FramePath::set(const RigidMotion& motion, double step) {
+  start_carried(motion, step, Vec3::UnitX());
+  add_carried(0.0, 0.0, 0.0);
+  finish({.pose = {normalized(quaternion_from_rotation_vector(step * motion.angular_velocity) * motion.pose.q),
+                   motion.pose.p + step * motion.velocity + 0.5 * step * step * motion.acceleration},
+          .velocity = motion.velocity + step * motion.acceleration,
+          .angular_velocity = motion.angular_velocity});
+}
+
+void FramePath::start_free(const RigidMotion& origin, double step, const PrincipalInertia& inertia) {
+  start(origin, step);
+  free_ = true;
+  inertia_ = inertia;
+}
+
+void FramePath::start_carried(const RigidMotion& parent, double step, const Vec3& line_axis) {
+  start(parent, step);
+  free_ = false;
+  line_axis_ = line_axis;
+}
+
+void FramePath::add_free(double begin, const FreeRotation& rotation, double since, const Vec3& momentum_W) {
+  const Quaternion q_WP = rotation.attitude(since) * inertia_.q_BP;
+  const RotationBounds b = rotation_bounds(inertia_.moments, q_WP.conjugate() * momentum_W);
+  parts_.push_back({.begin = begin,
+                    .rotation = rotation,
+                    .since = since,
+                    .momentum = momentum_W,
+                    .angular_speed = b.angular_speed,
+                    .bend = b.angular_acceleration + b.angular_speed * b.angular_speed});
+}
+
+void FramePath::add_carried(double begin, double angle, double angle_rate) {
+  const double carried = start_.angular_velocity.norm(), own = std::abs(angle_rate), speed = carried + own;
+  parts_.push_back({.begin = begin,
+                    .angle = angle,
+                    .angle_rate = angle_rate,
+                    .angular_speed = speed,
+                    .bend = carried * own + speed * speed});
+}
+
+void FramePath::finish(const RigidMotion& motion) { end_ = motion; }
+
+const FramePath::Part& FramePath::part_at(double t) const {
+  const auto after = std::upper_bound(parts_.begin() + 1, parts_.end(), t,
+                                      [](double time, const Part& part) { return time < part.begin; });
+  return *(after - 1);
+}
+
+double FramePath::end_of(const Part& part) const { return &part == &parts_.back() ? step_ : (&part + 1)->begin; }
+
+Quaternion FramePath::attitude(const Part& part, double t) const {
+  if (free_) return part.rotation.attitude(part.since + (t - part.begin));
+  const Quaternion carried = quaternion_from_rotation_vector(t * start_.angular_velocity) * start_.pose.q;
+  const double angle = part.angle + (t - part.begin) * part.angle_rate;
+  return normalized(carried * quaternion_from_rotation_vector(angle * line_axis_));
+}
+
+RigidTransform FramePath::pose(double t) const {
+  if (t >= step_) return end_.pose;
+  return {attitude(part_at(t), t), start_.pose.p + t * (start_.velocity + 0.5 * t * acceleration_)};
+}
+
+Vec3 FramePath::velocity(double t) const {
+  return t >= step_ ? end_.velocity : Vec3(start_.velocity + t * acceleration_);
+}
+
+Vec3 FramePath::angular_velocity(double t) const {
+  if (t >= step_) return end_.angular_velocity;
+  const Part& part = part_at(t);
+  if (!free_) return start_.angular_velocity + part.angle_rate * (attitude(part, t) * line_axis_);
+  const Quaternion q_WP = attitude(part, t) * inertia_.q_BP;
+  return q_WP * (q_WP.conjugate() * part.momentum).cwiseQuotient(inertia_.moments);
+}
+
+double FramePath::smooth_until(double t) const { return end_of(part_at(t)); }
+
+FrameBounds FramePath::bounds(double t0, double t1) const {
+  const double s = t1 - t0;
+  const Vec3 v0 = start_.velocity + t0 * acceleration_;
+  FrameBounds b{.speed = std::max(v0.norm(), (v0 + s * acceleration_).norm()),
+                .travel = s * std::max(v0.norm(), (v0 + 0.5 * s * acceleration_).norm())};
+  const Part* part = &part_at(t0);
+  if (end_of(*part) < t1) b.bend = std::numeric_limits<double>::infinity();
+  for (;; ++part) {
+    const double end = end_of(*part);
+    b.angular_speed = std::max(b.angular_speed, part->angular_speed);
+    b.turn += (std::min(end, t1) - std::max(part->begin, t0)) * part->angular_speed;
+    b.bend = std::max(b.bend, part->bend);
+    if (end >= t1) break;
+  }
+  b.turn = std::min(b.turn, std::numbers::pi);
+  return b;
+}
+
+}  // namespace limber
