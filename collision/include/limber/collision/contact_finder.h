@@ -7,17 +7,49 @@
 ///   const std::array states{BodyState{.pose = X_WB, .amplitudes = z}, BodyState{}};
 ///   std::vector<ContactPoint> contacts;
 ///   finder.find_contacts({.states = states, .margin = 1e-3}, contacts, serial_jobs());
+///
+/// A query takes a box about each awake body from its amplitudes alone, O(k); pairs of near boxes (BroadPhase); all
+/// contacts of each pair (NarrowPhase), with vertices made only where the two are near; and of each patch the few
+/// contacts that carry the same forces and torques (ContactClusters). Bodies that sleep cost nothing until one that is
+/// awake comes near. A model or shape that many bodies share is made ready once. docs/collision.md tells it in full.
 #pragma once
 
 #include <memory>
 
+#include "limber/collision/contact_clusters.h"
+#include "limber/collision/deformed_surface.h"
+#include "limber/collision/narrow_phase.h"
 #include "limber/dynamics/contact_source.h"
 
 namespace limber {
 
+struct ContactFinderOptions {
+  /// How boxes within a body are made: changes the time, not the contacts.
+  BoundsChoice bounds = BoundsChoice::kAutomatic;
+  NarrowPhaseOptions narrow_phase{};  ///< depth and normal of overlaps
+  /// How contacts are thinned; {.max_points = 0} gives all.
+  ContactClusterOptions clusters{};
+  /// Extent of a patch where a body deforms: no contact is farther from its first than this share of the smaller body's
+  /// diagonal at rest; > 0. Smaller ones follow a bent surface more closely, with more contacts. Two rigid bodies have
+  /// one patch for each direction of the normal.
+  double patch_radius = 0.25;
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
+};
+
+/// Used by one thread at a time; it spreads the work over the Jobs of the query itself.
+///
+/// What find_contacts() and find_impacts() refuse (InvalidArgument naming body and member, found before anything is
+/// changed): a pose that is not finite or whose quaternion is not of length 1 within 1e-6, another number of amplitudes
+/// than the body has modes, amplitudes that are not finite or move a vertex beyond 1e30 m, a reach or margin that is
+/// negative or not finite, and `states` that do not reach to every body. States of bodies that sleep are looked at when
+/// they fall asleep and when something comes near.
+///
+/// Ids: equal for the same features of the same two body indices, whatever happened between; made by mixing 64 bits, so
+/// that two contacts of different pairs have the same one with probability 2⁻⁶⁴.
 class ContactFinder final : public ContactSource {
  public:
-  ContactFinder();
+  /// @throws InvalidArgument see ContactFinderOptions::validate()
+  explicit ContactFinder(const ContactFinderOptions& options = {});
   ~ContactFinder() override;
   ContactFinder(ContactFinder&&) noexcept;
   ContactFinder& operator=(ContactFinder&&) noexcept;

@@ -1,0 +1,411 @@
+#include "limber/collision/contact_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <string>
+
+#include "geometry_cache.h"
+#include "limber/collision/broad_phase.h"
+#include "limber/core/error.h"
+#include "surface_pool.h"
+#include "world_bounds.h"
+
+namespace limber {
+namespace {
+
+constexpr std::size_t kPairsPerChunk = 4;
+constexpr std::size_t kBodiesPerChunk = 64;
+
+struct Body {
+  bool present = false;
+  std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
+  std::shared_ptr<const RigidGeometry> rigid{};
+  bool finds_itself = false;
+  double diagonal = 0.0;       ///< of its box at rest, m; infinite for a half-space
+  bool placed_asleep = false;  ///< as its place in the broad phase was made
+  double placed_reach = 0.0;
+
+  Index modes() const { return modal ? modal->surface->modes() : 0; }
+  bool is_half_space() const { return rigid && std::holds_alternative<HalfSpace>(rigid->shape()); }
+};
+
+/// What one thread works with. Which of them does a task changes nothing but the time.
+struct Worker {
+  explicit Worker(const ContactFinderOptions& options) : narrow(options.narrow_phase), clusters(options.clusters) {}
+  NarrowPhase narrow;
+  ContactClusters clusters;
+  SurfacePool pool;
+  DeformedSurface root;  ///< for boxes of whole bodies
+};
+
+/// Lends workers to threads.
+class Workers {
+ public:
+  void start_query(const ContactFinderOptions& options, int concurrency) {
+    while (all_.size() < static_cast<std::size_t>(concurrency)) all_.push_back(std::make_unique<Worker>(options));
+    free_.clear();
+    for (const auto& worker : all_) worker->pool.start_query(), free_.push_back(worker.get());
+  }
+  class Lease {
+   public:
+    explicit Lease(Workers& from) : from_(from), worker_(from.take()) {}
+    ~Lease() {
+      const std::lock_guard lock(from_.mutex_);
+      from_.free_.push_back(worker_);
+    }
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    Worker& operator*() const { return *worker_; }
+
+   private:
+    Workers& from_;
+    Worker* worker_;
+  };
+
+ private:
+  Worker* take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) throw ComputationError("ContactFinder: Jobs runs more loop bodies at once than concurrency()");
+    Worker* worker = free_.back();
+    free_.pop_back();
+    return worker;
+  }
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Worker>> all_;
+  std::vector<Worker*> free_;
+};
+
+/// What was kept of one pair: a range of ids.
+struct PairIds {
+  BodyPair pair;
+  std::size_t first = 0, count = 0;
+};
+
+/// A bijection that spreads every bit over all (the finaliser of Steele, Lea and Flood's SplitMix, 2014).
+std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// Different for each pair; for one pair as different as the features' own.
+std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
+  const auto key = static_cast<std::uint64_t>(pair.a) << 32 | static_cast<std::uint32_t>(pair.b);
+  return mixed(features ^ mixed(key + 0x9e3779b97f4a7c15u));
+}
+
+[[noreturn]] void refuse(Index body, const std::string& seen, const std::string& expected) {
+  throw InvalidArgument("ContactFinder: state of body " + std::to_string(body) + ": " + seen + ", expected " +
+                        expected);
+}
+
+void check_state(Index index, const Body& body, const BodyState& state) {
+  constexpr double kUnit = 1e-6;
+  const Quaternion& q = state.pose.q;
+  if (!state.pose.p.allFinite()) refuse(index, "pose.p is not finite", "finite coordinates");
+  if (!(std::abs(q.norm() - 1.0) <= kUnit)) refuse(index, "pose.q has length " + std::to_string(q.norm()), "1");
+  if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
+    refuse(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
+  if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
+    refuse(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
+  double farthest = 0.0;
+  for (std::size_t i = 0; i < state.amplitudes.size(); ++i) {
+    if (!std::isfinite(state.amplitudes[i]))
+      refuse(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
+    farthest += std::abs(state.amplitudes[i]) * body.modal->surface->largest_shape(static_cast<Index>(i));
+  }
+  if (!(farthest <= 1e30)) refuse(index, "amplitudes that move a vertex beyond 1e30 m", "smaller ones");
+}
+
+void check_length(const char* name, double length) {
+  if (!(length >= 0.0 && std::isfinite(length)))
+    throw InvalidArgument("ContactFinder: " + std::string(name) + " is " + std::to_string(length) +
+                          ", expected a finite number of at least 0");
+}
+
+}  // namespace
+
+void ContactFinderOptions::validate() const {
+  clusters.validate();
+  if (!(patch_radius > 0.0))
+    throw InvalidArgument("ContactFinderOptions: patch_radius is " + std::to_string(patch_radius) +
+                          ", expected above 0");
+}
+
+struct ContactFinder::Impl {
+  explicit Impl(const ContactFinderOptions& o) : options(o) { options.validate(); }
+
+  ContactFinderOptions options;
+  GeometryCache geometries;
+  std::vector<Body> bodies;
+  std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
+  BroadPhase broad_phase;
+  Workers workers;
+
+  // Of the query under way.
+  const ContactQuery* query = nullptr;
+  std::vector<Index> to_place;
+  std::vector<Aabb> boxes;  ///< by entry of to_place
+  std::vector<BodyPair> pairs, merged_pairs;
+  std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
+
+  // Of the last query, ascending.
+  std::vector<PairIds> kept_pairs;
+  std::vector<std::uint64_t> kept_ids;
+
+  Body& present(Index body, const char* function) {
+    if (!contains(body))
+      throw InvalidArgument("ContactFinder::" + std::string(function) + ": index " + std::to_string(body) +
+                            " holds no body, expected one that was added");
+    return at(body);
+  }
+  bool contains(Index body) const {
+    return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).present;
+  }
+  Body& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
+  const Body& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  static const BodyState& state(std::span<const BodyState> states, Index body) {
+    return states[static_cast<std::size_t>(body)];
+  }
+
+  void set_finds_itself(Index body, bool finds);
+  bool stays_in_place(Index body, const BodyState& state) const;
+  void check_and_list(std::span<const BodyState> states);
+  void make_boxes(std::span<const BodyState> states, Jobs& jobs);
+  void place(std::span<const BodyState> states);
+  void merge_self_pairs(std::span<const BodyState> states);
+  void check_sleepers_in_pairs(std::span<const BodyState> states) const;
+  void find_in_pairs(Jobs& jobs);
+  void find_in_pair(const BodyPair& pair, Worker& worker, std::vector<ContactPoint>& contacts) const;
+  CollisionBody collision_body(Index body, Worker& worker) const;
+  double patch_radius(const BodyPair& pair) const;
+  std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
+  void gather(std::vector<ContactPoint>& contacts);
+};
+
+void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
+  const auto where = std::lower_bound(self_touching.begin(), self_touching.end(), body);
+  const bool listed = where != self_touching.end() && *where == body;
+  if (finds && !listed) self_touching.insert(where, body);
+  if (!finds && listed) self_touching.erase(where);
+  at(body).finds_itself = finds;
+}
+
+bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
+  return s.asleep && at(body).placed_asleep && at(body).placed_reach == s.reach;
+}
+
+/// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
+void ContactFinder::Impl::check_and_list(std::span<const BodyState> states) {
+  to_place.clear();
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (!bodies[i].present) continue;
+    const auto body = static_cast<Index>(i);
+    if (i >= states.size())
+      throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
+                            std::to_string(i) + " too");
+    if (stays_in_place(body, states[i])) continue;
+    check_state(body, bodies[i], states[i]);
+    to_place.push_back(body);
+  }
+}
+
+/// Of each body to be placed, in the world, from its amplitudes alone.
+void ContactFinder::Impl::make_boxes(std::span<const BodyState> states, Jobs& jobs) {
+  boxes.resize(to_place.size());
+  struct Loop {
+    Impl& m;
+    std::span<const BodyState> states;
+  } loop{*this, states};
+  jobs.parallel_for(to_place.size(), kBodiesPerChunk, [&loop](std::size_t begin, std::size_t end) {
+    Impl& m = loop.m;
+    const Workers::Lease worker(m.workers);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Body& body = m.at(m.to_place[i]);
+      const BodyState& s = state(loop.states, m.to_place[i]);
+      if (body.modal) {
+        DeformedSurface& surface = (*worker).root;
+        surface.bind(body.modal->surface, s.amplitudes, BoundsChoice::kAmplitudes);
+        m.boxes[i] = world_box(surface.bounds(0), s.pose).grown(s.reach);
+      } else if (!body.is_half_space()) {
+        m.boxes[i] = world_box(*body.rigid, s.pose).grown(s.reach);
+      }
+    }
+  });
+}
+
+void ContactFinder::Impl::place(std::span<const BodyState> states) {
+  for (std::size_t i = 0; i < to_place.size(); ++i) {
+    const Index index = to_place[i];
+    Body& body = at(index);
+    const BodyState& s = state(states, index);
+    if (body.is_half_space()) {
+      HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), s.pose);
+      half_space.offset += s.reach;
+      broad_phase.set_half_space(index, half_space);
+    } else {
+      broad_phase.set_box(index, boxes[i]);
+    }
+    broad_phase.set_asleep(index, s.asleep);
+    body.placed_asleep = s.asleep;
+    body.placed_reach = s.reach;
+  }
+}
+
+/// Bodies that find themselves and are awake, among the pairs in their order.
+void ContactFinder::Impl::merge_self_pairs(std::span<const BodyState> states) {
+  if (self_touching.empty()) return;
+  merged_pairs.clear();
+  auto next = pairs.begin();
+  for (const Index body : self_touching) {
+    if (state(states, body).asleep) continue;
+    const BodyPair self{body, body};
+    for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
+    merged_pairs.push_back(self);
+  }
+  merged_pairs.insert(merged_pairs.end(), next, pairs.end());
+  pairs.swap(merged_pairs);
+}
+
+void ContactFinder::Impl::check_sleepers_in_pairs(std::span<const BodyState> states) const {
+  for (const auto& [a, b] : pairs)
+    for (const Index body : {a, b})
+      if (state(states, body).asleep) check_state(body, at(body), state(states, body));
+}
+
+CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
+  const Body& body = at(index);
+  const BodyState& s = state(query->states, index);
+  CollisionBody result{.index = index, .X_WB = s.pose};
+  if (body.modal) {
+    result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
+    result.volume = body.modal->volume ? &*body.modal->volume : nullptr;
+  } else {
+    result.geometry = body.rigid.get();
+  }
+  return result;
+}
+
+double ContactFinder::Impl::patch_radius(const BodyPair& pair) const {
+  const Body &a = at(pair.a), &b = at(pair.b);
+  if (a.modes() == 0 && b.modes() == 0) return std::numeric_limits<double>::infinity();
+  return options.patch_radius * std::min(a.diagonal, b.diagonal);
+}
+
+std::span<const std::uint64_t> ContactFinder::Impl::kept_last_time(const BodyPair& pair) const {
+  const auto known = std::lower_bound(kept_pairs.begin(), kept_pairs.end(), pair,
+                                      [](const PairIds& entry, const BodyPair& p) { return entry.pair < p; });
+  if (known == kept_pairs.end() || known->pair != pair) return {};
+  return std::span(kept_ids).subspan(known->first, known->count);
+}
+
+void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
+                                       std::vector<ContactPoint>& contacts) const {
+  const std::size_t first = contacts.size();
+  const CollisionBody a = collision_body(pair.a, worker);
+  if (pair.a == pair.b) {
+    worker.narrow.find_self_contacts(a, query->margin, query->origin, contacts);
+  } else {
+    const double reaches = state(query->states, pair.a).reach + state(query->states, pair.b).reach;
+    worker.narrow.find_contacts(a, collision_body(pair.b, worker), query->margin + reaches, query->origin, contacts);
+  }
+  for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
+  worker.clusters.reduce(contacts, first, patch_radius(pair), kept_last_time(pair));
+}
+
+void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
+  const std::size_t chunks = (pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk;
+  if (found.size() < chunks) found.resize(chunks);
+  for (auto& contacts : found) contacts.clear();
+  jobs.parallel_for(chunks, 1, [this](std::size_t begin, std::size_t end) {
+    const Workers::Lease worker(workers);
+    for (std::size_t p = begin * kPairsPerChunk; p < std::min(end * kPairsPerChunk, pairs.size()); ++p)
+      find_in_pair(pairs[p], *worker, found[p / kPairsPerChunk]);
+  });
+}
+
+void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
+  contacts.clear();
+  for (const auto& some : found) contacts.insert(contacts.end(), some.begin(), some.end());
+  kept_pairs.clear();
+  kept_ids.clear();
+  for (const ContactPoint& c : contacts) {
+    const BodyPair pair{c.a.body, c.b.body};
+    if (kept_pairs.empty() || kept_pairs.back().pair != pair) kept_pairs.push_back({pair, kept_ids.size(), 0});
+    ++kept_pairs.back().count;
+    kept_ids.push_back(c.id);
+  }
+}
+
+ContactFinder::ContactFinder(const ContactFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ContactFinder::~ContactFinder() = default;
+ContactFinder::ContactFinder(ContactFinder&&) noexcept = default;
+ContactFinder& ContactFinder::operator=(ContactFinder&&) noexcept = default;
+
+void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
+  Impl& m = *impl_;
+  if ((geometry.model == nullptr) == (geometry.shape == nullptr))
+    throw InvalidArgument("ContactFinder::add_body: body " + std::to_string(body) + " has " +
+                          (geometry.model ? "both a model and a shape" : "neither a model nor a shape") +
+                          ", expected one of them");
+  if (body < 0 || m.contains(body))
+    throw InvalidArgument("ContactFinder::add_body: index " + std::to_string(body) + (body < 0 ? "" : " holds a body") +
+                          ", expected a free index of at least 0");
+  Body fresh{.present = true};
+  if (geometry.model) {
+    fresh.modal = m.geometries.get(geometry.model);
+    fresh.diagonal = 2.0 * fresh.modal->surface->rest_bounds().half_extents().norm();
+  } else {
+    fresh.rigid = m.geometries.get(geometry.shape);
+    fresh.diagonal = 2.0 * fresh.rigid->bounds().half_extents().norm();
+  }
+  m.broad_phase.add(body, filter);
+  if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
+  m.at(body) = std::move(fresh);
+  m.set_finds_itself(body, filter.self && m.at(body).modal);
+}
+
+void ContactFinder::remove_body(Index body) {
+  impl_->present(body, "remove_body");
+  impl_->set_finds_itself(body, false);
+  impl_->broad_phase.remove(body);
+  impl_->at(body) = {};
+}
+
+void ContactFinder::set_filter(Index body, const CollisionFilter& filter) {
+  const Body& known = impl_->present(body, "set_filter");
+  impl_->broad_phase.set_filter(body, filter);
+  impl_->set_finds_itself(body, filter.self && known.modal);
+}
+
+void ContactFinder::exclude_pair(Index a, Index b, bool excluded) {
+  impl_->present(a, "exclude_pair");
+  impl_->present(b, "exclude_pair");
+  impl_->broad_phase.exclude_pair(a, b, excluded);
+}
+
+void ContactFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
+  Impl& m = *impl_;
+  check_length("margin", query.margin);
+  if (!query.origin.allFinite())
+    throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
+  m.check_and_list(query.states);
+  m.query = &query;
+  m.workers.start_query(m.options, jobs.concurrency());
+  m.make_boxes(query.states, jobs);
+  m.place(query.states);
+  m.broad_phase.find_pairs(query.margin, m.pairs, jobs);
+  m.merge_self_pairs(query.states);
+  m.check_sleepers_in_pairs(query.states);
+  m.find_in_pairs(jobs);
+  m.gather(contacts);
+  m.query = nullptr;
+}
+
+void ContactFinder::find_impacts(std::span<const BodyState>, std::span<const ExactMotion* const>, double, double,
+                                 std::vector<Impact>& impacts, Jobs&) {
+  impacts.clear();
+}
+
+}  // namespace limber

@@ -1,0 +1,47 @@
+// The deformed surfaces that one thread has at hand.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "limber/collision/deformed_surface.h"
+
+namespace limber {
+
+/// Bodies are bound when a pair needs them and kept while others do, as one body is in several pairs. Bounded, as a
+/// surface's scratch is as large as the surface: the one not used for longest makes room.
+class SurfacePool {
+ public:
+  /// Forgets all states.
+  void start_query() { ++query_; }
+
+  /// The surface of a body in the query's state; the last two that were asked for stay.
+  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+                       BoundsChoice choice) {
+    Slot* oldest = slots_.data();
+    for (Slot& slot : slots_) {
+      if (slot.body == body && slot.query == query_) return slot.use(++clock_);
+      if (slot.used < oldest->used) oldest = &slot;
+    }
+    oldest->surface.bind(surface, z, choice);
+    oldest->body = body;
+    oldest->query = query_;
+    return oldest->use(++clock_);
+  }
+
+ private:
+  struct Slot {
+    DeformedSurface surface;
+    Index body = -1;
+    std::uint64_t query = 0, used = 0;
+    DeformedSurface& use(std::uint64_t now) {
+      used = now;
+      return surface;
+    }
+  };
+  static constexpr std::size_t kSlots = 32;
+  std::array<Slot, kSlots> slots_;
+  std::uint64_t query_ = 0, clock_ = 0;
+};
+
+}  // namespace limber
