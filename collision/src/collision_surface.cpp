@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -187,15 +188,19 @@ void CollisionSurface::build_edges() {
 
 void CollisionSurface::build_vertex_adjacency() {
   std::vector<std::pair<Index, Index>> of_triangles, of_vertices;
+  DisjointSets parts(rest_.size());
   for (Index t = 0; t < triangles(); ++t)
     for (const Index v : triangle(t)) of_triangles.emplace_back(v, t);
   for (const SurfaceEdge& e : edges_)
     if (e.vertices[0] != e.vertices[1]) {
       of_vertices.emplace_back(e.vertices[0], e.vertices[1]);
       of_vertices.emplace_back(e.vertices[1], e.vertices[0]);
+      parts.join(e.vertices[0], e.vertices[1]);
     }
   std::tie(vertex_triangles_, vertex_triangles_start_) = lists(std::move(of_triangles), vertices());
   std::tie(vertex_neighbours_, vertex_neighbours_start_) = lists(std::move(of_vertices), vertices());
+  for (Index v = 0; v < vertices(); ++v)
+    if (parts.root(v) == v && !vertex_neighbours(v).empty()) component_vertices_.push_back(v);
 }
 
 void CollisionSurface::mark_degenerate() {

@@ -87,6 +87,8 @@ class CollisionSurface {
   std::span<const Index> vertex_neighbours(Index v) const {
     return range(vertex_neighbours_, vertex_neighbours_start_, v);
   }
+  /// The lowest vertex of each part that hangs together by edges, ascending.
+  std::span<const Index> component_vertices() const { return component_vertices_; }
   /// At rest, no area to speak of: twice its area is at most 1e-12 of its longest edge squared. Kept, as it may be bent
   /// into one that has.
   bool degenerate(Index t) const { return degenerate_[static_cast<std::size_t>(t)] != 0; }
@@ -142,6 +144,7 @@ class CollisionSurface {
   std::vector<SurfaceEdge> edges_;
   std::vector<std::array<Index, 3>> triangle_edges_;
   std::vector<Index> vertex_triangles_, vertex_triangles_start_, vertex_neighbours_, vertex_neighbours_start_;
+  std::vector<Index> component_vertices_;
   std::vector<std::uint8_t> degenerate_;
   bool closed_ = false;
 

@@ -1,0 +1,40 @@
+// Rigid convex shapes: hull of some points, and a radius around it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/core/types.h"
+#include "limber/model/shape.h"
+
+namespace limber {
+
+struct ConvexFace {
+  Vec3 normal;  // unit, outward
+  double offset;
+  Index first, count;  // of its corners in ConvexCore::loops, counter-clockwise
+};
+
+// A ball has one point, a capsule two; a polytope also faces. Flat neighbours among a hull's triangles are one face.
+struct ConvexCore {
+  std::vector<Vec3> points;
+  double radius = 0.0;
+  std::vector<ConvexFace> faces{};
+  std::vector<Index> loops{};
+  std::vector<Vec3> edge_directions{};  // unit, each once, whichever way round
+
+  std::span<const Index> loop(const ConvexFace& f) const {
+    return std::span(loops).subspan(static_cast<std::size_t>(f.first), static_cast<std::size_t>(f.count));
+  }
+};
+
+ConvexCore convex_core(const Sphere& shape);
+ConvexCore convex_core(const Capsule& shape);
+ConvexCore convex_core(const Box& shape);
+// @throws InvalidArgument if the points have no volume
+ConvexCore convex_core(const ConvexHull& shape);
+
+// The faces as triangles over the same points. @pre has faces
+TriangleMesh triangulated(const ConvexCore& core);
+
+}  // namespace limber

@@ -1,0 +1,87 @@
+// Contacts of two triangulated surfaces by their features, apart or overlapping; see narrow_phase.h for what counts.
+#pragma once
+
+#include <vector>
+
+#include "limber/collision/tree_traversal.h"
+#include "pair_surface.h"
+
+namespace limber {
+
+// Answers where a vertex that is inside a surface is to leave it.
+class OverlapRule {
+ public:
+  struct Exit {
+    FeatureSide at{};            // on the surface
+    Vec3 normal = Vec3::Zero();  // unit, out of the surface
+  };
+  virtual ~OverlapRule() = default;
+  // @param nearest the surface's point nearest to p, which is inside @return false: take that one
+  virtual bool exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) = 0;
+};
+
+class SurfaceContacts {
+ public:
+  // Appends all contacts of a and b, in the pair's frame. Both are bound with one tolerance; those found twice (two
+  // vertices) are appended twice. @param X_AB frame of b's body in that of a's @param rule_a of vertices inside a;
+  // null: the nearest point
+  void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, double margin, OverlapRule* rule_a,
+            OverlapRule* rule_b, std::vector<FeatureContact>& contacts);
+  // Of a surface with itself.
+  void find_self(PairSurface& a, double margin, std::vector<FeatureContact>& contacts);
+
+ private:
+  // An edge of one side that goes through a face of the other.
+  struct Piercing {
+    int of;
+    Index edge, face;
+    std::array<double, 2> heights;  // of the edge's ends over the face
+  };
+  struct Seed {
+    Index vertex;
+    double reach;  // the other surface is not farther from the vertex than this, m
+  };
+  struct EdgePair {
+    Index e, f;   // of side 0 and 1
+    double s, t;  // along each
+    Vec3 on_e, on_f;
+    Vec3 direction;  // unit, from f to e
+    double distance;
+  };
+
+  void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
+  void test_pair(Index s, Index t);
+  bool planes_separate(const PairSurface::Face& s, const PairSurface::Face& t) const;
+
+  void test_vertices(int of, Index s, Index t);
+  void vertex_against_face(int of, Index v, Index t);
+
+  void test_edges(Index s, Index t);
+  EdgePair nearest_of_edges(Index e, Index f);
+  void add_separated_edges(EdgePair pair);
+  void add_edges(const EdgePair& pair, const Vec3& normal);
+
+  void find_piercings(int of, Index s, Index t);
+  void find_piercing(int of, Index e, Index t);
+  void spread_inside(int of, OverlapRule* rule);
+  void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
+  void find_enclosed(int of, OverlapRule* rule);
+  bool has_inside_end(int of, Index e) const;
+  void cross_edges();
+  void take_shallower_crossing(const Piercing& piercing, EdgePair& best);
+  void push_out_of_faces();
+
+  void add(int of, const FeatureSide& mine, const FeatureSide& other, const Vec3& out_of_other, double gap);
+
+  PairSurface* side_[2] = {nullptr, nullptr};
+  double margin_ = 0.0, tolerance_ = 0.0;
+  bool self_ = false, overlap_ = false;
+  std::vector<FeatureContact>* contacts_ = nullptr;
+  std::vector<TrianglePair> pairs_;
+  std::vector<Piercing> piercings_;
+  std::vector<Seed> seeds_[2];
+  std::vector<std::uint32_t> visited_[2];  // generation_: looked at, outside; generation_ + 1: inside
+  std::uint32_t generation_ = 0;
+};
+
+}  // namespace limber
