@@ -48,6 +48,27 @@ HWY_ATTR double Dot(const double* x, const double* y, std::size_t n) {
   return SumOfBlock(sum);
 }
 
+HWY_ATTR void Equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
+  const Doubles d;
+  std::fill_n(C, n, 0.0);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double* row = M.row(i);
+    Vector most = hn::Zero(d);
+    for (std::size_t j = 0; j < n; j += kLanes) most = hn::Max(most, hn::Abs(hn::Load(d, row + j)));
+    R[i] = inverse_power_of_two(hn::GetLane(hn::MaxOfLanes(d, most)));
+    const Vector r = hn::Set(d, R[i]);
+    for (std::size_t j = 0; j < n; j += kLanes)
+      hn::Store(hn::Max(hn::Load(d, C + j), hn::Mul(r, hn::Abs(hn::Load(d, row + j)))), d, C + j);
+  }
+  for (std::size_t j = 0; j < n; ++j) C[j] = inverse_power_of_two(C[j]);
+  for (std::size_t i = 0; i < rows; ++i) {
+    double* row = M.row(i);
+    const Vector r = hn::Set(d, R[i]);
+    for (std::size_t j = 0; j < n; j += kLanes)
+      hn::Store(hn::Mul(hn::Mul(r, hn::Load(d, row + j)), hn::Load(d, C + j)), d, row + j);
+  }
+}
+
 HWY_INLINE HWY_ATTR void Add(double* HWY_RESTRICT y, double a, const double* HWY_RESTRICT x, std::size_t from,
                              std::size_t to) {
   const Doubles d;
@@ -207,6 +228,7 @@ HWY_AFTER_NAMESPACE();
 namespace limber {
 
 HWY_EXPORT(AllFinite);
+HWY_EXPORT(Equilibrate);
 HWY_EXPORT(Dot);
 HWY_EXPORT(AddScaled);
 HWY_EXPORT(CombineRows);
@@ -219,6 +241,18 @@ HWY_EXPORT(SubtractOuter);
 HWY_EXPORT(MultiplyRows);
 
 bool all_finite(const double* x, std::size_t n) { return HWY_DYNAMIC_DISPATCH(AllFinite)(x, n); }
+
+void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
+  HWY_DYNAMIC_DISPATCH(Equilibrate)(M, rows, padded(n), R, C);
+}
+
+std::size_t steepest(const double* d, const double* weight, double least, std::size_t n) {
+  std::size_t best = n;
+  double square = 0.0, over = 1.0;  // d²/w of the best as a fraction: no division in the loop
+  for (std::size_t i = 0; i < n; ++i)
+    if (d[i] > least && d[i] * d[i] * over > square * weight[i]) best = i, square = d[i] * d[i], over = weight[i];
+  return best;
+}
 
 double dot(const double* x, const double* y, std::size_t n) { return HWY_DYNAMIC_DISPATCH(Dot)(x, y, padded(n)); }
 

@@ -6,7 +6,10 @@
 // set that has fused multiply-add: sums run over rows in order, and dot products over eight partial sums.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 
 namespace limber {
 
@@ -23,6 +26,17 @@ struct MatrixView {
 
 /// Whether x[0 … n) holds neither an infinity nor a NaN. x may have any alignment, n any value.
 bool all_finite(const double* x, std::size_t n);
+
+/// Brings the rows, then the columns, of M to entries of about 1: M ← R M C, with powers of two, which round nothing.
+/// R gets `rows` numbers, C n and zeros in its padding.
+void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C);
+
+/// The power of two next below 1/x; 1 for x = 0. @pre x ≥ 0, finite
+inline double inverse_power_of_two(double x) {
+  if (x == 0.0) return 1.0;
+  const std::uint64_t exponent = std::bit_cast<std::uint64_t>(x) >> 52;
+  return std::bit_cast<double>(std::max<std::uint64_t>(2046 - exponent, 1) << 52);
+}
 
 double dot(const double* x, const double* y, std::size_t n);
 
@@ -46,6 +60,9 @@ void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x
 /// One exchange of a condensed simplex tableau: T(i, ·) −= T(i, q)·T(p, ·)/T(p, q) for i ≠ p, row p over the pivot,
 /// column q over the negative pivot, the pivot inverted.
 void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q);
+
+/// The entry of d to enter next: the largest d_i²/weight_i among d_i > least; n if there is none.
+std::size_t steepest(const double* d, const double* weight, double least, std::size_t n);
 
 /// C = XᵀX for the `rows` rows of X, n columns. All of C is written.
 void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n);

@@ -22,9 +22,6 @@ constexpr double kRatioTolerance = 1e-12;
 constexpr double kCostTolerance = 1e-12;
 constexpr int kMaxRefactorizations = 3;
 
-// The power of two next below 1/x: scaling by it rounds nothing.
-double inverse_power_of_two(double x) { return x > 0.0 ? std::ldexp(1.0, -std::ilogb(x)) : 1.0; }
-
 }  // namespace
 
 // The dual, one row per column j of A:  Σ_i A_ij y_i + s_j = c_j, y, s ≥ 0. Variables are numbered y_i: i, s_j: r + j.
@@ -32,10 +29,17 @@ double inverse_power_of_two(double x) { return x > 0.0 ? std::ldexp(1.0, -std::i
 // the values of the basic variables. At the end f_j = −d of s_j and (A f + b)_i = −d of y_i.
 struct LinearProgramSolver::Impl {
   std::size_t r = 0, n = 0;
-  std::vector<double> A, b, c;  // as given
-  std::vector<double> R, C;     // powers of two that bring the rows, then the columns, of A to about 1
-  MatrixBuffer tableau_memory;
+  MatrixBuffer scaled_memory, tableau_memory;
+  AlignedBuffer R_memory, C_memory, b_memory, c_memory, weight_memory, f_memory, w_memory, column_memory, values_memory;
+  MatrixView A{};  // R A C, with R and C the powers of two that bring the rows, then the columns, to about 1
+  double* R = nullptr;
+  double* C = nullptr;
+  double* b = nullptr;       // R b
+  double* c = nullptr;       // C c
+  double* weight = nullptr;  // of the nonbasic variables: about the square of what a unit of each moves (Devex)
   MatrixView T{};
+  double* column = nullptr;          // the entering column, and
+  double* values = nullptr;          // the values beside it
   std::vector<int> basic, nonbasic;  // the variable of each row and column
   std::vector<char> flipped;         // per y: the tableau holds bound − y instead
   double bound = kInfinity;          // of every y: slack's price; ∞ until the program proves infeasible
@@ -54,7 +58,6 @@ struct LinearProgramSolver::Impl {
 
   void take(const LinearProgram& program);
   void take_b(Numbers new_b);
-  void scale();
   void fill_tableau();
   void start_cold();
   void set_costs();
@@ -63,8 +66,9 @@ struct LinearProgramSolver::Impl {
   LinearProgramResult run(std::span<double> f);
   void optimise(int limit);
   std::size_t choose_entering() const;
-  std::size_t choose_leaving(std::size_t q, double largest) const;
-  double ratio(std::size_t row, double entry, double allowed) const;
+  void gather_column(std::size_t q);
+  std::size_t choose_leaving(double largest) const;
+  double ratio(std::size_t row, double allowed) const;
   void pivot(std::size_t p, std::size_t q);
   void flip_column(std::size_t q);
   void flip_row(std::size_t p);
@@ -75,34 +79,30 @@ struct LinearProgramSolver::Impl {
 
 void LinearProgramSolver::Impl::take(const LinearProgram& program) {
   r = static_cast<std::size_t>(program.rows), n = static_cast<std::size_t>(program.columns);
-  A.assign(program.A.begin(), program.A.end());
-  c.assign(n, 1.0);
-  std::copy(program.c.begin(), program.c.end(), c.begin());
+  A = scaled_memory.need(r, n);
+  for (std::size_t i = 0; i < r; ++i) {
+    std::copy_n(program.A.data() + i * n, n, A.row(i));
+    std::fill(A.row(i) + n, A.row(i) + A.stride, 0.0);
+  }
+  R = R_memory.need(r), C = C_memory.need(n);
+  equilibrate(A, r, n, R, C);
+  c = c_memory.need(n);
+  for (std::size_t j = 0; j < n; ++j) c[j] = C[j] * (program.c.empty() ? 1.0 : program.c[j]);
   take_b(program.b);
-  scale();
 }
 
-void LinearProgramSolver::Impl::take_b(Numbers new_b) { b.assign(new_b.begin(), new_b.end()); }
-
-void LinearProgramSolver::Impl::scale() {
-  R.assign(r, 0.0), C.assign(n, 0.0);
-  for (std::size_t i = 0; i < r; ++i)
-    for (std::size_t j = 0; j < n; ++j) R[i] = std::max(R[i], std::abs(A[i * n + j]));
-  for (double& x : R) x = inverse_power_of_two(x);
-  for (std::size_t i = 0; i < r; ++i)
-    for (std::size_t j = 0; j < n; ++j) C[j] = std::max(C[j], R[i] * std::abs(A[i * n + j]));
-  for (double& x : C) x = inverse_power_of_two(x);
+void LinearProgramSolver::Impl::take_b(Numbers new_b) {
+  b = b_memory.need(r);
+  for (std::size_t i = 0; i < r; ++i) b[i] = R[i] * new_b[i];
 }
 
 void LinearProgramSolver::Impl::fill_tableau() {
   T = tableau_memory.need(n + 1, r + 1);
-  for (std::size_t j = 0; j <= n; ++j) std::fill_n(T.row(j), T.stride, 0.0);
-  for (std::size_t i = 0; i < r; ++i)
-    for (std::size_t j = 0; j < n; ++j) T.row(j)[i] = R[i] * C[j] * A[i * n + j];
-  double largest = 0.0;
-  for (std::size_t j = 0; j < n; ++j) largest = std::max(largest, C[j] * c[j]);
-  for (std::size_t j = 0; j < n; ++j) value(j) = C[j] * c[j] * inverse_power_of_two(largest);
-  for (std::size_t i = 0; i < r; ++i) costs()[i] = -R[i] * b[i];
+  transpose(T, A, r, n);
+  const double price = inverse_power_of_two(n == 0 ? 0.0 : *std::max_element(c, c + n));
+  for (std::size_t j = 0; j < n; ++j) value(j) = c[j] * price;
+  std::fill_n(costs(), T.stride, 0.0);
+  for (std::size_t i = 0; i < r; ++i) costs()[i] = -b[i];
 }
 
 void LinearProgramSolver::Impl::start_cold() {
@@ -110,6 +110,9 @@ void LinearProgramSolver::Impl::start_cold() {
   bound = kInfinity;
   flipped.assign(r, 0);
   nonbasic.resize(r), basic.resize(n);
+  weight = weight_memory.need(r);
+  std::fill_n(weight, padded(r), 1.0);
+  column = column_memory.need(n), values = values_memory.need(n);
   entering.reserve(n), rows.reserve(n), coefficients.reserve(n);
   for (std::size_t i = 0; i < r; ++i) nonbasic[i] = static_cast<int>(i);
   for (std::size_t j = 0; j < n; ++j) basic[j] = static_cast<int>(r + j);
@@ -119,12 +122,12 @@ void LinearProgramSolver::Impl::start_cold() {
 void LinearProgramSolver::Impl::set_costs() {
   std::fill_n(costs(), T.stride, 0.0);
   for (std::size_t q = 0; q < r; ++q)
-    if (const auto y = static_cast<std::size_t>(nonbasic[q]); y < r) costs()[q] = -R[y] * b[y];
+    if (const auto y = static_cast<std::size_t>(nonbasic[q]); y < r) costs()[q] = -b[y];
   rows.clear(), coefficients.clear();
   for (std::size_t p = 0; p < n; ++p)
     if (const auto y = static_cast<std::size_t>(basic[p]); y < r) {
       rows.push_back(static_cast<int>(p));
-      coefficients.push_back(R[y] * b[y]);
+      coefficients.push_back(b[y]);
     }
   combine_rows(costs(), costs(), T, rows.data(), coefficients.data(), rows.size(), r + 1);
 }
@@ -162,53 +165,56 @@ bool LinearProgramSolver::Impl::clean_values() {
   return true;
 }
 
-// The variable to enter: of the steepest cost, or the first one (Bland). r if the basis is optimal.
+// The variable to enter: of the steepest descent, or the first one (Bland). r if the basis is optimal.
 std::size_t LinearProgramSolver::Impl::choose_entering() const {
   const double* d = costs();
   double scale = 0.0;
   for (std::size_t q = 0; q < r; ++q) scale = std::max(scale, std::abs(d[q]));
-  double most = kCostTolerance * scale;
+  const double least = kCostTolerance * scale;
+  if (!bland()) return steepest(d, weight, least, r);
   std::size_t best = r;
-  for (std::size_t q = 0; q < r; ++q) {
-    if (!(d[q] > most)) continue;
-    if (bland()) {
-      if (best == r || nonbasic[q] < nonbasic[best]) best = q;
-    } else {
-      best = q;
-      most = d[q];
-    }
-  }
+  for (std::size_t q = 0; q < r; ++q)
+    if (d[q] > least && (best == r || nonbasic[q] < nonbasic[best])) best = q;
   return best;
 }
 
+// The entering column and the values beside each other: the ratio test passes over them three times.
+void LinearProgramSolver::Impl::gather_column(std::size_t q) {
+  for (std::size_t p = 0; p < n; ++p) column[p] = T.row(p)[q], values[p] = value(p);
+}
+
 // How far the entering variable can go until the basic one of a row meets zero, or its bound; ∞ if it never does.
-double LinearProgramSolver::Impl::ratio(std::size_t row, double entry, double allowed) const {
-  if (entry > 0.0) return (value(row) + allowed) / entry;
-  if (entry < 0.0 && is_bounded(basic[row])) return (bound - value(row) + allowed * bound) / -entry;
+double LinearProgramSolver::Impl::ratio(std::size_t row, double allowed) const {
+  if (column[row] > 0.0) return (values[row] + allowed) / column[row];
+  if (column[row] < 0.0 && is_bounded(basic[row])) return (bound - values[row] + allowed * bound) / -column[row];
   return kInfinity;
 }
 
 // The row to leave. Two passes: the shortest step with every value allowed a little below zero, then the largest entry
 // among the rows that meet it. n if nothing stops the entering variable.
-std::size_t LinearProgramSolver::Impl::choose_leaving(std::size_t q, double largest) const {
+std::size_t LinearProgramSolver::Impl::choose_leaving(double largest) const {
   const double least = kPivotTolerance * largest;
+  const bool first_index = bland();
   double shortest = kInfinity;
   for (std::size_t p = 0; p < n; ++p)
-    if (const double entry = T.row(p)[q]; std::abs(entry) > least)
-      shortest = std::min(shortest, ratio(p, entry, bland() ? 0.0 : kRatioTolerance));
+    if (std::abs(column[p]) > least) shortest = std::min(shortest, ratio(p, first_index ? 0.0 : kRatioTolerance));
   if (shortest == kInfinity) return n;
   std::size_t best = n;
   for (std::size_t p = 0; p < n; ++p) {
-    const double entry = T.row(p)[q];
-    if (std::abs(entry) <= least || ratio(p, entry, 0.0) > shortest) continue;
-    const bool better = best == n || (bland() ? basic[p] < basic[best] : std::abs(entry) > std::abs(T.row(best)[q]));
+    if (std::abs(column[p]) <= least || ratio(p, 0.0) > shortest) continue;
+    const bool better =
+        best == n || (first_index ? basic[p] < basic[best] : std::abs(column[p]) > std::abs(column[best]));
     if (better) best = p;
   }
   return best;
 }
 
 void LinearProgramSolver::Impl::pivot(std::size_t p, std::size_t q) {
+  const double entering_weight = weight[q], entry = T.row(p)[q];
   exchange(T, n + 1, p, q);
+  for (std::size_t j = 0; j < r; ++j)  // row p is over the pivot already
+    weight[j] = std::max(weight[j], T.row(p)[j] * T.row(p)[j] * entering_weight);
+  weight[q] = std::max(entering_weight / (entry * entry), 1.0);
   std::swap(basic[p], nonbasic[q]);
 }
 
@@ -243,10 +249,11 @@ void LinearProgramSolver::Impl::optimise(int limit) {
       result.status = SolveStatus::kIterationLimit;
       return;
     }
+    gather_column(q);
     double largest = 0.0;
-    for (std::size_t p = 0; p < n; ++p) largest = std::max(largest, std::abs(T.row(p)[q]));
-    const std::size_t p = choose_leaving(q, largest);
-    const double step = p == n ? kInfinity : std::max(0.0, ratio(p, T.row(p)[q], 0.0));
+    for (std::size_t p = 0; p < n; ++p) largest = std::max(largest, std::abs(column[p]));
+    const std::size_t p = choose_leaving(largest);
+    const double step = p == n ? kInfinity : std::max(0.0, ratio(p, 0.0));
     if (p == n && !is_bounded(nonbasic[q])) {
       // A slack has no bound: its column is rounding. Its cost is, too.
       if (!is_y(nonbasic[q]))
@@ -261,7 +268,7 @@ void LinearProgramSolver::Impl::optimise(int limit) {
       flip_column(q);
       continue;
     }
-    if (T.row(p)[q] < 0.0) flip_row(p);  // it leaves at its bound
+    if (column[p] < 0.0) flip_row(p);  // it leaves at its bound
     pivot(p, q);
     for (std::size_t row = 0; row < n; ++row) value(row) = std::max(value(row), 0.0);
   }
@@ -278,17 +285,20 @@ void LinearProgramSolver::Impl::extract(std::span<double> f) const {
 
 // How far the rows are violated, relative to their terms; and in the result in their own unit.
 double LinearProgramSolver::Impl::violation(Numbers f) {
+  double* scaled = f_memory.need(n);
+  for (std::size_t j = 0; j < n; ++j) scaled[j] = f[j] / C[j];
+  std::fill(scaled + n, scaled + padded(n), 0.0);
+  double* w = w_memory.need(r);
+  multiply_rows(w, A, nullptr, scaled, r, n);
   double worst = 0.0;
   result.slack = 0.0;
   for (std::size_t i = 0; i < r; ++i) {
-    double w = b[i], size = std::abs(b[i]);
-    for (std::size_t j = 0; j < n; ++j) {
-      w += A[i * n + j] * f[j];
-      size += std::abs(A[i * n + j]) * f[j];
-    }
-    if (w >= 0.0) continue;
-    worst = std::max(worst, -w / size);
-    result.slack = std::max(result.slack, -w);
+    w[i] += b[i];
+    if (w[i] >= 0.0) continue;
+    double size = std::abs(b[i]);
+    for (std::size_t j = 0; j < n; ++j) size += std::abs(A.row(i)[j]) * scaled[j];
+    worst = std::max(worst, -w[i] / size);
+    result.slack = std::max(result.slack, -w[i] / R[i]);
   }
   return worst;
 }
@@ -311,7 +321,7 @@ LinearProgramResult LinearProgramSolver::Impl::run(std::span<double> f) {
     if (!restore_basis()) start_cold();
   }
   if (violated > options.tolerance && result.status == SolveStatus::kSolved) result.status = SolveStatus::kRelaxed;
-  for (std::size_t j = 0; j < n; ++j) result.objective += c[j] * f[j];
+  for (std::size_t j = 0; j < n; ++j) result.objective += c[j] / C[j] * f[j];
   return result;
 }
 
