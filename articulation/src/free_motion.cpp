@@ -81,8 +81,9 @@ struct Tolerances {
 /// All blocked positions along one path, by (1) of the header.
 class Search {
  public:
-  Search(const PathFrame& frame, const Side& moving, const Side& fixed, const Tolerances& tolerances)
-      : frame_(frame), moving_(moving), fixed_(fixed), tolerances_(tolerances) {}
+  Search(const PathFrame& frame, const Side& moving, const Side& fixed, const Tolerances& tolerances,
+         bool reachable_only)
+      : frame_(frame), moving_(moving), fixed_(fixed), tolerances_(tolerances), reachable_only_(reachable_only) {}
 
   FreeMotion run() {
     settle_tolerance();
@@ -112,7 +113,10 @@ class Search {
   const Side& moving_;
   const Side& fixed_;
   Tolerances tolerances_;
+  bool reachable_only_;
   bool overlapping_ = false;
+  /// The direction that freed the last point often frees the next; the answer does not depend on where one begins.
+  mutable std::size_t first_across_ = 0;
   std::vector<Witness> witnesses_;
   Spans blocked_;                                  ///< B
   std::vector<std::pair<Witness, Witness>> ends_;  ///< what blocks at the low and high end of each span of B
@@ -176,12 +180,15 @@ void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitP
   if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < 0.5)) return out.clear();
   Spans wide = dilated(out, by);
   thread_local std::vector<OrbitPiece> beside;
-  for (const auto& direction : kAcross) {
+  for (std::size_t k = 0; k < kAcross.size(); ++k) {
+    const std::size_t which = (k + first_across_) % kAcross.size();
     Orbit moved = orbit;
-    for (std::size_t i = 0; i < 2; ++i) moved.plane[i] += delta * direction[i];
+    for (std::size_t i = 0; i < 2; ++i) moved.plane[i] += delta * kAcross[which][i];
     raw_pieces(moved, moving, beside);
     wide = intersection(wide, dilated(beside, by));
-    if (wide.empty()) return out.clear();
+    if (!wide.empty()) continue;
+    first_across_ = which;
+    return out.clear();
   }
   keep_confirmed(out, wide, delta / v);
 }
@@ -212,6 +219,7 @@ void Search::blocked_pieces(const SurfacePoint& at, bool moving, std::vector<Orb
 
 // Overlap as read is a matter of drawing, not of motion: δ grows until none is left that is wider, as far as it may.
 void Search::settle_tolerance() {
+  if (tolerances_.across >= tolerances_.largest_overlap) return;
   constexpr double kGrowth = 1.5;
   std::vector<OrbitPiece> pieces;
   std::vector<std::pair<SurfacePoint, bool>> deep;
@@ -247,7 +255,7 @@ void Search::collect() {
         if (covers(blocked_, p.low, p.high)) continue;
         witnesses_.push_back({p, at, moving});
         blocked_.push_back({p.low, p.high});
-        normalise(blocked_);
+        normalise(blocked_, true);
       }
     }
 }
@@ -269,9 +277,14 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
       const double angle = kTurn * level + 2.0 * kPi * k / kDirections;
       const SurfacePoint next =
           over.walk(best.point, best.point.p + step * (std::cos(angle) * e + std::sin(angle) * f));
+      const auto improves = [&](const OrbitPiece& p) {
+        return low ? p.low < best.piece.low && p.high > gap.low : p.high > best.piece.high && p.low < gap.high;
+      };
+      raw_pieces(frame_.orbit_of(next.p), best.moving, pieces);
+      if (std::none_of(pieces.begin(), pieces.end(), improves)) continue;
       blocked_pieces(next, best.moving, pieces);
       for (const OrbitPiece& p : pieces)
-        if (low ? p.low < best.piece.low && p.low > gap.low : p.high > best.piece.high && p.high < gap.high) {
+        if (improves(p) && (low ? p.low > gap.low : p.high < gap.high)) {
           best = {p, next, best.moving};
           better = true;
         }
@@ -282,7 +295,7 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
 }
 
 void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
-  constexpr std::size_t kSeeds = 8;
+  constexpr std::size_t kSeeds = 6;
   std::vector<Witness> seeds;
   for (const Witness& w : witnesses_)
     if (w.piece.low >= span.low && w.piece.high <= span.high) seeds.push_back(w);
@@ -299,14 +312,19 @@ void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
 
 void Search::refine() {
   ends_.resize(blocked_.size());
-  for (std::size_t i = 0; i < blocked_.size(); ++i) {
+  const std::size_t count = blocked_.size();
+  // Spans on either side of 0; on a circle they may lie at the other end of the list.
+  const auto above = static_cast<std::size_t>(
+      std::find_if(blocked_.begin(), blocked_.end(), [](const Span& s) { return s.low >= 0.0; }) - blocked_.begin());
+  for (std::size_t i = 0; i < count; ++i) {
     const double before = i > 0 ? blocked_[i - 1].high : -kInfinity;
-    const double after = i + 1 < blocked_.size() ? blocked_[i + 1].low : kInfinity;
+    const double after = i + 1 < count ? blocked_[i + 1].low : kInfinity;
     const Span whole = blocked_[i];
-    refine_end(blocked_[i], true, {before, whole.high}, ends_[i].first);
-    Span high = whole;
-    refine_end(high, false, {whole.low, after}, ends_[i].second);
-    blocked_[i].high = high.high;
+    Span low = whole, high = whole;
+    if (!reachable_only_ || i == above % count) refine_end(low, true, {before, whole.high}, ends_[i].first);
+    if (!reachable_only_ || i == (above + count - 1) % count)
+      refine_end(high, false, {whole.low, after}, ends_[i].second);
+    blocked_[i] = {low.low, high.high};
   }
 }
 
@@ -327,7 +345,7 @@ FreeMotion Search::result() const {
     const std::size_t after = i < count ? i : 0;
     Interval gap{i > 0 ? blocked_[i - 1].high : -kInfinity, i < count ? blocked_[i].low : kInfinity};
     if (circle && i == count) gap.high = blocked_[0].low + 2.0 * kPi;
-    if (!(gap.low < gap.high)) continue;
+    if (!(gap.low < gap.high) && gap.low != 0.0) continue;
     const bool turned = circle && i == count && gap.low > 0.0;  // 0 may lie at the end that was moved by a turn
     if (turned && gap.high >= 2.0 * kPi) gap = {gap.low - 2.0 * kPi, gap.high - 2.0 * kPi};
     if (gap.low > 0.0 || gap.high < 0.0) {
@@ -389,7 +407,7 @@ FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const Motio
   auto fixed_met = that_meet(fixed_index, moving_index, t.largest_overlap);
   const Side moving_side{std::move(moving_index), SampledSurface(moving, std::move(moving_met), options.samples)};
   const Side fixed_side{std::move(fixed_index), SampledSurface(fixed, std::move(fixed_met), options.samples)};
-  return Search(frame, moving_side, fixed_side, t).run();
+  return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();
 }
 
 double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high, double crease) {

@@ -11,7 +11,12 @@ using Kind = MotionPath::Kind;
 constexpr double kPi = std::numbers::pi;
 constexpr Index kLeaf = 4;
 
-double wrapped(double angle) { return std::remainder(angle, 2.0 * kPi); }
+/// Within (−π, π]. @pre |angle| < 4π
+double wrapped(double angle) {
+  while (angle > kPi) angle -= 2.0 * kPi;
+  while (angle <= -kPi) angle += 2.0 * kPi;
+  return angle;
+}
 
 /// Distance of the origin from a segment in the plane.
 double distance_to_segment(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -49,8 +54,6 @@ std::pair<double, double> sector_of(const OrbitIndex::Face& f) {
   return {start + 0.5 * (low + high), 0.5 * (high - low) + kMargin};
 }
 
-Vec3 area_vector(const OrbitIndex::Face& f) { return (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]); }
-
 /// Tangent of the angle whose cosine is given.
 double slope_of(double cosine) { return std::sqrt(std::max(1.0 - cosine * cosine, 0.0)) / std::abs(cosine); }
 
@@ -71,11 +74,11 @@ double zero_between(const F& f, double a, double fa, double b, double fb) {
 }
 
 /// Whether a point of the triangle's plane lies inside it; on an edge counts.
-bool inside(const OrbitIndex::Face& f, const Vec3& n, const Vec3& q) {
+bool inside(const OrbitIndex::Face& f, const Vec3& q) {
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& a = f.corners[i];
     const Vec3& b = f.corners[(i + 1) % 3];
-    if ((b - a).cross(q - a).dot(n) < 0.0) return false;
+    if ((b - a).cross(q - a).dot(f.normal) < 0.0) return false;
   }
   return true;
 }
@@ -231,30 +234,27 @@ void OrbitIndex::cross(const Face& face, const Orbit& orbit, std::vector<Crossin
 // Plane n·q = c with q = (x, r cos θ, r sin θ):  r h cos(θ − β) = c − n_x x,  h = |(n_y, n_z)|, β its angle.
 void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const {
   constexpr double kAlong = 1e-9;  // sine of the angle below which the circle runs along the plane
-  const Vec3 n = area_vector(face);
   const auto [r, x] = orbit.plane;
-  const double h = std::hypot(n.y(), n.z());
-  if (!(h > kAlong * n.norm()) || !(r > 0.0)) return;
-  const double cosine = (n.dot(face.corners[0]) - n.x() * x) / (r * h);
+  if (!(face.across > kAlong) || !(r > 0.0)) return;
+  const double cosine = (face.offset - face.normal.x() * x) / (r * face.across);
   if (!(std::abs(cosine) <= 1.0)) return;
-  const double beta = std::atan2(n.z(), n.y()), half = std::acos(cosine);
+  const double half = std::acos(cosine), slope = slope_of(face.across * std::sin(half));
   for (const int side : {-1, 1}) {
-    const double theta = beta + side * half;
-    if (inside(face, n, {x, r * std::cos(theta), r * std::sin(theta)}))
-      // d/dθ cos(θ − β) = −sin: at β + half the circle goes inward
-      out.push_back({wrapped(theta - orbit.phase), face.body, side, slope_of(h * std::sin(half) / n.norm())});
+    const double theta = face.heading + side * half;
+    if (std::abs(wrapped(theta - face.bearing)) > face.sector) continue;
+    if (inside(face, {x, r * std::cos(theta), r * std::sin(theta)}))
+      out.push_back(
+          {wrapped(theta - orbit.phase), face.body, side, slope});  // d/dθ cos(θ − β) = −sin: + half goes inward
   }
 }
 
 void OrbitIndex::cross_line(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const {
   constexpr double kAlong = 1e-9;
-  const Vec3 n = area_vector(face);
-  if (!(std::abs(n.x()) > kAlong * n.norm())) return;
+  const Vec3& n = face.normal;
+  if (!(std::abs(n.x()) > kAlong)) return;
   const auto [y, z] = orbit.plane;
-  const Vec3& a = face.corners[0];
-  const double x = a.x() - (n.y() * (y - a.y()) + n.z() * (z - a.z())) / n.x();
-  if (inside(face, n, {x, y, z}))
-    out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x() / n.norm())});
+  const double x = (face.offset - n.y() * y - n.z() * z) / n.x();
+  if (inside(face, {x, y, z})) out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x())});
 }
 
 // The same plane along x = x₀ + pitch t:  f(t) = r h cos(θ₀ + t − β) + n_x pitch t + n_x x₀ − c. Between the zeros of
@@ -276,13 +276,13 @@ void OrbitIndex::cross_helix(const Face& face, const Orbit& orbit, std::vector<C
 
 void OrbitIndex::cross_helix_part(const Face& face, const Orbit& orbit, const Span& part,
                                   std::vector<Crossing>& out) const {
-  const Vec3 n = area_vector(face);
+  const Vec3& n = face.normal;
   const auto [r, x0] = orbit.plane;
-  const double pitch = frame_.pitch(), h = std::hypot(n.y(), n.z()), beta = std::atan2(n.z(), n.y());
+  const double pitch = frame_.pitch(), h = face.across, beta = face.heading;
   const auto point = [&, r = r, x0 = x0](double t) {
     return Vec3(x0 + pitch * t, r * std::cos(orbit.phase + t), r * std::sin(orbit.phase + t));
   };
-  const auto f = [&](double t) { return n.dot(point(t) - face.corners[0]); };
+  const auto f = [&](double t) { return n.dot(point(t)) - face.offset; };
   // f' has two zeros a turn, and a part is one turn at most. A zero that is not in it stands at its start.
   std::array<double, 2> extremes{part.low, part.low};
   if (const double sine = n.x() * pitch / (r * h); r * h > 0.0 && std::abs(sine) < 1.0)
@@ -297,9 +297,9 @@ void OrbitIndex::cross_helix_part(const Face& face, const Orbit& orbit, const Sp
     const double at_low = f(cuts[i]), at_high = f(cuts[i + 1]);
     if ((at_low < 0.0) == (at_high < 0.0)) continue;
     const double t = zero_between(f, cuts[i], at_low, cuts[i + 1], at_high);
-    if (!inside(face, n, point(t))) continue;
+    if (!inside(face, point(t))) continue;
     const double rate = n.x() * pitch - r * h * std::sin(orbit.phase + t - beta);
-    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, slope_of(rate / (n.norm() * std::hypot(r, pitch)))});
+    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, slope_of(rate / std::hypot(r, pitch))});
   }
 }
 
@@ -360,10 +360,19 @@ void OrbitIndex::add_solid(std::span<const Crossing> of_body, std::vector<OrbitP
 
 namespace {
 
-/// A screw's face: its sector, and the helices that can meet it as a box from 0 to a turn, or one that reaches beyond
+OrbitIndex::Face face_of(const std::array<Vec3, 3>& corners) {
+  OrbitIndex::Face f;
+  f.corners = corners;
+  f.normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
+  f.offset = f.normal.dot(corners[0]);
+  f.across = std::hypot(f.normal.y(), f.normal.z());
+  f.heading = std::atan2(f.normal.z(), f.normal.y());
+  return f;
+}
+
+/// A screw's face: the helices that can meet it as a box from 0 to a turn, or one that reaches beyond
 /// and a copy of the face one turn lower.
 void add_helices(const PathFrame& frame, OrbitIndex::Face face, std::vector<OrbitIndex::Face>& faces) {
-  std::tie(face.bearing, face.sector) = sector_of(face);
   const double turn = 2.0 * kPi * std::abs(frame.pitch()), half = std::abs(frame.pitch()) * face.sector;
   const auto [low_x, high_x] = std::minmax({face.corners[0].x(), face.corners[1].x(), face.corners[2].x()});
   double low = low_x - frame.pitch() * face.bearing - half, high = high_x - frame.pitch() * face.bearing + half;
@@ -389,12 +398,14 @@ std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<cons
     for (const Vec3& p : surface.vertices) local.push_back(frame.to_path(p));
     for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
       const Triangle& v = surface.triangles[t];
-      OrbitIndex::Face face{.corners = {local[v[0]], local[v[1]], local[v[2]]},
-                            .body = static_cast<Index>(b),
-                            .triangle = static_cast<Index>(t),
-                            .flipped = inside_out};
-      if (inside_out) std::swap(face.corners[1], face.corners[2]);
+      std::array<Vec3, 3> corners{local[v[0]], local[v[1]], local[v[2]]};
+      if (inside_out) std::swap(corners[1], corners[2]);
+      OrbitIndex::Face face = face_of(corners);
+      face.body = static_cast<Index>(b);
+      face.triangle = static_cast<Index>(t);
+      face.flipped = inside_out;
       face.box = frame.box_of(face.corners);
+      if (frame.kind() != Kind::kTranslation) std::tie(face.bearing, face.sector) = sector_of(face);
       if (frame.kind() == Kind::kScrew)
         add_helices(frame, face, faces);
       else

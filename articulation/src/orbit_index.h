@@ -66,10 +66,13 @@ class PathFrame {
 class OrbitIndex {
  public:
   struct Face {
-    std::array<Vec3, 3> corners;  ///< path coordinates, counter-clockwise seen from outside
+    std::array<Vec3, 3> corners;         ///< path coordinates, counter-clockwise seen from outside
+    Vec3 normal;                         ///< outward, unit; 0 without an area
+    double offset = 0.0;                 ///< normal · corner
+    double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
     Index body = 0, triangle = 0;
     bool flipped = false;                ///< the second and third corner have changed places
-    double bearing = 0.0, sector = 0.0;  ///< screws: all of it lies within θ = bearing ± sector
+    double bearing = 0.0, sector = 0.0;  ///< rotations, screws: all of it lies within θ = bearing ± sector
     OrbitBox box{};
   };
 

@@ -7,17 +7,13 @@
 namespace limber::internal {
 namespace {
 
-Vec3 unit_normal(const OrbitIndex::Face& f) {
-  return (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
-}
-
 double area(const OrbitIndex::Face& f) {
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
 }
 
 /// The point of a triangle nearest to q: that of its plane if it lies inside, else the nearest of its sides.
 Vec3 nearest_point(const OrbitIndex::Face& f, const Vec3& q) {
-  const Vec3 n = unit_normal(f);
+  const Vec3& n = f.normal;
   bool inside = n.squaredNorm() > 0.0;
   Vec3 best = f.corners[0];
   double least = std::numeric_limits<double>::infinity();
@@ -98,7 +94,7 @@ std::vector<SampledSurface::Edge> SampledSurface::sharp_edges() const {
   for (std::size_t i = 0; i < all.size();) {
     std::size_t end = i;
     while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
-    const auto normal = [&](std::size_t k) { return unit_normal(faces_[static_cast<std::size_t>(all[k].face)]); };
+    const auto normal = [&](std::size_t k) { return faces_[static_cast<std::size_t>(all[k].face)].normal; };
     if (end - i != 2 || normal(i).dot(normal(i + 1)) < kFlat) sharp.push_back(all[i]);
     i = end;
   }

@@ -12,12 +12,13 @@ struct Span {
 };
 using Spans = std::vector<Span>;
 
-/// Sorts and joins what touches.
-inline void normalise(Spans& spans) {
+/// Sorts and joins what touches; what touches at 0 only stays apart on request.
+inline void normalise(Spans& spans, bool apart_at_0 = false) {
   std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
   std::size_t kept = 0;
   for (const Span& s : spans) {
-    if (kept > 0 && s.low <= spans[kept - 1].high)
+    const bool meets = kept > 0 && s.low <= spans[kept - 1].high;
+    if (meets && !(apart_at_0 && s.low == 0.0 && spans[kept - 1].high == 0.0))
       spans[kept - 1].high = std::max(spans[kept - 1].high, s.high);
     else
       spans[kept++] = s;

@@ -66,8 +66,8 @@ struct JointFrame {
 
 struct JointSpec {
   JointType type = JointType::kFixed;
-  JointFrame frame;
-  JointLimits limits;
+  JointFrame frame{};
+  JointLimits limits{};
   double pitch = 0.0;  ///< cylindrical: advance along x per radian about x, m/rad; 0: no screw
 
   /// @throws InvalidArgument if the axes are not orthonormal and right-handed to 1e-6, a number is NaN, or low > high
