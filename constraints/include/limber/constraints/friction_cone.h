@@ -10,6 +10,10 @@
 /// (De Saxcé and Feng 1998; Acary and Brogliato 2008). At gap level the normal rows of b and A may be gaps over Δt.
 /// μ = 0 is a contact without friction.
 ///
+/// (1) is not convex: contacts strongly coupled by large friction may not converge by any method here (1–2 % of
+/// problems with random normals and μ up to 1.2; none of the boxes and stacks tried). The status then is
+/// kIterationLimit, and the forces are in their cones all the same.
+///
 /// Methods, all with (1) as fixed point where they converge:
 /// - kBlockGaussSeidel: one contact after the other, each solved exactly; memory and time linear in contacts × bodies.
 /// - kExact: the same sweeps to find which contacts stick, slide and part, then Newton steps on those equations.

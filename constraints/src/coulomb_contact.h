@@ -1,0 +1,25 @@
+// One contact with Coulomb friction: its cone, and its exact solution while all other forces are held. Vectors are
+// (normal, tangent, tangent).
+#pragma once
+
+#include "limber/core/types.h"
+
+namespace limber {
+
+/// The point of {|x_t| ≤ μ x_n} nearest to x.
+Vec3 project_on_cone(const Vec3& x, double mu);
+
+/// A derivative of project_on_cone() (at the kinks one of them).
+Mat3 cone_projection_derivative(const Vec3& x, double mu);
+
+/// û = u + μ|u_t| e_n
+inline Vec3 corrected_velocity(const Vec3& u, double mu) { return {u[0] + mu * u.tail<2>().norm(), u[1], u[2]}; }
+
+/// The force f with K_μ ∋ f ⊥ û ∈ K*_μ for u = A f + b, A symmetric positive definite: exactly one of parting, sticking
+/// and sliding, the last by the root of one function of the sliding coefficient.
+Vec3 solve_coulomb_contact(const Mat3& A, const Vec3& b, double mu);
+
+/// The tangential force of least ½fᵀA f + bᵀf in the disc |f| ≤ radius; A symmetric positive definite.
+Eigen::Vector2d solve_in_disc(const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double radius);
+
+}  // namespace limber

@@ -1,0 +1,574 @@
+#include "limber/constraints/friction_cone.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "aligned_buffer.h"
+#include "argument_checks.h"
+#include "coulomb_contact.h"
+#include "limber/constraints/contact_qp.h"
+#include "limber/constraints/least_squares.h"
+
+namespace limber {
+namespace {
+
+using Numbers = std::span<const double>;
+
+Vec3 triple(const double* x) { return {x[0], x[1], x[2]}; }
+
+struct Memory {
+  MatrixBuffer A, G;
+  AlignedBuffer b, u, v, zero, D, f, best, trial;
+  std::vector<double> scale, mu;  // √a_i, μ_i
+  std::vector<Mat3> diagonal;     // A_ii, scaled
+  std::vector<int> rows;
+  // blocks of G: contact i has 2i and 2i + 1
+  struct Block {
+    std::size_t first_row, offset, columns;  // rows of the padded G; offset in the padded v; 0 columns: none
+  };
+  std::vector<Block> blocks;
+  std::vector<int> offsets, body_columns;
+  // Newton
+  std::vector<double> jacobian, metric, map, step;
+  LeastSquaresSolver least_squares;
+  // staggered
+  std::vector<double> A_normal, b_normal, f_normal;
+  ContactQpSolver normal_solver;
+};
+
+// Contacts are scaled to a_i = trace A_ii/3 = 1: forces by √a_i, velocities by 1/√a_i. Cones do not change by that, and
+// all residuals have one unit. What nothing moves (a_i = 0) keeps its scale and no force.
+
+// u = A f + b with A in full, kept up to date.
+class DenseContacts {
+ public:
+  DenseContacts(const FrictionProblem& problem, Memory& memory) : memory_(memory) {
+    m_ = static_cast<std::size_t>(problem.contacts);
+    const std::size_t n = 3 * m_;
+    A_ = memory.A.need(n, n);
+    scales(problem);
+    for (std::size_t i = 0; i < n; ++i) {
+      double* row = A_.row(i);
+      const double* from = problem.A.data() + i * n;
+      for (std::size_t j = 0; j < n; ++j) row[j] = from[j] / (memory.scale[i / 3] * memory.scale[j / 3]);
+      std::fill(row + n, row + A_.stride, 0.0);
+    }
+    memory.diagonal.resize(m_);
+    for (std::size_t i = 0; i < m_; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          memory.diagonal[i](r, c) = A_.row(3 * i + static_cast<std::size_t>(r))[3 * i + static_cast<std::size_t>(c)];
+    u_ = memory.u.need(n);
+    b_ = memory.b.need(n);
+    std::fill_n(b_, padded(n), 0.0);
+    for (std::size_t i = 0; i < n; ++i) b_[i] = problem.b[i] / memory.scale[i / 3];
+  }
+
+  void refresh(const double* f) { combine_rows(u_, b_, A_, nullptr, f, 3 * m_, 3 * m_); }
+  Vec3 velocity(std::size_t i, const double*) const { return triple(u_ + 3 * i); }
+  void move(std::size_t i, const Vec3& change) {
+    const int rows[3] = {static_cast<int>(3 * i), static_cast<int>(3 * i + 1), static_cast<int>(3 * i + 2)};
+    combine_rows(u_, u_, A_, rows, change.data(), 3, 3 * m_);
+  }
+  const double* b() const { return b_; }
+  MatrixView A() const { return A_; }
+
+ private:
+  void scales(const FrictionProblem& problem) {
+    const std::size_t n = 3 * m_;
+    memory_.scale.resize(m_);
+    for (std::size_t i = 0; i < m_; ++i) {
+      double trace = 0.0;
+      for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) trace += problem.A[c * n + c];
+      memory_.scale[i] = trace > 0.0 ? std::sqrt(trace / 3.0) : 1.0;
+    }
+  }
+
+  Memory& memory_;
+  std::size_t m_;
+  MatrixView A_{};
+  double* u_ = nullptr;
+  double* b_ = nullptr;
+};
+
+// The same without A: v = Gᵀf of all bodies is kept, and u_i = b_i + D_i f_i + G_i v.
+class BlockContacts {
+ public:
+  BlockContacts(const BlockFrictionProblem& problem, Memory& memory) : memory_(memory) {
+    m_ = static_cast<std::size_t>(problem.contacts);
+    place_blocks(problem);
+    scales(problem);
+    b_ = memory.b.need(3 * m_);
+    D_ = memory.D.need(3 * m_);
+    for (std::size_t i = 0; i < 3 * m_; ++i) {
+      const double s = memory.scale[i / 3];
+      b_[i] = problem.b[i] / s;
+      D_[i] = problem.D.empty() ? 0.0 : problem.D[i] / (s * s);
+    }
+    std::fill(b_ + 3 * m_, b_ + padded(3 * m_), 0.0);
+    memory.diagonal.resize(m_);
+    for (std::size_t i = 0; i < m_; ++i) memory.diagonal[i] = block_of_A(i);
+  }
+
+  void refresh(const double* f) {
+    std::fill_n(v_, padded(v_size_), 0.0);
+    for (std::size_t i = 0; i < m_; ++i) add_to_motion(i, f + 3 * i);
+  }
+  Vec3 velocity(std::size_t i, const double* f) const {
+    Vec3 u;
+    for (std::size_t c = 0; c < 3; ++c) u[static_cast<int>(c)] = b_[3 * i + c] + D_[3 * i + c] * f[3 * i + c];
+    for (const Memory::Block* block = &memory_.blocks[2 * i]; block != &memory_.blocks[2 * i] + 2; ++block) {
+      if (block->columns == 0) continue;
+      double part[3];
+      multiply_rows(part, {G_.row(block->first_row), G_.stride}, nullptr, v_ + block->offset, 3, block->columns);
+      u += triple(part);
+    }
+    return u;
+  }
+  void move(std::size_t i, const Vec3& change) { add_to_motion(i, change.data()); }
+  const double* b() const { return b_; }
+
+ private:
+  // Each body's part of v begins at a padded place; each block's rows are padded.
+  void place_blocks(const BlockFrictionProblem& problem) {
+    const auto columns = static_cast<std::size_t>(problem.columns);
+    memory_.offsets.assign(columns, -1);
+    memory_.body_columns.assign(columns, 0);
+    memory_.blocks.resize(2 * m_);
+    std::size_t widest = 0, rows = 0;
+    v_size_ = 0;
+    for (std::size_t k = 0; k < 2 * m_; ++k) {
+      const FrictionBlock& from = problem.blocks[k];
+      memory_.blocks[k] = {rows, 0, 0};
+      if (!from.values || from.columns == 0) continue;
+      const auto first = static_cast<std::size_t>(from.first_column);
+      if (memory_.offsets[first] < 0) {
+        memory_.offsets[first] = static_cast<int>(v_size_);
+        memory_.body_columns[first] = from.columns;
+        v_size_ += padded(static_cast<std::size_t>(from.columns));
+      }
+      if (memory_.body_columns[first] != from.columns)
+        throw InvalidArgument("FrictionSolver::solve: block " + std::to_string(k) + " has " +
+                              std::to_string(from.columns) + " columns from " + std::to_string(first) +
+                              " on, an earlier one " + std::to_string(memory_.body_columns[first]));
+      memory_.blocks[k] = {rows, static_cast<std::size_t>(memory_.offsets[first]),
+                           static_cast<std::size_t>(from.columns)};
+      widest = std::max(widest, static_cast<std::size_t>(from.columns));
+      rows += 3;
+    }
+    v_ = memory_.v.need(v_size_);
+    G_ = memory_.G.need(rows, widest);
+    for (std::size_t k = 0; k < 2 * m_; ++k)
+      for (std::size_t c = 0; c < 3 && memory_.blocks[k].columns > 0; ++c) {
+        double* row = G_.row(memory_.blocks[k].first_row + c);
+        std::copy_n(problem.blocks[k].values + c * memory_.blocks[k].columns, memory_.blocks[k].columns, row);
+        std::fill(row + memory_.blocks[k].columns, row + G_.stride, 0.0);
+      }
+  }
+
+  void scales(const BlockFrictionProblem& problem) {
+    memory_.scale.assign(m_, 1.0);
+    for (std::size_t i = 0; i < m_; ++i) {
+      double trace = 0.0;
+      for (std::size_t c = 0; c < 3; ++c) trace += problem.D.empty() ? 0.0 : problem.D[3 * i + c];
+      for_rows(i, [&](double* row, std::size_t columns, std::size_t) { trace += dot(row, row, columns); });
+      if (!(trace > 0.0)) continue;
+      memory_.scale[i] = std::sqrt(trace / 3.0);
+      for_rows(i, [&](double* row, std::size_t columns, std::size_t) {
+        for (std::size_t j = 0; j < columns; ++j) row[j] /= memory_.scale[i];
+      });
+    }
+  }
+
+  template <class Body>
+  void for_rows(std::size_t i, const Body& body) const {
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
+      for (std::size_t c = 0; c < 3 && memory_.blocks[k].columns > 0; ++c)
+        body(G_.row(memory_.blocks[k].first_row + c), memory_.blocks[k].columns, c);
+  }
+
+  Mat3 block_of_A(std::size_t i) const {
+    Mat3 A = Vec3(D_[3 * i], D_[3 * i + 1], D_[3 * i + 2]).asDiagonal();
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
+      for (std::size_t r = 0; r < 3 && memory_.blocks[k].columns > 0; ++r)
+        for (std::size_t c = 0; c < 3; ++c)
+          A(static_cast<int>(r), static_cast<int>(c)) +=
+              dot(G_.row(memory_.blocks[k].first_row + r), G_.row(memory_.blocks[k].first_row + c),
+                  memory_.blocks[k].columns);
+    return A;
+  }
+
+  void add_to_motion(std::size_t i, const double* force) {
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k) {
+      const Memory::Block& block = memory_.blocks[k];
+      if (block.columns == 0) continue;
+      double* v = v_ + block.offset;
+      combine_rows(v, v, {G_.row(block.first_row), G_.stride}, nullptr, force, 3, block.columns);
+    }
+  }
+
+  Memory& memory_;
+  std::size_t m_ = 0, v_size_ = 0;
+  MatrixView G_{};
+  double* v_ = nullptr;
+  double* b_ = nullptr;
+  double* D_ = nullptr;
+};
+
+// What every method shares: sweeps and the residual, in scaled numbers.
+template <class Contacts>
+class Sweeps {
+ public:
+  Sweeps(Contacts& contacts, Memory& memory, std::size_t m, const FrictionOptions& options, FrictionResult& result)
+      : contacts_(contacts), memory_(memory), m_(m), options_(options), result_(result) {
+    f_ = memory.f.need(3 * m);
+    for (std::size_t i = 0; i < m; ++i) size_ = std::max(size_, triple(contacts.b() + 3 * i).norm());
+    if (size_ == 0.0) size_ = 1.0;  // nothing moves: zero is the solution
+  }
+
+  double* f() const { return f_; }
+  double size() const { return size_; }
+
+  void start(Numbers guess) {
+    std::fill_n(f_, padded(3 * m_), 0.0);
+    for (std::size_t i = 0; i < m_; ++i) {
+      const Vec3 given = triple(guess.data() + 3 * i) * memory_.scale[i];
+      if (given.allFinite()) put(i, project_on_cone(given, memory_.mu[i]));
+    }
+    contacts_.refresh(f_);
+  }
+
+  // Every contact solved once, in order. Returns the largest change of a force.
+  double sweep() {
+    double most = 0.0;
+    for (std::size_t i = 0; i < m_; ++i) {
+      const Mat3& A = memory_.diagonal[i];
+      if (!(A(0, 0) > 0.0)) continue;
+      const Vec3 old = triple(f_ + 3 * i);
+      const Vec3 b = contacts_.velocity(i, f_) - A * old;
+      const Vec3 change = solve_coulomb_contact(A, b, memory_.mu[i]) - old;
+      if (change.isZero(0.0)) continue;
+      put(i, old + change);
+      contacts_.move(i, change);
+      most = std::max(most, change.norm());
+    }
+    ++result_.sweeps;
+    return most;
+  }
+
+  Vec3 map(std::size_t i) const {
+    const Vec3 x = triple(f_ + 3 * i);
+    return x - project_on_cone(x - corrected_velocity(contacts_.velocity(i, f_), memory_.mu[i]), memory_.mu[i]);
+  }
+
+  double residual() const {
+    double worst = 0.0;
+    for (std::size_t i = 0; i < m_; ++i) worst = std::max(worst, map(i).norm());
+    return worst / size_;
+  }
+
+  // Up to `count` sweeps; whether the residual is small enough after them.
+  bool run(int count) {
+    for (int n = 0; n < count && result_.sweeps < options_.max_sweeps; ++n) {
+      // The residual costs as much as a sweep, and is not small where a force still changes much.
+      if (sweep() > 10.0 * options_.tolerance * size_) continue;
+      contacts_.refresh(f_);
+      result_.residual = residual();
+      if (result_.residual <= options_.tolerance) return true;
+    }
+    contacts_.refresh(f_);
+    result_.residual = residual();
+    return result_.residual <= options_.tolerance;
+  }
+
+  void put(std::size_t i, const Vec3& force) { std::copy_n(force.data(), 3, f_ + 3 * i); }
+
+  FrictionResult finish(std::span<double> f) {
+    result_.status = result_.residual <= options_.tolerance ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
+    for (std::size_t i = 0; i < m_; ++i) {
+      const Vec3 force = project_on_cone(triple(f_ + 3 * i), memory_.mu[i]) / memory_.scale[i];
+      std::copy_n(force.data(), 3, f.data() + 3 * i);
+    }
+    return result_;
+  }
+
+ private:
+  Contacts& contacts_;
+  Memory& memory_;
+  std::size_t m_;
+  const FrictionOptions& options_;
+  FrictionResult& result_;
+  double* f_ = nullptr;
+  double size_ = 0.0;
+};
+
+// Newton steps on the natural map f − P_K(f − û(f)), whose zeros are the solutions. Where contacts are redundant its
+// derivative is singular but the equations agree: the least-norm step stays closest to the forces the sweeps gave.
+class NewtonSteps {
+ public:
+  NewtonSteps(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m)
+      : contacts_(contacts), sweeps_(sweeps), memory_(memory), m_(m) {
+    const std::size_t n = 3 * m;
+    memory.jacobian.resize(n * n), memory.metric.assign(n, 1.0), memory.map.resize(n), memory.step.resize(n);
+    memory.best.need(n);
+  }
+
+  // One step; false if it does not bring the map down.
+  bool step() {
+    const double before = fill_map();
+    fill_jacobian();
+    const std::size_t n = 3 * m_;
+    memory_.least_squares.factor(memory_.jacobian, memory_.metric, static_cast<int>(n), {.rank_tolerance = 1e-13});
+    memory_.least_squares.solve(memory_.map, memory_.step);
+    double* f = sweeps_.f();
+    double* old = memory_.best.data();
+    std::copy_n(f, n, old);
+    for (double length = 1.0; length > 0.1; length *= 0.5) {
+      advance(old, length);
+      if (fill_map() <= (1.0 - 0.25 * length) * before) return true;
+    }
+    std::copy_n(old, n, f);
+    contacts_.refresh(f);
+    return false;
+  }
+
+ private:
+  double fill_map() {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < m_; ++i) {
+      const Vec3 x = sweeps_.map(i);
+      std::copy_n(x.data(), 3, memory_.map.data() + 3 * i);
+      sum += x.squaredNorm();
+    }
+    return std::sqrt(sum);
+  }
+
+  // Row i: E_i − P_i (E_i − (1 + μ e_n t_iᵀ) A_i), t_i the direction of sliding.
+  void fill_jacobian() {
+    const std::size_t n = 3 * m_;
+    const double* f = sweeps_.f();
+    for (std::size_t i = 0; i < m_; ++i) {
+      const Vec3 u = contacts_.velocity(i, f);
+      const double mu = memory_.mu[i], speed = u.tail<2>().norm();
+      const Mat3 P = cone_projection_derivative(triple(f + 3 * i) - corrected_velocity(u, mu), mu);
+      Mat3 correction = Mat3::Identity();
+      if (speed > 0.0) correction.block<1, 2>(0, 1) = mu / speed * u.tail<2>().transpose();
+      const Mat3 Q = P * correction;
+      for (std::size_t j = 0; j < m_; ++j) {
+        Mat3 block;
+        for (std::size_t r = 0; r < 3; ++r)
+          for (std::size_t c = 0; c < 3; ++c)
+            block(static_cast<int>(r), static_cast<int>(c)) = contacts_.A().row(3 * i + r)[3 * j + c];
+        block = (Q * block).eval();
+        if (i == j) block += Mat3::Identity() - P;
+        for (std::size_t r = 0; r < 3; ++r)
+          for (std::size_t c = 0; c < 3; ++c)
+            memory_.jacobian[(3 * i + r) * n + 3 * j + c] = block(static_cast<int>(r), static_cast<int>(c));
+      }
+    }
+  }
+
+  // f = old − length·Jᵀ(J Jᵀ)⁺ map
+  void advance(const double* old, double length) {
+    const std::size_t n = 3 * m_;
+    double* f = sweeps_.f();
+    std::copy_n(old, n, f);
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j) f[j] -= length * memory_.step[i] * memory_.jacobian[i * n + j];
+    contacts_.refresh(f);
+  }
+
+  DenseContacts& contacts_;
+  Sweeps<DenseContacts>& sweeps_;
+  Memory& memory_;
+  std::size_t m_;
+};
+
+void solve_exactly(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m,
+                   const FrictionOptions& options, FrictionResult& result) {
+  constexpr int kSweepsPerRound = 10, kNewtonPerRound = 12;
+  NewtonSteps newton(contacts, sweeps, memory, m);
+  while (!sweeps.run(kSweepsPerRound) && result.sweeps < options.max_sweeps) {
+    for (int n = 0; n < kNewtonPerRound && newton.step(); ++n) {
+      ++result.newton_steps;
+      result.residual = sweeps.residual();
+      if (result.residual <= options.tolerance) return;
+    }
+    for (std::size_t i = 0; i < m; ++i) sweeps.put(i, project_on_cone(triple(sweeps.f() + 3 * i), memory.mu[i]));
+    contacts.refresh(sweeps.f());
+  }
+}
+
+// Alternates the normal and the friction problem.
+class Staggered {
+ public:
+  Staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m)
+      : contacts_(contacts), sweeps_(sweeps), memory_(memory), m_(m) {
+    memory.A_normal.resize(m * m), memory.b_normal.resize(m), memory.f_normal.resize(m);
+    for (std::size_t i = 0; i < m; ++i)
+      for (std::size_t j = 0; j < m; ++j) memory.A_normal[i * m + j] = contacts.A().row(3 * i)[3 * j];
+  }
+
+  void solve_normal() {
+    double* f = sweeps_.f();
+    const std::vector<double>& A = memory_.A_normal;
+    for (std::size_t i = 0; i < m_; ++i) memory_.f_normal[i] = f[3 * i];
+    for (std::size_t i = 0; i < m_; ++i) {
+      double from_normals = 0.0;
+      for (std::size_t j = 0; j < m_; ++j) from_normals += A[i * m_ + j] * f[3 * j];
+      memory_.b_normal[i] = contacts_.velocity(i, f)[0] - from_normals;
+    }
+    memory_.normal_solver.solve(ContactQp{.size = static_cast<int>(m_), .A = A, .b = memory_.b_normal},
+                                memory_.f_normal);
+    for (std::size_t i = 0; i < m_; ++i) f[3 * i] = memory_.f_normal[i];
+    contacts_.refresh(f);
+  }
+
+  // Sweeps of discs of radius μ n until the forces stand still.
+  void solve_friction(double tolerance) {
+    constexpr int kMaxSweeps = 200;
+    double* f = sweeps_.f();
+    double most = 2.0 * tolerance;
+    for (int n = 0; n < kMaxSweeps && most > tolerance; ++n) {
+      most = 0.0;
+      for (std::size_t i = 0; i < m_; ++i) {
+        const Eigen::Matrix2d A = memory_.diagonal[i].bottomRightCorner<2, 2>();
+        const Eigen::Vector2d old(f[3 * i + 1], f[3 * i + 2]);
+        const Eigen::Vector2d b = contacts_.velocity(i, f).tail<2>() - A * old;
+        const Eigen::Vector2d force = solve_in_disc(A, b, memory_.mu[i] * f[3 * i]);
+        const Eigen::Vector2d change = force - old;
+        if (change.isZero(0.0)) continue;
+        f[3 * i + 1] = force[0], f[3 * i + 2] = force[1];
+        contacts_.move(i, {0.0, change[0], change[1]});
+        most = std::max(most, change.norm());
+      }
+    }
+    contacts_.refresh(f);
+  }
+
+ private:
+  DenseContacts& contacts_;
+  Sweeps<DenseContacts>& sweeps_;
+  Memory& memory_;
+  std::size_t m_;
+};
+
+// The alternation need not settle: the best forces on the way are kept.
+void solve_staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m,
+                     const FrictionOptions& options, FrictionResult& result) {
+  Staggered staggered(contacts, sweeps, memory, m);
+  double* best = memory.best.need(3 * m);
+  result.residual = sweeps.residual();
+  std::copy_n(sweeps.f(), 3 * m, best);
+  while (result.sweeps < options.max_sweeps && result.residual > options.tolerance) {
+    staggered.solve_normal();
+    staggered.solve_friction(0.01 * options.tolerance * sweeps.size());
+    ++result.sweeps;
+    if (const double now = sweeps.residual(); now < result.residual) {
+      result.residual = now;
+      std::copy_n(sweeps.f(), 3 * m, best);
+    }
+  }
+  std::copy_n(best, 3 * m, sweeps.f());
+}
+
+constexpr const char* kName = "FrictionSolver::solve";
+
+void check(int contacts, Numbers b, Numbers mu, Numbers f, const FrictionOptions& options) {
+  check_option(kName, "contacts", contacts >= 0, contacts, "0 or more");
+  const auto m = static_cast<std::size_t>(contacts);
+  check_length(kName, "b", b.size(), 3 * m);
+  check_length(kName, "mu", mu.size(), m);
+  check_length(kName, "f", f.size(), 3 * m);
+  check_option(kName, "tolerance", options.tolerance > 0.0, options.tolerance, "> 0");
+  check_option(kName, "max_sweeps", options.max_sweeps >= 1, options.max_sweeps, "1 or more");
+}
+
+bool take_friction(Numbers b, Numbers mu, Memory& memory) {
+  memory.mu.assign(mu.begin(), mu.end());
+  return all_finite(b.data(), b.size()) && all_finite(mu.data(), mu.size()) &&
+         std::all_of(mu.begin(), mu.end(), [](double x) { return x >= 0.0; });
+}
+
+void check_blocks(const BlockFrictionProblem& problem) {
+  const auto m = static_cast<std::size_t>(problem.contacts);
+  check_length(kName, "blocks", problem.blocks.size(), 2 * m);
+  check_optional_length(kName, "D", problem.D.size(), 3 * m);
+  for (const FrictionBlock& block : problem.blocks)
+    if (block.values)
+      check_option(
+          kName, "a block's last column",
+          block.first_column >= 0 && block.columns >= 0 && block.columns <= problem.columns - block.first_column,
+          block.first_column + block.columns, "at most the number of columns");
+}
+
+bool finite_blocks(const BlockFrictionProblem& problem) {
+  return std::all_of(problem.blocks.begin(), problem.blocks.end(), [](const FrictionBlock& block) {
+    return !block.values || all_finite(block.values, 3 * static_cast<std::size_t>(block.columns));
+  });
+}
+
+FrictionResult refuse(std::span<double> f) {
+  std::fill(f.begin(), f.end(), 0.0);
+  return {.status = SolveStatus::kInvalidInput};
+}
+
+}  // namespace
+
+struct FrictionSolver::Impl {
+  Memory memory;
+};
+
+FrictionSolver::FrictionSolver() : impl_(std::make_unique<Impl>()) {}
+FrictionSolver::~FrictionSolver() = default;
+FrictionSolver::FrictionSolver(FrictionSolver&&) noexcept = default;
+FrictionSolver& FrictionSolver::operator=(FrictionSolver&&) noexcept = default;
+
+FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<double> f,
+                                     const FrictionOptions& options) {
+  check(problem.contacts, problem.b, problem.mu, f, options);
+  const auto m = static_cast<std::size_t>(problem.contacts);
+  check_length(kName, "A", problem.A.size(), 9 * m * m);
+  Memory& memory = impl_->memory;
+  if (!take_friction(problem.b, problem.mu, memory) || !all_finite(problem.A.data(), problem.A.size()))
+    return refuse(f);
+  DenseContacts contacts(problem, memory);
+  FrictionResult result;
+  Sweeps<DenseContacts> sweeps(contacts, memory, m, options, result);
+  sweeps.start(f);
+  switch (options.method) {
+    case FrictionMethod::kExact:
+      solve_exactly(contacts, sweeps, memory, m, options, result);
+      break;
+    case FrictionMethod::kStaggered:
+      solve_staggered(contacts, sweeps, memory, m, options, result);
+      break;
+    case FrictionMethod::kBlockGaussSeidel:
+      sweeps.run(options.max_sweeps);
+      break;
+  }
+  return sweeps.finish(f);
+}
+
+FrictionResult FrictionSolver::solve(const BlockFrictionProblem& problem, std::span<double> f,
+                                     const FrictionOptions& options) {
+  check(problem.contacts, problem.b, problem.mu, f, options);
+  check_blocks(problem);
+  if (options.method != FrictionMethod::kBlockGaussSeidel)
+    throw InvalidArgument(
+        "FrictionSolver::solve: blocks are solved by kBlockGaussSeidel only, another method was asked for");
+  Memory& memory = impl_->memory;
+  if (!take_friction(problem.b, problem.mu, memory) || !finite_blocks(problem) ||
+      !std::all_of(problem.D.begin(), problem.D.end(), [](double x) { return x >= 0.0 && std::isfinite(x); }))
+    return refuse(f);
+  BlockContacts contacts(problem, memory);
+  FrictionResult result;
+  Sweeps<BlockContacts> sweeps(contacts, memory, static_cast<std::size_t>(problem.contacts), options, result);
+  sweeps.start(f);
+  sweeps.run(options.max_sweeps);
+  return sweeps.finish(f);
+}
+
+}  // namespace limber
