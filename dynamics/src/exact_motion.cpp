@@ -112,14 +112,16 @@ void ExactMotion::bounds(const MotionState& from, double until, MotionBounds& bo
 }
 
 double ExactMotion::reach(double distance, std::span<const double> shape) const {
-  const FrameBounds frame = path_.bounds(0.0, step());
-  double arm = distance, flexing = 0.0;
-  for (std::size_t i = 0; i < z_.size(); ++i) {
-    const double released = released_.empty() ? 0.0 : std::abs(released_[i]);
-    arm += shape[i] * (std::abs(z_[i]) + released);
-    flexing += shape[i] * (bound(i, mode_at(i, 0.0), 0.0, step()).change + released);
-  }
-  return frame.travel + 2.0 * std::sin(0.5 * frame.turn) * arm + flexing;
+  double arm = distance;
+  for (std::size_t i = 0; i < z_.size(); ++i) arm += shape[i] * (std::abs(z_[i]) + released(i));
+  return path_.bounds(0.0, step()).travel + sway(arm, shape);
+}
+
+double ExactMotion::sway(double arm, std::span<const double> shape) const {
+  double flexing = 0.0;
+  for (std::size_t i = 0; i < z_.size(); ++i)
+    flexing += shape[i] * (bound(i, mode_at(i, 0.0), 0.0, step()).change + released(i));
+  return 2.0 * std::sin(0.5 * path_.bounds(0.0, step()).turn) * arm + flexing;
 }
 
 }  // namespace limber

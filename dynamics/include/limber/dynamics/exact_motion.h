@@ -59,6 +59,9 @@ class ExactMotion {
   /// How far any point with |r| ≤ distance, |U_i| ≤ shape_i may be from its place at the start within the step, m: with
   /// the numbers of ModalModel::collision_extent(), BodyState::reach. O(k).
   double reach(double distance, std::span<const double> shape) const;
+  /// The same without the way of the body origin: how far turning and flexing take a point from where it would be if
+  /// the frame moved straight on. @param arm |r + U z| ≤ arm at the start, m
+  double sway(double arm, std::span<const double> shape) const;
 
   // For those who make one by hand: the frame first, then its modes, then the impulses on them.
   FramePath& path() { return path_; }
@@ -73,6 +76,7 @@ class ExactMotion {
 
  private:
   Mode mode(std::size_t i) const { return {lambda_[i], decay_[i]}; }
+  double released(std::size_t i) const { return released_.empty() ? 0.0 : std::abs(released_[i]); }
   ModeState mode_at(std::size_t i, double t) const;
   ModeBound bound(std::size_t i, const ModeState& from, double t0, double t1) const;
   std::span<const double> impulses_at(std::size_t n) const { return {impulses_.data() + n * z_.size(), z_.size()}; }
