@@ -6,13 +6,6 @@
 namespace limber {
 namespace {
 
-/// The rotation vector of q by the shorter way, |r| ≤ π: q = exp(r/2).
-Vec3 rotation_vector(const Quaternion& q) {
-  const Vec3 v = q.w < 0.0 ? Vec3(-q.vector()) : q.vector();
-  const double sine = v.norm();
-  return sine > 0.0 ? Vec3(v * (2.0 * std::atan2(sine, std::abs(q.w)) / sine)) : Vec3(Vec3::Zero());
-}
-
 FrameState between(const PoseKey& a, const PoseKey& b, double t) {
   const double span = b.time - a.time, u = (t - a.time) / span;
   const double s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
