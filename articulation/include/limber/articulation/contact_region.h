@@ -41,8 +41,8 @@ struct ContactOptions {
   int samples = 3000;            ///< wanted on each side; 100 … 100,000
   double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
   double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
-  double search = 0.04;          ///< largest gap, of the smaller component's diagonal; > 0
-  double largest_gap = 0.05;     ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
+  double search = 0.025;         ///< largest gap, of the smaller component's diagonal; > 0
+  double largest_gap = 0.025;    ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
   double hull_margin = 0.01;     ///< kConvexParts: growth of the hulls, of the smaller component's diagonal; ≥ 0
   void validate() const;         ///< @throws InvalidArgument naming the field
 };

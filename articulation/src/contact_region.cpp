@@ -1,0 +1,206 @@
+#include "limber/articulation/contact_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <numeric>
+
+#include "limber/core/error.h"
+#include "near_samples.h"
+
+namespace limber {
+namespace {
+
+void require(bool holds, const std::string& field, double value, const std::string& expected) {
+  if (!holds)
+    throw InvalidArgument("ContactOptions: " + field + " is " + std::to_string(value) + ", expected " + expected);
+}
+
+/// A component made ready: outward, with normals and a tree.
+struct Prepared {
+  Prepared(const Component& component, double crease_angle)
+      : mesh(outward(component)), smooth(mesh, crease_angle), diagonal(component.diagonal) {}
+
+  /// A closed surface drawn inside out is turned.
+  static SurfaceMesh outward(const Component& component) {
+    SurfaceMesh out = component.surface;
+    if (component.closed && enclosed_volume(out) < 0.0)
+      for (Triangle& t : out.triangles) std::swap(t[1], t[2]);
+    return out;
+  }
+
+  SurfaceMesh mesh;
+  SmoothSurface smooth;
+  double diagonal;
+};
+
+using Parts = std::vector<std::unique_ptr<Prepared>>;
+
+struct Pair {
+  Index a, b;
+};
+
+/// Pairs whose boxes come within reach of each other, ordered.
+std::vector<Pair> near_pairs(const Parts& parts, double search) {
+  std::vector<Index> by_x(parts.size());
+  std::iota(by_x.begin(), by_x.end(), Index{0});
+  const auto box = [&](Index i) -> const Eigen::AlignedBox3d& {
+    return parts[static_cast<std::size_t>(i)]->smooth.tree().box();
+  };
+  std::stable_sort(by_x.begin(), by_x.end(), [&](Index i, Index j) { return box(i).min()[0] < box(j).min()[0]; });
+  std::vector<Pair> out;
+  std::vector<Index> open;  // boxes that the sweep has not left behind
+  for (const Index i : by_x) {
+    const auto reach = [&](Index j) {
+      return search *
+             std::min(parts[static_cast<std::size_t>(i)]->diagonal, parts[static_cast<std::size_t>(j)]->diagonal);
+    };
+    std::erase_if(open, [&](Index j) {
+      return box(j).max()[0] + search * parts[static_cast<std::size_t>(j)]->diagonal < box(i).min()[0];
+    });
+    for (const Index j : open)
+      if (std::sqrt(box(i).squaredExteriorDistance(box(j))) <= reach(j))
+        out.push_back({std::min(i, j), std::max(i, j)});
+    open.push_back(i);
+  }
+  std::sort(out.begin(), out.end(),
+            [](const Pair& p, const Pair& q) { return std::pair(p.a, p.b) < std::pair(q.a, q.b); });
+  return out;
+}
+
+struct BothSides {
+  std::vector<NearSample> a, b;
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The largest gap that still belongs to the contact: a cluster grown from the smallest gaps, so that a small hinge is
+/// not swamped by large faces that run side by side further apart.
+double gap_limit(const BothSides& sides, double diagonal, double reach) {
+  struct Gap {
+    double distance, chord;
+  };
+  std::vector<Gap> gaps;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) gaps.push_back({s.distance, s.chord_error});
+  if (gaps.empty()) return 0.0;
+  std::sort(gaps.begin(), gaps.end(), [](const Gap& x, const Gap& y) { return x.distance < y.distance; });
+  std::size_t count = std::max<std::size_t>(1, gaps.size() / 50);
+  double limit = 0.0;
+  while (true) {
+    std::vector<double> chords;
+    for (std::size_t i = 0; i < count; ++i) chords.push_back(gaps[i].chord);
+    limit = std::min(reach, 2.5 * gaps[count / 2].distance + 3.0 * median(chords) + 1e-4 * diagonal);
+    const auto grown = static_cast<std::size_t>(
+        std::upper_bound(gaps.begin(), gaps.end(), limit, [](double l, const Gap& g) { return l < g.distance; }) -
+        gaps.begin());
+    if (grown <= count) return limit;
+    count = grown;
+  }
+}
+
+void keep_nearer(std::vector<NearSample>& samples, double limit) {
+  std::erase_if(samples, [&](const NearSample& s) { return s.distance > limit; });
+}
+
+/// What is measured over the samples of both sides.
+ContactRegion summarised(const Pair& pair, const BothSides& sides) {
+  ContactRegion out;
+  out.a = pair.a, out.b = pair.b;
+  std::vector<double> gaps, chords;
+  Eigen::AlignedBox3d box;
+  double area = 0.0;
+  for (auto [samples, target] : {std::pair(&sides.a, &out.on_a), {&sides.b, &out.on_b}})
+    for (const NearSample& s : *samples) {
+      target->push_back(s.contact);
+      gaps.push_back(s.distance);
+      chords.push_back(s.chord_error);
+      box.extend(s.contact.point);
+      out.normal_spread += s.contact.area * s.contact.normal.cross(s.contact.facing_normal).squaredNorm();
+      area += s.contact.area;
+    }
+  out.normal_spread /= area;
+  out.gap = median(gaps);
+  out.chord_error = median(chords);
+  out.extent = box.diagonal().norm();
+  return out;
+}
+
+BothSides sample(const Prepared& a, const Prepared& b, double reach, double facing_cosine, int wanted) {
+  return {near_samples(a.smooth, b.smooth, reach, facing_cosine, wanted),
+          near_samples(b.smooth, a.smooth, reach, facing_cosine, wanted)};
+}
+
+/// Leaves out samples that another component stands before: the inner tube of a telescope does not touch the outer one.
+void drop_hidden(const Pair& pair, const Parts& parts, BothSides& sides) {
+  Eigen::AlignedBox3d box;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) box.extend(s.contact.point).extend(s.contact.facing_point);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const TriangleTree& tree = parts[i]->smooth.tree();
+    if (static_cast<Index>(i) == pair.a || static_cast<Index>(i) == pair.b || !tree.box().intersects(box)) continue;
+    const auto hidden = [&](const NearSample& s) {
+      return s.distance > 0.0 && tree.crosses(s.contact.point, s.contact.facing_point);
+    };
+    std::erase_if(sides.a, hidden);
+    std::erase_if(sides.b, hidden);
+  }
+}
+
+std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, const ContactOptions& options) {
+  const Prepared &a = *parts[static_cast<std::size_t>(pair.a)], &b = *parts[static_cast<std::size_t>(pair.b)];
+  const double diagonal = std::min(a.diagonal, b.diagonal), reach = options.search * diagonal;
+  // A coarse look finds how wide the gap is; a fine one then spends its samples where the contact is.
+  const int coarse = std::max(100, options.samples / 4);
+  BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
+  const double first_limit = gap_limit(sides, diagonal, reach);
+  if (sides.a.empty() && sides.b.empty()) return {};
+  sides = sample(a, b, std::min(reach, 1.5 * first_limit), options.facing_cosine, options.samples);
+  const double limit = gap_limit(sides, diagonal, reach);
+  keep_nearer(sides.a, limit);
+  keep_nearer(sides.b, limit);
+  drop_hidden(pair, parts, sides);
+
+  constexpr std::size_t kFewest = 20;  // samples a side; fewer say nothing about a surface
+  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return {};
+  ContactRegion out = summarised(pair, sides);
+  if (out.gap > options.largest_gap * out.extent) return {};
+  return {std::move(out)};
+}
+
+}  // namespace
+
+void ContactOptions::validate() const {
+  require(samples >= 100 && samples <= 100000, "samples", samples, "100 to 100000");
+  require(facing_cosine >= -1.0 && facing_cosine <= 0.0, "facing_cosine", facing_cosine, "-1 to 0");
+  require(crease_angle >= 0.0 && crease_angle <= std::numbers::pi, "crease_angle", crease_angle, "0 to pi");
+  require(search > 0.0 && std::isfinite(search), "search", search, "more than 0");
+  require(largest_gap > 0.0, "largest_gap", largest_gap, "more than 0");
+  require(hull_margin >= 0.0 && std::isfinite(hull_margin), "hull_margin", hull_margin, "0 or more");
+}
+
+std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactOptions& options, Jobs& jobs) {
+  options.validate();
+  Parts parts(assembly.components.size());
+  jobs.parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      parts[i] = std::make_unique<Prepared>(assembly.components[i], options.crease_angle);
+  });
+  const auto pairs = near_pairs(parts, options.search);
+  std::vector<std::vector<ContactRegion>> found(pairs.size());
+  jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) found[i] = facing_contact(pairs[i], parts, options);
+  });
+  std::vector<ContactRegion> out;
+  for (auto& regions : found)
+    for (auto& region : regions) out.push_back(std::move(region));
+  return out;
+}
+
+}  // namespace limber

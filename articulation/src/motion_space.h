@@ -1,0 +1,62 @@
+/// Rigid motions of a contact and how much each slips. Private to the module.
+///
+/// Coordinates are the contact's own: about its centroid, in units of its RMS radius, so that the 6 × 6 matrices are
+/// well scaled. A motion ξ = (ω, v) moves p with ω × p + v.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "limber/articulation/contact_region.h"
+#include "limber/core/types.h"
+
+namespace limber {
+
+using Motion = Eigen::Matrix<double, 6, 1>;
+using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+
+struct WeightedPoint {
+  Vec3 point, normal;
+  double weight;
+};
+
+/// C and M of slippage.h (1) over a contact's samples.
+class MotionSpace {
+ public:
+  explicit MotionSpace(const std::vector<ContactRegion>& regions);
+
+  const std::vector<WeightedPoint>& points() const { return points_; }
+  /// Midway between each sample and what it faces, in the input's coordinates.
+  const std::vector<Vec3>& middles() const { return middles_; }
+  const Eigen::Matrix<double, 6, 6>& C() const { return C_; }
+  const Eigen::Matrix<double, 6, 6>& M() const { return M_; }
+  /// Σ w n nᵀ / Σ w
+  const Mat3& normal_covariance() const { return normal_covariance_; }
+  double spread() const { return spread_; }
+
+  Vec3 to_input(const Vec3& p) const { return centre_ + scale_ * p; }
+  double scale() const { return scale_; }
+
+  /// μ of the motions in a subspace, ascending, and the motions in the subspace's coordinates (columns).
+  struct Spectrum {
+    Eigen::VectorXd mu;
+    Eigen::MatrixXd vectors;
+  };
+  Spectrum spectrum(const Eigen::MatrixXd& basis) const;
+  /// The motions that are M-orthogonal to a subspace.
+  Eigen::MatrixXd complement(const Eigen::MatrixXd& basis) const;
+
+ private:
+  std::vector<WeightedPoint> points_;
+  std::vector<Vec3> middles_;
+  Vec3 centre_ = Vec3::Zero();
+  double scale_ = 1.0, spread_ = 0.0;
+  Eigen::Matrix<double, 6, 6> C_, M_;
+  Mat3 normal_covariance_;
+};
+
+Motion rotation_about(const Vec3& axis, const Vec3& through);
+Motion translation_along(const Vec3& direction);
+Mat3 cross_matrix(const Vec3& v);
+
+}  // namespace limber

@@ -1,0 +1,303 @@
+#include "limber/articulation/slippage.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "joint_frame.h"
+#include "limber/core/error.h"
+#include "motion_space.h"
+
+namespace limber {
+namespace {
+
+/// One family of motions fitted to a contact, in the contact's own coordinates.
+struct Family {
+  JointType type = JointType::kFixed;
+  Vec3 axis = Vec3::UnitX();
+  Vec3 origin = Vec3::Zero();
+  double pitch = 0.0;
+  Eigen::MatrixXd motions = Eigen::MatrixXd(6, 0);  ///< that the type leaves
+};
+
+Vec3 smallest_direction(const Mat3& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Mat3>(symmetric).eigenvectors().col(0);
+}
+
+// Fits. Each minimises the normal velocities of its family's motions over the samples.
+
+/// The point that all normals pass by nearest: Σ w (1 − n nᵀ)(p − q) = 0.
+Family fit_ball(const MotionSpace& space) {
+  Mat3 A = Mat3::Zero();
+  Vec3 b = Vec3::Zero();
+  for (const WeightedPoint& p : space.points()) {
+    const Mat3 across = p.weight * (Mat3::Identity() - p.normal * p.normal.transpose());
+    A += across;
+    b += across * p.point;
+  }
+  Family out;
+  out.type = JointType::kBall;
+  out.origin = A.ldlt().solve(b);
+  out.motions.resize(6, 3);
+  for (int k = 0; k < 3; ++k) out.motions.col(k) = rotation_about(Vec3::Unit(k), out.origin);
+  return out;
+}
+
+Family fit_planar(const MotionSpace& space) {
+  Family out;
+  out.type = JointType::kPlanar;
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(space.normal_covariance());
+  out.axis = solver.eigenvectors().col(2);
+  out.motions.resize(6, 3);
+  out.motions << translation_along(solver.eigenvectors().col(0)), translation_along(solver.eigenvectors().col(1)),
+      rotation_about(out.axis, Vec3::Zero());
+  return out;
+}
+
+Family fit_prismatic(const MotionSpace& space) {
+  Family out;
+  out.type = JointType::kPrismatic;
+  out.axis = smallest_direction(space.normal_covariance());
+  out.motions = translation_along(out.axis);
+  return out;
+}
+
+/// The point of the plane through 0 across `axis` about which a rotation has the least normal velocities; where the
+/// contact does not tell (a plane turned about its normal), the one nearest to 0.
+Vec3 best_centre(const MotionSpace& space, const Vec3& axis) {
+  Eigen::Matrix<double, 3, 2> U;
+  U.col(0) = axis.unitOrthogonal();
+  U.col(1) = axis.cross(U.col(0));
+  Eigen::Matrix<double, 6, 2> K;
+  K << Eigen::Matrix<double, 3, 2>::Zero(), -cross_matrix(axis) * U;
+  const Eigen::Matrix2d A = K.transpose() * space.C() * K;
+  const Eigen::Vector2d b = -K.transpose() * space.C() * rotation_about(axis, Vec3::Zero());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A);
+  Eigen::Vector2d x = Eigen::Vector2d::Zero();
+  constexpr double kUndetermined = 1e-9;  // of the largest possible entry, 1
+  for (int k = 0; k < 2; ++k)
+    if (solver.eigenvalues()[k] > kUndetermined)
+      x += solver.eigenvectors().col(k) * (solver.eigenvectors().col(k).dot(b) / solver.eigenvalues()[k]);
+  return U * x;
+}
+
+Family rotation_family(const Vec3& axis, const Vec3& origin) {
+  Family out;
+  out.type = JointType::kRevolute;
+  out.axis = axis;
+  out.origin = origin;
+  out.motions = rotation_about(axis, origin);
+  return out;
+}
+
+/// Improves direction and place of an axis in turn.
+Family refined_rotation(const MotionSpace& space, Vec3 axis) {
+  Vec3 origin = best_centre(space, axis);
+  constexpr int kRounds = 12;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::MatrixXd about(6, 3);
+    for (int k = 0; k < 3; ++k) about.col(k) = rotation_about(Vec3::Unit(k), origin);
+    const Vec3 turned = about.topRows<3>() * space.spectrum(about).vectors.col(0);
+    if (turned.norm() == 0.0) break;
+    const double moved = turned.normalized().cross(axis).norm();
+    axis = turned.normalized();
+    origin = best_centre(space, axis);
+    if (moved < 1e-12) break;
+  }
+  return rotation_family(axis, origin);
+}
+
+Family fit_revolute(const MotionSpace& space) {
+  std::vector<Vec3> starts;
+  const auto lowest = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors;
+  for (int k = 0; k < 3; ++k)
+    if (lowest.col(k).head<3>().norm() > 1e-6 * lowest.col(k).norm())
+      starts.push_back(lowest.col(k).head<3>().normalized());
+  const Eigen::SelfAdjointEigenSolver<Mat3> normals(space.normal_covariance());
+  for (int k = 0; k < 3; ++k) starts.push_back(normals.eigenvectors().col(k));
+  std::optional<Family> best;
+  double best_mu = 0.0;
+  for (const Vec3& start : starts) {
+    const Family family = refined_rotation(space, start);
+    const double mu = space.spectrum(family.motions).mu[0];
+    if (!best || mu < best_mu) best = family, best_mu = mu;
+  }
+  return *best;
+}
+
+Family fit_cylindrical(const MotionSpace& space) {
+  const Vec3 axis = smallest_direction(space.normal_covariance());
+  Family out = rotation_family(axis, best_centre(space, axis));
+  out.type = JointType::kCylindrical;
+  out.motions.resize(6, 2);
+  out.motions << rotation_about(out.axis, out.origin), translation_along(out.axis);
+  return out;
+}
+
+/// The motion that slips best of all, if it turns: ω·v/ω² is its pitch, ω × v/ω² a point of its axis.
+std::optional<Family> fit_screw(const MotionSpace& space) {
+  const Motion xi = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors.col(0);
+  const Vec3 omega = xi.head<3>(), v = xi.tail<3>();
+  if (omega.norm() <= 1e-3 * xi.norm()) return std::nullopt;
+  Family out = rotation_family(omega.normalized(), omega.cross(v) / omega.squaredNorm());
+  out.type = JointType::kCylindrical;
+  out.pitch = omega.dot(v) / omega.squaredNorm();
+  out.motions = xi / omega.norm();
+  return out;
+}
+
+// Evidence.
+
+/// How likely a motion slips. The tails keep one measurement from deciding alone.
+double slip_probability(double mu, double threshold) {
+  const double p = 1.0 / (1.0 + (mu / threshold) * (mu / threshold));
+  return std::clamp(p, 1e-4, 1.0 - 1e-4);
+}
+
+struct Judged {
+  Family family;
+  double slippage = 0.0;  ///< largest μ of the family's motions
+  double blocked = 1.0;   ///< smallest μ of the other motions
+  double log_evidence = 0.0;
+};
+
+/// All the family's motions slip and no other does: the product of those probabilities.
+Judged judge(const MotionSpace& space, const Family& family, double threshold) {
+  Judged out;
+  out.family = family;
+  if (family.motions.cols() > 0) {
+    const auto free = space.spectrum(family.motions).mu;
+    for (const double mu : free) out.log_evidence += std::log(slip_probability(mu, threshold));
+    out.slippage = free[free.size() - 1];
+  }
+  const Eigen::MatrixXd others =
+      family.motions.cols() > 0 ? space.complement(family.motions) : Eigen::MatrixXd(Eigen::MatrixXd::Identity(6, 6));
+  const auto held = space.spectrum(others).mu;
+  for (const double mu : held) out.log_evidence += std::log(1.0 - slip_probability(mu, threshold));
+  out.blocked = held[0];
+  return out;
+}
+
+/// Plain rotations are common and screws are not; a screw must beat the rotation by far.
+bool is_screw(const Judged& screw, double rotation_mu) {
+  constexpr double kClearly = 0.15, kLeast = 3e-4;
+  return screw.slippage < kClearly * rotation_mu && rotation_mu > kLeast;
+}
+
+std::vector<Judged> judged_families(const MotionSpace& space, double threshold) {
+  const Family revolute = fit_revolute(space);
+  std::vector<Judged> all;
+  for (const Family& family :
+       {fit_ball(space), fit_planar(space), fit_cylindrical(space), revolute, fit_prismatic(space), Family{}})
+    all.push_back(judge(space, family, threshold));
+  const double rotation_mu = all[3].slippage, translation_mu = all[4].slippage;
+  // An axis far off is a translation in disguise.
+  constexpr double kFarAxis = 15.0;  // of the contact's RMS radius
+  if (revolute.origin.norm() > kFarAxis) all[3].log_evidence -= 10.0;
+  if (const auto screw = fit_screw(space)) {
+    const Judged judged = judge(space, *screw, threshold);
+    const bool flat = screw->origin.norm() > kFarAxis || std::abs(screw->pitch) > kFarAxis;
+    if (!flat && is_screw(judged, std::min(rotation_mu, translation_mu))) {
+      all[3].log_evidence -= 5.0;
+      all.push_back(judged);
+    }
+  }
+  return all;
+}
+
+// Words.
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g", value);
+  return text;
+}
+
+std::string reason(const Judged& judged, double threshold) {
+  const JointFreedoms free = freedoms(judged.family.type);
+  std::string text;
+  if (judged.family.type == JointType::kFixed)
+    text = "no motion slips";
+  else if (judged.family.pitch != 0.0)
+    text = "a turn with an advance slips: slippage " + number(judged.slippage);
+  else {
+    if (free.rotations > 0) text += std::to_string(free.rotations) + (free.rotations > 1 ? " rotations" : " rotation");
+    if (free.rotations > 0 && free.translations > 0) text += " and ";
+    if (free.translations > 0)
+      text += std::to_string(free.translations) + (free.translations > 1 ? " translations" : " translation");
+    text += " slip: slippage at most " + number(judged.slippage);
+  }
+  if (judged.family.motions.cols() < 6) text += ", every other motion at least " + number(judged.blocked);
+  return text + " (threshold " + number(threshold) + ")";
+}
+
+JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double threshold) {
+  JointHypothesis out;
+  out.joint.type = judged.family.type;
+  out.joint.pitch = judged.family.pitch * space.scale();
+  out.joint.frame =
+      joint_frame(judged.family.type, judged.family.axis, space.to_input(judged.family.origin), space.middles());
+  out.slippage = judged.slippage;
+  out.reason = reason(judged, threshold);
+  return out;
+}
+
+/// [X09] 3.2: how many eigenvalues of C about the centroid are below the largest by the ratio g, and how many of their
+/// motions turn.
+JointType type_by_ratio(const MotionSpace& space, double ratio, std::array<double, 6>& relative) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(space.C());
+  int slips = 0;
+  const double largest = solver.eigenvalues()[5];
+  for (int j = 0; j < 6; ++j) {
+    relative[static_cast<std::size_t>(j)] = std::max(0.0, solver.eigenvalues()[j] / largest);
+    if (solver.eigenvalues()[j] * ratio < largest) ++slips;
+  }
+  slips = std::min(slips, 3);
+  if (slips == 0) return JointType::kFixed;
+  const auto turns = Eigen::JacobiSVD<Eigen::MatrixXd>(solver.eigenvectors().topLeftCorner(3, slips)).singularValues();
+  constexpr double kTurns = 0.2;
+  const auto rotations = std::count_if(turns.begin(), turns.end(), [](double s) { return s > kTurns; });
+  if (slips == 3) return rotations >= 2 ? JointType::kBall : JointType::kPlanar;
+  if (slips == 2) return JointType::kCylindrical;
+  return rotations > 0 ? JointType::kRevolute : JointType::kPrismatic;
+}
+
+}  // namespace
+
+void SlippageOptions::validate() const {
+  if (!(threshold > 0.0 && threshold < 1.0))
+    throw InvalidArgument("SlippageOptions: threshold is " + std::to_string(threshold) + ", expected between 0 and 1");
+  if (!(ratio > 1.0))
+    throw InvalidArgument("SlippageOptions: ratio is " + std::to_string(ratio) + ", expected more than 1");
+}
+
+Slippage analyse_slippage(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
+  options.validate();
+  std::size_t samples = 0;
+  for (const ContactRegion& r : regions) samples += r.on_a.size() + r.on_b.size();
+  if (samples == 0) throw InvalidArgument("analyse_slippage: the contact has no samples");
+
+  const MotionSpace space(regions);
+  Slippage out;
+  out.threshold = options.threshold + space.spread();
+  auto judged = judged_families(space, out.threshold);
+  if (options.method == SlippageMethod::kFixedRatio) {
+    const JointType type = type_by_ratio(space, options.ratio, out.mu);
+    for (Judged& j : judged) j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -10.0;
+  } else {
+    const auto mu = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).mu;
+    std::copy(mu.begin(), mu.end(), out.mu.begin());
+  }
+  std::stable_sort(judged.begin(), judged.end(),
+                   [](const Judged& x, const Judged& y) { return x.log_evidence > y.log_evidence; });
+  double sum = 0.0;
+  for (const Judged& j : judged) sum += std::exp(j.log_evidence - judged.front().log_evidence);
+  for (const Judged& j : judged) {
+    out.hypotheses.push_back(in_words(space, j, out.threshold));
+    out.hypotheses.back().confidence = std::exp(j.log_evidence - judged.front().log_evidence) / sum;
+  }
+  return out;
+}
+
+}  // namespace limber

@@ -1,0 +1,57 @@
+/// Nearest points of a triangulated surface. Private to the module.
+#pragma once
+
+#include <vector>
+
+#include "limber/mesh/surface_mesh.h"
+
+namespace limber {
+
+/// A binary tree of boxes along the axes over the triangles of one surface, which must outlive it.
+class TriangleTree {
+ public:
+  explicit TriangleTree(const SurfaceMesh& surface);
+
+  struct Nearest {
+    Index triangle = -1;              ///< −1: none
+    Vec3 point = Vec3::Zero();        ///< on the triangle
+    Vec3 barycentric = Vec3::Zero();  ///< of the point; ≥ 0, sum 1
+    double distance = 0.0;
+    bool found() const { return triangle >= 0; }
+  };
+
+  /// The nearest point within `limit` on a triangle whose unit normal m has direction·m ≤ cosine.
+  Nearest nearest(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
+
+  /// How often the surface winds around p, by a ray; of a closed surface 1 inside and 0 outside.
+  int winding(const Vec3& p) const;
+
+  /// Whether the surface crosses the segment from p to q, its ends included.
+  bool crosses(const Vec3& p, const Vec3& q) const;
+
+  const Vec3& normal(Index triangle) const { return normals_[static_cast<std::size_t>(triangle)]; }
+  const Eigen::AlignedBox3d& box() const { return nodes_.front().box; }
+
+ private:
+  struct Node {
+    Eigen::AlignedBox3d box;
+    Index first = 0,
+          count = 0;  ///< count > 0: a leaf with these of order_; else first is the left child, right next to it
+  };
+  void split(Index node, Index begin, Index end, const std::vector<Vec3>& centres);
+  std::array<Vec3, 3> corners(Index triangle) const;
+  /// Calls hit(leaving) for each triangle that the line p + t·direction meets at t in [0, longest], until it returns
+  /// true; returns whether it did.
+  template <class Hit>
+  bool cast(const Vec3& p, const Vec3& direction, double longest, Hit&& hit) const;
+
+  const SurfaceMesh& surface_;
+  std::vector<Node> nodes_;
+  std::vector<Index> order_;
+  std::vector<Vec3> normals_;  ///< per triangle; zero where it has no area
+};
+
+/// The point of a triangle nearest to p, in barycentric coordinates.
+Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
+}  // namespace limber

@@ -1,0 +1,108 @@
+// joint_accuracy: how often joints are read right, and how well.
+//   run:  build/release/bin/joint_accuracy [--method fixed-ratio|convex-parts] [--verbose]
+//   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
+//         on and for the held-out ones; the confusion matrix; every failure with --verbose
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <numbers>
+
+#include "assemblies.h"
+#include "joint_scores.h"
+#include "limber/articulation/detect_joints.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
+
+namespace limber::assemblies {
+namespace {
+
+const char* kColumns[] = {"ball", "revolute", "cylindrical", "prismatic", "planar", "fixed", "none"};
+
+struct Totals {
+  int joints = 0, right = 0, judged = 0, false_joints = 0, axis_late = 0, origin_late = 0;
+  std::vector<double> axis, origin;
+};
+
+double percentile(std::vector<double> v, double p) {
+  if (v.empty()) return 0.0;
+  std::sort(v.begin(), v.end());
+  return v[static_cast<std::size_t>(p * static_cast<double>(v.size() - 1))];
+}
+
+void print(const std::string& name, const Totals& t) {
+  std::printf("%-34s %5d %7.2f %7d %9.4f %9.4f %10.2e %10.2e\n", name.c_str(), t.joints,
+              t.joints ? 100.0 * t.right / t.joints : 100.0, t.false_joints, percentile(t.axis, 0.5),
+              percentile(t.axis, 1.0), percentile(t.origin, 0.5), percentile(t.origin, 1.0));
+}
+
+int run(const DetectionOptions& options, bool verbose, const std::string& only) {
+  TbbJobs jobs;
+  std::map<std::pair<int, int>, int> confusion;
+  for (const auto* names : {&tuning_names(), &held_out_names()}) {
+    std::printf("%s\n%-34s %5s %7s %7s %9s %9s %10s %10s\n", names == &tuning_names() ? "tuning" : "held out",
+                "variants", "n", "right%", "false", "axis50", "axis100", "origin50", "origin100");
+    for (const VariantClass& group : variant_classes()) {
+      Totals totals;
+      for (const std::string& name : *names) {
+        if (!only.empty() && only != name) continue;
+        for (const Variant& variant : group.variants) {
+          const MadeAssembly made = make(name, variant);
+          const Score score = scored(made, options, jobs);
+          for (const JointScore& j : score.joints) {
+            if (!group.with_balls && j.truth == static_cast<int>(JointType::kBall)) continue;
+            ++totals.joints;
+            ++confusion[{j.truth, j.found}];
+            totals.right += j.right() ? 1 : 0;
+            if (j.right()) totals.axis.push_back(j.axis_error), totals.origin.push_back(j.origin_error);
+            if (verbose && (!j.right() || j.axis_error > group.axis_tolerance || j.origin_error > 1e-3))
+              std::printf("    %-14s %-28s %s: %s read as %s (%.2f), axis %.3f deg, origin %.1e; %s\n", name.c_str(),
+                          group.name.c_str(), j.name.c_str(), kColumns[j.truth], kColumns[j.found], j.confidence,
+                          j.axis_error, j.origin_error, j.reason.c_str());
+          }
+          for (const std::string& extra : score.extra) {
+            ++totals.false_joints;
+            if (verbose) std::printf("    %-14s %-28s extra: %s\n", name.c_str(), group.name.c_str(), extra.c_str());
+          }
+          confusion[{6, 6}] += 0;
+        }
+      }
+      print(group.name, totals);
+      std::fflush(stdout);
+    }
+  }
+  std::printf("\n%-12s", "true \\ read");
+  for (const char* c : kColumns) std::printf(" %11s", c);
+  std::printf("\n");
+  for (int i = 0; i < 6; ++i) {
+    std::printf("%-12s", kColumns[i]);
+    for (int j = 0; j < 7; ++j) std::printf(" %11d", confusion[{i, j}]);
+    std::printf("\n");
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace limber::assemblies
+
+int main(int argc, char** argv) {
+  limber::DetectionOptions options;
+  bool verbose = false;
+  std::string only;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view arg = argv[i];
+    if (arg == "--verbose")
+      verbose = true;
+    else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
+      options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
+    else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "convex-parts")
+      options.contact.method = limber::ContactMethod::kConvexParts, ++i;
+    else if (arg == "--only" && i + 1 < argc)
+      only = argv[++i];
+    else
+      return std::fprintf(stderr, "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY or --method NAME\n",
+                          argv[i]),
+             2;
+  }
+  return limber::assemblies::run(options, verbose, only);
+}
