@@ -116,6 +116,7 @@ void CollisionSurface::build(std::vector<Triangle> triangles, const CollisionSur
   build_vertex_adjacency();
   mark_degenerate();
   build_tree(options.leaf_triangles);
+  list_leaf_vertices();
   build_bounds();
 }
 

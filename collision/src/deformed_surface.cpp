@@ -4,28 +4,30 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
 
+#include "deformed_scratch.h"
 #include "limber/core/error.h"
+#include "limber/dynamics/reconstruct.h"
 
 namespace limber {
+namespace {
 
-struct DeformedSurface::Scratch {
-  struct Box {
-    float center[3], half[3];
-    std::uint32_t epoch;
-  };
-  struct Vertex {
-    Vec3 p;
-    std::uint32_t epoch;
-  };
-  std::uint32_t epoch = 0;
-  std::vector<Box> boxes;
-  std::vector<Vertex> vertices;
-  std::vector<double> z;
-  std::vector<float> amplitudes, magnitudes;
-  float norm = 0.0f;
-};
+constexpr double kFarthest = 1e30;     ///< m
+constexpr double kLargestNorm = 1e37;  ///< a float holds it
+constexpr double kUnitRoundOff = 0x1p-24;
+
+/// Nodes whose boxes are made at once: a node and its sibling, which lie side by side. The root stands alone.
+Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) % 2; }
+
+/// How many boxes from amplitudes cost as much as one refit, by the floats that each reads: six rows for a box; three
+/// for a vertex, which streams, and about a box's constants for every triangle.
+long boxes_per_refit(const CollisionSurface& surface) {
+  const double k = surface.modes();
+  const double box = 6.0 * k + 40.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
+  return static_cast<long>((vertex * surface.vertices() + triangle * surface.triangles()) / box);
+}
+
+}  // namespace
 
 DeformedSurface::DeformedSurface() : scratch_(std::make_unique<Scratch>()) {}
 DeformedSurface::~DeformedSurface() = default;
@@ -34,75 +36,88 @@ DeformedSurface& DeformedSurface::operator=(DeformedSurface&&) noexcept = defaul
 
 std::span<const double> DeformedSurface::amplitudes() const { return scratch_->z; }
 
-void DeformedSurface::bind(std::shared_ptr<const CollisionSurface> surface, std::span<const double> z, BoundsChoice) {
+void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+                           BoundsChoice choice, long expected_boxes) {
   if (!surface) throw InvalidArgument("DeformedSurface::bind: the surface is null, expected one");
   if (z.size() != static_cast<std::size_t>(surface->modes()))
     throw InvalidArgument("DeformedSurface::bind: " + std::to_string(z.size()) + " amplitudes, expected " +
                           std::to_string(surface->modes()));
-  double farthest = 0.0, squared_norm = 0.0;
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    farthest += std::abs(z[i]) * surface->largest_shape(static_cast<Index>(i));
-    squared_norm += surface->weights_[i] * z[i] * z[i];
-  }
-  if (!(farthest <= 1e30))
-    throw InvalidArgument("DeformedSurface::bind: the amplitudes move a vertex by up to " + std::to_string(farthest) +
-                          " m, expected at most 1e30");
+  reserve(*surface);
   Scratch& s = *scratch_;
-  surface_ = std::move(surface);
-  counters_ = {};
-  s.z.assign(z.begin(), z.end());
-  s.amplitudes.clear(), s.magnitudes.clear();
-  for (const double a : z) {
-    s.amplitudes.push_back(static_cast<float>(a));
-    s.magnitudes.push_back(std::abs(static_cast<float>(a)));
+  const StateSums sums = prepare_state(z.data(), z.size(), surface->stride_, surface->largest_shape_.data(),
+                                       surface->weights_.data(), s.amplitudes.data(), s.magnitudes.data());
+  const double norm = std::sqrt(sums.squared_norm);
+  if (!(sums.farthest <= kFarthest && norm <= kLargestNorm)) {
+    surface_ = nullptr;
+    throw InvalidArgument("DeformedSurface::bind: the amplitudes move a vertex by up to " +
+                          std::to_string(sums.farthest) + " m, expected finite ones that move none beyond 1e30 m");
   }
-  s.norm = std::nextafter(static_cast<float>(std::sqrt(squared_norm)), std::numeric_limits<float>::infinity());
-  if (s.boxes.size() < surface_->nodes().size()) s.boxes.resize(surface_->nodes().size());
-  if (s.vertices.size() < static_cast<std::size_t>(surface_->vertices()))
-    s.vertices.resize(static_cast<std::size_t>(surface_->vertices()));
-  if (++s.epoch == 0) {
-    for (auto& box : s.boxes) box.epoch = 0;
-    for (auto& vertex : s.vertices) vertex.epoch = 0;
-    s.epoch = 1;
+  s.norm = std::nextafter(static_cast<float>(norm * (1.0 + kUnitRoundOff)), std::numeric_limits<float>::infinity());
+  s.farthest = sums.farthest;
+  s.z.assign(z.begin(), z.end());
+  std::fill(std::copy(z.begin(), z.end(), s.padded_z.data()), s.padded_z.data() + surface->stride_, 0.0);
+  if (surface_ != surface) surface_ = surface;
+  counters_ = {};
+  begin_state();
+
+  const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
+  s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
+  if (choice == BoundsChoice::kRefit || (choice == BoundsChoice::kAutomatic && expected_boxes > worth)) refit();
+}
+
+void DeformedSurface::reserve(const CollisionSurface& surface) {
+  Scratch& s = *scratch_;
+  const std::size_t nodes = surface.nodes().size(), vertices = static_cast<std::size_t>(surface.vertices());
+  if (s.boxes.size() < nodes) s.boxes = AlignedArray<NodeBox>(nodes);
+  if (s.vertices.size() < vertices) s.vertices.resize(vertices);
+  if (surface.modes() > 0 && s.positions.size() < 3 * vertices + 1) s.positions.resize(3 * vertices + 1);
+  if (s.amplitudes.size() < surface.stride_) {
+    s.amplitudes = AlignedArray<float>(surface.stride_);
+    s.magnitudes = AlignedArray<float>(surface.stride_);
+    s.padded_z = AlignedArray<double>(surface.stride_);
   }
 }
 
-Aabb DeformedSurface::bounds(Index node) {
+/// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
+void DeformedSurface::begin_state() {
   Scratch& s = *scratch_;
-  Scratch::Box& box = s.boxes[static_cast<std::size_t>(node)];
-  if (box.epoch != s.epoch) {
-    const CollisionSurface::NodeShape& shape = surface_->node_shapes_[static_cast<std::size_t>(node)];
-    const std::size_t stride = surface_->coefficients_.size() / (6 * surface_->nodes().size());
-    const float* C = surface_->coefficients_.data() + static_cast<std::size_t>(node) * 6 * stride;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float *c = C + axis * stride, *d = c + 3 * stride;
-      float center = shape.center[axis], spread = 0.0f;
-      for (std::size_t i = 0; i < s.amplitudes.size(); ++i) {
-        center += c[i] * s.amplitudes[i];
-        spread += d[i] * s.magnitudes[i];
-      }
-      box.center[axis] = center;
-      box.half[axis] = shape.half[axis] + std::min(spread, shape.energy[axis] * s.norm);
-    }
-    box.epoch = s.epoch;
-    ++counters_.boxes;
-  }
-  const Vec3 center(box.center[0], box.center[1], box.center[2]), half(box.half[0], box.half[1], box.half[2]);
-  return {center - half, center + half};
+  if (++s.stamp < Scratch::kRefitted) return;
+  for (std::size_t i = 0; i < s.boxes.size(); ++i) s.boxes[i].stamp = 0;
+  for (Scratch::Vertex& vertex : s.vertices) vertex.stamp = 0;
+  s.stamp = 1;
+}
+
+Aabb DeformedSurface::bounds(Index node) {
+  const NodeBox& box = BoxReader(*this)(node);
+  return {Vec3(box.low[0], box.low[1], box.low[2]), Vec3(box.high[0], box.high[1], box.high[2])};
+}
+
+void DeformedSurface::make_box(Index node) {
+  Scratch& s = *scratch_;
+  if (counters_.boxes >= s.boxes_before_refit && counters_.refits == 0) refit();
+  const auto first = static_cast<std::size_t>(first_of_siblings(node));
+  const std::size_t count = node == 0 ? 1 : 2;
+  NodeBox* boxes = s.boxes.data() + first;
+  if (boxes->stamp != (s.stamp | Scratch::kRefitted))
+    make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->stride_},
+               surface_->constants_.data() + first * kNodeConstants,
+               surface_->coefficients_.data() + first * 6 * surface_->stride_, count, boxes);
+  for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
+  counters_.boxes += static_cast<long>(count);
 }
 
 const Vec3& DeformedSurface::vertex(Index v) {
   Scratch& s = *scratch_;
   Scratch::Vertex& vertex = s.vertices[static_cast<std::size_t>(v)];
-  if (vertex.epoch != s.epoch) {
-    vertex.p = surface_->rest(v);
-    for (int axis = 0; axis < 3; ++axis) {
-      const float* u = surface_->row(v, axis);
-      for (std::size_t i = 0; i < s.z.size(); ++i) vertex.p[axis] += static_cast<double>(u[i]) * s.z[i];
-    }
-    vertex.epoch = s.epoch;
-    ++counters_.vertices;
-  }
+  if (vertex.stamp == s.stamp) return vertex.p;
+  vertex.stamp = s.stamp;
+  ++counters_.vertices;
+  vertex.p = surface_->rest(v);
+  if (surface_->modes() == 0) return vertex.p;
+  const VertexRows& rows = surface_->model()->collision_rows();
+  double u[3];
+  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.padded_z.data(), surface_->stride_, u);
+  vertex.p += Vec3(u[0], u[1], u[2]);
   return vertex.p;
 }
 
@@ -111,6 +126,17 @@ std::array<Vec3, 3> DeformedSurface::triangle(Index t) {
   return {vertex(a), vertex(b), vertex(c)};
 }
 
-void DeformedSurface::refit() {}
+void DeformedSurface::refit() {
+  if (surface_->modes() == 0 || counters_.refits > 0) return;
+  ++counters_.refits;
+  Scratch& s = *scratch_;
+  const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data()};
+  reconstruct(surface_->model()->collision(), std::span(&target, 1));
+  // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
+  const double terms = surface_->modes() + 24.0;
+  const double pad = kUnitRoundOff * (terms * s.farthest + 24.0 * surface_->rest_radius_) + 1e-36;
+  refit_boxes(surface_->vertex_tree_.data(), surface_->vertex_tree_.size(), surface_->leaf_vertices_.data(),
+              s.positions.data(), static_cast<float>(pad), s.stamp | Scratch::kRefitted, s.boxes.data());
+}
 
 }  // namespace limber

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "bounds_kernels.h"
 #include "limber/collision/collision_surface.h"
 
 namespace limber {
@@ -60,61 +61,83 @@ void CollisionSurface::build_tree(int leaf_triangles) {
   }
   for (const TreeNode& node : nodes_)  // ascending within a leaf, whatever nth_element left
     if (node.leaf()) std::sort(triangle_order_.begin() + node.first, triangle_order_.begin() + node.first + node.count);
-  for (const Vec3& r : rest_) rest_bounds_.include(r);
+  for (const Vec3& r : rest_) {
+    rest_bounds_.include(r);
+    rest_radius_ = std::max(rest_radius_, r.norm());
+  }
+}
+
+void CollisionSurface::list_leaf_vertices() {
+  vertex_tree_ = nodes_;
+  for (TreeNode& node : vertex_tree_) {
+    if (!node.leaf()) continue;
+    const auto first = static_cast<Index>(leaf_vertices_.size());
+    for (Index i = node.first; i < node.first + node.count; ++i)
+      for (const Index v : triangle(triangle_order_[static_cast<std::size_t>(i)])) leaf_vertices_.push_back(v);
+    std::sort(leaf_vertices_.begin() + first, leaf_vertices_.end());
+    leaf_vertices_.erase(std::unique(leaf_vertices_.begin() + first, leaf_vertices_.end()), leaf_vertices_.end());
+    node.first = first;
+    node.count = static_cast<Index>(leaf_vertices_.size()) - first;
+  }
 }
 
 void CollisionSurface::build_bounds() {
-  const auto stride = static_cast<std::size_t>(modes_ > 0 ? model_->collision_rows().stride() : 0);
   const auto k = static_cast<std::size_t>(modes_);
-  const double error = sum_error(modes_);
-  node_shapes_ = AlignedArray<NodeShape>(nodes_.size());
-  coefficients_ = AlignedArray<float>(nodes_.size() * 6 * stride);
-  std::vector<Index> node_vertices;
+  stride_ = (k + kBoundsLanes - 1) / kBoundsLanes * kBoundsLanes;
+  constants_ = AlignedArray<float>(nodes_.size() * kNodeConstants);
+  coefficients_ = AlignedArray<float>(nodes_.size() * 6 * stride_);
+  std::vector<Index> below;
   std::vector<std::size_t> seen(rest_.size(), nodes_.size());
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    node_vertices.clear();
+    below.clear();
     for (const Index t : node_triangles(static_cast<Index>(n)))
       for (const Index v : triangle(t))
-        if (std::exchange(seen[static_cast<std::size_t>(v)], n) != n) node_vertices.push_back(v);
-    Aabb box;
-    for (const Index v : node_vertices) box.include(rest(v));
-    NodeShape& shape = node_shapes_[n];
-    float* C = coefficients_.data() + n * 6 * stride;
-    for (int axis = 0; axis < 3; ++axis) {
-      float *c = C + static_cast<std::size_t>(axis) * stride, *d = c + 3 * stride;
-      shape.center[axis] = static_cast<float>(box.center()[axis]);
-      const double center = shape.center[axis];
-      const double half = std::max(box.high[axis] - center, center - box.low[axis]);
-      double underflow = (static_cast<double>(modes_) + 8.0) * kUnderflow, center_energy = 0.0, energy = 0.0;
-      if (k > 0) {
-        std::vector<float> low(k, std::numeric_limits<float>::infinity()),
-            high(k, -std::numeric_limits<float>::infinity());
-        for (const Index v : node_vertices) {
-          const float* u = row(v, axis);
-          for (std::size_t i = 0; i < k; ++i) low[i] = std::min(low[i], u[i]), high[i] = std::max(high[i], u[i]);
-        }
-        for (std::size_t i = 0; i < k; ++i) {
-          c[i] = static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])));
-          const double middle = c[i];
-          const double spread = std::max(high[i] - middle, middle - low[i]) + error * std::abs(middle);
-          d[i] = rounded_up(spread * (1.0 + error));
-          center_energy += middle * middle / weights_[i];
-          underflow += kUnderflow * (std::abs(middle) + spread);
-        }
-        for (const Index v : node_vertices) {
-          const float* u = row(v, axis);
-          double sum = 0.0;
-          for (std::size_t i = 0; i < k; ++i) {
-            const double difference = static_cast<double>(u[i]) - static_cast<double>(c[i]);
-            sum += difference * difference / weights_[i];
-          }
-          energy = std::max(energy, sum);
-        }
-      }
-      shape.half[axis] = rounded_up((half + error * (std::abs(center) + half)) * (1.0 + error) + underflow);
-      shape.energy[axis] = rounded_up((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));
-    }
+        if (std::exchange(seen[static_cast<std::size_t>(v)], n) != n) below.push_back(v);
+    for (int axis = 0; axis < 3; ++axis) bound_node(n, axis, below);
   }
+}
+
+/// c, h, C and d are the middles and half ranges of the vertices' rest positions and of their rows; e is the largest
+/// ‖(u − C) w^−½‖. The rounding of c + C z is at most error · (|c| + Σ|C_i||z_i|), which h, d and e take up; their own
+/// sums are grown by (1 + error).
+void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index> below) {
+  const auto k = static_cast<std::size_t>(modes_);
+  const double error = sum_error(modes_);
+  float* const C = coefficients_.data() + (n * 6 + static_cast<std::size_t>(axis)) * stride_;
+  float* const d = C + 3 * stride_;
+  double underflow = (static_cast<double>(modes_) + 8.0) * kUnderflow, center_energy = 0.0, energy = 0.0;
+
+  double least = std::numeric_limits<double>::infinity(), greatest = -least;
+  for (const Index v : below) least = std::min(least, rest(v)[axis]), greatest = std::max(greatest, rest(v)[axis]);
+  const float c = static_cast<float>(0.5 * (least + greatest));
+  const double half = std::max(greatest - static_cast<double>(c), static_cast<double>(c) - least);
+
+  std::vector<float> low(k, std::numeric_limits<float>::infinity()), high(k, -std::numeric_limits<float>::infinity());
+  for (const Index v : below) {
+    const float* u = row(v, axis);
+    for (std::size_t i = 0; i < k; ++i) low[i] = std::min(low[i], u[i]), high[i] = std::max(high[i], u[i]);
+  }
+  for (std::size_t i = 0; i < k; ++i) {
+    C[i] = static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])));
+    const double middle = C[i];
+    const double spread = std::max(high[i] - middle, middle - low[i]) + error * std::abs(middle);
+    d[i] = rounded_up(spread * (1.0 + error));
+    center_energy += middle * middle / weights_[i];
+    underflow += kUnderflow * (std::abs(middle) + spread);
+  }
+  for (const Index v : below) {
+    const float* u = row(v, axis);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < k; ++i) {
+      const double difference = static_cast<double>(u[i]) - static_cast<double>(C[i]);
+      sum += difference * difference / weights_[i];
+    }
+    energy = std::max(energy, sum);
+  }
+  float* const constants = constants_.data() + n * kNodeConstants + static_cast<std::size_t>(axis);
+  constants[0] = c;
+  constants[4] = rounded_up((half + error * (std::abs(static_cast<double>(c)) + half)) * (1.0 + error) + underflow);
+  constants[8] = rounded_up((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));
 }
 
 }  // namespace limber

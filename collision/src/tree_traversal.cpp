@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "deformed_scratch.h"
+#include "limber/collision/closest_features.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -31,45 +33,99 @@ struct Separation {
   }
 };
 
-std::array<double, 3> nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b, int i, int j) {
-  const Vec3 ab = b - a;
-  const double length = ab.squaredNorm();
-  const double s = length > 0.0 ? std::clamp(ab.dot(p - a) / length, 0.0, 1.0) : 0.0;
-  std::array<double, 3> w{0.0, 0.0, 0.0};
-  w[static_cast<std::size_t>(i)] = 1.0 - s;
-  w[static_cast<std::size_t>(j)] = s;
-  return w;
+double reach_of(const NodeBox& box) {  // from the origin, over the box
+  double squared = 0.0;
+  for (int i = 0; i < 3; ++i) squared += std::pow(std::max(std::abs(box.low[i]), std::abs(box.high[i])), 2);
+  return std::sqrt(squared);
 }
 
-Vec3 at(const std::array<Vec3, 3>& x, const std::array<double, 3>& w) {
-  return w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
-}
-
-/// Barycentric weights of the point of a triangle nearest to p: inside where the foot falls there, else on an edge.
-std::array<double, 3> nearest_weights(const Vec3& p, const std::array<Vec3, 3>& x) {
-  const Vec3 n = (x[1] - x[0]).cross(x[2] - x[0]);
-  const double area = n.squaredNorm();
-  if (area > 0.0) {
-    const double w1 = (p - x[0]).cross(x[2] - x[0]).dot(n) / area, w2 = (x[1] - x[0]).cross(p - x[0]).dot(n) / area;
-    if (w1 >= 0.0 && w2 >= 0.0 && w1 + w2 <= 1.0) return {1.0 - w1 - w2, w1, w2};
-  }
-  std::array<double, 3> best{};
-  double least = std::numeric_limits<double>::infinity();
+/// Error of the separating axis test in single precision: some thirty roundings of numbers up to `size`.
+BoxFrames box_frames(const RigidTransform& X_AB, double margin, double size) {
+  constexpr double kErrors = 64 * 0x1p-24;
+  const Mat3 R = to_matrix(X_AB.q);
+  BoxFrames frames{};
   for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3;
-    const auto w = nearest_on_segment(p, x[static_cast<std::size_t>(i)], x[static_cast<std::size_t>(j)], i, j);
-    const double distance = (at(x, w) - p).squaredNorm();
-    if (distance < least) least = distance, best = w;
+    for (int j = 0; j < 3; ++j) frames.columns[j][i] = frames.rows[i][j] = static_cast<float>(R(i, j));
+    frames.p[i] = static_cast<float>(X_AB.p[i]);
   }
-  return best;
+  frames.slack = static_cast<float>(margin + kErrors * (size + margin) + 1e-36);
+  return frames;
 }
 
-/// How much nearer two vertices of a body can come than at rest, at most: Σ |z_i| · 2 max |u_i|.
-double approach(const DeformedSurface& a) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.amplitudes().size(); ++i)
-    sum += std::abs(a.amplitudes()[i]) * a.surface().largest_shape(static_cast<Index>(i));
-  return 2.0 * sum;
+Aabb box_of(const std::array<Vec3, 3>& x) {
+  return {x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])};
+}
+
+/// The triangles of one leaf and their boxes.
+struct LeafBoxes {
+  static constexpr std::size_t kMost = 64;
+  std::array<Index, kMost> triangle;
+  std::array<Aabb, kMost> box;
+  std::size_t count = 0;
+
+  void add(Index t, const Aabb& b) { triangle[count] = t, box[count++] = b; }
+};
+
+/// Triangles of two leaves whose boxes along the axes of A come within the margin.
+class LeafPairs {
+ public:
+  LeafPairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin)
+      : a_(a), b_(b), R_(to_matrix(X_AB.q)), p_(X_AB.p), margin_(margin) {}
+
+  void append(Index m, Index n, std::vector<TrianglePair>& pairs) {
+    make_a(m);
+    Aabb all_of_a;
+    for (std::size_t i = 0; i < in_a_.count; ++i) all_of_a.include(in_a_.box[i]);
+    for (const Index u : b_.surface().node_triangles(n)) {
+      std::array<Vec3, 3> x = b_.triangle(u);
+      for (Vec3& p : x) p = R_ * p + p_;
+      const Aabb box = box_of(x);
+      const Aabb wide = box.grown(margin_ + kRoundOff * (p_.cwiseAbs().sum() + reach(box)));
+      if (!wide.overlaps(all_of_a)) continue;
+      for (std::size_t i = 0; i < in_a_.count; ++i)
+        if (wide.overlaps(in_a_.box[i])) pairs.push_back({in_a_.triangle[i], u});
+    }
+  }
+
+ private:
+  static double reach(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).sum(); }
+
+  /// A walk keeps to one leaf of a for several leaves of b.
+  void make_a(Index m) {
+    if (made_ == m) return;
+    made_ = m;
+    in_a_.count = 0;
+    for (const Index t : a_.surface().node_triangles(m)) in_a_.add(t, box_of(a_.triangle(t)));
+  }
+
+  DeformedSurface &a_, &b_;
+  Mat3 R_;
+  Vec3 p_;
+  double margin_;
+  Index made_ = -1;
+  LeafBoxes in_a_;
+};
+
+/// The triangles are within `margin` of each other in the rest shape.
+bool near_in_rest_shape(const CollisionSurface& surface, Index t, Index u, double margin) {
+  const auto corners = [&](Index i) {
+    const auto& [a, b, c] = surface.triangle(i);
+    return TrianglePoints{surface.rest(a), surface.rest(b), surface.rest(c)};
+  };
+  return closest_points(corners(t), corners(u)).distance <= margin;
+}
+
+/// One leaf with itself or another of the same surface.
+void append_self(DeformedSurface& a, Index m, Index n, double margin, bool near_at_rest,
+                 std::vector<TrianglePair>& pairs) {
+  const CollisionSurface& surface = a.surface();
+  for (const Index t : surface.node_triangles(m)) {
+    const Aabb box = box_of(a.triangle(t)).grown(margin);
+    for (const Index u : surface.node_triangles(n)) {
+      if ((m == n && u <= t) || surface.adjacent(t, u) || !box.overlaps(box_of(a.triangle(u)))) continue;
+      if (near_at_rest || !near_in_rest_shape(surface, t, u, margin)) pairs.push_back({std::min(t, u), std::max(t, u)});
+    }
+  }
 }
 
 }  // namespace
@@ -85,51 +141,60 @@ double distance_to_box(const Vec3& p, const Aabb& box) {
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
                          std::vector<TrianglePair>& pairs) {
   if (!(margin >= 0.0)) throw InvalidArgument("find_triangle_pairs: margin is negative or not a number, expected ≥ 0");
-  const Separation separation(X_AB);
+  BoxReader boxes_a(a), boxes_b(b);
+  const double size = reach_of(boxes_a(0)) + reach_of(boxes_b(0)) + X_AB.p.norm();
+  if (Separation(X_AB)(a.bounds(0), b.bounds(0)) > margin) return;
+  const BoxFrames frames = box_frames(X_AB, margin, size);
+  LeafPairs leaves(a, b, X_AB, margin);
   std::array<std::pair<Index, Index>, 2 * CollisionSurface::kMaxDepth + 4> stack;
-  std::size_t size = 0;
-  stack[size++] = {0, 0};
-  while (size > 0) {
-    const auto [m, n] = stack[--size];
-    if (separation(a.bounds(m), b.bounds(n)) > margin) continue;
+  std::size_t count = 0;
+  stack[count++] = {0, 0};
+  while (count > 0) {
+    const auto [m, n] = stack[--count];
     const TreeNode &ma = a.surface().node(m), &nb = b.surface().node(n);
     if (ma.leaf() && nb.leaf()) {
-      for (const Index t : a.surface().node_triangles(m))
-        for (const Index u : b.surface().node_triangles(n)) pairs.push_back({t, u});
-    } else if (nb.leaf() || (!ma.leaf() && ma.count >= nb.count)) {
-      stack[size++] = {ma.child + 1, n};
-      stack[size++] = {ma.child, n};
+      leaves.append(m, n, pairs);
+    } else if (nb.leaf() || (!ma.leaf() && ma.count > nb.count)) {
+      const unsigned within = siblings_within(frames, boxes_b(n), boxes_a.siblings(ma.child), false);
+      if (within & 2u) stack[count++] = {ma.child + 1, n};
+      if (within & 1u) stack[count++] = {ma.child, n};
     } else {
-      stack[size++] = {m, nb.child + 1};
-      stack[size++] = {m, nb.child};
+      const unsigned within = siblings_within(frames, boxes_a(m), boxes_b.siblings(nb.child), true);
+      if (within & 2u) stack[count++] = {m, nb.child + 1};
+      if (within & 1u) stack[count++] = {m, nb.child};
     }
   }
 }
 
 void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::vector<TrianglePair>& pairs) {
-  (void)near_at_rest, (void)approach(a);
+  if (!(margin >= 0.0)) throw InvalidArgument("find_self_pairs: margin is negative or not a number, expected ≥ 0");
   const CollisionSurface& surface = a.surface();
+  BoxReader boxes(a);
+  // Two parts that are farther apart at rest than both can move are apart: no box of this state is needed.
+  const double kept_apart = margin + 2.0 * boxes.farthest();
+  const auto apart = [&](Index m, Index n) {
+    return !boxes.rest_box(m).grown(kept_apart).overlaps(boxes.rest_box(n)) ||
+           !a.bounds(m).grown(margin).overlaps(a.bounds(n));
+  };
   std::array<std::pair<Index, Index>, 4 * CollisionSurface::kMaxDepth + 8> stack;
-  std::size_t size = 0;
-  stack[size++] = {0, 0};
-  while (size > 0) {
-    const auto [m, n] = stack[--size];
+  std::size_t count = 0;
+  stack[count++] = {0, 0};
+  while (count > 0) {
+    const auto [m, n] = stack[--count];
     const TreeNode &ma = surface.node(m), &nb = surface.node(n);
-    if (m != n && !a.bounds(m).grown(margin).overlaps(a.bounds(n))) continue;
+    if (m != n && apart(m, n)) continue;
     if (ma.leaf() && nb.leaf()) {
-      for (const Index t : surface.node_triangles(m))
-        for (const Index u : surface.node_triangles(n))
-          if ((m != n || t < u) && !surface.adjacent(t, u)) pairs.push_back({std::min(t, u), std::max(t, u)});
+      append_self(a, m, n, margin, near_at_rest, pairs);
     } else if (m == n) {
-      stack[size++] = {ma.child, ma.child + 1};
-      stack[size++] = {ma.child + 1, ma.child + 1};
-      stack[size++] = {ma.child, ma.child};
+      stack[count++] = {ma.child, ma.child + 1};
+      stack[count++] = {ma.child + 1, ma.child + 1};
+      stack[count++] = {ma.child, ma.child};
     } else if (nb.leaf() || (!ma.leaf() && ma.count >= nb.count)) {
-      stack[size++] = {ma.child + 1, n};
-      stack[size++] = {ma.child, n};
+      stack[count++] = {ma.child + 1, n};
+      stack[count++] = {ma.child, n};
     } else {
-      stack[size++] = {m, nb.child + 1};
-      stack[size++] = {m, nb.child};
+      stack[count++] = {m, nb.child + 1};
+      stack[count++] = {m, nb.child};
     }
   }
 }
@@ -158,12 +223,10 @@ std::optional<SurfaceProximity> nearest_point(DeformedSurface& a, const Vec3& p_
   branch_and_bound(
       a, [&](const Aabb& box) { return distance_to_box(p_B, box); },
       [&](Index t, double best) {
-        const std::array<Vec3, 3> x = a.triangle(t);
-        const std::array<double, 3> w = nearest_weights(p_B, x);
-        const Vec3 q = at(x, w);
-        const double distance = (q - p_B).norm();
+        const SurfaceFoot foot = closest_on_triangle(p_B, a.triangle(t));
+        const double distance = (foot.point - p_B).norm();
         if (!(distance < best)) return best;
-        found = SurfaceProximity{.triangle = t, .weight = w, .point_B = q, .distance = distance};
+        found = SurfaceProximity{.triangle = t, .weight = foot.weight, .point_B = foot.point, .distance = distance};
         return distance;
       },
       max_distance);

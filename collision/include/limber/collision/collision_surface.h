@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "limber/collision/aabb.h"
+#include "limber/collision/tree_node.h"
 #include "limber/core/aligned_array.h"
 #include "limber/core/types.h"
 #include "limber/model/modal_model.h"
@@ -24,13 +25,6 @@ struct SurfaceEdge {
   Index triangle_count = 0;  ///< 1: boundary; 2: inside a surface; more: not a manifold. 0: equal vertices
 
   bool boundary() const { return triangle_count == 1; }
-};
-
-/// A node of the tree over a surface's triangles. Both children of a node lie side by side and after their parent.
-struct TreeNode {
-  Index child = -1;            ///< first child, the second is child + 1; −1: a leaf
-  Index first = 0, count = 0;  ///< of its triangles in CollisionSurface::triangle_order()
-  bool leaf() const { return child < 0; }
 };
 
 struct CollisionSurfaceOptions {
@@ -98,11 +92,17 @@ class CollisionSurface {
   bool adjacent(Index t, Index u) const;
 
   // -- Tree ----------------------------------------------------------------------------------------------------------
-  /// Node 0 is the root. The tree is balanced: no deeper than kMaxDepth.
+  /// Node 0 is the root; ranges are of triangle_order(). The tree is balanced: no deeper than kMaxDepth.
   std::span<const TreeNode> nodes() const { return nodes_; }
   const TreeNode& node(Index n) const { return nodes_[static_cast<std::size_t>(n)]; }
   static constexpr int kMaxDepth = 32;
   std::span<const Index> triangle_order() const { return triangle_order_; }
+  /// Distinct vertices of a leaf's triangles, ascending.
+  std::span<const Index> leaf_vertices(Index n) const {
+    const TreeNode& leaf = vertex_tree_[static_cast<std::size_t>(n)];
+    return std::span(leaf_vertices_)
+        .subspan(static_cast<std::size_t>(leaf.first), static_cast<std::size_t>(leaf.count));
+  }
   /// Triangles below a node.
   std::span<const Index> node_triangles(Index n) const {
     return std::span(triangle_order_)
@@ -111,14 +111,7 @@ class CollisionSurface {
 
  private:
   friend class DeformedSurface;
-
-  /// Bounds of one node as a function of the amplitudes, see docs/collision.md:
-  ///   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
-  /// c, h, e here; rows of C and d in coefficients_. Every one is rounded so that the box, evaluated in single
-  /// precision, encloses the vertices evaluated in double.
-  struct alignas(64) NodeShape {
-    float center[3] = {}, half[3] = {}, energy[3] = {};
-  };
+  friend class BoxReader;
 
   static std::span<const Index> range(const std::vector<Index>& all, const std::vector<Index>& start, Index v) {
     const auto begin = static_cast<std::size_t>(start[static_cast<std::size_t>(v)]);
@@ -132,12 +125,15 @@ class CollisionSurface {
   void build_vertex_adjacency();
   void mark_degenerate();
   void build_tree(int leaf_triangles);
+  void list_leaf_vertices();
   void build_bounds();
+  void bound_node(std::size_t n, int axis, std::span<const Index> below);
 
   std::shared_ptr<const ModalModel> model_;
   Index modes_ = 0;
   std::vector<Vec3> rest_;
   Aabb rest_bounds_;
+  double rest_radius_ = 0.0;  ///< largest distance of a vertex from the origin, m
   std::vector<double> largest_shape_;
   std::vector<Triangle> triangles_;
   std::vector<Index> canonical_;
@@ -150,9 +146,16 @@ class CollisionSurface {
 
   std::vector<TreeNode> nodes_;
   std::vector<Index> triangle_order_;
-  std::vector<double> weights_;  ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
-  AlignedArray<NodeShape> node_shapes_;
-  AlignedArray<float> coefficients_;  ///< per node six rows of VertexRows' stride: C x, y, z, d x, y, z
+  std::vector<Index> leaf_vertices_;   ///< distinct vertices of each leaf
+  std::vector<TreeNode> vertex_tree_;  ///< the same nodes; a leaf's range is of leaf_vertices_
+
+  // Bounds of a node as a function of the amplitudes, see docs/collision.md:
+  //   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
+  // rounded so that the box, evaluated in single precision, encloses the vertices evaluated in double.
+  std::vector<double> weights_;       ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
+  std::size_t stride_ = 0;            ///< of the rows of C and d: modes, padded
+  AlignedArray<float> constants_;     ///< per node c, h, e
+  AlignedArray<float> coefficients_;  ///< per node six rows: C x, y, z, d x, y, z
 };
 
 }  // namespace limber

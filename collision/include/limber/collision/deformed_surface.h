@@ -31,7 +31,7 @@ class DeformedSurface {
  public:
   /// Work since the last bind().
   struct Counters {
-    long boxes = 0;     ///< made from amplitudes
+    long boxes = 0;     ///< nodes whose box was asked for, siblings counted together
     long vertices = 0;  ///< made one by one, in double
     long refits = 0;    ///< of the whole tree
   };
@@ -43,9 +43,11 @@ class DeformedSurface {
 
   /// A new state; forgets the last one. O(k). Allocates only for a surface larger than any before.
   /// @param surface not null; kept until the next bind()  @param z its k amplitudes, read here only
+  /// @param expected_boxes for kAutomatic: counters().boxes of a query that this one is probably like, such as the same
+  /// body's last one; 0 if none is known. A surface that is expected to need most of its boxes is refitted at once.
   /// @throws InvalidArgument if z has another size, is not finite, or moves a vertex by more than 1e30 m
-  void bind(std::shared_ptr<const CollisionSurface> surface, std::span<const double> z,
-            BoundsChoice choice = BoundsChoice::kAmplitudes);
+  void bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+            BoundsChoice choice = BoundsChoice::kAmplitudes, long expected_boxes = 0);
 
   const CollisionSurface& surface() const { return *surface_; }
   std::span<const double> amplitudes() const;
@@ -57,13 +59,18 @@ class DeformedSurface {
   /// Corners of a triangle.
   std::array<Vec3, 3> triangle(Index t);
 
-  /// All vertices are to be used anyway: makes the tree's boxes from them, now.
+  /// Makes all boxes from all vertices, now. Nothing to do for a rigid surface, whose boxes do not change.
   void refit();
 
   const Counters& counters() const { return counters_; }
 
  private:
+  friend class BoxReader;
   struct Scratch;
+  void reserve(const CollisionSurface& surface);
+  void begin_state();
+  void make_box(Index node);
+
   std::shared_ptr<const CollisionSurface> surface_;
   std::unique_ptr<Scratch> scratch_;
   Counters counters_;

@@ -1,0 +1,67 @@
+// The vector loops behind DeformedSurface. Raw pointers only: the file that implements them is compiled for several
+// instruction sets, so neither Eigen nor a header that includes it may reach it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "limber/collision/tree_node.h"
+
+namespace limber {
+
+/// Rows of mode shapes and amplitudes are padded with zeros to a multiple of so many modes.
+inline constexpr std::size_t kBoundsLanes = 8;
+
+/// A box in single precision; the fourth lanes make it two whole vectors.
+struct alignas(32) NodeBox {
+  float low[3];
+  std::uint32_t stamp;  ///< of the state it belongs to
+  float high[3];
+  float unused;
+};
+
+/// What a box is made of beside its rows, see CollisionSurface: center, half and energy, xyz and a zero each, and four
+/// zeros that fill the line.
+inline constexpr std::size_t kNodeConstants = 16;
+
+/// Amplitudes in the forms that the loops read, each padded to a multiple of kBoundsLanes.
+struct StateView {
+  const float* amplitudes;  ///< z
+  const float* magnitudes;  ///< |z|
+  float norm;               ///< ‖z‖_w, rounded up
+  std::size_t stride;       ///< of the rows of coefficients: modes, padded
+};
+
+/// Sums over the modes of one state: Σ|z_i| largest_i and Σ w_i z_i². Pads its outputs up to `stride`.
+struct StateSums {
+  double farthest, squared_norm;
+};
+StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
+                        const double* weights, float* amplitudes, float* magnitudes);
+
+/// `count` boxes in a row: center + C z ± (half + min(d |z|, energy ‖z‖_w)). Leaves the stamps alone.
+void make_boxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
+                NodeBox* boxes);
+
+/// u = Σ z_i u_i for one vertex. @param rows three, `stride` floats apart, zero from `modes` on
+/// @param z padded with zeros to a multiple of kBoundsLanes; the same bits on every instruction set with FMA
+void make_displacement(const float* rows, std::size_t stride, const double* z, std::size_t padded_modes, double* u);
+
+/// All boxes of a tree, children before parents, grown by `pad`; the
+/// leaves' ranges are of leaf_vertices. @param positions xyz per vertex and one float more
+void refit_boxes(const TreeNode* nodes, std::size_t count, const std::int32_t* leaf_vertices, const float* positions,
+                 float pad, std::uint32_t stamp, NodeBox* boxes);
+
+/// Where frame B lies as seen from A, in single precision, for the separating axis test along the axes of both.
+struct alignas(64) BoxFrames {
+  float columns[3][4];  ///< of R_AB
+  float rows[3][4];
+  float p[4];   ///< of B in A
+  float slack;  ///< margin, and what single precision may be wrong by
+};
+
+/// Which of two siblings may be within reach of one box: bit 0 the first, bit 1 the second.
+/// @param siblings_of_b whether the one box is in frame A and the siblings in B, or the other way round
+unsigned siblings_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* siblings, bool siblings_of_b);
+
+}  // namespace limber

@@ -1,0 +1,58 @@
+// What a DeformedSurface keeps, for the files that walk its tree box by box.
+#pragma once
+
+#include <vector>
+
+#include "bounds_kernels.h"
+#include "limber/collision/deformed_surface.h"
+
+namespace limber {
+
+struct DeformedSurface::Scratch {
+  struct Vertex {
+    Vec3 p;
+    std::uint32_t stamp = 0;
+  };
+
+  /// Of this state. Boxes that a refit made carry stamp | kRefitted until someone asks for them.
+  std::uint32_t stamp = 0;
+  static constexpr std::uint32_t kRefitted = 0x80000000u;
+
+  AlignedArray<NodeBox> boxes;
+  std::vector<Vertex> vertices;
+  std::vector<double> z;          ///< k
+  AlignedArray<double> padded_z;  ///< the same, with zeros up to the stride
+  AlignedArray<float> amplitudes, magnitudes;
+  float norm = 0.0f;
+  double farthest = 0.0;
+  long boxes_before_refit = 0;   ///< kAutomatic: so many, then refit
+  std::vector<float> positions;  ///< of a refit: xyz, and one float more
+};
+
+/// Direct access to the boxes of one state.
+class BoxReader {
+ public:
+  explicit BoxReader(DeformedSurface& surface) : surface_(surface), scratch_(*surface.scratch_) {}
+
+  const NodeBox& operator()(Index node) {
+    const NodeBox& box = scratch_.boxes[static_cast<std::size_t>(node)];
+    if (box.stamp != scratch_.stamp) surface_.make_box(node);
+    return box;
+  }
+  /// Both, in a row. @param child the first of two
+  const NodeBox* siblings(Index child) { return &(*this)(child); }
+  const CollisionSurface& surface() const { return *surface_.surface_; }
+  double farthest() const { return scratch_.farthest; }  ///< no vertex is moved by more, m
+  /// c ± h: the box at rest.
+  Aabb rest_box(Index node) const {
+    const float* c = surface().constants_.data() + static_cast<std::size_t>(node) * kNodeConstants;
+    const Vec3 center(c[0], c[1], c[2]), half(c[4], c[5], c[6]);
+    return {center - half, center + half};
+  }
+
+ private:
+  DeformedSurface& surface_;
+  DeformedSurface::Scratch& scratch_;
+};
+
+}  // namespace limber
