@@ -84,11 +84,11 @@ bool Within(const BoxFrames& f, const NodeBox& box_a, const NodeBox& box_b) {
   return true;
 }
 
-HWY_ATTR unsigned SiblingsWithin(const BoxFrames& frames, const NodeBox& one, const NodeBox* siblings,
-                                 bool siblings_of_b) {
-  unsigned bits = 0;
-  for (unsigned i = 0; i < 2; ++i)
-    if (siblings_of_b ? Within(frames, one, siblings[i]) : Within(frames, siblings[i], one)) bits |= 1u << i;
+HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,
+                                   bool many_of_b) {
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    if (many_of_b ? Within(frames, one, many[i]) : Within(frames, many[i], one)) bits |= std::uint64_t{1} << i;
   return bits;
 }
 
@@ -190,29 +190,31 @@ HWY_INLINE HWY_ATTR bool AllWithin(Quad along_a, Quad reach_a, Quad along_b, Qua
   return hn::AllFalse(d, hn::And(apart, hn::FirstN(d, 3)));
 }
 
-HWY_ATTR unsigned SiblingsWithin(const BoxFrames& frames, const NodeBox& one, const NodeBox* siblings,
-                                 bool siblings_of_b) {
+HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,
+                                   bool many_of_b) {
   const Four d;
   const Columns R = LoadColumns(frames.columns), Rt = LoadColumns(frames.rows);
   const Columns R_size = Magnitudes(R), Rt_size = Magnitudes(Rt);
   const Quad slack = hn::Set(d, frames.slack), p = hn::Load(d, frames.p), zero = hn::Zero(d);
   const Sides fixed = SidesOf(one);
-  unsigned bits = 0;
-  if (siblings_of_b) {
+  std::uint64_t bits = 0;
+  if (many_of_b) {
     const Quad from_fixed = hn::Sub(p, fixed.center), reach_a = hn::Add(fixed.half, slack);
     const Quad reach_b = Product(Rt_size, fixed.half, slack);
-    for (unsigned i = 0; i < 2; ++i) {
-      const Sides b = SidesOf(siblings[i]);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Sides b = SidesOf(many[i]);
       const Quad from_a = Product(R, b.center, from_fixed), from_b = Product(Rt, from_a, zero);
-      if (AllWithin(from_a, Product(R_size, b.half, reach_a), from_b, hn::Add(reach_b, b.half))) bits |= 1u << i;
+      if (AllWithin(from_a, Product(R_size, b.half, reach_a), from_b, hn::Add(reach_b, b.half)))
+        bits |= std::uint64_t{1} << i;
     }
   } else {
     const Quad to_fixed = Product(R, fixed.center, p), reach_a = Product(R_size, fixed.half, slack);
     const Quad reach_b = hn::Add(fixed.half, slack);
-    for (unsigned i = 0; i < 2; ++i) {
-      const Sides a = SidesOf(siblings[i]);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Sides a = SidesOf(many[i]);
       const Quad from_a = hn::Sub(to_fixed, a.center), from_b = Product(Rt, from_a, zero);
-      if (AllWithin(from_a, hn::Add(reach_a, a.half), from_b, Product(Rt_size, a.half, reach_b))) bits |= 1u << i;
+      if (AllWithin(from_a, hn::Add(reach_a, a.half), from_b, Product(Rt_size, a.half, reach_b)))
+        bits |= std::uint64_t{1} << i;
     }
   }
   return bits;
@@ -221,9 +223,11 @@ HWY_ATTR unsigned SiblingsWithin(const BoxFrames& frames, const NodeBox& one, co
 #endif  // HWY_TARGET
 
 HWY_ATTR void MakeBoxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
-                        NodeBox* boxes) {
-  for (std::size_t i = 0; i < count; ++i)
+                        std::uint32_t stamp, NodeBox* boxes) {
+  for (std::size_t i = 0; i < count; ++i) {
     MakeBox(state, constants + i * kNodeConstants, coefficients + i * 6 * state.stride, boxes + i);
+    boxes[i].stamp = stamp;
+  }
 }
 
 HWY_ATTR StateSums PrepareState(const double* HWY_RESTRICT z, std::size_t modes, std::size_t stride,
@@ -294,7 +298,7 @@ HWY_EXPORT(PrepareState);
 HWY_EXPORT(MakeBoxes);
 HWY_EXPORT(MakeDisplacement);
 HWY_EXPORT(RefitBoxes);
-HWY_EXPORT(SiblingsWithin);
+HWY_EXPORT(BoxesWithin);
 
 StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
                         const double* weights, float* amplitudes, float* magnitudes) {
@@ -302,8 +306,8 @@ StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, 
 }
 
 void make_boxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
-                NodeBox* boxes) {
-  HWY_DYNAMIC_DISPATCH(MakeBoxes)(state, constants, coefficients, count, boxes);
+                std::uint32_t stamp, NodeBox* boxes) {
+  HWY_DYNAMIC_DISPATCH(MakeBoxes)(state, constants, coefficients, count, stamp, boxes);
 }
 
 void make_displacement(const float* rows, std::size_t stride, const double* z, std::size_t padded_modes, double* u) {
@@ -315,8 +319,9 @@ void refit_boxes(const TreeNode* nodes, std::size_t count, const std::int32_t* l
   HWY_DYNAMIC_DISPATCH(RefitBoxes)(nodes, count, leaf_vertices, positions, pad, stamp, boxes);
 }
 
-unsigned siblings_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* siblings, bool siblings_of_b) {
-  return HWY_DYNAMIC_DISPATCH(SiblingsWithin)(frames, one, siblings, siblings_of_b);
+std::uint64_t boxes_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,
+                           bool many_of_b) {
+  return HWY_DYNAMIC_DISPATCH(BoxesWithin)(frames, one, many, count, many_of_b);
 }
 
 }  // namespace limber

@@ -39,9 +39,9 @@ struct StateSums {
 StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
                         const double* weights, float* amplitudes, float* magnitudes);
 
-/// `count` boxes in a row: center + C z ± (half + min(d |z|, energy ‖z‖_w)). Leaves the stamps alone.
+/// `count` boxes in a row: center + C z ± (half + min(d |z|, energy ‖z‖_w)).
 void make_boxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
-                NodeBox* boxes);
+                std::uint32_t stamp, NodeBox* boxes);
 
 /// u = Σ z_i u_i for one vertex. @param rows three, `stride` floats apart, zero from `modes` on
 /// @param z padded with zeros to a multiple of kBoundsLanes; the same bits on every instruction set with FMA
@@ -60,8 +60,9 @@ struct alignas(64) BoxFrames {
   float slack;  ///< margin, and what single precision may be wrong by
 };
 
-/// Which of two siblings may be within reach of one box: bit 0 the first, bit 1 the second.
-/// @param siblings_of_b whether the one box is in frame A and the siblings in B, or the other way round
-unsigned siblings_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* siblings, bool siblings_of_b);
+/// Which of up to 64 boxes in a row may be within reach of one box: a bit each.
+/// @param many_of_b whether the one box is in frame A and the others in B, or the other way round
+std::uint64_t boxes_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,
+                           bool many_of_b);
 
 }  // namespace limber

@@ -19,9 +19,9 @@ struct DeformedSurface::Scratch {
   static constexpr std::uint32_t kRefitted = 0x80000000u;
 
   AlignedArray<NodeBox> boxes;
+  AlignedArray<NodeBox> triangle_boxes;  ///< in the tree's order; rounded to nearest, so to be grown by who uses them
   std::vector<Vertex> vertices;
-  std::vector<double> z;          ///< k
-  AlignedArray<double> padded_z;  ///< the same, with zeros up to the stride
+  AlignedArray<double> z;  ///< padded with zeros to the rows' stride, as are the next
   AlignedArray<float> amplitudes, magnitudes;
   float norm = 0.0f;
   double farthest = 0.0;
@@ -41,6 +41,12 @@ class BoxReader {
   }
   /// Both, in a row. @param child the first of two
   const NodeBox* siblings(Index child) { return &(*this)(child); }
+  /// Of the triangles of a leaf, in their order there.
+  const NodeBox* triangle_boxes(Index leaf) {
+    const NodeBox* boxes = scratch_.triangle_boxes.data() + surface().node(leaf).first;
+    if (boxes->stamp != scratch_.stamp) surface_.make_triangle_boxes(leaf);
+    return boxes;
+  }
   const CollisionSurface& surface() const { return *surface_.surface_; }
   double farthest() const { return scratch_.farthest; }  ///< no vertex is moved by more, m
   /// c ± h: the box at rest.

@@ -19,12 +19,19 @@ constexpr double kUnitRoundOff = 0x1p-24;
 /// Nodes whose boxes are made at once: a node and its sibling, which lie side by side. The root stands alone.
 Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) % 2; }
 
-/// How many boxes from amplitudes cost as much as one refit, by the floats that each reads: six rows for a box; three
-/// for a vertex, which streams, and about a box's constants for every triangle.
+/// How many boxes from amplitudes cost as much as one refit, in floats read from the near cache. A refit streams: three
+/// floats per mode and vertex, and about 32 floats' time per triangle. Boxes lie scattered, and the wider ones among
+/// them lead the walk to more tests and vertices: all in all six floats per mode take four times as long (measured, see
+/// docs/collision.md).
 long boxes_per_refit(const CollisionSurface& surface) {
   const double k = surface.modes();
-  const double box = 6.0 * k + 40.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
+  const double box = 24.0 * k + 800.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
   return static_cast<long>((vertex * surface.vertices() + triangle * surface.triangles()) / box);
+}
+
+void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
+  for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
+  box.stamp = stamp;
 }
 
 }  // namespace
@@ -34,7 +41,9 @@ DeformedSurface::~DeformedSurface() = default;
 DeformedSurface::DeformedSurface(DeformedSurface&&) noexcept = default;
 DeformedSurface& DeformedSurface::operator=(DeformedSurface&&) noexcept = default;
 
-std::span<const double> DeformedSurface::amplitudes() const { return scratch_->z; }
+std::span<const double> DeformedSurface::amplitudes() const {
+  return std::span(scratch_->z.data(), static_cast<std::size_t>(surface_->modes()));
+}
 
 void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
                            BoundsChoice choice, long expected_boxes) {
@@ -52,10 +61,9 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
     throw InvalidArgument("DeformedSurface::bind: the amplitudes move a vertex by up to " +
                           std::to_string(sums.farthest) + " m, expected finite ones that move none beyond 1e30 m");
   }
-  s.norm = std::nextafter(static_cast<float>(norm * (1.0 + kUnitRoundOff)), std::numeric_limits<float>::infinity());
+  s.norm = static_cast<float>(norm * (1.0 + 4.0 * kUnitRoundOff));
   s.farthest = sums.farthest;
-  s.z.assign(z.begin(), z.end());
-  std::fill(std::copy(z.begin(), z.end(), s.padded_z.data()), s.padded_z.data() + surface->stride_, 0.0);
+  std::fill(std::copy(z.begin(), z.end(), s.z.data()), s.z.data() + surface->stride_, 0.0);
   if (surface_ != surface) surface_ = surface;
   counters_ = {};
   begin_state();
@@ -69,12 +77,14 @@ void DeformedSurface::reserve(const CollisionSurface& surface) {
   Scratch& s = *scratch_;
   const std::size_t nodes = surface.nodes().size(), vertices = static_cast<std::size_t>(surface.vertices());
   if (s.boxes.size() < nodes) s.boxes = AlignedArray<NodeBox>(nodes);
+  const auto triangles = static_cast<std::size_t>(surface.triangles());
+  if (s.triangle_boxes.size() < triangles) s.triangle_boxes = AlignedArray<NodeBox>(triangles);
   if (s.vertices.size() < vertices) s.vertices.resize(vertices);
   if (surface.modes() > 0 && s.positions.size() < 3 * vertices + 1) s.positions.resize(3 * vertices + 1);
   if (s.amplitudes.size() < surface.stride_) {
     s.amplitudes = AlignedArray<float>(surface.stride_);
     s.magnitudes = AlignedArray<float>(surface.stride_);
-    s.padded_z = AlignedArray<double>(surface.stride_);
+    s.z = AlignedArray<double>(surface.stride_);
   }
 }
 
@@ -83,6 +93,7 @@ void DeformedSurface::begin_state() {
   Scratch& s = *scratch_;
   if (++s.stamp < Scratch::kRefitted) return;
   for (std::size_t i = 0; i < s.boxes.size(); ++i) s.boxes[i].stamp = 0;
+  for (std::size_t i = 0; i < s.triangle_boxes.size(); ++i) s.triangle_boxes[i].stamp = 0;
   for (Scratch::Vertex& vertex : s.vertices) vertex.stamp = 0;
   s.stamp = 1;
 }
@@ -98,12 +109,28 @@ void DeformedSurface::make_box(Index node) {
   const auto first = static_cast<std::size_t>(first_of_siblings(node));
   const std::size_t count = node == 0 ? 1 : 2;
   NodeBox* boxes = s.boxes.data() + first;
-  if (boxes->stamp != (s.stamp | Scratch::kRefitted))
+  if (boxes->stamp == (s.stamp | Scratch::kRefitted))
+    for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
+  else
     make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->stride_},
                surface_->constants_.data() + first * kNodeConstants,
-               surface_->coefficients_.data() + first * 6 * surface_->stride_, count, boxes);
-  for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
+               surface_->coefficients_.data() + first * 6 * surface_->stride_, count, s.stamp, boxes);
   counters_.boxes += static_cast<long>(count);
+}
+
+/// Of the triangles of a leaf, from their vertices; their union takes the place of the leaf's own box, which is wider.
+void DeformedSurface::make_triangle_boxes(Index leaf) {
+  const auto first = static_cast<std::size_t>(surface_->node(leaf).first);
+  NodeBox* box = scratch_->triangle_boxes.data() + first;
+  Aabb all;
+  for (const Index t : surface_->node_triangles(leaf)) {
+    const std::array<Vec3, 3> x = triangle(t);
+    const Vec3 low = x[0].cwiseMin(x[1]).cwiseMin(x[2]), high = x[0].cwiseMax(x[1]).cwiseMax(x[2]);
+    store(low, high, scratch_->stamp, *box++);
+    all.include(Aabb{low, high});
+  }
+  const Vec3 rounding = 2.0 * kUnitRoundOff * all.low.cwiseAbs().cwiseMax(all.high.cwiseAbs());
+  store(all.low - rounding, all.high + rounding, scratch_->stamp, scratch_->boxes[static_cast<std::size_t>(leaf)]);
 }
 
 const Vec3& DeformedSurface::vertex(Index v) {
@@ -116,7 +143,7 @@ const Vec3& DeformedSurface::vertex(Index v) {
   if (surface_->modes() == 0) return vertex.p;
   const VertexRows& rows = surface_->model()->collision_rows();
   double u[3];
-  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.padded_z.data(), surface_->stride_, u);
+  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->stride_, u);
   vertex.p += Vec3(u[0], u[1], u[2]);
   return vertex.p;
 }

@@ -1,6 +1,7 @@
 #include "limber/collision/tree_traversal.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "deformed_scratch.h"
@@ -33,10 +34,10 @@ struct Separation {
   }
 };
 
-double reach_of(const NodeBox& box) {  // from the origin, over the box
-  double squared = 0.0;
-  for (int i = 0; i < 3; ++i) squared += std::pow(std::max(std::abs(box.low[i]), std::abs(box.high[i])), 2);
-  return std::sqrt(squared);
+double reach_of(const NodeBox& box) {  // from the origin to its farthest point, at most
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) sum += std::max(std::abs(box.low[i]), std::abs(box.high[i]));
+  return sum;
 }
 
 /// Error of the separating axis test in single precision: some thirty roundings of numbers up to `size`.
@@ -56,55 +57,21 @@ Aabb box_of(const std::array<Vec3, 3>& x) {
   return {x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])};
 }
 
-/// The triangles of one leaf and their boxes.
-struct LeafBoxes {
-  static constexpr std::size_t kMost = 64;
-  std::array<Index, kMost> triangle;
-  std::array<Aabb, kMost> box;
-  std::size_t count = 0;
-
-  void add(Index t, const Aabb& b) { triangle[count] = t, box[count++] = b; }
-};
-
-/// Triangles of two leaves whose boxes along the axes of A come within the margin.
-class LeafPairs {
- public:
-  LeafPairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin)
-      : a_(a), b_(b), R_(to_matrix(X_AB.q)), p_(X_AB.p), margin_(margin) {}
-
-  void append(Index m, Index n, std::vector<TrianglePair>& pairs) {
-    make_a(m);
-    Aabb all_of_a;
-    for (std::size_t i = 0; i < in_a_.count; ++i) all_of_a.include(in_a_.box[i]);
-    for (const Index u : b_.surface().node_triangles(n)) {
-      std::array<Vec3, 3> x = b_.triangle(u);
-      for (Vec3& p : x) p = R_ * p + p_;
-      const Aabb box = box_of(x);
-      const Aabb wide = box.grown(margin_ + kRoundOff * (p_.cwiseAbs().sum() + reach(box)));
-      if (!wide.overlaps(all_of_a)) continue;
-      for (std::size_t i = 0; i < in_a_.count; ++i)
-        if (wide.overlaps(in_a_.box[i])) pairs.push_back({in_a_.triangle[i], u});
-    }
+/// Triangles of two leaves whose boxes come within reach: those of a that reach the leaf of b, with each of b's.
+void append_leaf_pairs(BoxReader& a, BoxReader& b, Index m, Index n, const BoxFrames& frames,
+                       std::vector<TrianglePair>& pairs) {
+  const auto of_a = a.surface().node_triangles(m), of_b = b.surface().node_triangles(n);
+  const NodeBox* boxes_a = a.triangle_boxes(m);
+  std::uint64_t left_a = boxes_within(frames, b(n), boxes_a, of_a.size(), false);
+  if (left_a == 0) return;
+  const NodeBox* boxes_b = b.triangle_boxes(n);
+  for (; left_a != 0; left_a &= left_a - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left_a));
+    for (std::uint64_t left_b = boxes_within(frames, boxes_a[i], boxes_b, of_b.size(), true); left_b != 0;
+         left_b &= left_b - 1)
+      pairs.push_back({of_a[i], of_b[static_cast<std::size_t>(std::countr_zero(left_b))]});
   }
-
- private:
-  static double reach(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).sum(); }
-
-  /// A walk keeps to one leaf of a for several leaves of b.
-  void make_a(Index m) {
-    if (made_ == m) return;
-    made_ = m;
-    in_a_.count = 0;
-    for (const Index t : a_.surface().node_triangles(m)) in_a_.add(t, box_of(a_.triangle(t)));
-  }
-
-  DeformedSurface &a_, &b_;
-  Mat3 R_;
-  Vec3 p_;
-  double margin_;
-  Index made_ = -1;
-  LeafBoxes in_a_;
-};
+}
 
 /// The triangles are within `margin` of each other in the rest shape.
 bool near_in_rest_shape(const CollisionSurface& surface, Index t, Index u, double margin) {
@@ -141,11 +108,9 @@ double distance_to_box(const Vec3& p, const Aabb& box) {
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
                          std::vector<TrianglePair>& pairs) {
   if (!(margin >= 0.0)) throw InvalidArgument("find_triangle_pairs: margin is negative or not a number, expected ≥ 0");
-  BoxReader boxes_a(a), boxes_b(b);
-  const double size = reach_of(boxes_a(0)) + reach_of(boxes_b(0)) + X_AB.p.norm();
   if (Separation(X_AB)(a.bounds(0), b.bounds(0)) > margin) return;
-  const BoxFrames frames = box_frames(X_AB, margin, size);
-  LeafPairs leaves(a, b, X_AB, margin);
+  BoxReader boxes_a(a), boxes_b(b);
+  const BoxFrames frames = box_frames(X_AB, margin, reach_of(boxes_a(0)) + reach_of(boxes_b(0)) + X_AB.p.norm());
   std::array<std::pair<Index, Index>, 2 * CollisionSurface::kMaxDepth + 4> stack;
   std::size_t count = 0;
   stack[count++] = {0, 0};
@@ -153,13 +118,13 @@ void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTran
     const auto [m, n] = stack[--count];
     const TreeNode &ma = a.surface().node(m), &nb = b.surface().node(n);
     if (ma.leaf() && nb.leaf()) {
-      leaves.append(m, n, pairs);
+      append_leaf_pairs(boxes_a, boxes_b, m, n, frames, pairs);
     } else if (nb.leaf() || (!ma.leaf() && ma.count > nb.count)) {
-      const unsigned within = siblings_within(frames, boxes_b(n), boxes_a.siblings(ma.child), false);
+      const std::uint64_t within = boxes_within(frames, boxes_b(n), boxes_a.siblings(ma.child), 2, false);
       if (within & 2u) stack[count++] = {ma.child + 1, n};
       if (within & 1u) stack[count++] = {ma.child, n};
     } else {
-      const unsigned within = siblings_within(frames, boxes_a(m), boxes_b.siblings(nb.child), true);
+      const std::uint64_t within = boxes_within(frames, boxes_a(m), boxes_b.siblings(nb.child), 2, true);
       if (within & 2u) stack[count++] = {m, nb.child + 1};
       if (within & 1u) stack[count++] = {m, nb.child};
     }

@@ -70,6 +70,7 @@ class DeformedSurface {
   void reserve(const CollisionSurface& surface);
   void begin_state();
   void make_box(Index node);
+  void make_triangle_boxes(Index leaf);
 
   std::shared_ptr<const CollisionSurface> surface_;
   std::unique_ptr<Scratch> scratch_;
