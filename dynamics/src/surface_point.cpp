@@ -3,12 +3,27 @@
 #include <cmath>
 
 #include "limber/core/error.h"
+#include "surface_point_kernels.h"
 
 namespace limber {
 namespace {
 
 const ModalSurface& surface_of(const ModalModel& model, const SurfacePoint& at) {
   return at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
+}
+
+/// The rows of U at the corners that take part, weighted, and along each axis by `along`; a vertex reads one corner's.
+SurfaceRows rows_at(const ModalModel& model, const SurfacePoint& at, const Vec3& along) {
+  const Triangle& corners = model.collision().triangles[static_cast<std::size_t>(at.triangle)];
+  SurfaceRows rows{};
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    if (at.weight[corner] == 0.0) continue;
+    for (int axis = 0; axis < 3; ++axis, ++rows.count) {
+      rows.row[rows.count] = model.collision_rows().row(corners[corner], axis);
+      rows.weight[rows.count] = at.weight[corner] * along[axis];
+    }
+  }
+  return rows;
 }
 
 }  // namespace
@@ -35,6 +50,11 @@ Vec3 shape_at(const ModalModel& model, const SurfacePoint& at, Index mode) {
 }
 
 Vec3 displacement(const ModalModel& model, const SurfacePoint& at, std::span<const double> z) {
+  if (at.surface == SurfacePoint::Surface::kCollision) {
+    double sum[3];
+    rows_times(rows_at(model, at, Vec3::Ones()), z.size(), z.data(), sum);
+    return {sum[0], sum[1], sum[2]};
+  }
   Vec3 u = Vec3::Zero();
   for (std::size_t i = 0; i < z.size(); ++i) u += z[i] * shape_at(model, at, static_cast<Index>(i));
   return u;
@@ -50,6 +70,7 @@ Vec3 deformed_point(const ModalModel& model, const SurfacePoint& at, std::span<c
 }
 
 void add_modal_force(const ModalModel& model, const SurfacePoint& at, const Vec3& f_B, std::span<double> g) {
+  if (at.surface == SurfacePoint::Surface::kCollision) return add_rows(rows_at(model, at, f_B), g.size(), g.data());
   for (std::size_t i = 0; i < g.size(); ++i) g[i] += shape_at(model, at, static_cast<Index>(i)).dot(f_B);
 }
 
