@@ -52,6 +52,8 @@ double farthest(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.c
 class Side {
  public:
   void start(const MovingBody& body) {
+    if (!body.surface == !body.geometry)
+      throw InvalidArgument("TimeOfImpact::find: a body has both a surface and a geometry, or neither, expected one");
     motion_ = body.motion;
     surface_ = body.geometry ? body.geometry->surface() : body.surface;
     core_ = {Vec3::Zero(), Vec3::Zero()};
@@ -137,6 +139,7 @@ class Side {
   // The tree; a core is one leaf.
   bool leaf(Index node) const { return !surface_ || surface_->node(node).leaf(); }
   Index child(Index node) const { return surface_->node(node).child; }
+  /// Triangles below a node, or one core.
   Index weight(Index node) const { return surface_ ? surface_->node(node).count : 1; }
   Aabb box(Index node) {
     if (surface_) return shape_.bounds(node);
@@ -144,7 +147,6 @@ class Side {
     for (std::size_t i = 0; i < core_count_; ++i) box.include(core_[i]);
     return box;
   }
-  Index items(Index node) const { return weight(node); }
 
   /// Points of one triangle or core, in the body frame, and their velocities there, as far as flexing goes.
   struct Item {
@@ -232,6 +234,7 @@ class Pair {
     const bool swap = first.geometry && std::holds_alternative<HalfSpace>(first.geometry->shape());
     a.start(swap ? second : first);
     b.start(swap ? first : second);
+    last_.reset();
     go_to(0.0, step);
     return kRoundOff * (a.position().norm() + b.position().norm() + a.arm() + b.arm());
   }
@@ -270,6 +273,7 @@ class Pair {
     std::array<Entry, 2 * CollisionSurface::kMaxDepth + 4> stack;
     std::size_t size = 0;
     const auto entry = [&](Index m, Index n) { return Entry{m, n, earliest(a.box(m), b.box(n), kept)}; };
+    if (last_ && !visit(*last_, kept, margin, best)) return std::nullopt;
     stack[size++] = entry(0, 0);
     while (size > 0) {
       const Entry e = stack[--size];
@@ -333,17 +337,29 @@ class Pair {
 
   /// All pairs of items of two leaves. @return false where one is within the margin
   bool visit(Index m, Index n, double kept, double margin, double& best) {
-    for (Index i = 0; i < a.items(m); ++i) {
+    for (Index i = 0; i < a.weight(m); ++i) {
       const Side::Item one = a.item(m, i);
       const Aabb box_A = one.box();
-      for (Index j = 0; j < b.items(n); ++j) {
+      for (Index j = 0; j < b.weight(n); ++j) {
         const Side::Item other = b.item(n, j);
         if (!(earliest(box_A, other.box(), kept) < best)) continue;
-        if (!(b.plane() ? visit_plane(one, kept, margin, best) : visit_items(one, other, kept, margin, best)))
-          return false;
+        const double before = best;
+        if (!visit(one, other, kept, margin, best)) return false;
+        if (best < before) last_ = {m, n, i, j};
       }
     }
     return true;
+  }
+
+  struct ItemPair {
+    Index m, n, i, j;
+  };
+  bool visit(const ItemPair& p, double kept, double margin, double& best) {
+    return visit(a.item(p.m, p.i), b.item(p.n, p.j), kept, margin, best);
+  }
+
+  bool visit(const Side::Item& one, const Side::Item& other, double kept, double margin, double& best) const {
+    return b.plane() ? visit_plane(one, kept, margin, best) : visit_items(one, other, kept, margin, best);
   }
 
   bool visit_plane(const Side::Item& item, double kept, double margin, double& best) const {
@@ -399,6 +415,7 @@ class Pair {
   double acceleration_ = 0.0, offset_ = 0.0, thickness_ = 0.0;
   std::array<Axis, 6> axes_;
   std::size_t axis_count_ = 0;
+  std::optional<ItemPair> last_;  // whose time was the least: likely to be it again
 };
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "sample_models.h"
+#include "sheet_model.h"
 
 namespace limber {
 namespace {
@@ -236,59 +237,7 @@ TEST(TimeOfImpact, OfHugeAmplitudesIsRightToo) {
 // -- Tunnelling -------------------------------------------------------------------------------------------------------
 
 constexpr int kCells = 12;
-constexpr double kSheet = 1.0, kThickness = 1e-3;
-
-double sheet_shape(double x, double y, int mode) {
-  return std::cos(pi * (mode % 2 + 1) * (x / kSheet + 0.5)) * std::cos(pi * (mode / 2 + 1) * (y / kSheet + 0.5)) * 2.0;
-}
-
-/// A square sheet of two sides and an edge all round, that bends in z only.
-std::shared_ptr<const ModalModel> sheet_model() {
-  constexpr int kModes = 4;
-  ModalModelData d;
-  d.name = "sheet";
-  d.mass = 1.0;
-  d.volume = kSheet * kSheet * kThickness;
-  d.inertia = Vec3(1.0, 1.0, 2.0).asDiagonal() * (kSheet * kSheet / 12.0);
-  ModalSurface s;
-  for (int side = 0; side < 2; ++side)
-    for (int j = 0; j <= kCells; ++j)
-      for (int i = 0; i <= kCells; ++i)
-        s.rest.push_back(Vec3f(static_cast<float>(kSheet * (double(i) / kCells - 0.5)),
-                               static_cast<float>(kSheet * (double(j) / kCells - 0.5)),
-                               static_cast<float>((side - 0.5) * kThickness)));
-  const auto vertex = [](int side, int i, int j) { return Index((side * (kCells + 1) + j) * (kCells + 1) + i); };
-  const auto quad = [&](Index a, Index b, Index c, Index e) {
-    s.triangles.push_back({a, b, c});
-    s.triangles.push_back({a, c, e});
-  };
-  for (int j = 0; j < kCells; ++j)
-    for (int i = 0; i < kCells; ++i) {
-      quad(vertex(1, i, j), vertex(1, i + 1, j), vertex(1, i + 1, j + 1), vertex(1, i, j + 1));
-      quad(vertex(0, i, j), vertex(0, i, j + 1), vertex(0, i + 1, j + 1), vertex(0, i + 1, j));
-    }
-  for (int i = 0; i < kCells; ++i) {
-    quad(vertex(0, i, 0), vertex(0, i + 1, 0), vertex(1, i + 1, 0), vertex(1, i, 0));
-    quad(vertex(0, i + 1, kCells), vertex(0, i, kCells), vertex(1, i, kCells), vertex(1, i + 1, kCells));
-    quad(vertex(0, 0, i + 1), vertex(0, 0, i), vertex(1, 0, i), vertex(1, 0, i + 1));
-    quad(vertex(0, kCells, i), vertex(0, kCells, i + 1), vertex(1, kCells, i + 1), vertex(1, kCells, i));
-  }
-  s.basis = ModalBasis(s.vertices(), kModes);
-  for (int mode = 0; mode < kModes; ++mode) {
-    const double omega = 2.0 * pi * (20.0 + 35.0 * mode);
-    d.eigenvalues.push_back(omega * omega);
-    d.decays.push_back(1.0);
-    d.participation.push_back(Vec3::Zero());
-    d.moments.push_back(Mat3::Zero());
-    for (Index v = 0; v < s.vertices(); ++v) {
-      const Vec3f& r = s.rest[static_cast<std::size_t>(v)];
-      const double u = sheet_shape(static_cast<double>(r.x()), static_cast<double>(r.y()), mode);
-      s.basis.set(v, mode, {0.0f, 0.0f, static_cast<float>(u)});
-    }
-  }
-  d.render = std::move(s);
-  return std::make_shared<const ModalModel>(std::move(d));
-}
+constexpr double kSheet = testing::kSheetSide;
 
 /// Height of a point of the sheet's frame above its bent middle; none beside it. The sheet's own triangles.
 std::optional<double> height_above_sheet(const CollisionSurface& sheet, const Vec3& p_B, std::span<const double> z) {
@@ -335,7 +284,7 @@ std::optional<double> crossing(const CollisionSurface& sheet, const ExactMotion&
 }
 
 TEST(TimeOfImpact, NoneOfTenThousandShotsPassesThroughASheetOfOneMillimetre) {
-  const auto model = sheet_model();
+  const auto model = testing::sheet_model(kCells, 4);
   const auto surface = std::make_shared<const CollisionSurface>(model);
   const RigidGeometry ball{Sphere{0.004}}, cube{Box{{0.003, 0.002, 0.004}}};
   const double margin = 1e-4;
@@ -436,6 +385,7 @@ TEST(TimeOfImpact, EndsAtRestWhereAdvancementsDoNot) {
   EXPECT_LE(impatient.find({.geometry = &cube, .motion = &rolling}, {.geometry = &ground}, kFrame, margin).advancements,
             3);
   EXPECT_THROW(TimeOfImpact({.max_advancements = 0}), InvalidArgument);
+  EXPECT_THROW(impatient.find({}, {.geometry = &ground}, kFrame, margin), InvalidArgument);
 }
 
 TEST(TimeOfImpact, AMillionMetresAwayIsTheSameToTheRoundOffOfPoses) {

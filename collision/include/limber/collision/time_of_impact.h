@@ -68,7 +68,8 @@ class TimeOfImpact {
   /// the gap between half the margin and the margin: a graze that stays beyond half may be told or not. A margin below
   /// the round-off of the poses (a few ε of their distance from the world's origin) is raised to it.
   /// @param step s, ≥ 0, at most that of the motions. @param margin m, ≥ 0
-  /// @throws InvalidArgument for amplitudes of wrong number or not finite, as DeformedSurface::bind()
+  /// @throws InvalidArgument for a body that is not one of surface and geometry, and for amplitudes of wrong number or
+  /// not finite, as DeformedSurface::bind()
   ImpactTime find(const MovingBody& a, const MovingBody& b, double step, double margin);
 
  private:
