@@ -4,10 +4,13 @@
 #include <cmath>
 #include <mutex>
 #include <string>
+#include <tuple>
 
 #include "geometry_cache.h"
 #include "limber/collision/broad_phase.h"
+#include "limber/collision/time_of_impact.h"
 #include "limber/core/error.h"
+#include "limber/dynamics/exact_motion.h"
 #include "surface_pool.h"
 #include "world_bounds.h"
 
@@ -37,6 +40,8 @@ struct Worker {
   ContactClusters clusters;
   SurfacePool pool;
   DeformedSurface root;  ///< for boxes of whole bodies
+  TimeOfImpact time_of_impact;
+  std::vector<double> amplitudes;
 };
 
 /// Lends workers to threads.
@@ -100,6 +105,7 @@ std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
                         expected);
 }
 
+/// All but the amplitudes' size, which binding them shows: see bind_state().
 void check_state(Index index, const Body& body, const BodyState& state) {
   constexpr double kUnit = 1e-6;
   const Quaternion& q = state.pose.q;
@@ -109,13 +115,17 @@ void check_state(Index index, const Body& body, const BodyState& state) {
     refuse(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
   if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
     refuse(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
-  double farthest = 0.0;
-  for (std::size_t i = 0; i < state.amplitudes.size(); ++i) {
-    if (!std::isfinite(state.amplitudes[i]))
-      refuse(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
-    farthest += std::abs(state.amplitudes[i]) * body.modal->surface->largest_shape(static_cast<Index>(i));
+}
+
+/// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
+void bind_state(DeformedSurface& surface, Index index, const Body& body, std::span<const double> z) {
+  try {
+    surface.bind(body.modal->surface, z, BoundsChoice::kAmplitudes);
+  } catch (const InvalidArgument& e) {
+    for (std::size_t i = 0; i < z.size(); ++i)
+      if (!std::isfinite(z[i])) refuse(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
+    refuse(index, e.what(), "smaller amplitudes");
   }
-  if (!(farthest <= 1e30)) refuse(index, "amplitudes that move a vertex beyond 1e30 m", "smaller ones");
 }
 
 void check_length(const char* name, double length) {
@@ -144,11 +154,15 @@ struct ContactFinder::Impl {
   Workers workers;
 
   // Of the query under way.
-  const ContactQuery* query = nullptr;
+  std::span<const BodyState> states;
+  std::span<const ExactMotion* const> motions;  ///< none where contacts are asked for
+  double step = 0.0, margin = 0.0;
+  Vec3 origin = Vec3::Zero();
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
   std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
+  std::vector<ImpactTime> times;                 ///< by pair
 
   // Of the last query, ascending.
   std::vector<PairIds> kept_pairs;
@@ -165,23 +179,33 @@ struct ContactFinder::Impl {
   }
   Body& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
   const Body& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
-  static const BodyState& state(std::span<const BodyState> states, Index body) {
-    return states[static_cast<std::size_t>(body)];
+  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  const ExactMotion* motion(Index body) const {
+    return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
   }
 
   void set_finds_itself(Index body, bool finds);
   bool stays_in_place(Index body, const BodyState& state) const;
-  void check_and_list(std::span<const BodyState> states);
-  void make_boxes(std::span<const BodyState> states, Jobs& jobs);
-  void place(std::span<const BodyState> states);
-  void merge_self_pairs(std::span<const BodyState> states);
-  void check_sleepers_in_pairs(std::span<const BodyState> states) const;
+  void check_and_list();
+  void check_motion(Index index) const;
+  void find_near_pairs(Jobs& jobs);
+  void make_boxes(Jobs& jobs);
+  void make_box(std::size_t entry, Worker& worker);
+  Aabb swept_box(Index index, Worker& worker) const;
+  void place();
+  void merge_self_pairs();
+  void drop_still_pairs();
+  void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
   void find_in_pair(const BodyPair& pair, Worker& worker, std::vector<ContactPoint>& contacts) const;
   CollisionBody collision_body(Index body, Worker& worker) const;
   double patch_radius(const BodyPair& pair) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
+  void find_impacts_in_pairs(Jobs& jobs);
+  ImpactTime find_impact(const BodyPair& pair, Worker& worker) const;
+  MovingBody moving_body(Index index) const;
+  void gather(std::vector<Impact>& impacts) const;
 };
 
 void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
@@ -197,69 +221,101 @@ bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
 }
 
 /// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
-void ContactFinder::Impl::check_and_list(std::span<const BodyState> states) {
+void ContactFinder::Impl::check_and_list() {
   to_place.clear();
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (!bodies[i].present) continue;
-    const auto body = static_cast<Index>(i);
-    if (i >= states.size())
-      throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
-                            std::to_string(i) + " too");
-    if (stays_in_place(body, states[i])) continue;
-    check_state(body, bodies[i], states[i]);
-    to_place.push_back(body);
+    const auto index = static_cast<Index>(i);
+    if (motion(index) != nullptr) {
+      check_motion(index);
+    } else {
+      if (i >= states.size())
+        throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
+                              std::to_string(i) + " too");
+      if (stays_in_place(index, states[i])) continue;
+      check_state(index, bodies[i], states[i]);
+    }
+    to_place.push_back(index);
   }
 }
 
-/// Of each body to be placed, in the world, from its amplitudes alone.
-void ContactFinder::Impl::make_boxes(std::span<const BodyState> states, Jobs& jobs) {
+void ContactFinder::Impl::check_motion(Index index) const {
+  const ExactMotion& m = *motion(index);
+  if (m.modes() != at(index).modes())
+    refuse(index, "a motion of " + std::to_string(m.modes()) + " modes", std::to_string(at(index).modes()));
+  if (m.step() < step)
+    refuse(index, "a motion over " + std::to_string(m.step()) + " s", "the step, " + std::to_string(step) + " s");
+}
+
+void ContactFinder::Impl::make_boxes(Jobs& jobs) {
   boxes.resize(to_place.size());
-  struct Loop {
-    Impl& m;
-    std::span<const BodyState> states;
-  } loop{*this, states};
-  jobs.parallel_for(to_place.size(), kBodiesPerChunk, [&loop](std::size_t begin, std::size_t end) {
-    Impl& m = loop.m;
-    const Workers::Lease worker(m.workers);
-    for (std::size_t i = begin; i < end; ++i) {
-      const Body& body = m.at(m.to_place[i]);
-      const BodyState& s = state(loop.states, m.to_place[i]);
-      if (body.modal) {
-        DeformedSurface& surface = (*worker).root;
-        surface.bind(body.modal->surface, s.amplitudes, BoundsChoice::kAmplitudes);
-        m.boxes[i] = world_box(surface.bounds(0), s.pose).grown(s.reach);
-      } else if (!body.is_half_space()) {
-        m.boxes[i] = world_box(*body.rigid, s.pose).grown(s.reach);
-      }
-    }
+  jobs.parallel_for(to_place.size(), kBodiesPerChunk, [this](std::size_t begin, std::size_t end) {
+    const Workers::Lease worker(workers);
+    for (std::size_t i = begin; i < end; ++i) make_box(i, *worker);
   });
 }
 
-void ContactFinder::Impl::place(std::span<const BodyState> states) {
+/// Of a body to be placed, in the world, from its amplitudes alone.
+void ContactFinder::Impl::make_box(std::size_t entry, Worker& worker) {
+  const Index index = to_place[entry];
+  const Body& body = at(index);
+  if (motion(index) != nullptr) {
+    boxes[entry] = swept_box(index, worker);
+  } else if (body.modal) {
+    bind_state(worker.root, index, body, state(index).amplitudes);
+    boxes[entry] = world_box(worker.root.bounds(0), state(index).pose).grown(state(index).reach);
+  } else if (!body.is_half_space()) {
+    boxes[entry] = world_box(*body.rigid, state(index).pose).grown(state(index).reach);
+  }
+}
+
+/// Half-spaces that move may come anywhere.
+Aabb ContactFinder::Impl::swept_box(Index index, Worker& worker) const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const Body& body = at(index);
+  if (body.is_half_space()) return {Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)};
+  if (!body.modal) return swept(body.rigid->bounds(), {}, *motion(index));
+  RigidTransform pose;
+  worker.amplitudes.resize(static_cast<std::size_t>(body.modes()));
+  motion(index)->at(0.0, pose, worker.amplitudes);
+  bind_state(worker.root, index, body, worker.amplitudes);
+  return swept(worker.root.bounds(0), body.modal->surface->model()->collision_extent().shape, *motion(index));
+}
+
+void ContactFinder::Impl::place() {
   for (std::size_t i = 0; i < to_place.size(); ++i) {
     const Index index = to_place[i];
     Body& body = at(index);
-    const BodyState& s = state(states, index);
-    if (body.is_half_space()) {
-      HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), s.pose);
-      half_space.offset += s.reach;
+    const bool moves = motion(index) != nullptr;
+    if (body.is_half_space() && !moves) {
+      HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), state(index).pose);
+      half_space.offset += state(index).reach;
       broad_phase.set_half_space(index, half_space);
     } else {
       broad_phase.set_box(index, boxes[i]);
     }
-    broad_phase.set_asleep(index, s.asleep);
-    body.placed_asleep = s.asleep;
-    body.placed_reach = s.reach;
+    body.placed_asleep = !moves && state(index).asleep;
+    body.placed_reach = moves ? 0.0 : state(index).reach;
+    broad_phase.set_asleep(index, body.placed_asleep);
   }
 }
 
+void ContactFinder::Impl::find_near_pairs(Jobs& jobs) {
+  check_and_list();
+  workers.start_query(options, jobs.concurrency());
+  make_boxes(jobs);
+  place();
+  broad_phase.find_pairs(margin, pairs, jobs);
+  check_sleepers_in_pairs();
+}
+
 /// Bodies that find themselves and are awake, among the pairs in their order.
-void ContactFinder::Impl::merge_self_pairs(std::span<const BodyState> states) {
+void ContactFinder::Impl::merge_self_pairs() {
   if (self_touching.empty()) return;
   merged_pairs.clear();
   auto next = pairs.begin();
   for (const Index body : self_touching) {
-    if (state(states, body).asleep) continue;
+    if (state(body).asleep) continue;
     const BodyPair self{body, body};
     for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
     merged_pairs.push_back(self);
@@ -268,15 +324,20 @@ void ContactFinder::Impl::merge_self_pairs(std::span<const BodyState> states) {
   pairs.swap(merged_pairs);
 }
 
-void ContactFinder::Impl::check_sleepers_in_pairs(std::span<const BodyState> states) const {
+/// Their states were last looked at when they fell asleep.
+void ContactFinder::Impl::check_sleepers_in_pairs() {
+  const Workers::Lease worker(workers);
   for (const auto& [a, b] : pairs)
-    for (const Index body : {a, b})
-      if (state(states, body).asleep) check_state(body, at(body), state(states, body));
+    for (const Index index : {a, b}) {
+      if (motion(index) != nullptr || !state(index).asleep) continue;
+      check_state(index, at(index), state(index));
+      if (at(index).modal) bind_state((*worker).root, index, at(index), state(index).amplitudes);
+    }
 }
 
 CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
   const Body& body = at(index);
-  const BodyState& s = state(query->states, index);
+  const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
   if (body.modal) {
     result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
@@ -305,10 +366,10 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
-    worker.narrow.find_self_contacts(a, query->margin, query->origin, contacts);
+    worker.narrow.find_self_contacts(a, margin, origin, contacts);
   } else {
-    const double reaches = state(query->states, pair.a).reach + state(query->states, pair.b).reach;
-    worker.narrow.find_contacts(a, collision_body(pair.b, worker), query->margin + reaches, query->origin, contacts);
+    const double reaches = state(pair.a).reach + state(pair.b).reach;
+    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   worker.clusters.reduce(contacts, first, patch_radius(pair), kept_last_time(pair));
@@ -336,6 +397,42 @@ void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
     ++kept_pairs.back().count;
     kept_ids.push_back(c.id);
   }
+}
+
+void ContactFinder::Impl::drop_still_pairs() {
+  std::erase_if(pairs, [&](const BodyPair& pair) { return motion(pair.a) == nullptr && motion(pair.b) == nullptr; });
+}
+
+MovingBody ContactFinder::Impl::moving_body(Index index) const {
+  const Body& body = at(index);
+  MovingBody result{.geometry = body.rigid.get(), .motion = motion(index)};
+  if (body.modal) result.surface = body.modal->surface;
+  if (result.motion == nullptr) result.pose = state(index).pose, result.amplitudes = state(index).amplitudes;
+  return result;
+}
+
+ImpactTime ContactFinder::Impl::find_impact(const BodyPair& pair, Worker& worker) const {
+  return worker.time_of_impact.find(moving_body(pair.a), moving_body(pair.b), step, margin);
+}
+
+void ContactFinder::Impl::find_impacts_in_pairs(Jobs& jobs) {
+  times.resize(pairs.size());
+  jobs.parallel_for(pairs.size(), kPairsPerChunk, [this](std::size_t begin, std::size_t end) {
+    const Workers::Lease worker(workers);
+    for (std::size_t p = begin; p < end; ++p) times[p] = find_impact(pairs[p], *worker);
+  });
+}
+
+void ContactFinder::Impl::gather(std::vector<Impact>& impacts) const {
+  using Status = ImpactTime::Status;
+  impacts.clear();
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const auto& [status, time, advancements] = times[p];
+    if (status == Status::kImpact || status == Status::kResting)
+      impacts.push_back({.a = pairs[p].a, .b = pairs[p].b, .time = time, .resting = status == Status::kResting});
+  }
+  std::sort(impacts.begin(), impacts.end(),
+            [](const Impact& i, const Impact& j) { return std::tie(i.time, i.a, i.b) < std::tie(j.time, j.a, j.b); });
 }
 
 ContactFinder::ContactFinder(const ContactFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -390,22 +487,29 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   check_length("margin", query.margin);
   if (!query.origin.allFinite())
     throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
-  m.check_and_list(query.states);
-  m.query = &query;
-  m.workers.start_query(m.options, jobs.concurrency());
-  m.make_boxes(query.states, jobs);
-  m.place(query.states);
-  m.broad_phase.find_pairs(query.margin, m.pairs, jobs);
-  m.merge_self_pairs(query.states);
-  m.check_sleepers_in_pairs(query.states);
+  m.states = query.states;
+  m.motions = {};
+  m.margin = query.margin;
+  m.origin = query.origin;
+  m.find_near_pairs(jobs);
+  m.merge_self_pairs();
   m.find_in_pairs(jobs);
   m.gather(contacts);
-  m.query = nullptr;
 }
 
-void ContactFinder::find_impacts(std::span<const BodyState>, std::span<const ExactMotion* const>, double, double,
-                                 std::vector<Impact>& impacts, Jobs&) {
-  impacts.clear();
+void ContactFinder::find_impacts(std::span<const BodyState> states, std::span<const ExactMotion* const> motions,
+                                 double step, double margin, std::vector<Impact>& impacts, Jobs& jobs) {
+  Impl& m = *impl_;
+  check_length("step", step);
+  check_length("margin", margin);
+  m.states = states;
+  m.motions = motions;
+  m.step = step;
+  m.margin = margin;
+  m.find_near_pairs(jobs);
+  m.drop_still_pairs();
+  m.find_impacts_in_pairs(jobs);
+  m.gather(impacts);
 }
 
 }  // namespace limber
