@@ -15,6 +15,10 @@ namespace {
 using Numbers = std::span<const double>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// A row that differs from those of the free forces by a part σ has a pivot of σ², taken as zero below about 1e-14, and
+// is pulled by at most σ. A larger pull is no rounding.
+constexpr double kNearlyDependent = 1e-6;
+
 std::size_t count_of(int n) { return static_cast<std::size_t>(n); }
 
 double* copy_padded(AlignedBuffer& memory, Numbers from, std::size_t n, double otherwise = 0.0) {
@@ -76,7 +80,7 @@ struct Memory {
   AlignedBuffer b, lower, upper, D, diagonal, u, zero;
   AlignedBuffer f, w, scale, step, values;
   std::vector<int> free, wanted, nonzero;
-  std::vector<char> is_free;
+  std::vector<char> is_free, is_left;
   FreeSetFactor factor;
 };
 
@@ -116,6 +120,7 @@ class ActiveSet {
     step_ = memory_.step.need(m_ + 1);
     values_ = memory_.values.need(m_);
     memory_.is_free.assign(m_, 0);
+    memory_.is_left.assign(m_, 0);
     for (std::vector<int>* list : {&memory_.free, &memory_.wanted, &memory_.nonzero}) {
       list->clear();
       list->reserve(m_);
@@ -155,7 +160,7 @@ class ActiveSet {
   // Frees force j unless its row depends on those of P; then step_ holds R⁻ᵀA_Pj.
   bool append(std::size_t j) {
     A_.column(j, P_, step_);
-    if (!memory_.factor.append(step_, A_.diagonal(j) + added_compliance_)) return false;
+    if (!memory_.factor.append(step_, A_.diagonal(j) + compliance(j))) return false;
     memory_.is_free[j] = 1;
     P_.push_back(static_cast<int>(j));
     return true;
@@ -173,10 +178,12 @@ class ActiveSet {
     }
     A_.apply(problem_.b, memory_.nonzero, values_, m_, w_);
     if (added_compliance_ > 0.0)
-      for (std::size_t j = 0; j < m_; ++j) w_[j] += added_compliance_ * f_[j];
+      for (std::size_t j = 0; j < m_; ++j) w_[j] += compliance(j) * f_[j];
   }
 
-  double tolerated() const { return problem_.options.tolerance * std::max(largest_b_, largest_f_); }
+  double compliance(std::size_t j) const { return added_compliance_ / (scale_[j] * scale_[j]); }
+  double largest() const { return std::max(largest_b_, largest_f_); }
+  double tolerated() const { return problem_.options.tolerance * largest(); }
 
   // By how much (2) is violated at a force that is not free, scaled; the sign is the way it wants to go.
   double pull(std::size_t j) const {
@@ -189,7 +196,7 @@ class ActiveSet {
     std::size_t best = m_;
     double most = tolerated();
     for (std::size_t j = 0; j < m_; ++j) {
-      if (memory_.is_free[j]) continue;
+      if (memory_.is_free[j] || memory_.is_left[j]) continue;
       const double p = std::abs(pull(j));
       if (p <= most) continue;
       best = j;
@@ -225,6 +232,7 @@ class ActiveSet {
 
   void remove_at(std::size_t position) {
     memory_.factor.remove(position);
+    std::fill(memory_.is_left.begin(), memory_.is_left.end(), 0);
     memory_.is_free[static_cast<std::size_t>(P_[position])] = 0;
     P_.erase(P_.begin() + static_cast<std::ptrdiff_t>(position));
     ++result_.iterations;
@@ -262,8 +270,9 @@ class ActiveSet {
     return step < 1.0;
   }
 
-  // Force j depends on the free ones: A e = 0 along e = (−A_PP⁻¹A_Pj, 1), so the energy falls evenly along e until a
-  // bound is met. Where none is, (2) has no solution.
+  // Force j depends on the free ones to rounding: A e = 0 along e = (−A_PP⁻¹A_Pj, 1), so the energy falls evenly along
+  // e until a bound is met. Where none is, (2) has no solution; or, if the pull is small, the row is not quite
+  // dependent and rounding hides what would meet it: then it is left as it is.
   void slide(std::size_t j) {
     const std::size_t k = P_.size();
     memory_.factor.solve_upper(step_);
@@ -271,7 +280,13 @@ class ActiveSet {
     for (std::size_t i = 0; i < k; ++i) step_[i] *= -way;
     double step = clip(j, way, kInfinity);
     for (std::size_t i = 0; i < k; ++i) step = clip(static_cast<std::size_t>(P_[i]), step_[i], step);
-    if (step == kInfinity) return add_compliance();
+    if (step == kInfinity) {
+      if (std::abs(pull(j)) > kNearlyDependent * largest())
+        add_compliance();
+      else
+        memory_.is_left[j] = 1;
+      return;
+    }
     advance(j, way, step);
     for (std::size_t i = k; i-- > 0;)
       if (advance(static_cast<std::size_t>(P_[i]), step_[i], step)) remove_at(i);
@@ -280,13 +295,14 @@ class ActiveSet {
   }
 
   void add_compliance() {
-    result_.status = SolveStatus::kRelaxed;
-    added_compliance_ = std::max(10.0 * added_compliance_, problem_.options.infeasible_compliance * mean_diagonal_);
+    added_compliance_ = std::max(10.0 * added_compliance_, problem_.options.infeasible_compliance);
     factor_free();
   }
 
   // The residual of the problem as it was posed, without the compliance that was added.
   void finish(std::span<double> f) {
+    const bool left = std::find(memory_.is_left.begin(), memory_.is_left.end(), 1) != memory_.is_left.end();
+    if (left || added_compliance_ > 0.0) result_.status = SolveStatus::kRelaxed;
     added_compliance_ = 0.0;
     update_w();
     double worst = 0.0;
@@ -296,8 +312,7 @@ class ActiveSet {
       if (result_.status == SolveStatus::kRelaxed)
         result_.slack = std::max(result_.slack, std::abs(pull(j)) / scale_[j]);
     }
-    const double size = std::max(largest_b_, largest_f_);
-    result_.residual = size > 0.0 ? worst / size : 0.0;
+    result_.residual = largest() > 0.0 ? worst / largest() : 0.0;
     result_.free = static_cast<int>(P_.size());
     if (result_.iterations >= limit_) result_.status = SolveStatus::kIterationLimit;
     std::copy_n(f_, m_, f.begin());

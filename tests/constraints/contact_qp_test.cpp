@@ -128,6 +128,27 @@ TEST(ContactQp, RankDeficientSetsMeetTheirConditions) {
   }
 }
 
+TEST(ContactQp, NearlyEqualContactsAndUnequalMassesMeetTheirConditions) {
+  // Twice the same points to 1e-4 … 1e-10, with rows over eight decades: what a fine mesh and mass ratios bring about.
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  ContactQpSolver solver;
+  for (int n = 0; n < 400; ++n) {
+    const ContactSample exact = make_contacts(2 + n % 60, n % 30, Touching::kDuplicates, random);
+    Eigen::MatrixXd G = Eigen::Map<const RowMajor>(exact.G.data(), exact.contacts, exact.dimension);
+    const double difference = std::pow(10.0, -4 - n % 7), spread = n % 3 * 2.0;
+    for (double& x : G.reshaped()) x += difference * normal(random);
+    for (int i = 0; i < exact.contacts; ++i) G.row(i) *= std::pow(10.0, spread * uniform(random));
+    Eigen::VectorXd y(exact.dimension);
+    for (double& x : y) x = normal(random);
+    const ContactSample s = testing::sample_of(G, G * y);
+    EXPECT_LT(complementarity(s, solve_dense(s, solver).f), kResidual) << n;
+    EXPECT_LT(complementarity(s, solve_factored(s, solver).f), kResidual) << n;
+  }
+}
+
 TEST(ContactQp, NeverAddsEnergyAtVelocityLevel) {
   std::mt19937 random(3);
   ContactQpSolver solver;

@@ -45,7 +45,7 @@ struct FactoredContactQp {
 
 struct ContactQpOptions {
   double tolerance = 1e-11;             ///< of the residual below; > 0
-  double infeasible_compliance = 1e-6;  ///< added to the diagonal where (2) has no solution, in units of its mean; > 0
+  double infeasible_compliance = 1e-6;  ///< added to the diagonal, as a part of it, where (2) has no solution; > 0
   int max_iterations = 0;               ///< ≥ 0; 0: 100 + 20 m
 };
 
