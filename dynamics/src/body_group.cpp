@@ -195,6 +195,12 @@ void BodyGroup::commit(Index slot) {
   clear_loads(slot);
 }
 
+void BodyGroup::adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal) {
+  predictions_[static_cast<std::size_t>(slot)].frame.apply_impulse(constants_, impulse, moment);
+  const std::span<double> rates = predicted_rates_.modes(slot);
+  for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += modal[i];
+}
+
 void BodyGroup::apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment,
                                           std::span<const double> modal) {
   body(slot).frame.apply_impulse(constants_, impulse, moment);
@@ -294,6 +300,45 @@ void BodyGroup::clear_loads(Index slot) {
   if (b.modes_loaded || !couplings_.empty()) forces_.clear(slot);
   b.modes_loaded = false;
   b.delayed.clear();
+}
+
+BodyEnergy BodyGroup::energy(Index slot, const Vec3& gravity) const {
+  const bool answers = bodies_[static_cast<std::size_t>(slot)].modes_static;
+  return energy_of(frame(slot), amplitudes(slot), rates(slot),
+                   answers ? static_amplitudes(slot) : std::span<const double>(), gravity);
+}
+
+BodyEnergy BodyGroup::predicted_energy(Index slot, const Vec3& gravity) const {
+  const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
+  return energy_of(p.frame, predicted_amplitudes(slot), predicted_rates(slot),
+                   p.modes_static ? predicted_static_.modes(slot) : std::span<const double>(), gravity);
+}
+
+double BodyGroup::predicted_dissipation(Index slot) const {
+  const std::span<const double> z0 = amplitudes(slot), z1 = predicted_amplitudes(slot), v0 = rates(slot),
+                                v1 = predicted_rates(slot), g = predicted_forces_.modes(slot);
+  const bool had = bodies_[static_cast<std::size_t>(slot)].modes_static;
+  const bool has = predictions_[static_cast<std::size_t>(slot)].modes_static;
+  double taken = 0.0;
+  for (std::size_t i = 0; i < z0.size(); ++i) {
+    const double before = z0[i] - (had ? static_amplitudes(slot)[i] : 0.0);
+    const double after = z1[i] - (has ? predicted_static_.modes(slot)[i] : 0.0);
+    taken += g[i] * (after - before) + 0.5 * (v0[i] * v0[i] - v1[i] * v1[i]) +
+             0.5 * model_->data().eigenvalues[i] * (before * before - after * after);
+  }
+  return taken;
+}
+
+BodyEnergy BodyGroup::energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
+                                std::span<const double> answer, const Vec3& gravity) const {
+  const Vec3 mass_times_center = constants_.mass * frame.pose().p + frame.pose().q * first_moment_of(z);
+  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(constants_), .potential = -gravity.dot(mass_times_center)};
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double c = answer.empty() ? 0.0 : answer[i], vibrating = z[i] - c;
+    energy.kinetic_modal += 0.5 * rates[i] * rates[i];
+    energy.elastic += 0.5 * model_->data().eigenvalues[i] * (vibrating * vibrating + c * c);
+  }
+  return energy;
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }

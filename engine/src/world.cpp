@@ -356,18 +356,7 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
 
 BodyEnergy World::energy(BodyId id) const {
   const Impl::Entry& e = impl_->entry(id, "energy");
-  const BodyGroup& group = impl_->group(e);
-  const FrameConstants& c = group.frame_constants();
-  const RigidFrame& frame = group.frame(e.slot);
-  const std::span<const double> z = group.amplitudes(e.slot), rates = group.rates(e.slot);
-  const Vec3 mass_times_center = c.mass * frame.pose().p + frame.pose().q * group.first_moment(e.slot);
-  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(c),
-                    .potential = -impl_->options.gravity.dot(mass_times_center)};
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    energy.kinetic_modal += 0.5 * rates[i] * rates[i];
-    energy.elastic += 0.5 * group.model().data().eigenvalues[i] * z[i] * z[i];
-  }
-  return energy;
+  return impl_->group(e).energy(e.slot, impl_->options.gravity);
 }
 
 Vec3 World::angular_momentum(BodyId id) const {

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "limber/dynamics/body_energy.h"
 #include "limber/dynamics/oscillator.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
@@ -98,6 +99,8 @@ class BodyGroup {
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
   std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }
+  /// Changes the predicted velocities of frame and modes. Arguments as for apply_generalized_impulse(), but all modes.
+  void adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Makes the last prediction the state, and clears the loads, as advance() does.
   void commit(Index slot);
 
@@ -119,6 +122,13 @@ class BodyGroup {
   /// The part of amplitudes() that is the static answer to the last step's constraints; zero for modes below the
   /// Nyquist rate. The mode's energy is ½(ż² + λ(z − c)²) + ½λc².
   std::span<const double> static_amplitudes(Index slot) const { return static_amplitudes_.modes(slot); }
+
+  BodyEnergy energy(Index slot, const Vec3& gravity) const;
+  BodyEnergy predicted_energy(Index slot, const Vec3& gravity) const;
+  /// What the modes' damping takes over the predicted step, J: work of the forces held over it less what the modes gain.
+  double predicted_dissipation(Index slot) const;
+  /// Whether something comes part way into the next step: an impulse with a delay.
+  bool has_delayed_impulse(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].modes_delayed; }
 
   /// First mass moment about the body origin, deformed: m c + Σ z_i p_i, body axes, kg·m.
   Vec3 first_moment(Index slot) const;
@@ -180,6 +190,8 @@ class BodyGroup {
   bool answer_statically(Index slot, std::span<const double> modal);
   void clear_loads(Index slot);
   void clear_modes(Index slot);
+  BodyEnergy energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
+                       std::span<const double> answer, const Vec3& gravity) const;
   Vec3 first_moment_of(std::span<const double> z) const;
   Vec3 first_moment_at_end(const ExactMotion& motion) const;
   std::array<ModeRows*, 9> mode_rows() {

@@ -25,6 +25,7 @@
 
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/dynamics/body_energy.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
 #include "limber/model/modal_model.h"
@@ -62,15 +63,6 @@ struct BodyView {
   Vec3 angular_velocity;               ///< world, rad/s
   std::span<const double> amplitudes;  ///< z, kg^½·m
   std::span<const double> rates;       ///< ż, kg^½·m/s
-};
-
-/// Mechanical energy of one body, J.
-struct BodyEnergy {
-  double kinetic_rigid = 0.0;  ///< translation and rotation of the frame
-  double potential = 0.0;      ///< −m g·x of the centre of mass, deformed; 0 at the world's origin
-  double kinetic_modal = 0.0;  ///< ½ Σ ż²
-  double elastic = 0.0;        ///< ½ Σ λ z²
-  double total() const { return kinetic_rigid + potential + kinetic_modal + elastic; }
 };
 
 /// Where the vertices of one body go.

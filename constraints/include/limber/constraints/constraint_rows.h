@@ -1,0 +1,119 @@
+/// @file limber/constraints/constraint_rows.h
+/// Rows of J: what each constraint measures, on one body or two.
+///
+///   u = Σ_sides linear·v + angular·ω + modal·ż          the rate of the row's gap
+///   (impulse, moment, modal load) += f (linear, angular, modal)    what its impulse f does
+///
+/// v and ω are of the body origin, world axes. A point p of a body along n has linear n, angular (p − origin) × n and
+/// modal n·R U. Impulses that act on two bodies conserve momentum if their linear parts are opposite and their arms end
+/// at one world point.
+///
+/// A row asks for   gap(end of step) − offset + compliance f = w,   w = 0 while lower < f < upper, w ≥ 0 at the lower
+/// bound, w ≤ 0 at the upper one. Gaps are true, nonlinear functions of the bodies' states, given by the row's owner
+/// (constraint.h); J is their derivative at the step's start.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "limber/constraints/body_response.h"
+
+namespace limber {
+
+/// Which state of the bodies is meant: before the step, or as last predicted.
+enum class StepTime { kStart, kEnd };
+
+/// One body's part of a row.
+struct RowSide {
+  Index body = -1;                 ///< −1: the world, which does not move; the rest is not read then
+  Vec3 linear = Vec3::Zero();      ///< world
+  Vec3 angular = Vec3::Zero();     ///< world, about the body origin
+  std::span<const double> modal{};  ///< k numbers, or none where the modes do not show
+};
+
+inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+/// How a row is to be met.
+struct RowLaw {
+  double offset = 0.0;          ///< wanted gap at the step's end, in the gap's unit
+  double compliance = 0.0;      ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
+  double lower = -kUnbounded;   ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
+  double upper = kUnbounded;    ///< largest impulse
+  double tolerance = 1e-12;     ///< of the gap, in its unit; > 0
+  /// The row holds still what lies on it: its answer to gravity and other held forces is a held force too, so that what
+  /// rests has no velocity. For rows without compliance; springs do so by themselves.
+  bool holds = false;
+  /// How far the agent behind the row (a hand, a motor) moves what it holds within the step, in the gap's unit: the
+  /// work f/Δt times this may enter the system.
+  double agent_displacement = 0.0;
+  /// Of the spring in the row, force per unit gap from 0: its energy ½ stiffness gap² counts with that of the bodies.
+  double stiffness = 0.0;
+};
+
+/// The rows of one island, made anew every step in memory that is kept.
+class ConstraintRows {
+ public:
+  struct Side {
+    Index body = -1;
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+    std::size_t modal_begin = 0, modal_count = 0;
+  };
+  struct Row {
+    Side sides[2];
+    RowLaw law;
+  };
+
+  void clear();
+  /// @return the row's index. Copies the modal parts.
+  Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
+
+  Index size() const { return static_cast<Index>(rows_.size()); }
+  const Row& row(Index i) const { return rows_[static_cast<std::size_t>(i)]; }
+  Row& row(Index i) { return rows_[static_cast<std::size_t>(i)]; }
+  std::span<const double> modal(const Side& side) const {
+    return {modal_.data() + side.modal_begin, side.modal_count};
+  }
+
+ private:
+  std::vector<Row> rows_;
+  std::vector<double> modal_;
+};
+
+/// The bodies of one island with the places of their degrees of freedom among all of the island's.
+class IslandBodies {
+ public:
+  /// @param table all bodies. @param members indices into it, ascending
+  void set(std::span<const ConstrainedBody> table, std::span<const Index> members);
+  /// Turns the rotation axes with the bodies: as they are, or as predicted.
+  void place(StepTime when);
+
+  Index count() const { return static_cast<Index>(members_.size()); }
+  int degrees_of_freedom() const { return degrees_of_freedom_; }
+  Index member(Index local) const { return members_[static_cast<std::size_t>(local)]; }
+  const ConstrainedBody& body(Index local) const { return bodies_[static_cast<std::size_t>(local)]; }
+  const BodyResponse& response(Index local) const { return responses_[static_cast<std::size_t>(local)]; }
+  int first(Index local) const { return first_[static_cast<std::size_t>(local)]; }
+  /// −1 if the body is not of this island.
+  Index local(Index body) const;
+
+  /// J, rows × degrees of freedom, row-major. @param J that many numbers
+  void write_jacobian(const ConstraintRows& rows, std::span<double> J) const;
+  /// @param metric one number per degree of freedom
+  void write_position_metric(double step, std::span<double> metric) const;
+  void write_velocity_metric(std::span<double> metric) const;
+  void write_frame_metric(std::span<double> metric) const;
+
+ private:
+  std::vector<Index> members_;
+  std::vector<ConstrainedBody> bodies_;
+  std::vector<BodyResponse> responses_;
+  std::vector<int> first_;
+  int degrees_of_freedom_ = 0;
+};
+
+/// A = J D Jᵀ + diag(compliance), rows × rows, symmetric. For reference and small problems: the solver works on J.
+void assemble(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric,
+              std::span<double> A);
+
+}  // namespace limber

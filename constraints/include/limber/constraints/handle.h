@@ -1,0 +1,61 @@
+/// @file limber/constraints/handle.h
+/// Direct manipulation: a point of a body is held, dragged or pulled ([H03] section 3.4.1, position level).
+///
+/// The point is asked to be at its target at the *end* of the step. A handle without stiffness puts it there, to
+/// round-off, whatever the body's stiffness, as far as the held rows do not exceed what the body can do; conflicting
+/// handles meet in the least-squares sense. One with stiffness k and damping c pulls like a spring and a damper,
+/// evaluated at the end of the step, and so is stable for every k and c:
+///   F = −k (p − target) − c d/dt (p − target)
+#pragma once
+
+#include <vector>
+
+#include "limber/constraints/material_frame.h"
+
+namespace limber {
+
+struct HandleOptions {
+  /// World directions in which the point is held: 1 to 3, orthonormal. Empty: all three.
+  std::vector<Vec3> directions{};
+  double max_force = kUnbounded;  ///< N, along each direction; > 0
+  double stiffness = 0.0;         ///< k, N/m; 0: the target is met exactly
+  double damping = 0.0;           ///< c, N·s/m; ≥ 0, only with a stiffness
+  void validate() const;          ///< @throws InvalidArgument naming the field and its value
+};
+
+/// Where a handle wants its point.
+struct HandleTarget {
+  Vec3 position = Vec3::Zero();  ///< world, at the end of the coming step, m
+  Vec3 velocity = Vec3::Zero();  ///< world, after it, m/s: the target goes on by itself
+};
+
+class Handle final : public Constraint {
+ public:
+  /// @param start world: where the target is now, usually the point itself
+  Handle(MaterialFrame point, const Vec3& start, const HandleOptions& options = {});
+
+  void set_target(const HandleTarget& target);
+  const HandleTarget& target() const { return next_; }
+  const HandleOptions& options() const { return options_; }
+  const MaterialFrame& point() const { return point_; }
+  /// Mean force on the body over the last step, world, N.
+  const Vec3& force() const { return force_; }
+  /// Distance from the target along the held directions at the end of the last step, m.
+  double error() const { return error_; }
+
+  std::array<Index, 2> bodies() const override { return {point_.body(), -1}; }
+  void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
+  void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
+  void accept(const BodyStates& states, std::span<const double> impulses) override;
+
+ private:
+  MaterialFrame point_;
+  HandleOptions options_;
+  Vec3 now_;  // the target at the start of the step
+  HandleTarget next_;
+  double step_ = 0.0, error_ = 0.0;
+  Vec3 force_ = Vec3::Zero();
+  std::vector<double> modal_;
+};
+
+}  // namespace limber

@@ -1,0 +1,64 @@
+/// @file limber/constraints/island_solver.h
+/// One step of the bodies that constraints tie together: all rows of all kinds in one problem.
+///
+///   1. rows J are linearised at the step's start
+///   2. what the rows answer to gravity and other held forces, A_r μ + a ⊥ bounds, goes to the frames by halves, at
+///      the step's start and, with the rows there, at its end; to the modes as a held force
+///   3. the bodies are predicted, exactly, under the impulses f found so far; the rows' true gaps are measured
+///   4. f changes by the solution of  A Δf + gap − offset + compliance f ⊥ bounds,  A = J diag(Δt M⁻¹, H/Δt) Jᵀ
+///   5. 3 and 4 are repeated (Newton's method with the Jacobian of the start) until the gaps no longer change
+///   6. if the bodies came out of it with more energy than went in, their relative motion is slowed until they have
+///      not; what is taken so is given back when joints lose it to the method
+///   7. the prediction becomes the state
+///
+/// Momentum of free islands is kept by 4 (opposite impulses at one world point) and by 6 (the motion of the whole is
+/// not touched). What is guaranteed, and why, is in docs/derivations/constraints.md.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "limber/constraints/constraint.h"
+#include "limber/constraints/solve_status.h"
+
+namespace limber {
+
+struct IslandOptions {
+  double step = 1.0 / 60.0;      ///< s; that of all groups
+  Vec3 gravity = Vec3::Zero();   ///< m/s², world
+  int max_iterations = 30;      ///< of Newton's method; ≥ 1
+  bool guard_energy = true;     ///< step 6
+  /// J, ≥ 0: what step 6 took from this island before. Energy that joints then lose to the method alone is given back
+  /// from it, so that the method's own oscillation does not become a loss.
+  double energy_credit = 0.0;
+};
+
+struct IslandReport {
+  SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
+  int bodies = 0, rows = 0;
+  int iterations = 0;           ///< predictions made
+  double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance
+  double energy_removed = 0.0;  ///< J, by step 6; negative: given back
+  double energy_credit = 0.0;   ///< J, for the island's next step
+};
+
+/// The solver and its memory, which grows to the largest island seen; after that a step allocates nothing. One thread
+/// at a time. The same call gives the same bits.
+class IslandSolver {
+ public:
+  IslandSolver();
+  ~IslandSolver();
+  IslandSolver(IslandSolver&&) noexcept;
+  IslandSolver& operator=(IslandSolver&&) noexcept;
+
+  /// Advances the members by one step.
+  /// @param table the bodies that rows name. @param members indices into it, ascending: every body the rows touch
+  IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                    std::span<Constraint* const> constraints, const IslandOptions& options);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

@@ -1,0 +1,115 @@
+/// @file limber/constraints/joint_constraint.h
+/// Joints between two deforming bodies, or a body and the world, as rows ([X09] Table 1; joint_spec.h for the types).
+///
+/// Frame J sits on both parts, o_a, R_a and o_b, R_b, each moving with the patch it is attached to (material_frame.h).
+/// With d = R_aᵀ(o_b − o_a) and Q = R_aᵀR_b the locked freedoms are rows
+///   d_i = 0,     x_b or z_b along that of a (two rows),     or the vector part of Q's quaternion = 0 (three rows),
+/// and the free ones coordinates q: rotation about x (z for planar), translation along x (x and y), and for a ball the
+/// intrinsic x-y-z Euler angles. Angles count full turns. On each coordinate may act
+///   a limit     lo ≤ q ≤ hi                    rows of one sign
+///   a motor     q̇ = v, |F| ≤ max_force         a row with bounds
+///   a drive     F = −k (q − target) − c q̇      a spring and damper, evaluated at the end of the step: stable for all
+///   friction    |F| ≤ friction, against q̇      a row with bounds
+/// Impulses act at o_b on both bodies, so that momentum is kept exactly.
+///
+/// All locked rows are met at the end of the step, to 1e-12 of the joint's size. Parts that start out of place are
+/// brought together at 1 m/s and 1 rad/s.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "limber/constraints/material_frame.h"
+#include "limber/model/joint_spec.h"
+
+namespace limber {
+
+/// What acts on one coordinate. Forces are N or N·m, velocities m/s or rad/s.
+struct JointActuation {
+  double motor_velocity = 0.0;
+  double motor_max_force = 0.0;  ///< ≥ 0; 0: no motor
+  double drive_target = 0.0;     ///< m or rad
+  double drive_stiffness = 0.0;  ///< k, N/m or N·m/rad; ≥ 0; 0: no drive
+  double drive_damping = 0.0;    ///< c, N·s/m or N·m·s/rad; ≥ 0; without a stiffness: a damper
+  double friction = 0.0;         ///< ≥ 0
+  void validate() const;         ///< @throws InvalidArgument naming the field and its value
+};
+
+class JointConstraint final : public Constraint {
+ public:
+  /// @param a, b the joint's frame on each part. @param spec its frame is not read
+  /// @throws InvalidArgument if the spec is not valid
+  JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec);
+
+  const JointSpec& spec() const { return spec_; }
+  int coordinates() const { return freedoms_; }
+  void set_actuation(int coordinate, const JointActuation& actuation);
+  const JointActuation& actuation(int coordinate) const { return actuation_[static_cast<std::size_t>(coordinate)]; }
+
+  /// q at the end of the last step, angles with their full turns.
+  double coordinate(int i, const BodyStates& states) const;
+  /// Force along the coordinate over the last step: limit, motor, drive and friction together, N or N·m.
+  double coordinate_force(int i) const { return coordinate_force_[static_cast<std::size_t>(i)]; }
+  /// Force of the locked translations on b over the last step, world, N.
+  const Vec3& force() const { return force_; }
+  /// How far the locked freedoms are off: largest distance (m) and angle (rad).
+  struct Error {
+    double distance = 0.0, angle = 0.0;
+  };
+  Error error(const BodyStates& states) const;
+
+  std::array<Index, 2> bodies() const override { return {a_.body(), b_.body()}; }
+  void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
+  void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
+  void accept(const BodyStates& states, std::span<const double> impulses) override;
+
+ private:
+  /// Both frames at one instant.
+  struct Placement {
+    Vec3 o_a, o_b, d;  // d in a's axes
+    Mat3 R_a, R_b;
+  };
+  enum class Measure { kTranslation, kTurnOfX, kTurnOfZ, kTurn, kScrew, kLimit, kCone, kMotor, kDrive, kFriction };
+  struct RowPlan {
+    Measure measure;
+    int axis = 0;         // of J, or the coordinate
+    double sign = 1.0;    // kLimit: −1 for the upper end
+    double bound = 0.0;   // kLimit
+  };
+  /// Relative motion that a row measures: linear along n at o_b, and angular about a; world.
+  struct Direction {
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  };
+
+  Placement place(const BodyStates& states, StepTime when) const;
+  double raw_coordinate(const Placement& at, int i) const;
+  double unwrapped(const Placement& at, int i) const;
+  Direction coordinate_direction(const Placement& at, int i) const;
+  double gap(const Placement& at, const RowPlan& row) const;
+  Direction direction(const Placement& at, const RowPlan& row) const;
+  bool is_angle(int coordinate) const;
+  int axis_of(int coordinate) const;
+  void plan_locked_rows();
+  void plan_limits();
+  void plan_limit(int coordinate, const Interval& interval);
+  void plan_actuation();
+  void add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan, const RowLaw& law,
+           ConstraintRows& rows);
+  RowLaw law_of(const RowPlan& plan, double gap, double tolerance) const;
+  RowLaw actuation_law(const RowPlan& plan, double gap) const;
+
+  MaterialFrame a_, b_;
+  JointSpec spec_;
+  int freedoms_ = 0;
+  std::array<JointActuation, 3> actuation_{};
+  std::array<double, 3> last_{};  // coordinates at the last step's end: where angles are counted from
+  std::vector<RowPlan> plan_;     // locked rows, then limits
+  std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
+  std::array<double, 3> coordinate_force_{};
+  Vec3 force_ = Vec3::Zero();
+  double step_ = 0.0;
+  Mat3 axes_at_start_ = Mat3::Identity();
+  std::vector<double> modal_a_, modal_b_, modal_turn_;
+};
+
+}  // namespace limber

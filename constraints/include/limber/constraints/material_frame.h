@@ -1,0 +1,64 @@
+/// @file limber/constraints/material_frame.h
+/// A point or patch of a deforming body, prepared for rows: the rows of U are gathered once.
+///
+///   p_BP = r + D z,    R_BP = exp([Θ z]ₓ) R_rest
+///
+/// For one point D are its shapes and Θ = 0. For a patch of points r_v with weights w_v (Σ w_v = 1) it is the mean
+/// displacement and the rotation that fits the displacements u_v best in the least-squares sense, linear in z:
+///   D = Σ w_v U_v,    Θ = I_P⁻¹ Σ w_v [r_v − r̄]ₓ U_v,    I_P = Σ w_v (|x|²1 − x xᵀ),  x = r_v − r̄
+/// Θ is zero about directions in which the patch has no extent. A frame placed off the patch moves rigidly with it.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/constraints/constraint.h"
+#include "limber/dynamics/surface_point.h"
+#include "limber/model/joint_spec.h"
+
+namespace limber {
+
+class MaterialFrame {
+ public:
+  /// Fixed to the world.
+  explicit MaterialFrame(const JointFrame& in_world);
+  /// Moves with the body frame alone, whatever the modes do. @param in_body origin and axes, body frame, rest shape
+  MaterialFrame(Index body, const JointFrame& in_body);
+  /// One point of the surface; axes of the body frame.
+  MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at);
+  /// A patch: equal weights for all points. @param in_body where the frame sits in the rest shape
+  /// @throws InvalidArgument if `patch` is empty or a point of it is not valid
+  MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body);
+
+  Index body() const { return body_; }
+  bool deforms() const { return !displacement_.empty(); }
+
+  Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
+  Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
+  Vec3 velocity(const BodyStates& states, StepTime when) const;  ///< of the point, world, m/s
+  /// Angular velocity of the frame, deformation included (to first order), world, rad/s.
+  Vec3 angular_velocity(const BodyStates& states, StepTime when) const;
+
+  /// Row of the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
+  /// @param p, n world. @param scale of the whole row. @param modal room for k numbers; the result refers to it
+  RowSide point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
+                    std::vector<double>& modal) const;
+  /// Row of the angular velocity along a.
+  RowSide angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale, std::vector<double>& modal) const;
+
+ private:
+  Vec3 turn(std::span<const double> z) const;      // Θ z
+  Vec3 displace(std::span<const double> z) const;  // D z
+
+  Index body_ = -1;
+  JointFrame rest_;
+  std::vector<Vec3> displacement_, rotation_;  // D, Θ, one column per mode; empty: none
+};
+
+/// All vertices of a surface within a radius of a point, as a patch; the nearest vertex if there is none.
+/// @param center body frame, rest shape, m. @param radius m, ≥ 0
+std::vector<SurfacePoint> patch_around(const ModalModel& model, SurfacePoint::Surface surface, const Vec3& center,
+                                       double radius);
+
+}  // namespace limber

@@ -1,0 +1,107 @@
+#include "limber/constraints/constraint_rows.h"
+
+#include <algorithm>
+
+namespace limber {
+
+void ConstraintRows::clear() {
+  rows_.clear();
+  modal_.clear();
+}
+
+Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {
+  Row row{.sides = {}, .law = law};
+  for (int s = 0; s < 2; ++s) {
+    const RowSide& side = s == 0 ? a : b;
+    if (side.body < 0) continue;
+    row.sides[s] = {side.body, side.linear, side.angular, modal_.size(), side.modal.size()};
+    modal_.insert(modal_.end(), side.modal.begin(), side.modal.end());
+  }
+  rows_.push_back(row);
+  return size() - 1;
+}
+
+void IslandBodies::set(std::span<const ConstrainedBody> table, std::span<const Index> members) {
+  members_.assign(members.begin(), members.end());
+  bodies_.clear();
+  responses_.clear();
+  first_.clear();
+  degrees_of_freedom_ = 0;
+  for (const Index member : members) {
+    const ConstrainedBody& body = table[static_cast<std::size_t>(member)];
+    bodies_.push_back(body);
+    responses_.push_back(body_response(*body.group, body.group->frame(body.slot).pose().q));
+    first_.push_back(degrees_of_freedom_);
+    degrees_of_freedom_ += responses_.back().size();
+  }
+}
+
+void IslandBodies::place(StepTime when) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const auto [group, slot] = bodies_[i];
+    const RigidFrame& frame = when == StepTime::kStart ? group->frame(slot) : group->predicted_frame(slot);
+    responses_[i] = body_response(*group, frame.pose().q);
+  }
+}
+
+Index IslandBodies::local(Index body) const {
+  const auto found = std::lower_bound(members_.begin(), members_.end(), body);
+  return found != members_.end() && *found == body ? static_cast<Index>(found - members_.begin()) : -1;
+}
+
+void IslandBodies::write_jacobian(const ConstraintRows& rows, std::span<double> J) const {
+  std::fill(J.begin(), J.end(), 0.0);
+  const auto width = static_cast<std::size_t>(degrees_of_freedom_);
+  for (Index i = 0; i < rows.size(); ++i)
+    for (const ConstraintRows::Side& side : rows.row(i).sides) {
+      const Index b = local(side.body);
+      if (b < 0) continue;
+      response(b).add_row(side.linear, side.angular, rows.modal(side),
+                          J.data() + static_cast<std::size_t>(i) * width + static_cast<std::size_t>(first(b)));
+    }
+}
+
+void IslandBodies::write_position_metric(double step, std::span<double> metric) const {
+  for (Index b = 0; b < count(); ++b) response(b).write_position_metric(step, metric.data() + first(b));
+}
+
+void IslandBodies::write_velocity_metric(std::span<double> metric) const {
+  for (Index b = 0; b < count(); ++b) response(b).write_velocity_metric(metric.data() + first(b));
+}
+
+void IslandBodies::write_frame_metric(std::span<double> metric) const {
+  for (Index b = 0; b < count(); ++b) response(b).write_frame_metric(metric.data() + first(b));
+}
+
+namespace {
+
+/// One row of J against another: they meet where they share a body.
+double product(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric, Index i,
+               Index j) {
+  double sum = 0.0;
+  for (const ConstraintRows::Side& a : rows.row(i).sides)
+    for (const ConstraintRows::Side& b : rows.row(j).sides) {
+      const Index body = a.body == b.body ? bodies.local(a.body) : -1;
+      if (body < 0) continue;
+      const BodyResponse& r = bodies.response(body);
+      const double* D = metric.data() + bodies.first(body);
+      for (int t = 0; t < r.translations; ++t) sum += *D++ * a.linear[t] * b.linear[t];
+      for (int t = 0; t < r.rotations; ++t) sum += *D++ * r.axes.col(t).dot(a.angular) * r.axes.col(t).dot(b.angular);
+      const std::span<const double> za = rows.modal(a), zb = rows.modal(b);
+      for (std::size_t m = 0; m < std::min(za.size(), zb.size()); ++m) sum += D[m] * za[m] * zb[m];
+    }
+  return sum;
+}
+
+}  // namespace
+
+void assemble(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric,
+              std::span<double> A) {
+  const Index m = rows.size();
+  for (Index i = 0; i < m; ++i)
+    for (Index j = 0; j <= i; ++j)
+      A[static_cast<std::size_t>(i * m + j)] = A[static_cast<std::size_t>(j * m + i)] =
+          product(bodies, rows, metric, i, j) + (i == j ? rows.row(i).law.compliance : 0.0);
+}
+
+}  // namespace limber

@@ -1,0 +1,90 @@
+#include "limber/constraints/handle.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+// Positions are met to this part of the distances at hand: Newton's method ends where round-off begins.
+constexpr double kRelativeTolerance = 1e-11;
+
+std::vector<Vec3> all_directions() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
+
+}  // namespace
+
+void HandleOptions::validate() const {
+  const auto number = [](double value, bool open, const char* name, const char* expected) {
+    if (!(value >= 0.0) || (open && value == 0.0) || (std::isinf(value) && !open))
+      throw InvalidArgument(std::string("HandleOptions: ") + name + " is " + std::to_string(value) + ", expected " +
+                            expected);
+  };
+  number(max_force, true, "max_force", "more than 0");
+  number(stiffness, false, "stiffness", "a finite number of at least 0");
+  number(damping, false, "damping", "a finite number of at least 0");
+  if (damping > 0.0 && stiffness == 0.0)
+    throw InvalidArgument("HandleOptions: damping has no effect without a stiffness; give both");
+  if (directions.size() > 3)
+    throw InvalidArgument("HandleOptions: " + std::to_string(directions.size()) + " directions, expected at most 3");
+  for (std::size_t i = 0; i < directions.size(); ++i)
+    for (std::size_t j = 0; j <= i; ++j)
+      if (!(std::abs(directions[i].dot(directions[j]) - (i == j ? 1.0 : 0.0)) <= 1e-6))
+        throw InvalidArgument("HandleOptions: directions " + std::to_string(j) + " and " + std::to_string(i) +
+                              " are not orthonormal");
+}
+
+Handle::Handle(MaterialFrame point, const Vec3& start, const HandleOptions& options)
+    : point_(std::move(point)), options_(options), now_(start), next_{.position = start} {
+  options_.validate();
+  if (options_.directions.empty()) options_.directions = all_directions();
+}
+
+void Handle::set_target(const HandleTarget& target) { next_ = target; }
+
+void Handle::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
+  step_ = step;
+  const Vec3 p = point_.position(states, when);
+  const Vec3& target = when == StepTime::kStart ? now_ : next_.position;
+  const double length = (p - states.pose(point_.body(), when).p).norm() + p.norm();
+  for (const Vec3& n : options_.directions) {
+    const double gap = n.dot(p - target);
+    RowLaw law{.lower = -step * options_.max_force,
+               .upper = step * options_.max_force,
+               .tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min()};
+    law.agent_displacement = n.dot(next_.position - target);
+    if (options_.stiffness > 0.0) {
+      const double implicit = step * options_.stiffness + options_.damping;
+      law.compliance = 1.0 / implicit;
+      law.offset = options_.damping / implicit * gap;
+      law.stiffness = options_.stiffness;
+    } else {
+      law.holds = true;
+      law.agent_displacement -= gap;  // the hand takes the point to where it is wanted
+    }
+    rows.add(point_.point_row(states, when, p, n, 1.0, modal_), {}, law);
+  }
+}
+
+void Handle::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
+  const Vec3 off = point_.position(states, when) - (when == StepTime::kStart ? now_ : next_.position);
+  for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = options_.directions[i].dot(off);
+}
+
+void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
+  force_ = Vec3::Zero();
+  Vec3 off = Vec3::Zero();
+  const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
+  for (std::size_t i = 0; i < impulses.size(); ++i) {
+    force_ += impulses[i] / step_ * options_.directions[i];
+    off += options_.directions[i].dot(p - next_.position) * options_.directions[i];
+  }
+  error_ = off.norm();
+  now_ = next_.position;
+  next_.position += step_ * next_.velocity;
+}
+
+}  // namespace limber

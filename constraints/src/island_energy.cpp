@@ -1,0 +1,147 @@
+#include "island_energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber {
+namespace {
+
+// Energy is given back at most at this part of the relative kinetic energy in a step.
+constexpr double kLargestReturn = 0.1;
+
+/// A body whose parent moves gets work from it that nobody books.
+bool carried(const BodyGroup& group, Index slot) {
+  const FrameConstants& c = group.frame_constants();
+  if (c.motion == FrameMotion::kFree) return false;
+  const RigidFrame& frame = group.frame(slot);
+  return !frame.velocity().isZero(0.0) ||
+         (c.motion == FrameMotion::kKinematic && !frame.angular_velocity(c).isZero(0.0));
+}
+
+struct RelativeMotion {
+  Vec3 momentum, angular_momentum;
+  double energy;
+};
+
+Vec3 predicted_center(const BodyGroup& group, Index slot) {
+  return group.predicted_frame(slot).pose() * group.frame_constants().center_of_mass;
+}
+
+RelativeMotion relative_motion(const BodyGroup& group, Index slot, const CommonMotion& common) {
+  const FrameConstants& c = group.frame_constants();
+  const RigidFrame& frame = group.predicted_frame(slot);
+  const Mat3 R = to_matrix(frame.pose().q);
+  const Vec3 carried_along =
+      common.velocity + common.angular_velocity.cross(predicted_center(group, slot) - common.center);
+  const Vec3 velocity = frame.velocity() - carried_along;
+  const Vec3 omega = frame.angular_velocity(c) - common.angular_velocity;
+  const Vec3 angular_momentum = R * (c.inertia * (R.transpose() * omega));
+  return {c.mass * velocity, angular_momentum,
+          0.5 * c.mass * velocity.squaredNorm() + 0.5 * omega.dot(angular_momentum)};
+}
+
+}  // namespace
+
+void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
+  before_ = 0.0;
+  driven_ = false;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    before_ += group->energy(slot, gravity).total();
+    driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
+  }
+}
+
+double IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool workless,
+                           const IslandOptions& options) {
+  if (driven_) return 0.0;
+  double after = 0.0, damped = 0.0;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    after += group->predicted_energy(slot, options.gravity).total();
+    damped += group->predicted_dissipation(slot);
+    if (carried(*group, slot)) return 0.0;
+  }
+  const double gain = after - before_ - agent_work - load_work(bodies, options.step);
+  const double missing = workless ? std::min(options.energy_credit, -gain - damped) : 0.0;
+  const double excess = missing > 0.0 ? -missing : std::max(0.0, gain);
+  if (excess == 0.0) return 0.0;
+  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies) : CommonMotion{};
+  return remove_relative_energy(bodies, common, excess);
+}
+
+/// Work of the forces that the caller holds over the step.
+double IslandEnergy::load_work(const IslandBodies& bodies, double step) {
+  double work = 0.0;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    const FrameConstants& c = group->frame_constants();
+    const RigidFrame &start = group->frame(slot), &end = group->predicted_frame(slot);
+    work += group->held_force(slot).dot(end.pose().p - start.pose().p) +
+            0.5 * step * group->held_torque(slot).dot(start.angular_velocity(c) + end.angular_velocity(c));
+    const std::span<const double> g = group->held_modal_forces(slot), z0 = group->amplitudes(slot),
+                                  z1 = group->predicted_amplitudes(slot);
+    for (std::size_t i = 0; i < g.size(); ++i) work += g[i] * (z1[i] - z0[i]);
+  }
+  return work;
+}
+
+bool IslandEnergy::is_free(const IslandBodies& bodies, const ConstraintRows& rows) {
+  for (Index local = 0; local < bodies.count(); ++local)
+    if (bodies.response(local).translations == 0) return false;
+  for (Index i = 0; i < rows.size(); ++i)
+    for (const ConstraintRows::Side& side : rows.row(i).sides)
+      if (side.body < 0) return false;
+  return true;
+}
+
+CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
+  double mass = 0.0;
+  Vec3 first = Vec3::Zero(), momentum = Vec3::Zero();
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    const FrameConstants& c = group->frame_constants();
+    mass += c.mass;
+    first += c.mass * predicted_center(*group, slot);
+    momentum += group->predicted_frame(slot).linear_momentum(c);
+  }
+  CommonMotion common{.center = first / mass, .velocity = momentum / mass};
+  Mat3 inertia = Mat3::Zero();
+  Vec3 angular_momentum = Vec3::Zero();
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    const FrameConstants& c = group->frame_constants();
+    const RigidFrame& frame = group->predicted_frame(slot);
+    const Mat3 R = to_matrix(frame.pose().q);
+    const Vec3 x = predicted_center(*group, slot) - common.center;
+    inertia += R * c.inertia * R.transpose() + c.mass * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
+    angular_momentum += frame.angular_momentum(c) + x.cross(c.mass * frame.velocity());
+  }
+  common.angular_velocity = inertia.llt().solve(angular_momentum);
+  return common;
+}
+
+/// Scales all velocities relative to the common motion so that their energy, which the split leaves free of mixed terms,
+/// falls by the excess; or rises, by a tenth at most.
+double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess) {
+  double kinetic = 0.0;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    kinetic += relative_motion(*group, slot, common).energy;
+    for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
+  }
+  if (!(kinetic > 0.0)) return 0.0;
+  excess = std::clamp(excess, -kLargestReturn * kinetic, kinetic);
+  const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto [group, slot] = bodies.body(local);
+    const RelativeMotion r = relative_motion(*group, slot, common);
+    const std::span<const double> rates = group->predicted_rates(slot);
+    modal_.assign(rates.size(), 0.0);
+    for (std::size_t i = 0; i < rates.size(); ++i) modal_[i] = slower * rates[i];
+    group->adjust_prediction(slot, slower * r.momentum, slower * r.angular_momentum, modal_);
+  }
+  return excess;
+}
+
+}  // namespace limber

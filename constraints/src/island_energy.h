@@ -1,0 +1,35 @@
+// The energy of an island over one step, and what is done where it rises (docs/derivations/constraints.md).
+#pragma once
+
+#include "limber/constraints/island_solver.h"
+
+namespace limber {
+
+/// The motion that the whole island has: a rigid one if nothing holds it, else none.
+struct CommonMotion {
+  Vec3 center = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+};
+
+class IslandEnergy {
+ public:
+  /// Books the energy before the step.
+  void begin(const IslandBodies& bodies, const Vec3& gravity);
+  /// Slows the predicted relative motion until the energy is at most that before, and the work done on the island.
+  /// @param workless whether all rows are ones that can neither give nor take energy: what is missing then, beyond the
+  /// modes' damping, is the method's doing and is given back from the credit
+  /// @return J taken out; negative: given back
+  double guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool workless,
+               const IslandOptions& options);
+
+ private:
+  static bool is_free(const IslandBodies& bodies, const ConstraintRows& rows);
+  static CommonMotion common_motion(const IslandBodies& bodies);
+  static double load_work(const IslandBodies& bodies, double step);
+  double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess);
+
+  double before_ = 0.0;
+  bool driven_ = false;
+  std::vector<double> modal_;
+};
+
+}  // namespace limber

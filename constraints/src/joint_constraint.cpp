@@ -1,0 +1,337 @@
+#include "limber/constraints/joint_constraint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+// Newton's method ends here: angles in rad, distances as a part of the joint's arms.
+constexpr double kTolerance = 1e-11;
+// Parts out of place come together at this speed, m/s and rad/s.
+constexpr double kRecoverySpeed = 1.0;
+// Euler angles are singular at ±90° of the second; closer than this to it their rows keep a finite size.
+constexpr double kLeastEulerDeterminant = 1e-3;
+
+int coordinate_count(JointType type) { return freedoms(type).rotations + freedoms(type).translations; }
+
+Vec3 euler_xyz(const Mat3& Q) {
+  return {std::atan2(-Q(1, 2), Q(2, 2)), std::asin(std::clamp(Q(0, 2), -1.0, 1.0)), std::atan2(-Q(0, 1), Q(0, 0))};
+}
+
+/// The vector a with a·ω = rate of the i-th Euler angle, in the axes of the first part.
+Vec3 euler_rate(const Mat3& Q, int i) {
+  const Vec3 angles = euler_xyz(Q);
+  const Vec3 x = Vec3::UnitX();
+  const Vec3 y(0.0, std::cos(angles.x()), std::sin(angles.x()));
+  const Vec3 z = Q.col(2);
+  const double determinant = std::max(x.dot(y.cross(z)), kLeastEulerDeterminant);
+  const Vec3 dual = i == 0 ? y.cross(z) : i == 1 ? z.cross(x) : x.cross(y);
+  return dual / determinant;
+}
+
+}  // namespace
+
+void JointActuation::validate() const {
+  const auto number = [](double value, const char* name, double least) {
+    if (!(value >= least && std::isfinite(value)))
+      throw InvalidArgument(std::string("JointActuation: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number" + (least == 0.0 ? " of at least 0" : ""));
+  };
+  constexpr double kAny = -std::numeric_limits<double>::max();
+  number(motor_velocity, "motor_velocity", kAny);
+  number(motor_max_force, "motor_max_force", 0.0);
+  number(drive_target, "drive_target", kAny);
+  number(drive_stiffness, "drive_stiffness", 0.0);
+  number(drive_damping, "drive_damping", 0.0);
+  number(friction, "friction", 0.0);
+}
+
+JointConstraint::JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec)
+    : a_(std::move(a)), b_(std::move(b)), spec_(spec), freedoms_(coordinate_count(spec.type)) {
+  spec_.validate();
+  plan_locked_rows();
+  plan_limits();
+}
+
+void JointConstraint::set_actuation(int coordinate, const JointActuation& actuation) {
+  if (coordinate < 0 || coordinate >= freedoms_)
+    throw InvalidArgument("JointConstraint: coordinate " + std::to_string(coordinate) + ", expected 0 to " +
+                          std::to_string(freedoms_ - 1) + " for a " + std::string(to_string(spec_.type)) + " joint");
+  actuation.validate();
+  actuation_[static_cast<std::size_t>(coordinate)] = actuation;
+}
+
+// What the rows are ---------------------------------------------------------------------------------------------------
+
+void JointConstraint::plan_locked_rows() {
+  const JointType type = spec_.type;
+  const bool along_x = type == JointType::kCylindrical || type == JointType::kPrismatic;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (type == JointType::kPlanar ? axis < 2 : along_x && axis == 0) continue;
+    plan_.push_back({.measure = Measure::kTranslation, .axis = axis});
+  }
+  if (type == JointType::kCylindrical && spec_.pitch != 0.0) plan_.push_back({.measure = Measure::kScrew});
+  if (type == JointType::kRevolute || type == JointType::kCylindrical)
+    for (const int axis : {1, 2}) plan_.push_back({.measure = Measure::kTurnOfX, .axis = axis});
+  if (type == JointType::kPlanar)
+    for (const int axis : {0, 1}) plan_.push_back({.measure = Measure::kTurnOfZ, .axis = axis});
+  if (type == JointType::kPrismatic || type == JointType::kFixed)
+    for (int axis = 0; axis < 3; ++axis) plan_.push_back({.measure = Measure::kTurn, .axis = axis});
+}
+
+void JointConstraint::plan_limits() {
+  const JointLimits& limits = spec_.limits;
+  switch (spec_.type) {
+    case JointType::kBall:
+      for (int i = 0; i < 3; ++i) plan_limit(i, limits.euler[static_cast<std::size_t>(i)]);
+      if (std::isfinite(limits.cone)) plan_.push_back({.measure = Measure::kCone, .bound = limits.cone});
+      break;
+    case JointType::kRevolute: plan_limit(0, limits.rotation); break;
+    case JointType::kCylindrical:
+      plan_limit(0, limits.rotation);
+      plan_limit(1, limits.translation[0]);
+      break;
+    case JointType::kPrismatic: plan_limit(0, limits.translation[0]); break;
+    case JointType::kPlanar:
+      plan_limit(0, limits.translation[0]);
+      plan_limit(1, limits.translation[1]);
+      plan_limit(2, limits.rotation);
+      break;
+    case JointType::kFixed: break;
+  }
+}
+
+void JointConstraint::plan_limit(int coordinate, const Interval& interval) {
+  if (std::isfinite(interval.low))
+    plan_.push_back({.measure = Measure::kLimit, .axis = coordinate, .sign = 1.0, .bound = interval.low});
+  if (std::isfinite(interval.high))
+    plan_.push_back({.measure = Measure::kLimit, .axis = coordinate, .sign = -1.0, .bound = interval.high});
+}
+
+void JointConstraint::plan_actuation() {
+  rows_ = plan_;
+  for (int i = 0; i < freedoms_; ++i) {
+    const JointActuation& act = actuation(i);
+    if (act.motor_max_force > 0.0) rows_.push_back({.measure = Measure::kMotor, .axis = i});
+    if (act.drive_stiffness > 0.0 || act.drive_damping > 0.0)
+      rows_.push_back({.measure = Measure::kDrive, .axis = i});
+    if (act.friction > 0.0) rows_.push_back({.measure = Measure::kFriction, .axis = i});
+  }
+}
+
+// Coordinates ---------------------------------------------------------------------------------------------------------
+
+bool JointConstraint::is_angle(int coordinate) const {
+  switch (spec_.type) {
+    case JointType::kPrismatic: return false;
+    case JointType::kPlanar: return coordinate == 2;
+    case JointType::kCylindrical: return coordinate == 0;
+    default: return true;
+  }
+}
+
+int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
+
+JointConstraint::Placement JointConstraint::place(const BodyStates& states, StepTime when) const {
+  Placement at{.o_a = a_.position(states, when),
+               .o_b = b_.position(states, when),
+               .d = {},
+               .R_a = a_.axes(states, when),
+               .R_b = b_.axes(states, when)};
+  at.d = at.R_a.transpose() * (at.o_b - at.o_a);
+  return at;
+}
+
+double JointConstraint::raw_coordinate(const Placement& at, int i) const {
+  if (!is_angle(i)) return at.d[axis_of(i)];
+  const Mat3 Q = at.R_a.transpose() * at.R_b;
+  if (spec_.type == JointType::kBall) return euler_xyz(Q)[i];
+  const int x = (axis_of(i) + 1) % 3, y = (axis_of(i) + 2) % 3;
+  return std::atan2(Q(y, x) - Q(x, y), Q(x, x) + Q(y, y));
+}
+
+/// With the number of full turns that is nearest to the last step's.
+double JointConstraint::unwrapped(const Placement& at, int i) const {
+  const double raw = raw_coordinate(at, i);
+  if (!is_angle(i)) return raw;
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  return raw + kTurn * std::round((last_[static_cast<std::size_t>(i)] - raw) / kTurn);
+}
+
+double JointConstraint::coordinate(int i, const BodyStates& states) const {
+  return unwrapped(place(states, StepTime::kStart), i);
+}
+
+JointConstraint::Direction JointConstraint::coordinate_direction(const Placement& at, int i) const {
+  const Vec3 axis = at.R_a.col(axis_of(i));
+  if (!is_angle(i)) return {.linear = axis};
+  if (spec_.type == JointType::kBall) return {.angular = at.R_a * euler_rate(at.R_a.transpose() * at.R_b, i)};
+  return {.angular = axis};
+}
+
+// Gaps and their derivatives ------------------------------------------------------------------------------------------
+
+double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
+  switch (row.measure) {
+    case Measure::kTranslation: return at.d[row.axis];
+    case Measure::kScrew: return at.d.x() - spec_.pitch * unwrapped(at, 0);
+    case Measure::kTurnOfX:
+      return row.axis == 1 ? -at.R_a.col(2).dot(at.R_b.col(0)) : at.R_a.col(1).dot(at.R_b.col(0));
+    case Measure::kTurnOfZ:
+      return row.axis == 0 ? -at.R_a.col(1).dot(at.R_b.col(2)) : at.R_a.col(0).dot(at.R_b.col(2));
+    case Measure::kTurn: return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
+    case Measure::kLimit: return row.sign * (unwrapped(at, row.axis) - row.bound);
+    case Measure::kCone: {
+      const Vec3 x_a = at.R_a.col(0), x_b = at.R_b.col(0);
+      return row.bound - std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
+    }
+    case Measure::kDrive: return unwrapped(at, row.axis) - actuation(row.axis).drive_target;
+    case Measure::kMotor:
+    case Measure::kFriction: return unwrapped(at, row.axis);
+  }
+  return 0.0;
+}
+
+JointConstraint::Direction JointConstraint::direction(const Placement& at, const RowPlan& row) const {
+  const auto a = [&](int i) -> Vec3 { return at.R_a.col(i); };
+  const auto b = [&](int i) -> Vec3 { return at.R_b.col(i); };
+  switch (row.measure) {
+    case Measure::kTranslation: return {.linear = a(row.axis)};
+    case Measure::kScrew: return {.linear = a(0), .angular = -spec_.pitch * a(0)};
+    case Measure::kTurnOfX: return {.angular = row.axis == 1 ? a(2).cross(b(0)) : b(0).cross(a(1))};
+    case Measure::kTurnOfZ: return {.angular = row.axis == 0 ? a(1).cross(b(2)) : b(2).cross(a(0))};
+    case Measure::kTurn: return {.angular = a(row.axis)};
+    case Measure::kLimit: {
+      Direction d = coordinate_direction(at, row.axis);
+      d.linear *= row.sign, d.angular *= row.sign;
+      return d;
+    }
+    case Measure::kCone: {
+      const Vec3 axis = b(0).cross(a(0));
+      return {.angular = axis.norm() > 0.0 ? axis.normalized() : a(1)};
+    }
+    case Measure::kMotor:
+    case Measure::kDrive:
+    case Measure::kFriction: return coordinate_direction(at, row.axis);
+  }
+  return {};
+}
+
+// Rows of one step ----------------------------------------------------------------------------------------------------
+
+RowLaw JointConstraint::law_of(const RowPlan& plan, double gap, double tolerance) const {
+  RowLaw law{.tolerance = tolerance};
+  const double recovery = kRecoverySpeed * step_;
+  switch (plan.measure) {
+    case Measure::kMotor:
+    case Measure::kDrive:
+    case Measure::kFriction: return actuation_law(plan, gap);
+    case Measure::kLimit:
+    case Measure::kCone:
+      law.lower = 0.0;
+      law.offset = std::min(0.0, gap + recovery);
+      break;
+    default: law.offset = gap - std::clamp(gap, -recovery, recovery);
+  }
+  law.holds = true;
+  return law;
+}
+
+RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
+  const JointActuation& act = actuation(plan.axis);
+  RowLaw law;
+  if (plan.measure == Measure::kDrive) {
+    const double implicit = step_ * act.drive_stiffness + act.drive_damping;
+    law.compliance = 1.0 / implicit;
+    law.offset = act.drive_damping / implicit * gap;
+    law.stiffness = act.drive_stiffness;
+    return law;
+  }
+  const bool motor = plan.measure == Measure::kMotor;
+  law.upper = step_ * (motor ? act.motor_max_force : act.friction);
+  law.lower = -law.upper;
+  law.agent_displacement = motor ? step_ * act.motor_velocity : 0.0;
+  law.offset = gap + law.agent_displacement;
+  law.holds = true;
+  return law;
+}
+
+void JointConstraint::add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan, const RowLaw& law,
+                          ConstraintRows& rows) {
+  const Direction along = direction(at, plan);
+  const auto side = [&](const MaterialFrame& part, double sign, std::vector<double>& modal) {
+    RowSide row = part.point_row(states, when, at.o_b, along.linear, sign, modal);
+    if (part.body() >= 0 && !along.angular.isZero(0.0)) {
+      std::vector<double>& turn = modal_turn_;
+      const RowSide angular = part.angular_row(states, when, along.angular, sign, turn);
+      row.angular += angular.angular;
+      for (std::size_t i = 0; i < turn.size(); ++i) modal[i] += turn[i];
+    }
+    row.modal = modal;
+    return row;
+  };
+  const RowSide of_b = side(b_, 1.0, modal_b_), of_a = side(a_, -1.0, modal_a_);
+  rows.add(of_b, of_a, law);
+}
+
+void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
+  const Placement at = place(states, when);
+  if (when == StepTime::kStart) {
+    step_ = step;
+    plan_actuation();
+    axes_at_start_ = at.R_a;
+  }
+  const auto arm = [&](const MaterialFrame& part) {
+    return part.body() < 0 ? 0.0 : (at.o_b - states.pose(part.body(), when).p).norm();
+  };
+  const double length = std::max(arm(a_), arm(b_)) + at.o_b.norm() + std::numeric_limits<double>::min();
+  for (const RowPlan& plan : rows_) {
+    const bool distance = plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
+                          ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) &&
+                           !is_angle(plan.axis));
+    const double tolerance = distance ? kTolerance * length : kTolerance;
+    RowLaw law = law_of(plan, gap(at, plan), tolerance);
+    law.tolerance = tolerance;
+    add(states, when, at, plan, law, rows);
+  }
+}
+
+void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
+  const Placement at = place(states, when);
+  for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = gap(at, rows_[i]);
+}
+
+void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
+  force_ = Vec3::Zero();
+  coordinate_force_ = {};
+  for (std::size_t i = 0; i < impulses.size(); ++i) {
+    const RowPlan& plan = rows_[i];
+    const double force = impulses[i] / step_;
+    if (plan.measure == Measure::kTranslation) force_ += force * axes_at_start_.col(plan.axis);
+    if (plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor)
+      coordinate_force_[static_cast<std::size_t>(plan.axis)] += plan.sign * force;
+  }
+  const Placement at = place(states, StepTime::kStart);  // the state has been taken: the step's end
+  for (int i = 0; i < freedoms_; ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
+}
+
+JointConstraint::Error JointConstraint::error(const BodyStates& states) const {
+  const Placement at = place(states, StepTime::kStart);
+  Vec3 distance = Vec3::Zero(), angle = Vec3::Zero();
+  for (const RowPlan& plan : plan_) {
+    if (plan.measure == Measure::kTranslation) distance[plan.axis] = gap(at, plan);
+    if (plan.measure == Measure::kScrew) distance.x() = gap(at, plan);
+    if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ || plan.measure == Measure::kTurn)
+      angle[plan.axis] = gap(at, plan);
+  }
+  return {distance.norm(), angle.norm()};
+}
+
+}  // namespace limber
