@@ -24,7 +24,8 @@ BodyResponse body_response(const BodyGroup& group, const Quaternion& q_WB) {
       body.axes.col(0) = q_WB * c.line_axis;
       body.inverse_moments.x() = 1.0 / c.line_axis.dot(c.inertia * c.line_axis);
       break;
-    case FrameMotion::kKinematic: break;
+    case FrameMotion::kKinematic:
+      break;
   }
   return body;
 }

@@ -50,7 +50,8 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
   const Vec3 p = point_.position(states, when);
   const Vec3& target = when == StepTime::kStart ? now_ : next_.position;
   const double length = (p - states.pose(point_.body(), when).p).norm() + p.norm();
-  for (const Vec3& n : options_.directions) {
+  for (std::size_t i = 0; i < options_.directions.size(); ++i) {
+    const Vec3& n = options_.directions[i];
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
@@ -61,6 +62,8 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
       law.compliance = 1.0 / implicit;
       law.offset = options_.damping / implicit * gap;
       law.stiffness = options_.stiffness;
+      law.goes_on = true;
+      law.last_force = last_force_[i];
     } else {
       law.holds = true;
       law.agent_displacement -= gap;  // the hand takes the point to where it is wanted
@@ -79,7 +82,8 @@ void Handle::accept(const BodyStates& states, std::span<const double> impulses) 
   Vec3 off = Vec3::Zero();
   const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
   for (std::size_t i = 0; i < impulses.size(); ++i) {
-    force_ += impulses[i] / step_ * options_.directions[i];
+    last_force_[i] = impulses[i] / step_;
+    force_ += last_force_[i] * options_.directions[i];
     off += options_.directions[i].dot(p - next_.position) * options_.directions[i];
   }
   error_ = off.norm();

@@ -6,8 +6,11 @@
 namespace limber {
 namespace {
 
-// Energy is given back at most at this part of the relative kinetic energy in a step.
-constexpr double kLargestReturn = 0.1;
+// Energy is given back, and where little of it is too much is taken, at most at this part of the relative kinetic
+// energy in a step: a pendulum that turns round is not to stop there.
+constexpr double kLargestChange = 0.1;
+// This part of the energies at hand may wait for the next step.
+constexpr double kPatience = 1e-7;
 
 /// A body whose parent moves gets work from it that nobody books.
 bool carried(const BodyGroup& group, Index slot) {
@@ -52,22 +55,28 @@ void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
   }
 }
 
-double IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool workless,
-                           const IslandOptions& options) {
-  if (driven_) return 0.0;
-  double after = 0.0, damped = 0.0;
+IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work,
+                                         bool give_back, const IslandOptions& options) {
+  if (driven_) return {};
+  double after = 0.0, damped = 0.0, scale = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto [group, slot] = bodies.body(local);
-    after += group->predicted_energy(slot, options.gravity).total();
+    const FrameConstants& c = group->frame_constants();
+    const BodyEnergy energy = group->predicted_energy(slot, options.gravity);
+    after += energy.total();
     damped += group->predicted_dissipation(slot);
-    if (carried(*group, slot)) return 0.0;
+    scale += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
+             options.gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
+    if (carried(*group, slot)) return {};
   }
-  const double gain = after - before_ - agent_work - load_work(bodies, options.step);
-  const double missing = workless ? std::min(options.energy_credit, -gain - damped) : 0.0;
-  const double excess = missing > 0.0 ? -missing : std::max(0.0, gain);
-  if (excess == 0.0) return 0.0;
+  const double gain = after - before_ - agent_work - load_work(bodies, options.step) + options.energy_surplus;
+  const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
+  if (excess == 0.0) return {};
   const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies) : CommonMotion{};
-  return remove_relative_energy(bodies, common, excess);
+  const double patience = excess < kPatience * scale ? kLargestChange : 1.0;
+  const double removed = remove_relative_energy(bodies, common, excess, patience);
+  const double left = excess - removed;
+  return {removed, left > kPatience * scale ? left : 0.0, std::max(0.0, left)};
 }
 
 /// Work of the forces that the caller holds over the step.
@@ -121,9 +130,10 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
   return common;
 }
 
-/// Scales all velocities relative to the common motion so that their energy, which the split leaves free of mixed terms,
-/// falls by the excess; or rises, by a tenth at most.
-double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess) {
+/// Scales all velocities relative to the common motion so that their energy, which the split leaves free of mixed
+/// terms, falls by the excess or rises by what is missing. @return J taken out
+double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
+                                            double largest_part) {
   double kinetic = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto [group, slot] = bodies.body(local);
@@ -131,7 +141,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
     for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
   }
   if (!(kinetic > 0.0)) return 0.0;
-  excess = std::clamp(excess, -kLargestReturn * kinetic, kinetic);
+  excess = std::clamp(excess, -kLargestChange * kinetic, largest_part * kinetic);
   const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto [group, slot] = bodies.body(local);

@@ -14,18 +14,22 @@ class IslandEnergy {
  public:
   /// Books the energy before the step.
   void begin(const IslandBodies& bodies, const Vec3& gravity);
+  struct Change {
+    double removed = 0.0;  ///< J, taken out; negative: given back
+    double left = 0.0;     ///< J, that standing still could not take out
+    double surplus = 0.0;  ///< J, above what is allowed, for the next step
+  };
   /// Slows the predicted relative motion until the energy is at most that before, and the work done on the island.
-  /// @param workless whether all rows are ones that can neither give nor take energy: what is missing then, beyond the
-  /// modes' damping, is the method's doing and is given back from the credit
-  /// @return J taken out; negative: given back
-  double guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool workless,
+  /// @param give_back whether what is missing, beyond the modes' damping, is the method's doing: then it is made up for
+  Change guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool give_back,
                const IslandOptions& options);
 
  private:
   static bool is_free(const IslandBodies& bodies, const ConstraintRows& rows);
   static CommonMotion common_motion(const IslandBodies& bodies);
   static double load_work(const IslandBodies& bodies, double step);
-  double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess);
+  double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
+                                double largest_part);
 
   double before_ = 0.0;
   bool driven_ = false;

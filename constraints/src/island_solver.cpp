@@ -5,6 +5,7 @@
 
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
+#include "limber/constraints/least_squares.h"
 #include "secant_iteration.h"
 
 namespace limber {
@@ -35,17 +36,15 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
     a.linear = gravity + group.held_force(slot) / c.mass;
   else
     torque += (frame_at(group, slot, when).pose().q * group.first_moment(slot)).cross(gravity);
-  for (int i = 0; i < r.rotations; ++i)
-    a.angular += r.axes.col(i) * (r.inverse_moments[i] * r.axes.col(i).dot(torque));
+  for (int i = 0; i < r.rotations; ++i) a.angular += r.axes.col(i) * (r.inverse_moments[i] * r.axes.col(i).dot(torque));
   return a;
 }
 
 bool is_equality(const RowLaw& law) { return law.lower == -kUnbounded && law.upper == kUnbounded; }
 
-/// Whether bodies lie still on a row of one sign, or one with a largest force: at its gap, and slower than held forces
-/// make of rest within a step.
+/// Whether bodies lie still on a row of one sign: at its gap, and slower than what held forces make of rest in a step.
 bool rests(const RowLaw& law, double gap, double speed, double speed_of_a_step) {
-  return std::abs(gap - law.offset) <= 2.0 * law.tolerance && std::abs(speed) <= std::abs(speed_of_a_step);
+  return std::abs(gap - law.offset) <= 2.0 * law.tolerance && std::abs(speed) <= speed_of_a_step;
 }
 
 }  // namespace
@@ -58,6 +57,12 @@ struct IslandSolver::Impl {
   std::vector<double> f, next_f, reaction, end_reaction, change;
   std::vector<ConstraintLoad> loads;
   std::vector<double> modal_loads;
+  // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
+  std::vector<Index> bounded, order;
+  std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
+  std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
+  LeastSquaresSolver least_squares;
+  EqualityElimination elimination;
   ContactQpSolver qp;
   SecantIteration secant;
   IslandEnergy energy;
@@ -67,11 +72,20 @@ struct IslandSolver::Impl {
   void measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
                std::vector<double>& into) const;
   void weigh();
+  double step = 0.0;
+  struct HeldMotion {
+    double acceleration = 0.0, speed = 0.0, speed_of_a_step = 0.0;
+  };
+  HeldMotion held_motion(StepTime when, Index row, const IslandOptions& options) const;
   void find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer);
   void answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                       IslandReport& report);
+  void factor();
+  void respond(std::span<const double> values, std::vector<double>& gaps);
   SolveStatus improve();
+  SolveStatus improve_equalities();
+  SolveStatus improve_all();
   double largest_change() const;
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
@@ -80,6 +94,8 @@ struct IslandSolver::Impl {
   void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
+  void guard_energy(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
+                    IslandReport& report);
 };
 
 void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::span<const Index> members,
@@ -118,7 +134,37 @@ void IslandSolver::Impl::weigh() {
     for (std::size_t i = 0; i < n; ++i) G[row * n + i] = J[row * n + i] * weighted[i];
 }
 
-/// What the rows that hold answer to held forces; the others have no row of G then.
+/// The row's part of what the bodies do under held forces alone.
+IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, Index row,
+                                                               const IslandOptions& options) const {
+  HeldMotion motion;
+  double inverse_mass = 0.0, acceleration_squared = 0.0;
+  for (const ConstraintRows::Side& side : rows.row(row).sides) {
+    const Index local = bodies.local(side.body);
+    if (local < 0) continue;
+    const auto [group, slot] = bodies.body(local);
+    const FrameConstants& c = group->frame_constants();
+    const BodyResponse& r = bodies.response(local);
+    const RigidFrame& frame = frame_at(*group, slot, when);
+    const FrameAcceleration a = held_acceleration(*group, slot, when, r, options.gravity);
+    motion.acceleration += side.linear.dot(a.linear) + side.angular.dot(a.angular);
+    motion.speed += side.linear.dot(frame.velocity()) + side.angular.dot(frame.angular_velocity(c));
+    if (r.translations > 0) {
+      inverse_mass += r.inverse_mass * side.linear.squaredNorm();
+      acceleration_squared += a.linear.squaredNorm() / r.inverse_mass;
+    }
+    for (int i = 0; i < r.rotations; ++i) {
+      const double turn = r.axes.col(i).dot(side.angular), turned = r.axes.col(i).dot(a.angular);
+      inverse_mass += r.inverse_moments[i] * turn * turn;
+      acceleration_squared += turned * turned / r.inverse_moments[i];
+    }
+  }
+  // |J a| ≤ |J|_{M⁻¹} |a|_M, whatever other rows make of a.
+  motion.speed_of_a_step = options.step * std::sqrt(inverse_mass * acceleration_squared);
+  return motion;
+}
+
+/// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
   bodies.write_frame_metric(metric);
   weigh();
@@ -126,24 +172,14 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
-    double acceleration = 0.0, speed = 0.0;
-    for (const ConstraintRows::Side& side : rows.row(i).sides) {
-      const Index local = bodies.local(side.body);
-      if (local < 0) continue;
-      const ConstrainedBody& body = bodies.body(local);
-      const FrameAcceleration a =
-          held_acceleration(*body.group, body.slot, when, bodies.response(local), options.gravity);
-      const RigidFrame& frame = frame_at(*body.group, body.slot, when);
-      acceleration += side.linear.dot(a.linear) + side.angular.dot(a.angular);
-      speed += side.linear.dot(frame.velocity()) +
-               side.angular.dot(frame.angular_velocity(body.group->frame_constants()));
-    }
-    b[at] = acceleration;
+    const HeldMotion held = held_motion(when, i, options);
+    b[at] = held.acceleration;
     compliance[at] = 0.0;
     lower[at] = law.lower / options.step, upper[at] = law.upper / options.step;
-    if (law.stiffness > 0.0) {  // a spring holds with the force that it has
-      lower[at] = upper[at] = std::clamp(-law.stiffness * gap[at], lower[at], upper[at]);
-    } else if (!(law.holds && (is_equality(law) || rests(law, gap[at], speed, acceleration * options.step)))) {
+    if (law.goes_on) {
+      const double force = when == StepTime::kStart ? law.last_force : f[at] / options.step + reaction[at];
+      lower[at] = upper[at] = std::clamp(force, lower[at], upper[at]);
+    } else if (!(law.holds && (is_equality(law) || rests(law, gap[at], held.speed, held.speed_of_a_step)))) {
       lower[at] = upper[at] = b[at] = 0.0;
       std::fill_n(G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
     }
@@ -188,9 +224,9 @@ void IslandSolver::Impl::sum_loads(std::span<const double> values, double scale)
   loads.assign(static_cast<std::size_t>(bodies.count()), {});
   modal_loads.assign(metric.size(), 0.0);
   for (Index local = 0; local < bodies.count(); ++local)
-    loads[static_cast<std::size_t>(local)].modal = {modal_loads.data() + bodies.first(local) +
-                                                        bodies.response(local).size() - bodies.response(local).modes,
-                                                    static_cast<std::size_t>(bodies.response(local).modes)};
+    loads[static_cast<std::size_t>(local)].modal = {
+        modal_loads.data() + bodies.first(local) + bodies.response(local).size() - bodies.response(local).modes,
+        static_cast<std::size_t>(bodies.response(local).modes)};
   add_loads(values, scale, scale);
 }
 
@@ -213,28 +249,101 @@ void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_
 
 /// One step of Newton's method from f, to next_f; `change` is what it makes of the gaps.
 SolveStatus IslandSolver::Impl::improve() {
-  const auto m = static_cast<Eigen::Index>(f.size()), n = static_cast<Eigen::Index>(metric.size());
-  const Eigen::Map<const RowMajor> B(G.data(), m, n);
-  Eigen::Map<Eigen::VectorXd> x(weighted.data(), n);  // G's weights are no longer needed
-  x.noalias() = B.transpose() * as_vector(f);
-  Eigen::Map<Eigen::VectorXd>(change.data(), m).noalias() = B * x;
+  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all();
+  for (std::size_t i = 0; i < f.size(); ++i) b[i] = next_f[i] - f[i];
+  respond(b, change);
+  return status;
+}
+
+/// Rows without bounds: A Δf = −(gap − offset + compliance f), in the least-squares sense.
+SolveStatus IslandSolver::Impl::improve_equalities() {
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
-    b[at] = gap[at] - law.offset - change[at];  // w = A f' + compliance f' + b
+    next_f[at] = law.offset - gap[at] - law.compliance * (f[at] + step * reaction[at]);
   }
-  next_f = f;
-  const ContactQpResult result = qp.solve(FactoredContactQp{.size = static_cast<int>(m),
-                                                            .dimension = static_cast<int>(n),
-                                                            .G = G,
-                                                            .D = compliance,
-                                                            .b = b,
-                                                            .lower = lower,
-                                                            .upper = upper},
-                                          next_f);
-  x.noalias() = B.transpose() * (as_vector(next_f) - as_vector(f));
-  Eigen::Map<Eigen::VectorXd>(change.data(), m).noalias() = B * x;
+  const SolveStatus status = least_squares.solve(next_f, next_f);
+  for (std::size_t i = 0; i < f.size(); ++i) next_f[i] += f[i];
+  return status;
+}
+
+/// Rows with bounds beside the others, which are eliminated first: A f' + b, b = gap − offset − A₀ f.
+SolveStatus IslandSolver::Impl::improve_all() {
+  respond(f, change);
+  const std::size_t m = f.size(), e = m - bounded.size();
+  for (std::size_t i = 0; i < m; ++i) {
+    const auto at = static_cast<std::size_t>(order[i]);
+    const RowLaw& law = rows.row(order[i]).law;
+    ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
+  }
+  elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
+  for (std::size_t i = 0; i < bounded.size(); ++i) {
+    const auto at = static_cast<std::size_t>(bounded[i]);
+    f_bounded[i] = f[at], lower_bounded[i] = lower[at], upper_bounded[i] = upper[at];
+  }
+  const ContactQpResult result = qp.solve(ContactQp{.size = static_cast<int>(bounded.size()),
+                                                    .A = A_reduced,
+                                                    .b = b_reduced,
+                                                    .lower = lower_bounded,
+                                                    .upper = upper_bounded},
+                                          f_bounded);
+  f_equal.resize(e);
+  elimination.recover(f_bounded, f_equal);
+  for (std::size_t i = 0; i < m; ++i)
+    next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
   return result.status;
+}
+
+/// What impulses make of the gaps, compliance left out: J D Jᵀ values.
+void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
+  const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
+  const Eigen::Map<const RowMajor> Jacobian(J.data(), m, n);
+  Eigen::Map<Eigen::VectorXd> x(weighted.data(), n);
+  x.noalias() = Jacobian.transpose() * as_vector(values);
+  x.array() *= as_vector(metric).array();
+  Eigen::Map<Eigen::VectorXd>(gaps.data(), m).noalias() = Jacobian * x;
+}
+
+/// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
+void IslandSolver::Impl::factor() {
+  const std::size_t m = f.size(), n = metric.size();
+  if (bounded.empty()) {
+    std::size_t soft = 0;
+    for (const double c : compliance) soft += c > 0.0 ? 1 : 0;
+    if (soft == 0) {
+      least_squares.factor(J, metric, static_cast<int>(m));
+      return;
+    }
+    // A row's compliance is a degree of freedom of its own.
+    const std::size_t width = n + soft;
+    wide_J.assign(m * width, 0.0), wide_metric = metric;
+    for (std::size_t i = 0; i < m; ++i) {
+      std::copy_n(J.begin() + static_cast<std::ptrdiff_t>(i * n), n,
+                  wide_J.begin() + static_cast<std::ptrdiff_t>(i * width));
+      if (compliance[i] == 0.0) continue;
+      wide_J[i * width + wide_metric.size()] = 1.0;
+      wide_metric.push_back(compliance[i]);
+    }
+    least_squares.factor(wide_J, wide_metric, static_cast<int>(m));
+    return;
+  }
+  order.clear();
+  for (Index i = 0; i < rows.size(); ++i)
+    if (is_equality(rows.row(i).law)) order.push_back(i);
+  order.insert(order.end(), bounded.begin(), bounded.end());
+  weigh();
+  ordered_G.resize(m * n);
+  for (std::size_t i = 0; i < m; ++i)
+    std::copy_n(G.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(order[i]) * n), n,
+                ordered_G.begin() + static_cast<std::ptrdiff_t>(i * n));
+  A.resize(m * m);
+  const Eigen::Map<const RowMajor> B(ordered_G.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
+  Eigen::Map<RowMajor>(A.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(m)).noalias() =
+      B * B.transpose();
+  for (std::size_t i = 0; i < m; ++i) A[i * m + i] += compliance[static_cast<std::size_t>(order[i])];
+  const std::size_t c = bounded.size();
+  A_reduced.resize(c * c), b_reduced.resize(c), ordered_b.resize(m);
+  for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded}) v->resize(c);
 }
 
 double IslandSolver::Impl::largest_change() const {
@@ -246,15 +355,18 @@ double IslandSolver::Impl::largest_change() const {
 
 SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Constraint* const> constraints,
                                         const IslandOptions& options, IslandReport& report) {
-  bodies.write_position_metric(options.step, metric);
-  weigh();
+  step = options.step;
+  bodies.write_position_metric(step, metric);
+  bounded.clear();
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
     const double held = options.step * reaction[at];  // bounds are on the whole impulse
     lower[at] = law.lower - held, upper[at] = law.upper - held;
     compliance[at] = law.compliance;
+    if (!is_equality(law)) bounded.push_back(i);
   }
+  factor();
   secant.begin(f.size());
   for (report.iterations = 1;; ++report.iterations) {
     predict(options);
@@ -304,6 +416,26 @@ bool IslandSolver::Impl::is_workless() const {
   return true;
 }
 
+/// Where not even standing still is enough, since the rows did not come together and have left bodies bent: less of the
+/// impulses, in the end none. The free step has the energy it began with.
+void IslandSolver::Impl::guard_energy(const BodyStates& states, std::span<Constraint* const> constraints,
+                                      const IslandOptions& options, IslandReport& report) {
+  constexpr int kHalvings = 12;
+  bool give_back = options.undisturbed && report.status == SolveStatus::kSolved && is_workless();
+  for (int halving = 0;; ++halving) {
+    const IslandEnergy::Change done = energy.guard(bodies, rows, agent_work(options), give_back, options);
+    report.energy_removed = done.removed;
+    report.energy_surplus = done.surplus;
+    if (!(done.left > 0.0) || halving == kHalvings) return;
+    const double part = halving + 1 == kHalvings ? 0.0 : 0.5;
+    for (std::size_t i = 0; i < f.size(); ++i) f[i] *= part, reaction[i] *= part;
+    give_back = false;
+    report.status = SolveStatus::kIterationLimit;
+    predict(options);
+    measure(states, StepTime::kEnd, constraints, gap);
+  }
+}
+
 IslandSolver::IslandSolver() : impl_(std::make_unique<Impl>()) {}
 IslandSolver::~IslandSolver() = default;
 IslandSolver::IslandSolver(IslandSolver&&) noexcept = default;
@@ -318,12 +450,10 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
   s.energy.begin(s.bodies, options.gravity);
   s.find_reaction(StepTime::kStart, options, s.reaction);
   report.status = s.iterate(states, constraints, options, report);
-  const double work = s.agent_work(options);
   s.answer_at_end(states, constraints, options);
-  if (options.guard_energy)
-    report.energy_removed = s.energy.guard(s.bodies, s.rows, work, s.is_workless(), options);
-  report.energy_credit = options.energy_credit + report.energy_removed;
-  for (Index local = 0; local < s.bodies.count(); ++local) s.bodies.body(local).group->commit(s.bodies.body(local).slot);
+  if (options.guard_energy) s.guard_energy(states, constraints, options, report);
+  for (Index local = 0; local < s.bodies.count(); ++local)
+    s.bodies.body(local).group->commit(s.bodies.body(local).slot);
   for (std::size_t i = 0; i < s.f.size(); ++i) s.f[i] += options.step * s.reaction[i];
   for (std::size_t i = 0; i < constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(s.first_row[i]), end = static_cast<std::size_t>(s.first_row[i + 1]);

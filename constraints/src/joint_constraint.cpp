@@ -93,18 +93,23 @@ void JointConstraint::plan_limits() {
       for (int i = 0; i < 3; ++i) plan_limit(i, limits.euler[static_cast<std::size_t>(i)]);
       if (std::isfinite(limits.cone)) plan_.push_back({.measure = Measure::kCone, .bound = limits.cone});
       break;
-    case JointType::kRevolute: plan_limit(0, limits.rotation); break;
+    case JointType::kRevolute:
+      plan_limit(0, limits.rotation);
+      break;
     case JointType::kCylindrical:
       plan_limit(0, limits.rotation);
       plan_limit(1, limits.translation[0]);
       break;
-    case JointType::kPrismatic: plan_limit(0, limits.translation[0]); break;
+    case JointType::kPrismatic:
+      plan_limit(0, limits.translation[0]);
+      break;
     case JointType::kPlanar:
       plan_limit(0, limits.translation[0]);
       plan_limit(1, limits.translation[1]);
       plan_limit(2, limits.rotation);
       break;
-    case JointType::kFixed: break;
+    case JointType::kFixed:
+      break;
   }
 }
 
@@ -120,8 +125,7 @@ void JointConstraint::plan_actuation() {
   for (int i = 0; i < freedoms_; ++i) {
     const JointActuation& act = actuation(i);
     if (act.motor_max_force > 0.0) rows_.push_back({.measure = Measure::kMotor, .axis = i});
-    if (act.drive_stiffness > 0.0 || act.drive_damping > 0.0)
-      rows_.push_back({.measure = Measure::kDrive, .axis = i});
+    if (act.drive_stiffness > 0.0 || act.drive_damping > 0.0) rows_.push_back({.measure = Measure::kDrive, .axis = i});
     if (act.friction > 0.0) rows_.push_back({.measure = Measure::kFriction, .axis = i});
   }
 }
@@ -130,10 +134,14 @@ void JointConstraint::plan_actuation() {
 
 bool JointConstraint::is_angle(int coordinate) const {
   switch (spec_.type) {
-    case JointType::kPrismatic: return false;
-    case JointType::kPlanar: return coordinate == 2;
-    case JointType::kCylindrical: return coordinate == 0;
-    default: return true;
+    case JointType::kPrismatic:
+      return false;
+    case JointType::kPlanar:
+      return coordinate == 2;
+    case JointType::kCylindrical:
+      return coordinate == 0;
+    default:
+      return true;
   }
 }
 
@@ -180,21 +188,27 @@ JointConstraint::Direction JointConstraint::coordinate_direction(const Placement
 
 double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
   switch (row.measure) {
-    case Measure::kTranslation: return at.d[row.axis];
-    case Measure::kScrew: return at.d.x() - spec_.pitch * unwrapped(at, 0);
+    case Measure::kTranslation:
+      return at.d[row.axis];
+    case Measure::kScrew:
+      return at.d.x() - spec_.pitch * unwrapped(at, 0);
     case Measure::kTurnOfX:
       return row.axis == 1 ? -at.R_a.col(2).dot(at.R_b.col(0)) : at.R_a.col(1).dot(at.R_b.col(0));
     case Measure::kTurnOfZ:
       return row.axis == 0 ? -at.R_a.col(1).dot(at.R_b.col(2)) : at.R_a.col(0).dot(at.R_b.col(2));
-    case Measure::kTurn: return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
-    case Measure::kLimit: return row.sign * (unwrapped(at, row.axis) - row.bound);
+    case Measure::kTurn:
+      return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
+    case Measure::kLimit:
+      return row.sign * (unwrapped(at, row.axis) - row.bound);
     case Measure::kCone: {
       const Vec3 x_a = at.R_a.col(0), x_b = at.R_b.col(0);
       return row.bound - std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
     }
-    case Measure::kDrive: return unwrapped(at, row.axis) - actuation(row.axis).drive_target;
+    case Measure::kDrive:
+      return unwrapped(at, row.axis) - actuation(row.axis).drive_target;
     case Measure::kMotor:
-    case Measure::kFriction: return unwrapped(at, row.axis);
+    case Measure::kFriction:
+      return unwrapped(at, row.axis);
   }
   return 0.0;
 }
@@ -203,11 +217,16 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
   const auto a = [&](int i) -> Vec3 { return at.R_a.col(i); };
   const auto b = [&](int i) -> Vec3 { return at.R_b.col(i); };
   switch (row.measure) {
-    case Measure::kTranslation: return {.linear = a(row.axis)};
-    case Measure::kScrew: return {.linear = a(0), .angular = -spec_.pitch * a(0)};
-    case Measure::kTurnOfX: return {.angular = row.axis == 1 ? a(2).cross(b(0)) : b(0).cross(a(1))};
-    case Measure::kTurnOfZ: return {.angular = row.axis == 0 ? a(1).cross(b(2)) : b(2).cross(a(0))};
-    case Measure::kTurn: return {.angular = a(row.axis)};
+    case Measure::kTranslation:
+      return {.linear = a(row.axis)};
+    case Measure::kScrew:
+      return {.linear = a(0), .angular = -spec_.pitch * a(0)};
+    case Measure::kTurnOfX:
+      return {.angular = row.axis == 1 ? a(2).cross(b(0)) : b(0).cross(a(1))};
+    case Measure::kTurnOfZ:
+      return {.angular = row.axis == 0 ? a(1).cross(b(2)) : b(2).cross(a(0))};
+    case Measure::kTurn:
+      return {.angular = a(row.axis)};
     case Measure::kLimit: {
       Direction d = coordinate_direction(at, row.axis);
       d.linear *= row.sign, d.angular *= row.sign;
@@ -219,7 +238,8 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
     }
     case Measure::kMotor:
     case Measure::kDrive:
-    case Measure::kFriction: return coordinate_direction(at, row.axis);
+    case Measure::kFriction:
+      return coordinate_direction(at, row.axis);
   }
   return {};
 }
@@ -232,13 +252,15 @@ RowLaw JointConstraint::law_of(const RowPlan& plan, double gap, double tolerance
   switch (plan.measure) {
     case Measure::kMotor:
     case Measure::kDrive:
-    case Measure::kFriction: return actuation_law(plan, gap);
+    case Measure::kFriction:
+      return actuation_law(plan, gap);
     case Measure::kLimit:
     case Measure::kCone:
       law.lower = 0.0;
       law.offset = std::min(0.0, gap + recovery);
       break;
-    default: law.offset = gap - std::clamp(gap, -recovery, recovery);
+    default:
+      law.offset = gap - std::clamp(gap, -recovery, recovery);
   }
   law.holds = true;
   return law;
@@ -246,12 +268,14 @@ RowLaw JointConstraint::law_of(const RowPlan& plan, double gap, double tolerance
 
 RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
   const JointActuation& act = actuation(plan.axis);
-  RowLaw law;
+  const auto coordinate = static_cast<std::size_t>(plan.axis);
+  RowLaw law{.goes_on = true};
   if (plan.measure == Measure::kDrive) {
     const double implicit = step_ * act.drive_stiffness + act.drive_damping;
     law.compliance = 1.0 / implicit;
     law.offset = act.drive_damping / implicit * gap;
     law.stiffness = act.drive_stiffness;
+    law.last_force = drive_force_[coordinate];
     return law;
   }
   const bool motor = plan.measure == Measure::kMotor;
@@ -259,12 +283,12 @@ RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
   law.lower = -law.upper;
   law.agent_displacement = motor ? step_ * act.motor_velocity : 0.0;
   law.offset = gap + law.agent_displacement;
-  law.holds = true;
+  law.last_force = motor ? motor_force_[coordinate] : friction_force_[coordinate];
   return law;
 }
 
-void JointConstraint::add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan, const RowLaw& law,
-                          ConstraintRows& rows) {
+void JointConstraint::add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
+                          const RowLaw& law, ConstraintRows& rows) {
   const Direction along = direction(at, plan);
   const auto side = [&](const MaterialFrame& part, double sign, std::vector<double>& modal) {
     RowSide row = part.point_row(states, when, at.o_b, along.linear, sign, modal);
@@ -293,9 +317,9 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   };
   const double length = std::max(arm(a_), arm(b_)) + at.o_b.norm() + std::numeric_limits<double>::min();
   for (const RowPlan& plan : rows_) {
-    const bool distance = plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
-                          ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) &&
-                           !is_angle(plan.axis));
+    const bool distance =
+        plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
+        ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) && !is_angle(plan.axis));
     const double tolerance = distance ? kTolerance * length : kTolerance;
     RowLaw law = law_of(plan, gap(at, plan), tolerance);
     law.tolerance = tolerance;
@@ -310,11 +334,14 @@ void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<do
 
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
   force_ = Vec3::Zero();
-  coordinate_force_ = {};
+  coordinate_force_ = motor_force_ = drive_force_ = friction_force_ = {};
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const double force = impulses[i] / step_;
     if (plan.measure == Measure::kTranslation) force_ += force * axes_at_start_.col(plan.axis);
+    if (plan.measure == Measure::kMotor) motor_force_[static_cast<std::size_t>(plan.axis)] = force;
+    if (plan.measure == Measure::kDrive) drive_force_[static_cast<std::size_t>(plan.axis)] = force;
+    if (plan.measure == Measure::kFriction) friction_force_[static_cast<std::size_t>(plan.axis)] = force;
     if (plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor)
       coordinate_force_[static_cast<std::size_t>(plan.axis)] += plan.sign * force;
   }

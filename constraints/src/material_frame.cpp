@@ -81,8 +81,7 @@ Vec3 MaterialFrame::position(const BodyStates& states, StepTime when) const {
 
 Mat3 MaterialFrame::axes(const BodyStates& states, StepTime when) const {
   Quaternion q_WB = states.pose(body_, when).q;
-  if (!rotation_.empty())
-    q_WB = q_WB * quaternion_from_rotation_vector(turn(states.amplitudes(body_, when)));
+  if (!rotation_.empty()) q_WB = q_WB * quaternion_from_rotation_vector(turn(states.amplitudes(body_, when)));
   return to_matrix(q_WB) * rest_.axes;
 }
 

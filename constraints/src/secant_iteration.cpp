@@ -63,7 +63,8 @@ void SecantIteration::advance(std::span<double> x, std::span<const double> step,
 void SecantIteration::remember(std::span<const double> x, std::span<const double> step,
                                std::span<const double> residual) {
   if (known_ == kDepth) {  // forget the oldest
-    for (auto* secants : {&dx_, &dstep_, &dresidual_}) std::rotate(secants->begin(), secants->begin() + 1, secants->end());
+    for (auto* secants : {&dx_, &dstep_, &dresidual_})
+      std::rotate(secants->begin(), secants->begin() + 1, secants->end());
     --known_;
   }
   const auto s = static_cast<std::size_t>(known_++);
@@ -95,7 +96,8 @@ std::array<double, SecantIteration::kDepth> SecantIteration::secant_weights(std:
   N.diagonal().array() += kRidge;
   const Eigen::Matrix<double, kDepth, 1> solution = N.llt().solve(r);
   if (!solution.allFinite()) return weights;
-  for (int i = 0; i < known_; ++i) weights[static_cast<std::size_t>(i)] = scale[static_cast<std::size_t>(i)] * solution[i];
+  for (int i = 0; i < known_; ++i)
+    weights[static_cast<std::size_t>(i)] = scale[static_cast<std::size_t>(i)] * solution[i];
   return weights;
 }
 

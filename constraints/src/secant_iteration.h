@@ -1,5 +1,5 @@
-// Newton's method with one Jacobian for all iterations, made faster and safer: the secants seen so far stand in for what
-// the Jacobian misses (Anderson, J. ACM 12 (1965) 547), and a step that leads away is shortened.
+// Newton's method with one Jacobian for all iterations, made faster and safer: the secants seen so far stand in for
+// what the Jacobian misses (Anderson, J. ACM 12 (1965) 547), and a step that leads away is shortened.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ class SecantIteration {
 
   std::vector<double> x_, step_, residual_, best_x_, best_step_;  // of the last iterate, and the best
   std::array<std::vector<double>, kDepth> dx_, dstep_, dresidual_;
-  int known_ = 0;   // secants
+  int known_ = 0;  // secants
   bool first_ = true;
   double best_ = 0.0, length_ = 1.0;
 };

@@ -26,9 +26,9 @@ enum class StepTime { kStart, kEnd };
 
 /// One body's part of a row.
 struct RowSide {
-  Index body = -1;                 ///< −1: the world, which does not move; the rest is not read then
-  Vec3 linear = Vec3::Zero();      ///< world
-  Vec3 angular = Vec3::Zero();     ///< world, about the body origin
+  Index body = -1;                  ///< −1: the world, which does not move; the rest is not read then
+  Vec3 linear = Vec3::Zero();       ///< world
+  Vec3 angular = Vec3::Zero();      ///< world, about the body origin
   std::span<const double> modal{};  ///< k numbers, or none where the modes do not show
 };
 
@@ -36,14 +36,17 @@ inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 /// How a row is to be met.
 struct RowLaw {
-  double offset = 0.0;          ///< wanted gap at the step's end, in the gap's unit
-  double compliance = 0.0;      ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
-  double lower = -kUnbounded;   ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
-  double upper = kUnbounded;    ///< largest impulse
-  double tolerance = 1e-12;     ///< of the gap, in its unit; > 0
-  /// The row holds still what lies on it: its answer to gravity and other held forces is a held force too, so that what
-  /// rests has no velocity. For rows without compliance; springs do so by themselves.
+  double offset = 0.0;         ///< wanted gap at the step's end, in the gap's unit
+  double compliance = 0.0;     ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
+  double lower = -kUnbounded;  ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
+  double upper = kUnbounded;  ///< largest impulse
+  double tolerance = 1e-12;   ///< of the gap, in its unit; > 0
+  /// The row holds still what lies on it: a joint, a stop, the ground. Its answer to gravity and other held forces is
+  /// found by itself, so that what rests has no velocity. For rows without compliance.
   bool holds = false;
+  /// The row's force goes on from step to step: springs, motors, friction. `last_force` is that of the last step.
+  bool goes_on = false;
+  double last_force = 0.0;
   /// How far the agent behind the row (a hand, a motor) moves what it holds within the step, in the gap's unit: the
   /// work f/Δt times this may enter the system.
   double agent_displacement = 0.0;
@@ -71,9 +74,7 @@ class ConstraintRows {
   Index size() const { return static_cast<Index>(rows_.size()); }
   const Row& row(Index i) const { return rows_[static_cast<std::size_t>(i)]; }
   Row& row(Index i) { return rows_[static_cast<std::size_t>(i)]; }
-  std::span<const double> modal(const Side& side) const {
-    return {modal_.data() + side.modal_begin, side.modal_count};
-  }
+  std::span<const double> modal(const Side& side) const { return {modal_.data() + side.modal_begin, side.modal_count}; }
 
  private:
   std::vector<Row> rows_;

@@ -55,6 +55,7 @@ class Handle final : public Constraint {
   HandleTarget next_;
   double step_ = 0.0, error_ = 0.0;
   Vec3 force_ = Vec3::Zero();
+  std::array<double, 3> last_force_{};
   std::vector<double> modal_;
 };
 

@@ -8,7 +8,7 @@
 ///   4. f changes by the solution of  A Δf + gap − offset + compliance f ⊥ bounds,  A = J diag(Δt M⁻¹, H/Δt) Jᵀ
 ///   5. 3 and 4 are repeated (Newton's method with the Jacobian of the start) until the gaps no longer change
 ///   6. if the bodies came out of it with more energy than went in, their relative motion is slowed until they have
-///      not; what is taken so is given back when joints lose it to the method
+///      not; and made faster where joints alone have lost energy to the method
 ///   7. the prediction becomes the state
 ///
 /// Momentum of free islands is kept by 4 (opposite impulses at one world point) and by 6 (the motion of the whole is
@@ -24,13 +24,16 @@
 namespace limber {
 
 struct IslandOptions {
-  double step = 1.0 / 60.0;      ///< s; that of all groups
-  Vec3 gravity = Vec3::Zero();   ///< m/s², world
+  double step = 1.0 / 60.0;     ///< s; that of all groups
+  Vec3 gravity = Vec3::Zero();  ///< m/s², world
   int max_iterations = 30;      ///< of Newton's method; ≥ 1
   bool guard_energy = true;     ///< step 6
-  /// J, ≥ 0: what step 6 took from this island before. Energy that joints then lose to the method alone is given back
-  /// from it, so that the method's own oscillation does not become a loss.
-  double energy_credit = 0.0;
+  /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
+  /// are the same: what joints alone lose to the method is then given back by step 6.
+  bool undisturbed = false;
+  /// J: what step 6 left over in the last step, from IslandReport. It is at most 1e-7 of the energies at hand: bodies
+  /// that turn round have no motion to take it from.
+  double energy_surplus = 0.0;
 };
 
 struct IslandReport {
@@ -39,7 +42,7 @@ struct IslandReport {
   int iterations = 0;           ///< predictions made
   double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance
   double energy_removed = 0.0;  ///< J, by step 6; negative: given back
-  double energy_credit = 0.0;   ///< J, for the island's next step
+  double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
 };
 
 /// The solver and its memory, which grows to the largest island seen; after that a step allocates nothing. One thread

@@ -72,9 +72,9 @@ class JointConstraint final : public Constraint {
   enum class Measure { kTranslation, kTurnOfX, kTurnOfZ, kTurn, kScrew, kLimit, kCone, kMotor, kDrive, kFriction };
   struct RowPlan {
     Measure measure;
-    int axis = 0;         // of J, or the coordinate
-    double sign = 1.0;    // kLimit: −1 for the upper end
-    double bound = 0.0;   // kLimit
+    int axis = 0;        // of J, or the coordinate
+    double sign = 1.0;   // kLimit: −1 for the upper end
+    double bound = 0.0;  // kLimit
   };
   /// Relative motion that a row measures: linear along n at o_b, and angular about a; world.
   struct Direction {
@@ -106,6 +106,7 @@ class JointConstraint final : public Constraint {
   std::vector<RowPlan> plan_;     // locked rows, then limits
   std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
   std::array<double, 3> coordinate_force_{};
+  std::array<double, 3> motor_force_{}, drive_force_{}, friction_force_{};  // of the last step
   Vec3 force_ = Vec3::Zero();
   double step_ = 0.0;
   Mat3 axes_at_start_ = Mat3::Identity();

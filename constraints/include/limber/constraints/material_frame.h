@@ -45,7 +45,8 @@ class MaterialFrame {
   RowSide point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
                     std::vector<double>& modal) const;
   /// Row of the angular velocity along a.
-  RowSide angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale, std::vector<double>& modal) const;
+  RowSide angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale,
+                      std::vector<double>& modal) const;
 
  private:
   Vec3 turn(std::span<const double> z) const;      // Θ z

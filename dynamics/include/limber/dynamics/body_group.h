@@ -125,10 +125,11 @@ class BodyGroup {
 
   BodyEnergy energy(Index slot, const Vec3& gravity) const;
   BodyEnergy predicted_energy(Index slot, const Vec3& gravity) const;
-  /// What the modes' damping takes over the predicted step, J: work of the forces held over it less what the modes gain.
+  /// What the modes' damping takes over the predicted step, J: work of the forces held over it less what the modes
+  /// gain.
   double predicted_dissipation(Index slot) const;
   /// Whether something comes part way into the next step: an impulse with a delay.
-  bool has_delayed_impulse(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].modes_delayed; }
+  bool has_delayed_impulse(Index slot) const { return !bodies_[static_cast<std::size_t>(slot)].delayed.empty(); }
 
   /// First mass moment about the body origin, deformed: m c + Σ z_i p_i, body axes, kg·m.
   Vec3 first_moment(Index slot) const;
