@@ -69,6 +69,7 @@ struct LinearProgramSolver::Impl {
   void gather_column(std::size_t q);
   std::size_t choose_leaving(double largest) const;
   double ratio(std::size_t row, double allowed) const;
+  bool lifts_y(std::size_t q, double least) const;
   void pivot(std::size_t p, std::size_t q);
   void flip_column(std::size_t q);
   void flip_row(std::size_t p);
@@ -209,6 +210,14 @@ std::size_t LinearProgramSolver::Impl::choose_leaving(double largest) const {
   return best;
 }
 
+// Whether some y grows with the variable of column q.
+bool LinearProgramSolver::Impl::lifts_y(std::size_t q, double least) const {
+  if (is_y(nonbasic[q])) return true;
+  for (std::size_t p = 0; p < n; ++p)
+    if (is_y(basic[p]) && column[p] < -least) return true;
+  return false;
+}
+
 void LinearProgramSolver::Impl::pivot(std::size_t p, std::size_t q) {
   const double entering_weight = weight[q], entry = T.row(p)[q];
   exchange(T, n + 1, p, q);
@@ -255,11 +264,10 @@ void LinearProgramSolver::Impl::optimise(int limit) {
     const std::size_t p = choose_leaving(largest);
     const double step = p == n ? kInfinity : std::max(0.0, ratio(p, 0.0));
     if (p == n && !is_bounded(nonbasic[q])) {
-      // A slack has no bound: its column is rounding. Its cost is, too.
-      if (!is_y(nonbasic[q]))
-        costs()[q] = 0.0;
-      else
+      if (bound == kInfinity && lifts_y(q, kPivotTolerance * largest))
         price_slack();
+      else
+        costs()[q] = 0.0;  // only slacks would grow, which cost nothing: rounding
       continue;
     }
     ++result.pivots;

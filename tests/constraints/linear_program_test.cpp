@@ -172,6 +172,40 @@ TEST(LinearProgram, InfeasibleRowsBuyTheLeastSlack) {
   EXPECT_LE(result.slack, 0.5 + 1e-12);
 }
 
+TEST(LinearProgram, SlackBoughtIsTheLeastThatClpFinds) {
+  // Clp on min Σt, A f + t + b ≥ 0. Every row's largest entry is 1.5, so that all are priced alike.
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  LinearProgramSolver solver;
+  int infeasible = 0;
+  for (int n = 0; n < 500; ++n) {
+    const int r = 2 + n % 9, columns = 1 + n % 7;
+    Sample s{.rows = r, .columns = columns}, with_slack{.rows = r, .columns = columns + r};
+    for (int i = 0; i < r; ++i) {
+      for (int j = 0; j < columns; ++j) s.A.push_back(j == i % columns ? -1.5 : uniform(random));
+      s.b.push_back(uniform(random));
+      with_slack.A.insert(with_slack.A.end(), s.A.end() - columns, s.A.end());
+      for (int j = 0; j < r; ++j) with_slack.A.push_back(j == i ? 1.0 : 0.0);
+    }
+    s.c.assign(static_cast<std::size_t>(columns), 1.0);
+    with_slack.b = s.b, with_slack.c.assign(static_cast<std::size_t>(columns), 0.0);
+    with_slack.c.resize(static_cast<std::size_t>(columns + r), 1.0);
+    std::vector<double> f(s.c.size());
+    if (solver.solve(s.program(), f).status == SolveStatus::kSolved) continue;
+    ++infeasible;
+    double slack = 0.0;
+    for (std::size_t i = 0; i < s.b.size(); ++i) {
+      double w = s.b[i];
+      for (std::size_t j = 0; j < f.size(); ++j) w += s.A[i * f.size() + j] * f[j];
+      slack += std::max(0.0, -w);
+    }
+    const Oracle oracle = clp(with_slack);
+    ASSERT_TRUE(oracle.feasible);
+    EXPECT_NEAR(slack, oracle.objective, kObjective * std::max(1.0, oracle.objective)) << n;
+  }
+  EXPECT_GT(infeasible, 100);
+}
+
 TEST(LinearProgram, WarmSolvesFindTheColdOptimum) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
