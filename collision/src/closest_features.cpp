@@ -12,6 +12,7 @@ using Kind = Feature::Kind;
 // Lines whose angle has a sine below this are taken as parallel: the ends decide then, and what is lost is their length
 // times this.
 constexpr double kParallelSine = 1e-13;
+constexpr double kRoundOff = 32 * std::numeric_limits<double>::epsilon();
 
 // Where the foot of p falls on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
 double line_parameter(const Vec3& p, const Vec3& s0, const Vec3& s1) {
@@ -65,6 +66,29 @@ void keep_nearer(ClosestPoints& best, const SurfaceFoot& a, const SurfaceFoot& b
 
 ClosestPoints none_yet() { return {{}, {}, std::numeric_limits<double>::infinity()}; }
 
+// The longest edge of a triangle, from a to b, and the height of the third vertex c over it.
+struct Altitude {
+  explicit Altitude(const TrianglePoints& t) {
+    double longest = -1.0;
+    for (std::size_t i = 0; i < 3; ++i)
+      if (const double length = (t[(i + 1) % 3] - t[i]).squaredNorm(); length > longest) longest = length, a = i;
+    b = (a + 1) % 3, c = (a + 2) % 3;
+    edge = t[b] - t[a], edge2 = edge.squaredNorm();
+    if (edge2 == 0.0) return;
+    foot = (t[c] - t[a]).dot(edge) / edge2;
+    height = t[c] - t[a] - foot * edge;
+    height -= height.dot(edge) / edge2 * edge;
+    height2 = height.squaredNorm();
+    flat = !(height2 > kParallelSine * kParallelSine * edge2);
+  }
+
+  std::size_t a = 0, b = 1, c = 2;
+  Vec3 edge = Vec3::Zero(), height = Vec3::Zero();
+  double edge2 = 0.0, height2 = 0.0;
+  double foot = 0.0;  // where the height stands on the edge: 0 at a, 1 at b
+  bool flat = true;
+};
+
 // The common point of a segment and a triangle that it pierces, or crosses at its rim; none if it lies in the plane.
 struct Piercing {
   bool pierces = false;
@@ -73,35 +97,44 @@ struct Piercing {
 };
 
 Piercing pierce(const SegmentPoints& s, const TrianglePoints& t) {
-  const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
+  const Vec3 n = unit_normal(t);
   const double h0 = n.dot(s[0] - t[0]), h1 = n.dot(s[1] - t[0]);
   if (h0 == h1 || (h0 > 0.0 && h1 > 0.0) || (h0 < 0.0 && h1 < 0.0)) return {};
   const double parameter = h0 / (h0 - h1);
   const Vec3 p = between(s[0], s[1], parameter);
   for (std::size_t i = 0; i < 3; ++i)
     if (n.dot((t[(i + 1) % 3] - t[i]).cross(p - t[i])) < 0.0) return {};
-  return {true, parameter, closest_on_triangle(p, t)};
-}
-
-SurfaceFoot foot_on_face(const Vec3& point, double v, double w) {
-  return {point, {1.0 - v - w, v, w}, {Kind::kFace, 0}};
+  // The plane of a sliver is round-off in one direction: what it says is taken only where the triangle is indeed met.
+  const SurfaceFoot foot = closest_on_triangle(p, t);
+  const double round_off = kRoundOff * (s[0].norm() + s[1].norm() + t[0].norm());
+  return {(p - foot.point).norm() <= round_off, parameter, foot};
 }
 
 }  // namespace
+
+Vec3 unit_normal(const TrianglePoints& t) {
+  const Altitude base(t);
+  if (base.flat) return Vec3::Zero();
+  return (base.edge / std::sqrt(base.edge2)).cross(base.height / std::sqrt(base.height2)).normalized();
+}
 
 SurfaceFoot closest_on_segment(const Vec3& p, const SegmentPoints& s) {
   return foot_at(s, line_parameter(p, s[0], s[1]));
 }
 
 SurfaceFoot closest_on_triangle(const Vec3& p, const TrianglePoints& t) {
-  const Vec3 e1 = t[1] - t[0], e2 = t[2] - t[0], r = p - t[0];
-  const Vec3 n = e1.cross(e2);
-  const double area2 = n.squaredNorm();
-  // A triangle thinner than round-off has no inside that could be told from its edges.
-  const double longest2 = std::max({e1.squaredNorm(), e2.squaredNorm(), (t[2] - t[1]).squaredNorm()});
-  if (area2 > kParallelSine * kParallelSine * longest2 * longest2) {
-    const double v = n.dot(r.cross(e2)) / area2, w = n.dot(e1.cross(r)) / area2;
-    if (v > 0.0 && w > 0.0 && v + w < 1.0) return foot_on_face(p - (n.dot(r) / area2) * n, v, w);
+  const Altitude base(t);
+  if (!base.flat) {
+    // Along the longest edge first, then across: the two errors do not mix, however thin the triangle.
+    const Vec3 r = p - t[base.a];
+    const double along = r.dot(base.edge) / base.edge2;
+    const double c = (r - along * base.edge).dot(base.height) / base.height2;
+    const double b = along - c * base.foot, a = 1.0 - b - c;
+    if (a > 0.0 && b > 0.0 && c > 0.0) {
+      SurfaceFoot inside{t[base.a] + along * base.edge + c * base.height, {}, {Kind::kFace, 0}};
+      inside.weight[base.a] = a, inside.weight[base.b] = b, inside.weight[base.c] = c;
+      return inside;
+    }
   }
   SurfaceFoot best{};
   double best2 = std::numeric_limits<double>::infinity();

@@ -8,8 +8,6 @@
 namespace limber {
 namespace {
 
-// A triangle of less height over its longest edge, in parts of that edge, has no normal to speak of.
-constexpr double kFlat = 1e-12;
 // How far a direction may lean out of a crease's normal cone, per unit of |inward₁ + inward₂|: 12° at a right angle, 0
 // on a plane. A hollow edge would need 0.5.
 constexpr double kRocking = 0.15;
@@ -56,13 +54,11 @@ void PairSurface::make_face(Index t) {
     f.box.include(f.x[c]);
   }
   const std::array<Vec3, 3> edge{f.x[1] - f.x[0], f.x[2] - f.x[1], f.x[0] - f.x[2]};
-  const Vec3 area = edge[0].cross(-edge[2]);
-  const double longest2 = std::max({edge[0].squaredNorm(), edge[1].squaredNorm(), edge[2].squaredNorm()});
-  const double size = area.norm();
-  const bool flat = !(size > kFlat * longest2);
-  f.normal = flat ? Vec3(Vec3::Zero()) : Vec3(area / size);
-  for (std::size_t c = 0; c < 3; ++c)
-    f.inward[c] = flat ? Vec3(Vec3::Zero()) : Vec3(f.normal.cross(edge[c]) / edge[c].norm());
+  f.normal = unit_normal(f.x);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double length = edge[c].norm();
+    f.inward[c] = length > 0.0 ? Vec3(f.normal.cross(edge[c]) / length) : Vec3(Vec3::Zero());
+  }
   face_stamp_[i] = generation_;
 }
 
