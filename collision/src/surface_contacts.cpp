@@ -123,8 +123,9 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
   pair.s = on_e.weight[1], pair.t = on_f.weight[1];
   pair.on_e = on_e.point, pair.on_f = on_f.point;
   pair.distance = (pair.on_e - pair.on_f).norm();
-  pair.direction = pair.distance > kDirectionless * tolerance_ ? Vec3((pair.on_e - pair.on_f) / pair.distance)
-                                                               : Vec3(n / std::sqrt(n2));
+  // Of the two ways to the direction, the one that loses fewer digits.
+  const bool nearly_parallel = std::sqrt(n2 / (u2 * w2)) * std::sqrt(u2 + w2) < pair.distance;
+  pair.direction = nearly_parallel ? Vec3((pair.on_e - pair.on_f) / pair.distance) : Vec3(n / std::sqrt(n2));
   if (pair.direction.dot(pair.on_e - pair.on_f) < 0.0) pair.direction = -pair.direction;
   return pair;
 }
@@ -155,13 +156,15 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   const std::array<Index, 2> ends = mine.surface().edge(e).vertices;
   const Vec3 &x0 = mine.vertex(ends[0]), &x1 = mine.vertex(ends[1]);
   const double h0 = f.normal.dot(x0 - f.x[0]), h1 = f.normal.dot(x1 - f.x[0]);
-  if (!((h0 < 0.0 && h1 >= 0.0) || (h0 >= 0.0 && h1 < 0.0))) return;
-  const Vec3 p = x0 + h0 / (h0 - h1) * (x1 - x0);
+  const std::size_t behind = h0 < h1 ? 0 : 1;
+  const double back = std::min(h0, h1), front = std::max(h0, h1);
+  if (!(back < -tolerance_ && front >= -tolerance_)) return;
+  const Vec3 p = x0 + std::clamp(h0 / (h0 - h1), 0.0, 1.0) * (x1 - x0);
   for (std::size_t c = 0; c < 3; ++c)
     if ((p - f.x[c]).dot(f.inward[c]) < -tolerance_) return;
-  piercings_.push_back({of, e, t, {h0, h1}});
-  const std::size_t behind = h0 < 0.0 ? 0 : 1;
   if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], (p - mine.vertex(ends[behind])).norm()});
+  // An edge that only begins or ends on the face touches it.
+  if (front > tolerance_) piercings_.push_back({of, e, t, {h0, h1}});
 }
 
 // From the ends of piercing edges over the mesh to every vertex that is inside the other surface.
