@@ -160,11 +160,12 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   const double back = std::min(h0, h1), front = std::max(h0, h1);
   if (!(back < -tolerance_ && front >= -tolerance_)) return;
   const Vec3 p = x0 + std::clamp(h0 / (h0 - h1), 0.0, 1.0) * (x1 - x0);
-  for (std::size_t c = 0; c < 3; ++c)
-    if ((p - f.x[c]).dot(f.inward[c]) < -tolerance_) return;
+  double within = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
+  if (within < -tolerance_) return;
   if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], (p - mine.vertex(ends[behind])).norm()});
-  // An edge that only begins or ends on the face touches it.
-  if (front > tolerance_) piercings_.push_back({of, e, t, {h0, h1}});
+  // An edge that only begins or ends on the face, or meets its rim, touches it.
+  if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}});
 }
 
 // From the ends of piercing edges over the mesh to every vertex that is inside the other surface.
