@@ -143,6 +143,30 @@ double enclosed_volume(const SurfaceMesh& surface) {
   return six_volumes / 6.0;
 }
 
+// Tetrahedra from a point near the surface to each triangle. Over one with corners 0, a, b, c and volume V:
+// ∫ x = V (a + b + c)/4,  ∫ x xᵀ = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ) with s = a + b + c.
+SolidProperties solid_properties(const SurfaceMesh& surface) {
+  SolidProperties out;
+  if (surface.vertices.empty()) return out;
+  const Vec3 near = surface.vertices.front();
+  Vec3 first = Vec3::Zero();
+  Mat3 second = Mat3::Zero();
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 a = surface.vertices[t[0]] - near, b = surface.vertices[t[1]] - near, c = surface.vertices[t[2]] - near;
+    const double volume = a.dot(b.cross(c)) / 6.0;
+    const Vec3 s = a + b + c;
+    out.volume += volume;
+    first += 0.25 * volume * s;
+    second += volume / 20.0 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
+  }
+  if (out.volume == 0.0) return out;
+  const Vec3 offset = first / out.volume;
+  out.centroid = near + offset;
+  second -= out.volume * offset * offset.transpose();
+  out.inertia = second.trace() * Mat3::Identity() - second;
+  return out;
+}
+
 SurfaceQuality surface_quality(const SurfaceMesh& surface) {
   SurfaceQuality q;
   const auto edges = sorted_edges(surface);

@@ -126,4 +126,23 @@ void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface) {
   write_file(path, out.str());
 }
 
+std::string stl_bytes(const SurfaceMesh& surface) {
+  for (const Triangle& t : surface.triangles)
+    for (const Index v : t) check_index(v, surface.vertices.size(), "vertex of a triangle");
+  std::string bytes(80, ' ');  // a header that must not begin with "solid"
+  const auto append = [&](auto value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto append_vector = [&](const Vec3& x) {
+    for (int i = 0; i < 3; ++i) append(static_cast<float>(x[i]));
+  };
+  bytes.reserve(84 + 50 * surface.triangles.size());
+  append(static_cast<std::uint32_t>(surface.triangles.size()));
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 &a = surface.vertices[t[0]], &b = surface.vertices[t[1]], &c = surface.vertices[t[2]];
+    append_vector((b - a).cross(c - a).stableNormalized());
+    append_vector(a), append_vector(b), append_vector(c);
+    append(std::uint16_t{0});
+  }
+  return bytes;
+}
+
 }  // namespace limber

@@ -35,6 +35,14 @@ BoundarySurface boundary_surface(const TetMesh& mesh);
 /// Signed volume enclosed by a closed surface, m³ (divergence theorem); meaningless for an open one.
 double enclosed_volume(const SurfaceMesh& surface);
 
+/// Integrals over the solid that a closed surface bounds; outward triangles. Meaningless for an open one.
+struct SolidProperties {
+  double volume = 0.0;            ///< m³
+  Vec3 centroid = Vec3::Zero();   ///< m
+  Mat3 inertia = Mat3::Zero();    ///< ∫ (|x|² 1 − x xᵀ) dV about the centroid, m⁵; times the density: kg·m²
+};
+SolidProperties solid_properties(const SurfaceMesh& surface);
+
 /// What keeps a surface from bounding a solid, as counts.
 struct SurfaceQuality {
   Index boundary_edges = 0;      ///< edges of one triangle

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
@@ -18,5 +19,9 @@ void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
 /// Wavefront OBJ: positions and triangles.
 /// @throws InvalidArgument if an index is out of range. @throws InputError (see write_file())
 void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface);
+
+/// Binary STL: three float32 corners and a normal per triangle; vertices are not shared.
+/// @throws InvalidArgument if an index is out of range or there are more than 2³² − 1 triangles
+std::string stl_bytes(const SurfaceMesh& surface);
 
 }  // namespace limber
