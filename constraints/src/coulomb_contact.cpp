@@ -120,7 +120,7 @@ Eigen::Vector2d solve_in_disc(const Eigen::Matrix2d& A, const Eigen::Vector2d& b
   if (radius <= 0.0 || b.norm() == 0.0) return Vec2::Zero();
   const double det = A(0, 0) * A(1, 1) - A(0, 1) * A(1, 0);
   if (det > 0.0) {
-    const Vec2 t = Vec2(A(0, 1) * b[1] - A(1, 1) * b[0], A(1, 0) * b[0] - A(0, 0) * b[1]) / det;
+    Vec2 t = Vec2(A(0, 1) * b[1] - A(1, 1) * b[0], A(1, 0) * b[0] - A(0, 0) * b[1]) / det;
     if (t.norm() <= radius) return t;
   }
   const Vec2 t = Sliding(A, b, radius, Vec2::Zero(), 1.0).solve();

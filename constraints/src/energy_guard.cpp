@@ -16,11 +16,11 @@ struct Work {
   Numbers A, A_rigid, b, gap_before;
   double a, r, c;
 
-  double Q(std::size_t i, std::size_t j) const {
+  double quadratic(std::size_t i, std::size_t j) const {
     const std::size_t at = i * b.size() + j;
     return a * A[at] - (A_rigid.empty() ? 0.0 : r * A_rigid[at]);
   }
-  double q(std::size_t i) const { return c * (b[i] - (gap_before.empty() ? 0.0 : gap_before[i])); }
+  double linear(std::size_t i) const { return c * (b[i] - (gap_before.empty() ? 0.0 : gap_before[i])); }
 };
 
 // ΔE along f₀ + s (f₁ − f₀), and the size of the terms it is summed from, which bounds its rounding.
@@ -33,10 +33,10 @@ Line along(const Work& work, Numbers f1, Numbers f0) {
   Line line;
   const std::size_t m = work.b.size();
   for (std::size_t i = 0; i < m; ++i) {
-    const double di = f1[i] - f0[i], qi = work.q(i);
+    const double di = f1[i] - f0[i], qi = work.linear(i);
     double Qf = 0.0, Qd = 0.0, size = 0.0;
     for (std::size_t j = 0; j < m; ++j) {
-      const double Qij = work.Q(i, j);
+      const double Qij = work.quadratic(i, j);
       Qf += Qij * f0[j];
       Qd += Qij * (f1[j] - f0[j]);
       size += std::abs(Qij) * (std::abs(f0[j]) + std::abs(f1[j]));

@@ -73,7 +73,7 @@ class DenseContacts {
     combine_rows(u_, u_, A_, rows, change.data(), 3, 3 * m_);
   }
   const double* b() const { return b_; }
-  MatrixView A() const { return A_; }
+  MatrixView matrix() const { return A_; }
 
  private:
   void scales(const FrictionProblem& problem) {
@@ -109,7 +109,7 @@ class BlockContacts {
     }
     std::fill(b_ + 3 * m_, b_ + padded(3 * m_), 0.0);
     memory.diagonal.resize(m_);
-    for (std::size_t i = 0; i < m_; ++i) memory.diagonal[i] = block_of_A(i);
+    for (std::size_t i = 0; i < m_; ++i) memory.diagonal[i] = own_block(i);
   }
 
   void refresh(const double* f) {
@@ -189,7 +189,7 @@ class BlockContacts {
         body(G_.row(memory_.blocks[k].first_row + c), memory_.blocks[k].columns, c);
   }
 
-  Mat3 block_of_A(std::size_t i) const {
+  Mat3 own_block(std::size_t i) const {
     Mat3 A = Vec3(D_[3 * i], D_[3 * i + 1], D_[3 * i + 2]).asDiagonal();
     for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
       for (std::size_t r = 0; r < 3 && memory_.blocks[k].columns > 0; ++r)
@@ -315,8 +315,9 @@ class NewtonSteps {
     memory.best.need(n);
   }
 
-  // One step; false if it does not bring the map down.
+  // One step, whole or halved a few times; false if none brings the map down.
   bool step() {
+    constexpr int kLengths = 4;
     const double before = fill_map();
     fill_jacobian();
     const std::size_t n = 3 * m_;
@@ -325,7 +326,8 @@ class NewtonSteps {
     double* f = sweeps_.f();
     double* old = memory_.best.data();
     std::copy_n(f, n, old);
-    for (double length = 1.0; length > 0.1; length *= 0.5) {
+    double length = 1.0;
+    for (int tried = 0; tried < kLengths; ++tried, length *= 0.5) {
       advance(old, length);
       if (fill_map() <= (1.0 - 0.25 * length) * before) return true;
     }
@@ -360,7 +362,7 @@ class NewtonSteps {
         Mat3 block;
         for (std::size_t r = 0; r < 3; ++r)
           for (std::size_t c = 0; c < 3; ++c)
-            block(static_cast<int>(r), static_cast<int>(c)) = contacts_.A().row(3 * i + r)[3 * j + c];
+            block(static_cast<int>(r), static_cast<int>(c)) = contacts_.matrix().row(3 * i + r)[3 * j + c];
         block = (Q * block).eval();
         if (i == j) block += Mat3::Identity() - P;
         for (std::size_t r = 0; r < 3; ++r)
@@ -408,7 +410,7 @@ class Staggered {
       : contacts_(contacts), sweeps_(sweeps), memory_(memory), m_(m) {
     memory.A_normal.resize(m * m), memory.b_normal.resize(m), memory.f_normal.resize(m);
     for (std::size_t i = 0; i < m; ++i)
-      for (std::size_t j = 0; j < m; ++j) memory.A_normal[i * m + j] = contacts.A().row(3 * i)[3 * j];
+      for (std::size_t j = 0; j < m; ++j) memory.A_normal[i * m + j] = contacts.matrix().row(3 * i)[3 * j];
   }
 
   void solve_normal() {
