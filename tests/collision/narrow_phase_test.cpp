@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 
 #include "block_model.h"
@@ -28,6 +29,12 @@ using testing::winding_number;
 // What is asked of gaps, in parts of a size of 1 m, and of normals where the gap is above 1e-6 of it.
 constexpr double kGap = 1e-9;
 double normal_error(double gap) { return 1e-9 / std::abs(gap); }
+
+// Configurations per kind of pair; the CTest entry `collision.ten_thousand_pairs` asks for more.
+int trials(int usual) {
+  const char* asked = std::getenv("LIMBER_TRIALS");
+  return asked == nullptr ? usual : std::atoi(asked);
+}
 
 // -- Bodies -----------------------------------------------------------------------------------------------------------
 
@@ -312,7 +319,7 @@ TEST(NarrowPhase, TwoLumpySpheresHaveTheContactsOfAllFeaturePairs) {
   Random random(21);
   Tally tally;
   Body a(lumpy_sphere(1, 5)), b(lumpy_sphere(2, 3));
-  for (int trial = 0; trial < 300; ++trial) {
+  for (int trial = 0; trial < trials(300); ++trial) {
     const RigidTransform X_WA = random.pose(1.0);
     const Vec3 away = random.vector(1.0).normalized();
     a.place(X_WA, random.amplitudes(5, 0.05));
@@ -331,7 +338,7 @@ TEST(NarrowPhase, LumpySphereAndBoxHaveTheContactsOfAllFeaturePairs) {
   Tally tally;
   const Vec3 half(0.5, 0.3, 0.4);
   Body a(lumpy_sphere(2, 5)), b(Shape{Box{half}});
-  for (int trial = 0; trial < 300; ++trial) {
+  for (int trial = 0; trial < trials(300); ++trial) {
     a.place(random.pose(1.0), random.amplitudes(5, 0.05));
     const Vec3 away = random.vector(1.0).normalized();
     b.place_box({random.pose(1.0).q, a.pose.p + random.uniform(0.6, 1.2) * away}, half);
@@ -347,7 +354,7 @@ TEST(NarrowPhase, LumpySphereAndBoxHaveTheContactsOfAllFeaturePairs) {
 TEST(NarrowPhase, BarOnAPlaneHasEveryVertexWithinTheMargin) {
   Random random(23);
   Body bar(testing::block_model(6));
-  for (int trial = 0; trial < 500; ++trial) {
+  for (int trial = 0; trial < trials(500); ++trial) {
     const Vec3 n = random.vector(1.0).normalized();
     Body plane(Shape{HalfSpace{n, random.uniform(-1.0, 1.0)}});
     plane.place(random.pose(2.0));
@@ -384,7 +391,7 @@ TEST(NarrowPhase, SheetAndBallHaveEveryVertexAndTheNearestPointsOfFacesAndEdges)
   Random random(24);
   Body cloth(sheet(6, 4));
   int vertices = 0, others = 0, inside = 0;
-  for (int trial = 0; trial < 500; ++trial) {
+  for (int trial = 0; trial < trials(500); ++trial) {
     const double radius = random.uniform(0.05, 0.3), margin = 0.05;
     Body ball(Shape{Sphere{radius}});
     cloth.place(random.pose(1.0), random.amplitudes(4, 0.1));
