@@ -5,11 +5,12 @@
 //          that stay stay the same, so that a solver can start from last time's forces
 //   next:  docs/collision.md
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstdio>
 #include <exception>
 
 #include "limber/collision/contact_finder.h"
+#include "limber/core/error.h"
 #include "limber/model/asset.h"
 
 namespace {
@@ -29,6 +30,7 @@ double depth(const limber::ModalModel& model, double amplitude) {
 
 int main(int argc, char** argv) try {
   const auto model = limber::read_asset(argc > 1 ? argv[1] : "bunny.glb").bodies.at(0);
+  if (model->modes() == 0) throw limber::InvalidArgument("the body has no modes, expected one that bends");
   const double size = model->collision_extent().radius, bend = 0.05 * size / model->collision_extent().shape.at(0);
 
   limber::ContactFinder finder;
