@@ -1,5 +1,5 @@
 // joint_accuracy: how often joints are read right, and how well.
-//   run:  build/release/bin/joint_accuracy [--method fixed-ratio|convex-parts] [--verbose]
+//   run:  build/release/bin/joint_accuracy [--method fixed-ratio|convex-parts] [--only ASSEMBLY] [--class TEXT] [--verbose]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose
 #include <algorithm>
@@ -36,13 +36,15 @@ void print(const std::string& name, const Totals& t) {
               percentile(t.axis, 1.0), percentile(t.origin, 0.5), percentile(t.origin, 1.0));
 }
 
-int run(const DetectionOptions& options, bool verbose, const std::string& only) {
+int run(const DetectionOptions& options, bool verbose, const std::string& only,
+        const std::string& group_text) {
   TbbJobs jobs;
   std::map<std::pair<int, int>, int> confusion;
   for (const auto* names : {&tuning_names(), &held_out_names()}) {
     std::printf("%s\n%-34s %5s %7s %7s %9s %9s %10s %10s\n", names == &tuning_names() ? "tuning" : "held out",
                 "variants", "n", "right%", "false", "axis50", "axis100", "origin50", "origin100");
     for (const VariantClass& group : variant_classes()) {
+      if (group.name.find(group_text) == std::string::npos) continue;
       Totals totals;
       for (const std::string& name : *names) {
         if (!only.empty() && only != name) continue;
@@ -88,7 +90,7 @@ int run(const DetectionOptions& options, bool verbose, const std::string& only) 
 int main(int argc, char** argv) {
   limber::DetectionOptions options;
   bool verbose = false;
-  std::string only;
+  std::string only, group_text;
   for (int i = 1; i < argc; ++i) {
     const std::string_view arg = argv[i];
     if (arg == "--verbose")
@@ -99,10 +101,12 @@ int main(int argc, char** argv) {
       options.contact.method = limber::ContactMethod::kConvexParts, ++i;
     else if (arg == "--only" && i + 1 < argc)
       only = argv[++i];
+    else if (arg == "--class" && i + 1 < argc)
+      group_text = argv[++i];
     else
-      return std::fprintf(stderr, "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY or --method NAME\n",
+      return std::fprintf(stderr, "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY, --class TEXT or --method NAME\n",
                           argv[i]),
              2;
   }
-  return limber::assemblies::run(options, verbose, only);
+  return limber::assemblies::run(options, verbose, only, group_text);
 }

@@ -1,10 +1,12 @@
 #include "limber/articulation/contact_region.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 #include "limber/core/error.h"
 #include "near_samples.h"
@@ -20,7 +22,7 @@ void require(bool holds, const std::string& field, double value, const std::stri
 /// A component made ready: outward, with normals and a tree.
 struct Prepared {
   Prepared(const Component& component, double crease_angle)
-      : mesh(outward(component)), smooth(mesh, crease_angle), diagonal(component.diagonal) {}
+      : mesh(outward(component)), smooth(mesh, crease_angle), diagonal(component.diagonal), closed(component.closed) {}
 
   /// A closed surface drawn inside out is turned.
   static SurfaceMesh outward(const Component& component) {
@@ -33,6 +35,7 @@ struct Prepared {
   SurfaceMesh mesh;
   SmoothSurface smooth;
   double diagonal;
+  bool closed;
 };
 
 using Parts = std::vector<std::unique_ptr<Prepared>>;
@@ -109,27 +112,74 @@ void keep_nearer(std::vector<NearSample>& samples, double limit) {
   std::erase_if(samples, [&](const NearSample& s) { return s.distance > limit; });
 }
 
+double normal_spread(const BothSides& sides) {
+  double spread = 0.0, area = 0.0;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) {
+      spread += s.contact.area * s.contact.normal.cross(s.contact.facing_normal).squaredNorm();
+      area += s.contact.area;
+    }
+  return spread / area;
+}
+
 /// What is measured over the samples of both sides.
 ContactRegion summarised(const Pair& pair, const BothSides& sides) {
   ContactRegion out;
   out.a = pair.a, out.b = pair.b;
   std::vector<double> gaps, chords;
   Eigen::AlignedBox3d box;
-  double area = 0.0;
   for (auto [samples, target] : {std::pair(&sides.a, &out.on_a), {&sides.b, &out.on_b}})
     for (const NearSample& s : *samples) {
       target->push_back(s.contact);
       gaps.push_back(s.distance);
       chords.push_back(s.chord_error);
       box.extend(s.contact.point);
-      out.normal_spread += s.contact.area * s.contact.normal.cross(s.contact.facing_normal).squaredNorm();
-      area += s.contact.area;
     }
-  out.normal_spread /= area;
+  out.normal_spread = normal_spread(sides);
   out.gap = median(gaps);
   out.chord_error = median(chords);
   out.extent = box.diagonal().norm();
   return out;
+}
+
+/// The normal of the plane that rough samples lie in, if they do: whatever their facets say, it blocks no motion along
+/// it.
+std::optional<Vec3> plane_of(const BothSides& sides) {
+  constexpr double kFlat = 0.02;  // thickness per width, RMS
+  Vec3 centre = Vec3::Zero();
+  Mat3 second = Mat3::Zero();
+  double count = 0.0;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) centre += s.contact.point, count += 1.0;
+  centre /= count;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) second += (s.contact.point - centre) * (s.contact.point - centre).transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(second);
+  if (solver.eigenvalues()[0] > kFlat * kFlat * solver.eigenvalues()[1]) return std::nullopt;
+  return solver.eigenvectors().col(0);
+}
+
+void flatten(std::vector<NearSample>& samples, const Vec3& normal) {
+  for (NearSample& s : samples) {
+    s.contact.normal = s.contact.normal.dot(normal) < 0.0 ? Vec3(-normal) : normal;
+    s.contact.facing_normal = -s.contact.normal;
+  }
+}
+
+/// Takes the noise out of rough surfaces, where that makes the two sides agree better.
+void quieten(BothSides& sides) {
+  constexpr double kRough = 3e-3, kBetter = 0.5;
+  const double before = normal_spread(sides);
+  if (before < kRough) return;
+  if (const auto normal = plane_of(sides)) {
+    flatten(sides.a, *normal);
+    flatten(sides.b, *normal);
+    return;
+  }
+  BothSides quiet = sides;
+  average_patches(quiet.a);
+  average_patches(quiet.b);
+  if (normal_spread(quiet) < kBetter * before) sides = std::move(quiet);
 }
 
 BothSides sample(const Prepared& a, const Prepared& b, double reach, double facing_cosine, int wanted) {
@@ -153,6 +203,27 @@ void drop_hidden(const Pair& pair, const Parts& parts, BothSides& sides) {
   }
 }
 
+/// A shaft drawn through a solid block without a hole: of the two surfaces inside each other the larger, if it is held
+/// from all round. A shallow cap, whose normals point one way, is an overlap by chance.
+std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Prepared& b, int samples) {
+  if (!a.closed || !b.closed || !a.smooth.tree().box().intersects(b.smooth.tree().box())) return {};
+  BothSides sides = {inside_samples(a.smooth, b.smooth, samples), inside_samples(b.smooth, a.smooth, samples)};
+  const auto area = [](const std::vector<NearSample>& side) {
+    return side.empty() ? 0.0 : side.front().contact.area * static_cast<double>(side.size());
+  };
+  (area(sides.a) >= area(sides.b) ? sides.b : sides.a).clear();
+  const auto& kept = sides.a.empty() ? sides.b : sides.a;
+  constexpr std::size_t kFewest = 20;
+  if (kept.size() < kFewest) return {};
+  Vec3 mean = Vec3::Zero();
+  for (const NearSample& s : kept) mean += s.contact.normal / static_cast<double>(kept.size());
+  constexpr double kOneWay = 0.6;  // a cap of 78 degrees about its pole
+  if (mean.norm() > kOneWay) return {};
+  ContactRegion out = summarised(pair, sides);
+  out.overlapping = true;
+  return {std::move(out)};
+}
+
 std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, const ContactOptions& options) {
   const Prepared &a = *parts[static_cast<std::size_t>(pair.a)], &b = *parts[static_cast<std::size_t>(pair.b)];
   const double diagonal = std::min(a.diagonal, b.diagonal), reach = options.search * diagonal;
@@ -160,7 +231,7 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   const int coarse = std::max(100, options.samples / 4);
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
   const double first_limit = gap_limit(sides, diagonal, reach);
-  if (sides.a.empty() && sides.b.empty()) return {};
+  if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
   sides = sample(a, b, std::min(reach, 1.5 * first_limit), options.facing_cosine, options.samples);
   const double limit = gap_limit(sides, diagonal, reach);
   keep_nearer(sides.a, limit);
@@ -168,7 +239,8 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   drop_hidden(pair, parts, sides);
 
   constexpr std::size_t kFewest = 20;  // samples a side; fewer say nothing about a surface
-  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return {};
+  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return overlap(pair, a, b, coarse);
+  quieten(sides);
   ContactRegion out = summarised(pair, sides);
   if (out.gap > options.largest_gap * out.extent) return {};
   return {std::move(out)};

@@ -7,17 +7,20 @@ namespace limber {
 namespace {
 
 /// Weights that fall with the square root of how much area has a similar normal: a wide plate does not drown the small
-/// peg under it.
+/// peg under it. The floor keeps normals that are nothing but noise from counting for much.
 std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
   constexpr double kSimilar = 0.9;        // cosine
+  constexpr double kFloor = 0.05;         // of the whole area
   constexpr std::size_t kCompared = 600;  // samples that stand for all
   const std::size_t stride = 1 + points.size() / kCompared;
+  double compared = 0.0;
+  for (std::size_t j = 0; j < points.size(); j += stride) compared += points[j].weight;
   std::vector<double> weights;
   for (const WeightedPoint& p : points) {
-    double similar = 0.0;
+    double similar = kFloor * compared;
     for (std::size_t j = 0; j < points.size(); j += stride)
       if (p.normal.dot(points[j].normal) > kSimilar) similar += points[j].weight;
-    weights.push_back(p.weight / std::sqrt(std::max(similar, p.weight)));
+    weights.push_back(p.weight / std::sqrt(similar));
   }
   return weights;
 }

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <queue>
+#include <utility>
 
 namespace limber {
 namespace {
@@ -23,16 +25,17 @@ struct Piece {
   }
 };
 
-/// Cuts a surface down to what is near another.
+/// Cuts a surface down to what may matter: halves triangles, the largest first, and drops pieces on the way.
 class NearPart {
  public:
-  NearPart(const SmoothSurface& surface, const SmoothSurface& other, double reach)
-      : surface_(surface), other_(other), reach_(reach) {}
+  /// Whether some of a piece of this triangle, within this radius of the centre, may matter.
+  using Keep = std::function<bool(Index triangle, const Vec3& centre, double radius)>;
 
-  std::vector<Piece> pieces(std::size_t most) {
-    Eigen::AlignedBox3d box = other_.tree().box();
-    box.min().array() -= reach_;
-    box.max().array() += reach_;
+  NearPart(const SmoothSurface& surface, Keep keep) : surface_(surface), keep_(std::move(keep)) {}
+
+  /// Pieces in the order of their triangles, until there are `most` or the largest has the radius `finest`.
+  /// @param box what matters lies in it
+  std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most, double finest) {
     for (std::size_t t = 0; t < surface_.mesh().triangles.size(); ++t) {
       Eigen::AlignedBox3d own;
       for (const Index v : surface_.mesh().triangles[t])
@@ -40,7 +43,7 @@ class NearPart {
       if (!box.intersects(own)) continue;
       push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}});
     }
-    while (!queue_.empty() && queue_.size() < most && queue_.top().radius > 0.25 * reach_) {
+    while (!queue_.empty() && queue_.size() < most && queue_.top().radius > finest) {
       const Piece piece = queue_.top();
       queue_.pop();
       halve(piece);
@@ -56,17 +59,12 @@ class NearPart {
   }
 
  private:
-  /// Keeps the piece if some of it may be near enough and face the other surface.
   void push(Piece piece) {
     const Vec3 centre = surface_.point(piece.triangle, piece.centre());
     piece.radius = 0.0;
     for (const Vec3& c : piece.corner)
       piece.radius = std::max(piece.radius, (surface_.point(piece.triangle, c) - centre).norm());
-    constexpr double kLooseFacing = -0.5;  // of facets; the smooth normals decide later
-    if (other_.tree()
-            .nearest(centre, reach_ + piece.radius, surface_.tree().normal(piece.triangle), kLooseFacing)
-            .found())
-      queue_.push(piece);
+    if (keep_(piece.triangle, centre, piece.radius)) queue_.push(piece);
   }
 
   void halve(const Piece& piece) {
@@ -88,8 +86,7 @@ class NearPart {
   }
 
   const SmoothSurface& surface_;
-  const SmoothSurface& other_;
-  double reach_;
+  Keep keep_;
   std::priority_queue<Piece> queue_;
 };
 
@@ -106,35 +103,107 @@ Vec3 even_barycentric(const Piece& piece, std::size_t i) {
   return piece.corner[0] + u[0] * (piece.corner[1] - piece.corner[0]) + u[1] * (piece.corner[2] - piece.corner[0]);
 }
 
-}  // namespace
-
-std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
-                                     double facing_cosine, int wanted) {
-  const auto pieces = NearPart(surface, other, reach).pieces(static_cast<std::size_t>(wanted));
+/// Calls use(piece, barycentric, area) for `wanted` points spread evenly over the pieces' area.
+template <class Use>
+void spread_evenly(const SmoothSurface& surface, const std::vector<Piece>& pieces, int wanted, Use&& use) {
   double total = 0.0;
   std::vector<double> area;
   for (const Piece& p : pieces) area.push_back(p.share() * surface.area(p.triangle)), total += area.back();
-
-  std::vector<NearSample> out;
   const double step = total / wanted;
   double covered = 0.0;
   std::size_t i = 0;
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     covered += area[p];
-    for (; (static_cast<double>(i) + 0.5) * step < covered && i < static_cast<std::size_t>(wanted); ++i) {
-      const Vec3 barycentric = even_barycentric(pieces[p], i);
-      const Vec3 point = surface.point(pieces[p].triangle, barycentric);
-      const Vec3 normal = surface.normal(pieces[p].triangle, barycentric);
-      constexpr double kFacetFacing = -0.6;  // facets may bend from the smooth normals by half a segment on each side
-      const auto facing = other.tree().nearest(point, reach, normal, kFacetFacing);
-      if (!facing.found()) continue;
-      const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
-      if (normal.dot(facing_normal) > facing_cosine) continue;
-      out.push_back({{point, normal, facing.point, facing_normal, step, (point - facing.point).dot(facing_normal)},
-                     facing.distance,
-                     std::max(surface.chord_error(pieces[p].triangle), other.chord_error(facing.triangle))});
-    }
+    for (; (static_cast<double>(i) + 0.5) * step < covered && i < static_cast<std::size_t>(wanted); ++i)
+      use(pieces[p], even_barycentric(pieces[p], i), step);
   }
+}
+
+/// The nearest of every stride-th sample.
+std::vector<std::size_t> neighbours(const std::vector<NearSample>& samples, const Vec3& p, std::size_t stride,
+                                    std::size_t wanted) {
+  std::vector<std::pair<double, std::size_t>> all;
+  for (std::size_t j = 0; j < samples.size(); j += stride)
+    all.emplace_back((samples[j].contact.point - p).squaredNorm(), j);
+  wanted = std::min(wanted, all.size());
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted - 1), all.end());
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < wanted; ++k) out.push_back(all[k].second);
+  return out;
+}
+
+}  // namespace
+
+void average_patches(std::vector<NearSample>& samples) {
+  constexpr std::size_t kCandidates = 800, kPatches = 20;  // a patch is a twentieth of the contact
+  const std::size_t stride = 1 + samples.size() / kCandidates;
+  const std::size_t wanted = std::max<std::size_t>(6, samples.size() / stride / kPatches);
+  constexpr double kSameSide = 0.5;  // cosine; what bends more is another face
+  std::vector<NearSample> out;
+  for (const NearSample& s : samples) {
+    NearSample mean = s;
+    Vec3 own = s.facet, facing = s.facing_facet;
+    double count = 1.0;
+    for (const std::size_t j : neighbours(samples, s.contact.point, stride, wanted)) {
+      const NearSample& other = samples[j];
+      if (other.facet.dot(s.contact.normal) < kSameSide) continue;
+      own += other.facet;
+      facing += other.facing_facet;
+      mean.contact.point += other.contact.point;
+      mean.contact.facing_point += other.contact.facing_point;
+      count += 1.0;
+    }
+    mean.contact.normal = own.normalized();
+    mean.contact.facing_normal = facing.normalized();
+    mean.contact.point /= count;
+    mean.contact.facing_point /= count;
+    out.push_back(mean);
+  }
+  samples = std::move(out);
+}
+
+std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
+                                     double facing_cosine, int wanted) {
+  const auto may_face = [&](Index triangle, const Vec3& centre, double radius) {
+    constexpr double kLooseFacing = -0.5;  // of facets; the smooth normals decide later
+    return other.tree().nearest(centre, reach + radius, surface.tree().normal(triangle), kLooseFacing).found();
+  };
+  Eigen::AlignedBox3d box = other.tree().box();
+  box.min().array() -= reach;
+  box.max().array() += reach;
+  const auto pieces = NearPart(surface, may_face).pieces(box, static_cast<std::size_t>(wanted), 0.25 * reach);
+
+  std::vector<NearSample> out;
+  spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
+    const Vec3 point = surface.point(piece.triangle, barycentric), normal = surface.normal(piece.triangle, barycentric);
+    constexpr double kFacetFacing = -0.6;  // facets may bend from the smooth normals by half a segment on each side
+    const auto facing = other.tree().nearest(point, reach, normal, kFacetFacing);
+    if (!facing.found()) return;
+    const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
+    if (normal.dot(facing_normal) > facing_cosine) return;
+    out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal)},
+                   surface.tree().normal(piece.triangle),
+                   other.tree().normal(facing.triangle),
+                   facing.distance,
+                   std::max(surface.chord_error(piece.triangle), other.chord_error(facing.triangle))});
+  });
+  return out;
+}
+
+std::vector<NearSample> inside_samples(const SmoothSurface& surface, const SmoothSurface& solid, int wanted) {
+  const Eigen::AlignedBox3d& box = solid.tree().box();
+  const auto may_be_inside = [&](Index, const Vec3& centre, double radius) {
+    return box.squaredExteriorDistance(centre) <= radius * radius;
+  };
+  const auto pieces = NearPart(surface, may_be_inside).pieces(box, static_cast<std::size_t>(wanted), 0.0);
+  std::vector<NearSample> out;
+  spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
+    const Vec3 point = surface.point(piece.triangle, barycentric), normal = surface.normal(piece.triangle, barycentric);
+    const Vec3& facet = surface.tree().normal(piece.triangle);
+    if (solid.tree().winding(point) > 0)
+      out.push_back(
+          {{point, normal, point, -normal, area, 0.0}, facet, -facet, 0.0, surface.chord_error(piece.triangle)});
+  });
   return out;
 }
 

@@ -10,6 +10,7 @@ namespace limber {
 
 struct NearSample {
   ContactSample contact;
+  Vec3 facet, facing_facet;  ///< unit normals of the two triangles
   double distance = 0.0;     ///< unsigned gap
   double chord_error = 0.0;  ///< of the two triangles, the larger
 };
@@ -19,5 +20,14 @@ struct NearSample {
 /// @param wanted points over that part; fewer come back where it faces nothing
 std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
                                      double facing_cosine, int wanted);
+
+/// Points spread evenly over the part of `surface` that lies inside a closed surface. Each faces itself.
+std::vector<NearSample> inside_samples(const SmoothSurface& surface, const SmoothSurface& solid, int wanted);
+
+/// Replaces each sample by the mean of a patch around it: points, and facets' normals, whose sum is the patch's vector
+/// area, in which noise of vertices inside cancels. Means of points and normals belong together: where normals are
+/// linear in the point (planes, spheres, cylinders) they stay so. For rough surfaces; a smooth one's own normals are
+/// better.
+void average_patches(std::vector<NearSample>& samples);
 
 }  // namespace limber

@@ -192,8 +192,9 @@ std::vector<Judged> judged_families(const MotionSpace& space, double threshold) 
        {fit_ball(space), fit_planar(space), fit_cylindrical(space), revolute, fit_prismatic(space), Family{}})
     all.push_back(judge(space, family, threshold));
   const double rotation_mu = all[3].slippage, translation_mu = all[4].slippage;
-  // An axis far off is a translation in disguise.
-  constexpr double kFarAxis = 15.0;  // of the contact's RMS radius
+  // A centre far off is a plane, and an axis far off a translation, in disguise.
+  constexpr double kFarCentre = 4.0, kFarAxis = 15.0;  // of the contact's RMS radius
+  if (all[0].family.origin.norm() > kFarCentre) all[0].log_evidence -= 10.0;
   if (revolute.origin.norm() > kFarAxis) all[3].log_evidence -= 10.0;
   if (const auto screw = fit_screw(space)) {
     const Judged judged = judge(space, *screw, threshold);

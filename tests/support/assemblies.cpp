@@ -199,7 +199,7 @@ void chair(Builder& b) {
                        {0.018, high + k},
                        {0.018, high + k + 0.008},
                        {0, high + k + 0.008}},
-                      b.n(), 0.0, {1, 0, 0, 1, 0, 0, 0, 1, 1}));
+                      b.n(), 0.0, {1, 0, 0, 0, 0, 0, 0, 0, 1}));
   b.add("seat", lathe({{q + k, low}, {0.05, low}, {0.2, low + 0.02}, {0.2, low + 0.05}, {0.04, high}, {q + k, high}},
                       b.n(), b.v.phase));
   b.truth("foot", "stem", JointType::kCylindrical, at({0, 0, 0.1}));

@@ -12,7 +12,7 @@ namespace limber {
 
 /// A point of one surface that faces the other.
 struct ContactSample {
-  Vec3 point;          ///< on its own surface
+  Vec3 point;          ///< on its own surface; of a rough one the mean of a patch
   Vec3 normal;         ///< outward, smooth across edges blunter than the crease angle; unit
   Vec3 facing_point;   ///< nearest facing point of the other surface
   Vec3 facing_normal;  ///< the other surface's outward normal there; unit
