@@ -10,15 +10,24 @@ HWY_BEFORE_NAMESPACE();
 namespace limber::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+using Many = hn::CappedTag<float, kBoundsLanes>;  // eight lanes, or as many as there are
+
+// Half floats; the box of a large body is bound by reading them.
+HWY_INLINE HWY_ATTR hn::Vec<Many> Coefficients(const std::uint16_t* HWY_RESTRICT bits) {
+  const hn::Rebind<std::uint16_t, Many> d;
+  const hn::Rebind<hwy::float16_t, Many> half;
+  return hn::PromoteTo(Many(), hn::BitCast(half, hn::Load(d, bits)));
+}
+
 #if HWY_TARGET == HWY_SCALAR
 
 // Without vectors of four.
-void MakeBox(const StateView& state, const float* constants, const float* row, NodeBox* box) {
+HWY_ATTR void MakeBox(const StateView& state, const float* constants, const std::uint16_t* row, NodeBox* box) {
   for (std::size_t axis = 0; axis < 3; ++axis, row += state.stride) {
     float center = 0.0f, by_mode = 0.0f;
     for (std::size_t i = 0; i < state.stride; ++i) {
-      center += row[i] * state.amplitudes[i];
-      by_mode += row[3 * state.stride + i] * state.magnitudes[i];
+      center += hn::GetLane(Coefficients(row + i)) * state.amplitudes[i];
+      by_mode += hn::GetLane(Coefficients(row + 3 * state.stride + i)) * state.magnitudes[i];
     }
     const float by_energy = constants[8 + axis] * state.norm;
     const float half = constants[4 + axis] + (by_mode < by_energy ? by_mode : by_energy);
@@ -95,7 +104,6 @@ HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, 
 #else
 
 using Four = hn::FixedTag<float, 4>;
-using Many = hn::CappedTag<float, kBoundsLanes>;  // eight lanes, or four
 using Quad = hn::Vec<Four>;
 
 HWY_INLINE HWY_ATTR Quad Fold(hn::Vec<Many> v) {
@@ -116,19 +124,19 @@ HWY_INLINE HWY_ATTR Quad SumOfEach(Quad x, Quad y, Quad z) {
 }
 
 HWY_INLINE HWY_ATTR void MakeBox(const StateView& state, const float* HWY_RESTRICT constants,
-                                 const float* HWY_RESTRICT row, NodeBox* box) {
+                                 const std::uint16_t* HWY_RESTRICT row, NodeBox* box) {
   const Many d;
   const Four four;
   const std::size_t n = state.stride;
   auto cx = hn::Zero(d), cy = cx, cz = cx, dx = cx, dy = cx, dz = cx;
   for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
     const auto z = hn::Load(d, state.amplitudes + i), m = hn::Load(d, state.magnitudes + i);
-    cx = hn::MulAdd(hn::Load(d, row + i), z, cx);
-    cy = hn::MulAdd(hn::Load(d, row + n + i), z, cy);
-    cz = hn::MulAdd(hn::Load(d, row + 2 * n + i), z, cz);
-    dx = hn::MulAdd(hn::Load(d, row + 3 * n + i), m, dx);
-    dy = hn::MulAdd(hn::Load(d, row + 4 * n + i), m, dy);
-    dz = hn::MulAdd(hn::Load(d, row + 5 * n + i), m, dz);
+    cx = hn::MulAdd(Coefficients(row + i), z, cx);
+    cy = hn::MulAdd(Coefficients(row + n + i), z, cy);
+    cz = hn::MulAdd(Coefficients(row + 2 * n + i), z, cz);
+    dx = hn::MulAdd(Coefficients(row + 3 * n + i), m, dx);
+    dy = hn::MulAdd(Coefficients(row + 4 * n + i), m, dy);
+    dz = hn::MulAdd(Coefficients(row + 5 * n + i), m, dz);
   }
   const Quad center = hn::Add(hn::Load(four, constants), SumOfEach(Fold(cx), Fold(cy), Fold(cz)));
   const Quad by_mode = SumOfEach(Fold(dx), Fold(dy), Fold(dz));
@@ -222,8 +230,8 @@ HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, 
 
 #endif  // HWY_TARGET
 
-HWY_ATTR void MakeBoxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
-                        std::uint32_t stamp, NodeBox* boxes) {
+HWY_ATTR void MakeBoxes(const StateView& state, const float* constants, const std::uint16_t* coefficients,
+                        std::size_t count, std::uint32_t stamp, NodeBox* boxes) {
   for (std::size_t i = 0; i < count; ++i) {
     MakeBox(state, constants + i * kNodeConstants, coefficients + i * 6 * state.stride, boxes + i);
     boxes[i].stamp = stamp;
@@ -232,7 +240,8 @@ HWY_ATTR void MakeBoxes(const StateView& state, const float* constants, const fl
 
 HWY_ATTR StateSums PrepareState(const double* HWY_RESTRICT z, std::size_t modes, std::size_t stride,
                                 const double* HWY_RESTRICT largest, const double* HWY_RESTRICT weights,
-                                float* HWY_RESTRICT amplitudes, float* HWY_RESTRICT magnitudes) {
+                                const double* HWY_RESTRICT scale, float* HWY_RESTRICT amplitudes,
+                                float* HWY_RESTRICT magnitudes) {
   const hn::CappedTag<double, kBoundsLanes> d;
   const hn::Rebind<float, decltype(d)> f;
   constexpr std::size_t kLanes = hn::MaxLanes(d);
@@ -243,15 +252,16 @@ HWY_ATTR StateSums PrepareState(const double* HWY_RESTRICT z, std::size_t modes,
     const auto m = hn::Abs(a);
     farthest = hn::MulAdd(m, hn::LoadU(d, largest + i), farthest);
     squared = hn::MulAdd(hn::Mul(a, a), hn::LoadU(d, weights + i), squared);
-    hn::Store(hn::DemoteTo(f, a), f, amplitudes + i);
-    hn::Store(hn::DemoteTo(f, m), f, magnitudes + i);
+    const auto to = hn::LoadU(d, scale + i);
+    hn::Store(hn::DemoteTo(f, hn::Mul(a, to)), f, amplitudes + i);
+    hn::Store(hn::DemoteTo(f, hn::Mul(m, to)), f, magnitudes + i);
   }
   StateSums sums{hn::GetLane(hn::SumOfLanes(d, farthest)), hn::GetLane(hn::SumOfLanes(d, squared))};
   for (; i < modes; ++i) {
     const double m = z[i] < 0.0 ? -z[i] : z[i];
     sums.farthest += m * largest[i];
     sums.squared_norm += z[i] * z[i] * weights[i];
-    amplitudes[i] = static_cast<float>(z[i]), magnitudes[i] = static_cast<float>(m);
+    amplitudes[i] = static_cast<float>(z[i] * scale[i]), magnitudes[i] = static_cast<float>(m * scale[i]);
   }
   for (; i < stride; ++i) amplitudes[i] = magnitudes[i] = 0.0f;
   return sums;
@@ -301,11 +311,11 @@ HWY_EXPORT(RefitBoxes);
 HWY_EXPORT(BoxesWithin);
 
 StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
-                        const double* weights, float* amplitudes, float* magnitudes) {
-  return HWY_DYNAMIC_DISPATCH(PrepareState)(z, modes, stride, largest, weights, amplitudes, magnitudes);
+                        const double* weights, const double* scale, float* amplitudes, float* magnitudes) {
+  return HWY_DYNAMIC_DISPATCH(PrepareState)(z, modes, stride, largest, weights, scale, amplitudes, magnitudes);
 }
 
-void make_boxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
+void make_boxes(const StateView& state, const float* constants, const std::uint16_t* coefficients, std::size_t count,
                 std::uint32_t stamp, NodeBox* boxes) {
   HWY_DYNAMIC_DISPATCH(MakeBoxes)(state, constants, coefficients, count, stamp, boxes);
 }

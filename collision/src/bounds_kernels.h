@@ -26,8 +26,8 @@ inline constexpr std::size_t kNodeConstants = 16;
 
 /// Amplitudes in the forms that the loops read, each padded to a multiple of kBoundsLanes.
 struct StateView {
-  const float* amplitudes;  ///< z
-  const float* magnitudes;  ///< |z|
+  const float* amplitudes;  ///< z · scale
+  const float* magnitudes;  ///< |z| · scale
   float norm;               ///< ‖z‖_w, rounded up
   std::size_t stride;       ///< of the rows of coefficients: modes, padded
 };
@@ -37,10 +37,11 @@ struct StateSums {
   double farthest, squared_norm;
 };
 StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
-                        const double* weights, float* amplitudes, float* magnitudes);
+                        const double* weights, const double* scale, float* amplitudes, float* magnitudes);
 
 /// `count` boxes in a row: center + C z ± (half + min(d |z|, energy ‖z‖_w)).
-void make_boxes(const StateView& state, const float* constants, const float* coefficients, std::size_t count,
+/// @param coefficients half floats, 16-byte aligned
+void make_boxes(const StateView& state, const float* constants, const std::uint16_t* coefficients, std::size_t count,
                 std::uint32_t stamp, NodeBox* boxes);
 
 /// u = Σ z_i u_i for one vertex. @param rows three, `stride` floats apart, zero from `modes` on

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "limber/core/disjoint_sets.h"
@@ -58,6 +58,7 @@ CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, cons
     for (Index v = 0; v < surface.vertices(); ++v)
       largest = std::max(largest, surface.basis.shape(v, m).cast<double>().norm());
     largest_shape_.push_back(largest * (1.0 + 1e-15));
+    scale_.push_back(largest > 0.0 ? std::exp2(std::ceil(std::log2(largest))) : 1.0);
   }
   double positive = 1.0;
   for (const double lambda : model_->data().eigenvalues)

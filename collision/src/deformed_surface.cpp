@@ -53,8 +53,9 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
                           std::to_string(surface->modes()));
   reserve(*surface);
   Scratch& s = *scratch_;
-  const StateSums sums = prepare_state(z.data(), z.size(), surface->stride_, surface->largest_shape_.data(),
-                                       surface->weights_.data(), s.amplitudes.data(), s.magnitudes.data());
+  const StateSums sums =
+      prepare_state(z.data(), z.size(), surface->stride_, surface->largest_shape_.data(), surface->weights_.data(),
+                    surface->scale_.data(), s.amplitudes.data(), s.magnitudes.data());
   const double norm = std::sqrt(sums.squared_norm);
   if (!(sums.farthest <= kFarthest && norm <= kLargestNorm)) {
     surface_ = nullptr;

@@ -1,4 +1,5 @@
 // The tree of a CollisionSurface and the bounds of its nodes as functions of the amplitudes; see docs/collision.md.
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,6 +26,14 @@ double sum_error(Index modes) {
 float rounded_up(double x) {
   const float f = static_cast<float>(x);
   return static_cast<double>(f) < x ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
+}
+
+/// Bits of the least half float that is not less. @pre 0 ≤ x ≤ 60000
+std::uint16_t half_rounded_up(double x) {
+  Eigen::half h(static_cast<float>(x));
+  if (static_cast<double>(static_cast<float>(h)) < x)
+    ++h.x;  // the next one up: positive numbers ascend with their bits
+  return h.x;
 }
 
 }  // namespace
@@ -85,7 +94,7 @@ void CollisionSurface::build_bounds() {
   const auto k = static_cast<std::size_t>(modes_);
   stride_ = (k + kBoundsLanes - 1) / kBoundsLanes * kBoundsLanes;
   constants_ = AlignedArray<float>(nodes_.size() * kNodeConstants);
-  coefficients_ = AlignedArray<float>(nodes_.size() * 6 * stride_);
+  coefficients_ = AlignedArray<std::uint16_t>(nodes_.size() * 6 * stride_);
   std::vector<Index> below;
   std::vector<std::size_t> seen(rest_.size(), nodes_.size());
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
@@ -103,8 +112,9 @@ void CollisionSurface::build_bounds() {
 void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index> below) {
   const auto k = static_cast<std::size_t>(modes_);
   const double error = sum_error(modes_);
-  float* const C = coefficients_.data() + (n * 6 + static_cast<std::size_t>(axis)) * stride_;
-  float* const d = C + 3 * stride_;
+  std::uint16_t* const C = coefficients_.data() + (n * 6 + static_cast<std::size_t>(axis)) * stride_;
+  std::uint16_t* const d = C + 3 * stride_;
+  std::vector<double> middle(k);
   double underflow = (static_cast<double>(modes_) + 8.0) * kUnderflow, center_energy = 0.0, energy = 0.0;
 
   double least = std::numeric_limits<double>::infinity(), greatest = -least;
@@ -118,18 +128,20 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
     for (std::size_t i = 0; i < k; ++i) low[i] = std::min(low[i], u[i]), high[i] = std::max(high[i], u[i]);
   }
   for (std::size_t i = 0; i < k; ++i) {
-    C[i] = static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])));
-    const double middle = C[i];
-    const double spread = std::max(high[i] - middle, middle - low[i]) + error * std::abs(middle);
-    d[i] = rounded_up(spread * (1.0 + error));
-    center_energy += middle * middle / weights_[i];
-    underflow += kUnderflow * (std::abs(middle) + spread);
+    const Eigen::half C_i(
+        static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])) / scale_[i]));
+    C[i] = C_i.x;
+    middle[i] = static_cast<double>(static_cast<float>(C_i)) * scale_[i];
+    const double spread = std::max(high[i] - middle[i], middle[i] - low[i]) + error * std::abs(middle[i]);
+    d[i] = half_rounded_up(spread * (1.0 + error) / scale_[i]);
+    center_energy += middle[i] * middle[i] / weights_[i];
+    underflow += kUnderflow * 4.0;  // of terms that are at most about the scale's
   }
   for (const Index v : below) {
     const float* u = row(v, axis);
     double sum = 0.0;
     for (std::size_t i = 0; i < k; ++i) {
-      const double difference = static_cast<double>(u[i]) - static_cast<double>(C[i]);
+      const double difference = static_cast<double>(u[i]) - middle[i];
       sum += difference * difference / weights_[i];
     }
     energy = std::max(energy, sum);

@@ -152,10 +152,12 @@ class CollisionSurface {
   // Bounds of a node as a function of the amplitudes, see docs/collision.md:
   //   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
   // rounded so that the box, evaluated in single precision, encloses the vertices evaluated in double.
-  std::vector<double> weights_;       ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
-  std::size_t stride_ = 0;            ///< of the rows of C and d: modes, padded
-  AlignedArray<float> constants_;     ///< per node c, h, e
-  AlignedArray<float> coefficients_;  ///< per node six rows: C x, y, z, d x, y, z
+  std::vector<double> weights_;    ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
+  std::vector<double> scale_;      ///< of each mode, a power of two: C and d are stored divided by it
+  std::size_t stride_ = 0;         ///< of the rows of C and d: modes, padded
+  AlignedArray<float> constants_;  ///< per node c, h, e
+  /// Per node six rows, C x, y, z, d x, y, z, as half floats: the boxes of a large body are bound by reading them.
+  AlignedArray<std::uint16_t> coefficients_;
 };
 
 }  // namespace limber
