@@ -105,7 +105,7 @@ struct Pair {
       X_AB.q = quaternion_from_rotation_vector({0.0, 0.0, 0.7});
       X_AB.p = Vec3(scene == kFar ? 16.0 : gap_free_distance() + (scene == kNearBalls ? 0.04 : -0.02), 0.0, 0.0);
     } else {
-      X_AB.p = Vec3(0.0, 0.0, scene == kEverywhere ? 1e-5 : 0.096);
+      X_AB.p = Vec3(0.0, 0.0, scene == kEverywhere ? 1e-5 : 0.085);
     }
   }
 
@@ -133,8 +133,8 @@ struct Query {
   DeformedSurface::Counters last_a, last_b;
 
   void run(const Pair& pair, BoundsChoice choice) {
-    a.bind(pair.a, pair.z_a, choice, last_a.boxes);
-    b.bind(pair.b, pair.z_b, choice, last_b.boxes);
+    a.bind(pair.a, pair.z_a, choice, &last_a);
+    b.bind(pair.b, pair.z_b, choice, &last_b);
     pairs.clear();
     find_triangle_pairs(a, b, pair.X_AB, 0.0, pairs);
     last_a = a.counters(), last_b = b.counters();
@@ -287,6 +287,50 @@ void boxes(benchmark::State& state) {
   state.counters["triangles"] = bodies.a->triangles();
 }
 
+/// range(0) modes, range(1) bodies: balls of 2,600 triangles on a cubic grid, each tested with its three neighbours
+/// ahead, 5 % of the diameter apart or (range(2)) touching: flexing, with states of their own, and the same surface
+/// rigid.
+void crowd(benchmark::State& state) {
+  const auto modes = static_cast<Index>(state.range(0));
+  const auto count = static_cast<Index>(state.range(1));
+  const Surface flexing = std::make_shared<const CollisionSurface>(testing::wavy_model(ball(26), modes));
+  const SurfaceMesh mesh = ball(26);
+  const Surface rigid = std::make_shared<const CollisionSurface>(TriangleMesh{mesh.vertices, mesh.triangles});
+  std::vector<std::vector<double>> z;
+  for (Index b = 0; b < count; ++b) {
+    z.emplace_back();
+    for (Index i = 0; i < modes; ++i) z.back().push_back(0.004 * std::sin(1.0 + i + 3.7 * b) / (1.0 + 0.6 * i));
+  }
+  DeformedSurface a, b;
+  std::vector<TrianglePair> pairs;
+  const double spacing = state.range(2) != 0 ? 2.0 : 2.1;
+  const auto all = [&](const Surface& surface, bool flexes) {
+    const auto amplitudes_of = [&](Index body) {
+      return flexes ? std::span<const double>(z[static_cast<std::size_t>(body % count)]) : std::span<const double>();
+    };
+    for (Index body = 0; body < count; ++body) {
+      a.bind(surface, amplitudes_of(body));
+      for (int axis = 0; axis < 3; ++axis) {
+        b.bind(surface, amplitudes_of(body + 1 + 10 * axis));
+        pairs.clear();
+        const Quaternion turned = quaternion_from_rotation_vector(Vec3(0.1 * (body % 7), 0.2, 0.3 * axis));
+        find_triangle_pairs(a, b, {.q = turned, .p = Vec3(spacing * Vec3::Unit(axis))}, 0.0, pairs);
+      }
+    }
+  };
+  double seconds[2] = {};
+  for (auto _ : state) {
+    seconds[0] = least_seconds(
+        state, [&] { all(flexing, true); }, 1);
+    seconds[1] = least_seconds(
+        state, [&] { all(rigid, false); }, 1);
+  }
+  state.counters["flexing_us_per_body"] = 1e6 * seconds[0] / count;
+  state.counters["rigid_us_per_body"] = 1e6 * seconds[1] / count;
+  state.counters["flexing_over_rigid"] = seconds[0] / seconds[1];
+}
+
+BENCHMARK(crowd)->ArgNames({"modes", "bodies", "touching"})->ArgsProduct({{8, 32}, {2000}, {0, 1}})->Iterations(1);
 BENCHMARK(boxes)->ArgNames({"modes", "leaf", "large"})->ArgsProduct({{8, 32, 64}, {1, 2, 4, 8}, {0, 1}})->Iterations(1);
 BENCHMARK(pair)
     ->ArgNames({"scene", "large", "modes"})

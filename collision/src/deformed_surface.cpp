@@ -21,13 +21,16 @@ Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) %
 
 /// How many boxes from amplitudes cost as much as one refit, in floats read from the near cache. A refit streams: three
 /// floats per mode and vertex, and about 32 floats' time per triangle. Boxes lie scattered, and the wider ones among
-/// them lead the walk to more tests and vertices: all in all six floats per mode take four times as long (measured, see
-/// docs/collision.md).
+/// them lead the walk to more tests and vertices, which is most of their price: measured, see docs/collision.md.
 long boxes_per_refit(const CollisionSurface& surface) {
   const double k = surface.modes();
-  const double box = 24.0 * k + 800.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
+  const double box = 48.0 * k + 1000.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
   return static_cast<long>((vertex * surface.vertices() + triangle * surface.triangles()) / box);
 }
+
+/// Boxes that a query would have asked for without a refit, whose tighter ones end the walk earlier: up to half as
+/// many.
+long wanted_boxes(const DeformedSurface::Counters& last) { return last.refits > 0 ? 2 * last.boxes : last.boxes; }
 
 void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
   for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
@@ -46,7 +49,7 @@ std::span<const double> DeformedSurface::amplitudes() const {
 }
 
 void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-                           BoundsChoice choice, long expected_boxes) {
+                           BoundsChoice choice, const Counters* last) {
   if (!surface) throw InvalidArgument("DeformedSurface::bind: the surface is null, expected one");
   if (z.size() != static_cast<std::size_t>(surface->modes()))
     throw InvalidArgument("DeformedSurface::bind: " + std::to_string(z.size()) + " amplitudes, expected " +
@@ -71,7 +74,8 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
 
   const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
   s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
-  if (choice == BoundsChoice::kRefit || (choice == BoundsChoice::kAutomatic && expected_boxes > worth)) refit();
+  const bool expected = choice == BoundsChoice::kAutomatic && last != nullptr && wanted_boxes(*last) > worth;
+  if (choice == BoundsChoice::kRefit || expected) refit();
 }
 
 void DeformedSurface::reserve(const CollisionSurface& surface) {
