@@ -38,7 +38,8 @@ void IslandBodies::set(std::span<const ConstrainedBody> table, std::span<const I
 
 void IslandBodies::place(StepTime when) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const auto [group, slot] = bodies_[i];
+    BodyGroup* const group = bodies_[i].group;
+    const Index slot = bodies_[i].slot;
     const RigidFrame& frame = when == StepTime::kStart ? group->frame(slot) : group->predicted_frame(slot);
     responses_[i] = body_response(*group, frame.pose().q);
   }

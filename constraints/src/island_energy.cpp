@@ -49,7 +49,7 @@ void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
   before_ = 0.0;
   driven_ = false;
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     before_ += group->energy(slot, gravity).total();
     driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
   }
@@ -60,7 +60,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
   if (driven_) return {};
   double after = 0.0, damped = 0.0, scale = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const BodyEnergy energy = group->predicted_energy(slot, options.gravity);
     after += energy.total();
@@ -83,7 +83,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
 double IslandEnergy::load_work(const IslandBodies& bodies, double step) {
   double work = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const RigidFrame &start = group->frame(slot), &end = group->predicted_frame(slot);
     work += group->held_force(slot).dot(end.pose().p - start.pose().p) +
@@ -108,7 +108,7 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
   double mass = 0.0;
   Vec3 first = Vec3::Zero(), momentum = Vec3::Zero();
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     mass += c.mass;
     first += c.mass * predicted_center(*group, slot);
@@ -118,7 +118,7 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
   Mat3 inertia = Mat3::Zero();
   Vec3 angular_momentum = Vec3::Zero();
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const RigidFrame& frame = group->predicted_frame(slot);
     const Mat3 R = to_matrix(frame.pose().q);
@@ -136,7 +136,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
                                             double largest_part) {
   double kinetic = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     kinetic += relative_motion(*group, slot, common).energy;
     for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
   }
@@ -144,7 +144,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   excess = std::clamp(excess, -kLargestChange * kinetic, largest_part * kinetic);
   const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
   for (Index local = 0; local < bodies.count(); ++local) {
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const RelativeMotion r = relative_motion(*group, slot, common);
     const std::span<const double> rates = group->predicted_rates(slot);
     modal_.assign(rates.size(), 0.0);

@@ -142,7 +142,7 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
   for (const ConstraintRows::Side& side : rows.row(row).sides) {
     const Index local = bodies.local(side.body);
     if (local < 0) continue;
-    const auto [group, slot] = bodies.body(local);
+    const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const BodyResponse& r = bodies.response(local);
     const RigidFrame& frame = frame_at(*group, slot, when);

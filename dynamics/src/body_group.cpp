@@ -139,7 +139,7 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
 
 void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
   for (Index slot = begin; slot < end; ++slot)
-    if (body(slot).occupied) advance_body(slot, gravity);
+    if (body(slot).occupied && !body(slot).constrained) advance_body(slot, gravity);
 }
 
 void BodyGroup::advance_body(Index slot, const Vec3& gravity) {

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <string>
+#include <type_traits>
 
+#include "constraint_stage.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/reconstruct.h"
@@ -96,6 +98,7 @@ struct World::Impl {
   std::vector<std::uint32_t> vacant_entries;
   std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
   std::vector<Range> ranges;                       // covers all slots of all groups
+  ConstraintStage constraints;                     // bodies by their entries' indices
   std::size_t alive = 0;
   std::uint64_t steps = 0;
   double accumulator = 0.0, dropped = 0.0;
@@ -119,6 +122,24 @@ struct World::Impl {
     return id.index < entries.size() && entries[id.index].alive && entries[id.index].generation == id.generation;
   }
   BodyGroup& group(const Entry& e) const { return *groups[static_cast<std::size_t>(e.group)]; }
+
+  /// The constraint that an id names, if it is of the kind asked for.
+  template <class Id>
+  const ConstraintStage::Entry* find(Id id) const {
+    if (id.index >= constraints.entries().size()) return nullptr;
+    const ConstraintStage::Entry& e = constraints.entries()[id.index];
+    const bool kind = std::is_same_v<Id, HandleId> ? e.handle != nullptr : e.joint != nullptr;
+    return kind && e.generation == id.generation ? &e : nullptr;
+  }
+  template <class Id>
+  const ConstraintStage::Entry& constraint(Id id, const char* function) const {
+    if (const ConstraintStage::Entry* found = find(id)) return *found;
+    throw InvalidArgument(std::string("World::") + function + ": " +
+                          (std::is_same_v<Id, HandleId> ? "handle " : "joint ") + std::to_string(id.index) +
+                          " (generation " + std::to_string(id.generation) +
+                          ") does not exist; it was removed, with its body or by itself, or belongs to another world");
+  }
+  MaterialFrame joint_side(BodyId id, const JointFrame& in_world, const JointAttachment& on) const;
 
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
@@ -148,12 +169,27 @@ void World::Impl::make_ranges() {
       ranges.push_back({static_cast<Index>(g), begin, std::min(begin + kBodiesPerJob, groups[g]->slots())});
 }
 
+/// The joint's frame on one part, as it stands.
+MaterialFrame World::Impl::joint_side(BodyId id, const JointFrame& in_world, const JointAttachment& on) const {
+  if (id == BodyId{}) return MaterialFrame(in_world);
+  const Entry& e = entry(id, "add_joint");
+  const ModalModel& model = group(e).model();
+  const RigidTransform X_BW = group(e).frame(e.slot).pose().inverse();
+  const JointFrame in_body{.origin = X_BW * in_world.origin, .axes = to_matrix(X_BW.q) * in_world.axes};
+  const auto body = static_cast<Index>(id.index);
+  if (model.modes() == 0) return {body, in_body};
+  if (!on.patch.empty()) return {body, model, on.patch, in_body};
+  return {body, model, patch_around(model, on.surface, in_body.origin, on.radius), in_body};
+}
+
 void World::Impl::advance_all() {
+  constraints.find_islands();
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
   jobs->parallel_for(ranges.size(), 1, [this](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r)
       groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
   });
+  constraints.step(*jobs, {.step = options.step, .gravity = options.gravity});
 }
 
 /// Amplitudes between the last two states.
@@ -209,6 +245,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   Impl::Entry& entry = impl_->entries[index];
   entry.alive = true, entry.group = group, entry.slot = slot;
   ++impl_->alive;
+  impl_->constraints.set_body(static_cast<Index>(index), {.group = &impl_->group(entry), .slot = slot});
   impl_->make_ranges();
   return {index, entry.generation};
 }
@@ -216,6 +253,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
 void World::remove_body(BodyId id) {
   const Impl::Entry& known = impl_->entry(id, "remove_body");
   BodyGroup& group = impl_->group(known);
+  impl_->constraints.remove_body(static_cast<Index>(id.index));
   group.remove(known.slot);
   if (group.count() == 0) {  // lets go of the model
     impl_->groups[static_cast<std::size_t>(known.group)].reset();
@@ -279,6 +317,7 @@ void World::apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_
                           " s, expected from 0 to less than " + std::to_string(impl_->options.step));
   const Vec3 impulse_W = axes == Axes::kWorld ? newton_seconds : group.frame(e.slot).pose().q * newton_seconds;
   group.apply_impulse(e.slot, at, impulse_W, delay);
+  impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 void World::set_kinematic_frame(BodyId id, const KinematicFrame& target) {
@@ -296,6 +335,87 @@ void World::set_kinematic_frame(BodyId id, const KinematicFrame& target) {
   group.set_parent(e.slot, target);
 }
 
+// Constraints ---------------------------------------------------------------------------------------------------------
+
+HandleId World::add_handle(BodyId id, const SurfacePoint& at, const HandleOptions& options) {
+  const Impl::Entry& e = impl_->entry(id, "add_handle");
+  const ModalModel& model = impl_->group(e).model();
+  validate(model, at);
+  auto made = std::make_unique<Handle>(MaterialFrame(static_cast<Index>(id.index), model, at),
+                                       impl_->group(e).position(e.slot, at), options);
+  const std::uint32_t index = impl_->constraints.add(std::move(made));
+  return {index, impl_->constraints.entries()[index].generation};
+}
+
+void World::remove_handle(HandleId id) {
+  impl_->constraint(id, "remove_handle");
+  impl_->constraints.remove(id.index);
+}
+
+bool World::contains(HandleId id) const { return impl_->find(id) != nullptr; }
+
+void World::set_handle_target(HandleId id, const HandleTarget& target) {
+  const ConstraintStage::Entry& e = impl_->constraint(id, "set_handle_target");
+  require_finite(target.position, "set_handle_target", "position");
+  require_finite(target.velocity, "set_handle_target", "velocity");
+  e.handle->set_target(target);
+}
+
+HandleView World::handle(HandleId id) const {
+  const Handle& h = *impl_->constraint(id, "handle").handle;
+  return {.target = h.target(), .force = h.force(), .error = h.error()};
+}
+
+JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a,
+                         const JointAttachment& on_b) {
+  spec.validate();
+  if (a == b) throw InvalidArgument("World::add_joint: both parts are the same");
+  for (const JointAttachment* on : {&on_a, &on_b})
+    if (!(on->radius >= 0.0 && std::isfinite(on->radius)))
+      throw InvalidArgument("World::add_joint: the attachment's radius is " + std::to_string(on->radius) +
+                            " m, expected a finite number of at least 0");
+  auto made = std::make_unique<JointConstraint>(impl_->joint_side(a, spec.frame, on_a),
+                                                impl_->joint_side(b, spec.frame, on_b), spec);
+  const std::uint32_t index = impl_->constraints.add(std::move(made));
+  return {index, impl_->constraints.entries()[index].generation};
+}
+
+void World::remove_joint(JointId id) {
+  impl_->constraint(id, "remove_joint");
+  impl_->constraints.remove(id.index);
+}
+
+bool World::contains(JointId id) const { return impl_->find(id) != nullptr; }
+
+void World::set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation) {
+  impl_->constraint(id, "set_joint_actuation").joint->set_actuation(coordinate, actuation);
+}
+
+JointView World::joint(JointId id) const {
+  const JointConstraint& j = *impl_->constraint(id, "joint").joint;
+  const BodyStates states = impl_->constraints.states();
+  const JointConstraint::Error error = j.error(states);
+  JointView view{.coordinates = j.coordinates(),
+                 .lock_force = j.force(),
+                 .distance_error = error.distance,
+                 .angle_error = error.angle};
+  for (int i = 0; i < j.coordinates(); ++i) {
+    view.position[static_cast<std::size_t>(i)] = j.coordinate(i, states);
+    view.force[static_cast<std::size_t>(i)] = j.coordinate_force(i);
+  }
+  return view;
+}
+
+ConstraintReport World::constraint_report() const {
+  const IslandReport r = impl_->constraints.report();
+  return {.islands = impl_->constraints.island_count(),
+          .bodies = r.bodies,
+          .rows = r.rows,
+          .iterations = r.iterations,
+          .solved = r.status == SolveStatus::kSolved,
+          .energy_removed = r.energy_removed};
+}
+
 // State ---------------------------------------------------------------------------------------------------------------
 
 BodyView World::body(BodyId id) const {
@@ -310,6 +430,7 @@ void World::set_pose(BodyId id, const RigidTransform& pose) {
   const Impl::Entry& e = impl_->entry(id, "set_pose");
   require_pose(pose, "set_pose");
   impl_->group(e).set_pose(e.slot, pose);
+  impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 void World::set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_velocity) {
@@ -317,6 +438,7 @@ void World::set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_ve
   require_finite(velocity, "set_velocity", "velocity");
   require_finite(angular_velocity, "set_velocity", "angular velocity");
   impl_->group(e).set_velocity(e.slot, velocity, angular_velocity);
+  impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::span<const double> rates) {
@@ -327,6 +449,7 @@ void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::s
   require_finite(amplitudes, "set_amplitudes", "amplitudes");
   require_finite(rates, "set_amplitudes", "rates");
   impl_->group(e).set_amplitudes(e.slot, amplitudes, rates);
+  impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 void World::set_node_displacements(BodyId id, std::span<const double> displacements,
@@ -352,6 +475,7 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
     return z;
   };
   impl_->group(e).set_amplitudes(e.slot, project(displacements), project(velocities));
+  impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 BodyEnergy World::energy(BodyId id) const {
@@ -448,6 +572,12 @@ std::uint64_t World::state_hash() const {
     hash.add(frame.angular_momentum(group.frame_constants()));
     hash.add(group.amplitudes(e.slot));
     hash.add(group.rates(e.slot));
+  }
+  for (const ConstraintStage::Entry& e : impl_->constraints.entries()) {
+    hash.add(std::uint64_t{e.generation});
+    if (e.handle) hash.add(e.handle->target().position);
+    for (int i = 0; e.joint && i < e.joint->coordinates(); ++i)
+      hash.add(e.joint->coordinate(i, impl_->constraints.states()));
   }
   return hash.value();
 }

@@ -21,10 +21,11 @@
 namespace limber {
 
 /// Names one body of a group. A table of these, indexed by the body numbers that rows use, is how constraints see a
-/// scene; entries that name no body have no group.
+/// scene. An entry without a group does not move: it stands at `pose`.
 struct ConstrainedBody {
   BodyGroup* group = nullptr;
   Index slot = 0;
+  RigidTransform pose{};  ///< X_WB, where there is no group
 };
 
 /// The degrees of freedom of one body at one instant, and what they weigh.

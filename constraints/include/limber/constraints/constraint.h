@@ -19,6 +19,7 @@ class BodyStates {
   Vec3 velocity(Index body, StepTime when) const;          ///< of the body origin, world, m/s
   Vec3 angular_velocity(Index body, StepTime when) const;  ///< world, rad/s
   std::span<const double> rates(Index body, StepTime when) const;
+  bool is_static(Index body) const { return body < 0 || this->body(body).group == nullptr; }
   const ConstrainedBody& body(Index body) const { return table_[static_cast<std::size_t>(body)]; }
 
  private:

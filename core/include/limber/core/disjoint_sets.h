@@ -14,7 +14,13 @@ namespace limber {
 class DisjointSets {
  public:
   /// Every index a set of its own.
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
+  explicit DisjointSets(std::size_t count = 0) { reset(count); }
+
+  /// The same anew; allocates only where there are more than ever before.
+  void reset(std::size_t count) {
+    parent_.resize(count);
+    std::iota(parent_.begin(), parent_.end(), Index{0});
+  }
 
   /// The lowest index of the set that holds i. @pre 0 ≤ i < count
   Index root(Index i) {

@@ -92,6 +92,9 @@ class BodyGroup {
   /// What advance() would do to one body, at any time within the step. The body stays as it is.
   void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const;
 
+  /// Whether advance() leaves the body alone: it is predicted and committed by whoever solves its constraints.
+  void set_constrained(Index slot, bool constrained) { body(slot).constrained = constrained; }
+
   // One step in two phases, for bodies under constraints: predict as often as wanted, then commit the last prediction.
   // predict() and commit() without a load come to the same bits as advance(). Neither allocates nor throws.
   /// Finds the state at the step's end under the body's own loads and `load`; the body itself does not change.
@@ -165,6 +168,7 @@ class BodyGroup {
     RigidTransform previous_pose;
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // held over the next step, world
     bool occupied = true;
+    bool constrained = false;
     bool modes_loaded = false;              // forces_ is not zero
     bool modes_static = false;              // static_amplitudes_ are not zero
     std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step

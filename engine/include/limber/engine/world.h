@@ -13,6 +13,10 @@
 /// order in the step (limber/dynamics/rigid_frame.h). Deterministic: same calls, same bits, for any Jobs. Once warm, a
 /// step allocates nothing. A World is used by one thread at a time; it spreads the work over its Jobs itself.
 ///
+/// Handles and joints tie bodies together. All of an island of bodies is one problem per step, solved at the step's
+/// end: held points and joints are where they should be to round-off, and the island's energy does not rise but by the
+/// work of what drives it (limber/constraints/island_solver.h). Bodies without constraints cost what they cost without.
+///
 /// All functions throw InvalidArgument, and then change nothing, for an id that names no body, for numbers that are not
 /// finite, and for arrays of the wrong length.
 #pragma once
@@ -23,6 +27,8 @@
 #include <span>
 #include <vector>
 
+#include "limber/constraints/handle.h"
+#include "limber/constraints/joint_constraint.h"
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
 #include "limber/dynamics/body_energy.h"
@@ -39,6 +45,20 @@ struct BodyId {
   friend bool operator==(const BodyId&, const BodyId&) = default;
 };
 
+/// Names a handle of one world. Stays invalid for good once it is removed, by itself or with its body.
+struct HandleId {
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;  ///< 0: no handle
+  friend bool operator==(const HandleId&, const HandleId&) = default;
+};
+
+/// Names a joint of one world, like HandleId.
+struct JointId {
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;  ///< 0: no joint
+  friend bool operator==(const JointId&, const JointId&) = default;
+};
+
 struct WorldOptions {
   double step = 1.0 / 60.0;             ///< s; > 0
   Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s², world
@@ -52,6 +72,38 @@ struct BodyPlacement {
   Vec3 velocity = Vec3::Zero();  ///< m/s; for bodies with fixed nodes: of what carries them
   /// rad/s; kLine: its part along the line counts; kKinematic: of what carries it
   Vec3 angular_velocity = Vec3::Zero();
+};
+
+/// How a joint sits on a deforming body: on a patch of its surface, whose mean displacement and rotation it follows.
+struct JointAttachment {
+  std::vector<SurfacePoint> patch{};  ///< its points; empty: vertices around the joint's origin
+  double radius = 0.0;                ///< m, ≥ 0; without a patch: all vertices within it, or the nearest one
+  SurfacePoint::Surface surface = SurfacePoint::Surface::kCollision;  ///< without a patch: of which surface
+};
+
+/// What a handle does, as of the last step.
+struct HandleView {
+  HandleTarget target{};      ///< for the coming step
+  Vec3 force = Vec3::Zero();  ///< mean force on the body, world, N
+  double error = 0.0;         ///< distance from the target along the held directions, m
+};
+
+/// What a joint does, as of the last step. The first `coordinates` numbers of each array count.
+struct JointView {
+  int coordinates = 0;
+  std::array<double, 3> position{};  ///< m or rad, with full turns; see joint_constraint.h for which
+  std::array<double, 3> force{};     ///< along each: limit, motor, drive and friction together, N or N·m
+  Vec3 lock_force = Vec3::Zero();    ///< of the locked translations on b, world, N
+  double distance_error = 0.0;       ///< of the locked freedoms, m
+  double angle_error = 0.0;          ///< rad
+};
+
+/// What the constraints of all islands took in the last step.
+struct ConstraintReport {
+  int islands = 0, bodies = 0, rows = 0;
+  int iterations = 0;           ///< the most that an island needed
+  bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
+  double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)
 };
 
 enum class Axes { kWorld, kBody };
@@ -82,7 +134,7 @@ class World {
 
   // Bodies -----------------------------------------------------------------------------------------------------------
   BodyId add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement = {});
-  void remove_body(BodyId id);
+  void remove_body(BodyId id);  ///< and with it its handles and joints
   bool contains(BodyId id) const;
   std::size_t body_count() const;
   const ModalModel& model(BodyId id) const;
@@ -111,6 +163,29 @@ class World {
   /// its parent's velocity and angular velocity without acceleration; at rest unless told otherwise.
   /// @throws InvalidArgument for a free body
   void set_kinematic_frame(BodyId id, const KinematicFrame& target);
+
+  // Handles ----------------------------------------------------------------------------------------------------------
+  /// Takes hold of a point where it is now.
+  HandleId add_handle(BodyId id, const SurfacePoint& at, const HandleOptions& options = {});
+  void remove_handle(HandleId id);
+  bool contains(HandleId id) const;
+  /// Where the point is wanted at the end of the coming step, and how it goes on from there.
+  void set_handle_target(HandleId id, const HandleTarget& target);
+  HandleView handle(HandleId id) const;
+
+  // Joints -----------------------------------------------------------------------------------------------------------
+  /// Joins two bodies as they stand: the pose now is the joint's reference, all its coordinates are 0.
+  /// @param a, b part b moves relative to part a; BodyId{} is the world, for one of them
+  /// @param spec its frame in world axes @throws InvalidArgument if it is not valid, or a and b are the same
+  JointId add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a = {},
+                    const JointAttachment& on_b = {});
+  void remove_joint(JointId id);
+  bool contains(JointId id) const;
+  /// Motor, drive and friction of one coordinate.
+  void set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation);
+  JointView joint(JointId id) const;
+
+  ConstraintReport constraint_report() const;
 
   // State ------------------------------------------------------------------------------------------------------------
   BodyView body(BodyId id) const;

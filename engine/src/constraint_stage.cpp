@@ -1,0 +1,177 @@
+#include "constraint_stage.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace limber {
+
+void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
+  const auto i = static_cast<std::size_t>(body);
+  if (i >= table_.size()) {
+    table_.resize(i + 1);
+    disturbed_.resize(i + 1);
+    surplus_.resize(i + 1);
+  }
+  table_[i] = at;
+  disturbed_[i] = true;
+  surplus_[i] = 0.0;
+  stale_ = true;
+}
+
+void ConstraintStage::remove_body(Index body) {
+  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+    const Constraint* constraint = entries_[i].constraint();
+    if (constraint == nullptr) continue;
+    const std::array<Index, 2> on = constraint->bodies();
+    if (on[0] == body || on[1] == body) remove(i);
+  }
+  release_bodies();
+  table_[static_cast<std::size_t>(body)] = {};
+  surplus_[static_cast<std::size_t>(body)] = 0.0;
+  stale_ = true;
+}
+
+std::uint32_t ConstraintStage::add(std::unique_ptr<Handle> handle) {
+  Entry entry;
+  entry.handle = std::move(handle);
+  return place(std::move(entry));
+}
+
+std::uint32_t ConstraintStage::add(std::unique_ptr<JointConstraint> joint) {
+  Entry entry;
+  entry.joint = std::move(joint);
+  return place(std::move(entry));
+}
+
+std::uint32_t ConstraintStage::place(Entry&& entry) {
+  if (vacant_.empty()) {
+    entries_.emplace_back();
+    vacant_.reserve(entries_.size());  // so that remove() cannot fail
+    vacant_.push_back(static_cast<std::uint32_t>(entries_.size() - 1));
+  }
+  const std::uint32_t index = vacant_.back();
+  vacant_.pop_back();
+  entry.generation = entries_[index].generation;
+  entries_[index] = std::move(entry);
+  ++alive_;
+  stale_ = true;
+  disturb_bodies_of(index);
+  return index;
+}
+
+void ConstraintStage::remove(std::uint32_t index) {
+  disturb_bodies_of(index);
+  Entry& entry = entries_[index];
+  entry.handle.reset();
+  entry.joint.reset();
+  --alive_;
+  stale_ = true;
+  // A place whose generations are used up is never given again.
+  if (++entry.generation != 0) vacant_.push_back(index);
+}
+
+void ConstraintStage::disturb_bodies_of(std::uint32_t index) {
+  for (const Index body : entries_[index].constraint()->bodies())
+    if (body >= 0) disturb(body);
+}
+
+/// Bodies of islands that are no more advance by themselves again.
+void ConstraintStage::release_bodies() {
+  for (const Index body : members_)
+    if (moves(body))
+      table_[static_cast<std::size_t>(body)].group->set_constrained(table_[static_cast<std::size_t>(body)].slot, false);
+  members_.clear();
+}
+
+void ConstraintStage::find_islands() {
+  if (!stale_) return;
+  stale_ = false;
+  release_bodies();
+  islands_.clear();
+  constraints_.clear();
+  if (alive_ == 0) return;
+
+  sets_.reset(table_.size());
+  island_of_.assign(table_.size(), -1);
+  for (const Entry& entry : entries_) {
+    if (entry.constraint() == nullptr) continue;
+    const auto [a, b] = entry.constraint()->bodies();
+    if (moves(a) && moves(b)) sets_.join(a, b);
+  }
+  // Islands are numbered by their first body among those that a constraint touches.
+  const auto island_with = [&](const Constraint* constraint) {
+    const auto [a, b] = constraint->bodies();
+    return moves(a) ? sets_.root(a) : moves(b) ? sets_.root(b) : Index{-1};
+  };
+  std::vector<Index>& number = island_of_;
+  for (const Entry& entry : entries_)
+    if (entry.constraint() != nullptr && island_with(entry.constraint()) >= 0)
+      number[static_cast<std::size_t>(island_with(entry.constraint()))] = 0;
+  Index count = 0;
+  for (Index& n : number)
+    if (n == 0) n = count++;
+  islands_.assign(static_cast<std::size_t>(count), {});
+
+  for (Index island = 0; island < count; ++island) {
+    Island& made = islands_[static_cast<std::size_t>(island)];
+    made.first_member = members_.size();
+    made.first_constraint = constraints_.size();
+    for (Index body = 0; body < static_cast<Index>(table_.size()); ++body)
+      if (moves(body) && number[static_cast<std::size_t>(sets_.root(body))] == island) members_.push_back(body);
+    for (const Entry& entry : entries_) {
+      if (entry.constraint() == nullptr) continue;
+      const Index root = island_with(entry.constraint());
+      if (root >= 0 && number[static_cast<std::size_t>(root)] == island) constraints_.push_back(entry.constraint());
+    }
+    made.members = members_.size() - made.first_member;
+    made.constraints = constraints_.size() - made.first_constraint;
+  }
+  for (const Index body : members_)
+    table_[static_cast<std::size_t>(body)].group->set_constrained(table_[static_cast<std::size_t>(body)].slot, true);
+  if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
+  reports_.assign(islands_.size(), {});
+}
+
+void ConstraintStage::step(Jobs& jobs, const IslandOptions& options) {
+  if (islands_.empty()) return;
+  options_ = options;
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t island = begin; island < end; ++island) step_island(island, options_);
+  });
+}
+
+void ConstraintStage::step_island(std::size_t island, const IslandOptions& options) {
+  const Island& at = islands_[island];
+  const std::span<const Index> members = std::span(members_).subspan(at.first_member, at.members);
+  IslandOptions own = options;
+  own.undisturbed = true;
+  own.energy_surplus = 0.0;
+  for (const Index body : members) {
+    own.undisturbed = own.undisturbed && !disturbed_[static_cast<std::size_t>(body)];
+    own.energy_surplus += surplus_[static_cast<std::size_t>(body)];
+  }
+  IslandReport& report = reports_[island];
+  report =
+      solvers_[island].step(table_, members, std::span(constraints_).subspan(at.first_constraint, at.constraints), own);
+  for (const Index body : members) {
+    disturbed_[static_cast<std::size_t>(body)] = false;
+    surplus_[static_cast<std::size_t>(body)] = report.energy_surplus / static_cast<double>(members.size());
+  }
+}
+
+IslandReport ConstraintStage::report() const {
+  IslandReport sum;
+  for (const IslandReport& r : reports_) {
+    if (r.status != SolveStatus::kSolved) sum.status = r.status;
+    sum.bodies += r.bodies;
+    sum.rows += r.rows;
+    sum.iterations = std::max(sum.iterations, r.iterations);
+    sum.change = std::max(sum.change, r.change);
+    sum.energy_removed += r.energy_removed;
+    sum.energy_surplus += r.energy_surplus;
+  }
+  return sum;
+}
+
+}  // namespace limber

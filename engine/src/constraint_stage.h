@@ -1,0 +1,79 @@
+// The constraints of a world: what they are, which bodies they tie together, and their step.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "limber/constraints/handle.h"
+#include "limber/constraints/island_solver.h"
+#include "limber/constraints/joint_constraint.h"
+#include "limber/core/disjoint_sets.h"
+#include "limber/core/jobs.h"
+
+namespace limber {
+
+class ConstraintStage {
+ public:
+  /// One constraint with its owner's bookkeeping; `constraint` is null where a place is vacant.
+  struct Entry {
+    std::uint32_t generation = 1;
+    std::unique_ptr<Handle> handle;
+    std::unique_ptr<JointConstraint> joint;
+    Constraint* constraint() const {
+      return handle ? static_cast<Constraint*>(handle.get()) : static_cast<Constraint*>(joint.get());
+    }
+  };
+
+  // Bodies, by number ---------------------------------------------------------------------------------------------
+  void set_body(Index body, const ConstrainedBody& at);
+  /// Forgets it, and all constraints on it.
+  void remove_body(Index body);
+  BodyStates states() const { return BodyStates(table_); }
+  /// Its velocity, place or shape was changed from outside.
+  void disturb(Index body) { disturbed_[static_cast<std::size_t>(body)] = true; }
+
+  // Constraints, by place -----------------------------------------------------------------------------------------
+  std::uint32_t add(std::unique_ptr<Handle> handle);
+  std::uint32_t add(std::unique_ptr<JointConstraint> joint);
+  void remove(std::uint32_t place);
+  const std::vector<Entry>& entries() const { return entries_; }
+  void disturb_bodies_of(std::uint32_t place);
+
+  /// Islands of the bodies that constraints tie together; those bodies are left alone by BodyGroup::advance().
+  void find_islands();
+  /// Advances all islands.
+  void step(Jobs& jobs, const IslandOptions& options);
+
+  /// Sums over the islands of the last step.
+  IslandReport report() const;
+  int island_count() const { return static_cast<int>(islands_.size()); }
+  double energy_surplus(Index body) const { return surplus_[static_cast<std::size_t>(body)]; }
+
+ private:
+  struct Island {
+    std::size_t first_member, members, first_constraint, constraints;
+  };
+  std::uint32_t place(Entry&& entry);
+  void step_island(std::size_t island, const IslandOptions& options);
+  void release_bodies();
+  bool moves(Index body) const { return body >= 0 && table_[static_cast<std::size_t>(body)].group != nullptr; }
+
+  std::vector<ConstrainedBody> table_;
+  std::vector<char> disturbed_;  // char: written by different threads
+  std::vector<double> surplus_;  // per body: its share of its island's
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> vacant_;
+  std::size_t alive_ = 0;
+
+  bool stale_ = true;  // the islands
+  DisjointSets sets_;
+  std::vector<Index> island_of_;  // per root, and then per body; −1: none
+  std::vector<Island> islands_;
+  std::vector<Index> members_;
+  std::vector<Constraint*> constraints_;
+  std::vector<IslandSolver> solvers_;  // one per island
+  std::vector<IslandReport> reports_;
+  IslandOptions options_;
+};
+
+}  // namespace limber

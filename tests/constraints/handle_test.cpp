@@ -1,0 +1,152 @@
+#include "limber/constraints/handle.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "islands.h"
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+using testing::Island;
+using testing::kGravity;
+
+constexpr double kFrame = 1.0 / 60.0;
+constexpr double kSize = 0.6;    // m, of the sample body
+constexpr double kExact = 1e-9;  // of the size: what a held point may be off by
+const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+const SurfacePoint kOther{.triangle = 8, .weight = {0.1, 0.1, 0.8}};
+
+TEST(Handle, HeldPointIsAtItsTargetAtAnyStiffnessOnATurningBody) {
+  for (const double hz : {0.5, 5.0, 29.0, 100.0, 1e5})
+    for (const double step : {1e-3, kFrame}) {
+      Island island({.modes = 12, .lowest_hz = hz, .decay = 0.2}, step);
+      island.add_body({}, {0.2, 0.1, 0.0}, {3.0, -2.0, 4.0});
+      Handle& handle = island.hold(0, kCorner);
+      Vec3 target = handle.target().position;
+      for (int i = 0; i < 100; ++i) {
+        target += step * Vec3(0.3 * std::cos(i * step), 0.2, -0.1);
+        handle.set_target({.position = target});
+        const IslandReport report = island.step();
+        ASSERT_EQ(report.status, SolveStatus::kSolved) << hz << ' ' << step;
+        ASSERT_LT((island.group.position(0, kCorner) - target).norm(), kExact * kSize);
+        ASSERT_LT(handle.error(), kExact * kSize);
+      }
+    }
+}
+
+/// Two handles on a body with enough modes are two feasible ones; four points of it, twice, are redundant.
+TEST(Handle, SeveralAndRedundantOnesAreMetTogether) {
+  Island island({.modes = 12, .lowest_hz = 10.0, .decay = 0.5}, kFrame);
+  island.add_body({});
+  std::vector<Handle*> handles = {&island.hold(0, kCorner), &island.hold(0, kOther), &island.hold(0, kCorner)};
+  for (int i = 0; i < 60; ++i) {
+    for (Handle* handle : handles)
+      handle->set_target({.position = handle->target().position + Vec3(0.0, 0.002, 0.001)});
+    EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+    for (const Handle* handle : handles) EXPECT_LT(handle->error(), kExact * kSize);
+  }
+}
+
+/// Two hands that want one point at different places share it: least squares.
+TEST(Handle, ConflictingOnesMeetInTheMiddle) {
+  Island island({.modes = 6, .lowest_hz = 10.0, .decay = 0.5}, kFrame);
+  island.add_body({});
+  Handle &one = island.hold(0, kCorner), &other = island.hold(0, kCorner);
+  const Vec3 at = one.target().position;
+  one.set_target({.position = at + Vec3(0.0, 0.0, 0.02)});
+  other.set_target({.position = at - Vec3(0.0, 0.0, 0.01)});
+  for (int i = 0; i < 60; ++i) island.step();
+  EXPECT_LT((island.group.position(0, kCorner) - at - Vec3(0.0, 0.0, 0.005)).norm(), 1e-6 * kSize);
+}
+
+TEST(Handle, HoldsInItsDirectionsAlone) {
+  Island island({.modes = 0}, kFrame);
+  island.add_body({}, {0.3, 0.0, 0.0});
+  const Vec3 before = island.group.position(0, kCorner);
+  island.hold(0, kCorner, {.directions = {Vec3::UnitZ()}});
+  for (int i = 0; i < 30; ++i) island.step();
+  const Vec3 moved = island.group.position(0, kCorner) - before;
+  EXPECT_LT(std::abs(moved.z()), kExact * kSize);
+  EXPECT_GT(moved.x(), 0.1);
+}
+
+TEST(Handle, FixedHandsGiveNoEnergy) {
+  for (const double hz : {1.0, 20.0, 1e4})
+    for (const double step : {1e-3, kFrame, 0.05}) {
+      Island island({.modes = 10, .lowest_hz = hz}, step);
+      island.add_body({}, Vec3::Zero(), {1.0, 2.0, -1.0});
+      island.hold(0, kCorner);
+      double before = island.energy(), rise = 0.0;
+      for (int i = 0; i < 300; ++i) {
+        island.step();
+        rise = std::max(rise, island.energy() - before);
+        before = island.energy();
+      }
+      EXPECT_LT(rise, 1e-6 * island.energy_scale()) << hz << ' ' << step;
+    }
+}
+
+TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
+  for (const double k : {10.0, 1e3, 1e6, 1e12}) {
+    Island island({.modes = 8, .lowest_hz = 8.0, .decay = 2.0}, kFrame);
+    island.add_body({});
+    Handle& spring = island.hold(0, kCorner, {.stiffness = k, .damping = 0.05 * k});
+    const double weight = island.model->data().mass * kGravity;
+    for (int i = 0; i < 6000; ++i) island.step();
+    EXPECT_NEAR(spring.force().z(), weight, 1e-2 * weight) << k;
+    EXPECT_NEAR(spring.error(), weight / k, 1e-2 * weight / k + kExact * kSize) << k;
+  }
+}
+
+TEST(Handle, PullsNoHarderThanItsForce) {
+  Island island({.modes = 4, .lowest_hz = 20.0}, kFrame, Vec3::Zero());
+  island.add_body({});
+  Handle& hand = island.hold(0, kCorner, {.max_force = 2.0});
+  hand.set_target({.position = hand.target().position + Vec3(10.0, 0.0, 0.0)});
+  for (int i = 0; i < 60; ++i) {
+    island.step();
+    EXPECT_LE(hand.force().cwiseAbs().maxCoeff(), 2.0 * (1.0 + 1e-12));
+  }
+  EXPECT_GT(hand.force().x(), 1.9);
+  const Vec3 gained = island.linear_momentum();
+  EXPECT_NEAR(gained.x(), 2.0, 0.05) << "about 2 N for a second";
+}
+
+/// Bodies of any stiffness, modes above the Nyquist rate among them, dragged at random: no amplitude beyond what the
+/// hands' motion can ask for.
+TEST(Handle, NothingBlowsUpInFiveHundredRandomRuns) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int run = 0; run < 500; ++run) {
+    const double hz = std::pow(10.0, -0.5 + 5.0 * unit(random));
+    Island island({.modes = 10, .lowest_hz = hz, .decay = run % 3 == 0 ? 0.0 : 0.02 * hz}, kFrame, Vec3::Zero());
+    island.add_body({});
+    const int hands = 1 + run % 3;
+    for (int i = 0; i < hands; ++i) {
+      Handle& hand = island.hold(
+          0, {.triangle = static_cast<Index>(12.0 * unit(random)), .weight = {0.2 + 0.1 * i, 0.5, 0.3 - 0.1 * i}});
+      hand.set_target({.position = hand.target().position,
+                       .velocity = 0.1 * Vec3(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5)});
+    }
+    for (int i = 0; i < 100; ++i) island.step();
+    for (std::size_t m = 0; m < 10; ++m) ASSERT_LT(std::abs(island.group.amplitudes(0)[m]), 10.0) << run << ' ' << hz;
+    ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << run << ' ' << hz;
+  }
+}
+
+TEST(Handle, RefusesOptionsWithoutSense) {
+  const auto refused = [](const HandleOptions& options) { EXPECT_THROW(options.validate(), InvalidArgument); };
+  refused({.directions = {Vec3::UnitX(), Vec3::UnitX()}});
+  refused({.directions = {2.0 * Vec3::UnitX()}});
+  refused({.max_force = 0.0});
+  refused({.stiffness = -1.0});
+  refused({.damping = 1.0});
+  refused({.stiffness = std::nan("")});
+}
+
+}  // namespace
+}  // namespace limber
