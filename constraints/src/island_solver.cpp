@@ -53,6 +53,7 @@ struct IslandSolver::Impl {
   IslandBodies bodies;
   ConstraintRows rows;
   std::vector<Index> first_row;  // per constraint, and the end
+  std::vector<RowLaw> laws;      // of the rows at the step's start
   std::vector<double> J, metric, G, weighted, gap, start_gap, b, lower, upper, compliance;
   std::vector<double> f, next_f, reaction, end_reaction, change;
   std::vector<ConstraintLoad> loads;
@@ -109,6 +110,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
     constraint->add_rows(states, StepTime::kStart, options.step, rows);
   }
   first_row.push_back(rows.size());
+  laws.clear();
+  for (Index i = 0; i < rows.size(); ++i) laws.push_back(rows.row(i).law);
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   J.resize(m * n), metric.resize(n), G.resize(m * n), weighted.resize(n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
@@ -394,24 +397,21 @@ SolveStatus IslandSolver::Impl::take_best(const BodyStates& states, std::span<Co
   return SolveStatus::kIterationLimit;
 }
 
-/// Σ f/Δt times the agents' displacements, what is negative not counted.
+/// Σ f/Δt times the agents' displacements, what is negative not counted, and what the rows' springs give.
 double IslandSolver::Impl::agent_work(const IslandOptions& options) const {
   double work = 0.0;
-  for (Index i = 0; i < rows.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    work += std::max(0.0, (f[at] / options.step + reaction[at]) * rows.row(i).law.agent_displacement);
-    const double before = start_gap[at], after = gap[at];
-    work += 0.5 * rows.row(i).law.stiffness * (before * before - after * after);  // given by the row's spring
+  for (std::size_t i = 0; i < laws.size(); ++i) {
+    work += std::max(0.0, (f[i] / options.step + reaction[i]) * laws[i].agent_displacement);
+    work += 0.5 * laws[i].stiffness * (start_gap[i] * start_gap[i] - gap[i] * gap[i]);
   }
   return work;
 }
 
 /// Whether only rows act that can neither give nor take energy: hard ones that no agent moves.
 bool IslandSolver::Impl::is_workless() const {
-  for (Index i = 0; i < rows.size(); ++i) {
-    const RowLaw& law = rows.row(i).law;
-    if (f[static_cast<std::size_t>(i)] == 0.0 && reaction[static_cast<std::size_t>(i)] == 0.0) continue;
-    if (!is_equality(law) || law.compliance > 0.0 || law.agent_displacement != 0.0) return false;
+  for (std::size_t i = 0; i < laws.size(); ++i) {
+    if (f[i] == 0.0 && reaction[i] == 0.0) continue;
+    if (!is_equality(laws[i]) || laws[i].compliance > 0.0 || laws[i].agent_displacement != 0.0) return false;
   }
   return true;
 }

@@ -64,8 +64,8 @@ TEST(Handle, ConflictingOnesMeetInTheMiddle) {
 }
 
 TEST(Handle, HoldsInItsDirectionsAlone) {
-  Island island({.modes = 0}, kFrame);
-  island.add_body({}, {0.3, 0.0, 0.0});
+  Island island({.modes = 0}, kFrame, Vec3::Zero());
+  island.add_body({}, {0.3, 0.0, 0.2});
   const Vec3 before = island.group.position(0, kCorner);
   island.hold(0, kCorner, {.directions = {Vec3::UnitZ()}});
   for (int i = 0; i < 30; ++i) island.step();
@@ -96,9 +96,15 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
     island.add_body({});
     Handle& spring = island.hold(0, kCorner, {.stiffness = k, .damping = 0.05 * k});
     const double weight = island.model->data().mass * kGravity;
-    for (int i = 0; i < 6000; ++i) island.step();
-    EXPECT_NEAR(spring.force().z(), weight, 1e-2 * weight) << k;
-    EXPECT_NEAR(spring.error(), weight / k, 1e-2 * weight / k + kExact * kSize) << k;
+    constexpr int kSteps = 6000;
+    double mean = 0.0;
+    for (int i = 0; i < kSteps; ++i) {
+      island.step();
+      mean += spring.force().z() / kSteps;
+      ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << k;
+    }
+    EXPECT_NEAR(mean, weight, 2e-2 * weight) << "what swings below it pulls by its weight in the mean; " << k;
+    EXPECT_NEAR(spring.error(), spring.force().norm() / k, 0.2 * weight / k + kExact * kSize) << k;
   }
 }
 
@@ -116,25 +122,28 @@ TEST(Handle, PullsNoHarderThanItsForce) {
   EXPECT_NEAR(gained.x(), 2.0, 0.05) << "about 2 N for a second";
 }
 
-/// Bodies of any stiffness, modes above the Nyquist rate among them, dragged at random: no amplitude beyond what the
-/// hands' motion can ask for.
+/// Bodies of any stiffness, most with modes above the Nyquist rate, dragged by hands that pull them along together and
+/// apart by a little. What they do stays of the size of what the hands do.
 TEST(Handle, NothingBlowsUpInFiveHundredRandomRuns) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto vector = [&] { return Vec3(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5); };
+  constexpr double kSpeed = 0.2;  // m/s, of the hands
   for (int run = 0; run < 500; ++run) {
     const double hz = std::pow(10.0, -0.5 + 5.0 * unit(random));
     Island island({.modes = 10, .lowest_hz = hz, .decay = run % 3 == 0 ? 0.0 : 0.02 * hz}, kFrame, Vec3::Zero());
     island.add_body({});
-    const int hands = 1 + run % 3;
-    for (int i = 0; i < hands; ++i) {
+    const Vec3 together = kSpeed * vector();
+    for (int i = 0; i < 1 + run % 3; ++i) {
       Handle& hand = island.hold(
           0, {.triangle = static_cast<Index>(12.0 * unit(random)), .weight = {0.2 + 0.1 * i, 0.5, 0.3 - 0.1 * i}});
-      hand.set_target({.position = hand.target().position,
-                       .velocity = 0.1 * Vec3(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5)});
+      hand.set_target({.position = hand.target().position, .velocity = together + 1e-3 * kSpeed * vector()});
     }
-    for (int i = 0; i < 100; ++i) island.step();
-    for (std::size_t m = 0; m < 10; ++m) ASSERT_LT(std::abs(island.group.amplitudes(0)[m]), 10.0) << run << ' ' << hz;
-    ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << run << ' ' << hz;
+    for (int i = 0; i < 100; ++i) {
+      island.step();
+      ASSERT_LT(island.group.velocity(0, kCorner).norm(), 50.0 * kSpeed) << run << ' ' << hz;
+    }
+    for (std::size_t m = 0; m < 10; ++m) ASSERT_LT(std::abs(island.group.amplitudes(0)[m]), 1.0) << run << ' ' << hz;
   }
 }
 
