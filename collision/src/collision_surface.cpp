@@ -142,11 +142,11 @@ void CollisionSurface::find_canonical_vertices() {
   };
   std::vector<Index> order(rest_.size());
   for (std::size_t v = 0; v < order.size(); ++v) order[v] = static_cast<Index>(v);
-  std::stable_sort(order.begin(), order.end(), before);
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return before(a, b) || (!before(b, a) && a < b); });
   canonical_.resize(rest_.size());
   for (std::size_t i = 0, first = 0; i < order.size(); ++i) {
     if (before(order[first], order[i])) first = i;
-    canonical_[static_cast<std::size_t>(order[i])] = order[first];  // stable: the first of equals is the lowest
+    canonical_[static_cast<std::size_t>(order[i])] = order[first];  // the first of equals is the lowest
   }
   for (Triangle& t : triangles_)
     for (Index& v : t) v = canonical_vertex(v);

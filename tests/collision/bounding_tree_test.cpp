@@ -49,7 +49,7 @@ TEST(TreeTraversal, PairsHoldEveryPairWithinTheMargin) {
                 long_one = wavy(shapes::box({-2, -0.1, -0.2}, {2, 0.1, 0.2}), 3),
                 off_center = wavy(shapes::sphere(Vec3(1.0, 2.0, 3.0), 0.7, 2), 5, 4);
   DeformedSurface a, b;
-  for (int trial = 0; trial < 40; ++trial) {
+  for (int trial = 0; trial < 18; ++trial) {
     const Surface& first = trial % 2 ? round : off_center;
     const Surface& second = trial % 3 ? long_one : round;
     const BoundsChoice choice = static_cast<BoundsChoice>(trial % 3);
@@ -209,7 +209,7 @@ TEST(TreeTraversal, SelfPairsHoldWhatBruteForceFinds) {
   const Surface s = wavy(bar, 6, 2);
   DeformedSurface a;
   int touching = 0;
-  for (int trial = 0; trial < 40; ++trial) {
+  for (int trial = 0; trial < 12; ++trial) {
     a.bind(s, random.amplitudes(6, trial % 2 ? 2.0 : 0.05), static_cast<BoundsChoice>(trial % 3));
     const double margin = trial % 4 < 2 ? 0.0 : 0.02;
     for (const bool near_at_rest : {false, true}) {
