@@ -1,0 +1,197 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "counted_new.h"
+#include "limber/core/error.h"
+#include "limber/engine/world.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
+#include "sample_models.h"
+
+namespace limber {
+namespace {
+
+using testing::sample_model;
+
+const SurfacePoint kPoint{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+constexpr double kLink = 0.6;    // m, length of a sample body
+constexpr double kExact = 1e-9;  // of a length
+
+JointSpec hinge_at(const Vec3& origin) {
+  JointSpec spec{.type = JointType::kRevolute, .frame = {.origin = origin}};
+  spec.frame.axes.col(0) = Vec3::UnitY(), spec.frame.axes.col(1) = Vec3::UnitZ(),
+  spec.frame.axes.col(2) = Vec3::UnitX();
+  return spec;
+}
+
+/// Links along x from `from`, the first hinged to the world.
+struct Chain {
+  std::vector<BodyId> links;
+  std::vector<JointId> joints;
+};
+Chain add_chain(World& world, const std::shared_ptr<const ModalModel>& model, int links, const Vec3& from) {
+  Chain chain;
+  for (int i = 0; i < links; ++i) {
+    const Vec3 start = from + i * kLink * Vec3::UnitX();
+    chain.links.push_back(world.add_body(model, {.pose = {.p = start + 0.5 * kLink * Vec3::UnitX()}}));
+    chain.joints.push_back(world.add_joint(i == 0 ? BodyId{} : chain.links[static_cast<std::size_t>(i) - 1],
+                                           chain.links.back(), hinge_at(start), {.radius = 0.25}, {.radius = 0.25}));
+  }
+  return chain;
+}
+
+double total_energy(const World& world, const Chain& chain) {
+  double sum = 0.0;
+  for (const BodyId id : chain.links) sum += world.energy(id).total();
+  return sum;
+}
+
+TEST(Constraints, DraggedPointIsWhereTheHandIs) {
+  World world;
+  const BodyId body = world.add_body(sample_model({.modes = 8, .lowest_hz = 12.0, .decay = 0.5}));
+  const HandleId hand = world.add_handle(body, kPoint);
+  Vec3 target = world.position(body, kPoint);
+  for (int i = 0; i < 120; ++i) {
+    target += Vec3(0.001, 0.002 * std::sin(0.1 * i), 0.003);
+    world.set_handle_target(hand, {.position = target});
+    world.step();
+    ASSERT_LT((world.position(body, kPoint) - target).norm(), kExact);
+  }
+  EXPECT_GT(world.handle(hand).force.z(), 0.0);
+  EXPECT_EQ(world.constraint_report().islands, 1);
+  EXPECT_TRUE(world.constraint_report().solved);
+  world.remove_handle(hand);
+  EXPECT_FALSE(world.contains(hand));
+  const double z = world.position(body, kPoint).z();
+  for (int i = 0; i < 60; ++i) world.step();
+  EXPECT_LT(world.position(body, kPoint).z(), z - 0.5) << "let go, it falls";
+}
+
+TEST(Constraints, ChainOfFlexibleLinksHangsTogetherAndGainsNothing) {
+  World world;
+  const Chain chain = add_chain(world, sample_model({.modes = 8, .lowest_hz = 25.0, .decay = 0.5}), 4, {0, 0, 2});
+  double before = total_energy(world, chain);
+  const double scale = 4.0 * world.model(chain.links[0]).data().mass * 9.80665 * kLink;
+  for (int i = 0; i < 600; ++i) {
+    world.step();
+    for (const JointId joint : chain.joints) {
+      EXPECT_LT(world.joint(joint).distance_error, kExact);
+      EXPECT_LT(world.joint(joint).angle_error, kExact);
+    }
+    const double energy = total_energy(world, chain);
+    EXPECT_LT(energy - before, 1e-6 * scale);
+    before = energy;
+  }
+}
+
+TEST(Constraints, IslandsAreWhatConstraintsTieTogether) {
+  World world;
+  const auto model = sample_model({.modes = 0});
+  for (int i = 0; i < 3; ++i) add_chain(world, model, 2 + i, {0.0, 2.0 * i, 0.0});
+  world.add_body(model);
+  world.step();
+  EXPECT_EQ(world.constraint_report().islands, 3);
+  EXPECT_EQ(world.constraint_report().bodies, 2 + 3 + 4);
+}
+
+TEST(Constraints, BodiesWithoutConstraintsFallAsBefore) {
+  World with, without;
+  const auto model = sample_model();
+  add_chain(with, model, 2, {5, 5, 5});
+  const BodyId a = with.add_body(model, {.angular_velocity = {1, 2, 3}});
+  const BodyId b = without.add_body(model, {.angular_velocity = {1, 2, 3}});
+  for (int i = 0; i < 50; ++i) with.step(), without.step();
+  EXPECT_EQ(with.body(a).pose.p, without.body(b).pose.p);
+  EXPECT_EQ(with.body(a).pose.q.vector(), without.body(b).pose.q.vector());
+}
+
+TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {
+  World world;
+  const Chain chain = add_chain(world, sample_model(), 3, Vec3::Zero());
+  const HandleId hand = world.add_handle(chain.links[1], kPoint);
+  world.step();
+  world.remove_body(chain.links[1]);
+  EXPECT_FALSE(world.contains(hand));
+  EXPECT_TRUE(world.contains(chain.joints[0]));
+  EXPECT_FALSE(world.contains(chain.joints[1]));
+  EXPECT_FALSE(world.contains(chain.joints[2]));
+  EXPECT_THROW(world.handle(hand), InvalidArgument);
+  const double z = world.body(chain.links[2]).pose.p.z();
+  for (int i = 0; i < 30; ++i) world.step();
+  EXPECT_LT(world.body(chain.links[2]).pose.p.z(), z - 0.5) << "the last link falls";
+  const HandleId other = world.add_handle(chain.links[0], kPoint);
+  EXPECT_TRUE(world.contains(other));
+  EXPECT_FALSE(world.contains(hand)) << "an id stays invalid though its place is used again";
+}
+
+TEST(Constraints, RefuseWhatIsNotThere) {
+  World world;
+  const BodyId body = world.add_body(sample_model());
+  EXPECT_THROW(world.add_handle(BodyId{7, 1}, kPoint), InvalidArgument);
+  EXPECT_THROW(world.add_handle(body, {.triangle = 99}), InvalidArgument);
+  EXPECT_THROW(world.add_handle(body, kPoint, {.max_force = -1.0}), InvalidArgument);
+  EXPECT_THROW(world.add_joint(body, body, {}), InvalidArgument);
+  EXPECT_THROW(world.add_joint(BodyId{}, BodyId{}, {}), InvalidArgument);
+  EXPECT_THROW(world.add_joint(BodyId{}, body, {}, {}, {.radius = -1.0}), InvalidArgument);
+  EXPECT_THROW(world.remove_joint(JointId{0, 1}), InvalidArgument);
+  const JointId joint = world.add_joint(BodyId{}, body, hinge_at(Vec3::Zero()));
+  EXPECT_THROW(world.set_joint_actuation(joint, 1, {}), InvalidArgument);
+  EXPECT_FALSE(world.contains(HandleId{joint.index, joint.generation})) << "a joint's id is no handle's";
+}
+
+TEST(Constraints, MotorTurnsTheWorld) {
+  World world({.gravity = Vec3::Zero()});
+  const BodyId body = world.add_body(sample_model({.modes = 0}), {.pose = {.p = {0.3, 0, 0}}});
+  const JointId joint = world.add_joint(BodyId{}, body, hinge_at(Vec3::Zero()));
+  world.set_joint_actuation(joint, 0, {.motor_velocity = 3.0, .motor_max_force = 1e4});
+  for (int i = 0; i < 180; ++i) world.step();
+  EXPECT_NEAR(world.joint(joint).position[0], 9.0, 1e-6) << "three seconds at 3 rad/s";
+}
+
+std::uint64_t hash_after_200_steps(Jobs& jobs) {
+  World world({}, jobs);
+  const auto model = sample_model({.modes = 6, .lowest_hz = 20.0});
+  std::vector<HandleId> hands;
+  for (int i = 0; i < 12; ++i) {
+    const Chain chain = add_chain(world, model, 1 + i % 4, {0.0, 2.0 * i, 0.0});
+    hands.push_back(world.add_handle(chain.links.back(), kPoint, {.stiffness = 200.0, .damping = 3.0}));
+  }
+  for (int step = 0; step < 200; ++step) {
+    for (const HandleId hand : hands)
+      world.set_handle_target(hand, {.position = world.handle(hand).target.position + Vec3(0.0, 0.001, 0.002)});
+    world.step();
+  }
+  return world.state_hash();
+}
+
+TEST(Constraints, StateHashIsTheSameForAnyThreadCount) {
+  const std::uint64_t serial = hash_after_200_steps(serial_jobs());
+  for (int run = 0; run < 3; ++run) {
+    TbbJobs jobs;
+    EXPECT_EQ(hash_after_200_steps(jobs), serial);
+  }
+}
+
+TEST(Constraints, StepDoesNotAllocateOnceWarm) {
+  World world;
+  const auto model = sample_model({.modes = 6, .lowest_hz = 20.0});
+  const Chain chain = add_chain(world, model, 3, Vec3::Zero());
+  JointSpec limited = hinge_at({0.0, 3.0, 0.0});
+  limited.limits.rotation = {-0.3, 0.3};
+  const BodyId door = world.add_body(model, {.pose = {.p = {0.3, 3.0, 0.0}}});
+  const JointId joint = world.add_joint(BodyId{}, door, limited);
+  world.set_joint_actuation(joint, 0, {.motor_velocity = 1.0, .motor_max_force = 2.0, .friction = 0.1});
+  const HandleId hand = world.add_handle(chain.links.back(), kPoint, {.stiffness = 100.0, .damping = 1.0});
+  const auto frame = [&] {
+    world.set_handle_target(hand, {.position = world.handle(hand).target.position + Vec3(0.0, 0.001, 0.002)});
+    world.step();
+  };
+  for (int i = 0; i < 60; ++i) frame();
+  const long before = testing::allocations();
+  for (int i = 0; i < 100; ++i) frame();
+  EXPECT_EQ(testing::allocations() - before, 0);
+}
+
+}  // namespace
+}  // namespace limber
