@@ -1,7 +1,7 @@
 // 02_picture_of_a_flight: how do deformed vertices get out of limber and into a renderer?
 //   run:   02_picture_of_a_flight bunny.glb flight.pov && povray flight.pov +W1600 +H800 +A
 //   see:   the body at six instants of one flight, struck at its highest point; colour is the distance from rest
-//   next:  engine/include/limber/engine/world.h, the header to read
+//   next:  03_find_contacts; the header to read is engine/include/limber/engine/world.h
 #include <algorithm>
 #include <cstdio>
 #include <numbers>
