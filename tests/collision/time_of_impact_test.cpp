@@ -266,7 +266,7 @@ std::optional<double> crossing(const CollisionSurface& sheet, const ExactMotion&
     shot.at(t, pose, {});
     return height_above_sheet(sheet, s.pose.inverse() * pose.p, s.amplitudes);
   };
-  constexpr int kSamples = 240;
+  constexpr int kSamples = 150;
   std::optional<double> before = height(0.0);
   for (int i = 1; i <= kSamples; ++i) {
     double low = step * (i - 1) / kSamples, high = step * i / kSamples;
