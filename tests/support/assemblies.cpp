@@ -260,7 +260,7 @@ void dog(Builder& b) {
     for (const double side : {-1.0, 1.0}) {
       const std::string s = std::string(fore < 0 ? "hind " : "fore ") + (side < 0 ? "left " : "right ");
       const Vec3 hip(fore * 0.2, side * 0.09, 0.36), knee = hip + Vec3(fore * 0.02, side * 0.045, -0.16);
-      b.bar("body", hip + Vec3(0, -side * 0.035, 0.023), hip + Vec3(0, side * 0.005, 0.023), 0.01);
+      b.bar("body", hip + Vec3(0, -side * 0.035, 0.0297), hip + Vec3(0, side * 0.005, 0.0297), 0.004);
       b.hinge("body", s + "thigh", at(hip, y), 0.018, 0.014);
       b.bar(s + "thigh", hip + Vec3(0, side * 0.023, 0), hip + Vec3(0, side * 0.045, 0), 0.02);
       b.bar(s + "thigh", hip + Vec3(0, side * 0.045, 0.01), knee + Vec3(0, 0, 0.023), 0.016);

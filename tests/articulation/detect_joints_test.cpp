@@ -1,0 +1,230 @@
+#include "limber/articulation/detect_joints.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <numbers>
+
+#include "assemblies.h"
+#include "joint_scores.h"
+#include "limber/core/error.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
+#include "shells.h"
+
+namespace limber {
+namespace {
+
+using assemblies::MadeAssembly;
+using assemblies::make;
+using assemblies::Variant;
+
+std::vector<std::string> all_names() {
+  auto names = assemblies::tuning_names();
+  const auto& more = assemblies::held_out_names();
+  names.insert(names.end(), more.begin(), more.end());
+  return names;
+}
+
+/// Fewer samples than by default: quick, and harder.
+DetectionOptions quick() {
+  DetectionOptions out;
+  out.contact.samples = 1500;
+  return out;
+}
+
+Assembly taken_apart(const MadeAssembly& made) {
+  return find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
+}
+
+std::vector<DetectedJoint> joints_of(const MadeAssembly& made) {
+  TbbJobs jobs;
+  return detect_joints(taken_apart(made), quick(), jobs);
+}
+
+struct Share {
+  int all = 0, right = 0, extra = 0;
+  double axis = 0.0, origin = 0.0;  ///< worst of those read right
+  std::string wrong;
+
+  double part() const { return static_cast<double>(right) / all; }
+};
+
+Share share_right(const std::vector<std::string>& names, const Variant& variant, bool with_balls = true) {
+  Share out;
+  TbbJobs jobs;
+  for (const std::string& name : names) {
+    const auto score = assemblies::scored(make(name, variant), quick(), jobs);
+    for (const auto& joint : score.joints) {
+      if (!with_balls && joint.truth == static_cast<int>(JointType::kBall)) continue;
+      ++out.all;
+      if (joint.right()) {
+        ++out.right;
+        out.axis = std::max(out.axis, joint.axis_error);
+        out.origin = std::max(out.origin, joint.origin_error);
+      } else {
+        out.wrong += name + ": " + joint.name + "; ";
+      }
+    }
+    for (const auto& extra : score.extra) out.wrong += name + ": " + extra + "; ";
+    out.extra += static_cast<int>(score.extra.size());
+  }
+  return out;
+}
+
+// The drawings themselves: what else would the truth be worth?
+TEST(Assemblies, EveryShellIsClosedAndLooksOutward) {
+  for (const std::string& name : all_names()) {
+    const Assembly assembly = find_components(make(name, {.segments = 8, .clearance = 0.005}).surface);
+    for (const Component& c : assembly.components) {
+      EXPECT_TRUE(c.closed) << name << ": " << c.name;
+      EXPECT_GT(enclosed_volume(c.surface), 0.0) << name << ": " << c.name;
+    }
+  }
+}
+
+TEST(DetectJoints, AllTypesAreRightAt32Segments) {
+  const Share share = share_right(all_names(), {.segments = 32, .clearance = 0.005});
+  EXPECT_GE(share.part(), 0.97) << share.wrong;
+  EXPECT_EQ(share.extra, 0) << share.wrong;
+  EXPECT_LT(share.axis, 0.5);     // degrees
+  EXPECT_LT(share.origin, 1e-3);  // of the diagonal
+}
+
+TEST(DetectJoints, TouchingAndOverlappingPartsAreReadToo) {
+  const std::vector<std::string> names = {"brush arm", "scissors", "telescope", "hitch", "stack"};
+  for (const double clearance : {0.0, 0.02, -0.005}) {
+    const Share share = share_right(names, {.segments = 32, .clearance = clearance});
+    EXPECT_EQ(share.right, share.all) << clearance << ": " << share.wrong;
+    EXPECT_LT(share.axis, clearance == 0.02 ? 1.0 : 0.5);
+  }
+}
+
+TEST(DetectJoints, CoarseMeshesAreReadByTheirNormals) {
+  EXPECT_GE(share_right(all_names(), {.segments = 16, .clearance = 0.005}).part(), 0.95);
+  EXPECT_GE(share_right(assemblies::tuning_names(), {.segments = 8}, false).part(), 0.90);
+}
+
+TEST(DetectJoints, NoiseOfAThousandthOfEachPartIsBorne) {
+  const Share share =
+      share_right({"brush arm", "humanoid", "dog", "stack"}, {.segments = 32, .clearance = 0.005, .jitter = 1e-3});
+  EXPECT_GE(share.part(), 0.90) << share.wrong;
+  EXPECT_LT(share.axis, 2.0);
+}
+
+TEST(DetectJoints, SoupAndOpenShellsAreReadLikeSolids) {
+  const std::vector<std::string> names = {"chair", "scissors", "telescope", "drawer", "piston"};
+  const Share soup = share_right(names, {.soup = true}), open = share_right(names, {.clearance = 0.005, .open = true});
+  EXPECT_EQ(soup.right, soup.all) << soup.wrong;
+  EXPECT_EQ(open.right, open.all) << open.wrong;
+}
+
+TEST(DetectJoints, BeadsThatTouchAtAPointMakeNoJoint) {
+  for (const int segments : {8, 16, 32, 64}) EXPECT_TRUE(joints_of(make("snake", {.segments = segments})).empty());
+}
+
+TEST(DetectJoints, PoseScaleAndOrderChangeNoTypeAndNoAxis) {
+  const Variant plain{.clearance = 0.005};
+  Variant moved = plain;
+  moved.rotation = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+  moved.shuffled = moved.swapped = true;
+  for (const double scale : {1e-3, 1e3}) {
+    moved.scale = scale;
+    moved.translation = scale * Vec3(5, -3, 2);
+    for (const std::string name : {"brush arm", "stack", "piston"}) {
+      const MadeAssembly before = make(name, plain), after = make(name, moved);
+      const Assembly parts_before = taken_apart(before), parts_after = taken_apart(after);
+      TbbJobs jobs;
+      std::map<std::pair<std::string, std::string>, JointSpec> known;
+      const auto key = [](const Assembly& parts, const DetectedJoint& j) {
+        const std::pair<std::string, std::string> names = std::minmax(
+            parts.components[static_cast<std::size_t>(j.a)].name, parts.components[static_cast<std::size_t>(j.b)].name);
+        return names;
+      };
+      for (const auto& j : detect_joints(parts_before, quick(), jobs)) known[key(parts_before, j)] = j.joint;
+      const auto found = detect_joints(parts_after, quick(), jobs);
+      ASSERT_EQ(found.size(), known.size()) << name;
+      for (const auto& j : found) {
+        const auto& expected = known.at(key(parts_after, j));
+        EXPECT_EQ(j.joint.type, expected.type) << name;
+        if (expected.type == JointType::kBall || expected.type == JointType::kFixed) continue;
+        const int column = expected.type == JointType::kPlanar ? 2 : 0;
+        const Vec3 axis = moved.rotation * expected.frame.axes.col(column);
+        constexpr double kAxis = 0.05 * std::numbers::pi / 180.0;
+        EXPECT_LT(axis.cross(Vec3(j.joint.frame.axes.col(column))).norm(), kAxis) << name;
+      }
+    }
+  }
+}
+
+TEST(DetectJoints, AShaftDrawnThroughASolidBlockTurnsAndSlides) {
+  GroupedSurface input;
+  const auto add = [&](const std::string& name, const assemblies::Shell& shell) {
+    const auto offset = static_cast<Index>(input.surface.vertices.size());
+    input.groups.push_back(
+        {name, "", static_cast<Index>(input.surface.triangles.size()), static_cast<Index>(shell.triangles.size())});
+    input.surface.vertices.insert(input.surface.vertices.end(), shell.vertices.begin(), shell.vertices.end());
+    for (const Triangle& t : shell.triangles) {
+      input.face_of.push_back(static_cast<Index>(input.face_of.size()));
+      input.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+    }
+  };
+  add("block", assemblies::box({-1, -1, -0.5}, {1, 1, 0.5}));
+  add("shaft", assemblies::lathe({{0, -2}, {0.2, -2}, {0.2, 2}, {0, 2}}, 32));
+  const auto joints = detect_joints(find_components(input));
+  ASSERT_EQ(joints.size(), 1u);
+  EXPECT_EQ(joints[0].joint.type, JointType::kCylindrical);
+  EXPECT_GT(std::abs(joints[0].joint.frame.axes(2, 0)), 1.0 - 1e-9);
+}
+
+TEST(DetectJoints, ThreeHingesOfOneDoorAreOneRevoluteJoint) {
+  const auto joints = joints_of(make("door", {.clearance = 0.005}));
+  ASSERT_EQ(joints.size(), 1u);
+  EXPECT_EQ(joints[0].joint.type, JointType::kRevolute);
+  EXPECT_NO_THROW(joints[0].joint.validate());
+  EXPECT_GT(joints[0].influence.half_extents.maxCoeff(), 0.7);  // from the lowest hinge to the highest
+}
+
+TEST(DetectJoints, AnyThreadCountGivesTheSameBits) {
+  const Assembly assembly = taken_apart(make("brush arm", {.clearance = 0.005}));
+  TbbJobs jobs(2);
+  const auto one = detect_joints(assembly, quick()), two = detect_joints(assembly, quick(), jobs);
+  ASSERT_EQ(one.size(), two.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].joint.frame.origin, two[i].joint.frame.origin);
+    EXPECT_EQ(one[i].joint.frame.axes, two[i].joint.frame.axes);
+    EXPECT_EQ(one[i].confidence, two[i].confidence);
+  }
+}
+
+TEST(DetectJoints, ProgressRisesToOneAndWrongOptionsAreRefused) {
+  const Assembly assembly = taken_apart(make("welded pair"));
+  std::vector<double> told;
+  DetectionOptions options = quick();
+  options.progress = [&](double part, std::string_view) { told.push_back(part); };
+  detect_joints(assembly, options);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.back(), 1.0);
+  options.contact.samples = 1;
+  EXPECT_THROW(detect_joints(assembly, options), InvalidArgument);
+}
+
+// A slider crank of three hinges and a round piston: counting says −1, but it turns.
+TEST(Kinematics, ASliderCrankHasOneLoopAndOneMotion) {
+  const MadeAssembly made = make("piston", {.clearance = 0.005});
+  const Kinematics all = overall_kinematics(taken_apart(made), joints_of(made));
+  EXPECT_EQ(all.loops, 1);
+  EXPECT_EQ(all.groups, 1);
+  EXPECT_EQ(all.kutzbach, -1);
+  EXPECT_EQ(all.mobility, 1);
+}
+
+TEST(Kinematics, OpenChainsHaveTheSumOfTheirFreedoms) {
+  const MadeAssembly made = make("brush arm", {.clearance = 0.005});
+  const Kinematics all = overall_kinematics(taken_apart(made), joints_of(made));
+  EXPECT_EQ(all.loops, 0);
+  EXPECT_EQ(all.mobility, 0 + 1 + 1 + 2 + 3 + 3);
+  EXPECT_EQ(all.kutzbach, all.mobility);
+}
+
+}  // namespace
+}  // namespace limber
