@@ -56,6 +56,8 @@ struct IslandSolver::Impl {
   std::vector<RowLaw> laws;      // of the rows at the step's start
   std::vector<double> J, metric, G, weighted, gap, start_gap, b, lower, upper, compliance;
   std::vector<double> f, next_f, reaction, end_reaction, change;
+  std::vector<FrameAcceleration> accelerations;  // per body, under held forces
+  std::vector<double> frame_G, unit_metric;
   std::vector<ConstraintLoad> loads;
   std::vector<double> modal_loads;
   // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
@@ -73,6 +75,7 @@ struct IslandSolver::Impl {
   void measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
                std::vector<double>& into) const;
   void weigh();
+  std::size_t weigh_frames();
   double step = 0.0;
   struct HeldMotion {
     double acceleration = 0.0, speed = 0.0, speed_of_a_step = 0.0;
@@ -149,7 +152,7 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
     const FrameConstants& c = group->frame_constants();
     const BodyResponse& r = bodies.response(local);
     const RigidFrame& frame = frame_at(*group, slot, when);
-    const FrameAcceleration a = held_acceleration(*group, slot, when, r, options.gravity);
+    const FrameAcceleration& a = accelerations[static_cast<std::size_t>(local)];
     motion.acceleration += side.linear.dot(a.linear) + side.angular.dot(a.angular);
     motion.speed += side.linear.dot(frame.velocity()) + side.angular.dot(frame.angular_velocity(c));
     if (r.translations > 0) {
@@ -169,32 +172,69 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
 
 /// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
-  bodies.write_frame_metric(metric);
-  weigh();
-  const std::size_t n = metric.size();
+  accelerations.clear();
+  for (Index local = 0; local < bodies.count(); ++local)
+    accelerations.push_back(held_acceleration(*bodies.body(local).group, bodies.body(local).slot, when,
+                                              bodies.response(local), options.gravity));
+  const std::size_t n = weigh_frames();
+  bool equalities = true, any = false;
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
     const HeldMotion held = held_motion(when, i, options);
     b[at] = held.acceleration;
-    compliance[at] = 0.0;
     lower[at] = law.lower / options.step, upper[at] = law.upper / options.step;
     if (law.goes_on) {
       const double force = when == StepTime::kStart ? law.last_force : f[at] / options.step + reaction[at];
       lower[at] = upper[at] = std::clamp(force, lower[at], upper[at]);
+      equalities = equalities && lower[at] == 0.0;
+      if (lower[at] == 0.0) b[at] = 0.0;
     } else if (!(law.holds && (is_equality(law) || rests(law, gap[at], held.speed, held.speed_of_a_step)))) {
       lower[at] = upper[at] = b[at] = 0.0;
-      std::fill_n(G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
+    } else {
+      equalities = equalities && is_equality(law);
     }
+    if (lower[at] == 0.0 && upper[at] == 0.0)
+      std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
+    any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
+  }
+  std::fill(answer.begin(), answer.end(), 0.0);
+  if (!any) return;
+  if (equalities) {
+    unit_metric.assign(n, 1.0);
+    least_squares.factor(frame_G, unit_metric, static_cast<int>(f.size()));
+    for (double& acceleration : b) acceleration = -acceleration;
+    least_squares.solve(b, answer);
+    return;
   }
   qp.solve(FactoredContactQp{.size = static_cast<int>(f.size()),
                              .dimension = static_cast<int>(n),
-                             .G = G,
-                             .D = compliance,
+                             .G = frame_G,
+                             .D = {},
                              .b = b,
                              .lower = lower,
                              .upper = upper},
            answer);
+}
+
+/// J M^−½ of the frames alone: the modes answer to held forces by themselves. @return its columns
+std::size_t IslandSolver::Impl::weigh_frames() {
+  bodies.write_frame_metric(metric);
+  std::size_t n = 0;
+  for (Index local = 0; local < bodies.count(); ++local)
+    n += static_cast<std::size_t>(bodies.response(local).translations + bodies.response(local).rotations);
+  frame_G.resize(f.size() * n);
+  std::size_t column = 0;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const BodyResponse& r = bodies.response(local);
+    for (int i = 0; i < r.translations + r.rotations; ++i, ++column) {
+      const auto from = static_cast<std::size_t>(bodies.first(local) + i);
+      const double weight = std::sqrt(metric[from]);
+      for (std::size_t row = 0; row < f.size(); ++row)
+        frame_G[row * n + column] = weight * J[row * metric.size() + from];
+    }
+  }
+  return n;
 }
 
 /// The frames' second half of what holds them: at the step's end, by the rows there.
