@@ -36,18 +36,6 @@ double diagonal(std::span<const MotionBody> bodies) {
   return (high - low).allFinite() ? (high - low).norm() : 0.0;
 }
 
-internal::OrbitBox box_of_all(const std::vector<OrbitIndex::Face>& faces) {
-  internal::OrbitBox box;
-  for (const auto& f : faces) box.add(f.box);
-  return box;
-}
-
-/// Leaves only the faces that an orbit through `reach` can meet.
-void keep_in_reach(std::vector<OrbitIndex::Face>& faces, internal::OrbitBox reach, double margin) {
-  reach.grow(margin);
-  std::erase_if(faces, [&](const auto& f) { return !f.box.overlaps(reach); });
-}
-
 /// One side: its triangles in reach of the other, and points on them.
 struct Side {
   OrbitIndex index;
@@ -95,6 +83,11 @@ class Search {
  private:
   void settle_tolerance();
   void collect();
+  bool adds(const OrbitPiece& piece) const;
+  void add(const Witness& witness);
+  bool touches_start(const OrbitPiece& piece, const SurfacePoint& at) const {
+    return piece.sheet != 0 && std::abs(piece.low) * speed(at) <= tolerances_.across;
+  }
   void refine();
   FreeMotion result() const;
 
@@ -118,7 +111,8 @@ class Search {
   /// The direction that freed the last point often frees the next; the answer does not depend on where one begins.
   mutable std::size_t first_across_ = 0;
   std::vector<Witness> witnesses_;
-  Spans blocked_;                                  ///< B
+  double sheet_below_ = -kInfinity, sheet_above_ = kInfinity;  ///< the nearest sheets that block
+  Spans blocked_;                                              ///< B
   std::vector<std::pair<Witness, Witness>> ends_;  ///< what blocks at the low and high end of each span of B
 };
 
@@ -241,23 +235,39 @@ void Search::settle_tolerance() {
   overlapping_ = !deep.empty();
 }
 
+// Behind a sheet nothing is looked for: of sheets, only the nearest on either side of 0 matter.
+bool Search::adds(const OrbitPiece& p) const {
+  if (p.sheet == 0) return !covers(blocked_, p.low, p.high);
+  return p.low >= 0.0 ? p.low < sheet_above_ : p.high > sheet_below_;
+}
+
+void Search::add(const Witness& witness) {
+  const OrbitPiece& p = witness.piece;
+  witnesses_.push_back(witness);
+  if (p.sheet != 0) {
+    (p.low >= 0.0 ? sheet_above_ : sheet_below_) = p.low >= 0.0 ? p.low : p.high;
+    return;
+  }
+  blocked_.push_back({p.low, p.high});
+  normalise(blocked_, true);
+}
+
 void Search::collect() {
   std::vector<OrbitPiece> pieces;
   for (const bool moving : {true, false})
     for (const SurfacePoint& at : surface(moving).points()) {
       raw_pieces(frame_.orbit_of(at.p), moving, pieces);
       // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
-      if (std::all_of(pieces.begin(), pieces.end(),
-                      [&](const OrbitPiece& p) { return covers(blocked_, p.low, p.high); }))
+      if (std::none_of(pieces.begin(), pieces.end(),
+                       [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
         continue;
       blocked_pieces(at, moving, pieces);
-      for (const OrbitPiece& p : pieces) {
-        if (covers(blocked_, p.low, p.high)) continue;
-        witnesses_.push_back({p, at, moving});
-        blocked_.push_back({p.low, p.high});
-        normalise(blocked_, true);
-      }
+      for (const OrbitPiece& p : pieces)
+        if (adds(p)) add({p, at, moving});
     }
+  for (const double sheet : {sheet_below_, sheet_above_})
+    if (std::isfinite(sheet)) blocked_.push_back({sheet, sheet});
+  normalise(blocked_, true);
 }
 
 // Over the surface downhill: the point whose orbit is blocked first, by a pattern of steps that halve where none helps.
@@ -304,6 +314,7 @@ void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
   };
   std::stable_sort(seeds.begin(), seeds.end(), first);
   if (seeds.size() > kSeeds) seeds.resize(kSeeds);
+  if (seeds.empty()) return;
   end = seeds.front();
   for (const Witness& seed : seeds)
     if (const Witness found = descend(seed, low, gap); first(found, end)) end = found;
@@ -311,8 +322,10 @@ void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
 }
 
 void Search::refine() {
-  ends_.resize(blocked_.size());
+  constexpr std::size_t kMostSpans = 32;  // more are noise, whose ends nobody wants to know
   const std::size_t count = blocked_.size();
+  const bool nearest_only = reachable_only_ || count > kMostSpans;
+  ends_.resize(count);
   // Spans on either side of 0; on a circle they may lie at the other end of the list.
   const auto above = static_cast<std::size_t>(
       std::find_if(blocked_.begin(), blocked_.end(), [](const Span& s) { return s.low >= 0.0; }) - blocked_.begin());
@@ -321,9 +334,8 @@ void Search::refine() {
     const double after = i + 1 < count ? blocked_[i + 1].low : kInfinity;
     const Span whole = blocked_[i];
     Span low = whole, high = whole;
-    if (!reachable_only_ || i == above % count) refine_end(low, true, {before, whole.high}, ends_[i].first);
-    if (!reachable_only_ || i == (above + count - 1) % count)
-      refine_end(high, false, {whole.low, after}, ends_[i].second);
+    if (!nearest_only || i == above % count) refine_end(low, true, {before, whole.high}, ends_[i].first);
+    if (!nearest_only || i == (above + count - 1) % count) refine_end(high, false, {whole.low, after}, ends_[i].second);
     blocked_[i] = {low.low, high.high};
   }
 }
@@ -399,9 +411,9 @@ FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const Motio
   t.nudge = 1e-2 * least;
 
   const PathFrame frame(path);
-  auto moving_faces = orbit_faces(frame, moving), fixed_faces = orbit_faces(frame, fixed);
-  keep_in_reach(fixed_faces, box_of_all(moving_faces), t.largest_overlap);
-  keep_in_reach(moving_faces, box_of_all(fixed_faces), t.largest_overlap);
+  internal::OrbitBox reach_moving = reach_of(frame, moving), reach_fixed = reach_of(frame, fixed);
+  reach_moving.grow(t.largest_overlap), reach_fixed.grow(t.largest_overlap);
+  auto moving_faces = orbit_faces(frame, moving, reach_fixed), fixed_faces = orbit_faces(frame, fixed, reach_moving);
   OrbitIndex moving_index(frame, moving, std::move(moving_faces)), fixed_index(frame, fixed, std::move(fixed_faces));
   auto moving_met = that_meet(moving_index, fixed_index, t.largest_overlap);
   auto fixed_met = that_meet(fixed_index, moving_index, t.largest_overlap);

@@ -129,9 +129,18 @@ OrbitBox PathFrame::box_of(const Orbit& orbit) const {
   return box;
 }
 
+OrbitBox PathFrame::plane_point(const Vec3& p) const {
+  OrbitBox box;
+  if (kind_ == Kind::kTranslation)
+    box.add(p.y(), p.z());
+  else
+    box.add(std::hypot(p.y(), p.z()), p.x());
+  return box;
+}
+
 OrbitBox PathFrame::box_of(std::span<const Vec3, 3> corners) const {
   OrbitBox box;
-  for (const Vec3& c : corners) box.add(box_of(orbit_of(c)));
+  for (const Vec3& c : corners) box.add(plane_point(c));
   if (kind_ != Kind::kTranslation) box.low[0] = least_radius(corners);
   return box;
 }
@@ -388,16 +397,35 @@ void add_helices(const PathFrame& frame, OrbitIndex::Face face, std::vector<Orbi
 
 }  // namespace
 
-std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<const MotionBody> bodies) {
+OrbitBox reach_of(const PathFrame& frame, std::span<const MotionBody> bodies) {
+  OrbitBox reach;
+  for (const MotionBody& b : bodies)
+    for (const Vec3& p : b.surface->vertices) reach.add(frame.plane_point(frame.to_path(p)));
+  if (frame.kind() != Kind::kTranslation) reach.low[0] = 0.0;  // faces pass nearer to the axis than their corners
+  if (frame.kind() == Kind::kScrew) reach.low[1] = -1e300, reach.high[1] = 1e300;
+  return reach;
+}
+
+std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<const MotionBody> bodies,
+                                          const OrbitBox& reach) {
   std::vector<OrbitIndex::Face> faces;
+  std::vector<Vec3> local;
+  std::vector<OrbitBox> plane;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const SurfaceMesh& surface = *bodies[b].surface;
+    if (!reach_of(frame, bodies.subspan(b, 1)).overlaps(reach)) continue;
     const bool inside_out = bodies[b].closed && enclosed_volume(surface) < 0.0;
-    std::vector<Vec3> local;
-    local.reserve(surface.vertices.size());
-    for (const Vec3& p : surface.vertices) local.push_back(frame.to_path(p));
+    local.clear(), plane.clear();
+    for (const Vec3& p : surface.vertices) {
+      local.push_back(frame.to_path(p));
+      plane.push_back(frame.plane_point(local.back()));
+    }
     for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
       const Triangle& v = surface.triangles[t];
+      OrbitBox rough = plane[v[0]];
+      rough.add(plane[v[1]]), rough.add(plane[v[2]]);
+      if (frame.kind() != Kind::kTranslation) rough.low[0] = 0.0;
+      if (!rough.overlaps(reach)) continue;
       std::array<Vec3, 3> corners{local[v[0]], local[v[1]], local[v[2]]};
       if (inside_out) std::swap(corners[1], corners[2]);
       OrbitIndex::Face face = face_of(corners);
@@ -408,7 +436,7 @@ std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<cons
       if (frame.kind() != Kind::kTranslation) std::tie(face.bearing, face.sector) = sector_of(face);
       if (frame.kind() == Kind::kScrew)
         add_helices(frame, face, faces);
-      else
+      else if (face.box.overlaps(reach))
         faces.push_back(face);
     }
   }

@@ -46,8 +46,9 @@ class PathFrame {
   explicit PathFrame(const MotionPath& path);
   Vec3 to_path(const Vec3& p) const { return axes_.transpose() * (p - origin_); }
   Vec3 from_path(const Vec3& p) const { return axes_ * p + origin_; }
-  Orbit orbit_of(const Vec3& p) const;                      ///< p in path coordinates
-  OrbitBox box_of(const Orbit& orbit) const;                ///< a point
+  Orbit orbit_of(const Vec3& p) const;        ///< p in path coordinates
+  OrbitBox plane_point(const Vec3& p) const;  ///< p in path coordinates: its place in the orbit plane, no screw's
+  OrbitBox box_of(const Orbit& orbit) const;  ///< a point
   OrbitBox box_of(std::span<const Vec3, 3> corners) const;  ///< of the orbits that meet a triangle
   double speed(const Orbit& orbit) const;                   ///< length per unit of t
   MotionPath::Kind kind() const { return kind_; }
@@ -113,7 +114,12 @@ class OrbitIndex {
   std::vector<Node> nodes_;
 };
 
-/// The triangles of all bodies, turned outward where a closed surface is inside out.
-std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<const MotionBody> bodies);
+/// A box around all orbits of the bodies' points.
+OrbitBox reach_of(const PathFrame& frame, std::span<const MotionBody> bodies);
+
+/// The triangles of all bodies that orbits within `reach` can meet, turned outward where a closed surface is inside
+/// out.
+std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<const MotionBody> bodies,
+                                          const OrbitBox& reach);
 
 }  // namespace limber::internal

@@ -158,7 +158,7 @@ class Trial {
 /// The least swing of the x axis over all directions. Swings by an angle about cos ψ y + sin ψ z.
 /// @param tolerance as it came out for the rotations: overlap as read is the same for all paths
 double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, const RangeOptions& options) {
-  constexpr int kRefinements = 6;
+  constexpr int kRefinements = 4;
   FreeMotionOptions motion = options.motion;
   motion.tolerance = motion.largest_overlap = tolerance;
   motion.reachable_only = true;

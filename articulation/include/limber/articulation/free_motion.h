@@ -16,7 +16,7 @@
 /// the point still meets the other body. δ starts at `tolerance` or the sagitta of the facets, and grows to the overlap
 /// found as read, up to `largest_overlap`. Along the motion nothing is lost: a stop is found where it is.
 ///
-/// Closed surfaces bound solids; open ones are sheets that block where they are crossed.
+/// Closed surfaces bound solids; open ones are sheets that block where they are crossed, and hide what lies behind.
 /// Source: [X09] 3.3 bisects by collision tests, which sees one interval only; orbits are not in the paper.
 #pragma once
 

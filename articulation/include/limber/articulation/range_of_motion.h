@@ -34,7 +34,7 @@ struct RangeOptions {
   FreeMotionOptions motion{};
   double min_rotation = 0.0349;   ///< rad (2°); a rotation of less is none; ≥ 0
   double min_translation = 2e-3;  ///< of the smaller of the two components' diagonals; ≥ 0
-  int cone_directions = 16;       ///< swings tried for a ball's cone, before the least is refined; 4 … 360
+  int cone_directions = 12;       ///< swings tried for a ball's cone, before the least is refined; 4 … 360
   /// Called from the calling thread with the part done (0 … 1, ascending); may be empty.
   std::function<void(double)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
