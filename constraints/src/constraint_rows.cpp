@@ -7,6 +7,8 @@ namespace limber {
 void ConstraintRows::clear() {
   rows_.clear();
   modal_.clear();
+  flexibility_.clear();
+  stored_energy_ = 0.0;
 }
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {

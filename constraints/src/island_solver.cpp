@@ -5,6 +5,7 @@
 
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
+#include "limber/constraints/friction_cone.h"
 #include "limber/constraints/least_squares.h"
 #include "secant_iteration.h"
 
@@ -40,11 +41,16 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
   return a;
 }
 
-bool is_equality(const RowLaw& law) { return law.lower == -kUnbounded && law.upper == kUnbounded; }
+bool is_equality(const RowLaw& law) { return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded; }
 
-/// Whether bodies lie still on a row of one sign: at its gap, and slower than what held forces make of rest in a step.
+bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
+
+/// Whether bodies lie still on a row of one sign: closed, and slower than what held forces make of rest in a step.
 bool rests(const RowLaw& law, double gap, double speed, double speed_of_a_step) {
-  return std::abs(gap - law.offset) <= 2.0 * law.tolerance && std::abs(speed) <= speed_of_a_step;
+  const double open = gap - law.offset;
+  const bool closed =
+      (law.lower < 0.0 || open <= 2.0 * law.tolerance) && (law.upper > 0.0 || open >= -2.0 * law.tolerance);
+  return closed && std::abs(speed) <= speed_of_a_step;
 }
 
 }  // namespace
@@ -61,12 +67,18 @@ struct IslandSolver::Impl {
   std::vector<ConstraintLoad> loads;
   std::vector<double> modal_loads;
   // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
-  std::vector<Index> bounded, order;
+  // Among those the contacts with friction come first, three rows each.
+  std::vector<Index> bounded, order, place;
+  std::size_t cones = 0;
   std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
+  std::vector<double> held_impulse, friction, A_cones, b_cones, A_boxes, b_boxes;
+  std::vector<ConstraintRows::Flexibility> flexibility;  // of the rows at the step's start
+  double stored_energy = 0.0;
   std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
+  FrictionSolver friction_solver;
   SecantIteration secant;
   IslandEnergy energy;
 
@@ -87,9 +99,12 @@ struct IslandSolver::Impl {
                       IslandReport& report);
   void factor();
   void respond(std::span<const double> values, std::vector<double>& gaps);
-  SolveStatus improve();
+  SolveStatus improve(bool first);
   SolveStatus improve_equalities();
-  SolveStatus improve_all();
+  SolveStatus improve_all(bool first);
+  SolveStatus solve_reduced();
+  SolveStatus solve_with_friction(bool first);
+  void keep_within_bounds();
   double largest_change() const;
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
@@ -115,6 +130,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   first_row.push_back(rows.size());
   laws.clear();
   for (Index i = 0; i < rows.size(); ++i) laws.push_back(rows.row(i).law);
+  flexibility = rows.flexibility();
+  stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   J.resize(m * n), metric.resize(n), G.resize(m * n), weighted.resize(n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
@@ -178,18 +195,21 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
                                               bodies.response(local), options.gravity));
   const std::size_t n = weigh_frames();
   bool equalities = true, any = false;
+  bool rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
     const HeldMotion held = held_motion(when, i, options);
+    const bool lies = rests(law, gap[at], held.speed, held.speed_of_a_step);
+    if (law.friction > 0.0) rested = lies;
     b[at] = held.acceleration;
     lower[at] = law.lower / options.step, upper[at] = law.upper / options.step;
-    if (law.goes_on) {
+    if (law.goes_on && (!law.slides || rested)) {
       const double force = when == StepTime::kStart ? law.last_force : f[at] / options.step + reaction[at];
       lower[at] = upper[at] = std::clamp(force, lower[at], upper[at]);
       equalities = equalities && lower[at] == 0.0;
       if (lower[at] == 0.0) b[at] = 0.0;
-    } else if (!(law.holds && (is_equality(law) || rests(law, gap[at], held.speed, held.speed_of_a_step)))) {
+    } else if (!(law.holds && (is_equality(law) || lies))) {
       lower[at] = upper[at] = b[at] = 0.0;
     } else {
       equalities = equalities && is_equality(law);
@@ -291,8 +311,8 @@ void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_
 }
 
 /// One step of Newton's method from f, to next_f; `change` is what it makes of the gaps.
-SolveStatus IslandSolver::Impl::improve() {
-  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all();
+SolveStatus IslandSolver::Impl::improve(bool first) {
+  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all(first);
   for (std::size_t i = 0; i < f.size(); ++i) b[i] = next_f[i] - f[i];
   respond(b, change);
   return status;
@@ -311,12 +331,17 @@ SolveStatus IslandSolver::Impl::improve_equalities() {
 }
 
 /// Rows with bounds beside the others, which are eliminated first: A f' + b, b = gap − offset − A₀ f.
-SolveStatus IslandSolver::Impl::improve_all() {
+SolveStatus IslandSolver::Impl::improve_all(bool first) {
   respond(f, change);
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    change[i] -= g.value * reaction[j];
+    if (i != j) change[j] -= g.value * reaction[i];
+  }
   const std::size_t m = f.size(), e = m - bounded.size();
   for (std::size_t i = 0; i < m; ++i) {
     const auto at = static_cast<std::size_t>(order[i]);
-    const RowLaw& law = rows.row(order[i]).law;
+    const RowLaw& law = laws[at];
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
   elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
@@ -324,17 +349,69 @@ SolveStatus IslandSolver::Impl::improve_all() {
     const auto at = static_cast<std::size_t>(bounded[i]);
     f_bounded[i] = f[at], lower_bounded[i] = lower[at], upper_bounded[i] = upper[at];
   }
-  const ContactQpResult result = qp.solve(ContactQp{.size = static_cast<int>(bounded.size()),
-                                                    .A = A_reduced,
-                                                    .b = b_reduced,
-                                                    .lower = lower_bounded,
-                                                    .upper = upper_bounded},
-                                          f_bounded);
+  const SolveStatus status = cones == 0 ? solve_reduced() : solve_with_friction(first);
   f_equal.resize(e);
   elimination.recover(f_bounded, f_equal);
   for (std::size_t i = 0; i < m; ++i)
     next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
-  return result.status;
+  return status;
+}
+
+SolveStatus IslandSolver::Impl::solve_reduced() {
+  return qp
+      .solve(ContactQp{.size = static_cast<int>(bounded.size()),
+                       .A = A_reduced,
+                       .b = b_reduced,
+                       .lower = lower_bounded,
+                       .upper = upper_bounded},
+             f_bounded)
+      .status;
+}
+
+/// The cones are of whole impulses, f + Δt reaction: A F + (b − A held). Contacts and rows with fixed bounds are solved
+/// for in turn, each exactly, until neither changes the other.
+SolveStatus IslandSolver::Impl::solve_with_friction(bool first) {
+  constexpr int kRounds = 50;
+  constexpr double kSettled = 1e-12;  // of the largest impulse
+  const auto c = static_cast<Eigen::Index>(3 * cones), n = static_cast<Eigen::Index>(bounded.size()), r = n - c;
+  const Eigen::Map<const RowMajor> M(A_reduced.data(), n, n);
+  Eigen::Map<Eigen::VectorXd> F(f_bounded.data(), n), b0(b_reduced.data(), n), h(held_impulse.data(), n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(bounded[static_cast<std::size_t>(i)]);
+    h[i] = step * reaction[at];
+    if (first && i < c) F[i] = step * laws[at].last_force - h[i];
+    lower_bounded[static_cast<std::size_t>(i)] += h[i], upper_bounded[static_cast<std::size_t>(i)] += h[i];
+  }
+  Eigen::Map<RowMajor>(A_cones.data(), c, c) = M.topLeftCorner(c, c);
+  Eigen::Map<RowMajor>(A_boxes.data(), r, r) = M.bottomRightCorner(r, r);
+  b0.noalias() -= M * h;
+  F += h;
+  SolveStatus status = SolveStatus::kSolved;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Map<Eigen::VectorXd> b_c(b_cones.data(), c), b_r(b_boxes.data(), r);
+    if (r > 0) {
+      b_r = b0.tail(r);
+      b_r.noalias() += M.bottomLeftCorner(r, c) * F.head(c);
+      qp.solve(ContactQp{.size = static_cast<int>(r),
+                         .A = A_boxes,
+                         .b = b_boxes,
+                         .lower = std::span(lower_bounded).subspan(3 * cones),
+                         .upper = std::span(upper_bounded).subspan(3 * cones)},
+               std::span(f_bounded).subspan(3 * cones));
+    }
+    b_c = b0.head(c);
+    b_c.noalias() += M.topRightCorner(c, r) * F.tail(r);
+    std::copy_n(f_bounded.begin(), 3 * cones, held_impulse.begin());  // to see what changes
+    status =
+        friction_solver
+            .solve(FrictionProblem{.contacts = static_cast<int>(cones), .A = A_cones, .b = b_cones, .mu = friction},
+                   std::span(f_bounded).first(3 * cones))
+            .status;
+    if (r == 0 || (h.head(c) - F.head(c)).lpNorm<Eigen::Infinity>() <= kSettled * F.lpNorm<Eigen::Infinity>()) break;
+  }
+  for (std::size_t i = 0; i < bounded.size(); ++i)
+    f_bounded[i] -= step * reaction[static_cast<std::size_t>(bounded[i])];
+  return status;
 }
 
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
@@ -374,6 +451,8 @@ void IslandSolver::Impl::factor() {
   for (Index i = 0; i < rows.size(); ++i)
     if (is_equality(rows.row(i).law)) order.push_back(i);
   order.insert(order.end(), bounded.begin(), bounded.end());
+  place.resize(m);
+  for (std::size_t i = 0; i < m; ++i) place[static_cast<std::size_t>(order[i])] = static_cast<Index>(i);
   weigh();
   ordered_G.resize(m * n);
   for (std::size_t i = 0; i < m; ++i)
@@ -384,9 +463,19 @@ void IslandSolver::Impl::factor() {
   Eigen::Map<RowMajor>(A.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(m)).noalias() =
       B * B.transpose();
   for (std::size_t i = 0; i < m; ++i) A[i * m + i] += compliance[static_cast<std::size_t>(order[i])];
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(place[static_cast<std::size_t>(g.i)]),
+               j = static_cast<std::size_t>(place[static_cast<std::size_t>(g.j)]);
+    A[i * m + j] += g.value / step;
+    if (i != j) A[j * m + i] += g.value / step;
+  }
   const std::size_t c = bounded.size();
   A_reduced.resize(c * c), b_reduced.resize(c), ordered_b.resize(m);
-  for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded}) v->resize(c);
+  for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
+  const std::size_t boxes = c - 3 * cones;
+  friction.resize(cones), A_cones.resize(9 * cones * cones), b_cones.resize(3 * cones);
+  A_boxes.resize(boxes * boxes), b_boxes.resize(boxes);
+  for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
 }
 
 double IslandSolver::Impl::largest_change() const {
@@ -407,21 +496,37 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     const double held = options.step * reaction[at];  // bounds are on the whole impulse
     lower[at] = law.lower - held, upper[at] = law.upper - held;
     compliance[at] = law.compliance;
-    if (!is_equality(law)) bounded.push_back(i);
+    if (in_cone(law)) bounded.push_back(i);
   }
+  cones = bounded.size() / 3;
+  for (Index i = 0; i < rows.size(); ++i)
+    if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
   factor();
   secant.begin(f.size());
   for (report.iterations = 1;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
-    const SolveStatus status = improve();
+    const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
     if (report.change <= 1.0) return status;
     if (report.iterations > options.max_iterations) return take_best(states, constraints, options, report);
     for (std::size_t i = 0; i < f.size(); ++i) next_f[i] -= f[i];
     for (Index i = 0; i < rows.size(); ++i) change[static_cast<std::size_t>(i)] /= rows.row(i).law.tolerance;
     secant.advance(f, next_f, change);
-    for (std::size_t i = 0; i < f.size(); ++i) f[i] = std::clamp(f[i], lower[i], upper[i]);
+    keep_within_bounds();
+  }
+}
+
+void IslandSolver::Impl::keep_within_bounds() {
+  for (std::size_t i = 0; i < f.size(); ++i) f[i] = std::clamp(f[i], lower[i], upper[i]);
+  for (std::size_t i = 0; i < cones; ++i) {
+    const auto n = static_cast<std::size_t>(bounded[3 * i]), t = n + 1, u = n + 2;
+    const double largest = friction[i] * (f[n] + step * reaction[n]);
+    const double along = f[t] + step * reaction[t], across = f[u] + step * reaction[u];
+    const double size = std::hypot(along, across);
+    if (!(size > largest)) continue;
+    f[t] += along * (largest / size - 1.0);
+    f[u] += across * (largest / size - 1.0);
   }
 }
 
@@ -443,6 +548,11 @@ double IslandSolver::Impl::agent_work(const IslandOptions& options) const {
   for (std::size_t i = 0; i < laws.size(); ++i) {
     work += std::max(0.0, (f[i] / options.step + reaction[i]) * laws[i].agent_displacement);
     work += 0.5 * laws[i].stiffness * (start_gap[i] * start_gap[i] - gap[i] * gap[i]);
+  }
+  work += stored_energy;
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    work -= (i == j ? 0.5 : 1.0) * g.value * (f[i] / step + reaction[i]) * (f[j] / step + reaction[j]);
   }
   return work;
 }

@@ -37,7 +37,8 @@ class Constraint {
   virtual std::array<Index, 2> bodies() const = 0;
   /// Appends the rows, linearised at the step's start or at its predicted end: as many, in the same order.
   virtual void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) = 0;
-  /// The gaps of the rows in the order in which they were appended. @param gaps as many numbers
+  /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
+  /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
   /// @param impulses of the rows over the step that ends now, N·s, held part included
   virtual void accept(const BodyStates& states, std::span<const double> impulses) = 0;

@@ -52,6 +52,12 @@ struct RowLaw {
   double agent_displacement = 0.0;
   /// Of the spring in the row, force per unit gap from 0: its energy ½ stiffness gap² counts with that of the bodies.
   double stiffness = 0.0;
+  /// μ of a contact's normal row, bounds (0, ∞): the next two rows are its tangents, and their impulses stay in the
+  /// cone
+  /// |(f₁, f₂)| ≤ μ f. 0: no tangents.
+  double friction = 0.0;
+  /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
+  bool slides = false;
 };
 
 /// The rows of one island, made anew every step in memory that is kept.
@@ -67,17 +73,31 @@ class ConstraintRows {
     RowLaw law;
   };
 
+  /// Two rows that yield to each other's forces, beyond what the modes show: gap_i += G f_j/Δt, gap_j += G f_i/Δt.
+  struct Flexibility {
+    Index i = 0, j = 0;
+    double value = 0.0;  // G, m/N
+  };
+
   void clear();
   /// @return the row's index. Copies the modal parts.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
+  /// Each pair once, i = j too; for rows with bounds. All values together are a positive semidefinite matrix.
+  void add_flexibility(Index i, Index j, double value) { flexibility_.push_back({i, j, value}); }
+  /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
+  void add_stored_energy(double energy) { stored_energy_ += energy; }
 
   Index size() const { return static_cast<Index>(rows_.size()); }
   const Row& row(Index i) const { return rows_[static_cast<std::size_t>(i)]; }
   Row& row(Index i) { return rows_[static_cast<std::size_t>(i)]; }
   std::span<const double> modal(const Side& side) const { return {modal_.data() + side.modal_begin, side.modal_count}; }
+  const std::vector<Flexibility>& flexibility() const { return flexibility_; }
+  double stored_energy() const { return stored_energy_; }
 
  private:
   std::vector<Row> rows_;
+  std::vector<Flexibility> flexibility_;
+  double stored_energy_ = 0.0;
   std::vector<double> modal_;
 };
 

@@ -1,0 +1,82 @@
+/// @file limber/constraints/contact_constraint.h
+/// Contacts as rows of an island: one-sided along the normal, Coulomb's cone across it.
+///
+///   0 ≤ f_n ⊥ gap(end of step) + (G F)_n − offset ≥ 0         |f_t| ≤ μ f_n, against the slip of the whole step
+///
+/// Both points of a contact are carried along by their bodies, deformation included; the normal stays as it was found.
+/// The gap is that at the end of the step, so that stiff bodies do not sink, and the slip is the way of the one point
+/// along the other within the step, so that what sticks does not creep.
+///
+/// G F is the residual compliance (residual_compliance.h) under the contact forces F = f/Δt: the part of a dent that
+/// the kept modes cannot show. Contacts of one pair of bodies yield to each other's forces. The dent stays from step to
+/// step with the contact's id, and its energy ½ FᵀG F is booked.
+///
+/// From a penetrated start the gap is asked to shrink no further, and is pushed open slowly; what that takes counts as
+/// work done on the island.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/constraints/constraint.h"
+#include "limber/dynamics/contact_source.h"
+
+namespace limber {
+
+struct ContactOptions {
+  double friction = 0.5;            ///< μ of bodies that do not say; ≥ 0
+  double recovery_speed = 0.05;     ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
+  bool residual_compliance = true;  ///< used where the models have it
+  void validate() const;            ///< @throws InvalidArgument naming the field and its value
+};
+
+/// What became of a contact in the last step.
+enum class ContactPhase {
+  kBegun,    ///< pressed now, and not before
+  kLasting,  ///< pressed now and before
+  kEnded,    ///< pressed before, and not now
+};
+
+/// One contact after a step, for sound, damage and games.
+struct ContactEvent {
+  std::uint64_t id = 0;  ///< of the ContactPoint
+  Index a = -1, b = -1;  ///< bodies
+  ContactPhase phase = ContactPhase::kBegun;
+  Vec3 position = Vec3::Zero();  ///< world, at the start of the step in which it was last pressed
+  Vec3 normal = Vec3::Zero();    ///< world, out of b into a
+  Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s; zero for kEnded
+};
+
+/// All contacts of one scene, remembered from step to step. In every step: update(), then the island solver with
+/// constraints() among the others, then finish(). Once warm nothing allocates.
+class ContactSet {
+ public:
+  /// @throws InvalidArgument see ContactOptions::validate()
+  explicit ContactSet(const ContactOptions& options = {});
+  ~ContactSet();
+  ContactSet(ContactSet&&) noexcept;
+  ContactSet& operator=(ContactSet&&) noexcept;
+
+  /// Takes the contacts found at the step's start, in the order of ContactSource.
+  /// @param origin that of the query. @param friction by body: μ of a pair is √(μ_a μ_b); bodies beyond its end have
+  /// that of the options
+  void update(const BodyStates& states, std::span<const ContactPoint> contacts, const Vec3& origin = Vec3::Zero(),
+              std::span<const double> friction = {});
+  /// One for each pair of bodies that have contacts, ordered as they are. Valid until the next update().
+  std::span<Constraint* const> constraints() const;
+
+  /// Books what the step did: after the islands' steps, before the next update().
+  void finish();
+  /// Contacts that press, or have ceased to, in the last step, ordered by id.
+  std::span<const ContactEvent> events() const;
+  /// Forgets what it knows of earlier steps.
+  void clear();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

@@ -1,0 +1,340 @@
+#include "limber/constraints/contact_constraint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "limber/core/error.h"
+#include "limber/dynamics/surface_point.h"
+
+namespace limber {
+namespace {
+
+// Gaps are met to this part of the distances at hand.
+constexpr double kRelativeTolerance = 1e-10;
+// Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
+constexpr double kRecovery = 0.2;
+
+/// What is kept of a contact from step to step.
+struct Memory {
+  std::uint64_t id = 0;
+  Vec3 force = Vec3::Zero();  // on a over the last step, world, N
+};
+
+/// One side of a contact, prepared.
+struct Side {
+  Index body = -1;
+  const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
+  SurfacePoint at{};
+  Vec3 rigid_point = Vec3::Zero();  // without a model: body frame
+
+  Vec3 position(const BodyStates& states, StepTime when) const {
+    const Vec3 p = model != nullptr ? deformed_point(*model, at, states.amplitudes(body, when)) : rigid_point;
+    return states.pose(body, when) * p;
+  }
+};
+
+struct Contact {
+  std::uint64_t id = 0;
+  Side a, b;
+  Mat3 axes = Mat3::Identity();  // columns: normal, two tangents; world
+  double friction = 0.0;
+  Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
+  Vec3 start_position = Vec3::Zero();
+  Vec3 last_force = Vec3::Zero();  // world, on a, N
+  Vec3 dent = Vec3::Zero();        // G F of the last step along the axes, m
+  Vec3 impulse = Vec3::Zero();     // of this step, world, on a
+};
+
+Side make_side(const BodyStates& states, const ContactSide& side) {
+  Side made{.body = side.body, .rigid_point = side.point_B};
+  if (side.triangle < 0 || states.is_static(side.body)) return made;
+  made.model = &states.body(side.body).group->model();
+  made.at = {.surface = SurfacePoint::Surface::kCollision, .triangle = side.triangle, .weight = side.weight};
+  return made;
+}
+
+/// A right-handed frame whose first axis is n; the same for the same n.
+Mat3 frame_along(const Vec3& n) {
+  Index least = 0;
+  n.cwiseAbs().minCoeff(&least);
+  Mat3 axes;
+  axes.col(0) = n;
+  axes.col(1) = n.cross(Vec3::Unit(least)).normalized();
+  axes.col(2) = n.cross(axes.col(1));
+  return axes;
+}
+
+/// The residual flexibility between two points of one body, world axes: what a force at `j` does at `i`.
+Mat3 flexibility(const BodyStates& states, const Side& i, const Side& j) {
+  Mat3 G = Mat3::Zero();
+  const ResidualCompliance& compliance = *i.model->data().residual_compliance;
+  const std::vector<Triangle>& triangles = i.model->collision().triangles;
+  const Triangle &at_i = triangles[static_cast<std::size_t>(i.at.triangle)],
+                 &at_j = triangles[static_cast<std::size_t>(j.at.triangle)];
+  for (std::size_t p = 0; p < 3; ++p)
+    for (std::size_t q = 0; q < 3; ++q)
+      if (const double weight = i.at.weight[p] * j.at.weight[q]; weight != 0.0)
+        G += weight * compliance.block(at_i[p], at_j[q]);
+  const Mat3 R = to_matrix(states.pose(i.body, StepTime::kStart).q);
+  return R * G * R.transpose();
+}
+
+bool yields(const Side& side) { return side.model != nullptr && side.model->data().residual_compliance.has_value(); }
+
+/// The same between two contacts: p_a − p_b of the one under the force on a of the other.
+Mat3 flexibility(const BodyStates& states, const Contact& i, const Contact& j) {
+  Mat3 G = Mat3::Zero();
+  const auto add = [&](const Side& at_i, const Side& at_j, double sign) {
+    if (at_i.body == at_j.body && yields(at_i) && yields(at_j)) G += sign * flexibility(states, at_i, at_j);
+  };
+  add(i.a, j.a, 1.0);
+  add(i.b, j.b, 1.0);
+  if (i.a.body == i.b.body) {  // a body that touches itself
+    add(i.a, j.b, -1.0);
+    add(i.b, j.a, -1.0);
+  }
+  return G;
+}
+
+/// Row of the velocity of a side's point along n, its arm ending at `end`, which both sides share.
+RowSide point_row(const BodyStates& states, StepTime when, const Side& side, const Vec3& end, const Vec3& n,
+                  std::vector<double>& modal) {
+  modal.clear();
+  if (states.is_static(side.body)) return {};
+  const RigidTransform& X = states.pose(side.body, when);
+  if (side.model != nullptr) {
+    modal.assign(static_cast<std::size_t>(side.model->modes()), 0.0);
+    add_modal_force(*side.model, side.at, X.q.conjugate() * n, modal);
+  }
+  return {side.body, n, (end - X.p).cross(n), modal};
+}
+
+/// All contacts of one pair of bodies.
+class PairContacts final : public Constraint {
+ public:
+  void set(const BodyStates& states, std::span<Contact> contacts, const ContactOptions& options) {
+    contacts_ = contacts;
+    options_ = &options;
+    const Contact& first = contacts.front();
+    soft_ = options.residual_compliance && (yields(first.a) || yields(first.b));
+    if (soft_) find_flexibility(states);
+  }
+
+  std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
+
+  void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override {
+    step_ = step;
+    const Index first = rows.size();
+    for (const Contact& contact : contacts_) add_contact(states, when, contact, rows);
+    if (!soft_ || when != StepTime::kStart) return;
+    for (std::size_t i = 0; i < contacts_.size(); ++i)
+      for (std::size_t j = 0; j <= i; ++j) couple(first, i, j, rows);
+    rows.add_stored_energy(stored_energy_);
+  }
+
+  void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override {
+    std::size_t row = 0;
+    for (const Contact& contact : contacts_) {
+      const Vec3 offset = contact.a.position(states, when) - contact.b.position(states, when);
+      gaps[row++] = contact.axes.col(0).dot(offset) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
+      if (contact.friction == 0.0) continue;
+      for (int t = 1; t < 3; ++t)
+        gaps[row++] =
+            contact.axes.col(t).dot(offset - contact.offset) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
+    }
+  }
+
+  void accept(const BodyStates&, std::span<const double> impulses) override {
+    std::size_t row = 0;
+    for (Contact& contact : contacts_) {
+      contact.impulse = impulses[row++] * contact.axes.col(0);
+      if (contact.friction == 0.0) continue;
+      for (int t = 1; t < 3; ++t) contact.impulse += impulses[row++] * contact.axes.col(t);
+    }
+    for (Contact& contact : contacts_) contact.last_force = contact.impulse / step_;
+  }
+
+ private:
+  void find_flexibility(const BodyStates& states) {
+    const std::size_t m = contacts_.size();
+    flexibility_.resize(m * m);
+    stored_energy_ = 0.0;
+    for (std::size_t i = 0; i < m; ++i)
+      for (std::size_t j = 0; j <= i; ++j) {
+        flexibility_[i * m + j] = flexibility(states, contacts_[i], contacts_[j]);
+        if (j < i) flexibility_[j * m + i] = flexibility_[i * m + j].transpose();
+      }
+    for (std::size_t i = 0; i < m; ++i) {
+      Vec3 dent = Vec3::Zero();
+      for (std::size_t j = 0; j < m; ++j) dent += flexibility_[i * m + j] * contacts_[j].last_force;
+      contacts_[i].dent = contacts_[i].axes.transpose() * dent;
+      stored_energy_ += 0.5 * contacts_[i].last_force.dot(dent);
+    }
+  }
+
+  void couple(Index first, std::size_t i, std::size_t j, ConstraintRows& rows) const {
+    const Contact &at_i = contacts_[i], &at_j = contacts_[j];
+    const Mat3 G = at_i.axes.transpose() * flexibility_[i * contacts_.size() + j] * at_j.axes;
+    for (Index p = 0; p < row_count(at_i); ++p)
+      for (Index q = 0; q < (i == j ? p + 1 : row_count(at_j)); ++q)
+        rows.add_flexibility(first + first_row(i) + p, first + first_row(j) + q, G(p, q));
+  }
+
+  static Index row_count(const Contact& contact) { return contact.friction == 0.0 ? 1 : 3; }
+  Index first_row(std::size_t contact) const {
+    // μ is one for the whole pair.
+    return static_cast<Index>(contact) * row_count(contacts_.front());
+  }
+
+  void add_contact(const BodyStates& states, StepTime when, const Contact& contact, ConstraintRows& rows) {
+    const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
+    const Vec3 end = 0.5 * (a + b);
+    const double length = (a - states.pose(contact.a.body, when).p).norm() + a.norm();
+    const double tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min();
+    for (Index axis = 0; axis < row_count(contact); ++axis) {
+      const Vec3 n = contact.axes.col(axis);
+      RowLaw law{.tolerance = tolerance};
+      if (axis == 0) {
+        const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
+        const double recovery = std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
+        law.offset = std::min(0.0, gap) + recovery;
+        law.agent_displacement = recovery;
+        law.lower = 0.0;
+        law.holds = true;
+        law.friction = contact.friction;
+      } else {
+        law.offset = contact.dent[axis];
+        law.slides = true;
+        law.goes_on = true;
+        law.last_force = n.dot(contact.last_force);
+      }
+      const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
+      const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
+      rows.add(on_a, on_b, law);
+    }
+  }
+
+  std::span<Contact> contacts_;
+  const ContactOptions* options_ = nullptr;
+  bool soft_ = false;
+  double step_ = 0.0, stored_energy_ = 0.0;
+  std::vector<Mat3> flexibility_;
+  std::vector<double> modal_a_, modal_b_;
+};
+
+}  // namespace
+
+void ContactOptions::validate() const {
+  const auto number = [](double value, const char* name) {
+    if (!(value >= 0.0) || std::isinf(value))
+      throw InvalidArgument(std::string("ContactOptions: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number of at least 0");
+  };
+  number(friction, "friction");
+  number(recovery_speed, "recovery_speed");
+}
+
+struct ContactSet::Impl {
+  ContactOptions options;
+  std::vector<Contact> contacts;
+  std::vector<Memory> memory;  // by id, those that pressed in the last step
+  std::vector<std::unique_ptr<PairContacts>> pairs;
+  std::vector<Constraint*> constraints;
+  std::vector<ContactEvent> events, last_events;
+
+  const Memory* find(std::uint64_t id) const;
+  void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
+};
+
+const Memory* ContactSet::Impl::find(std::uint64_t id) const {
+  const auto found =
+      std::lower_bound(memory.begin(), memory.end(), id, [](const Memory& m, std::uint64_t i) { return m.id < i; });
+  return found != memory.end() && found->id == id ? &*found : nullptr;
+}
+
+void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const Vec3& origin,
+                           std::span<const double> friction) {
+  const auto of = [&](Index body) {
+    return static_cast<std::size_t>(body) < friction.size() ? friction[static_cast<std::size_t>(body)]
+                                                            : options.friction;
+  };
+  Contact contact{.id = point.id, .a = make_side(states, point.a), .b = make_side(states, point.b)};
+  contact.axes = frame_along(point.normal);
+  contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
+  contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
+  contact.start_position = point.position + origin;
+  if (const Memory* known = find(point.id)) contact.last_force = known->force;
+  contacts.push_back(contact);
+}
+
+ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
+  options.validate();
+  impl_->options = options;
+}
+ContactSet::~ContactSet() = default;
+ContactSet::ContactSet(ContactSet&&) noexcept = default;
+ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
+
+void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points, const Vec3& origin,
+                        std::span<const double> friction) {
+  Impl& s = *impl_;
+  s.contacts.clear();
+  s.constraints.clear();
+  for (const ContactPoint& point : points)
+    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
+  std::size_t begin = 0, pair = 0;
+  for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
+    const Contact& first = s.contacts[begin];
+    if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
+    if (pair == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
+    s.pairs[pair]->set(states, std::span(s.contacts).subspan(begin, i - begin), s.options);
+    s.constraints.push_back(s.pairs[pair++].get());
+    begin = i;
+  }
+}
+
+std::span<Constraint* const> ContactSet::constraints() const { return impl_->constraints; }
+
+void ContactSet::finish() {
+  Impl& s = *impl_;
+  std::swap(s.events, s.last_events);
+  s.events.clear();
+  for (const Contact& contact : s.contacts) {
+    if (contact.impulse.isZero(0.0)) continue;
+    s.events.push_back({.id = contact.id,
+                        .a = contact.a.body,
+                        .b = contact.b.body,
+                        .phase = s.find(contact.id) != nullptr ? ContactPhase::kLasting : ContactPhase::kBegun,
+                        .position = contact.start_position,
+                        .normal = contact.axes.col(0),
+                        .impulse = contact.impulse});
+  }
+  const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
+  std::sort(s.events.begin(), s.events.end(), by_id);
+  const std::size_t pressed = s.events.size();
+  for (const ContactEvent& last : s.last_events) {
+    const auto end = s.events.begin() + static_cast<std::ptrdiff_t>(pressed);
+    if (last.phase == ContactPhase::kEnded || std::binary_search(s.events.begin(), end, last, by_id)) continue;
+    s.events.push_back(last);
+    s.events.back().phase = ContactPhase::kEnded;
+    s.events.back().impulse = Vec3::Zero();
+  }
+  s.memory.clear();
+  for (const Contact& contact : s.contacts)
+    if (!contact.impulse.isZero(0.0)) s.memory.push_back({contact.id, contact.last_force});
+  std::sort(s.memory.begin(), s.memory.end(), by_id);
+  std::sort(s.events.begin(), s.events.end(), by_id);
+}
+
+std::span<const ContactEvent> ContactSet::events() const { return impl_->events; }
+
+void ContactSet::clear() {
+  impl_->contacts.clear();
+  impl_->constraints.clear();
+  impl_->memory.clear();
+  impl_->events.clear();
+}
+
+}  // namespace limber
