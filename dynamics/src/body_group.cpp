@@ -205,7 +205,7 @@ void BodyGroup::apply_generalized_impulse(Index slot, const Vec3& impulse, const
                                           std::span<const double> modal) {
   body(slot).frame.apply_impulse(constants_, impulse, moment);
   const std::span<double> rates = rates_.modes(slot);
-  for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += velocity_response_[i] * modal[i];
+  for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += modal[i];
 }
 
 void BodyGroup::apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque,

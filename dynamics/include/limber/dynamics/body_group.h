@@ -102,13 +102,13 @@ class BodyGroup {
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
   std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }
-  /// Changes the predicted velocities of frame and modes. Arguments as for apply_generalized_impulse(), but all modes.
+  /// Changes the predicted velocities of frame and modes. Arguments as for apply_generalized_impulse().
   void adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Makes the last prediction the state, and clears the loads, as advance() does.
   void commit(Index slot);
 
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
-  /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none; modes above the step's Nyquist rate stay as they are
+  /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none
   void apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Lasts for the next step. @param modal k numbers, kg^½·m/s², or none
   void apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque, std::span<const double> modal);
