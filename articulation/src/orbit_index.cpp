@@ -246,7 +246,7 @@ void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<
   const auto [r, x] = orbit.plane;
   if (!(face.across > kAlong) || !(r > 0.0)) return;
   const double cosine = (face.offset - face.normal.x() * x) / (r * face.across);
-  if (!(std::abs(cosine) <= 1.0)) return;
+  if (!(cosine >= face.cosine_low && cosine <= face.cosine_high)) return;
   const double half = std::acos(cosine), slope = slope_of(face.across * std::sin(half));
   for (const int side : {-1, 1}) {
     const double theta = face.heading + side * half;
@@ -397,6 +397,17 @@ void add_helices(const PathFrame& frame, OrbitIndex::Face face, std::vector<Orbi
 
 }  // namespace
 
+namespace {
+
+void set_sector(OrbitIndex::Face& face) {
+  std::tie(face.bearing, face.sector) = sector_of(face);
+  const double off = std::abs(wrapped(face.bearing - face.heading));
+  if (off > face.sector) face.cosine_high = std::cos(off - face.sector);
+  if (off + face.sector < kPi) face.cosine_low = std::cos(off + face.sector);
+}
+
+}  // namespace
+
 OrbitBox reach_of(const PathFrame& frame, std::span<const MotionBody> bodies) {
   OrbitBox reach;
   for (const MotionBody& b : bodies)
@@ -433,7 +444,7 @@ std::vector<OrbitIndex::Face> orbit_faces(const PathFrame& frame, std::span<cons
       face.triangle = static_cast<Index>(t);
       face.flipped = inside_out;
       face.box = frame.box_of(face.corners);
-      if (frame.kind() != Kind::kTranslation) std::tie(face.bearing, face.sector) = sector_of(face);
+      if (frame.kind() != Kind::kTranslation) set_sector(face);
       if (frame.kind() == Kind::kScrew)
         add_helices(frame, face, faces);
       else if (face.box.overlaps(reach))

@@ -74,6 +74,7 @@ class OrbitIndex {
     Index body = 0, triangle = 0;
     bool flipped = false;                ///< the second and third corner have changed places
     double bearing = 0.0, sector = 0.0;  ///< rotations, screws: all of it lies within θ = bearing ± sector
+    double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
     OrbitBox box{};
   };
 

@@ -49,7 +49,7 @@ SampledSurface::SampledSurface(std::span<const MotionBody> bodies, std::vector<O
   if (faces_.empty()) return;
   number_vertices(bodies);
   add_face_points(count);
-  add_edge_points(sharp_edges(), count);
+  add_edge_points(sharp_edges(), std::max(count / 2, 1));
 }
 
 void SampledSurface::number_vertices(std::span<const MotionBody> bodies) {

@@ -19,8 +19,8 @@ struct SurfacePoint {
 /// The faces of one side: points on them, and their neighbours.
 class SampledSurface {
  public:
-  /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, and as many on sharp edges and
-  /// at most as many on the ends of these
+  /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, half as many on sharp edges and
+  /// as many at most on the ends of these
   SampledSurface(std::span<const MotionBody> bodies, std::vector<OrbitIndex::Face> faces, int count);
 
   const std::vector<OrbitIndex::Face>& faces() const { return faces_; }

@@ -47,7 +47,7 @@ struct MotionBody {
 struct FreeMotionOptions {
   double tolerance = 0.0;        ///< δ to start with, length; ≥ 0; 0: 2e-4 of the smaller body's diagonal
   double largest_overlap = 0.0;  ///< δ at most, length; ≥ 0; 0: 2e-2 of the smaller body's diagonal
-  int samples = 3000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
+  int samples = 2000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
   bool reachable_only = false;   ///< saves the work of following the ends of `others`
   void validate() const;         ///< @throws InvalidArgument naming the field
 };
