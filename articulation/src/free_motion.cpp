@@ -207,7 +207,8 @@ void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
 void Search::blocked_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
   const double v = speed(at);
   wide_pieces(at, moving, out);
-  std::erase_if(out, [&](const OrbitPiece& p) { return holds_start(p, v); });
+  // Sheets that slide on each other cross at grazing angles.
+  std::erase_if(out, [&](const OrbitPiece& p) { return holds_start(p, v) || (p.sheet != 0 && p.slope_low > kSlope); });
   clip_at_start(out, v);
 }
 
