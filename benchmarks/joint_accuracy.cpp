@@ -1,6 +1,6 @@
 // joint_accuracy: how often joints are read right, and how well.
 //   run:  build/release/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
-//         build/release/bin/joint_accuracy [--method fixed-ratio|convex-parts] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/release/bin/joint_accuracy [--method fixed-ratio] [--only ASSEMBLY] [--class TEXT] [--verbose]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose
 #include <algorithm>
@@ -139,8 +139,6 @@ int main(int argc, char** argv) {
       verbose = true;
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
-    else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "convex-parts")
-      options.contact.method = limber::ContactMethod::kConvexParts, ++i;
     else if (arg == "--only" && i + 1 < argc)
       only = argv[++i];
     else if (arg == "--class" && i + 1 < argc)

@@ -254,7 +254,6 @@ void ContactOptions::validate() const {
   require(crease_angle >= 0.0 && crease_angle <= std::numbers::pi, "crease_angle", crease_angle, "0 to pi");
   require(search > 0.0 && std::isfinite(search), "search", search, "more than 0");
   require(largest_gap > 0.0, "largest_gap", largest_gap, "more than 0");
-  require(hull_margin >= 0.0 && std::isfinite(hull_margin), "hull_margin", hull_margin, "0 or more");
 }
 
 std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactOptions& options, Jobs& jobs) {

@@ -31,19 +31,12 @@ struct ContactRegion {
   bool overlapping = false;    ///< found as surface inside the other solid, not as surfaces that face each other
 };
 
-enum class ContactMethod {
-  kFacingSamples,  ///< area-uniform samples, facing normals, a cluster grown from the smallest gaps
-  kConvexParts,  ///< [X09] 3.1: triangles where the convex hulls of convex parts intersect, filtered by facing normals
-};
-
 struct ContactOptions {
-  ContactMethod method = ContactMethod::kFacingSamples;
   int samples = 3000;            ///< wanted on each side; 100 … 100,000
   double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
   double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
   double search = 0.025;         ///< largest gap, of the smaller component's diagonal; > 0
   double largest_gap = 0.025;    ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
-  double hull_margin = 0.01;     ///< kConvexParts: growth of the hulls, of the smaller component's diagonal; ≥ 0
   void validate() const;         ///< @throws InvalidArgument naming the field
 };
 
