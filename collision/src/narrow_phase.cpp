@@ -1,6 +1,7 @@
 #include "limber/collision/narrow_phase.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -14,6 +15,7 @@
 #include "primitive_contacts.h"
 #include "rest_depth.h"
 #include "surface_contacts.h"
+#include "tet_overlap.h"
 
 namespace limber {
 
@@ -84,7 +86,9 @@ const std::shared_ptr<const CollisionSurface>& RigidGeometry::surface() const { 
 // -- Pairs ------------------------------------------------------------------------------------------------------------
 
 struct RestVolume::Impl : RestDepth {
-  using RestDepth::RestDepth;
+  explicit Impl(std::shared_ptr<const ModalModel> model)
+      : RestDepth(std::move(model)), boundary(boundary_faces(volume())) {}
+  std::vector<Triangle> boundary;
 };
 
 RestVolume::RestVolume(std::shared_ptr<const ModalModel> model)
@@ -101,6 +105,8 @@ struct NarrowPhase::Impl {
   CoreContacts core_contacts;
   ConvexContacts convex_contacts;
   RestDepthRule rest_depth[2];
+  TetOverlap tet_overlap;
+  TetOverlapRule tet_rule[2];
   std::vector<Index> triangles;
   std::vector<FeatureContact> found;
 
@@ -116,7 +122,7 @@ struct NarrowPhase::Impl {
   }
 
   DeformedSurface& deformed(const CollisionBody& body, int side);
-  OverlapRule* rule(const CollisionBody& body, const RigidTransform& X_PB, int side);
+  std::array<OverlapRule*, 2> rules(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB);
   void bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side);
   static double size(const CollisionBody& body);
 
@@ -173,10 +179,30 @@ void NarrowPhase::Impl::bind(const CollisionBody& body, const RigidTransform& X_
   surface[side].bind(deformed(body, side), X_PB, tolerance);
 }
 
-OverlapRule* NarrowPhase::Impl::rule(const CollisionBody& body, const RigidTransform& X_PB, int side) {
-  if (options.overlap != OverlapMethod::kRestDepth || body.volume == nullptr) return nullptr;
-  rest_depth[side].bind(*body.volume->impl_, *body.surface, X_PB);
-  return &rest_depth[side];
+// For vertices inside each, in the frame of a, both surfaces of which are bound; null: the nearest point.
+std::array<OverlapRule*, 2> NarrowPhase::Impl::rules(const CollisionBody& a, const CollisionBody& b,
+                                                     const RigidTransform& X_AB) {
+  std::array<OverlapRule*, 2> chosen{nullptr, nullptr};
+  const CollisionBody* body[2] = {&a, &b};
+  const RigidTransform X_PB[2] = {{}, X_AB};
+  if (options.overlap == OverlapMethod::kRestDepth) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (body[i]->volume == nullptr) continue;
+      rest_depth[i].bind(*body[i]->volume->impl_, *body[i]->surface, X_PB[i]);
+      chosen[i] = &rest_depth[i];
+    }
+  } else if (options.overlap == OverlapMethod::kTetOverlap && a.volume != nullptr && b.volume != nullptr) {
+    const auto overlapping = [&](std::size_t i) {
+      const RestVolume::Impl& volume = *body[i]->volume->impl_;
+      return TetOverlap::Body{&volume.volume(), volume.boundary, body[i]->surface->amplitudes(), X_PB[i]};
+    };
+    tet_overlap.bind(overlapping(0), overlapping(1), surface[0].tolerance());
+    for (std::size_t i = 0; i < 2; ++i) {
+      tet_rule[i].bind(tet_overlap, static_cast<int>(i));
+      chosen[i] = &tet_rule[i];
+    }
+  }
+  return chosen;
 }
 
 void NarrowPhase::Impl::flip() {
@@ -225,7 +251,8 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     const double round_off = kRoundOff * (size(a) + size(b) + X_AB.p.norm());
     bind(a, {}, round_off, 0);
     bind(b, X_AB, round_off, 1);
-    surface_contacts.find(surface[0], surface[1], X_AB, margin, rule(a, {}, 0), rule(b, X_AB, 1), found);
+    const auto [rule_a, rule_b] = rules(a, b, X_AB);
+    surface_contacts.find(surface[0], surface[1], X_AB, margin, rule_a, rule_b, found);
   }
 }
 

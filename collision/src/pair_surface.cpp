@@ -12,6 +12,26 @@ namespace {
 // on a plane. A hollow edge would need 0.5.
 constexpr double kRocking = 0.15;
 
+// Rays that meet a face at less than this, the cosine to its normal, go by.
+constexpr double kGrazing = 1e-9;
+
+// How far along a ray a box begins; infinite where the ray misses it.
+double distance_along(const Vec3& p, const Vec3& direction, const Aabb& box) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double first = 0.0, last = kInfinity;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0.0) {
+      if (p[axis] < box.low[axis] || p[axis] > box.high[axis]) return kInfinity;
+      continue;
+    }
+    const double to_low = (box.low[axis] - p[axis]) / direction[axis];
+    const double to_high = (box.high[axis] - p[axis]) / direction[axis];
+    first = std::max(first, std::min(to_low, to_high));
+    last = std::min(last, std::max(to_low, to_high));
+  }
+  return first <= last ? first : kInfinity;
+}
+
 template <class T>
 void grow(std::vector<T>& v, Index size) {
   if (v.size() < static_cast<std::size_t>(size)) v.resize(static_cast<std::size_t>(size));
@@ -206,6 +226,26 @@ PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
   r.outward = normal_at(r.triangle, r.foot.feature);
   r.inside = sided_ && r.outward.dot(p - r.foot.point) < 0.0 && !on_rim(r.triangle, r.foot.feature);
   return r;
+}
+
+PairSurface::WayOut PairSurface::way_out(const Vec3& p, const Vec3& direction) {
+  WayOut way;
+  const Vec3 p_S = X_SP_ * p, direction_S = X_SP_.q * direction;
+  branch_and_bound(
+      *deformed_, [&](const Aabb& box) { return distance_along(p_S, direction_S, box.grown(tolerance_)); },
+      [&](Index t, double best) {
+        const Face& f = face(t);
+        const double slope = f.normal.dot(direction), height = f.normal.dot(f.x[0] - p);
+        if (!(slope > kGrazing) || height < -tolerance_) return best;
+        const double d = std::max(height / slope, 0.0);
+        if (!(d < best)) return best;
+        const Vec3 q = p + d * direction;
+        for (std::size_t c = 0; c < 3; ++c)
+          if ((q - f.x[c]).dot(f.inward[c]) < -tolerance_ / slope) return best;  // q is as uncertain as that
+        way = {t, d};
+        return d;
+      });
+  return way;
 }
 
 }  // namespace limber

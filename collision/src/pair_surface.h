@@ -124,6 +124,13 @@ class PairSurface {
     bool inside = false;          // the point is behind the surface; never where the foot is on a rim
   };
   Nearest nearest(const Vec3& p, double max_distance);
+  // Where a ray from a point inside first goes out through a face.
+  struct WayOut {
+    Index triangle = -1;    // −1: nowhere
+    double distance = 0.0;  // along the ray, ≥ 0
+  };
+  // @param direction unit
+  WayOut way_out(const Vec3& p, const Vec3& direction);
   // False only where p is outside the surface's bounds.
   bool may_hold(const Vec3& p) { return deformed_->bounds(0).contains(X_SP_ * p); }
 

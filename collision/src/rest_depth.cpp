@@ -35,10 +35,8 @@ void RestDepthRule::bind(const RestDepth& rest, DeformedSurface& deformed, const
   rest_is_bound_ = false;
 }
 
-Vec3 RestDepthRule::deformed_node(Index node) const {
-  const ModalVolume& volume = rest_->volume();
+Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node) {
   Vec3 p = volume.rest[static_cast<std::size_t>(node)];
-  const auto z = deformed_->amplitudes();
   for (std::size_t i = 0; i < z.size(); ++i) p += z[i] * volume.basis.shape(node, static_cast<Index>(i)).cast<double>();
   return p;
 }
@@ -54,7 +52,8 @@ bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& 
     std::array<Vec3, 4> at_rest, now;
     for (std::size_t i = 0; i < 4; ++i) {
       const Index node = volume.tets[static_cast<std::size_t>(tet)][i];
-      at_rest[i] = volume.rest[static_cast<std::size_t>(node)], now[i] = deformed_node(node);
+      at_rest[i] = volume.rest[static_cast<std::size_t>(node)],
+      now[i] = deformed_node(volume, deformed_->amplitudes(), node);
     }
     const Mat3 inverse = edges(at_rest).inverse();
     place.F = edges(now) * inverse;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "limber/mesh/tet_locator.h"
@@ -9,6 +10,9 @@
 #include "surface_contacts.h"
 
 namespace limber {
+
+// A node of the volume in one state: rest + Σ z_i w_i, body frame.
+Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node);
 
 // What does not change: the model, and which tetrahedron of its rest shape holds a point.
 class RestDepth {
@@ -35,7 +39,6 @@ class RestDepthRule final : public OverlapRule {
     Mat3 F;     // deformation gradient there
   };
   bool carry_back(const Vec3& p_B, const Vec3& first_guess, Place& place) const;
-  Vec3 deformed_node(Index node) const;
 
   const RestDepth* rest_ = nullptr;
   DeformedSurface* deformed_ = nullptr;

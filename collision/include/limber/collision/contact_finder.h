@@ -26,7 +26,9 @@ namespace limber {
 struct ContactFinderOptions {
   /// How boxes within a body are made: changes the time, not the contacts.
   BoundsChoice bounds = BoundsChoice::kAutomatic;
-  NarrowPhaseOptions narrow_phase{};  ///< depth and normal of overlaps
+  /// Depth and normal of overlaps. kTetOverlap costs all nodes of both volumes for each overlapping pair, and works
+  /// between modal bodies with a volume block only; kRestDepth asks for one of the body that a vertex is in.
+  NarrowPhaseOptions narrow_phase{};
   /// How contacts are thinned; {.max_points = 0} gives all.
   ContactClusterOptions clusters{};
   /// Extent of a patch where a body deforms: no contact is farther from its first than this share of the smaller body's
