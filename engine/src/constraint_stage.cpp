@@ -53,7 +53,6 @@ std::uint32_t ConstraintStage::place(Entry&& entry) {
   vacant_.pop_back();
   entry.generation = entries_[index].generation;
   entries_[index] = std::move(entry);
-  ++alive_;
   stale_ = true;
   disturb_bodies_of(index);
   return index;
@@ -64,7 +63,6 @@ void ConstraintStage::remove(std::uint32_t index) {
   Entry& entry = entries_[index];
   entry.handle.reset();
   entry.joint.reset();
-  --alive_;
   stale_ = true;
   // A place whose generations are used up is never given again.
   if (++entry.generation != 0) vacant_.push_back(index);
@@ -83,19 +81,27 @@ void ConstraintStage::release_bodies() {
   members_.clear();
 }
 
+void ConstraintStage::set_contacts(std::span<Constraint* const> contacts) {
+  stale_ = stale_ || !contacts_.empty() || !contacts.empty();
+  contacts_.assign(contacts.begin(), contacts.end());
+}
+
 void ConstraintStage::find_islands() {
   if (!stale_) return;
   stale_ = false;
   release_bodies();
   islands_.clear();
   constraints_.clear();
-  if (alive_ == 0) return;
+  all_.clear();
+  for (const Entry& entry : entries_)
+    if (entry.constraint() != nullptr) all_.push_back(entry.constraint());
+  all_.insert(all_.end(), contacts_.begin(), contacts_.end());
+  if (all_.empty()) return;
 
   sets_.reset(table_.size());
   island_of_.assign(table_.size(), -1);
-  for (const Entry& entry : entries_) {
-    if (entry.constraint() == nullptr) continue;
-    const auto [a, b] = entry.constraint()->bodies();
+  for (const Constraint* constraint : all_) {
+    const auto [a, b] = constraint->bodies();
     if (moves(a) && moves(b)) sets_.join(a, b);
   }
   // Islands are numbered by their first body among those that a constraint touches.
@@ -104,9 +110,8 @@ void ConstraintStage::find_islands() {
     return moves(a) ? sets_.root(a) : moves(b) ? sets_.root(b) : Index{-1};
   };
   std::vector<Index>& number = island_of_;
-  for (const Entry& entry : entries_)
-    if (entry.constraint() != nullptr && island_with(entry.constraint()) >= 0)
-      number[static_cast<std::size_t>(island_with(entry.constraint()))] = 0;
+  for (const Constraint* constraint : all_)
+    if (island_with(constraint) >= 0) number[static_cast<std::size_t>(island_with(constraint))] = 0;
   Index count = 0;
   for (Index& n : number)
     if (n == 0) n = count++;
@@ -118,10 +123,9 @@ void ConstraintStage::find_islands() {
     made.first_constraint = constraints_.size();
     for (Index body = 0; body < static_cast<Index>(table_.size()); ++body)
       if (moves(body) && number[static_cast<std::size_t>(sets_.root(body))] == island) members_.push_back(body);
-    for (const Entry& entry : entries_) {
-      if (entry.constraint() == nullptr) continue;
-      const Index root = island_with(entry.constraint());
-      if (root >= 0 && number[static_cast<std::size_t>(root)] == island) constraints_.push_back(entry.constraint());
+    for (Constraint* constraint : all_) {
+      const Index root = island_with(constraint);
+      if (root >= 0 && number[static_cast<std::size_t>(root)] == island) constraints_.push_back(constraint);
     }
     made.members = members_.size() - made.first_member;
     made.constraints = constraints_.size() - made.first_constraint;

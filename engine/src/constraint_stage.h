@@ -39,6 +39,8 @@ class ConstraintStage {
   const std::vector<Entry>& entries() const { return entries_; }
   void disturb_bodies_of(std::uint32_t place);
 
+  /// Constraints of the coming step alone, beside the others: they stay the caller's.
+  void set_contacts(std::span<Constraint* const> contacts);
   /// Islands of the bodies that constraints tie together; those bodies are left alone by BodyGroup::advance().
   void find_islands();
   /// Advances all islands.
@@ -63,7 +65,8 @@ class ConstraintStage {
   std::vector<double> surplus_;  // per body: its share of its island's
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> vacant_;
-  std::size_t alive_ = 0;
+  std::vector<Constraint*> contacts_;
+  std::vector<Constraint*> all_;  // entries and contacts, in this order
 
   bool stale_ = true;  // the islands
   DisjointSets sets_;

@@ -9,6 +9,7 @@
 #include "constraint_stage.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
+#include "limber/dynamics/exact_motion.h"
 #include "limber/dynamics/reconstruct.h"
 
 namespace limber {
@@ -85,7 +86,10 @@ struct World::Impl {
   struct Entry {
     std::uint32_t generation = 1;
     bool alive = false;
-    Index group = 0, slot = 0;
+    Index group = 0, slot = 0;  // group −1: static
+    std::shared_ptr<const Shape> shape{};
+    RigidTransform pose{};  // of a static one
+    CollisionFilter filter{};
   };
   /// Slots [begin, end) of a group: what one job advances.
   struct Range {
@@ -99,6 +103,11 @@ struct World::Impl {
   std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
   std::vector<Range> ranges;                       // covers all slots of all groups
   ConstraintStage constraints;                     // bodies by their entries' indices
+  ContactSource* source = nullptr;
+  ContactSet contacts;
+  std::vector<ContactPoint> touching;
+  std::vector<BodyState> states;  // by entries' indices, for the source
+  std::vector<ExactMotion> motions;
   std::size_t alive = 0;
   std::uint64_t steps = 0;
   double accumulator = 0.0, dropped = 0.0;
@@ -116,6 +125,9 @@ struct World::Impl {
       throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) + " (generation " +
                             std::to_string(id.generation) +
                             ") does not exist; it was removed or belongs to another world");
+    if (entries[id.index].group < 0)
+      throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) +
+                            " is a static shape; it has no motion");
     return entries[id.index];
   }
   bool contains(BodyId id) const {
@@ -141,6 +153,9 @@ struct World::Impl {
   }
   MaterialFrame joint_side(BodyId id, const JointFrame& in_world, const JointAttachment& on) const;
 
+  BodyId place(Entry&& made);
+  void tell_source(std::uint32_t index);
+  void find_contacts();
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
   void advance_all();
@@ -182,7 +197,44 @@ MaterialFrame World::Impl::joint_side(BodyId id, const JointFrame& in_world, con
   return {body, model, patch_around(model, on.surface, in_body.origin, on.radius), in_body};
 }
 
+/// Registers one body with the source.
+void World::Impl::tell_source(std::uint32_t index) {
+  const Entry& e = entries[index];
+  if (source == nullptr || !e.alive) return;
+  BodyGeometry geometry;
+  if (e.group < 0)
+    geometry.shape = e.shape;
+  else
+    geometry.model = group(e).shared_model();
+  source->add_body(static_cast<Index>(index), geometry, e.filter);
+}
+
+/// What touches, or may within the step, as rows for the islands.
+void World::Impl::find_contacts() {
+  if (source == nullptr) return;
+  states.resize(entries.size());
+  motions.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const Entry& e = entries[i];
+    if (!e.alive) continue;
+    if (e.group < 0) {
+      states[i] = {.pose = e.pose};
+      continue;
+    }
+    const BodyGroup& bodies = group(e);
+    bodies.predict_motion(e.slot, options.gravity, motions[i]);
+    const SurfaceExtent& extent = bodies.model().collision_extent();
+    states[i] = {.pose = bodies.frame(e.slot).pose(),
+                 .amplitudes = bodies.amplitudes(e.slot),
+                 .reach = motions[i].reach(extent.radius, extent.shape)};
+  }
+  source->find_contacts({.states = states}, touching, *jobs);
+  contacts.update(constraints.states(), touching);
+  constraints.set_contacts(contacts.constraints());
+}
+
 void World::Impl::advance_all() {
+  find_contacts();
   constraints.find_islands();
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
   jobs->parallel_for(ranges.size(), 1, [this](std::size_t begin, std::size_t end) {
@@ -190,6 +242,7 @@ void World::Impl::advance_all() {
       groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
   });
   constraints.step(*jobs, {.step = options.step, .gravity = options.gravity});
+  if (source != nullptr) contacts.finish();
 }
 
 /// Amplitudes between the last two states.
@@ -235,29 +288,53 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   const Index group = impl_->group_of(std::move(model));
   const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
                                                                          placement.angular_velocity);
-  if (impl_->vacant_entries.empty()) {
-    impl_->entries.emplace_back();
-    impl_->vacant_entries.reserve(impl_->entries.size());  // so that remove_body() cannot fail
-    impl_->vacant_entries.push_back(static_cast<std::uint32_t>(impl_->entries.size() - 1));
-  }
-  const std::uint32_t index = impl_->vacant_entries.back();
-  impl_->vacant_entries.pop_back();
-  Impl::Entry& entry = impl_->entries[index];
-  entry.alive = true, entry.group = group, entry.slot = slot;
-  ++impl_->alive;
-  impl_->constraints.set_body(static_cast<Index>(index), {.group = &impl_->group(entry), .slot = slot});
+  const BodyId id = impl_->place({.group = group, .slot = slot, .filter = placement.filter});
+  impl_->constraints.set_body(static_cast<Index>(id.index),
+                              {.group = &impl_->group(impl_->entries[id.index]), .slot = slot});
+  impl_->tell_source(id.index);
   impl_->make_ranges();
-  return {index, entry.generation};
+  return id;
+}
+
+/// Gives a body an id.
+BodyId World::Impl::place(Entry&& made) {
+  if (vacant_entries.empty()) {
+    entries.emplace_back();
+    vacant_entries.reserve(entries.size());  // so that remove_body() cannot fail
+    vacant_entries.push_back(static_cast<std::uint32_t>(entries.size() - 1));
+  }
+  const std::uint32_t index = vacant_entries.back();
+  vacant_entries.pop_back();
+  made.generation = entries[index].generation;
+  made.alive = true;
+  entries[index] = std::move(made);
+  ++alive;
+  return {index, entries[index].generation};
+}
+
+BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose,
+                         const CollisionFilter& filter) {
+  if (!shape) throw InvalidArgument("World::add_static: the shape is null");
+  validate(*shape);
+  require_pose(pose, "add_static");
+  const BodyId id = impl_->place({.group = -1, .shape = std::move(shape), .pose = pose, .filter = filter});
+  impl_->constraints.set_body(static_cast<Index>(id.index), {.pose = pose});
+  impl_->tell_source(id.index);
+  return id;
 }
 
 void World::remove_body(BodyId id) {
-  const Impl::Entry& known = impl_->entry(id, "remove_body");
-  BodyGroup& group = impl_->group(known);
+  if (!impl_->contains(id)) impl_->entry(id, "remove_body");  // tells so
+  const Impl::Entry& known = impl_->entries[id.index];
+  if (impl_->source != nullptr) impl_->source->remove_body(static_cast<Index>(id.index));
   impl_->constraints.remove_body(static_cast<Index>(id.index));
-  group.remove(known.slot);
-  if (group.count() == 0) {  // lets go of the model
-    impl_->groups[static_cast<std::size_t>(known.group)].reset();
-    impl_->make_ranges();
+  if (known.group >= 0) {
+    BodyGroup& group = impl_->group(known);
+    group.remove(known.slot);
+    if (group.count() == 0) {  // lets go of the model
+      impl_->groups[static_cast<std::size_t>(known.group)].reset();
+      impl_->make_ranges();
+    }
   }
   Impl::Entry& entry = impl_->entries[id.index];
   entry.alive = false;
@@ -416,6 +493,16 @@ ConstraintReport World::constraint_report() const {
           .energy_removed = r.energy_removed};
 }
 
+void World::set_contact_source(ContactSource* source, const ContactOptions& options) {
+  ContactSet contacts(options);
+  impl_->constraints.set_contacts({});
+  impl_->contacts = std::move(contacts);
+  impl_->source = source;
+  for (std::uint32_t i = 0; i < impl_->entries.size(); ++i) impl_->tell_source(i);
+}
+
+std::span<const ContactEvent> World::contact_events() const { return impl_->contacts.events(); }
+
 // State ---------------------------------------------------------------------------------------------------------------
 
 BodyView World::body(BodyId id) const {
@@ -563,7 +650,7 @@ std::uint64_t World::state_hash() const {
   hash.add(impl_->steps);
   for (const Impl::Entry& e : impl_->entries) {
     hash.add(std::uint64_t{e.generation});
-    if (!e.alive) continue;
+    if (!e.alive || e.group < 0) continue;
     const BodyGroup& group = impl_->group(e);
     const RigidFrame& frame = group.frame(e.slot);
     hash.add(frame.pose().q);

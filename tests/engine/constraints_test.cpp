@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "counted_new.h"
+#include "limber/collision/contact_finder.h"
 #include "limber/core/error.h"
 #include "limber/engine/world.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
@@ -191,6 +192,27 @@ TEST(Constraints, StepDoesNotAllocateOnceWarm) {
   const long before = testing::allocations();
   for (int i = 0; i < 100; ++i) frame();
   EXPECT_EQ(testing::allocations() - before, 0);
+}
+
+TEST(Constraints, WithAContactSourceABodyFallsOnTheGroundAndStaysThere) {
+  ContactFinder finder;
+  World world;
+  world.set_contact_source(&finder);
+  const BodyId ground = world.add_static(std::make_shared<const Shape>(HalfSpace{}));
+  const BodyId body =
+      world.add_body(sample_model({.modes = 6, .lowest_hz = 60.0, .decay = 20.0}), {.pose = {.p = {0.0, 0.0, 0.5}}});
+  bool begun = false;
+  for (int i = 0; i < 300; ++i) {
+    world.step();
+    for (const ContactEvent& event : world.contact_events()) begun = begun || event.phase == ContactPhase::kBegun;
+  }
+  EXPECT_TRUE(begun);
+  EXPECT_NEAR(world.body(body).pose.p.z(), 0.1, 0.02) << "half its height";
+  EXPECT_LT(world.body(body).velocity.norm(), 1e-3);
+  EXPECT_THROW(world.body(ground), InvalidArgument);
+  world.remove_body(ground);
+  for (int i = 0; i < 60; ++i) world.step();
+  EXPECT_LT(world.body(body).pose.p.z(), -1.0) << "nothing holds it any more";
 }
 
 }  // namespace

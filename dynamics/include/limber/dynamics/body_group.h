@@ -48,6 +48,7 @@ class BodyGroup {
   BodyGroup(std::shared_ptr<const ModalModel> model, double step);
 
   const ModalModel& model() const { return *model_; }
+  const std::shared_ptr<const ModalModel>& shared_model() const { return model_; }
   const FrameConstants& frame_constants() const { return constants_; }
   double step_length() const { return table_.step(); }
 

@@ -27,6 +27,7 @@
 #include <span>
 #include <vector>
 
+#include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/joint_constraint.h"
 #include "limber/core/jobs.h"
@@ -72,6 +73,7 @@ struct BodyPlacement {
   Vec3 velocity = Vec3::Zero();  ///< m/s; for bodies with fixed nodes: of what carries them
   /// rad/s; kLine: its part along the line counts; kKinematic: of what carries it
   Vec3 angular_velocity = Vec3::Zero();
+  CollisionFilter filter{};  ///< whom it meets, where the world has a contact source
 };
 
 /// How a joint sits on a deforming body: on a patch of its surface, whose mean displacement and rotation it follows.
@@ -134,6 +136,9 @@ class World {
 
   // Bodies -----------------------------------------------------------------------------------------------------------
   BodyId add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement = {});
+  /// A rigid shape that never moves. Only contains() and remove_body() take its id.
+  BodyId add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose = {},
+                    const CollisionFilter& filter = {});
   void remove_body(BodyId id);  ///< and with it its handles and joints
   bool contains(BodyId id) const;
   std::size_t body_count() const;
@@ -186,6 +191,14 @@ class World {
   JointView joint(JointId id) const;
 
   ConstraintReport constraint_report() const;
+
+  // Contacts ---------------------------------------------------------------------------------------------------------
+  /// Who finds the contacts, such as ContactFinder of collision/: without one, bodies pass through each other. Its
+  /// bodies are those of the world, numbered by BodyId::index; it must outlive the world and holds none at first. Null:
+  /// none.
+  void set_contact_source(ContactSource* source, const ContactOptions& options = {});
+  /// What pressed, or ceased to, in the last step; bodies by BodyId::index.
+  std::span<const ContactEvent> contact_events() const;
 
   // State ------------------------------------------------------------------------------------------------------------
   BodyView body(BodyId id) const;
