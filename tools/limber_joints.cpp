@@ -78,9 +78,7 @@ void declare_detection(CLI::App& options, Arguments& a) {
       ->check(CLI::IsMember({"connectivity", "groups", "materials"}))
       ->capture_default_str();
   options.add_option("--merge", a.merge, "components that are one part, by name; repeatable")->type_name("A,B,...");
-  options
-      .add_option("--method", a.method,
-                  "\"paper\": contacts from hulls of convex parts and one fixed ratio of eigenvalues")
+  options.add_option("--method", a.method, "\"paper\": slippage by one fixed ratio of eigenvalues, as in [X09]")
       ->check(CLI::IsMember({"default", "paper"}))
       ->capture_default_str();
   options.add_option("--samples", a.detection.contact.samples, "points on each side of a contact")
@@ -185,10 +183,7 @@ Assembly take_apart(const Arguments& a, const Work& work) {
 DetectionOptions detection_options(const Arguments& a, Program& program) {
   DetectionOptions options = a.detection;
   options.min_confidence = a.min_confidence;
-  if (a.method == "paper") {
-    options.contact.method = ContactMethod::kConvexParts;
-    options.slippage.method = SlippageMethod::kFixedRatio;
-  }
+  if (a.method == "paper") options.slippage.method = SlippageMethod::kFixedRatio;
   options.progress = [&program](double done, std::string_view what) {
     program.progress().stage(what);
     program.progress().fraction(done);

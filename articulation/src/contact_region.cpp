@@ -16,7 +16,7 @@ namespace {
 
 void require(bool holds, const std::string& field, double value, const std::string& expected) {
   if (!holds)
-    throw InvalidArgument("ContactOptions: " + field + " is " + std::to_string(value) + ", expected " + expected);
+    throw InvalidArgument("ContactRegionOptions: " + field + " is " + std::to_string(value) + ", expected " + expected);
 }
 
 /// A component made ready: outward, with normals and a tree.
@@ -224,7 +224,7 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   return {std::move(out)};
 }
 
-std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, const ContactOptions& options) {
+std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, const ContactRegionOptions& options) {
   const Prepared &a = *parts[static_cast<std::size_t>(pair.a)], &b = *parts[static_cast<std::size_t>(pair.b)];
   const double diagonal = std::min(a.diagonal, b.diagonal), reach = options.search * diagonal;
   // A coarse look finds how wide the gap is; a fine one then spends its samples where the contact is.
@@ -248,7 +248,7 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
 
 }  // namespace
 
-void ContactOptions::validate() const {
+void ContactRegionOptions::validate() const {
   require(samples >= 100 && samples <= 100000, "samples", samples, "100 to 100000");
   require(facing_cosine >= -1.0 && facing_cosine <= 0.0, "facing_cosine", facing_cosine, "-1 to 0");
   require(crease_angle >= 0.0 && crease_angle <= std::numbers::pi, "crease_angle", crease_angle, "0 to pi");
@@ -256,7 +256,8 @@ void ContactOptions::validate() const {
   require(largest_gap > 0.0, "largest_gap", largest_gap, "more than 0");
 }
 
-std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactOptions& options, Jobs& jobs) {
+std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactRegionOptions& options,
+                                                Jobs& jobs) {
   options.validate();
   Parts parts(assembly.components.size());
   jobs.parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {

@@ -31,7 +31,7 @@ struct ContactRegion {
   bool overlapping = false;    ///< found as surface inside the other solid, not as surfaces that face each other
 };
 
-struct ContactOptions {
+struct ContactRegionOptions {
   int samples = 3000;            ///< wanted on each side; 100 … 100,000
   double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
   double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
@@ -42,7 +42,7 @@ struct ContactOptions {
 
 /// Contacts of all pairs of components, ordered by (a, b). Pairs without a contact are absent.
 /// Parallel over pairs and over components; the same bits for any thread count.
-std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactOptions& options = {},
+std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactRegionOptions& options = {},
                                                 Jobs& jobs = serial_jobs());
 
 }  // namespace limber

@@ -39,7 +39,7 @@ struct DetectedJoint {
 };
 
 struct DetectionOptions {
-  ContactOptions contact = {};
+  ContactRegionOptions contact = {};
   SlippageOptions slippage = {};
   double min_confidence = 0.0;  ///< joints below are left out; 0 … 1
   /// Called from the calling thread with the part done (0 … 1, ascending) and what is being done; may be empty.
