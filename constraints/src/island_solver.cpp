@@ -111,6 +111,7 @@ struct IslandSolver::Impl {
   void predict(const IslandOptions& options);
   void sum_loads(std::span<const double> values, double scale);
   void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
+  double largest_recovery_work(double distance, const IslandOptions& options) const;
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
   void guard_energy(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
@@ -371,7 +372,7 @@ SolveStatus IslandSolver::Impl::solve_reduced() {
 /// The cones are of whole impulses, f + Δt reaction: A F + (b − A held). Contacts and rows with fixed bounds are solved
 /// for in turn, each exactly, until neither changes the other.
 SolveStatus IslandSolver::Impl::solve_with_friction(bool first) {
-  constexpr int kRounds = 50;
+  constexpr int kRounds = 50, kSweeps = 60;
   constexpr double kSettled = 1e-12;  // of the largest impulse
   const auto c = static_cast<Eigen::Index>(3 * cones), n = static_cast<Eigen::Index>(bounded.size()), r = n - c;
   const Eigen::Map<const RowMajor> M(A_reduced.data(), n, n);
@@ -405,7 +406,7 @@ SolveStatus IslandSolver::Impl::solve_with_friction(bool first) {
     status =
         friction_solver
             .solve(FrictionProblem{.contacts = static_cast<int>(cones), .A = A_cones, .b = b_cones, .mu = friction},
-                   std::span(f_bounded).first(3 * cones))
+                   std::span(f_bounded).first(3 * cones), {.max_sweeps = kSweeps})
             .status;
     if (r == 0 || (h.head(c) - F.head(c)).lpNorm<Eigen::Infinity>() <= kSettled * F.lpNorm<Eigen::Infinity>()) break;
   }
@@ -501,6 +502,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   cones = bounded.size() / 3;
   for (Index i = 0; i < rows.size(); ++i)
     if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
+  constexpr int kIterationsUnsettled = 6;
   factor();
   secant.begin(f.size());
   for (report.iterations = 1;; ++report.iterations) {
@@ -509,7 +511,10 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
     if (report.change <= 1.0) return status;
-    if (report.iterations > options.max_iterations) return take_best(states, constraints, options, report);
+    // Cones that do not come together give other impulses every time.
+    const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
+                                                            : options.max_iterations;
+    if (report.iterations > most) return take_best(states, constraints, options, report);
     for (std::size_t i = 0; i < f.size(); ++i) next_f[i] -= f[i];
     for (Index i = 0; i < rows.size(); ++i) change[static_cast<std::size_t>(i)] /= rows.row(i).law.tolerance;
     secant.advance(f, next_f, change);
@@ -542,13 +547,32 @@ SolveStatus IslandSolver::Impl::take_best(const BodyStates& states, std::span<Co
   return SolveStatus::kIterationLimit;
 }
 
+/// What it takes to lift all bodies of the island by a distance within a step. Rows that push overlapping bodies apart
+/// may do no more, however hard they press against each other.
+double IslandSolver::Impl::largest_recovery_work(double distance, const IslandOptions& options) const {
+  const double speed = distance / options.step;
+  double work = 0.0;
+  for (Index local = 0; local < bodies.count(); ++local)
+    work +=
+        bodies.body(local).group->frame_constants().mass * (0.5 * speed * speed + options.gravity.norm() * distance);
+  return work;
+}
+
 /// Σ f/Δt times the agents' displacements, what is negative not counted, and what the rows' springs give.
 double IslandSolver::Impl::agent_work(const IslandOptions& options) const {
   double work = 0.0;
+  double recovery_work = 0.0, recovery = 0.0;
   for (std::size_t i = 0; i < laws.size(); ++i) {
-    work += std::max(0.0, (f[i] / options.step + reaction[i]) * laws[i].agent_displacement);
+    const double given = std::max(0.0, (f[i] / options.step + reaction[i]) * laws[i].agent_displacement);
+    if (laws[i].lower == 0.0) {
+      recovery_work += given;
+      recovery = std::max(recovery, laws[i].agent_displacement);
+    } else {
+      work += given;
+    }
     work += 0.5 * laws[i].stiffness * (start_gap[i] * start_gap[i] - gap[i] * gap[i]);
   }
+  work += std::min(recovery_work, largest_recovery_work(recovery, options));
   work += stored_energy;
   for (const ConstraintRows::Flexibility& g : flexibility) {
     const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);

@@ -106,6 +106,7 @@ struct World::Impl {
   ContactSource* source = nullptr;
   ContactSet contacts;
   std::vector<ContactPoint> touching;
+  std::function<bool(const ContactPoint&)> contact_acts;
   std::vector<BodyState> states;  // by entries' indices, for the source
   std::vector<ExactMotion> motions;
   std::size_t alive = 0;
@@ -229,6 +230,7 @@ void World::Impl::find_contacts() {
                  .reach = motions[i].reach(extent.radius, extent.shape)};
   }
   source->find_contacts({.states = states}, touching, *jobs);
+  if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
   contacts.update(constraints.states(), touching);
   constraints.set_contacts(contacts.constraints());
 }
@@ -500,6 +502,8 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   impl_->source = source;
   for (std::uint32_t i = 0; i < impl_->entries.size(); ++i) impl_->tell_source(i);
 }
+
+void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) { impl_->contact_acts = std::move(acts); }
 
 std::span<const ContactEvent> World::contact_events() const { return impl_->contacts.events(); }
 

@@ -22,6 +22,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -197,6 +198,9 @@ class World {
   /// bodies are those of the world, numbered by BodyId::index; it must outlive the world and holds none at first. Null:
   /// none.
   void set_contact_source(ContactSource* source, const ContactOptions& options = {});
+  /// Asked of every contact found, before it acts: false leaves it out of the step. From the thread that calls step();
+  /// empty: all act.
+  void set_contact_veto(std::function<bool(const ContactPoint&)> acts);
   /// What pressed, or ceased to, in the last step; bodies by BodyId::index.
   std::span<const ContactEvent> contact_events() const;
 
