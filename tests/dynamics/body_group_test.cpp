@@ -71,8 +71,8 @@ TEST(BodyGroup, ModesFeelTheInertialForcesThatTheParticlesFeel) {
   const Particles body = sample_particles(options);
   const double h = 1e-6;
   BodyGroup group(sample_model(options), h);
-  const Index slot = group.add({kTurned, {}}, Vec3::Zero(), Vec3::Zero());
-  const KinematicFrame parent{.pose = {kTurned, {}},
+  const Index slot = group.add({kTurned, Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
+  const KinematicFrame parent{.pose = {kTurned, Vec3::Zero()},
                               .acceleration = {1.0, -2.0, 0.5},
                               .angular_velocity = {0.8, 1.5, -2.0},
                               .angular_acceleration = {3.0, -1.0, 2.0}};
@@ -94,7 +94,7 @@ TEST(BodyGroup, HungBodySagsByGravityOverStiffness) {
   const SampleOptions options{.motion = FrameMotion::kKinematic, .decay = 20.0};
   const auto model = sample_model(options);
   BodyGroup group(model, 0.1);
-  const Index slot = group.add({kTurned, {}}, Vec3::Zero(), Vec3::Zero());
+  const Index slot = group.add({kTurned, Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   for (int i = 0; i < 200; ++i) group.advance(0, 1, kDown);
   for (std::size_t i = 0; i < 4; ++i) {
     const double expected =
@@ -157,7 +157,7 @@ TEST(BodyGroup, SoftPendulumKeepsItsEnergy) {
   const auto model = sample_model(options);
   const auto worst = [&](double h) {
     BodyGroup group(model, h);
-    const Index slot = group.add({quaternion_from_rotation_vector({1.2, 0, 0}), {}}, Vec3::Zero(), {0, 1, 0});
+    const Index slot = group.add({quaternion_from_rotation_vector({1.2, 0, 0}), Vec3::Zero()}, Vec3::Zero(), {0, 1, 0});
     const auto energy = [&] {
       const RigidFrame& frame = group.frame(slot);
       double e = frame.kinetic_energy(group.frame_constants()) - kDown.dot(frame.pose().q * group.first_moment(slot));
@@ -204,7 +204,7 @@ TEST(BodyGroup, HeldForceDisplacesModesByItsClosedForm) {
   const auto model = sample_model({.decay = 1.0});
   const SurfacePoint at{.triangle = 4, .weight = {0.1, 0.2, 0.7}};
   BodyGroup group(model, 0.2);
-  group.add({kTurned, {}}, Vec3::Zero(), Vec3::Zero());
+  group.add({kTurned, Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   const Vec3 force{1.0, -2.0, 3.0};
   group.apply_force(0, at, 0.25 * force);
   group.apply_force(0, at, 0.75 * force);

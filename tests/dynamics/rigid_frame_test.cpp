@@ -104,7 +104,7 @@ class Pendulum : public ::testing::TestWithParam<FrameMotion> {
   /// Angle from the lowest point, about x.
   static double angle(const RigidFrame& frame) { return 2.0 * std::atan2(frame.pose().q.x, frame.pose().q.w); }
   RigidFrame let_go(double start) const {
-    return RigidFrame(c, {quaternion_from_rotation_vector({start, 0, 0}), {}}, Vec3::Zero(), Vec3::Zero());
+    return RigidFrame(c, {quaternion_from_rotation_vector({start, 0, 0}), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   }
   /// −mgl cos θ
   double energy(const RigidFrame& frame) const {
@@ -180,7 +180,7 @@ INSTANTIATE_TEST_SUITE_P(PointAndLine, Pendulum, ::testing::Values(FrameMotion::
 TEST(RigidFrame, SphericalPendulumKeepsItsVerticalMomentum) {
   // Gravity has no moment about the vertical through the pivot.
   const FrameConstants c = hanging_body(FrameMotion::kPoint, {0.7, 0.9, 0.3}, 0.4);
-  RigidFrame frame(c, {quaternion_from_rotation_vector({1.0, 0.3, 0}), {}}, Vec3::Zero(), {0.4, 0.0, 3.0});
+  RigidFrame frame(c, {quaternion_from_rotation_vector({1.0, 0.3, 0}), Vec3::Zero()}, Vec3::Zero(), {0.4, 0.0, 3.0});
   const double vertical = frame.angular_momentum(c).z();
   for (int i = 0; i < 10000; ++i) step(frame, c, {.gravity = kDown}, 0.01);
   EXPECT_NEAR(frame.angular_momentum(c).z(), vertical, 1e4 * kEpsilon * vertical);
@@ -194,11 +194,11 @@ TEST(RigidFrame, GovernorStandsAtTheAngleWhereGravityAndSpinAgree) {
   const double angle = std::acos(c.mass * kGravity * 0.4 / (spin * spin * (moments.y() - moments.z())));
   ASSERT_GT(angle, 0.5);
   const Quaternion tilt = quaternion_from_rotation_vector({angle, 0, 0});
-  RigidFrame frame(c, {tilt, {}}, Vec3::Zero(), Vec3::Zero());
+  RigidFrame frame(c, {tilt, Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   const double h = 1.0 / 240.0;
   for (int i = 1; i <= 2400; ++i) {
     const Quaternion turned = quaternion_from_rotation_vector({0, 0, spin * h * i}) * tilt;
-    frame.set_parent({.pose = {turned, {}}, .angular_velocity = {0, 0, spin}});
+    frame.set_parent({.pose = {turned, Vec3::Zero()}, .angular_velocity = {0, 0, spin}});
     step(frame, c, {.gravity = kDown}, h);
   }
   // The first half kick is before the parent spins: ½h·mgl sin θ/I of speed makes it swing by 0.005 about that angle.
@@ -233,12 +233,12 @@ TEST(RigidFrame, CarriedLineObeysTheParticlesEquationOfMotion) {
   const testing::SampleOptions options{.motion = FrameMotion::kLine};
   const FrameConstants c(sample_model_data(options));
   const Quaternion q_WK = quaternion_from_rotation_vector({0.7, -0.4, 1.1});
-  const KinematicFrame parent{.pose = {q_WK, {}},
+  const KinematicFrame parent{.pose = {q_WK, Vec3::Zero()},
                               .acceleration = {1.0, -2.0, 0.5},
                               .angular_velocity = {0.8, 1.5, -2.0},
                               .angular_acceleration = {3.0, -1.0, 2.0}};
   const double rate = 1.7;
-  RigidFrame frame(c, {q_WK, {}}, Vec3::Zero(), rate * (q_WK * Vec3(1, 0, 0)));
+  RigidFrame frame(c, {q_WK, Vec3::Zero()}, Vec3::Zero(), rate * (q_WK * Vec3(1, 0, 0)));
   // One tiny step to tell the parent's rates, then one whose change of θ̇ is θ̈ h.
   const double h = 1e-7;
   const auto line_rate = [&] {
