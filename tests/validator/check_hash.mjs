@@ -24,6 +24,7 @@ function contentHash(document, binary) {
     [body.vertices, body.triangles].forEach(u64);
     optional(body.collision, 'vertices', 'triangles');
     optional(body.volume_block, 'nodes', 'tets');
+    if (body.residual_compliance) text(body.residual_compliance.form), u64(body.residual_compliance.vertices);
   }
   return `sha256:${hash.update(binary).digest('hex')}`;
 }

@@ -144,7 +144,9 @@ class BodyGroup {
    public:
     explicit ModeRows(Index modes) : modes_(static_cast<std::size_t>(modes)), blocks_((modes_ + 7) / 8) {}
     void resize(std::size_t slots) { storage_.resize(slots * blocks_); }
-    double* row(Index slot) { return storage_.data()[static_cast<std::size_t>(slot) * blocks_].lanes; }
+    double* row(Index slot) {
+      return blocks_ == 0 ? nullptr : storage_[static_cast<std::size_t>(slot) * blocks_].lanes;
+    }
     std::span<double> modes(Index slot) { return {modes_ == 0 ? nullptr : row(slot), modes_}; }
     std::span<const double> modes(Index slot) const { return const_cast<ModeRows*>(this)->modes(slot); }
     void clear(Index slot);
