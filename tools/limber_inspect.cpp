@@ -67,13 +67,9 @@ Box box_of(const ModalSurface& surface) {
 
 Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
-std::string residual_form(const ResidualCompliance& r) {
-  return r.form() == ResidualCompliance::Form::kFull ? "full" : "local";
-}
-
 Json residual_report(const ModalModelData& d) {
   if (!d.residual_compliance) return {};
-  return {{"form", residual_form(*d.residual_compliance)}, {"vertices", d.residual_compliance->vertices()}};
+  return {{"form", to_string(d.residual_compliance->form())}, {"vertices", d.residual_compliance->vertices()}};
 }
 
 Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
@@ -142,7 +138,7 @@ std::string surfaces_text(const ModalModelData& d) {
     text +=
         fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
   if (const auto& r = d.residual_compliance)
-    text += fmt::format("  residual        {}, of {} vertices\n", residual_form(*r), r->vertices());
+    text += fmt::format("  residual        {}, of {} vertices\n", to_string(r->form()), r->vertices());
   return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
 }
 

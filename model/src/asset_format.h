@@ -21,10 +21,6 @@ inline constexpr char kExtension[] = "LIMBER_modal";
 inline constexpr int kFormatVersion = 1;
 inline constexpr std::string_view kHashPrefix = "sha256:";
 
-inline std::string_view form_name(ResidualCompliance::Form form) {
-  return form == ResidualCompliance::Form::kFull ? "full" : "local";
-}
-
 /// The content hash: provenance, then the numbers of every body, then the whole BIN chunk. It does not depend on how
 /// the JSON is laid out, only on what it says.
 class ContentHash {
@@ -61,7 +57,7 @@ class ContentHash {
       add(std::uint64_t{body.volume_block->tets.size()});
     }
     if (body.residual_compliance) {
-      add(form_name(body.residual_compliance->form()));
+      add(to_string(body.residual_compliance->form()));
       add(static_cast<std::uint64_t>(body.residual_compliance->vertices()));
     }
   }

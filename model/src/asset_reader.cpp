@@ -277,9 +277,9 @@ class BodyReader {
     using Form = ResidualCompliance::Form;
     const JsonObject block(block_.at("residual_compliance"), block_.where("residual_compliance"));
     const std::string form = block.text("form");
-    if (form != "full" && form != "local")
+    const Form kind = form == to_string(Form::kFull) ? Form::kFull : Form::kLocal;
+    if (form != to_string(kind))
       throw InputError(block.where("form") + ": is \"" + form + "\", expected \"full\" or \"local\"");
-    const Form kind = form == "full" ? Form::kFull : Form::kLocal;
     const auto vertices = static_cast<Index>(count_of(block, "vertices"));
     const std::string_view bytes =
         pieces_.raw(block, "blocks", sizeof(float) * ResidualCompliance::value_count(kind, vertices));

@@ -80,7 +80,7 @@ json volume_block(GlbBuilder& glb, const ModalVolume& volume) {
 }
 
 json residual_block(GlbBuilder& glb, const ResidualCompliance& residual) {
-  json block = {{"form", asset_format::form_name(residual.form())}, {"vertices", residual.vertices()}};
+  json block = {{"form", to_string(residual.form())}, {"vertices", residual.vertices()}};
   block["blocks"] = glb.add_raw(std::as_bytes(residual.values()));
   return block;
 }

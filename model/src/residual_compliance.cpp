@@ -10,6 +10,10 @@ namespace {
 constexpr std::size_t kBlock = 9;
 }
 
+std::string_view to_string(ResidualCompliance::Form form) {
+  return form == ResidualCompliance::Form::kFull ? "full" : "local";
+}
+
 ResidualCompliance::ResidualCompliance(Form form, Index vertices) : form_(form), vertices_(vertices) {
   if (vertices < 0)
     throw InvalidArgument("ResidualCompliance: " + std::to_string(vertices) + " vertices, expected 0 or more");

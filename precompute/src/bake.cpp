@@ -360,6 +360,18 @@ std::vector<char> selected_flags(const TetMesh& mesh, std::span<const NodeSelect
   return selected;
 }
 
+/// A node that does not move answers no load.
+void warn_of_fixed_loads(std::span<const char> loaded, std::span<const char> fixed, Warnings& warnings) {
+  std::size_t chosen = 0, idle = 0;
+  for (std::size_t n = 0; n < loaded.size(); ++n) {
+    chosen += loaded[n] ? 1 : 0;
+    idle += loaded[n] && fixed[n] ? 1 : 0;
+  }
+  if (idle > 0)
+    warnings.push_back("residual: " + std::to_string(idle) + " of the " + std::to_string(chosen) +
+                       " chosen nodes are fixed and get no residual modes");
+}
+
 void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warnings& warnings) {
   std::vector<char> used(mesh.nodes.size(), 0);
   for (const Tet& t : mesh.tets)
@@ -422,6 +434,7 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
   const auto fixed = selected_flags(input.mesh, options.fixed);
   const auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);
+  warn_of_fixed_loads(loaded, fixed, warnings);
 
   const auto component = connected_components(input.mesh);
   const Index bodies = 1 + *std::max_element(component.begin(), component.end());

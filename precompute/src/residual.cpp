@@ -19,10 +19,18 @@ Columns columns(const std::vector<double>& all, Index nodes) {
   return {all.data(), rows, static_cast<Eigen::Index>(all.size()) / rows};
 }
 
+std::span<const double> numbers(const Eigen::MatrixXd& X) { return {X.data(), static_cast<std::size_t>(X.size())}; }
+
+Columns like(const std::vector<double>& numbers, const Eigen::MatrixXd& X) {
+  return {numbers.data(), X.rows(), X.cols()};
+}
+
 Eigen::MatrixXd displacements(ElasticCompliance& compliance, const Eigen::MatrixXd& forces) {
-  const auto size = static_cast<std::size_t>(forces.size());
-  const std::vector<double> u = compliance.displacements({forces.data(), size});
-  return Eigen::Map<const Eigen::MatrixXd>(u.data(), forces.rows(), forces.cols());
+  return like(compliance.displacements(numbers(forces)), forces);
+}
+
+Eigen::MatrixXd mass_times(const ElasticCompliance& compliance, const Eigen::MatrixXd& X) {
+  return like(compliance.mass_times(numbers(X)), X);
 }
 
 /// The kept modes that answer statically: those with λ > 0. A mechanism gives way to any load.
@@ -55,11 +63,6 @@ struct Ritz {
   Eigen::MatrixXd W, MW;
   Eigen::VectorXd eigenvalues;
 };
-
-Eigen::MatrixXd mass_times(const ElasticCompliance& compliance, const Eigen::MatrixXd& X) {
-  const std::vector<double> y = compliance.mass_times({X.data(), static_cast<std::size_t>(X.size())});
-  return Eigen::Map<const Eigen::MatrixXd>(y.data(), X.rows(), X.cols());
-}
 
 Ritz ritz_modes(const ElasticCompliance& compliance, const Eigen::MatrixXd& Y) {
   const Eigen::MatrixXd MY = mass_times(compliance, Y);

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -152,6 +153,16 @@ TEST_P(ResidualOfBox, ResidualModesAreMassNormalisedWithTheKeptOnes) {
         product += volume.basis.shape(n, i).cast<double>().dot(volume.mass_times_basis.shape(n, j).cast<double>());
       EXPECT_NEAR(product, i == j ? 1.0 : 0.0, kFloat) << i << " " << j;
     }
+}
+
+TEST(Residual, OfFixedNodesIsNothingAndTold) {
+  BakeOptions o = options_for(5);
+  o.fixed = {NodesByIndex{{0, 1, 2, 3}}};
+  o.residual.nodes = {NodesByIndex{{2, 3}}};
+  Warnings warnings;
+  const BakeResult r = bake({.name = "box", .mesh = box()}, o, warnings);
+  EXPECT_EQ(r.bodies[0].residual.modes, 0);
+  EXPECT_THAT(warnings, ::testing::Contains(::testing::HasSubstr("2 of the 2 chosen nodes are fixed")));
 }
 
 TEST(Residual, OfABodyWithAllItsModesIsNothing) {

@@ -23,7 +23,7 @@ Json json(const EmbeddingReport& e) {
 
 Json json(const ResidualReport& r) {
   Json form;
-  if (r.form) form = *r.form == ResidualCompliance::Form::kFull ? "full" : "local";
+  if (r.form) form = to_string(*r.form);
   return {{"modes", r.modes}, {"form", form}, {"vertices", r.vertices}, {"bytes", r.bytes}};
 }
 

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "limber/core/types.h"
@@ -50,5 +51,8 @@ class ResidualCompliance {
   Index vertices_ = 0;
   std::vector<float> values_;
 };
+
+/// "full" or "local": its name in files and reports.
+std::string_view to_string(ResidualCompliance::Form form);
 
 }  // namespace limber
