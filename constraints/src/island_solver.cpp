@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bounded_rows.h"
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
-#include "limber/constraints/friction_cone.h"
 #include "limber/constraints/least_squares.h"
 #include "secant_iteration.h"
 
@@ -71,14 +71,14 @@ struct IslandSolver::Impl {
   std::vector<Index> bounded, order, place;
   std::size_t cones = 0;
   std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
-  std::vector<double> held_impulse, friction, A_cones, b_cones, A_boxes, b_boxes;
+  std::vector<double> held_impulse, friction;
   std::vector<ConstraintRows::Flexibility> flexibility;  // of the rows at the step's start
   double stored_energy = 0.0;
   std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
-  FrictionSolver friction_solver;
+  BoundedRowSolver bounded_rows;
   SecantIteration secant;
   IslandEnergy energy;
 
@@ -102,8 +102,7 @@ struct IslandSolver::Impl {
   SolveStatus improve(bool first);
   SolveStatus improve_equalities();
   SolveStatus improve_all(bool first);
-  SolveStatus solve_reduced();
-  SolveStatus solve_with_friction(bool first);
+  SolveStatus solve_bounded(bool first);
   void keep_within_bounds();
   double largest_change() const;
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
@@ -346,11 +345,7 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
   elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
-  for (std::size_t i = 0; i < bounded.size(); ++i) {
-    const auto at = static_cast<std::size_t>(bounded[i]);
-    f_bounded[i] = f[at], lower_bounded[i] = lower[at], upper_bounded[i] = upper[at];
-  }
-  const SolveStatus status = cones == 0 ? solve_reduced() : solve_with_friction(first);
+  const SolveStatus status = solve_bounded(first);
   f_equal.resize(e);
   elimination.recover(f_bounded, f_equal);
   for (std::size_t i = 0; i < m; ++i)
@@ -358,60 +353,26 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
   return status;
 }
 
-SolveStatus IslandSolver::Impl::solve_reduced() {
-  return qp
-      .solve(ContactQp{.size = static_cast<int>(bounded.size()),
-                       .A = A_reduced,
-                       .b = b_reduced,
-                       .lower = lower_bounded,
-                       .upper = upper_bounded},
-             f_bounded)
-      .status;
-}
-
-/// The cones are of whole impulses, f + Δt reaction: A F + (b − A held). Contacts and rows with fixed bounds are solved
-/// for in turn, each exactly, until neither changes the other.
-SolveStatus IslandSolver::Impl::solve_with_friction(bool first) {
-  constexpr int kRounds = 50, kSweeps = 60;
-  constexpr double kSettled = 1e-12;  // of the largest impulse
-  const auto c = static_cast<Eigen::Index>(3 * cones), n = static_cast<Eigen::Index>(bounded.size()), r = n - c;
-  const Eigen::Map<const RowMajor> M(A_reduced.data(), n, n);
-  Eigen::Map<Eigen::VectorXd> F(f_bounded.data(), n), b0(b_reduced.data(), n), h(held_impulse.data(), n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto at = static_cast<std::size_t>(bounded[static_cast<std::size_t>(i)]);
-    h[i] = step * reaction[at];
-    if (first && i < c) F[i] = step * laws[at].last_force - h[i];
-    lower_bounded[static_cast<std::size_t>(i)] += h[i], upper_bounded[static_cast<std::size_t>(i)] += h[i];
+/// Bounds and cones are of whole impulses, F = f + Δt reaction: A F + (b − A Δt reaction).
+SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
+  const std::size_t n = bounded.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(bounded[i]);
+    held_impulse[i] = step * reaction[at];
+    f_bounded[i] = first && i < 3 * cones ? step * laws[at].last_force : f[at] + held_impulse[i];
+    lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
   }
-  Eigen::Map<RowMajor>(A_cones.data(), c, c) = M.topLeftCorner(c, c);
-  Eigen::Map<RowMajor>(A_boxes.data(), r, r) = M.bottomRightCorner(r, r);
-  b0.noalias() -= M * h;
-  F += h;
-  SolveStatus status = SolveStatus::kSolved;
-  for (int round = 0; round < kRounds; ++round) {
-    Eigen::Map<Eigen::VectorXd> b_c(b_cones.data(), c), b_r(b_boxes.data(), r);
-    if (r > 0) {
-      b_r = b0.tail(r);
-      b_r.noalias() += M.bottomLeftCorner(r, c) * F.head(c);
-      qp.solve(ContactQp{.size = static_cast<int>(r),
-                         .A = A_boxes,
-                         .b = b_boxes,
-                         .lower = std::span(lower_bounded).subspan(3 * cones),
-                         .upper = std::span(upper_bounded).subspan(3 * cones)},
-               std::span(f_bounded).subspan(3 * cones));
-    }
-    b_c = b0.head(c);
-    b_c.noalias() += M.topRightCorner(c, r) * F.tail(r);
-    std::copy_n(f_bounded.begin(), 3 * cones, held_impulse.begin());  // to see what changes
-    status =
-        friction_solver
-            .solve(FrictionProblem{.contacts = static_cast<int>(cones), .A = A_cones, .b = b_cones, .mu = friction},
-                   std::span(f_bounded).first(3 * cones), {.max_sweeps = kSweeps})
-            .status;
-    if (r == 0 || (h.head(c) - F.head(c)).lpNorm<Eigen::Infinity>() <= kSettled * F.lpNorm<Eigen::Infinity>()) break;
-  }
-  for (std::size_t i = 0; i < bounded.size(); ++i)
-    f_bounded[i] -= step * reaction[static_cast<std::size_t>(bounded[i])];
+  const auto size = static_cast<Eigen::Index>(n);
+  Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
+      Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
+  const SolveStatus status = bounded_rows.solve({.cones = static_cast<int>(cones),
+                                                 .A = A_reduced,
+                                                 .b = b_reduced,
+                                                 .friction = friction,
+                                                 .lower = lower_bounded,
+                                                 .upper = upper_bounded},
+                                                f_bounded);
+  for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
   return status;
 }
 
@@ -473,9 +434,7 @@ void IslandSolver::Impl::factor() {
   const std::size_t c = bounded.size();
   A_reduced.resize(c * c), b_reduced.resize(c), ordered_b.resize(m);
   for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
-  const std::size_t boxes = c - 3 * cones;
-  friction.resize(cones), A_cones.resize(9 * cones * cones), b_cones.resize(3 * cones);
-  A_boxes.resize(boxes * boxes), b_boxes.resize(boxes);
+  friction.resize(cones);
   for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
 }
 
