@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "free_motion_of_bodies.h"
 #include "limber/core/error.h"
 #include "orbit_index.h"
 #include "orbit_samples.h"
@@ -14,6 +15,8 @@ namespace limber {
 namespace {
 
 using internal::Orbit;
+using internal::OrbitBody;
+using internal::OrbitFace;
 using internal::OrbitIndex;
 using internal::OrbitPiece;
 using internal::PathFrame;
@@ -29,29 +32,19 @@ constexpr double kDefaultLargestOverlap = 2e-2;  // the same
 /// The steepest slope (see OrbitPiece) at which a surface is a stop; beyond it, it slides.
 constexpr double kSlope = 2.0;
 
-double diagonal(std::span<const MotionBody> bodies) {
-  Vec3 low = Vec3::Constant(kInfinity), high = -low;
-  for (const MotionBody& b : bodies)
-    for (const Vec3& p : b.surface->vertices) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  return (high - low).allFinite() ? (high - low).norm() : 0.0;
+double diagonal(std::span<const OrbitBody> bodies) {
+  Eigen::AlignedBox3d box;
+  for (const OrbitBody& b : bodies) box.extend(b.box);
+  return box.isEmpty() ? 0.0 : box.diagonal().norm();
 }
 
 /// One side: its triangles in reach of the other, and points on them.
 struct Side {
+  Side(const PathFrame& frame, std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int samples)
+      : index(frame, bodies, faces), surface(bodies, std::move(faces), samples) {}
   OrbitIndex index;
   SampledSurface surface;
 };
-
-/// The faces of one side that meet a face of the other in the orbit plane: points elsewhere are of no use.
-std::vector<OrbitIndex::Face> that_meet(const OrbitIndex& own, const OrbitIndex& other, double margin) {
-  std::vector<OrbitIndex::Face> faces;
-  for (const auto& f : own.faces()) {
-    internal::OrbitBox box = f.box;
-    box.grow(margin);
-    if (other.meets(box)) faces.push_back(f);
-  }
-  return faces;
-}
 
 /// A blocked piece and the point that told of it.
 struct Witness {
@@ -74,6 +67,7 @@ class Search {
       : frame_(frame), moving_(moving), fixed_(fixed), tolerances_(tolerances), reachable_only_(reachable_only) {}
 
   FreeMotion run() {
+    find_raw();
     settle_tolerance();
     collect();
     refine();
@@ -81,6 +75,16 @@ class Search {
   }
 
  private:
+  /// The pieces of each point's own orbit, as raw_pieces() gives them.
+  struct RawPieces {
+    std::vector<OrbitPiece> pieces;
+    std::vector<std::size_t> first;  ///< per point, and the end
+    std::span<const OrbitPiece> of(std::size_t point) const {
+      return std::span(pieces).subspan(first[point], first[point + 1] - first[point]);
+    }
+  };
+
+  void find_raw();
   void settle_tolerance();
   void collect();
   bool adds(const OrbitPiece& piece) const;
@@ -91,16 +95,22 @@ class Search {
   void refine();
   FreeMotion result() const;
 
-  void raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const;
+  void gather(const Orbit& orbit, bool moving, double around, std::vector<Index>& near) const;
+  void raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index>& near, std::vector<OrbitPiece>& out) const;
   void wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const;
-  void blocked_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const;
+  /// @param near what gather() found within δ of the point's orbit
+  void wide_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
+                   std::vector<OrbitPiece>& out) const;
+  void blocked_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
+                      std::vector<OrbitPiece>& out) const;
   void clip_at_start(std::vector<OrbitPiece>& pieces, double speed) const;
   bool holds_start(const OrbitPiece& piece, double speed) const;
   Witness descend(Witness start, bool low, const Span& gap) const;
-  void refine_end(Span& span, bool low, const Span& gap, Witness& end);
+  void refine_end(Span& span, bool low, const Span& gap, std::size_t seeds, Witness& end);
   MotionStop stop_of(const Witness& witness) const;
   double speed(const SurfacePoint& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
   const SampledSurface& surface(bool moving) const { return (moving ? moving_ : fixed_).surface; }
+  const RawPieces& raw(bool moving) const { return moving ? raw_moving_ : raw_fixed_; }
 
   const PathFrame& frame_;
   const Side& moving_;
@@ -108,20 +118,42 @@ class Search {
   Tolerances tolerances_;
   bool reachable_only_;
   bool overlapping_ = false;
+  RawPieces raw_moving_, raw_fixed_;
   /// The direction that freed the last point often frees the next; the answer does not depend on where one begins.
   mutable std::size_t first_across_ = 0;
   std::vector<Witness> witnesses_;
-  double sheet_below_ = -kInfinity, sheet_above_ = kInfinity;  ///< the nearest sheets that block
-  Spans blocked_;                                              ///< B
+  Span sheet_below_{-kInfinity, -kInfinity}, sheet_above_{kInfinity, kInfinity};  ///< the nearest sheets that block
+  Spans blocked_;                                                                 ///< B
   std::vector<std::pair<Witness, Witness>> ends_;  ///< what blocks at the low and high end of each span of B
 };
 
+void Search::gather(const Orbit& orbit, bool moving, double around, std::vector<Index>& near) const {
+  (moving ? fixed_ : moving_).index.gather(orbit, around + tolerances_.nudge, near);
+}
+
 // A moving point meets the fixed side at t; a fixed point meets the moving side as if that stood still, at −t.
-void Search::raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const {
-  (moving ? fixed_ : moving_).index.pieces(orbit, tolerances_.nudge, out);
+void Search::raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index>& near,
+                        std::vector<OrbitPiece>& out) const {
+  (moving ? fixed_ : moving_).index.pieces(orbit, tolerances_.nudge, near, out);
   if (moving) return;
   for (OrbitPiece& p : out) p = {-p.high, -p.low, p.body, -p.sheet, p.slope_high, p.slope_low};
   std::reverse(out.begin(), out.end());
+}
+
+void Search::find_raw() {
+  std::vector<Index> near;
+  std::vector<OrbitPiece> pieces;
+  for (const bool moving : {true, false}) {
+    RawPieces& raw = moving ? raw_moving_ : raw_fixed_;
+    raw.first = {0};
+    for (const SurfacePoint& at : surface(moving).points()) {
+      const Orbit orbit = frame_.orbit_of(at.p);
+      gather(orbit, moving, 0.0, near);
+      raw_pieces(orbit, moving, near, pieces);
+      raw.pieces.insert(raw.pieces.end(), pieces.begin(), pieces.end());
+      raw.first.push_back(raw.pieces.size());
+    }
+  }
 }
 
 /// Pieces made longer by `by` on both sides, as a set.
@@ -156,6 +188,13 @@ void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double d
 
 // Overlap wider than δ: orbits moved by δ in eight directions across meet the other side as well.
 void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
+  thread_local std::vector<Index> near;
+  gather(frame_.orbit_of(at.p), moving, tolerances_.across, near);
+  wide_pieces(at, moving, near, out);
+}
+
+void Search::wide_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
+                         std::vector<OrbitPiece>& out) const {
   constexpr double kDiagonal = std::numbers::sqrt2 / 2.0;
   constexpr std::array<std::array<double, 2>, 8> kAcross{{{1, 0},
                                                           {-1, 0},
@@ -167,7 +206,7 @@ void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitP
                                                           {-kDiagonal, kDiagonal}}};
   const Orbit orbit = frame_.orbit_of(at.p);
   const double v = frame_.speed(orbit), delta = tolerances_.across;
-  raw_pieces(orbit, moving, out);
+  raw_pieces(orbit, moving, near, out);
   if (out.empty()) return;
   // So near to the axis that δ is a good part of a turn, nothing can be told.
   const double by = kSlope * delta / v;
@@ -178,7 +217,7 @@ void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitP
     const std::size_t which = (k + first_across_) % kAcross.size();
     Orbit moved = orbit;
     for (std::size_t i = 0; i < 2; ++i) moved.plane[i] += delta * kAcross[which][i];
-    raw_pieces(moved, moving, beside);
+    raw_pieces(moved, moving, near, beside);
     wide = intersection(wide, dilated(beside, by));
     if (!wide.empty()) continue;
     first_across_ = which;
@@ -204,9 +243,10 @@ void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
   }
 }
 
-void Search::blocked_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
+void Search::blocked_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
+                            std::vector<OrbitPiece>& out) const {
   const double v = speed(at);
-  wide_pieces(at, moving, out);
+  wide_pieces(at, moving, near, out);
   // Sheets that slide on each other cross at grazing angles.
   std::erase_if(out, [&](const OrbitPiece& p) { return holds_start(p, v) || (p.sheet != 0 && p.slope_low > kSlope); });
   clip_at_start(out, v);
@@ -218,20 +258,22 @@ void Search::settle_tolerance() {
   constexpr double kGrowth = 1.5;
   std::vector<OrbitPiece> pieces;
   std::vector<std::pair<SurfacePoint, bool>> deep;
-  const auto is_deep = [&](const SurfacePoint& at, bool moving, bool wide) {
-    if (wide)
-      wide_pieces(at, moving, pieces);
-    else
-      raw_pieces(frame_.orbit_of(at.p), moving, pieces);
+  const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfacePoint& at) {
     const double v = speed(at);
-    return std::any_of(pieces.begin(), pieces.end(), [&](const OrbitPiece& p) { return holds_start(p, v); });
+    return std::any_of(among.begin(), among.end(), [&](const OrbitPiece& p) { return holds_start(p, v); });
   };
-  for (const bool moving : {true, false})
-    for (const SurfacePoint& at : surface(moving).points())
-      if (is_deep(at, moving, false) && is_deep(at, moving, true)) deep.emplace_back(at, moving);
+  const auto is_wide = [&](const SurfacePoint& at, bool moving) {
+    wide_pieces(at, moving, pieces);
+    return is_deep(pieces, at);
+  };
+  for (const bool moving : {true, false}) {
+    const auto& points = surface(moving).points();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (is_deep(raw(moving).of(i), points[i]) && is_wide(points[i], moving)) deep.emplace_back(points[i], moving);
+  }
   while (!deep.empty() && tolerances_.across < tolerances_.largest_overlap) {
     tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
-    std::erase_if(deep, [&](const auto& d) { return !is_deep(d.first, d.second, true); });
+    std::erase_if(deep, [&](const auto& d) { return !is_wide(d.first, d.second); });
   }
   overlapping_ = !deep.empty();
 }
@@ -239,14 +281,14 @@ void Search::settle_tolerance() {
 // Behind a sheet nothing is looked for: of sheets, only the nearest on either side of 0 matter.
 bool Search::adds(const OrbitPiece& p) const {
   if (p.sheet == 0) return !covers(blocked_, p.low, p.high);
-  return p.low >= 0.0 ? p.low < sheet_above_ : p.high > sheet_below_;
+  return p.low >= 0.0 ? p.low < sheet_above_.low : p.high > sheet_below_.high;
 }
 
 void Search::add(const Witness& witness) {
   const OrbitPiece& p = witness.piece;
   witnesses_.push_back(witness);
   if (p.sheet != 0) {
-    (p.low >= 0.0 ? sheet_above_ : sheet_below_) = p.low >= 0.0 ? p.low : p.high;
+    (p.low >= 0.0 ? sheet_above_ : sheet_below_) = {p.low, p.high};
     return;
   }
   blocked_.push_back({p.low, p.high});
@@ -255,19 +297,23 @@ void Search::add(const Witness& witness) {
 
 void Search::collect() {
   std::vector<OrbitPiece> pieces;
-  for (const bool moving : {true, false})
-    for (const SurfacePoint& at : surface(moving).points()) {
-      raw_pieces(frame_.orbit_of(at.p), moving, pieces);
+  std::vector<Index> near;
+  for (const bool moving : {true, false}) {
+    const auto& points = surface(moving).points();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const SurfacePoint& at = points[i];
+      const auto own = raw(moving).of(i);
       // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
-      if (std::none_of(pieces.begin(), pieces.end(),
-                       [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
+      if (std::none_of(own.begin(), own.end(), [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
         continue;
-      blocked_pieces(at, moving, pieces);
+      gather(frame_.orbit_of(at.p), moving, tolerances_.across, near);
+      blocked_pieces(at, moving, near, pieces);
       for (const OrbitPiece& p : pieces)
         if (adds(p)) add({p, at, moving});
     }
-  for (const double sheet : {sheet_below_, sheet_above_})
-    if (std::isfinite(sheet)) blocked_.push_back({sheet, sheet});
+  }
+  for (const Span& sheet : {sheet_below_, sheet_above_})
+    if (std::isfinite(sheet.low)) blocked_.push_back(sheet);
   normalise(blocked_, true);
 }
 
@@ -276,6 +322,7 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
   constexpr int kDirections = 6, kMostSteps = 400;
   constexpr double kTurn = 0.4;  // rad; from pattern to pattern, so that the directions do not stay the same
   std::vector<OrbitPiece> pieces;
+  std::vector<Index> near;
   const SampledSurface& over = surface(best.moving);
   const double finest = 0.1 * tolerances_.across;
   double step = over.spacing();
@@ -291,9 +338,11 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
       const auto improves = [&](const OrbitPiece& p) {
         return low ? p.low < best.piece.low && p.high > gap.low : p.high > best.piece.high && p.low < gap.high;
       };
-      raw_pieces(frame_.orbit_of(next.p), best.moving, pieces);
+      const Orbit orbit = frame_.orbit_of(next.p);
+      gather(orbit, best.moving, tolerances_.across, near);
+      raw_pieces(orbit, best.moving, near, pieces);
       if (std::none_of(pieces.begin(), pieces.end(), improves)) continue;
-      blocked_pieces(next, best.moving, pieces);
+      blocked_pieces(next, best.moving, near, pieces);
       for (const OrbitPiece& p : pieces)
         if (improves(p) && (low ? p.low > gap.low : p.high < gap.high)) {
           best = {p, next, best.moving};
@@ -305,8 +354,7 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
   return best;
 }
 
-void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
-  constexpr std::size_t kSeeds = 6;
+void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_seeds, Witness& end) {
   std::vector<Witness> seeds;
   for (const Witness& w : witnesses_)
     if (w.piece.low >= span.low && w.piece.high <= span.high) seeds.push_back(w);
@@ -314,7 +362,7 @@ void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
     return low ? a.piece.low < b.piece.low : a.piece.high > b.piece.high;
   };
   std::stable_sort(seeds.begin(), seeds.end(), first);
-  if (seeds.size() > kSeeds) seeds.resize(kSeeds);
+  if (seeds.size() > most_seeds) seeds.resize(most_seeds);
   if (seeds.empty()) return;
   end = seeds.front();
   for (const Witness& seed : seeds)
@@ -323,7 +371,8 @@ void Search::refine_end(Span& span, bool low, const Span& gap, Witness& end) {
 }
 
 void Search::refine() {
-  constexpr std::size_t kMostSpans = 32;  // more are noise, whose ends nobody wants to know
+  constexpr std::size_t kSeeds = 6, kSeedsBehind = 2;  // those of free intervals behind an obstacle matter less
+  constexpr std::size_t kMostSpans = 32;               // more are noise, whose ends nobody wants to know
   const std::size_t count = blocked_.size();
   const bool nearest_only = reachable_only_ || count > kMostSpans;
   ends_.resize(count);
@@ -331,12 +380,14 @@ void Search::refine() {
   const auto above = static_cast<std::size_t>(
       std::find_if(blocked_.begin(), blocked_.end(), [](const Span& s) { return s.low >= 0.0; }) - blocked_.begin());
   for (std::size_t i = 0; i < count; ++i) {
-    const double before = i > 0 ? blocked_[i - 1].high : -kInfinity;
-    const double after = i + 1 < count ? blocked_[i + 1].low : kInfinity;
     const Span whole = blocked_[i];
+    double before = i > 0 ? blocked_[i - 1].high : -kInfinity, after = i + 1 < count ? blocked_[i + 1].low : kInfinity;
+    (whole.low >= 0.0 ? before : after) = whole.low >= 0.0 ? std::max(before, 0.0) : std::min(after, 0.0);
     Span low = whole, high = whole;
-    if (!nearest_only || i == above % count) refine_end(low, true, {before, whole.high}, ends_[i].first);
-    if (!nearest_only || i == (above + count - 1) % count) refine_end(high, false, {whole.low, after}, ends_[i].second);
+    const bool ends_above = i == above % count, ends_below = i == (above + count - 1) % count;
+    const auto seeds = [](bool reachable) { return reachable ? kSeeds : kSeedsBehind; };
+    if (ends_above || !nearest_only) refine_end(low, true, {before, whole.high}, seeds(ends_above), ends_[i].first);
+    if (ends_below || !nearest_only) refine_end(high, false, {whole.low, after}, seeds(ends_below), ends_[i].second);
     blocked_[i] = {low.low, high.high};
   }
 }
@@ -397,12 +448,10 @@ void FreeMotionOptions::validate() const {
     throw InvalidArgument("FreeMotionOptions: samples is " + std::to_string(samples) + ", expected 100 to 1000000");
 }
 
-FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const MotionBody> fixed, const MotionPath& path,
+namespace internal {
+
+FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed, const MotionPath& path,
                        const FreeMotionOptions& options, double sagitta) {
-  options.validate();
-  validate(moving, "moving");
-  validate(fixed, "fixed");
-  validate(path);
   const double size = std::min(diagonal(moving), diagonal(fixed));
   const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
   const double least = given(options.tolerance, kDefaultTolerance * size);
@@ -412,15 +461,26 @@ FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const Motio
   t.nudge = 1e-2 * least;
 
   const PathFrame frame(path);
-  internal::OrbitBox reach_moving = reach_of(frame, moving), reach_fixed = reach_of(frame, fixed);
-  reach_moving.grow(t.largest_overlap), reach_fixed.grow(t.largest_overlap);
-  auto moving_faces = orbit_faces(frame, moving, reach_fixed), fixed_faces = orbit_faces(frame, fixed, reach_moving);
-  OrbitIndex moving_index(frame, moving, std::move(moving_faces)), fixed_index(frame, fixed, std::move(fixed_faces));
-  auto moving_met = that_meet(moving_index, fixed_index, t.largest_overlap);
-  auto fixed_met = that_meet(fixed_index, moving_index, t.largest_overlap);
-  const Side moving_side{std::move(moving_index), SampledSurface(moving, std::move(moving_met), options.samples)};
-  const Side fixed_side{std::move(fixed_index), SampledSurface(fixed, std::move(fixed_met), options.samples)};
+  auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
+  const Side moving_side(frame, moving, std::move(moving_faces), options.samples);
+  const Side fixed_side(frame, fixed, std::move(fixed_faces), options.samples);
   return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();
+}
+
+}  // namespace internal
+
+FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const MotionBody> fixed, const MotionPath& path,
+                       const FreeMotionOptions& options, double sagitta) {
+  options.validate();
+  validate(moving, "moving");
+  validate(fixed, "fixed");
+  validate(path);
+  const auto ready = [](std::span<const MotionBody> bodies) {
+    std::vector<OrbitBody> out;
+    for (const MotionBody& body : bodies) out.push_back(internal::orbit_body(body));
+    return out;
+  };
+  return internal::free_motion(ready(moving), ready(fixed), path, options, sagitta);
 }
 
 double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high, double crease) {

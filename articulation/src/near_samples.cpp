@@ -166,7 +166,7 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
                                      double facing_cosine, int wanted) {
   const auto may_face = [&](Index triangle, const Vec3& centre, double radius) {
     constexpr double kLooseFacing = -0.5;  // of facets; the smooth normals decide later
-    return other.tree().nearest(centre, reach + radius, surface.tree().normal(triangle), kLooseFacing).found();
+    return other.tree().is_within(centre, reach + radius, surface.tree().normal(triangle), kLooseFacing);
   };
   Eigen::AlignedBox3d box = other.tree().box();
   box.min().array() -= reach;

@@ -7,12 +7,12 @@
 namespace limber::internal {
 namespace {
 
-double area(const OrbitIndex::Face& f) {
+double area(const OrbitFace& f) {
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
 }
 
 /// The point of a triangle nearest to q: that of its plane if it lies inside, else the nearest of its sides.
-Vec3 nearest_point(const OrbitIndex::Face& f, const Vec3& q) {
+Vec3 nearest_point(const OrbitFace& f, const Vec3& q) {
   const Vec3& n = f.normal;
   bool inside = n.squaredNorm() > 0.0;
   Vec3 best = f.corners[0];
@@ -44,7 +44,7 @@ std::size_t at_measure(const std::vector<double>& sums, double measure) {
 
 }  // namespace
 
-SampledSurface::SampledSurface(std::span<const MotionBody> bodies, std::vector<OrbitIndex::Face> faces, int count)
+SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count)
     : faces_(std::move(faces)) {
   if (faces_.empty()) return;
   number_vertices(bodies);
@@ -52,9 +52,9 @@ SampledSurface::SampledSurface(std::span<const MotionBody> bodies, std::vector<O
   add_edge_points(sharp_edges(), std::max(count / 2, 1));
 }
 
-void SampledSurface::number_vertices(std::span<const MotionBody> bodies) {
+void SampledSurface::number_vertices(std::span<const OrbitBody> bodies) {
   std::vector<Index> base{0};
-  for (const MotionBody& b : bodies) base.push_back(base.back() + static_cast<Index>(b.surface->vertices.size()));
+  for (const OrbitBody& b : bodies) base.push_back(base.back() + static_cast<Index>(b.surface->vertices.size()));
   vertices_.reserve(faces_.size());
   for (const auto& f : faces_) {
     Triangle v = bodies[static_cast<std::size_t>(f.body)].surface->triangles[static_cast<std::size_t>(f.triangle)];
@@ -75,7 +75,7 @@ void SampledSurface::number_vertices(std::span<const MotionBody> bodies) {
 Vec3 SampledSurface::corner(Index face, Index vertex) const {
   const Triangle& v = vertices_[static_cast<std::size_t>(face)];
   const auto found = static_cast<std::size_t>(std::find(v.begin(), v.end(), vertex) - v.begin());
-  const OrbitIndex::Face& f = faces_[static_cast<std::size_t>(face)];
+  const OrbitFace& f = faces_[static_cast<std::size_t>(face)];
   return f.corners[f.flipped && found > 0 ? 3 - found : found];
 }
 

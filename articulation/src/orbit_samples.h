@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "orbit_index.h"
+#include "orbit_faces.h"
 
 namespace limber::internal {
 
@@ -19,11 +19,11 @@ struct SurfacePoint {
 /// The faces of one side: points on them, and their neighbours.
 class SampledSurface {
  public:
-  /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, half as many on sharp edges and
-  /// as many at most on the ends of these
-  SampledSurface(std::span<const MotionBody> bodies, std::vector<OrbitIndex::Face> faces, int count);
+  /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, half as many on sharp edges
+  /// and as many at most on the ends of these
+  SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count);
 
-  const std::vector<OrbitIndex::Face>& faces() const { return faces_; }
+  const std::vector<OrbitFace>& faces() const { return faces_; }
   const std::vector<SurfacePoint>& points() const { return points_; }
   double spacing() const { return spacing_; }  ///< typical distance between points on faces
 
@@ -36,13 +36,13 @@ class SampledSurface {
     Index face = 0;
   };
 
-  void number_vertices(std::span<const MotionBody> bodies);
+  void number_vertices(std::span<const OrbitBody> bodies);
   std::vector<Edge> sharp_edges() const;
   void add_face_points(int count);
   void add_edge_points(const std::vector<Edge>& edges, int count);
   Vec3 corner(Index face, Index vertex) const;
 
-  std::vector<OrbitIndex::Face> faces_;
+  std::vector<OrbitFace> faces_;
   std::vector<Triangle> vertices_;            ///< per face, numbers of its corners over all bodies
   std::vector<Index> first_around_, around_;  ///< faces around each vertex
   std::vector<SurfacePoint> points_;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <thread>
 
+#include "free_motion_of_bodies.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "number_text.h"
@@ -15,6 +16,7 @@ namespace {
 
 using internal::degrees_text;
 using internal::number_text;
+using internal::OrbitBody;
 using Kind = MotionPath::Kind;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -102,13 +104,21 @@ std::vector<NamedPath> paths_of(JointSpec& joint) {
 
 // Trying --------------------------------------------------------------------------------------------------------------
 
+/// All components, ready for any path.
+std::vector<OrbitBody> bodies_of(const Assembly& assembly) {
+  std::vector<OrbitBody> out;
+  for (const Component& c : assembly.components) out.push_back(internal::orbit_body({&c.surface, c.closed}));
+  return out;
+}
+
 /// One joint of an assembly with its two sides, ready to be moved along paths.
 class Trial {
  public:
-  Trial(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint)
+  Trial(const Assembly& assembly, std::span<const OrbitBody> bodies, const std::vector<DetectedJoint>& joints,
+        std::size_t joint)
       : sides_(joint_sides(static_cast<Index>(assembly.components.size()), joints, joint)),
-        moving_(bodies(assembly, sides_.moving)),
-        fixed_(bodies(assembly, sides_.fixed)) {
+        moving_(some_of(bodies, sides_.moving)),
+        fixed_(some_of(bodies, sides_.fixed)) {
     const DetectedJoint& j = joints[joint];
     const Component &a = component(assembly, j.a), &b = component(assembly, j.b);
     size_ = std::min(a.diagonal, b.diagonal);
@@ -124,7 +134,7 @@ class Trial {
     if (options.largest_overlap == 0.0) options.largest_overlap = kLargestOverlap * size_;
     // A tolerance that was found before has the facets in it.
     const double sagitta = options.tolerance == options.largest_overlap ? 0.0 : sagitta_;
-    FreeMotion m = free_motion(moving_, fixed_, path, options, sagitta);
+    FreeMotion m = internal::free_motion(moving_, fixed_, path, options, sagitta);
     for (MotionStop* stop : {&m.low, &m.high})
       if (stop->body >= 0) stop->body = sides_.fixed[static_cast<std::size_t>(stop->body)];
     return m;
@@ -136,9 +146,9 @@ class Trial {
   static const Component& component(const Assembly& assembly, Index i) {
     return assembly.components[static_cast<std::size_t>(i)];
   }
-  static std::vector<MotionBody> bodies(const Assembly& assembly, const std::vector<Index>& components) {
-    std::vector<MotionBody> out;
-    for (const Index c : components) out.push_back({&component(assembly, c).surface, component(assembly, c).closed});
+  static std::vector<OrbitBody> some_of(std::span<const OrbitBody> bodies, const std::vector<Index>& components) {
+    std::vector<OrbitBody> out;
+    for (const Index c : components) out.push_back(bodies[static_cast<std::size_t>(c)]);
     return out;
   }
   static double sagitta_near(const DetectedJoint& joint, const Component& part) {
@@ -151,7 +161,7 @@ class Trial {
   }
 
   JointSides sides_;
-  std::vector<MotionBody> moving_, fixed_;
+  std::vector<OrbitBody> moving_, fixed_;
   double size_ = 0.0, sagitta_ = 0.0;
 };
 
@@ -318,10 +328,11 @@ JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double m
   return joint;
 }
 
-RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
-                              const RangeOptions& options) {
-  options.validate();
-  const Trial trial(assembly, joints, joint);
+namespace {
+
+RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodies,
+                       const std::vector<DetectedJoint>& joints, std::size_t joint, const RangeOptions& options) {
+  const Trial trial(assembly, bodies, joints, joint);
   RangeOfMotion out{.joint = joints[joint].joint, .freedoms = {}, .reasons = {}};
   out.joint.limits = {};
   for (const NamedPath& p : paths_of(out.joint)) {
@@ -351,15 +362,24 @@ RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<Detect
   return out;
 }
 
+}  // namespace
+
+RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
+                              const RangeOptions& options) {
+  options.validate();
+  return range_of(assembly, bodies_of(assembly), joints, joint, options);
+}
+
 std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                                             const RangeOptions& options, Jobs& jobs) {
   options.validate();
+  const std::vector<OrbitBody> bodies = bodies_of(assembly);
   std::vector<RangeOfMotion> out(joints.size());
   std::atomic<std::size_t> done{0};
   const auto caller = std::this_thread::get_id();
   jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t j = begin; j < end; ++j) {
-      out[j] = range_of_motion(assembly, joints, j, options);
+      out[j] = range_of(assembly, bodies, joints, j, options);
       ++done;
       if (options.progress && std::this_thread::get_id() == caller)
         options.progress(static_cast<double>(done) / static_cast<double>(joints.size()));

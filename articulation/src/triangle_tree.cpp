@@ -43,90 +43,126 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return {va / sum, vb / sum, vc / sum};
 }
 
-TriangleTree::TriangleTree(const SurfaceMesh& surface) : surface_(surface), order_(surface.triangles.size()) {
-  std::iota(order_.begin(), order_.end(), Index{0});
+TriangleTree::TriangleTree(const SurfaceMesh& surface) {
+  const std::size_t count = surface.triangles.size();
+  std::vector<Index> order(count);
+  std::iota(order.begin(), order.end(), Index{0});
+  std::vector<Placed> placed;
   std::vector<Vec3> centres;
-  centres.reserve(order_.size());
-  normals_.reserve(order_.size());
-  for (std::size_t t = 0; t < order_.size(); ++t) {
-    const auto [a, b, c] = corners(static_cast<Index>(t));
-    centres.push_back((a + b + c) / 3.0);
-    normals_.push_back((b - a).cross(c - a).stableNormalized());
+  placed.reserve(count), centres.reserve(count), normals_.reserve(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const auto corner = [&](int k) -> const Vec3& {
+      return surface.vertices[static_cast<std::size_t>(surface.triangles[t][k])];
+    };
+    const Vec3 &p = corner(0), &q = corner(1), &r = corner(2);
+    centres.push_back((p + q + r) / 3.0);
+    normals_.push_back((q - p).cross(r - p).stableNormalized());
+    placed.push_back({p, q, r, normals_.back(), static_cast<Index>(t)});
   }
   nodes_.emplace_back();
-  split(0, 0, static_cast<Index>(order_.size()), centres);
+  split(0, 0, static_cast<Index>(count), order, placed, centres);
+  placed_.reserve(count);
+  for (const Index t : order) placed_.push_back(placed[static_cast<std::size_t>(t)]);
 }
 
-std::array<Vec3, 3> TriangleTree::corners(Index triangle) const {
-  const Triangle& t = surface_.triangles[static_cast<std::size_t>(triangle)];
-  const auto at = [&](int k) -> const Vec3& { return surface_.vertices[static_cast<std::size_t>(t[k])]; };
-  return {at(0), at(1), at(2)};
-}
-
-void TriangleTree::split(Index node, Index begin, Index end, const std::vector<Vec3>& centres) {
-  Eigen::AlignedBox3d box, middle;
+void TriangleTree::split(Index node, Index begin, Index end, std::vector<Index>& order,
+                         const std::vector<Placed>& placed, const std::vector<Vec3>& centres) {
+  Eigen::AlignedBox3d middle;
+  Node& own = nodes_[static_cast<std::size_t>(node)];
   for (Index i = begin; i < end; ++i) {
-    for (const Vec3& p : corners(order_[static_cast<std::size_t>(i)])) box.extend(p);
-    middle.extend(centres[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])]);
+    const auto t = static_cast<std::size_t>(order[static_cast<std::size_t>(i)]);
+    own.box.extend(placed[t].a).extend(placed[t].b).extend(placed[t].c);
+    own.normals.extend(placed[t].normal);
+    middle.extend(centres[t]);
   }
-  nodes_[static_cast<std::size_t>(node)].box = box;
   if (end - begin <= kLeaf) {
-    nodes_[static_cast<std::size_t>(node)].first = begin;
-    nodes_[static_cast<std::size_t>(node)].count = end - begin;
+    own.first = begin;
+    own.count = end - begin;
     return;
   }
   int axis = 0;
   middle.sizes().maxCoeff(&axis);
   const Index half = begin + (end - begin) / 2;
-  std::nth_element(order_.begin() + begin, order_.begin() + half, order_.begin() + end, [&](Index i, Index j) {
+  std::nth_element(order.begin() + begin, order.begin() + half, order.begin() + end, [&](Index i, Index j) {
     const double x = centres[static_cast<std::size_t>(i)][axis], y = centres[static_cast<std::size_t>(j)][axis];
     return x < y || (x == y && i < j);
   });
   const auto left = static_cast<Index>(nodes_.size());
-  nodes_[static_cast<std::size_t>(node)].first = left;
+  own.first = left;
   nodes_.emplace_back();
   nodes_.emplace_back();
-  split(left, begin, half, centres);
-  split(left + 1, half, end, centres);
+  split(left, begin, half, order, placed, centres);
+  split(left + 1, half, end, order, placed, centres);
 }
 
-TriangleTree::Nearest TriangleTree::nearest(const Vec3& p, double limit, const Vec3& direction, double cosine) const {
-  Nearest best;
-  double best_squared = limit * limit;
+bool TriangleTree::Node::may_face(const Vec3& direction, double cosine) const {
+  double least = 0.0;
+  for (int k = 0; k < 3; ++k) least += direction[k] * (direction[k] > 0.0 ? normals.min()[k] : normals.max()[k]);
+  constexpr double kRounding = 1e-12;
+  return least <= cosine + kRounding;
+}
+
+template <class Nearer>
+void TriangleTree::search(const Vec3& p, double& squared_limit, const Vec3& direction, double cosine,
+                          Nearer&& nearer) const {
   struct Entry {
     Index node;
     double squared;
   };
   std::array<Entry, 128> stack;  // a tree over 2³¹ triangles is 31 deep and leaves one entry a level
   int size = 0;
-  stack[size++] = {0, squared_distance(nodes_[0].box, p)};
+  const auto visit = [&](Index node, double squared) {
+    if (squared <= squared_limit && nodes_[static_cast<std::size_t>(node)].may_face(direction, cosine))
+      stack[size++] = {node, squared};
+  };
+  visit(0, squared_distance(nodes_[0].box, p));
   while (size > 0) {
     const auto [index, squared] = stack[--size];
-    if (squared > best_squared) continue;
+    if (squared > squared_limit) continue;
     const Node& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.count > 0) {
-      for (Index i = node.first; i < node.first + node.count; ++i) {
-        const Index t = order_[static_cast<std::size_t>(i)];
-        if (normal(t).dot(direction) > cosine) continue;
-        const auto [a, b, c] = corners(t);
-        const Vec3 weights = nearest_on_triangle(p, a, b, c);
-        const Vec3 q = weights[0] * a + weights[1] * b + weights[2] * c;
-        const double d = (q - p).squaredNorm();
-        if (d < best_squared || (d <= best_squared && !best.found())) {
-          best_squared = d;
-          best = {t, q, weights, 0.0};
-        }
-      }
+    if (node.count == 0) {
+      const double left = squared_distance(nodes_[static_cast<std::size_t>(node.first)].box, p);
+      const double right = squared_distance(nodes_[static_cast<std::size_t>(node.first) + 1].box, p);
+      const bool left_first = left <= right;  // the nearer is looked at first: it goes on the stack last
+      visit(left_first ? node.first + 1 : node.first, left_first ? right : left);
+      visit(left_first ? node.first : node.first + 1, left_first ? left : right);
       continue;
     }
-    const double left = squared_distance(nodes_[static_cast<std::size_t>(node.first)].box, p);
-    const double right = squared_distance(nodes_[static_cast<std::size_t>(node.first) + 1].box, p);
-    const bool left_first = left <= right;  // the nearer is looked at first: it goes on the stack last
-    stack[size++] = left_first ? Entry{node.first + 1, right} : Entry{node.first, left};
-    stack[size++] = left_first ? Entry{node.first, left} : Entry{node.first + 1, right};
+    for (Index i = node.first; i < node.first + node.count; ++i) {
+      const Placed& t = placed_[static_cast<std::size_t>(i)];
+      if (t.normal.dot(direction) > cosine) continue;
+      constexpr double kRounding = 1.0 - 1e-9;
+      const double above = t.normal.dot(p - t.a);  // of the plane: no point of the triangle is nearer
+      if (kRounding * above * above > squared_limit) continue;
+      const Vec3 weights = nearest_on_triangle(p, t.a, t.b, t.c);
+      const Vec3 q = weights[0] * t.a + weights[1] * t.b + weights[2] * t.c;
+      if (!nearer(t, q, weights, (q - p).squaredNorm())) return;
+    }
   }
-  best.distance = std::sqrt(best_squared);
+}
+
+TriangleTree::Nearest TriangleTree::nearest(const Vec3& p, double limit, const Vec3& direction, double cosine) const {
+  Nearest best;
+  double squared_limit = limit * limit;
+  search(p, squared_limit, direction, cosine, [&](const Placed& t, const Vec3& q, const Vec3& weights, double squared) {
+    if (squared < squared_limit || (squared <= squared_limit && !best.found())) {
+      squared_limit = squared;
+      best = {t.triangle, q, weights, 0.0};
+    }
+    return true;
+  });
+  best.distance = std::sqrt(squared_limit);
   return best;
+}
+
+bool TriangleTree::is_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const {
+  bool found = false;
+  double squared_limit = limit * limit;
+  search(p, squared_limit, direction, cosine, [&](const Placed&, const Vec3&, const Vec3&, double squared) {
+    found = squared <= squared_limit;
+    return !found;
+  });
+  return found;
 }
 
 template <class Hit>
@@ -151,8 +187,8 @@ bool TriangleTree::cast(const Vec3& p, const Vec3& direction, double longest, Hi
       continue;
     }
     for (Index i = node.first; i < node.first + node.count; ++i) {
-      const auto [a, b, c] = corners(order_[static_cast<std::size_t>(i)]);
-      const Vec3 ab = b - a, ac = c - a, h = direction.cross(ac);
+      const Placed& placed = placed_[static_cast<std::size_t>(i)];
+      const Vec3 &a = placed.a, ab = placed.b - a, ac = placed.c - a, h = direction.cross(ac);
       const double det = ab.dot(h);
       if (det == 0.0) continue;
       const Vec3 s = p - a, q = s.cross(ab);

@@ -7,7 +7,7 @@
 
 namespace limber {
 
-/// A binary tree of boxes along the axes over the triangles of one surface, which must outlive it.
+/// A binary tree of boxes along the axes over the triangles of one surface.
 class TriangleTree {
  public:
   explicit TriangleTree(const SurfaceMesh& surface);
@@ -23,6 +23,9 @@ class TriangleTree {
   /// The nearest point within `limit` on a triangle whose unit normal m has direction·m ≤ cosine.
   Nearest nearest(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
 
+  /// Whether there is one. Quicker than looking for the nearest.
+  bool is_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
+
   /// How often the surface winds around p, by a ray; of a closed surface 1 inside and 0 outside.
   int winding(const Vec3& p) const;
 
@@ -35,20 +38,31 @@ class TriangleTree {
  private:
   struct Node {
     Eigen::AlignedBox3d box;
+    Eigen::AlignedBox3d normals;  ///< around the unit normals
     Index first = 0,
-          count = 0;  ///< count > 0: a leaf with these of order_; else first is the left child, right next to it
+          count = 0;  ///< count > 0: a leaf with these of placed_; else first is the left child, right next to it
+    /// Whether some unit normal m of it may have direction·m ≤ cosine.
+    bool may_face(const Vec3& direction, double cosine) const;
   };
-  void split(Index node, Index begin, Index end, const std::vector<Vec3>& centres);
-  std::array<Vec3, 3> corners(Index triangle) const;
+  /// A triangle where the tree needs it.
+  struct Placed {
+    Vec3 a, b, c, normal;
+    Index triangle;
+  };
+  void split(Index node, Index begin, Index end, std::vector<Index>& order, const std::vector<Placed>& placed,
+             const std::vector<Vec3>& centres);
+  /// Calls nearer(placed, point, barycentric, squared distance) for triangles that face and may be nearer than the
+  /// limit, which it may lower, until it returns false. Near nodes come first.
+  template <class Nearer>
+  void search(const Vec3& p, double& squared_limit, const Vec3& direction, double cosine, Nearer&& nearer) const;
   /// Calls hit(leaving) for each triangle that the line p + t·direction meets at t in [0, longest], until it returns
   /// true; returns whether it did.
   template <class Hit>
   bool cast(const Vec3& p, const Vec3& direction, double longest, Hit&& hit) const;
 
-  const SurfaceMesh& surface_;
   std::vector<Node> nodes_;
-  std::vector<Index> order_;
-  std::vector<Vec3> normals_;  ///< per triangle; zero where it has no area
+  std::vector<Placed> placed_;  ///< leaf after leaf
+  std::vector<Vec3> normals_;   ///< per triangle; zero where it has no area
 };
 
 /// The point of a triangle nearest to p, in barycentric coordinates.

@@ -1,0 +1,232 @@
+#include "orbit_faces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <tuple>
+
+namespace limber::internal {
+namespace {
+
+using Kind = MotionPath::Kind;
+constexpr double kPi = std::numbers::pi;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// A triangle in reach, as little of it as tells whether it matters.
+struct Candidate {
+  Index body = 0, triangle = 0;
+};
+
+/// One body's vertices in path coordinates.
+struct BodyOnPath {
+  std::vector<Vec3> vertices;
+  std::vector<OrbitBox> plane;  ///< a point each
+  std::vector<double> angle;    ///< about the axis, once it was asked for
+};
+
+/// The bodies of one side along a path.
+class SideOnPath {
+ public:
+  SideOnPath(const PathFrame& frame, std::span<const OrbitBody> bodies)
+      : frame_(frame), bodies_(bodies), on_path_(bodies.size()) {
+    around_.reserve(bodies.size());
+    for (const OrbitBody& body : bodies) around_.push_back(frame.box_around(body.box));
+  }
+
+  /// Of the bodies that may come within `reach`, by their boxes.
+  OrbitBox rough_reach(const OrbitBox& reach) const {
+    OrbitBox out;
+    for (const OrbitBox& box : around_)
+      if (box.overlaps(reach)) out.add(box);
+    return out;
+  }
+
+  /// Takes the bodies that may come within `reach` to path coordinates. @return the reach of their vertices
+  OrbitBox transform(const OrbitBox& reach);
+
+  /// Finds the triangles that orbits within `reach` can meet.
+  void select(const OrbitBox& reach);
+  const OrbitBoxTree& tree() const { return *tree_; }
+
+  /// Those of select() that pass, in the order of the tree.
+  template <class Passes>
+  std::vector<OrbitFace> faces(Passes&& passes) {
+    std::vector<OrbitFace> out;
+    const std::vector<Index>& order = tree_->order();
+    for (std::size_t place = 0; place < order.size(); ++place) {
+      const OrbitBox& box = tree_->box(static_cast<Index>(place));
+      if (!passes(box)) continue;
+      out.push_back(face_of(candidates_[static_cast<std::size_t>(order[place])]));
+      out.back().box = box;
+    }
+    return out;
+  }
+
+ private:
+  OrbitFace face_of(const Candidate& candidate);
+  void set_sector(OrbitFace& face);
+  double angle(const OrbitFace& face, std::size_t corner);
+  void add_helices(const Candidate& candidate, std::vector<OrbitBox>& boxes);
+
+  const PathFrame& frame_;
+  std::span<const OrbitBody> bodies_;
+  std::vector<OrbitBox> around_;
+  std::vector<BodyOnPath> on_path_;  ///< without vertices where out of reach
+  std::vector<Candidate> candidates_;
+  std::optional<OrbitBoxTree> tree_;
+};
+
+OrbitBox SideOnPath::transform(const OrbitBox& reach) {
+  OrbitBox out;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    if (!around_[b].overlaps(reach)) continue;
+    BodyOnPath& body = on_path_[b];
+    const std::vector<Vec3>& points = bodies_[b].surface->vertices;
+    body.vertices.reserve(points.size()), body.plane.reserve(points.size());
+    for (const Vec3& p : points) {
+      body.vertices.push_back(frame_.to_path(p));
+      body.plane.push_back(frame_.plane_point(body.vertices.back()));
+      out.add(body.plane.back());
+    }
+    if (frame_.kind() != Kind::kTranslation) body.angle.assign(points.size(), kUnknown);
+  }
+  if (frame_.kind() != Kind::kTranslation) out.low[0] = 0.0;  // faces pass nearer to the axis than their corners
+  if (frame_.kind() == Kind::kScrew) out.low[1] = -1e300, out.high[1] = 1e300;
+  return out;
+}
+
+void SideOnPath::select(const OrbitBox& reach) {
+  std::vector<OrbitBox> boxes;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const BodyOnPath& body = on_path_[b];
+    if (body.vertices.empty()) continue;
+    const std::vector<Triangle>& triangles = bodies_[b].surface->triangles;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const auto& [i, j, k] = triangles[t];
+      OrbitBox box = body.plane[static_cast<std::size_t>(i)];
+      box.add(body.plane[static_cast<std::size_t>(j)]), box.add(body.plane[static_cast<std::size_t>(k)]);
+      if (frame_.kind() != Kind::kTranslation) box.low[0] = 0.0;
+      if (!box.overlaps(reach)) continue;
+      const Candidate candidate{static_cast<Index>(b), static_cast<Index>(t)};
+      if (frame_.kind() == Kind::kScrew) {
+        add_helices(candidate, boxes);
+        continue;
+      }
+      if (frame_.kind() == Kind::kRotation)
+        box.low[0] =
+            least_radius(body.vertices[static_cast<std::size_t>(i)], body.vertices[static_cast<std::size_t>(j)],
+                         body.vertices[static_cast<std::size_t>(k)]);
+      if (!box.overlaps(reach)) continue;
+      candidates_.push_back(candidate);
+      boxes.push_back(box);
+    }
+  }
+  tree_.emplace(boxes);
+}
+
+OrbitFace SideOnPath::face_of(const Candidate& candidate) {
+  const OrbitBody& body = bodies_[static_cast<std::size_t>(candidate.body)];
+  const BodyOnPath& on_path = on_path_[static_cast<std::size_t>(candidate.body)];
+  OrbitFace f;
+  f.body = candidate.body;
+  f.triangle = candidate.triangle;
+  f.flipped = body.inside_out;
+  for (std::size_t i = 0; i < 3; ++i)
+    f.corners[i] = on_path.vertices[static_cast<std::size_t>(
+        body.surface->triangles[static_cast<std::size_t>(candidate.triangle)][i])];
+  if (f.flipped) std::swap(f.corners[1], f.corners[2]);
+  f.normal = (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
+  f.offset = f.normal.dot(f.corners[0]);
+  f.across = std::hypot(f.normal.y(), f.normal.z());
+  f.heading = std::atan2(f.normal.z(), f.normal.y());
+  if (frame_.kind() != Kind::kTranslation) {
+    f.box.low[0] = least_radius(f.corners[0], f.corners[1], f.corners[2]);
+    set_sector(f);
+  }
+  return f;
+}
+
+double SideOnPath::angle(const OrbitFace& face, std::size_t corner) {
+  const auto b = static_cast<std::size_t>(face.body);
+  const Triangle& t = bodies_[b].surface->triangles[static_cast<std::size_t>(face.triangle)];
+  double& known = on_path_[b].angle[static_cast<std::size_t>(t[face.flipped && corner > 0 ? 3 - corner : corner])];
+  if (std::isnan(known)) known = std::atan2(face.corners[corner].z(), face.corners[corner].y());
+  return known;
+}
+
+/// The angles about the axis that a triangle covers: middle and half width.
+void SideOnPath::set_sector(OrbitFace& face) {
+  face.bearing = 0.0, face.sector = kPi;
+  if (face.box.low[0] > 0.0) {
+    const double start = angle(face, 0);
+    const auto [low, high] = std::minmax({0.0, wrapped(angle(face, 1) - start), wrapped(angle(face, 2) - start)});
+    constexpr double kMargin = 1e-9;
+    if (high - low < kPi) face.bearing = start + 0.5 * (low + high), face.sector = 0.5 * (high - low) + kMargin;
+  }
+  const double off = std::abs(wrapped(face.bearing - face.heading));
+  if (off > face.sector) face.cosine_high = std::cos(off - face.sector);
+  if (off + face.sector < kPi) face.cosine_low = std::cos(off + face.sector);
+}
+
+/// A screw's face: the helices that can meet it as a box from 0 to a turn, or one that reaches beyond
+/// and a copy of the face one turn lower.
+void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& boxes) {
+  const OrbitFace face = face_of(candidate);
+  const double turn = 2.0 * kPi * std::abs(frame_.pitch()), half = std::abs(frame_.pitch()) * face.sector;
+  const auto [low_x, high_x] = std::minmax({face.corners[0].x(), face.corners[1].x(), face.corners[2].x()});
+  const double low = low_x - frame_.pitch() * face.bearing - half, high = high_x - frame_.pitch() * face.bearing + half;
+  const double down = high - low < turn ? turn * std::floor(low / turn) : low;
+  OrbitBox box = frame_.box_of(face.corners);
+  box.low[1] = low - down;
+  box.high[1] = high - low < turn ? high - down : turn;
+  candidates_.push_back(candidate);
+  boxes.push_back(box);
+  if (box.high[1] <= turn || high - low >= turn) return;
+  box.low[1] -= turn;
+  box.high[1] -= turn;
+  candidates_.push_back(candidate);
+  boxes.push_back(box);
+}
+
+}  // namespace
+
+OrbitBody orbit_body(const MotionBody& body) {
+  OrbitBody out{body.surface, body.closed, body.closed && enclosed_volume(*body.surface) < 0.0};
+  for (const Vec3& p : body.surface->vertices) out.box.extend(p);
+  return out;
+}
+
+std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
+                                                                          std::span<const OrbitBody> moving,
+                                                                          std::span<const OrbitBody> fixed,
+                                                                          double margin) {
+  constexpr double kEverywhere = 1e300;
+  const auto grown = [&](OrbitBox box) {
+    box.grow(margin);
+    return box;
+  };
+  SideOnPath a(frame, moving), b(frame, fixed);
+  const OrbitBox everywhere{{-kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere}};
+  const OrbitBox near_a = b.rough_reach(grown(a.rough_reach(everywhere)));
+  const OrbitBox reach_a = a.transform(grown(near_a)), reach_b = b.transform(grown(reach_a));
+  a.select(grown(reach_b));
+  b.select(grown(reach_a));
+  const double turn = frame.kind() == Kind::kScrew ? 2.0 * kPi * std::abs(frame.pitch()) : 0.0;
+  const auto meets = [&](const OrbitBoxTree& other) {
+    return [&, turn](OrbitBox box) {
+      box.grow(margin);
+      const auto found = [](Index) { return true; };
+      if (other.any_overlapping(box, found)) return true;
+      if (turn == 0.0) return false;
+      box.low[1] += turn, box.high[1] += turn;
+      if (other.any_overlapping(box, found)) return true;
+      box.low[1] -= 2.0 * turn, box.high[1] -= 2.0 * turn;
+      return other.any_overlapping(box, found);
+    };
+  };
+  return {a.faces(meets(b.tree())), b.faces(meets(a.tree()))};
+}
+
+}  // namespace limber::internal

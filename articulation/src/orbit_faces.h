@@ -1,0 +1,42 @@
+/// @file orbit_faces.h
+/// Triangles as the orbits of a motion see them. Private to the articulation module.
+#pragma once
+
+#include <array>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "path_frame.h"
+
+namespace limber::internal {
+
+/// A surface made ready for any path.
+struct OrbitBody {
+  const SurfaceMesh* surface = nullptr;
+  bool closed = true;
+  bool inside_out = false;  ///< closed, and its triangles are clockwise seen from outside
+  Eigen::AlignedBox3d box{};
+};
+OrbitBody orbit_body(const MotionBody& body);
+
+struct OrbitFace {
+  std::array<Vec3, 3> corners;         ///< path coordinates, counter-clockwise seen from outside
+  Vec3 normal;                         ///< outward, unit; 0 without an area
+  double offset = 0.0;                 ///< normal · corner
+  double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
+  Index body = 0, triangle = 0;
+  bool flipped = false;                         ///< the second and third corner have changed places
+  double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
+  double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
+  OrbitBox box{};                               ///< of the orbits that meet it
+};
+
+/// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
+/// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.
+std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
+                                                                          std::span<const OrbitBody> moving,
+                                                                          std::span<const OrbitBody> fixed,
+                                                                          double margin);
+
+}  // namespace limber::internal
