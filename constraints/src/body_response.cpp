@@ -4,11 +4,11 @@
 
 namespace limber {
 
-BodyResponse body_response(const BodyGroup& group, const Quaternion& q_WB) {
+BodyResponse body_response(const BodyGroup& group, const Quaternion& q_WB, const ModalStep& modes) {
   const FrameConstants& c = group.frame_constants();
   BodyResponse body{.modes = group.model().modes(),
-                    .position_modes = group.position_response(),
-                    .velocity_modes = group.velocity_response()};
+                    .position_modes = modes.position_response(),
+                    .velocity_modes = modes.velocity_response()};
   switch (c.motion) {
     case FrameMotion::kFree:
       body.translations = 3;
@@ -36,10 +36,10 @@ void BodyResponse::add_row(const Vec3& linear, const Vec3& angular, std::span<co
   for (const double shape : modal) *row++ += shape;
 }
 
-void BodyResponse::write_position_metric(double step, double* metric) const {
+void BodyResponse::write_position_metric(double step, double theta, double* metric) const {
   write_frame_metric(metric);
   const int frame = translations + rotations;
-  for (int i = 0; i < frame; ++i) metric[i] *= step;
+  for (int i = 0; i < frame; ++i) metric[i] *= theta * step;
   std::copy(position_modes.begin(), position_modes.end(), metric + frame);
 }
 

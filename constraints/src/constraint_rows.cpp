@@ -27,15 +27,21 @@ void IslandBodies::set(std::span<const ConstrainedBody> table, std::span<const I
   members_.assign(members.begin(), members.end());
   bodies_.clear();
   responses_.clear();
+  steps_ = {};
   first_.clear();
   degrees_of_freedom_ = 0;
   for (const Index member : members) {
     const ConstrainedBody& body = table[static_cast<std::size_t>(member)];
     bodies_.push_back(body);
-    responses_.push_back(body_response(*body.group, body.group->frame(body.slot).pose().q));
+    responses_.push_back(body_response(*body.group, body.group->frame(body.slot).pose().q, body.group->modal_step()));
     first_.push_back(degrees_of_freedom_);
     degrees_of_freedom_ += responses_.back().size();
   }
+}
+
+void IslandBodies::set_modal_steps(std::span<const ModalStep> steps) {
+  steps_ = steps;
+  place(StepTime::kStart);
 }
 
 void IslandBodies::place(StepTime when) {
@@ -43,7 +49,7 @@ void IslandBodies::place(StepTime when) {
     BodyGroup* const group = bodies_[i].group;
     const Index slot = bodies_[i].slot;
     const RigidFrame& frame = when == StepTime::kStart ? group->frame(slot) : group->predicted_frame(slot);
-    responses_[i] = body_response(*group, frame.pose().q);
+    responses_[i] = body_response(*group, frame.pose().q, modal_step(static_cast<Index>(i)));
   }
 }
 
@@ -64,8 +70,8 @@ void IslandBodies::write_jacobian(const ConstraintRows& rows, std::span<double> 
     }
 }
 
-void IslandBodies::write_position_metric(double step, std::span<double> metric) const {
-  for (Index b = 0; b < count(); ++b) response(b).write_position_metric(step, metric.data() + first(b));
+void IslandBodies::write_position_metric(double step, double theta, std::span<double> metric) const {
+  for (Index b = 0; b < count(); ++b) response(b).write_position_metric(step, theta, metric.data() + first(b));
 }
 
 void IslandBodies::write_velocity_metric(std::span<double> metric) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "limber/core/error.h"
@@ -15,11 +16,19 @@ namespace {
 constexpr double kRelativeTolerance = 1e-10;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
+// Steps that an impact may last in any case.
+constexpr double kShortestStrike = 2.0;
 
 /// What is kept of a contact from step to step.
 struct Memory {
   std::uint64_t id = 0;
   Vec3 force = Vec3::Zero();  // on a over the last step, world, N
+};
+
+/// What is kept of a pair of bodies that strike each other.
+struct Strike {
+  Index a = -1, b = -1;
+  double since = 0.0;  // s
 };
 
 /// One side of a contact, prepared.
@@ -32,6 +41,12 @@ struct Side {
   Vec3 position(const BodyStates& states, StepTime when) const {
     const Vec3 p = model != nullptr ? deformed_point(*model, at, states.amplitudes(body, when)) : rigid_point;
     return states.pose(body, when) * p;
+  }
+  Vec3 velocity(const BodyStates& states, StepTime when) const {
+    const RigidTransform& X = states.pose(body, when);
+    Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
+    if (model != nullptr) v += X.q * displacement(*model, at, states.rates(body, when));
+    return v;
   }
 };
 
@@ -81,6 +96,10 @@ Mat3 flexibility(const BodyStates& states, const Side& i, const Side& j) {
   return R * G * R.transpose();
 }
 
+bool flexes(const Side& side) {
+  return side.model != nullptr && (side.model->modes() > 0 || side.model->data().residual_compliance.has_value());
+}
+
 bool yields(const Side& side) { return side.model != nullptr && side.model->data().residual_compliance.has_value(); }
 
 /// The same between two contacts: p_a − p_b of the one under the force on a of the other.
@@ -111,12 +130,28 @@ RowSide point_row(const BodyStates& states, StepTime when, const Side& side, con
   return {side.body, n, (end - X.p).cross(n), modal};
 }
 
+/// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
+double longest_rebound(const Side& a, const Side& b) {
+  double longest = 0.0;
+  for (const Side* side : {&a, &b}) {
+    if (side->model == nullptr) continue;
+    for (const double lambda : side->model->data().eigenvalues)
+      if (lambda > 0.0) {
+        longest = std::max(longest, 2.0 * std::numbers::pi / std::sqrt(lambda));
+        break;
+      }
+  }
+  return longest;
+}
+
 /// All contacts of one pair of bodies.
 class PairContacts final : public Constraint {
  public:
-  void set(const BodyStates& states, std::span<Contact> contacts, const ContactOptions& options) {
+  /// @param lasted since when the bodies have struck each other, s
+  void set(const BodyStates& states, std::span<Contact> contacts, const ContactOptions& options, double lasted) {
     contacts_ = contacts;
     options_ = &options;
+    lasted_ = lasted;
     const Contact& first = contacts.front();
     soft_ = options.residual_compliance && (yields(first.a) || yields(first.b));
     if (soft_) find_flexibility(states);
@@ -126,6 +161,7 @@ class PairContacts final : public Constraint {
 
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override {
     step_ = step;
+    if (when == StepTime::kStart) strikes_ = strikes(states);
     const Index first = rows.size();
     for (const Contact& contact : contacts_) add_contact(states, when, contact, rows);
     if (!soft_ || when != StepTime::kStart) return;
@@ -154,9 +190,28 @@ class PairContacts final : public Constraint {
       for (int t = 1; t < 3; ++t) contact.impulse += impulses[row++] * contact.axes.col(t);
     }
     for (Contact& contact : contacts_) contact.last_force = contact.impulse / step_;
+    const bool pressed = std::ranges::any_of(contacts_, [](const Contact& c) { return !c.impulse.isZero(0.0); });
+    lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
   }
 
+  /// Since when the bodies have struck each other, after the step, s; 0: they have not.
+  double lasted() const { return lasted_; }
+
  private:
+  /// Whether the bodies are in an impact in the coming step.
+  bool strikes(const BodyStates& states) const {
+    const Contact& first = contacts_.front();
+    if (options_->impact == ImpactModel::kAbsorbed || !(flexes(first.a) || flexes(first.b))) return false;
+    if (lasted_ > 0.0) return lasted_ < std::max(longest_rebound(first.a, first.b), kShortestStrike * step_);
+    return std::ranges::any_of(contacts_, [&](const Contact& contact) {
+      if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
+      const Vec3 n = contact.axes.col(0);
+      const double speed =
+          n.dot(contact.a.velocity(states, StepTime::kStart) - contact.b.velocity(states, StepTime::kStart));
+      return -speed > options_->impact_speed && n.dot(contact.offset) + step_ * speed < 0.0;
+    });
+  }
+
   void find_flexibility(const BodyStates& states) {
     const std::size_t m = contacts_.size();
     flexibility_.resize(m * m);
@@ -195,7 +250,7 @@ class PairContacts final : public Constraint {
     const double tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min();
     for (Index axis = 0; axis < row_count(contact); ++axis) {
       const Vec3 n = contact.axes.col(axis);
-      RowLaw law{.tolerance = tolerance};
+      RowLaw law{.tolerance = tolerance, .contact = true};
       if (axis == 0) {
         const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
         const double recovery = std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
@@ -203,6 +258,7 @@ class PairContacts final : public Constraint {
         law.agent_displacement = recovery;
         law.lower = 0.0;
         law.holds = true;
+        law.strikes = strikes_;
         law.friction = contact.friction;
       } else {
         law.offset = contact.dent[axis];
@@ -218,8 +274,8 @@ class PairContacts final : public Constraint {
 
   std::span<Contact> contacts_;
   const ContactOptions* options_ = nullptr;
-  bool soft_ = false;
-  double step_ = 0.0, stored_energy_ = 0.0;
+  bool soft_ = false, strikes_ = false;
+  double step_ = 0.0, lasted_ = 0.0, stored_energy_ = 0.0;
   std::vector<Mat3> flexibility_;
   std::vector<double> modal_a_, modal_b_;
 };
@@ -234,17 +290,20 @@ void ContactOptions::validate() const {
   };
   number(friction, "friction");
   number(recovery_speed, "recovery_speed");
+  number(impact_speed, "impact_speed");
 }
 
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<Contact> contacts;
-  std::vector<Memory> memory;  // by id, those that pressed in the last step
+  std::vector<Memory> memory;   // by id, those that pressed in the last step
+  std::vector<Strike> strikes;  // by (a, b), those that did so in the last step
   std::vector<std::unique_ptr<PairContacts>> pairs;
   std::vector<Constraint*> constraints;
   std::vector<ContactEvent> events, last_events;
 
   const Memory* find(std::uint64_t id) const;
+  double lasted(Index a, Index b) const;
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
 };
 
@@ -252,6 +311,12 @@ const Memory* ContactSet::Impl::find(std::uint64_t id) const {
   const auto found =
       std::lower_bound(memory.begin(), memory.end(), id, [](const Memory& m, std::uint64_t i) { return m.id < i; });
   return found != memory.end() && found->id == id ? &*found : nullptr;
+}
+
+double ContactSet::Impl::lasted(Index a, Index b) const {
+  for (const Strike& strike : strikes)
+    if (strike.a == a && strike.b == b) return strike.since;
+  return 0.0;
 }
 
 void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const Vec3& origin,
@@ -289,7 +354,8 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     const Contact& first = s.contacts[begin];
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
     if (pair == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
-    s.pairs[pair]->set(states, std::span(s.contacts).subspan(begin, i - begin), s.options);
+    s.pairs[pair]->set(states, std::span(s.contacts).subspan(begin, i - begin), s.options,
+                       s.lasted(first.a.body, first.b.body));
     s.constraints.push_back(s.pairs[pair++].get());
     begin = i;
   }
@@ -325,6 +391,12 @@ void ContactSet::finish() {
   for (const Contact& contact : s.contacts)
     if (!contact.impulse.isZero(0.0)) s.memory.push_back({contact.id, contact.last_force});
   std::sort(s.memory.begin(), s.memory.end(), by_id);
+  s.strikes.clear();
+  for (std::size_t i = 0; i < s.constraints.size(); ++i)
+    if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
+      const auto [a, b] = s.pairs[i]->bodies();
+      s.strikes.push_back({a, b, lasted});
+    }
   std::sort(s.events.begin(), s.events.end(), by_id);
 }
 
@@ -334,6 +406,7 @@ void ContactSet::clear() {
   impl_->contacts.clear();
   impl_->constraints.clear();
   impl_->memory.clear();
+  impl_->strikes.clear();
   impl_->events.clear();
 }
 

@@ -43,6 +43,12 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
 
 bool is_equality(const RowLaw& law) { return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded; }
 
+/// θ: forces are truly held while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
+double start_share(std::span<const RowLaw> laws) {
+  const bool contacts_alone = std::ranges::all_of(laws, &RowLaw::contact);
+  return contacts_alone && std::ranges::any_of(laws, &RowLaw::strikes) ? 0.5 : 1.0;
+}
+
 bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
 
 /// Whether bodies lie still on a row of one sign: closed, and slower than what held forces make of rest in a step.
@@ -58,8 +64,9 @@ bool rests(const RowLaw& law, double gap, double speed, double speed_of_a_step) 
 struct IslandSolver::Impl {
   IslandBodies bodies;
   ConstraintRows rows;
-  std::vector<Index> first_row;  // per constraint, and the end
-  std::vector<RowLaw> laws;      // of the rows at the step's start
+  std::vector<ModalStep> modal_steps;  // of the bodies, where they are not those of their groups
+  std::vector<Index> first_row;        // per constraint, and the end
+  std::vector<RowLaw> laws;            // of the rows at the step's start
   std::vector<double> J, metric, G, weighted, gap, start_gap, b, lower, upper, compliance;
   std::vector<double> f, next_f, reaction, end_reaction, change;
   std::vector<FrameAcceleration> accelerations;  // per body, under held forces
@@ -89,12 +96,14 @@ struct IslandSolver::Impl {
   void weigh();
   std::size_t weigh_frames();
   double step = 0.0;
+  double theta = 1.0;  // the part of f that frames get at the step's start; the rest at its end
   struct HeldMotion {
     double acceleration = 0.0, speed = 0.0, speed_of_a_step = 0.0;
   };
   HeldMotion held_motion(StepTime when, Index row, const IslandOptions& options) const;
   void find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer);
   void answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
+  void let_all_modes_move(double length);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                       IslandReport& report);
   void factor();
@@ -108,7 +117,7 @@ struct IslandSolver::Impl {
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);
-  void sum_loads(std::span<const double> values, double scale);
+  void sum_loads(std::span<const double> values, double frame_scale, double modal_scale);
   void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
   double largest_recovery_work(double distance, const IslandOptions& options) const;
   double agent_work(const IslandOptions& options) const;
@@ -130,6 +139,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   first_row.push_back(rows.size());
   laws.clear();
   for (Index i = 0; i < rows.size(); ++i) laws.push_back(rows.row(i).law);
+  theta = start_share(laws);
+  if (theta < 1.0) let_all_modes_move(options.step);
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
@@ -257,7 +268,7 @@ std::size_t IslandSolver::Impl::weigh_frames() {
   return n;
 }
 
-/// The frames' second half of what holds them: at the step's end, by the rows there.
+/// The frames' second half of what holds them, and of what strikes them: at the step's end, by the rows there.
 void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints,
                                        const IslandOptions& options) {
   bodies.place(StepTime::kEnd);
@@ -265,7 +276,8 @@ void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Const
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);
   bodies.write_jacobian(rows, J);
   find_reaction(StepTime::kEnd, options, end_reaction);
-  sum_loads(end_reaction, 0.5 * options.step);
+  sum_loads(end_reaction, 0.5 * options.step, 0.0);
+  if (theta < 1.0) add_loads(f, 1.0 - theta, 0.0);
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     const ConstraintLoad& load = loads[static_cast<std::size_t>(local)];
@@ -273,24 +285,24 @@ void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Const
   }
 }
 
-/// The bodies under f and the first half of the reaction at the step's start; their modes under all of both, held.
+/// The bodies under θ f and the first half of the reaction at the step's start; their modes under all of both, held.
 void IslandSolver::Impl::predict(const IslandOptions& options) {
-  sum_loads(f, 1.0);
+  sum_loads(f, theta, 1.0);
   add_loads(reaction, 0.5 * options.step, options.step);
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
-    body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)]);
+    body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)], bodies.modal_step(local));
   }
 }
 
-void IslandSolver::Impl::sum_loads(std::span<const double> values, double scale) {
+void IslandSolver::Impl::sum_loads(std::span<const double> values, double frame_scale, double modal_scale) {
   loads.assign(static_cast<std::size_t>(bodies.count()), {});
   modal_loads.assign(metric.size(), 0.0);
   for (Index local = 0; local < bodies.count(); ++local)
     loads[static_cast<std::size_t>(local)].modal = {
         modal_loads.data() + bodies.first(local) + bodies.response(local).size() - bodies.response(local).modes,
         static_cast<std::size_t>(bodies.response(local).modes)};
-  add_loads(values, scale, scale);
+  add_loads(values, frame_scale, modal_scale);
 }
 
 void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_scale, double modal_scale) {
@@ -376,6 +388,17 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
   return status;
 }
 
+/// Modes that answered statically would lose what they store; held forces alone cannot whip them.
+void IslandSolver::Impl::let_all_modes_move(double length) {
+  if (modal_steps.size() < static_cast<std::size_t>(bodies.count()))
+    modal_steps.resize(static_cast<std::size_t>(bodies.count()));
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ModalModelData& data = bodies.body(local).group->model().data();
+    modal_steps[static_cast<std::size_t>(local)].set(data.eigenvalues, data.decays, length, ModalStep::kNone);
+  }
+  bodies.set_modal_steps(std::span(modal_steps).first(static_cast<std::size_t>(bodies.count())));
+}
+
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
 void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
   const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
@@ -448,7 +471,7 @@ double IslandSolver::Impl::largest_change() const {
 SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Constraint* const> constraints,
                                         const IslandOptions& options, IslandReport& report) {
   step = options.step;
-  bodies.write_position_metric(step, metric);
+  bodies.write_position_metric(step, theta, metric);
   bounded.clear();
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -542,6 +565,7 @@ double IslandSolver::Impl::agent_work(const IslandOptions& options) const {
 
 /// Whether only rows act that can neither give nor take energy: hard ones that no agent moves.
 bool IslandSolver::Impl::is_workless() const {
+  if (stored_energy > 0.0) return false;  // dents that let go
   for (std::size_t i = 0; i < laws.size(); ++i) {
     if (f[i] == 0.0 && reaction[i] == 0.0) continue;
     if (!is_equality(laws[i]) || laws[i].compliance > 0.0 || laws[i].agent_displacement != 0.0) return false;

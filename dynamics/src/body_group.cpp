@@ -38,7 +38,6 @@ void BodyGroup::ModeRows::copy_from(const ModeRows& other, Index slot) {
 BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
     : model_(required(std::move(model))),
       constants_(model_->data()),
-      table_(model_->data().eigenvalues, model_->data().decays, positive(step)),
       amplitudes_(model_->modes()),
       rates_(model_->modes()),
       previous_amplitudes_(model_->modes()),
@@ -48,13 +47,7 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
       predicted_rates_(model_->modes()),
       predicted_forces_(model_->modes()),
       predicted_static_(model_->modes()) {
-  for (Index i = 0; i < table_.modes(); ++i) {
-    const double lambda = model_->data().eigenvalues[static_cast<std::size_t>(i)];
-    const double xi = model_->data().decays[static_cast<std::size_t>(i)];
-    const bool answers_statically = std::sqrt(std::max(lambda - xi * xi, 0.0)) * step > std::numbers::pi;
-    position_response_.push_back(answers_statically ? 1.0 / (lambda * step) : table_.at(i).z_g / step);
-    velocity_response_.push_back(answers_statically ? 0.0 : 1.0);
-  }
+  whole_.set(model_->data().eigenvalues, model_->data().decays, positive(step), std::numbers::pi / step);
   if (constants_.motion == FrameMotion::kFree) return;
   const ModalModelData& data = model_->data();
   for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
@@ -134,7 +127,7 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
                         (q_WB * deformed_point(*model_, at, amplitudes(slot))).cross(newton_seconds));
   const Vec3 impulse_B = q_WB.conjugate() * newton_seconds;
   if (delay == 0.0) return add_modal_force(*model_, at, impulse_B, rates_.modes(slot));
-  if (table_.modes() > 0) b.delayed.push_back({at, impulse_B, delay});
+  if (whole_.table().modes() > 0) b.delayed.push_back({at, impulse_B, delay});
 }
 
 void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
@@ -148,17 +141,17 @@ void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
   previous_amplitudes_.copy_from(amplitudes_, slot);
 
   const FrameLoad load{gravity, b.force, b.torque};
-  const double h = table_.step();
+  const double h = step_length();
   const ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
   const FrameExcitation excitation = b.frame.begin_step(constants_, load, first_moment(slot), h);
   if (!couplings_.empty()) excite_modes(modes.forces, excitation);
   if (b.modes_static) leave_static_answer(slot, modes.z);
-  advance_modes(slot, modes, b.modes_loaded || !couplings_.empty());
+  advance_modes(slot, modes, b.modes_loaded || !couplings_.empty(), whole_);
   b.frame.end_step(constants_, load, first_moment(slot), h);
   clear_loads(slot);
 }
 
-void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& load) {
+void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& load, const ModalStep& step) {
   const Body& b = body(slot);
   Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   p.frame = b.frame;
@@ -167,17 +160,17 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   predicted_forces_.copy_from(forces_, slot);
 
   const FrameLoad frame_load{gravity, b.force + load.force, b.torque + load.torque};
-  const double h = table_.step();
+  const double h = step.length();
   const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
   // An impulse of zero would still set the closed rotation up anew, and cost it its last bits.
   if (!load.impulse.isZero(0.0) || !load.moment.isZero(0.0))
     p.frame.apply_impulse(constants_, load.impulse, load.moment);
   const FrameExcitation excitation = p.frame.begin_step(constants_, frame_load, first_moment(slot), h);
   if (!couplings_.empty()) excite_modes(modes.forces, excitation);
-  const bool constrained = add_modal_load(load.modal, modes.forces);
+  const bool constrained = add_modal_load(load.modal, modes.forces, step);
   if (b.modes_static) leave_static_answer(slot, modes.z);
-  advance_modes(slot, modes, b.modes_loaded || constrained || !couplings_.empty());
-  p.modes_static = constrained && answer_statically(slot, load.modal);
+  advance_modes(slot, modes, b.modes_loaded || constrained || !couplings_.empty(), step);
+  p.modes_static = constrained && answer_statically(slot, load.modal, step);
   p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
 }
 
@@ -218,18 +211,18 @@ void BodyGroup::apply_generalized_force(Index slot, const Vec3& force, const Vec
   b.modes_loaded = b.modes_loaded || !modal.empty();
 }
 
-void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded) const {
-  if (table_.modes() == 0) return;
+void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const {
+  if (step.table().modes() == 0) return;
   if (loaded)
-    table_.advance(modes.z, modes.rates, modes.forces);
+    step.table().advance(modes.z, modes.rates, modes.forces);
   else
-    table_.advance_free(modes.z, modes.rates);
+    step.table().advance_free(modes.z, modes.rates);
   const ModalModelData& data = model_->data();
   for (const DelayedImpulse& impulse : body(slot).delayed)
     for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
       const double j = shape_at(*model_, impulse.at, static_cast<Index>(i)).dot(impulse.impulse_B);
       const Mode mode{data.eigenvalues[i], data.decays[i]};
-      const ModeState change = impulse_response(mode, table_.step() - impulse.time, j);
+      const ModeState change = impulse_response(mode, step.length() - impulse.time, j);
       modes.z[i] += change.z;
       modes.rates[i] += change.zdot;
     }
@@ -238,7 +231,7 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded) 
 void BodyGroup::predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
   const Body& b = body(slot);
   const FrameLoad load{gravity, b.force, b.torque};
-  const double h = table_.step();
+  const double h = step_length();
   const ModalModelData& data = model_->data();
   RigidFrame frame = b.frame;
   const FrameExcitation excitation = frame.begin_step(constants_, load, first_moment(slot), h, &motion.path());
@@ -265,21 +258,21 @@ void BodyGroup::leave_static_answer(Index slot, double* z) const {
 }
 
 /// @return whether there is any
-bool BodyGroup::add_modal_load(std::span<const double> modal, double* forces) const {
+bool BodyGroup::add_modal_load(std::span<const double> modal, double* forces, const ModalStep& step) {
   bool any = false;
   for (std::size_t i = 0; i < modal.size(); ++i) {
     any = any || modal[i] != 0.0;
-    forces[i] += velocity_response_[i] * modal[i] / table_.step();
+    forces[i] += step.velocity_response()[i] * modal[i] / step.length();
   }
   return any;
 }
 
 /// @return whether a mode did
-bool BodyGroup::answer_statically(Index slot, std::span<const double> modal) {
+bool BodyGroup::answer_statically(Index slot, std::span<const double> modal, const ModalStep& step) {
   const std::span<double> z = predicted_amplitudes_.modes(slot), answer = predicted_static_.modes(slot);
   bool any = false;
   for (std::size_t i = 0; i < modal.size(); ++i) {
-    answer[i] = velocity_response_[i] == 0.0 ? position_response_[i] * modal[i] : 0.0;
+    answer[i] = step.velocity_response()[i] == 0.0 ? step.position_response()[i] * modal[i] : 0.0;
     z[i] += answer[i];
     any = any || answer[i] != 0.0;
   }

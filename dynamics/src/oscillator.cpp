@@ -71,13 +71,14 @@ ModeState impulse_response(const Mode& mode, double remaining, double j) {
   return advance(propagator(mode, remaining), {.z = 0.0, .zdot = j});
 }
 
-PropagatorTable::PropagatorTable(std::span<const double> lambda, std::span<const double> decay, double h)
-    : modes_(static_cast<Index>(lambda.size())), step_(h) {
+void PropagatorTable::set(std::span<const double> lambda, std::span<const double> decay, double h) {
   if (lambda.size() != decay.size())
     throw InvalidArgument("PropagatorTable: " + std::to_string(lambda.size()) + " lambdas and " +
                           std::to_string(decay.size()) + " decays, expected as many of each");
   require_in_range(h, "h");
-  blocks_.resize(static_cast<std::size_t>(padded() / kPad));
+  modes_ = static_cast<Index>(lambda.size());
+  step_ = h;
+  blocks_.assign(static_cast<std::size_t>(padded() / kPad), Block{});
   for (Index mode = 0; mode < modes_; ++mode) {
     const ModePropagator p = propagator({lambda[mode], decay[mode]}, h);
     auto& c = blocks_[mode / kPad].coefficients;

@@ -35,7 +35,10 @@ class GroundedIsland : public Island {
  public:
   GroundedIsland(const SampleOptions& sample, double step, const ContactOptions& options = {},
                  const Vec3& normal = Vec3::UnitZ(), const Vec3& gravity = {0.0, 0.0, -kGravity})
-      : Island(sample, step, gravity), contacts(options), normal_(normal) {}
+      : GroundedIsland(sample_model(sample), step, options, normal, gravity) {}
+  GroundedIsland(std::shared_ptr<const ModalModel> body, double step, const ContactOptions& options = {},
+                 const Vec3& normal = Vec3::UnitZ(), const Vec3& gravity = {0.0, 0.0, -kGravity})
+      : Island(std::move(body), step, gravity), contacts(options), normal_(normal) {}
 
   /// One step: contacts of all corners with the ground, and what is in `others`.
   IslandReport step() {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "limber/constraints/handle.h"
@@ -20,8 +21,10 @@ inline const Vec3 kLeftEnd{-0.3, 0.0, 0.0}, kRightEnd{0.3, 0.0, 0.0};
 /// One island. Add bodies first, then constraints.
 class Island {
  public:
+  Island(std::shared_ptr<const ModalModel> body, double step, const Vec3& gravity = {0.0, 0.0, -kGravity})
+      : model(std::move(body)), group(model, step), gravity_(gravity), step_(step) {}
   Island(const SampleOptions& sample, double step, const Vec3& gravity = {0.0, 0.0, -kGravity})
-      : model(sample_model(sample)), group(model, step), gravity_(gravity), step_(step) {}
+      : Island(sample_model(sample), step, gravity) {}
 
   Index add_body(const RigidTransform& X_WB, const Vec3& velocity = Vec3::Zero(),
                  const Vec3& angular_velocity = Vec3::Zero()) {

@@ -11,7 +11,7 @@
 ///   kFree 3 + 3 + k,   kPoint 0 + 3 + k,   kLine 0 + 1 + k,   kKinematic 0 + 0 + k,   the world (body −1) none
 ///
 /// Modes above the step's Nyquist rate answer by 1/(λΔt) at the end of the step and not at all at velocity level
-/// (body_group.h). Derivation: docs/derivations/constraints.md.
+/// (modal_step.h). Derivation: docs/derivations/constraints.md.
 #pragma once
 
 #include <span>
@@ -34,15 +34,16 @@ struct BodyResponse {
   double inverse_mass = 0.0;               ///< 1/kg
   Vec3 inverse_moments = Vec3::Zero();     ///< about `axes`, 1/(kg·m²); the first `rotations` count
   Mat3 axes = Mat3::Identity();            ///< columns: the rotation axes, world; the first `rotations` count
-  std::span<const double> position_modes;  ///< H/Δt per mode, s
+  std::span<const double> position_modes;  ///< H/Δt or 1/(λΔt) per mode, s
   std::span<const double> velocity_modes;  ///< 1 per mode, 0 above the Nyquist rate
 
   int size() const { return translations + rotations + modes; }
 
   /// Adds one side of a row of J in these degrees of freedom. @param row size() numbers
   void add_row(const Vec3& linear, const Vec3& angular, std::span<const double> modal, double* row) const;
-  /// D at the end of the step for impulses at its start (θ = 1), s/kg and so on. @param metric size() numbers
-  void write_position_metric(double step, double* metric) const;
+  /// D at the end of the step, s/kg and so on. @param theta of the frame's impulses: 1 all at the step's start, ½ half
+  /// there and half at its end. @param metric size() numbers
+  void write_position_metric(double step, double theta, double* metric) const;
   /// D of the velocities. @param metric size() numbers
   void write_velocity_metric(double* metric) const;
   /// D of the frame's velocities alone: 0 for the modes.
@@ -50,6 +51,7 @@ struct BodyResponse {
 };
 
 /// The response of a body as it stands at a pose. Does not allocate or throw.
-BodyResponse body_response(const BodyGroup& group, const Quaternion& q_WB);
+/// @param modes how they go through the step; kept by reference
+BodyResponse body_response(const BodyGroup& group, const Quaternion& q_WB, const ModalStep& modes);
 
 }  // namespace limber

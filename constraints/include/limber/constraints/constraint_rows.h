@@ -56,6 +56,9 @@ struct RowLaw {
   /// cone
   /// |(f₁, f₂)| ≤ μ f. 0: no tangents.
   double friction = 0.0;
+  bool contact = false;  ///< of a contact, its normal row or a tangent
+  /// The contact is an impact: where only contacts act, all the island's forces are then held over the step (θ = ½).
+  bool strikes = false;
   /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
   bool slides = false;
 };
@@ -106,6 +109,9 @@ class IslandBodies {
  public:
   /// @param table all bodies. @param members indices into it, ascending
   void set(std::span<const ConstrainedBody> table, std::span<const Index> members);
+  /// How the modes of each body go through the coming step, in place of a whole step of their group. Until the next
+  /// set(). @param steps one per body; kept by reference
+  void set_modal_steps(std::span<const ModalStep> steps);
   /// Turns the rotation axes with the bodies: as they are, or as predicted.
   void place(StepTime when);
 
@@ -113,6 +119,9 @@ class IslandBodies {
   int degrees_of_freedom() const { return degrees_of_freedom_; }
   Index member(Index local) const { return members_[static_cast<std::size_t>(local)]; }
   const ConstrainedBody& body(Index local) const { return bodies_[static_cast<std::size_t>(local)]; }
+  const ModalStep& modal_step(Index local) const {
+    return steps_.empty() ? body(local).group->modal_step() : steps_[static_cast<std::size_t>(local)];
+  }
   const BodyResponse& response(Index local) const { return responses_[static_cast<std::size_t>(local)]; }
   int first(Index local) const { return first_[static_cast<std::size_t>(local)]; }
   /// −1 if the body is not of this island.
@@ -121,7 +130,7 @@ class IslandBodies {
   /// J, rows × degrees of freedom, row-major. @param J that many numbers
   void write_jacobian(const ConstraintRows& rows, std::span<double> J) const;
   /// @param metric one number per degree of freedom
-  void write_position_metric(double step, std::span<double> metric) const;
+  void write_position_metric(double step, double theta, std::span<double> metric) const;
   void write_velocity_metric(std::span<double> metric) const;
   void write_frame_metric(std::span<double> metric) const;
 
@@ -129,6 +138,7 @@ class IslandBodies {
   std::vector<Index> members_;
   std::vector<ConstrainedBody> bodies_;
   std::vector<BodyResponse> responses_;
+  std::span<const ModalStep> steps_;
   std::vector<int> first_;
   int degrees_of_freedom_ = 0;
 };

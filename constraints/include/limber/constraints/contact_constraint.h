@@ -11,6 +11,12 @@
 /// the kept modes cannot show. Contacts of one pair of bodies yield to each other's forces. The dent stays from step to
 /// step with the contact's id, and its energy ½ FᵀG F is booked.
 ///
+/// An impact, for ImpactModel, is a pair of bodies that begin to press on each other at more than `impact_speed`, of
+/// which one at least can flex (modes or residual compliance). It lasts until none of their contacts presses any more,
+/// at most a period of the lowest mode of either: longer is no rebound. θ is one for an island, since A would not be
+/// symmetric otherwise, and ½ only where nothing but contacts acts in it: the velocities of joints and hands want θ
+/// = 1.
+///
 /// From a penetrated start the gap is asked to shrink no further, and is pushed open slowly; what that takes counts as
 /// work done on the island.
 #pragma once
@@ -25,12 +31,25 @@
 
 namespace limber {
 
+/// How long a contact force lasts, seen from the frames of the bodies; their modes always feel it held over the step.
+enum class ImpactModel {
+  /// All at the step's start, θ = 1. What the frames bring into a contact is lost to the method in the measure of the
+  /// step: a rigid body does not rebound, an elastic one in contact for N steps loses about 4/N of its energy.
+  kAbsorbed,
+  /// Held over the step, θ = ½, while an impact lasts; else θ = 1. Loses nothing but what the gap at the first step's
+  /// start costs, so that the rebound is that of the elastic bodies.
+  kHeld,
+};
+
 struct ContactOptions {
   double friction = 0.5;         ///< μ of bodies that do not say; ≥ 0
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
   /// Used where the models have it. Not yet reliable: resting dents come out within 0.4 %, but can lose their balance
   /// for a step, which shows as overlap that is then recovered from.
   bool residual_compliance = false;
+  ImpactModel impact = ImpactModel::kAbsorbed;
+  /// m/s, ≥ 0: what comes together more slowly is no impact, so that bouncing ends and what rests stays (θ = 1).
+  double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 

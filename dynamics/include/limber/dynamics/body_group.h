@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "limber/dynamics/body_energy.h"
-#include "limber/dynamics/oscillator.h"
+#include "limber/dynamics/modal_step.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
 #include "limber/model/modal_model.h"
@@ -50,7 +50,8 @@ class BodyGroup {
   const ModalModel& model() const { return *model_; }
   const std::shared_ptr<const ModalModel>& shared_model() const { return model_; }
   const FrameConstants& frame_constants() const { return constants_; }
-  double step_length() const { return table_.step(); }
+  double step_length() const { return whole_.length(); }
+  const ModalStep& modal_step() const { return whole_; }
 
   // Bodies. Adding may allocate; a vacant slot is used first. The new body is at rest shape.
   Index add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity);
@@ -99,7 +100,12 @@ class BodyGroup {
   // One step in two phases, for bodies under constraints: predict as often as wanted, then commit the last prediction.
   // predict() and commit() without a load come to the same bits as advance(). Neither allocates nor throws.
   /// Finds the state at the step's end under the body's own loads and `load`; the body itself does not change.
-  void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load = {});
+  void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load = {}) {
+    predict(slot, gravity, load, whole_);
+  }
+  /// The same for a step of the length of `modes`, in which they answer as it says: part of a step that is cut.
+  /// Impulses with a delay are not to be waiting then, nor a parent's new place.
+  void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load, const ModalStep& modes);
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
   std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }
@@ -118,11 +124,9 @@ class BodyGroup {
   const Vec3& held_torque(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].torque; }
   std::span<const double> held_modal_forces(Index slot) const { return forces_.modes(slot); }
 
-  // The modes' answers to a constraint, one number per mode.
-  /// End-of-step displacement per unit of ConstraintLoad::modal, s: H/Δt, or 1/(λΔt) above the Nyquist rate. > 0.
-  std::span<const double> position_response() const { return position_response_; }
-  /// Velocity per unit impulse: 1, or 0 above the Nyquist rate.
-  std::span<const double> velocity_response() const { return velocity_response_; }
+  // The modes' answers to a constraint over a whole step, one number per mode; see ModalStep.
+  std::span<const double> position_response() const { return whole_.position_response(); }
+  std::span<const double> velocity_response() const { return whole_.velocity_response(); }
   /// The part of amplitudes() that is the static answer to the last step's constraints; zero for modes below the
   /// Nyquist rate. The mode's energy is ½(ż² + λ(z − c)²) + ½λc².
   std::span<const double> static_amplitudes(Index slot) const { return static_amplitudes_.modes(slot); }
@@ -191,11 +195,11 @@ class BodyGroup {
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
   const Body& body(Index slot) const { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
-  void advance_modes(Index slot, const ModeArrays& modes, bool loaded) const;
+  void advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const;
   void excite_modes(double* forces, const FrameExcitation& excitation) const;
   void leave_static_answer(Index slot, double* z) const;
-  bool add_modal_load(std::span<const double> modal, double* forces) const;
-  bool answer_statically(Index slot, std::span<const double> modal);
+  static bool add_modal_load(std::span<const double> modal, double* forces, const ModalStep& step);
+  bool answer_statically(Index slot, std::span<const double> modal, const ModalStep& step);
   void clear_loads(Index slot);
   void clear_modes(Index slot);
   BodyEnergy energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
@@ -209,7 +213,7 @@ class BodyGroup {
 
   std::shared_ptr<const ModalModel> model_;
   FrameConstants constants_;
-  PropagatorTable table_;
+  ModalStep whole_;
   /// Per mode what it feels of the frame: p, −∫ρ x × w and the symmetric matrix tr(S) 1 − S.
   struct Coupling {
     Vec3 field, angular_acceleration;
@@ -225,7 +229,6 @@ class BodyGroup {
 
   std::vector<Prediction> predictions_;
   ModeRows predicted_amplitudes_, predicted_rates_, predicted_forces_, predicted_static_;
-  std::vector<double> position_response_, velocity_response_;  // per mode
 };
 
 }  // namespace limber

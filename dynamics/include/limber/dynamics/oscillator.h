@@ -59,7 +59,10 @@ class PropagatorTable {
   static constexpr Index kPad = 8;
   /// @param lambda, decay as in Mode, one per mode. @param h step length, s; ≥ 0
   /// @throws InvalidArgument if the two differ in length, and as propagator()
-  PropagatorTable(std::span<const double> lambda, std::span<const double> decay, double h);
+  PropagatorTable(std::span<const double> lambda, std::span<const double> decay, double h) { set(lambda, decay, h); }
+  PropagatorTable() = default;  ///< no modes, step 0
+  /// The same for another step or other modes. Allocates nothing once it has held as many.
+  void set(std::span<const double> lambda, std::span<const double> decay, double h);
 
   Index modes() const { return modes_; }
   Index padded() const { return (modes_ + kPad - 1) / kPad * kPad; }

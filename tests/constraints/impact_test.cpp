@@ -1,0 +1,124 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bar_model.h"
+#include "contact_scene.h"
+
+namespace limber::testing {
+namespace {
+
+/// What a bar does that comes at a wall at unit speed.
+struct Rebound {
+  double speed = 0.0;           // of the mass centre afterwards, away from the wall
+  double contact_time = 0.0;    // from the first step with a force to the last
+  double highest_energy = 0.0;  // at the end of any step, by that at first; dents not counted
+};
+
+/// @param phase of the touch within a step: 0 at its start
+Rebound strike(int modes, double step, const ContactOptions& options, double phase, bool residual = true) {
+  GroundedIsland wall(bar_model(modes, residual), step, options, Vec3::UnitX(), Vec3::Zero());
+  wall.add_body({{}, {0.5 * kBarLength + phase * step, 0.0, 0.0}}, {-1.0, 0.0, 0.0});
+  Rebound seen;
+  const double scale = wall.energy();
+  int first = -1, last = -1;
+  for (int i = 0; i * step < 1.5 * kBarContactTime; ++i) {
+    wall.step();
+    bool pressed = false;
+    for (const ContactEvent& e : wall.contacts.events()) pressed = pressed || e.phase != ContactPhase::kEnded;
+    if (pressed && first < 0) first = i;
+    if (pressed) last = i;
+    seen.highest_energy = std::max(seen.highest_energy, wall.energy() / scale);
+  }
+  seen.contact_time = (last - first + 1) * step;
+  seen.speed = wall.group.frame(0).velocity().x();
+  return seen;
+}
+
+/// The worst over touches anywhere within a step.
+Rebound strike_at_any_phase(int modes, double step, const ContactOptions& options) {
+  Rebound worst{.speed = 2.0};
+  for (const double phase : {0.05, 0.3, 0.5, 0.7, 0.95}) {
+    const Rebound r = strike(modes, step, options, phase);
+    if (r.speed < worst.speed) worst = r;
+  }
+  return worst;
+}
+
+constexpr ContactOptions kHeld{.friction = 0.0, .residual_compliance = true, .impact = ImpactModel::kHeld};
+#if defined(__SANITIZE_ADDRESS__)
+constexpr double kStepsPerContact[] = {100.0, 10.0};  // the sanitizers take twenty times as long
+#else
+constexpr double kStepsPerContact[] = {1000.0, 100.0, 20.0, 10.0};
+#endif
+
+TEST(Impact, ABarReboundsAsItCameIfStepsStartAtTheTouch) {
+  for (const int modes : {20, 40})
+    for (const double steps : kStepsPerContact) {
+      const double h = kBarContactTime / steps;
+      const Rebound r = strike(modes, h, kHeld, 0.0);
+      EXPECT_GE(r.speed, 0.98) << modes << " modes, T/" << steps;
+      EXPECT_LE(r.speed, 1.0 + 1e-12) << modes << " modes, T/" << steps;
+      EXPECT_NEAR(r.contact_time, kBarContactTime, 0.02 * kBarContactTime + h) << modes << " modes, T/" << steps;
+      EXPECT_LE(r.highest_energy, 1.0 + 1e-12) << modes << " modes, T/" << steps;
+    }
+}
+
+TEST(Impact, ABarReboundsWithMostOfItsSpeedWhereverTheTouchFallsWithinAStep) {
+  for (const int modes : {20, 40})
+    for (const double steps : {100.0, 20.0, 10.0}) {
+      const double h = kBarContactTime / steps;
+      const Rebound r = strike_at_any_phase(modes, h, kHeld);
+      EXPECT_GE(r.speed, 0.88) << modes << " modes, T/" << steps;
+      EXPECT_NEAR(r.contact_time, kBarContactTime, 0.02 * kBarContactTime + h) << modes << " modes, T/" << steps;
+      EXPECT_LE(r.highest_energy, 1.0 + 1e-12) << modes << " modes, T/" << steps;
+    }
+}
+
+/// With θ = 1 each step takes ½ f A_r f from the frame: N equal impulses 2mv/N take 4/N of its energy.
+TEST(Impact, ImpulsesAtTheStepsStartLoseFourNthsOfTheEnergy) {
+  for (const double steps : {10.0, 20.0, 50.0}) {
+    const Rebound r = strike(40, kBarContactTime / steps, {.friction = 0.0}, 0.0);
+    EXPECT_NEAR(r.speed, std::sqrt(1.0 - 4.0 / steps), 0.03) << "T/" << steps;
+  }
+}
+
+TEST(Impact, WhatHasNothingElasticDoesNotRebound) {
+  const Rebound r = strike(0, 0.1, {.friction = 0.0, .impact = ImpactModel::kHeld}, 0.3, false);
+  EXPECT_NEAR(r.speed, 0.0, 1e-12);
+}
+
+TEST(Impact, WhatComesSlowlyIsNoImpact) {
+  ContactOptions slow = kHeld;
+  slow.impact_speed = 1.1;
+  ContactOptions absorbed = kHeld;
+  absorbed.impact = ImpactModel::kAbsorbed;
+  EXPECT_EQ(strike(20, 0.1, slow, 0.3).speed, strike(20, 0.1, absorbed, 0.3).speed);
+}
+
+/// Two equal bars end on: the first stops and the second goes on.
+TEST(Impact, EqualBarsExchangeTheirSpeeds) {
+  constexpr double kStep = 0.02, kFarFromTheWall = 10.0;
+  GroundedIsland bars(bar_model(40, true), kStep, kHeld, Vec3::UnitX(), Vec3::Zero());
+  bars.add_body({{}, {kFarFromTheWall, 0.0, 0.0}}, {1.0, 0.0, 0.0});
+  bars.add_body({{}, {kFarFromTheWall + kBarLength + 1e-3, 0.0, 0.0}});
+  for (int i = 0; i < 200; ++i) {
+    bars.others.clear();
+    for (const Index corner : {0, 2, 4, 6}) {  // the left end of the right bar on the right end of the left one
+      const SurfacePoint left = corner_point(*bars.model, corner), right = corner_point(*bars.model, corner + 1);
+      bars.others.push_back({.a = contact_side(bars, 0, right),
+                             .b = contact_side(bars, 1, left),
+                             .normal = -Vec3::UnitX(),
+                             .position = bars.group.position(0, right),
+                             .gap = bars.group.position(1, left).x() - bars.group.position(0, right).x(),
+                             .id = static_cast<std::uint64_t>(100 + corner)});
+    }
+    bars.step();
+  }
+  EXPECT_NEAR(bars.group.frame(0).velocity().x(), 0.0, 0.02);
+  EXPECT_NEAR(bars.group.frame(1).velocity().x(), 1.0, 0.02);
+  EXPECT_NEAR(bars.linear_momentum().x(), kBarMass, 1e-10);
+}
+
+}  // namespace
+}  // namespace limber::testing
