@@ -130,6 +130,26 @@ RowSide point_row(const BodyStates& states, StepTime when, const Side& side, con
   return {side.body, n, (end - X.p).cross(n), modal};
 }
 
+/// The place and velocity of a side's point at some time, from its body's free motion.
+struct Passage {
+  MotionState state;
+
+  void find(const BodyStates& states, const FreeMotions& motions, const Side& side, double time, Vec3& place,
+            Vec3& velocity) {
+    const ExactMotion* motion = motions.of(side.body);
+    if (motion == nullptr) {
+      place = side.position(states, StepTime::kStart);
+      velocity = Vec3::Zero();
+      return;
+    }
+    motion->evaluate(time, state);
+    const Vec3 p = side.model != nullptr ? deformed_point(*side.model, side.at, state.amplitudes) : side.rigid_point;
+    place = state.pose * p;
+    velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
+    if (side.model != nullptr) velocity += state.pose.q * displacement(*side.model, side.at, state.rates);
+  }
+};
+
 /// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
 double longest_rebound(const Side& a, const Side& b) {
   double longest = 0.0;
@@ -148,20 +168,19 @@ double longest_rebound(const Side& a, const Side& b) {
 class PairContacts final : public Constraint {
  public:
   /// @param lasted since when the bodies have struck each other, s
-  void set(const BodyStates& states, std::span<Contact> contacts, const ContactOptions& options, double lasted) {
+  void set(std::span<Contact> contacts, const ContactOptions& options, double lasted) {
     contacts_ = contacts;
     options_ = &options;
     lasted_ = lasted;
     const Contact& first = contacts.front();
     soft_ = options.residual_compliance && (yields(first.a) || yields(first.b));
-    if (soft_) find_flexibility(states);
   }
 
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
 
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override {
     step_ = step;
-    if (when == StepTime::kStart) strikes_ = strikes(states);
+    if (when == StepTime::kStart) begin(states);
     const Index first = rows.size();
     for (const Contact& contact : contacts_) add_contact(states, when, contact, rows);
     if (!soft_ || when != StepTime::kStart) return;
@@ -182,15 +201,25 @@ class PairContacts final : public Constraint {
     }
   }
 
+  bool is_contact() const override { return true; }
+
+  double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override {
+    const Contact& first = contacts_.front();
+    if (options_->impact != ImpactModel::kHeldFromTouch || !(flexes(first.a) || flexes(first.b))) return within;
+    for (const Contact& contact : contacts_) within = touch(states, motions, contact, within);
+    return within;
+  }
+
   void accept(const BodyStates&, std::span<const double> impulses) override {
     std::size_t row = 0;
+    bool pressed = false;
     for (Contact& contact : contacts_) {
-      contact.impulse = impulses[row++] * contact.axes.col(0);
-      if (contact.friction == 0.0) continue;
-      for (int t = 1; t < 3; ++t) contact.impulse += impulses[row++] * contact.axes.col(t);
+      Vec3 impulse = impulses[row++] * contact.axes.col(0);
+      for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
+      contact.last_force = impulse / step_;
+      contact.impulse += impulse;
+      pressed = pressed || !impulse.isZero(0.0);
     }
-    for (Contact& contact : contacts_) contact.last_force = contact.impulse / step_;
-    const bool pressed = std::ranges::any_of(contacts_, [](const Contact& c) { return !c.impulse.isZero(0.0); });
     lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
   }
 
@@ -198,6 +227,40 @@ class PairContacts final : public Constraint {
   double lasted() const { return lasted_; }
 
  private:
+  /// A step, or part of one, starts from here.
+  void begin(const BodyStates& states) {
+    for (Contact& contact : contacts_)
+      contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
+    strikes_ = strikes(states);
+    if (soft_) find_flexibility(states);
+  }
+
+  /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.
+  double touch(const BodyStates& states, const FreeMotions& motions, const Contact& contact, double within) {
+    constexpr int kMostHalvings = 60;
+    constexpr double kClosed = 1e-12;  // of the way through the step
+    const Vec3 n = contact.axes.col(0);
+    Vec3 a, b, velocity_a, velocity_b;
+    const auto gap = [&](double time) {
+      passage_a_.find(states, motions, contact.a, time, a, velocity_a);
+      passage_b_.find(states, motions, contact.b, time, b, velocity_b);
+      return n.dot(a - b);
+    };
+    double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
+    const double least = kRelativeTolerance * a.norm();
+    if (!(gap_open > least && gap_closed < 0.0)) return within;
+    for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
+      // Secants from both ends close in from one side alone: every third step halves.
+      const double part = i % 3 == 2 ? 0.5 : std::clamp(gap_open / (gap_open - gap_closed), 1e-3, 1.0 - 1e-3);
+      const double between = open + part * (closed - open), seen = gap(between);
+      (seen > 0.0 ? open : closed) = between;
+      (seen > 0.0 ? gap_open : gap_closed) = seen;
+      if (seen > 0.0 && seen <= least) break;
+    }
+    gap(open);
+    return n.dot(velocity_b - velocity_a) > options_->impact_speed ? open : within;
+  }
+
   /// Whether the bodies are in an impact in the coming step.
   bool strikes(const BodyStates& states) const {
     const Contact& first = contacts_.front();
@@ -278,6 +341,7 @@ class PairContacts final : public Constraint {
   double step_ = 0.0, lasted_ = 0.0, stored_energy_ = 0.0;
   std::vector<Mat3> flexibility_;
   std::vector<double> modal_a_, modal_b_;
+  Passage passage_a_, passage_b_;
 };
 
 }  // namespace
@@ -354,7 +418,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     const Contact& first = s.contacts[begin];
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
     if (pair == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
-    s.pairs[pair]->set(states, std::span(s.contacts).subspan(begin, i - begin), s.options,
+    s.pairs[pair]->set(std::span(s.contacts).subspan(begin, i - begin), s.options,
                        s.lasted(first.a.body, first.b.body));
     s.constraints.push_back(s.pairs[pair++].get());
     begin = i;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "bounded_rows.h"
 #include "island_energy.h"
@@ -59,11 +60,26 @@ bool rests(const RowLaw& law, double gap, double speed, double speed_of_a_step) 
   return closed && std::abs(speed) <= speed_of_a_step;
 }
 
+// A step is cut so often at most, and never into parts shorter than this share of it.
+constexpr int kMostCuts = 4;
+constexpr double kShortestPart = 1e-3;
+
+/// Whether a step may be cut: free bodies that nothing but contacts, gravity and held forces acts on.
+bool allows_cuts(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                 std::span<Constraint* const> constraints) {
+  return std::ranges::all_of(constraints, [](const Constraint* c) { return c->is_contact(); }) &&
+         std::ranges::all_of(members, [&](Index member) {
+           const auto& [group, slot, pose] = table[static_cast<std::size_t>(member)];
+           return group->frame_constants().motion == FrameMotion::kFree && !group->has_delayed_impulse(slot);
+         });
+}
+
 }  // namespace
 
 struct IslandSolver::Impl {
   IslandBodies bodies;
   ConstraintRows rows;
+  std::vector<ExactMotion> motions;    // of the members, where a step may be cut
   std::vector<ModalStep> modal_steps;  // of the bodies, where they are not those of their groups
   std::vector<Index> first_row;        // per constraint, and the end
   std::vector<RowLaw> laws;            // of the rows at the step's start
@@ -103,7 +119,16 @@ struct IslandSolver::Impl {
   HeldMotion held_motion(StepTime when, Index row, const IslandOptions& options) const;
   void find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer);
   void answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
-  void let_all_modes_move(double length);
+  void set_modal_steps(double length, double whole_step);
+  struct Part {
+    std::span<const ConstrainedBody> table;
+    std::span<const Index> members;
+    std::span<Constraint* const> constraints;
+    bool begins, ends;  // the whole step
+  };
+  void take_part(const Part& part, const IslandOptions& options, double whole_step, IslandReport& report);
+  double next_cut(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                  std::span<Constraint* const> constraints, const Vec3& gravity, double left);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                       IslandReport& report);
   void factor();
@@ -140,7 +165,6 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   laws.clear();
   for (Index i = 0; i < rows.size(); ++i) laws.push_back(rows.row(i).law);
   theta = start_share(laws);
-  if (theta < 1.0) let_all_modes_move(options.step);
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
@@ -388,17 +412,6 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
   return status;
 }
 
-/// Modes that answered statically would lose what they store; held forces alone cannot whip them.
-void IslandSolver::Impl::let_all_modes_move(double length) {
-  if (modal_steps.size() < static_cast<std::size_t>(bodies.count()))
-    modal_steps.resize(static_cast<std::size_t>(bodies.count()));
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const ModalModelData& data = bodies.body(local).group->model().data();
-    modal_steps[static_cast<std::size_t>(local)].set(data.eigenvalues, data.decays, length, ModalStep::kNone);
-  }
-  bodies.set_modal_steps(std::span(modal_steps).first(static_cast<std::size_t>(bodies.count())));
-}
-
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
 void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
   const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
@@ -601,22 +614,78 @@ IslandSolver& IslandSolver::operator=(IslandSolver&&) noexcept = default;
 IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                                 std::span<Constraint* const> constraints, const IslandOptions& options) {
   Impl& s = *impl_;
-  const BodyStates states(table);
-  s.gather(table, members, constraints, options);
-  IslandReport report{.bodies = s.bodies.count(), .rows = s.rows.size()};
-  s.energy.begin(s.bodies, options.gravity);
-  s.find_reaction(StepTime::kStart, options, s.reaction);
-  report.status = s.iterate(states, constraints, options, report);
-  s.answer_at_end(states, constraints, options);
-  if (options.guard_energy) s.guard_energy(states, constraints, options, report);
-  for (Index local = 0; local < s.bodies.count(); ++local)
-    s.bodies.body(local).group->commit(s.bodies.body(local).slot);
-  for (std::size_t i = 0; i < s.f.size(); ++i) s.f[i] += options.step * s.reaction[i];
-  for (std::size_t i = 0; i < constraints.size(); ++i) {
-    const auto begin = static_cast<std::size_t>(s.first_row[i]), end = static_cast<std::size_t>(s.first_row[i + 1]);
-    constraints[i]->accept(states, std::span<const double>(s.f).subspan(begin, end - begin));
+  IslandReport report{.bodies = static_cast<int>(members.size())};
+  IslandOptions part = options;
+  double left = options.step;
+  bool begins = true;
+  const bool may_cut = allows_cuts(table, members, constraints);
+  for (int cut = 0; may_cut && cut < kMostCuts; ++cut) {
+    const double time = s.next_cut(table, members, constraints, options.gravity, left);
+    if (!(time > kShortestPart * options.step && left - time > kShortestPart * options.step)) break;
+    part.step = time;
+    s.take_part({table, members, constraints, begins, false}, part, options.step, report);
+    part.energy_surplus = report.energy_surplus;
+    left -= time;
+    begins = false;
+    ++report.cuts;
   }
+  part.step = left;
+  s.take_part({table, members, constraints, begins, true}, part, options.step, report);
   return report;
+}
+
+/// One step, or a part of one that is cut.
+void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& options, double whole_step,
+                                   IslandReport& report) {
+  const BodyStates states(part.table);
+  gather(part.table, part.members, part.constraints, options);
+  set_modal_steps(options.step, whole_step);
+  IslandReport done;
+  energy.begin(bodies, options.gravity);
+  find_reaction(StepTime::kStart, options, reaction);
+  done.status = iterate(states, part.constraints, options, done);
+  answer_at_end(states, part.constraints, options);
+  if (options.guard_energy) guard_energy(states, part.constraints, options, done);
+  for (Index local = 0; local < bodies.count(); ++local)
+    bodies.body(local).group->commit(bodies.body(local).slot, part.begins, part.ends);
+  for (std::size_t i = 0; i < f.size(); ++i) f[i] += options.step * reaction[i];
+  for (std::size_t i = 0; i < part.constraints.size(); ++i) {
+    const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
+    part.constraints[i]->accept(states, std::span<const double>(f).subspan(begin, end - begin));
+  }
+  if (done.status != SolveStatus::kSolved) report.status = done.status;
+  report.rows = rows.size();
+  report.iterations = std::max(report.iterations, done.iterations);
+  report.change = std::max(report.change, done.change);
+  report.energy_removed += done.energy_removed;
+  report.energy_surplus = done.energy_surplus;
+}
+
+/// The first time at which a constraint wants the step cut; all of what is left of it where none does.
+double IslandSolver::Impl::next_cut(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                                    std::span<Constraint* const> constraints, const Vec3& gravity, double left) {
+  if (motions.size() < members.size()) motions.resize(members.size());
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const ConstrainedBody& body = table[static_cast<std::size_t>(members[i])];
+    body.group->predict_motion(body.slot, gravity, left, motions[i]);
+  }
+  const FreeMotions free{members, std::span(motions).first(members.size())};
+  for (Constraint* constraint : constraints) left = constraint->next_cut(BodyStates(table), free, left);
+  return left;
+}
+
+/// Makes the modes go through a part of a step, or through an impact, in which all of them move: those that answer
+/// statically would lose what they store, and no hand is there to whip them.
+void IslandSolver::Impl::set_modal_steps(double length, double whole_step) {
+  if (theta == 1.0 && length == whole_step) return;
+  const auto count = static_cast<std::size_t>(bodies.count());
+  if (modal_steps.size() < count) modal_steps.resize(count);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ModalModelData& data = bodies.body(local).group->model().data();
+    modal_steps[static_cast<std::size_t>(local)].set(data.eigenvalues, data.decays, length,
+                                                     theta < 1.0 ? ModalStep::kNone : std::numbers::pi / whole_step);
+  }
+  bodies.set_modal_steps(std::span(modal_steps).first(count));
 }
 
 }  // namespace limber

@@ -174,18 +174,20 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
 }
 
-void BodyGroup::commit(Index slot) {
+void BodyGroup::commit(Index slot, bool begins, bool ends) {
   Body& b = body(slot);
   const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
-  b.previous_pose = b.frame.pose();
-  previous_amplitudes_.copy_from(amplitudes_, slot);
+  if (begins) {
+    b.previous_pose = b.frame.pose();
+    previous_amplitudes_.copy_from(amplitudes_, slot);
+  }
   b.frame = p.frame;
   amplitudes_.copy_from(predicted_amplitudes_, slot);
   rates_.copy_from(predicted_rates_, slot);
   if (p.modes_static) static_amplitudes_.copy_from(predicted_static_, slot);
   if (b.modes_static && !p.modes_static) static_amplitudes_.clear(slot);
   b.modes_static = p.modes_static;
-  clear_loads(slot);
+  if (ends) clear_loads(slot);
 }
 
 void BodyGroup::adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal) {
@@ -228,10 +230,9 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded, 
     }
 }
 
-void BodyGroup::predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
+void BodyGroup::predict_motion(Index slot, const Vec3& gravity, double h, ExactMotion& motion) const {
   const Body& b = body(slot);
   const FrameLoad load{gravity, b.force, b.torque};
-  const double h = step_length();
   const ModalModelData& data = model_->data();
   RigidFrame frame = b.frame;
   const FrameExcitation excitation = frame.begin_step(constants_, load, first_moment(slot), h, &motion.path());

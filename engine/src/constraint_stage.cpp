@@ -170,6 +170,7 @@ IslandReport ConstraintStage::report() const {
     if (r.status != SolveStatus::kSolved) sum.status = r.status;
     sum.bodies += r.bodies;
     sum.rows += r.rows;
+    sum.cuts += r.cuts;
     sum.iterations = std::max(sum.iterations, r.iterations);
     sum.change = std::max(sum.change, r.change);
     sum.energy_removed += r.energy_removed;

@@ -491,6 +491,7 @@ ConstraintReport World::constraint_report() const {
           .bodies = r.bodies,
           .rows = r.rows,
           .iterations = r.iterations,
+          .cuts = r.cuts,
           .solved = r.status == SolveStatus::kSolved,
           .energy_removed = r.energy_removed};
 }

@@ -118,6 +118,30 @@ TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   EXPECT_LT(worst, kRise * scale);
 }
 
+/// A damped box that is dropped bounces, in steps that are cut where it strikes, and comes to rest.
+TEST(WorldContact, ImpactsInCutStepsGainNoEnergyAndEndAtRest) {
+  constexpr double kRise = 1e-6;
+  GroundedWorld scene({.recovery_speed = 0.0, .impact = ImpactModel::kHeldFromTouch});
+  World& world = scene.world;
+  const BodyId box = world.add_body(damped_box(8, 30.0), {.pose = {{}, {0.0, 0.0, 0.6}}});
+  const double scale = world.energy(box).total();
+  double before = scale, worst = 0.0, fastest = 0.0;
+  int cuts = 0;
+  for (int i = 0; i < 600; ++i) {
+    world.step();
+    cuts += world.constraint_report().cuts;
+    fastest = std::max(fastest, world.body(box).velocity.z());
+    worst = std::max(worst, world.energy(box).total() - before);
+    before = world.energy(box).total();
+  }
+  EXPECT_GT(cuts, 0);
+  EXPECT_GT(fastest, 1.0);  // of the 3 m/s that it falls at: it has bounced
+  EXPECT_LT(worst, kRise * scale);
+  const Vec3 rest = world.body(box).pose.p;
+  for (int i = 0; i < 60; ++i) world.step();
+  EXPECT_LT((world.body(box).pose.p - rest).norm(), 1e-4);
+}
+
 TEST(WorldContact, EventsNameTheBodiesAndTheVetoLetsThemFall) {
   GroundedWorld scene;
   World& world = scene.world;

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "limber/constraints/constraint_rows.h"
+#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 
@@ -26,6 +27,14 @@ class BodyStates {
   std::span<const ConstrainedBody> table_;
 };
 
+/// How the bodies of an island would go through the rest of a step if nothing touched them.
+struct FreeMotions {
+  std::span<const Index> members;        ///< bodies, ascending
+  std::span<const ExactMotion> motions;  ///< one for each
+  /// Null: the body stands still.
+  const ExactMotion* of(Index body) const;
+};
+
 /// Rows with one owner, who knows their true gaps. In every step the solver calls add_rows() at its start, gaps() after
 /// each prediction, add_rows() at its end for the rows' answer to gravity there, and accept() with what was found. None
 /// of them may allocate once warm, or throw.
@@ -40,6 +49,11 @@ class Constraint {
   /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
   /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
+  /// Whether it is contact: an island of nothing else may have its step cut where bodies strike. Each part is then a
+  /// step for the functions here.
+  virtual bool is_contact() const { return false; }
+  /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
+  virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
   /// @param impulses of the rows over the step that ends now, N·s, held part included
   virtual void accept(const BodyStates& states, std::span<const double> impulses) = 0;
 };

@@ -11,6 +11,9 @@
 ///      not; and made faster where joints alone have lost energy to the method
 ///   7. the prediction becomes the state
 ///
+/// Where bodies strike and that is asked for (Constraint::next_cut), the step is cut there, four times at most, and 1
+/// to 7 are done for each part.
+///
 /// Momentum of free islands is kept by 4 (opposite impulses at one world point) and by 6 (the motion of the whole is
 /// not touched). What is guaranteed, and why, is in docs/derivations/constraints.md.
 #pragma once
@@ -39,7 +42,8 @@ struct IslandOptions {
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
-  int iterations = 0;           ///< predictions made
+  int cuts = 0;                 ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch)
+  int iterations = 0;           ///< predictions made, in the part of the step that needed most
   double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance
   double energy_removed = 0.0;  ///< J, by step 6; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step

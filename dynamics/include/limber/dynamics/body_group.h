@@ -92,7 +92,11 @@ class BodyGroup {
   void advance(Index begin, Index end, const Vec3& gravity);
 
   /// What advance() would do to one body, at any time within the step. The body stays as it is.
-  void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const;
+  void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
+    predict_motion(slot, gravity, step_length(), motion);
+  }
+  /// The same over another length, s: what is left of a step that is cut.
+  void predict_motion(Index slot, const Vec3& gravity, double length, ExactMotion& motion) const;
 
   /// Whether advance() leaves the body alone: it is predicted and committed by whoever solves its constraints.
   void set_constrained(Index slot, bool constrained) { body(slot).constrained = constrained; }
@@ -112,7 +116,8 @@ class BodyGroup {
   /// Changes the predicted velocities of frame and modes. Arguments as for apply_generalized_impulse().
   void adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Makes the last prediction the state, and clears the loads, as advance() does.
-  void commit(Index slot);
+  /// @param begins, ends whether it is the first and the last part of a step: held loads stay until the last
+  void commit(Index slot, bool begins = true, bool ends = true);
 
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
   /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none
