@@ -11,6 +11,8 @@ namespace {
 constexpr double kLargestChange = 0.1;
 // This part of the energies at hand may wait for the next step.
 constexpr double kPatience = 1e-7;
+// A gain above this many times the energies at hand is nonsense, not motion to be slowed: digits would not be left.
+constexpr double kNonsense = 10.0;
 
 /// A body whose parent moves gets work from it that nobody books.
 bool carried(const BodyGroup& group, Index slot) {
@@ -46,11 +48,15 @@ RelativeMotion relative_motion(const BodyGroup& group, Index slot, const CommonM
 }  // namespace
 
 void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
-  before_ = 0.0;
+  before_ = scale_ = 0.0;
   driven_ = false;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    before_ += group->energy(slot, gravity).total();
+    const FrameConstants& c = group->frame_constants();
+    const BodyEnergy energy = group->energy(slot, gravity);
+    before_ += energy.total();
+    scale_ += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
+              gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
     driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
   }
 }
@@ -58,25 +64,25 @@ void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
 IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work,
                                          bool give_back, const IslandOptions& options) {
   if (driven_) return {};
-  double after = 0.0, damped = 0.0, scale = 0.0;
+  double after = 0.0, damped = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    const FrameConstants& c = group->frame_constants();
-    const BodyEnergy energy = group->predicted_energy(slot, options.gravity);
-    after += energy.total();
+    after += group->predicted_energy(slot, options.gravity).total();
     damped += group->predicted_dissipation(slot);
-    scale += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
-             options.gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
     if (carried(*group, slot)) return {};
   }
-  const double gain = after - before_ - agent_work - load_work(bodies, options.step) + options.energy_surplus;
+  const double work = agent_work + load_work(bodies, options.step);
+  const double gain = after - before_ - work + options.energy_surplus;
+  // Of what there was, never of what came out: that may be any number where the rows did not come together.
+  const double patience = kPatience * (scale_ + std::max(0.0, work));
   const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
+  if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
+  if (excess > kNonsense * (scale_ + std::max(0.0, work))) return {.left = excess};
   const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies) : CommonMotion{};
-  const double patience = excess < kPatience * scale ? kLargestChange : 1.0;
-  const double removed = remove_relative_energy(bodies, common, excess, patience);
+  const double removed = remove_relative_energy(bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;
-  return {removed, left > kPatience * scale ? left : 0.0, std::max(0.0, left)};
+  return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
 }
 
 /// Work of the forces that the caller holds over the step.

@@ -597,8 +597,11 @@ void IslandSolver::Impl::guard_energy(const BodyStates& states, std::span<Constr
     report.energy_removed = done.removed;
     report.energy_surplus = done.surplus;
     if (!(done.left > 0.0) || halving == kHalvings) return;
-    const double part = halving + 1 == kHalvings ? 0.0 : 0.5;
-    for (std::size_t i = 0; i < f.size(); ++i) f[i] *= part, reaction[i] *= part;
+    const bool last = halving + 1 == kHalvings;
+    for (std::size_t i = 0; i < f.size(); ++i) {
+      f[i] = last ? 0.0 : 0.5 * f[i];  // not times 0: they need not be finite
+      reaction[i] = last ? 0.0 : 0.5 * reaction[i];
+    }
     give_back = false;
     report.status = SolveStatus::kIterationLimit;
     predict(options);
