@@ -1,6 +1,6 @@
 // joint_accuracy: how often joints are read right, and how well.
 //   run:  build/release/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
-//         build/release/bin/joint_accuracy [--method fixed-ratio] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/release/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose
 #include <algorithm>
@@ -13,8 +13,10 @@
 #include <numbers>
 
 #include "assemblies.h"
+#include "grouped_parts.h"
 #include "joint_scores.h"
 #include "limber/articulation/detect_joints.h"
+#include "limber/articulation/range_of_motion.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
 #include "shells.h"
 
@@ -90,22 +92,12 @@ int run(const DetectionOptions& options, bool verbose, const std::string& only, 
 /// 25 shafts with flanges in their sleeves, in a square.
 GroupedSurface many_hinges(int segments) {
   GroupedSurface out;
-  const auto add = [&](const Shell& shell) {
-    const auto offset = static_cast<Index>(out.surface.vertices.size());
-    out.groups.push_back(
-        {"", "", static_cast<Index>(out.surface.triangles.size()), static_cast<Index>(shell.triangles.size())});
-    out.surface.vertices.insert(out.surface.vertices.end(), shell.vertices.begin(), shell.vertices.end());
-    for (const Triangle& t : shell.triangles) {
-      out.face_of.push_back(static_cast<Index>(out.face_of.size()));
-      out.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-    }
-  };
   const Shell sleeve = lathe({{1.01, -1}, {2, -1}, {2, 1}, {1.01, 1}}, segments, 0.5);
   const Shell shaft =
       lathe({{0, -2}, {1.5, -2}, {1.5, -1.01}, {1, -1.01}, {1, 1.01}, {1.5, 1.01}, {1.5, 2}, {0, 2}}, segments);
   for (int i = 0; i < 25; ++i)
     for (const Shell* shell : {&sleeve, &shaft})
-      add(shell->placed(Mat3::Identity(), Vec3(4.2 * (i % 5), 4.2 * (i / 5), 0)));
+      append_group(shell->placed(Mat3::Identity(), Vec3(4.2 * (i % 5), 4.2 * (i / 5), 0)), "", out);
   return out;
 }
 
@@ -116,12 +108,20 @@ int time_large() {
   const std::clock_t cpu = std::clock();
   const Assembly assembly = find_components(input);
   const auto joints = detect_joints(assembly, {}, jobs);
+  const std::clock_t detected = std::clock();
+  const auto ranges = ranges_of_motion(assembly, joints, {}, jobs);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   const auto right = std::count_if(joints.begin(), joints.end(),
                                    [](const DetectedJoint& j) { return j.joint.type == JointType::kRevolute; });
-  std::printf("%zu triangles, %zu components: %zu joints, %td of them revolute; %.2f s, %.2f s of processor time\n",
-              input.surface.triangles.size(), assembly.components.size(), joints.size(), right, seconds.count(),
-              static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
+  const auto endless = std::count_if(ranges.begin(), ranges.end(),
+                                     [](const RangeOfMotion& r) { return r.joint.limits.rotation.open(); });
+  const auto processor = [](std::clock_t from, std::clock_t to) {
+    return static_cast<double>(to - from) / CLOCKS_PER_SEC;
+  };
+  std::printf("%zu triangles, %zu components: %zu joints, %td of them revolute, %td of them without an end\n",
+              input.surface.triangles.size(), assembly.components.size(), joints.size(), right, endless);
+  std::printf("%.2f s; processor time: %.2f s for components and joints, %.2f s for ranges of motion\n",
+              seconds.count(), processor(cpu, detected), processor(detected, std::clock()));
   return 0;
 }
 
@@ -139,15 +139,17 @@ int main(int argc, char** argv) {
       verbose = true;
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
+    else if (arg == "--contacts" && i + 1 < argc && std::string_view(argv[i + 1]) == "hulls")
+      options.contact.method = limber::ContactMethod::kHulls, ++i;
     else if (arg == "--only" && i + 1 < argc)
       only = argv[++i];
     else if (arg == "--class" && i + 1 < argc)
       group_text = argv[++i];
     else
-      return std::fprintf(
-                 stderr,
-                 "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY, --class TEXT or --method NAME\n",
-                 argv[i]),
+      return std::fprintf(stderr,
+                          "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY, --class TEXT, --contacts "
+                          "NAME or --method NAME\n",
+                          argv[i]),
              2;
   }
   return limber::assemblies::run(options, verbose, only, group_text);

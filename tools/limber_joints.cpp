@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <filesystem>
@@ -24,7 +25,7 @@ using Json = nlohmann::ordered_json;
 
 struct Arguments {
   std::string model, output, keep, urdf, mjcf, glb;
-  std::string components = "connectivity", method = "default", unit = "m";
+  std::string components = "connectivity", contacts = "nearest", method = "default", unit = "m";
   std::vector<std::string> merge;
   double scale = 0.0, density = 1000.0, min_confidence = 0.0, overlap = 0.0;
   bool explain = false, no_limits = false;
@@ -78,6 +79,16 @@ void declare_detection(CLI::App& options, Arguments& a) {
       ->check(CLI::IsMember({"connectivity", "groups", "materials"}))
       ->capture_default_str();
   options.add_option("--merge", a.merge, "components that are one part, by name; repeatable")->type_name("A,B,...");
+  options
+      .add_option(
+          "--contacts", a.contacts,
+          "how contacts are found: by a cluster of the smallest gaps, or as in [X09] in the hulls of convex pieces")
+      ->check(CLI::IsMember({"nearest", "hulls"}))
+      ->capture_default_str();
+  options.add_option("--growth", a.detection.contact.hull_growth, "of hulls, for --contacts hulls")
+      ->type_name("PART_OF_DIAGONAL")
+      ->check(positive_number())
+      ->capture_default_str();
   options.add_option("--method", a.method, "\"paper\": slippage by one fixed ratio of eigenvalues, as in [X09]")
       ->check(CLI::IsMember({"default", "paper"}))
       ->capture_default_str();
@@ -180,13 +191,18 @@ Assembly take_apart(const Arguments& a, const Work& work) {
   return find_components(work.surface, options);
 }
 
+/// Of the percentage shown over detection and limits, which never falls.
+constexpr double kDetectionShare = 0.3;
+
 DetectionOptions detection_options(const Arguments& a, Program& program) {
   DetectionOptions options = a.detection;
   options.min_confidence = a.min_confidence;
   if (a.method == "paper") options.slippage.method = SlippageMethod::kFixedRatio;
-  options.progress = [&program](double done, std::string_view what) {
-    program.progress().stage(what);
-    program.progress().fraction(done);
+  if (a.contacts == "hulls") options.contact.method = ContactMethod::kHulls;
+  const double share = a.no_limits ? 1.0 : kDetectionShare;
+  options.progress = [&program, share, stage = std::string()](double done, std::string_view what) mutable {
+    if (stage != what) program.progress().stage(stage = what);
+    program.progress().fraction(share * done);
   };
   return options;
 }
@@ -194,8 +210,11 @@ DetectionOptions detection_options(const Arguments& a, Program& program) {
 void find_limits(const Arguments& a, Program& program, Jobs& jobs, Work& work) {
   RangeOptions options = a.range;
   options.motion.largest_overlap = a.overlap;
-  options.progress = [&program](double done) { program.progress().fraction(done); };
+  options.progress = [&program](double done) {
+    program.progress().fraction(kDetectionShare + (1.0 - kDetectionShare) * done);
+  };
   program.progress().stage("limits");
+  options.progress(0.0);
   work.ranges = ranges_of_motion(work.assembly, work.joints, options, jobs);
   for (std::size_t j = 0; j < work.joints.size(); ++j) {
     if (work.limits_kept[j]) continue;
@@ -288,7 +307,8 @@ void fill_report(Json& report, const Work& work, const Kinematics& k) {
   report["diagonal"] = work.assembly.diagonal;
   report["components"] = Json::array();
   for (const Component& c : work.assembly.components)
-    report["components"].push_back({{"name", c.name}, {"triangles", c.triangles.size()}, {"closed", c.closed}});
+    report["components"].push_back(
+        {{"name", c.name}, {"triangles", c.triangles.size()}, {"closed", c.closed}, {"capped", !c.caps.empty()}});
   report["proposals"] = Json::array();
   for (const MergeProposal& p : work.assembly.proposals)
     report["proposals"].push_back({{"components", p.components}, {"reason", p.reason}});
@@ -317,7 +337,9 @@ void write_robot(Program& program, const Arguments& a, const Work& work, const s
                                               .density = a.density,
                                               .metres_per_unit = metres_per_unit(a)});
   program.write_file(file, robot.text);
-  program.warnings().insert(program.warnings().end(), robot.warnings.begin(), robot.warnings.end());
+  for (const std::string& warning : robot.warnings)  // both formats tell of the same masses
+    if (auto& told = program.warnings(); std::find(told.begin(), told.end(), warning) == told.end())
+      told.push_back(warning);
   if (!written.insert(folder).second) return;
   std::error_code error;
   fs::create_directory(folder, error);

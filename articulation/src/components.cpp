@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "hole_caps.h"
 #include "limber/articulation/assembly.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
@@ -237,12 +238,20 @@ Assembly find_components(const GroupedSurface& input, const ComponentOptions& op
     component.faces = face_ranges(component.triangles, input.face_of);
     component.surface = own_surface(input.surface, component.triangles, scratch);
     component.closed = surface_quality(component.surface).closed_manifold();
+    if (auto caps = component.closed ? std::nullopt : small_hole_caps(component.surface))
+      component.closed = true, component.caps = std::move(*caps);
     component.diagonal = box_diagonal(component.surface.vertices);
   }
   if (options.rule == ComponentRule::kConnectivity) {
     propose_by_name(input, out);
     propose_by_open_edges(out);
   }
+  return out;
+}
+
+SurfaceMesh bounding_surface(const Component& component) {
+  SurfaceMesh out = component.surface;
+  out.triangles.insert(out.triangles.end(), component.caps.begin(), component.caps.end());
   return out;
 }
 

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <optional>
 
+#include "convex_pieces.h"
+#include "counted_progress.h"
 #include "limber/core/error.h"
 #include "near_samples.h"
 
@@ -22,20 +24,26 @@ void require(bool holds, const std::string& field, double value, const std::stri
 /// A component made ready: outward, with normals and a tree.
 struct Prepared {
   Prepared(const Component& component, double crease_angle)
-      : mesh(outward(component)), smooth(mesh, crease_angle), diagonal(component.diagonal), closed(component.closed) {}
+      : mesh(outward(component.surface, inside_out(component))),
+        smooth(mesh, crease_angle, outward({{}, component.caps}, inside_out(component)).triangles),
+        diagonal(component.diagonal),
+        closed(component.closed) {}
 
+  static bool inside_out(const Component& component) {
+    return component.closed && enclosed_volume(bounding_surface(component)) < 0.0;
+  }
   /// A closed surface drawn inside out is turned.
-  static SurfaceMesh outward(const Component& component) {
-    SurfaceMesh out = component.surface;
-    if (component.closed && enclosed_volume(out) < 0.0)
-      for (Triangle& t : out.triangles) std::swap(t[1], t[2]);
-    return out;
+  static SurfaceMesh outward(SurfaceMesh surface, bool inside_out) {
+    if (inside_out)
+      for (Triangle& t : surface.triangles) std::swap(t[1], t[2]);
+    return surface;
   }
 
   SurfaceMesh mesh;
   SmoothSurface smooth;
   double diagonal;
   bool closed;
+  std::optional<ConvexPieces> pieces{};
 };
 
 using Parts = std::vector<std::unique_ptr<Prepared>>;
@@ -71,6 +79,8 @@ std::vector<Pair> near_pairs(const Parts& parts, double search) {
             [](const Pair& p, const Pair& q) { return std::pair(p.a, p.b) < std::pair(q.a, q.b); });
   return out;
 }
+
+constexpr std::size_t kFewest = 20;  // samples a side; fewer say nothing about a surface
 
 struct BothSides {
   std::vector<NearSample> a, b;
@@ -213,7 +223,6 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   };
   (area(sides.a) >= area(sides.b) ? sides.b : sides.a).clear();
   const auto& kept = sides.a.empty() ? sides.b : sides.a;
-  constexpr std::size_t kFewest = 20;
   if (kept.size() < kFewest) return {};
   Vec3 mean = Vec3::Zero();
   for (const NearSample& s : kept) mean += s.contact.normal / static_cast<double>(kept.size());
@@ -222,6 +231,20 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   ContactRegion out = summarised(pair, sides);
   out.overlapping = true;
   return {std::move(out)};
+}
+
+/// [X09] 3.1.
+std::vector<ContactRegion> hull_contact(const Pair& pair, const Parts& parts, const ContactRegionOptions& options) {
+  const Prepared &a = *parts[static_cast<std::size_t>(pair.a)], &b = *parts[static_cast<std::size_t>(pair.b)];
+  const double diagonal = std::min(a.diagonal, b.diagonal), growth = options.hull_growth * diagonal;
+  BothSides sides = sample(a, b, options.search * diagonal, options.facing_cosine, options.samples);
+  const auto outside = [&](const Prepared& other) {
+    return [&other, growth](const NearSample& s) { return !other.pieces->hold(s.contact.point, growth); };
+  };
+  std::erase_if(sides.a, outside(b));
+  std::erase_if(sides.b, outside(a));
+  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return {};
+  return {summarised(pair, sides)};
 }
 
 std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, const ContactRegionOptions& options) {
@@ -238,7 +261,6 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   keep_nearer(sides.b, limit);
   drop_hidden(pair, parts, sides);
 
-  constexpr std::size_t kFewest = 20;  // samples a side; fewer say nothing about a surface
   if (sides.a.size() < kFewest || sides.b.size() < kFewest) return overlap(pair, a, b, coarse);
   quieten(sides);
   ContactRegion out = summarised(pair, sides);
@@ -254,20 +276,29 @@ void ContactRegionOptions::validate() const {
   require(crease_angle >= 0.0 && crease_angle <= std::numbers::pi, "crease_angle", crease_angle, "0 to pi");
   require(search > 0.0 && std::isfinite(search), "search", search, "more than 0");
   require(largest_gap > 0.0, "largest_gap", largest_gap, "more than 0");
+  require(hull_growth > 0.0 && hull_growth <= search, "hull_growth", hull_growth, "more than 0, at most `search`");
+  require(concavity > 0.0, "concavity", concavity, "more than 0");
 }
 
 std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactRegionOptions& options,
-                                                Jobs& jobs) {
+                                                Jobs& jobs, const std::function<void(double)>& progress) {
   options.validate();
   Parts parts(assembly.components.size());
+  const bool hulls = options.method == ContactMethod::kHulls;
   jobs.parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
+    for (std::size_t i = begin; i < end; ++i) {
       parts[i] = std::make_unique<Prepared>(assembly.components[i], options.crease_angle);
+      if (hulls) parts[i]->pieces.emplace(parts[i]->mesh, options.concavity * parts[i]->diagonal);
+    }
   });
   const auto pairs = near_pairs(parts, options.search);
   std::vector<std::vector<ContactRegion>> found(pairs.size());
+  internal::CountedProgress counted(pairs.size(), progress);
   jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) found[i] = facing_contact(pairs[i], parts, options);
+    for (std::size_t i = begin; i < end; ++i) {
+      found[i] = hulls ? hull_contact(pairs[i], parts, options) : facing_contact(pairs[i], parts, options);
+      counted.done();
+    }
   });
   std::vector<ContactRegion> out;
   for (auto& regions : found)

@@ -102,9 +102,8 @@ void SideOnPath::select(const OrbitBox& reach) {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const BodyOnPath& body = on_path_[b];
     if (body.vertices.empty()) continue;
-    const std::vector<Triangle>& triangles = bodies_[b].surface->triangles;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const auto& [i, j, k] = triangles[t];
+    for (std::size_t t = 0; t < bodies_[b].triangles(); ++t) {
+      const auto& [i, j, k] = bodies_[b].triangle(t);
       OrbitBox box = body.plane[static_cast<std::size_t>(i)];
       box.add(body.plane[static_cast<std::size_t>(j)]), box.add(body.plane[static_cast<std::size_t>(k)]);
       if (frame_.kind() != Kind::kTranslation) box.low[0] = 0.0;
@@ -128,14 +127,15 @@ void SideOnPath::select(const OrbitBox& reach) {
 
 OrbitFace SideOnPath::face_of(const Candidate& candidate) {
   const OrbitBody& body = bodies_[static_cast<std::size_t>(candidate.body)];
+  const auto number = static_cast<std::size_t>(candidate.triangle);
   const BodyOnPath& on_path = on_path_[static_cast<std::size_t>(candidate.body)];
   OrbitFace f;
   f.body = candidate.body;
   f.triangle = candidate.triangle;
+  f.cap = number >= body.surface->triangles.size();
   f.flipped = body.inside_out;
   for (std::size_t i = 0; i < 3; ++i)
-    f.corners[i] = on_path.vertices[static_cast<std::size_t>(
-        body.surface->triangles[static_cast<std::size_t>(candidate.triangle)][i])];
+    f.corners[i] = on_path.vertices[static_cast<std::size_t>(body.triangle(number)[i])];
   if (f.flipped) std::swap(f.corners[1], f.corners[2]);
   f.normal = (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
   f.offset = f.normal.dot(f.corners[0]);
@@ -150,7 +150,7 @@ OrbitFace SideOnPath::face_of(const Candidate& candidate) {
 
 double SideOnPath::angle(const OrbitFace& face, std::size_t corner) {
   const auto b = static_cast<std::size_t>(face.body);
-  const Triangle& t = bodies_[b].surface->triangles[static_cast<std::size_t>(face.triangle)];
+  const Triangle& t = bodies_[b].triangle(static_cast<std::size_t>(face.triangle));
   double& known = on_path_[b].angle[static_cast<std::size_t>(t[face.flipped && corner > 0 ? 3 - corner : corner])];
   if (std::isnan(known)) known = std::atan2(face.corners[corner].z(), face.corners[corner].y());
   return known;
@@ -193,7 +193,15 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
 }  // namespace
 
 OrbitBody orbit_body(const MotionBody& body) {
-  OrbitBody out{body.surface, body.closed, body.closed && enclosed_volume(*body.surface) < 0.0};
+  OrbitBody out{body.surface, body.closed};
+  out.caps = body.caps;
+  if (body.closed && body.caps.empty()) {
+    out.inside_out = enclosed_volume(*body.surface) < 0.0;
+  } else if (body.closed) {
+    SurfaceMesh with_caps = *body.surface;
+    with_caps.triangles.insert(with_caps.triangles.end(), body.caps.begin(), body.caps.end());
+    out.inside_out = enclosed_volume(with_caps) < 0.0;
+  }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
   return out;
 }

@@ -17,6 +17,13 @@ struct OrbitBody {
   bool closed = true;
   bool inside_out = false;  ///< closed, and its triangles are clockwise seen from outside
   Eigen::AlignedBox3d box{};
+  std::span<const Triangle> caps{};  ///< over small holes
+
+  std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
+  const Triangle& triangle(std::size_t i) const {
+    const std::size_t own = surface->triangles.size();
+    return i < own ? surface->triangles[i] : caps[i - own];
+  }
 };
 OrbitBody orbit_body(const MotionBody& body);
 
@@ -26,6 +33,7 @@ struct OrbitFace {
   double offset = 0.0;                 ///< normal · corner
   double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
   Index body = 0, triangle = 0;
+  bool cap = false;                             ///< over a hole: solid behind it, and no surface
   bool flipped = false;                         ///< the second and third corner have changed places
   double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
   double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector

@@ -7,7 +7,9 @@
 namespace limber::internal {
 namespace {
 
+/// Of what can touch.
 double area(const OrbitFace& f) {
+  if (f.cap) return 0.0;
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
 }
 
@@ -57,7 +59,7 @@ void SampledSurface::number_vertices(std::span<const OrbitBody> bodies) {
   for (const OrbitBody& b : bodies) base.push_back(base.back() + static_cast<Index>(b.surface->vertices.size()));
   vertices_.reserve(faces_.size());
   for (const auto& f : faces_) {
-    Triangle v = bodies[static_cast<std::size_t>(f.body)].surface->triangles[static_cast<std::size_t>(f.triangle)];
+    Triangle v = bodies[static_cast<std::size_t>(f.body)].triangle(static_cast<std::size_t>(f.triangle));
     for (Index& i : v) i += base[static_cast<std::size_t>(f.body)];
     vertices_.push_back(v);
   }
@@ -84,7 +86,7 @@ std::vector<SampledSurface::Edge> SampledSurface::sharp_edges() const {
   constexpr double kFlat = 0.94;
   std::vector<Edge> all;
   for (std::size_t f = 0; f < vertices_.size(); ++f)
-    for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3 && !faces_[f].cap; ++i) {
       const auto [a, b] = std::minmax(vertices_[f][i], vertices_[f][(i + 1) % 3]);
       all.push_back({a, b, static_cast<Index>(f)});
     }

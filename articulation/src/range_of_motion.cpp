@@ -1,11 +1,11 @@
 #include "limber/articulation/range_of_motion.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <functional>
 #include <numbers>
-#include <thread>
 
+#include "counted_progress.h"
 #include "free_motion_of_bodies.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
@@ -107,7 +107,7 @@ std::vector<NamedPath> paths_of(JointSpec& joint) {
 /// All components, ready for any path.
 std::vector<OrbitBody> bodies_of(const Assembly& assembly) {
   std::vector<OrbitBody> out;
-  for (const Component& c : assembly.components) out.push_back(internal::orbit_body({&c.surface, c.closed}));
+  for (const Component& c : assembly.components) out.push_back(internal::orbit_body({&c.surface, c.closed, c.caps}));
   return out;
 }
 
@@ -165,24 +165,35 @@ class Trial {
   double size_ = 0.0, sagitta_ = 0.0;
 };
 
+constexpr int kConeRefinements = 4;
+
+/// How many paths are tried for a joint, at most.
+std::size_t path_count(JointSpec joint, const RangeOptions& options) {
+  const std::size_t swings =
+      joint.type == JointType::kBall ? static_cast<std::size_t>(options.cone_directions + 2 * kConeRefinements) : 0;
+  return paths_of(joint).size() + swings;
+}
+
 /// The least swing of the x axis over all directions. Swings by an angle about cos ψ y + sin ψ z.
 /// @param tolerance as it came out for the rotations: overlap as read is the same for all paths
-double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, const RangeOptions& options) {
-  constexpr int kRefinements = 4;
+double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, const RangeOptions& options,
+               const std::function<void()>& path_done) {
   FreeMotionOptions motion = options.motion;
   motion.tolerance = motion.largest_overlap = tolerance;
   motion.reachable_only = true;
   motion.samples = std::max(100, motion.samples / 3);  // many directions share the work of finding the obstacles
   const auto swing = [&](double psi) {
     const Vec3 axis = std::cos(psi) * axis_of(joint, 1) + std::sin(psi) * axis_of(joint, 2);
-    return trial.along(rotation(joint, axis), motion).reachable.high;
+    const double high = trial.along(rotation(joint, axis), motion).reachable.high;
+    path_done();
+    return high;
   };
   const double step = 2.0 * std::numbers::pi / options.cone_directions;
   double least = kInfinity, at = 0.0;
   for (int i = 0; i < options.cone_directions; ++i)
     if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
   if (least == kInfinity) return least;
-  for (double d = 0.5 * step, i = 0; i < kRefinements; ++i, d *= 0.5)
+  for (double d = 0.5 * step, i = 0; i < kConeRefinements; ++i, d *= 0.5)
     for (const double psi : {at - d, at + d})
       if (const double angle = swing(psi); angle < least) least = angle, at = psi;
   return std::min(least, std::numbers::pi);
@@ -331,19 +342,21 @@ JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double m
 namespace {
 
 RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodies,
-                       const std::vector<DetectedJoint>& joints, std::size_t joint, const RangeOptions& options) {
+                       const std::vector<DetectedJoint>& joints, std::size_t joint, const RangeOptions& options,
+                       const std::function<void()>& path_done) {
   const Trial trial(assembly, bodies, joints, joint);
   RangeOfMotion out{.joint = joints[joint].joint, .freedoms = {}, .reasons = {}};
   out.joint.limits = {};
   for (const NamedPath& p : paths_of(out.joint)) {
     out.freedoms.push_back({p.freedom, trial.along(p.path, options.motion)});
+    path_done();
     *p.limit = out.freedoms.back().motion.reachable;
     out.reasons.push_back(range_sentence(assembly, out.freedoms.back()));
   }
   if (out.joint.type == JointType::kBall) {
     double tolerance = 0.0;
     for (const FreedomRange& f : out.freedoms) tolerance = std::max(tolerance, f.motion.tolerance);
-    out.joint.limits.cone = cone_of(trial, out.joint, tolerance, options);
+    out.joint.limits.cone = cone_of(trial, out.joint, tolerance, options, path_done);
     out.reasons.push_back("swing of x: " +
                           (out.joint.limits.cone < kInfinity
                                ? "at least " + degrees_text(out.joint.limits.cone) + " in every direction."
@@ -367,7 +380,7 @@ RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodi
 RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
                               const RangeOptions& options) {
   options.validate();
-  return range_of(assembly, bodies_of(assembly), joints, joint, options);
+  return range_of(assembly, bodies_of(assembly), joints, joint, options, [] {});
 }
 
 std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
@@ -375,15 +388,12 @@ std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std:
   options.validate();
   const std::vector<OrbitBody> bodies = bodies_of(assembly);
   std::vector<RangeOfMotion> out(joints.size());
-  std::atomic<std::size_t> done{0};
-  const auto caller = std::this_thread::get_id();
+  std::size_t paths = 0;
+  for (const DetectedJoint& j : joints) paths += path_count(j.joint, options);
+  internal::CountedProgress progress(paths, options.progress);
   jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) {
-      out[j] = range_of(assembly, bodies, joints, j, options);
-      ++done;
-      if (options.progress && std::this_thread::get_id() == caller)
-        options.progress(static_cast<double>(done) / static_cast<double>(joints.size()));
-    }
+    for (std::size_t j = begin; j < end; ++j)
+      out[j] = range_of(assembly, bodies, joints, j, options, [&] { progress.done(); });
   });
   return out;
 }

@@ -137,7 +137,7 @@ class Robot {
     constexpr double kLeast = 1e-9;  // kg; lighter bodies are refused by readers
     const double s = options.metres_per_unit;
     SolidProperties solid;
-    if (c.closed) solid = solid_properties(c.surface);
+    if (c.closed) solid = solid_properties(bounding_surface(c));
     if (!(std::abs(solid.volume) > 0.0)) {
       solid = box_properties(c.surface, kFill);
       warnings.push_back("Component \"" + c.name + "\" bounds no solid: its mass is that of a tenth of its box.");
@@ -268,7 +268,8 @@ std::string mjcf_body(const Robot& robot, const TreeLink& link, int depth) {
       attribute("fullinertia", exact(Vec3(I(0, 0), I(1, 1), I(2, 2))) + " " + exact(Vec3(I(0, 1), I(0, 2), I(1, 2)))) +
       "/>\n";
   text += mjcf_freedoms(robot, link, depth + 1);
-  const bool closed = robot.assembly.components[static_cast<std::size_t>(link.component)].closed;
+  const Component& component = robot.assembly.components[static_cast<std::size_t>(link.component)];
+  const bool closed = component.closed && component.caps.empty();  // the mesh file has no caps
   text += indent(depth + 1) + "<geom" + attribute("type", "mesh") + attribute("mesh", robot.name(link)) +
           attribute("pos", exact(Vec3(robot.middle(link.component) - link.origin))) +
           (closed ? "" : attribute("shellinertia", "true")) + attribute("contype", "0") +

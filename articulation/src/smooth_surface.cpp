@@ -34,8 +34,8 @@ double corner_angle(const SurfaceMesh& mesh, std::size_t corner) {
 
 }  // namespace
 
-SmoothSurface::SmoothSurface(const SurfaceMesh& surface, double crease_angle)
-    : mesh_(surface), tree_(surface), corner_normals_(surface.triangles.size()) {
+SmoothSurface::SmoothSurface(const SurfaceMesh& surface, double crease_angle, std::span<const Triangle> caps)
+    : mesh_(surface), tree_(surface, caps), corner_normals_(surface.triangles.size()) {
   const Corners corners = corners_of_vertices(mesh_);
   std::vector<double> angle(3 * mesh_.triangles.size());
   for (std::size_t c = 0; c < angle.size(); ++c) angle[c] = corner_angle(mesh_, c);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "limber/mesh/surface_mesh.h"
@@ -13,8 +14,8 @@ namespace limber {
 /// angle from the corner's own. Facets alone leave a rotation of a cylinder of N sides a slippage of (π/N)²/3.
 class SmoothSurface {
  public:
-  /// The surface must outlive this.
-  SmoothSurface(const SurfaceMesh& surface, double crease_angle);
+  /// The surface must outlive this. @param caps see TriangleTree
+  SmoothSurface(const SurfaceMesh& surface, double crease_angle, std::span<const Triangle> caps = {});
 
   const SurfaceMesh& mesh() const { return mesh_; }
   const TriangleTree& tree() const { return tree_; }

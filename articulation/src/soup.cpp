@@ -125,7 +125,7 @@ void propose_by_open_edges(Assembly& assembly) {
   std::vector<Index> open_count(assembly.components.size(), 0);
   for (std::size_t c = 0; c < assembly.components.size(); ++c) {
     const Component& component = assembly.components[c];
-    if (component.closed) continue;
+    if (component.closed && component.caps.empty()) continue;
     std::map<std::pair<Index, Index>, int> uses;
     for (const Triangle& t : component.surface.triangles)
       for (int a = 0; a < 3; ++a) ++uses[std::minmax({t[a], t[(a + 1) % 3]})];

@@ -43,26 +43,29 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return {va / sum, vb / sum, vc / sum};
 }
 
-TriangleTree::TriangleTree(const SurfaceMesh& surface) {
+TriangleTree::Placed TriangleTree::placed(const SurfaceMesh& surface, const Triangle& triangle, Index number) {
+  const auto corner = [&](int k) -> const Vec3& { return surface.vertices[static_cast<std::size_t>(triangle[k])]; };
+  const Vec3 &p = corner(0), &q = corner(1), &r = corner(2);
+  return {p, q, r, (q - p).cross(r - p).stableNormalized(), number};
+}
+
+TriangleTree::TriangleTree(const SurfaceMesh& surface, std::span<const Triangle> caps) {
   const std::size_t count = surface.triangles.size();
   std::vector<Index> order(count);
   std::iota(order.begin(), order.end(), Index{0});
-  std::vector<Placed> placed;
+  std::vector<Placed> all;
   std::vector<Vec3> centres;
-  placed.reserve(count), centres.reserve(count), normals_.reserve(count);
+  all.reserve(count), centres.reserve(count), normals_.reserve(count);
   for (std::size_t t = 0; t < count; ++t) {
-    const auto corner = [&](int k) -> const Vec3& {
-      return surface.vertices[static_cast<std::size_t>(surface.triangles[t][k])];
-    };
-    const Vec3 &p = corner(0), &q = corner(1), &r = corner(2);
-    centres.push_back((p + q + r) / 3.0);
-    normals_.push_back((q - p).cross(r - p).stableNormalized());
-    placed.push_back({p, q, r, normals_.back(), static_cast<Index>(t)});
+    all.push_back(placed(surface, surface.triangles[t], static_cast<Index>(t)));
+    centres.push_back((all.back().a + all.back().b + all.back().c) / 3.0);
+    normals_.push_back(all.back().normal);
   }
   nodes_.emplace_back();
-  split(0, 0, static_cast<Index>(count), order, placed, centres);
+  split(0, 0, static_cast<Index>(count), order, all, centres);
   placed_.reserve(count);
-  for (const Index t : order) placed_.push_back(placed[static_cast<std::size_t>(t)]);
+  for (const Index t : order) placed_.push_back(all[static_cast<std::size_t>(t)]);
+  for (const Triangle& cap : caps) caps_.push_back(placed(surface, cap, -1));
 }
 
 void TriangleTree::split(Index node, Index begin, Index end, std::vector<Index>& order,
@@ -165,6 +168,16 @@ bool TriangleTree::is_within(const Vec3& p, double limit, const Vec3& direction,
   return found;
 }
 
+bool TriangleTree::meets(const Placed& triangle, const Vec3& p, const Vec3& direction, double longest, bool& leaving) {
+  const Vec3 &a = triangle.a, ab = triangle.b - a, ac = triangle.c - a, h = direction.cross(ac);
+  const double det = ab.dot(h);
+  if (det == 0.0) return false;
+  const Vec3 s = p - a, q = s.cross(ab);
+  const double u = s.dot(h) / det, v = direction.dot(q) / det, t = ac.dot(q) / det;
+  leaving = det < 0.0;
+  return u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0 && t <= longest;
+}
+
 template <class Hit>
 bool TriangleTree::cast(const Vec3& p, const Vec3& direction, double longest, Hit&& hit) const {
   const Eigen::Array3d inverse = direction.array().inverse();
@@ -187,13 +200,8 @@ bool TriangleTree::cast(const Vec3& p, const Vec3& direction, double longest, Hi
       continue;
     }
     for (Index i = node.first; i < node.first + node.count; ++i) {
-      const Placed& placed = placed_[static_cast<std::size_t>(i)];
-      const Vec3 &a = placed.a, ab = placed.b - a, ac = placed.c - a, h = direction.cross(ac);
-      const double det = ab.dot(h);
-      if (det == 0.0) continue;
-      const Vec3 s = p - a, q = s.cross(ab);
-      const double u = s.dot(h) / det, v = direction.dot(q) / det, t = ac.dot(q) / det;
-      if (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0 && t <= longest && hit(det < 0.0)) return true;
+      bool leaving = false;
+      if (meets(placed_[static_cast<std::size_t>(i)], p, direction, longest, leaving) && hit(leaving)) return true;
     }
   }
   return false;
@@ -202,11 +210,16 @@ bool TriangleTree::cast(const Vec3& p, const Vec3& direction, double longest, Hi
 int TriangleTree::winding(const Vec3& p) const {
   // An odd direction hits no edge of a drawn shape.
   static const Vec3 kRay = Vec3(0.5377, 0.3129, 0.7829).normalized();
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
   int count = 0;
-  cast(p, kRay, std::numeric_limits<double>::infinity(), [&](bool leaving) {
-    count += leaving ? 1 : -1;
+  bool leaving = false;
+  const auto add = [&](bool outward) {
+    count += outward ? 1 : -1;
     return false;
-  });
+  };
+  cast(p, kRay, kEndless, add);
+  for (const Placed& cap : caps_)
+    if (meets(cap, p, kRay, kEndless, leaving)) add(leaving);
   return count;
 }
 

@@ -1,6 +1,7 @@
 /// Nearest points of a triangulated surface. Private to the module.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "limber/mesh/surface_mesh.h"
@@ -10,7 +11,8 @@ namespace limber {
 /// A binary tree of boxes along the axes over the triangles of one surface.
 class TriangleTree {
  public:
-  explicit TriangleTree(const SurfaceMesh& surface);
+  /// @param caps that close the surface's holes, over its vertices: for winding(), and for nothing else
+  explicit TriangleTree(const SurfaceMesh& surface, std::span<const Triangle> caps = {});
 
   struct Nearest {
     Index triangle = -1;              ///< −1: none
@@ -26,7 +28,7 @@ class TriangleTree {
   /// Whether there is one. Quicker than looking for the nearest.
   bool is_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
 
-  /// How often the surface winds around p, by a ray; of a closed surface 1 inside and 0 outside.
+  /// How often the surface winds around p, by a ray; of one that its caps close 1 inside and 0 outside.
   int winding(const Vec3& p) const;
 
   /// Whether the surface crosses the segment from p to q, its ends included.
@@ -55,6 +57,9 @@ class TriangleTree {
   /// limit, which it may lower, until it returns false. Near nodes come first.
   template <class Nearer>
   void search(const Vec3& p, double& squared_limit, const Vec3& direction, double cosine, Nearer&& nearer) const;
+  static Placed placed(const SurfaceMesh& surface, const Triangle& triangle, Index number);
+  /// Whether the line p + t·direction meets the triangle at t in [0, longest]; then `leaving` tells which way.
+  static bool meets(const Placed& triangle, const Vec3& p, const Vec3& direction, double longest, bool& leaving);
   /// Calls hit(leaving) for each triangle that the line p + t·direction meets at t in [0, longest], until it returns
   /// true; returns whether it did.
   template <class Hit>
@@ -62,7 +67,8 @@ class TriangleTree {
 
   std::vector<Node> nodes_;
   std::vector<Placed> placed_;  ///< leaf after leaf
-  std::vector<Vec3> normals_;   ///< per triangle; zero where it has no area
+  std::vector<Placed> caps_;
+  std::vector<Vec3> normals_;  ///< per triangle; zero where it has no area
 };
 
 /// The point of a triangle nearest to p, in barycentric coordinates.

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "grouped_parts.h"
 #include "limber/articulation/assembly.h"
 #include "limber/core/error.h"
 
@@ -19,16 +20,7 @@ SurfaceMesh box(const Vec3& low, const Vec3& high) {
 
 GroupedSurface together(const std::vector<std::pair<std::string, SurfaceMesh>>& parts) {
   GroupedSurface out;
-  for (const auto& [name, part] : parts) {
-    const auto offset = static_cast<Index>(out.surface.vertices.size());
-    out.groups.push_back(
-        {name, "", static_cast<Index>(out.surface.triangles.size()), static_cast<Index>(part.triangles.size())});
-    out.surface.vertices.insert(out.surface.vertices.end(), part.vertices.begin(), part.vertices.end());
-    for (const Triangle& t : part.triangles) {
-      out.face_of.push_back(static_cast<Index>(out.face_of.size()));
-      out.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-    }
-  }
+  for (const auto& [name, part] : parts) append_group(part, name, out);
   return out;
 }
 

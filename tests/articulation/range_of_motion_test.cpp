@@ -205,6 +205,16 @@ TEST(RangeOfMotion, NarrowFreedomsGo) {
   EXPECT_EQ(reasons.size(), 3u);
 }
 
+TEST(RangesOfMotion, ProgressIsToldPathByPathAndRisesToOne) {
+  const Lever lever(8);
+  std::vector<double> told;
+  RangeOptions options;
+  options.progress = [&](double part) { told.push_back(part); };
+  const std::vector<RangeOfMotion> ranges = ranges_of_motion(lever.assembly, lever.joints, options);
+  EXPECT_EQ(ranges.at(0).joint.limits, range_of_motion(lever.assembly, lever.joints, 0).joint.limits);
+  EXPECT_THAT(told, ElementsAre(0.5, 1.0));  // turning, then sliding
+}
+
 TEST(RangeOfMotion, WrongArgumentsAreTold) {
   const Lever lever(8);
   EXPECT_THROW(range_of_motion(lever.assembly, lever.joints, 1), InvalidArgument);

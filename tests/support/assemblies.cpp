@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "grouped_parts.h"
 #include "limber/core/error.h"
 #include "shells.h"
 
@@ -603,17 +604,6 @@ void vary(SurfaceMesh& part, const Variant& v, std::mt19937& random) {
   for (Vec3& p : part.vertices) p = v.rotation * p * v.scale + v.translation;
 }
 
-void append(const SurfaceMesh& part, const std::string& name, GroupedSurface& out) {
-  const auto offset = static_cast<Index>(out.surface.vertices.size());
-  out.groups.push_back(
-      {name, "", static_cast<Index>(out.surface.triangles.size()), static_cast<Index>(part.triangles.size())});
-  out.surface.vertices.insert(out.surface.vertices.end(), part.vertices.begin(), part.vertices.end());
-  for (const Triangle& t : part.triangles) {
-    out.face_of.push_back(static_cast<Index>(out.face_of.size()));
-    out.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  }
-}
-
 }  // namespace
 
 const std::vector<std::string>& tuning_names() {
@@ -641,7 +631,7 @@ MadeAssembly make(const std::string& name, const Variant& variant) {
   for (const auto& part : builder.parts) {
     SurfaceMesh surface = part_surface(part, variant);
     vary(surface, variant, random);
-    append(surface, part.name, out.surface);
+    append_group(surface, part.name, out.surface);
   }
   for (TrueJoint joint : builder.joints) {
     joint.origin = variant.rotation * joint.origin * variant.scale + variant.translation;

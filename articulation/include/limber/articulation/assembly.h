@@ -29,8 +29,12 @@ struct Component {
   std::vector<FaceRange> faces;  ///< ascending, neither empty nor adjacent
   std::vector<Index> triangles;  ///< the same as triangles of Assembly::source, ascending
   SurfaceMesh surface;           ///< its own triangles, in the order of `triangles`, over its own vertices, welded
-  bool closed = false;           ///< whether the surface bounds a solid
-  double diagonal = 0.0;         ///< of the bounding box along the axes
+  bool closed = false;           ///< whether the surface, with `caps`, bounds a solid
+  /// Over the small holes of a surface that is meant to bound a solid (each of less than 1 % of its area, 5 %
+  /// together), as triangles over its vertices, turned like it. They tell inside from outside and are no surface to
+  /// touch.
+  std::vector<Triangle> caps{};
+  double diagonal = 0.0;  ///< of the bounding box along the axes
 };
 
 /// Several components that look like one part drawn in pieces.
@@ -38,6 +42,11 @@ struct MergeProposal {
   std::vector<Index> components;  ///< ascending, two or more
   std::string reason;             ///< one sentence
 };
+
+/// The surface with its caps. A point's winding number about it is a whole number; about the surface alone
+/// [Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers", 2013] it differs by the
+/// caps' solid angle over 4π, so that both say the same side of ½ wherever the caps fill less than half the view.
+SurfaceMesh bounding_surface(const Component& component);
 
 struct Assembly {
   SurfaceMesh source;  ///< the whole input, as read

@@ -2,6 +2,7 @@
 /// Where two components touch: the part of each surface that faces the other across a small gap.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,18 +32,30 @@ struct ContactRegion {
   bool overlapping = false;    ///< found as surface inside the other solid, not as surfaces that face each other
 };
 
+enum class ContactMethod {
+  kNearest,  ///< facing samples in a cluster grown from the smallest gaps
+  /// After [X09] 3.1: parts are cut into nearly convex pieces; what of each surface lies in a slightly grown hull of
+  /// the other's pieces and faces it there is the contact, whatever its gap.
+  kHulls,
+};
+
 struct ContactRegionOptions {
+  ContactMethod method = ContactMethod::kNearest;
   int samples = 3000;            ///< wanted on each side; 100 … 100,000
   double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
   double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
   double search = 0.025;         ///< largest gap, of the smaller component's diagonal; > 0
   double largest_gap = 0.025;    ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
+  double hull_growth = 0.01;     ///< kHulls: of the smaller component's diagonal; > 0, at most `search`
+  double concavity = 0.01;       ///< kHulls: of a piece at most, of its component's diagonal; > 0
   void validate() const;         ///< @throws InvalidArgument naming the field
 };
 
 /// Contacts of all pairs of components, ordered by (a, b). Pairs without a contact are absent.
 /// Parallel over pairs and over components; the same bits for any thread count.
+/// @param progress called from the calling thread with the part done (0 … 1, ascending); may be empty
 std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const ContactRegionOptions& options = {},
-                                                Jobs& jobs = serial_jobs());
+                                                Jobs& jobs = serial_jobs(),
+                                                const std::function<void(double)>& progress = {});
 
 }  // namespace limber

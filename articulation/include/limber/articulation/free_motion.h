@@ -41,7 +41,8 @@ struct MotionPath {
 /// One surface that moves or stays.
 struct MotionBody {
   const SurfaceMesh* surface = nullptr;  ///< never null; triangles of either orientation
-  bool closed = true;                    ///< it bounds a solid, see surface_quality(); otherwise it is a sheet
+  bool closed = true;                    ///< it bounds a solid, with its caps; otherwise it is a sheet
+  std::span<const Triangle> caps = {};   ///< over small holes, over the surface's vertices and turned like it
 };
 
 struct FreeMotionOptions {
