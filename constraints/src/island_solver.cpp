@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "bounded_rows.h"
+#include "difference_newton.h"
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
 #include "limber/constraints/least_squares.h"
@@ -103,6 +104,8 @@ struct IslandSolver::Impl {
   ContactQpSolver qp;
   BoundedRowSolver bounded_rows;
   SecantIteration secant;
+  DifferenceNewton newton;
+  std::vector<double> slope, tolerance;
   IslandEnergy energy;
 
   void gather(std::span<const ConstrainedBody> table, std::span<const Index> members,
@@ -139,6 +142,9 @@ struct IslandSolver::Impl {
   SolveStatus solve_bounded(bool first);
   void keep_within_bounds();
   double largest_change() const;
+  bool can_differentiate() const;
+  SolveStatus differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
+                            const IslandOptions& options, IslandReport& report);
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);
@@ -497,7 +503,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   cones = bounded.size() / 3;
   for (Index i = 0; i < rows.size(); ++i)
     if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
-  constexpr int kIterationsUnsettled = 6;
+  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 12;
   factor();
   secant.begin(f.size());
   for (report.iterations = 1;; ++report.iterations) {
@@ -509,6 +515,8 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     // Cones that do not come together give other impulses every time.
     const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
                                                             : options.max_iterations;
+    if (report.iterations > kIterationsOfStart && can_differentiate())
+      return differentiate(states, constraints, options, report);
     if (report.iterations > most) return take_best(states, constraints, options, report);
     for (std::size_t i = 0; i < f.size(); ++i) next_f[i] -= f[i];
     for (Index i = 0; i < rows.size(); ++i) change[static_cast<std::size_t>(i)] /= rows.row(i).law.tolerance;
@@ -528,6 +536,44 @@ void IslandSolver::Impl::keep_within_bounds() {
     f[t] += along * (largest / size - 1.0);
     f[u] += across * (largest / size - 1.0);
   }
+}
+
+/// Whether the island is small enough, and its rows have an interval each.
+bool IslandSolver::Impl::can_differentiate() const {
+  constexpr std::size_t kMostRows = 96;
+  return f.size() <= kMostRows && cones == 0 && flexibility.empty();
+}
+
+/// From the best impulses seen, with the rows' true derivatives.
+SolveStatus IslandSolver::Impl::differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
+                                              const IslandOptions& options, IslandReport& report) {
+  const std::size_t m = f.size(), n = metric.size();
+  take_best(states, constraints, options, report);
+  slope.resize(m), tolerance.resize(m);
+  for (std::size_t i = 0; i < m; ++i) {
+    slope[i] = compliance[i];
+    for (std::size_t j = 0; j < n; ++j) slope[i] += metric[j] * J[i * n + j] * J[i * n + j];
+    tolerance[i] = laws[i].tolerance;
+  }
+  struct Context {
+    Impl& solver;
+    const BodyStates& states;
+    std::span<Constraint* const> constraints;
+    const IslandOptions& options;
+    IslandReport& report;
+  } context{*this, states, constraints, options, report};
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  const auto evaluate = [&context](std::span<const double> impulses, std::span<double> w) {
+    Impl& s = context.solver;
+    if (impulses.data() != s.f.data()) std::copy(impulses.begin(), impulses.end(), s.f.begin());
+    s.predict(context.options);
+    s.measure(context.states, StepTime::kEnd, context.constraints, s.gap);
+    ++context.report.iterations;
+    for (std::size_t i = 0; i < w.size(); ++i)
+      w[i] = s.gap[i] - s.laws[i].offset + s.compliance[i] * (s.f[i] + s.step * s.reaction[i]);
+  };
+  report.change = newton.solve({.slope = slope, .tolerance = tolerance, .lower = lower, .upper = upper}, evaluate, f);
+  return report.change <= 1.0 ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
 }
 
 /// The best impulses seen, where Newton's method does not settle: steps in which bodies turn by a radian and more.

@@ -86,6 +86,23 @@ TEST(Constraints, ChainOfFlexibleLinksHangsTogetherAndGainsNothing) {
   }
 }
 
+// Beyond a radian a step the rows of the step's start are no guide to its end, and no step would settle by them: their
+// true derivatives lead there.
+TEST(Constraints, MostStepsSettleWhereLinksTurnByMoreThanARadianInEach) {
+  constexpr int kSteps = 120, kUnsettled = kSteps / 3;
+  World world;
+  const Chain chain = add_chain(world, sample_model({.modes = 0}), 3, {0, 0, 2});
+  const double spin = 1.3 / world.options().step;  // rad/s
+  for (std::size_t i = 0; i < chain.links.size(); ++i)
+    world.set_velocity(chain.links[i], {0.0, 0.0, -spin * kLink * (static_cast<double>(i) + 0.5)}, {0.0, spin, 0.0});
+  int unsettled = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    world.step();
+    if (!world.constraint_report().solved) ++unsettled;
+  }
+  EXPECT_LT(unsettled, kUnsettled);
+}
+
 TEST(Constraints, IslandsAreWhatConstraintsTieTogether) {
   World world;
   const auto model = sample_model({.modes = 0});
