@@ -111,6 +111,8 @@ void check_state(Index index, const Body& body, const BodyState& state) {
   const Quaternion& q = state.pose.q;
   if (!state.pose.p.allFinite()) refuse(index, "pose.p is not finite", "finite coordinates");
   if (!(std::abs(q.norm() - 1.0) <= kUnit)) refuse(index, "pose.q has length " + std::to_string(q.norm()), "1");
+  if (!state.displacement.allFinite() || !state.rotation.allFinite())
+    refuse(index, "displacement or rotation is not finite", "finite numbers");
   if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
     refuse(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
   if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
@@ -339,6 +341,7 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   const Body& body = at(index);
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
+  if (!s.asleep) result.displacement = s.displacement, result.rotation = s.rotation;
   if (body.modal) {
     result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;

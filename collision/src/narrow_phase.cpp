@@ -251,6 +251,9 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     const double round_off = kRoundOff * (size(a) + size(b) + X_AB.p.norm());
     bind(a, {}, round_off, 0);
     bind(b, X_AB, round_off, 1);
+    const Quaternion to_a = a.X_WB.q.conjugate();
+    surface[0].expect_motion(to_a * a.displacement, to_a * a.rotation);
+    surface[1].expect_motion(to_a * b.displacement, to_a * b.rotation);
     const auto [rule_a, rule_b] = rules(a, b, X_AB);
     surface_contacts.find(surface[0], surface[1], X_AB, margin, rule_a, rule_b, found);
   }

@@ -49,6 +49,7 @@ void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, do
   deformed_ = &deformed;
   tolerance_ = tolerance;
   X_PS_ = X_PS, X_SP_ = X_PS.inverse();
+  displacement_ = rotation_ = Vec3::Zero();
   sided_ = surface().closed() || surface().model() == nullptr;
   grow(vertices_, surface().vertices()), grow(vertex_stamp_, surface().vertices());
   grow(faces_, surface().triangles()), grow(face_stamp_, surface().triangles());
@@ -139,6 +140,37 @@ bool PairSurface::in_normal_cone(Index e, const Vec3& direction) {
   }
   if (worst > kRoundOff + kRocking * sum.norm()) return false;
   return !sided_ || edge_normal(e).dot(direction) >= -kRoundOff;
+}
+
+bool PairSurface::in_front(Index v, const Vec3& n, double leaning) {
+  const Vec3& p = vertex(v);
+  const auto neighbours = surface().vertex_neighbours(v);
+  return std::all_of(neighbours.begin(), neighbours.end(), [&](Index w) {
+    const Vec3 d = vertex(w) - p;
+    return n.dot(d) >= -leaning * d.norm();
+  });
+}
+
+bool PairSurface::behind(const FeatureSide& feature, const Vec3& n, double leaning) {
+  const Index index = index_of(feature.key);
+  switch (kind_of(feature.key)) {
+    case Feature::Kind::kVertex:
+      return in_front(index, -n, leaning);
+    case Feature::Kind::kEdge:
+      for (const Index t : surface().edge(index).triangles)
+        if (t >= 0 && n.dot(face(t).inward[static_cast<std::size_t>(corner_of_edge(surface(), t, index))]) > leaning)
+          return false;
+      return std::abs(n.dot(edge_vector(index))) <= leaning * edge_vector(index).norm();
+    case Feature::Kind::kFace:
+      break;
+  }
+  return n.dot(face(index).normal) >= std::sqrt(1.0 - leaning * leaning);
+}
+
+double PairSurface::shortest_edge(Index v) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const Index w : surface().vertex_neighbours(v)) shortest = std::min(shortest, (vertex(w) - vertex(v)).norm());
+  return shortest;
 }
 
 Vec3 PairSurface::edge_normal(Index e) {

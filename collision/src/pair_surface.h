@@ -20,6 +20,7 @@ inline FeatureKey feature_key(Feature::Kind kind, Index index) {
   return static_cast<FeatureKey>(kind) << 30 | static_cast<FeatureKey>(index);
 }
 
+inline Index index_of(FeatureKey key) { return static_cast<Index>(key & 0x3fffffffu); }
 inline Feature::Kind kind_of(FeatureKey key) { return static_cast<Feature::Kind>(key >> 30); }
 
 // Round-off of a length, in parts of the largest coordinate: points nearer than this to where two features meet belong
@@ -32,6 +33,17 @@ inline Vec3 unit_or(const Vec3& v, const Vec3& otherwise) {
   const double n = v.norm();
   return n > 0.0 ? Vec3(v / n) : otherwise;
 }
+
+// Closer than this part of the edges at hand, the direction between two points tells little: the faces that touch do.
+inline constexpr double kTouching = 0.01;
+// How far, as a sine, faces may be from parallel to touch each other along an area.
+inline constexpr double kFlat = 0.02;
+// How far a surface may lean against a contact's normal, as a sine, for the contact to count as its own: 12°.
+inline constexpr double kLeaning = 0.2;
+// Beyond this, 30°, it runs through the plane that the contact stands for.
+inline constexpr double kSteep = 0.5;
+// Parts of the edges at hand by which a plane may have been passed and still serve to keep bodies apart.
+inline constexpr double kPassed = 1e-4;
 
 // One side of a contact, in the pair's frame.
 struct FeatureSide {
@@ -105,6 +117,34 @@ class PairSurface {
   // widening of creases (see narrow_phase.h); of a sided surface, on its outer side.
   bool in_normal_cone(Index e, const Vec3& direction);
 
+  // Whether the surface near a vertex lies in front of it along a unit direction, leaning back by no more than a sine:
+  // n · (w − v) ≥ −leaning |w − v| for all its neighbours w. What pushes the vertex along n then pushes the surface.
+  bool in_front(Index v, const Vec3& n, double leaning);
+  // The same, but behind, for all that meets at a feature.
+  bool behind(const FeatureSide& feature, const Vec3& n, double leaning);
+  double shortest_edge(Index v);
+  Vec3 edge_vector(Index e) { return vertex(surface().edge(e).vertices[1]) - vertex(surface().edge(e).vertices[0]); }
+
+  // How the body is expected to move within the step: of its points to first order, in the pair's frame.
+  void expect_motion(const Vec3& displacement, const Vec3& rotation) {
+    displacement_ = displacement, rotation_ = rotation;
+  }
+  Vec3 expected_motion(const Vec3& point) const { return displacement_ + rotation_.cross(point - X_PS_.p); }
+
+  // Faces that meet at a feature, whose key is that of a vertex, an edge or a face.
+  template <class Visit>
+  void for_faces_at(FeatureKey key, const Visit& visit) {
+    const Index index = index_of(key);
+    if (kind_of(key) == Feature::Kind::kVertex) {
+      for (const Index t : surface().vertex_triangles(index)) visit(t);
+    } else if (kind_of(key) == Feature::Kind::kEdge) {
+      for (const Index t : surface().edge(index).triangles)
+        if (t >= 0) visit(t);
+    } else {
+      visit(index);
+    }
+  }
+
   // Sum of the unit normals at an edge; angle-weighted normal at a vertex. Not of unit length.
   Vec3 edge_normal(Index e);
   Vec3 vertex_normal(Index v);
@@ -146,6 +186,7 @@ class PairSurface {
   RigidTransform X_PS_{}, X_SP_{};
   bool sided_ = false;
   double tolerance_ = 0.0;
+  Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;
   std::vector<Vec3> vertices_;

@@ -10,6 +10,11 @@ namespace {
 
 // Edges whose angle has a sine below this are parallel: their ends make the contacts.
 constexpr double kParallelSine = 1e-12;
+// The same for edges that all but touch, whose common perpendicular is lost sooner.
+constexpr double kParallelTouchingSine = 1e-4;
+
+// Up to this part of the edges at hand, overlap of bodies with flush sides is pushed out along the other faces.
+constexpr double kAlignedDepth = 0.5;
 
 bool apart(const Aabb& a, const Aabb& b, double margin) {
   return ((a.low - b.high).array() > margin).any() || ((b.low - a.high).array() > margin).any();
@@ -86,8 +91,124 @@ void SurfaceContacts::test_vertices(int of, Index s, Index t) {
 void SurfaceContacts::vertex_against_face(int of, Index v, Index t) {
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
   other.for_each_minimum(mine.vertex(v), t, margin_, self_, [&](const PairSurface::Minimum& minimum) {
-    if (mine.sees(v, minimum.at.point)) add(of, mine.at_vertex(v), minimum.at, minimum.direction, minimum.distance);
+    if (mine.sees(v, minimum.at.point)) add_vertex(of, v, minimum);
   });
+}
+
+// How near a vertex and a face must be for the faces at hand to tell the normal.
+double SurfaceContacts::nearness(int of, Index v, Index t) {
+  const std::array<Vec3, 3>& x = side_[1 - of]->face(t).x;
+  double shortest = side_[of]->shortest_edge(v);
+  for (std::size_t c = 0; c < 3; ++c) shortest = std::min(shortest, (x[(c + 1) % 3] - x[c]).norm());
+  return kTouching * shortest;
+}
+
+void SurfaceContacts::add_vertex(int of, Index v, PairSurface::Minimum minimum) {
+  PairSurface& mine = *side_[of];
+  const bool solids = !self_ && mine.sided() && side_[1 - of]->sided();
+  const bool near = solids && minimum.distance <= nearness(of, v, minimum.at.triangle);
+  if (near && rests_on_faces(of, v, minimum)) return;
+  if (near && kind_of(minimum.at.key) == Feature::Kind::kVertex) {  // or the other's corner on my faces
+    PairSurface::Minimum back = minimum;
+    back.at = mine.at_vertex(v);
+    if (rests_on_faces(1 - of, index_of(minimum.at.key), back)) return;
+  }
+  if (near && kind_of(minimum.at.key) != Feature::Kind::kFace && minimum.distance <= kDirectionless * tolerance_)
+    minimum.direction = unit_or(minimum.direction - unit_or(mine.vertex_normal(v), Vec3::Zero()), minimum.direction);
+  const Vec3 n = solids ? unhindered(of, v, minimum) : minimum.direction;
+  if (n.isZero()) return;
+  add(of, mine.at_vertex(v), minimum.at, n, n.dot(mine.vertex(v) - minimum.at.point));
+}
+
+// The normal of touching features lies in the cones of both. Where faces touch it is theirs, one contact for each
+// direction in which they do (in a corner there are several); where they only have a rim in common there is none:
+// bodies side by side, or on a floor of boxes, press on each other's faces but not on their edges.
+// Returns whether faces decide it.
+bool SurfaceContacts::rests_on_faces(int of, Index v, const PairSurface::Minimum& minimum) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3& p = mine.vertex(v);
+  const FeatureSide& at = minimum.at;
+  bool rim = false;
+  std::size_t count = 0;
+  std::array<Index, 3> touching{};  // one face for each direction
+  other.for_faces_at(at.key, [&](Index t) {
+    if (kind_of(at.key) == Feature::Kind::kFace) return;
+    const Touch found = touch(of, v, at, t);
+    rim = rim || found == Touch::kRim;
+    if (found != Touch::kArea || count == touching.size()) return;
+    for (std::size_t i = 0; i < count; ++i)
+      if (other.face(touching[i]).normal.dot(other.face(t).normal) > 1.0 - kFlat) return;
+    touching[count++] = t;
+  });
+  for (std::size_t i = 0; i < count; ++i) {
+    const FeatureSide side = count > 1 ? other.on_face(touching[i], at.point) : at;
+    const Vec3& n = other.face(touching[i]).normal;
+    add(of, mine.at_vertex(v), side, n, n.dot(p - at.point));
+  }
+  if (count > 0) return true;
+  const bool aligned = flush(of, v, at);
+  if (!aligned && (rim || mine.in_front(v, minimum.direction, kLeaning))) return rim;
+  OverlapRule::Exit exit;
+  if (!find_supporting_face(of, v, at.triangle, aligned, exit)) return rim;
+  add(of, mine.at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
+  return true;
+}
+
+// Whether a face at a vertex lies in one plane with a face of the other's, the one solid within the other there.
+bool SurfaceContacts::flush(int of, Index v, const FeatureSide& at) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3 into = -unit_or(mine.vertex_normal(v), Vec3::Zero());
+  bool any = false, within = true;
+  other.for_faces_at(at.key, [&](Index t) {
+    const Vec3& n = other.face(t).normal;
+    within = within && n.dot(into) < -kFlat;
+    for (const Index g : mine.surface().vertex_triangles(v))
+      any = any || mine.face(g).normal.dot(n) > 1.0 - kFlat * kFlat;
+  });
+  return any && within;
+}
+
+// Whether the surface at a vertex lies on a face of the other's, at a point of its rim: flat on it with an area or an
+// edge, or along the rim alone.
+SurfaceContacts::Touch SurfaceContacts::touch(int of, Index v, const FeatureSide& at, Index t) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const PairSurface::Face& f = other.face(t);
+  if (!mine.in_front(v, f.normal, kFlat)) return Touch::kNone;
+  // Directions that lead from the point into a face are those along all inward normals of its edges there.
+  const auto leads_into = [](const PairSurface::Face& face, const std::array<bool, 3>& edges, const Vec3& d) {
+    constexpr double kInto = 1e-3;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (edges[c] && !(d.dot(face.inward[c]) > kInto)) return false;
+    return true;
+  };
+  std::array<bool, 3> rim{};
+  for (std::size_t c = 0; c < 3; ++c) rim[c] = std::abs((at.point - f.x[c]).dot(f.inward[c])) <= tolerance_;
+  const auto direction = [](const Vec3& d) { return unit_or(d, Vec3::Zero()); };
+  const Vec3& p = mine.vertex(v);
+  bool flat = false;
+  for (const Index w : mine.surface().vertex_neighbours(v)) {
+    const Vec3 d = direction(mine.vertex(w) - p);
+    if (std::abs(d.dot(f.normal)) <= kFlat && leads_into(f, rim, d)) return Touch::kArea;
+  }
+  // Or what leads into the face lies within a face of mine.
+  for (const Index g : mine.surface().vertex_triangles(v)) {
+    const PairSurface::Face& own = mine.face(g);
+    if (own.normal.dot(f.normal) > -1.0 + kFlat * kFlat) continue;
+    flat = true;
+    std::array<bool, 3> at_v{};
+    std::array<Vec3, 5> rays;
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      at_v[c] = mine.surface().triangle(g)[c] == v || mine.surface().triangle(g)[(c + 1) % 3] == v;
+      if (mine.surface().triangle(g)[c] != v) rays[count++] = direction(own.x[c] - p);
+      if ((f.x[c] - at.point).norm() > tolerance_) rays[count++] = direction(f.x[c] - at.point);
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (const Vec3 d = direction(rays[i] + rays[j]); leads_into(f, rim, d) && leads_into(own, at_v, d))
+          return Touch::kArea;
+  }
+  return flat ? Touch::kRim : Touch::kNone;
 }
 
 // -- Two edges --------------------------------------------------------------------------------------------------------
@@ -132,15 +253,86 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
 
 // Out of f towards e, and back: both edges must have nothing nearer to either side.
 void SurfaceContacts::add_separated_edges(EdgePair pair) {
+  const Vec3 u = side_[0]->edge_vector(pair.e), w = side_[1]->edge_vector(pair.f);
+  if (pair.distance <= kTouching * shorter_edge(pair) &&
+      u.cross(w).norm() <= kParallelTouchingSine * u.norm() * w.norm())
+    return;
   if (pair.distance <= kDirectionless * tolerance_ && pair.direction.dot(side_[1]->edge_normal(pair.f)) < 0.0)
     pair.direction = -pair.direction;
-  if (side_[1]->in_normal_cone(pair.f, pair.direction) && side_[0]->in_normal_cone(pair.e, -pair.direction))
-    add_edges(pair, pair.direction);
+  if (!side_[1]->in_normal_cone(pair.f, pair.direction) || !side_[0]->in_normal_cone(pair.e, -pair.direction)) return;
+  if (const Vec3 n = unhindered(pair); !n.isZero()) add_edges(pair, n);
+}
+
+double SurfaceContacts::shorter_edge(const EdgePair& pair) {
+  return std::min(side_[0]->edge_vector(pair.e).norm(), side_[1]->edge_vector(pair.f).norm());
 }
 
 void SurfaceContacts::add_edges(const EdgePair& pair, const Vec3& normal) {
   add(0, side_[0]->on_edge(pair.e, pair.s, pair.on_e), side_[1]->on_edge(pair.f, pair.t, pair.on_f), normal,
       normal.dot(pair.on_e - pair.on_f));
+}
+
+// -- What the bodies' motion meets ------------------------------------------------------------------------------------
+
+// A contact stands for a plane, which may end where it was found: something that moves along the top of a box is not to
+// be stopped by the plane of its side, nor by the next box's. Where the expected motion would pass the plane, another
+// one of the same two features is taken if it passes that less: one of a face, in the cones of both. Zero: it does not
+// pass that one, so the two will not meet.
+Vec3 SurfaceContacts::unhindered(int of, Index v, const PairSurface::Minimum& minimum) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3& p = mine.vertex(v);
+  const Vec3 motion = mine.expected_motion(p) - other.expected_motion(minimum.at.point);
+  Vec3 best = minimum.direction;
+  double end = minimum.distance + best.dot(motion);
+  if (!(end < 0.0)) return best;
+  const double passed = kPassed / kTouching * nearness(of, v, minimum.at.triangle);
+  const auto try_normal = [&](const FeatureSide& at, const Vec3& n) {
+    const double gap = n.dot(p - at.point);
+    if (!(gap >= -passed) || !(gap + n.dot(motion) > end)) return;
+    if (!mine.in_front(v, n, kLeaning) || !other.behind(at, n, kLeaning)) return;
+    best = n, end = gap + n.dot(motion);
+  };
+  const auto try_faces_at = [&](Feature::Kind kind, Index index) {
+    FeatureSide at = minimum.at;
+    at.key = feature_key(kind, index);
+    other.for_faces_at(at.key, [&](Index t) { try_normal(at, other.face(t).normal); });
+    for (const Index t : mine.surface().vertex_triangles(v)) try_normal(at, -mine.face(t).normal);
+  };
+  // The edges and corners of the face that are met or all but met.
+  const Index t = minimum.at.triangle;
+  const PairSurface::Face& f = other.face(t);
+  for (int i = 0; i < 3; ++i) {
+    const auto c = static_cast<std::size_t>(i);
+    const Vec3 from_corner = minimum.at.point - f.x[c];
+    if (from_corner.dot(f.inward[c]) <= passed) try_faces_at(Feature::Kind::kEdge, other.surface().edge_of(t, i));
+    if (from_corner.norm() <= passed) try_faces_at(Feature::Kind::kVertex, other.surface().triangle(t)[c]);
+  }
+  if (end >= -passed && best != minimum.direction) return Vec3::Zero();
+  return best;
+}
+
+Vec3 SurfaceContacts::unhindered(const EdgePair& pair) {
+  const Vec3 motion = side_[0]->expected_motion(pair.on_e) - side_[1]->expected_motion(pair.on_f);
+  const Vec3 apart = pair.on_e - pair.on_f;
+  Vec3 best = pair.direction;
+  double end = best.dot(apart + motion);
+  if (self_ || !(end < 0.0)) return best;
+  const double passed = kPassed * shorter_edge(pair);
+  const double room_s = std::min(pair.s, 1.0 - pair.s), room_t = std::min(pair.t, 1.0 - pair.t);
+  if (room_s * side_[0]->edge_vector(pair.e).norm() <= passed ||
+      room_t * side_[1]->edge_vector(pair.f).norm() <= passed)
+    return Vec3::Zero();  // the vertex there tells of it
+  const auto try_normal = [&](const Vec3& n) {
+    if (!(n.dot(apart) >= -passed) || !(n.dot(apart + motion) > end)) return;
+    if (!side_[1]->in_normal_cone(pair.f, n) || !side_[0]->in_normal_cone(pair.e, -n)) return;
+    best = n, end = n.dot(apart + motion);
+  };
+  side_[0]->for_faces_at(feature_key(Feature::Kind::kEdge, pair.e),
+                         [&](Index t) { try_normal(-side_[0]->face(t).normal); });
+  side_[1]->for_faces_at(feature_key(Feature::Kind::kEdge, pair.f),
+                         [&](Index t) { try_normal(side_[1]->face(t).normal); });
+  if (end >= -passed && best != pair.direction) return Vec3::Zero();
+  return best;
 }
 
 // -- Overlap ----------------------------------------------------------------------------------------------------------
@@ -197,8 +389,32 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
     exit.normal = nearest.distance > kDirectionless * tolerance_ ? Vec3((exit.at.point - p) / nearest.distance)
                                                                  : unit_or(nearest.outward, Vec3::UnitZ());
   }
+  if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, kSteep))
+    find_supporting_face(of, v, nearest.triangle, flush(of, v, exit.at), exit);
   overlap_ = true;
   add(of, side_[of]->at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
+}
+
+// Next to a rim, the nearest point may be on a face that the vertex's own surface does not follow: the top box of a
+// stack would be pushed off sideways. The nearest face of those around whose normal it does follow is found, if it lies
+// within reach.
+bool SurfaceContacts::find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3& p = mine.vertex(v);
+  // Sides in one plane say nothing about how deep the overlap is.
+  const double reach = (aligned ? kAlignedDepth / kTouching : 1.0) * nearness(of, v, near);
+  double least = reach;
+  for (const Index corner : other.surface().triangle(near))
+    for (const Index t : other.surface().vertex_triangles(corner)) {
+      const PairSurface::Face& f = other.face(t);
+      const double height = std::abs(f.normal.dot(p - f.x[0]));
+      if (!(height < least) || !mine.in_front(v, f.normal, kLeaning)) continue;
+      const SurfaceFoot foot = closest_on_triangle(p, f.x);
+      if ((p - foot.point).norm() > reach) continue;
+      exit = {other.at_foot(t, foot), f.normal};
+      least = height;
+    }
+  return least < reach;
 }
 
 // Parts of one surface that are inside the other without meeting it.
@@ -218,8 +434,8 @@ bool SurfaceContacts::has_inside_end(int of, Index e) const {
                      [&](Index v) { return visited_[of][static_cast<std::size_t>(v)] == generation_ + 1; });
 }
 
-// Edges of two solids that have passed through each other, with no vertex inside to tell of it: of each piercing edge
-// the crossing that is least deep.
+// Edges of two solids that have passed through each other: of each piercing edge the crossing that is least deep. Where
+// a vertex inside tells of it already only those that all but touch, which are corners of the area that rests.
 void SurfaceContacts::cross_edges() {
   if (!side_[0]->sided() || !side_[1]->sided()) return;
   std::sort(piercings_.begin(), piercings_.end(), [](const Piercing& a, const Piercing& b) {
@@ -231,7 +447,7 @@ void SurfaceContacts::cross_edges() {
     best.distance = std::numeric_limits<double>::infinity();
     std::size_t next = first;
     for (; next < piercings_.size() && piercings_[next].of == of && piercings_[next].edge == edge; ++next)
-      if (!has_inside_end(of, edge)) take_shallower_crossing(piercings_[next], best);
+      take_shallower_crossing(piercings_[next], best);
     if (best.distance < std::numeric_limits<double>::infinity()) {
       overlap_ = true;
       add_edges(best, -best.direction);
@@ -243,8 +459,10 @@ void SurfaceContacts::cross_edges() {
 void SurfaceContacts::take_shallower_crossing(const Piercing& piercing, EdgePair& best) {
   for (int c = 0; c < 3; ++c) {
     const Index f = side_[1 - piercing.of]->surface().edge_of(piercing.face, c);
-    if (has_inside_end(1 - piercing.of, f)) continue;
     const EdgePair pair = piercing.of == 0 ? nearest_of_edges(piercing.edge, f) : nearest_of_edges(f, piercing.edge);
+    if ((has_inside_end(piercing.of, piercing.edge) || has_inside_end(1 - piercing.of, f)) &&
+        !(pair.distance <= kTouching * shorter_edge(pair)))
+      continue;
     if (pair.distance < best.distance && side_[1]->in_normal_cone(pair.f, -pair.direction) &&
         side_[0]->in_normal_cone(pair.e, pair.direction))
       best = pair;

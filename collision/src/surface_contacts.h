@@ -55,16 +55,27 @@ class SurfaceContacts {
 
   void test_vertices(int of, Index s, Index t);
   void vertex_against_face(int of, Index v, Index t);
+  void add_vertex(int of, Index v, PairSurface::Minimum minimum);
+  bool rests_on_faces(int of, Index v, const PairSurface::Minimum& minimum);
+  enum class Touch { kNone, kRim, kArea };
+  Touch touch(int of, Index v, const FeatureSide& at, Index t);
+  double nearness(int of, Index v, Index t);
 
   void test_edges(Index s, Index t);
   EdgePair nearest_of_edges(Index e, Index f);
   void add_separated_edges(EdgePair pair);
+  double shorter_edge(const EdgePair& pair);
   void add_edges(const EdgePair& pair, const Vec3& normal);
+
+  Vec3 unhindered(int of, Index v, const PairSurface::Minimum& minimum);
+  Vec3 unhindered(const EdgePair& pair);
 
   void find_piercings(int of, Index s, Index t);
   void find_piercing(int of, Index e, Index t);
   void spread_inside(int of, OverlapRule* rule);
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
+  bool find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit);
+  bool flush(int of, Index v, const FeatureSide& at);
   void find_enclosed(int of, OverlapRule* rule);
   bool has_inside_end(int of, Index e) const;
   void cross_edges();

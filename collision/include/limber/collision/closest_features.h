@@ -36,8 +36,8 @@ struct SurfaceFoot {
   Feature feature{};
 };
 
-/// Unit normal of a triangle, counter-clockwise seen from its tip; zero where its height over the longest edge is less than
-/// 1e-13 of that edge. Orthogonal to the longest edge to round-off, also for slivers.
+/// Unit normal of a triangle, counter-clockwise seen from its tip; zero where its height over the longest edge is less
+/// than 1e-13 of that edge. Orthogonal to the longest edge to round-off, also for slivers.
 Vec3 unit_normal(const TrianglePoints& t);
 
 SurfaceFoot closest_on_segment(const Vec3& p, const SegmentPoints& s);
@@ -54,8 +54,8 @@ ClosestPoints closest_points(const SegmentPoints& a, const SegmentPoints& b);
 
 /// Nearest points of solids that may intersect.
 struct ClosestOrCrossing : ClosestPoints {
-  /// Then distance = 0 and a = b is a common point, to round-off. Slivers, whose plane is lost in round-off, may be told
-  /// as apart by as little.
+  /// Then distance = 0 and a = b is a common point, to round-off. Slivers, whose plane is lost in round-off, may be
+  /// told as apart by as little.
   bool intersecting = false;
   /// Where they intersect: what they have in common is this segment (its two ends are the same for a point; for
   /// triangles in one plane, which have an area in common, both are the common point a).

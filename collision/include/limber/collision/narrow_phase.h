@@ -9,6 +9,14 @@
 ///    of each edge; for creases the cone is widened by up to about 12°, so that bodies that rest on each other face to
 ///    face keep the crossings of their outlines while they rock.
 ///
+/// Solids that all but touch (nearer than a hundredth of the edges at hand) have the normals of the faces that lie on
+/// each other: flush stacks press straight down. A vertex whose own surface runs through the plane of the contact, and
+/// rims that touch without an area in common, have none.
+///
+/// Features that are apart and would pass each other within the expected motion (CollisionBody::displacement) may have
+/// the normal of one of their faces in place of the direction between them, if the motion goes less far through that: a
+/// body that slides along a floor of many boxes is not stopped by their sides.
+///
 /// Every local minimum of the distance between the two surfaces is among these, so a pair that is within the margin has
 /// at least one. Of closed surfaces only the outer side counts, of open modal sheets both, of open rigid ones the
 /// front.
@@ -82,6 +90,9 @@ struct CollisionBody {
   DeformedSurface* surface = nullptr;
   const RigidGeometry* geometry = nullptr;
   const RestVolume* volume = nullptr;  ///< optional, of the surface's model
+  /// How it is expected to move before the contacts are looked for again, world: of its origin, m, and the rotation
+  /// vector, rad. Decides nothing but the normals of features that are apart and would be passed.
+  Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
 };
 
 /// Depth and normal of a vertex that is inside another modal body.

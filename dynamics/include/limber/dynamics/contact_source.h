@@ -40,6 +40,9 @@ struct BodyState {
   /// How far any of its points may come beyond this state, m, ≥ 0: contacts up to the sum of both bodies' reaches (and
   /// the query's margin) are found, so what a step may bring together is there before it.
   double reach = 0.0;
+  /// The free motion expected until the next query: of the body origin, m, and the rotation vector, rad; world. A
+  /// source may choose normals by it for what is apart but would be passed; zero: nothing moves.
+  Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
   bool asleep = false;  ///< has not moved since the last query; two that sleep are not tested with each other
 };
 
