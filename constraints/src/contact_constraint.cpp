@@ -19,18 +19,6 @@ constexpr double kRecovery = 0.2;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
-/// What is kept of a contact from step to step.
-struct Memory {
-  std::uint64_t id = 0;
-  Vec3 force = Vec3::Zero();  // on a over the last step, world, N
-};
-
-/// What is kept of a pair of bodies that strike each other.
-struct Strike {
-  Index a = -1, b = -1;
-  double since = 0.0;  // s
-};
-
 /// One side of a contact, prepared.
 struct Side {
   Index body = -1;
@@ -360,25 +348,27 @@ void ContactOptions::validate() const {
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<Contact> contacts;
-  std::vector<Memory> memory;   // by id, those that pressed in the last step
-  std::vector<Strike> strikes;  // by (a, b), those that did so in the last step
+  std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
+  std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<std::unique_ptr<PairContacts>> pairs;
   std::vector<Constraint*> constraints;
   std::vector<ContactEvent> events, last_events;
+  std::vector<ContactEvent> resting, last_resting;  // the last of bodies that sleep
 
-  const Memory* find(std::uint64_t id) const;
+  void remember(std::span<const char> asleep);
+  const ContactMemory* find(std::uint64_t id) const;
   double lasted(Index a, Index b) const;
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
 };
 
-const Memory* ContactSet::Impl::find(std::uint64_t id) const {
-  const auto found =
-      std::lower_bound(memory.begin(), memory.end(), id, [](const Memory& m, std::uint64_t i) { return m.id < i; });
+const ContactMemory* ContactSet::Impl::find(std::uint64_t id) const {
+  const auto found = std::lower_bound(memory.begin(), memory.end(), id,
+                                      [](const ContactMemory& m, std::uint64_t i) { return m.id < i; });
   return found != memory.end() && found->id == id ? &*found : nullptr;
 }
 
 double ContactSet::Impl::lasted(Index a, Index b) const {
-  for (const Strike& strike : strikes)
+  for (const StrikeMemory& strike : strikes)
     if (strike.a == a && strike.b == b) return strike.since;
   return 0.0;
 }
@@ -394,7 +384,7 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
   contact.start_position = point.position + origin;
-  if (const Memory* known = find(point.id)) contact.last_force = known->force;
+  if (const ContactMemory* known = find(point.id)) contact.last_force = known->force;
   contacts.push_back(contact);
 }
 
@@ -427,10 +417,25 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
 
 std::span<Constraint* const> ContactSet::constraints() const { return impl_->constraints; }
 
-void ContactSet::finish() {
+namespace {
+
+const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
+
+bool rests(std::span<const char> asleep, Index a, Index b) {
+  const auto sleeps = [&](Index body) {
+    return static_cast<std::size_t>(body) < asleep.size() && asleep[static_cast<std::size_t>(body)] != 0;
+  };
+  return sleeps(a) || sleeps(b);
+}
+
+}  // namespace
+
+void ContactSet::finish(std::span<const char> asleep) {
   Impl& s = *impl_;
   std::swap(s.events, s.last_events);
+  std::swap(s.resting, s.last_resting);
   s.events.clear();
+  s.resting.clear();
   for (const Contact& contact : s.contacts) {
     if (contact.impulse.isZero(0.0)) continue;
     s.events.push_back({.id = contact.id,
@@ -441,20 +446,21 @@ void ContactSet::finish() {
                         .normal = contact.axes.col(0),
                         .impulse = contact.impulse});
   }
-  const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
   std::sort(s.events.begin(), s.events.end(), by_id);
   const std::size_t pressed = s.events.size();
-  for (const ContactEvent& last : s.last_events) {
-    const auto end = s.events.begin() + static_cast<std::ptrdiff_t>(pressed);
-    if (last.phase == ContactPhase::kEnded || std::binary_search(s.events.begin(), end, last, by_id)) continue;
-    s.events.push_back(last);
-    s.events.back().phase = ContactPhase::kEnded;
-    s.events.back().impulse = Vec3::Zero();
-  }
-  s.memory.clear();
-  for (const Contact& contact : s.contacts)
-    if (!contact.impulse.isZero(0.0)) s.memory.push_back({contact.id, contact.last_force});
-  std::sort(s.memory.begin(), s.memory.end(), by_id);
+  for (const std::vector<ContactEvent>* earlier : {&s.last_events, &s.last_resting})
+    for (const ContactEvent& last : *earlier) {
+      const auto end = s.events.begin() + static_cast<std::ptrdiff_t>(pressed);
+      if (last.phase == ContactPhase::kEnded || std::binary_search(s.events.begin(), end, last, by_id)) continue;
+      if (rests(asleep, last.a, last.b)) {
+        s.resting.push_back(last);
+        continue;
+      }
+      s.events.push_back(last);
+      s.events.back().phase = ContactPhase::kEnded;
+      s.events.back().impulse = Vec3::Zero();
+    }
+  s.remember(asleep);
   s.strikes.clear();
   for (std::size_t i = 0; i < s.constraints.size(); ++i)
     if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
@@ -464,7 +470,21 @@ void ContactSet::finish() {
   std::sort(s.events.begin(), s.events.end(), by_id);
 }
 
+/// The forces of this step, and those under which bodies fell asleep.
+void ContactSet::Impl::remember(std::span<const char> asleep) {
+  std::swap(memory, last_memory);
+  memory.clear();
+  for (const Contact& contact : contacts)
+    if (!contact.impulse.isZero(0.0))
+      memory.push_back({contact.id, contact.a.body, contact.b.body, contact.last_force});
+  for (const ContactMemory& last : last_memory)
+    if (rests(asleep, last.a, last.b)) memory.push_back(last);
+  std::sort(memory.begin(), memory.end(), by_id);
+}
+
 std::span<const ContactEvent> ContactSet::events() const { return impl_->events; }
+std::span<const ContactMemory> ContactSet::memory() const { return impl_->memory; }
+std::span<const StrikeMemory> ContactSet::strikes() const { return impl_->strikes; }
 
 void ContactSet::clear() {
   impl_->contacts.clear();
@@ -472,6 +492,7 @@ void ContactSet::clear() {
   impl_->memory.clear();
   impl_->strikes.clear();
   impl_->events.clear();
+  impl_->resting.clear();
 }
 
 }  // namespace limber

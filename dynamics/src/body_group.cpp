@@ -132,13 +132,28 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
 
 void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
   for (Index slot = begin; slot < end; ++slot)
-    if (body(slot).occupied && !body(slot).constrained) advance_body(slot, gravity);
+    if (body(slot).occupied && !body(slot).constrained && !body(slot).asleep) advance_body(slot, gravity);
+}
+
+void BodyGroup::keep_previous_state(Index slot) {
+  if (within_step_) return;
+  body(slot).previous_pose = body(slot).frame.pose();
+  previous_amplitudes_.copy_from(amplitudes_, slot);
+}
+
+void BodyGroup::put_to_sleep(Index slot) {
+  Body& b = body(slot);
+  b.frame.set_velocity(constants_, Vec3::Zero(), Vec3::Zero());
+  rates_.clear(slot);
+  b.previous_pose = b.frame.pose();
+  previous_amplitudes_.copy_from(amplitudes_, slot);
+  clear_loads(slot);
+  b.asleep = true;
 }
 
 void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
   Body& b = body(slot);
-  b.previous_pose = b.frame.pose();
-  previous_amplitudes_.copy_from(amplitudes_, slot);
+  keep_previous_state(slot);
 
   const FrameLoad load{gravity, b.force, b.torque};
   const double h = step_length();
@@ -177,10 +192,7 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
 void BodyGroup::commit(Index slot, bool begins, bool ends) {
   Body& b = body(slot);
   const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
-  if (begins) {
-    b.previous_pose = b.frame.pose();
-    previous_amplitudes_.copy_from(amplitudes_, slot);
-  }
+  if (begins) keep_previous_state(slot);
   b.frame = p.frame;
   amplitudes_.copy_from(predicted_amplitudes_, slot);
   rates_.copy_from(predicted_rates_, slot);

@@ -10,9 +10,11 @@ void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
   if (i >= table_.size()) {
     table_.resize(i + 1);
     disturbed_.resize(i + 1);
+    asleep_.resize(i + 1);
     surplus_.resize(i + 1);
   }
   table_[i] = at;
+  asleep_[i] = 0;
   disturbed_[i] = true;
   surplus_[i] = 0.0;
   stale_ = true;
@@ -73,6 +75,17 @@ void ConstraintStage::disturb_bodies_of(std::uint32_t index) {
     if (body >= 0) disturb(body);
 }
 
+void ConstraintStage::set_asleep(Index body, bool asleep) {
+  const auto i = static_cast<std::size_t>(body);
+  if (asleep)
+    table_[i].group->put_to_sleep(table_[i].slot);
+  else
+    table_[i].group->wake(table_[i].slot);
+  asleep_[i] = asleep ? 1 : 0;
+  disturbed_[i] = true;
+  stale_ = true;
+}
+
 /// Bodies of islands that are no more advance by themselves again.
 void ConstraintStage::release_bodies() {
   for (const Index body : members_)
@@ -92,6 +105,7 @@ void ConstraintStage::find_islands() {
   release_bodies();
   islands_.clear();
   constraints_.clear();
+  reports_.clear();
   all_.clear();
   for (const Entry& entry : entries_)
     if (entry.constraint() != nullptr) all_.push_back(entry.constraint());
@@ -102,38 +116,74 @@ void ConstraintStage::find_islands() {
   island_of_.assign(table_.size(), -1);
   for (const Constraint* constraint : all_) {
     const auto [a, b] = constraint->bodies();
-    if (moves(a) && moves(b)) sets_.join(a, b);
+    if (acts(a) && acts(b)) sets_.join(a, b);
   }
-  // Islands are numbered by their first body among those that a constraint touches.
-  const auto island_with = [&](const Constraint* constraint) {
-    const auto [a, b] = constraint->bodies();
-    return moves(a) ? sets_.root(a) : moves(b) ? sets_.root(b) : Index{-1};
-  };
-  std::vector<Index>& number = island_of_;
-  for (const Constraint* constraint : all_)
-    if (island_with(constraint) >= 0) number[static_cast<std::size_t>(island_with(constraint))] = 0;
-  Index count = 0;
-  for (Index& n : number)
-    if (n == 0) n = count++;
-  islands_.assign(static_cast<std::size_t>(count), {});
-
-  for (Index island = 0; island < count; ++island) {
-    Island& made = islands_[static_cast<std::size_t>(island)];
-    made.first_member = members_.size();
-    made.first_constraint = constraints_.size();
-    for (Index body = 0; body < static_cast<Index>(table_.size()); ++body)
-      if (moves(body) && number[static_cast<std::size_t>(sets_.root(body))] == island) members_.push_back(body);
-    for (Constraint* constraint : all_) {
-      const Index root = island_with(constraint);
-      if (root >= 0 && number[static_cast<std::size_t>(root)] == island) constraints_.push_back(constraint);
-    }
-    made.members = members_.size() - made.first_member;
-    made.constraints = constraints_.size() - made.first_constraint;
-  }
+  number_islands();
+  list_members();
+  list_constraints();
   for (const Index body : members_)
     table_[static_cast<std::size_t>(body)].group->set_constrained(table_[static_cast<std::size_t>(body)].slot, true);
   if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
   reports_.assign(islands_.size(), {});
+}
+
+/// The root of the island that a constraint acts in; −1: it touches nothing that moves.
+Index ConstraintStage::root_of(const Constraint* constraint) {
+  const auto [a, b] = constraint->bodies();
+  return acts(a) ? sets_.root(a) : acts(b) ? sets_.root(b) : Index{-1};
+}
+
+/// Roots that a constraint touches, in ascending order; an island's root is its first body.
+void ConstraintStage::number_islands() {
+  constexpr Index kTouched = 0;
+  for (const Constraint* constraint : all_)
+    if (const Index root = root_of(constraint); root >= 0) island_of_[static_cast<std::size_t>(root)] = kTouched;
+  Index count = 0;
+  for (Index& island : island_of_)
+    if (island == kTouched) island = count++;
+  islands_.assign(static_cast<std::size_t>(count), {});
+}
+
+/// Members of every island, ascending, one island after the other: counted, then filled in.
+void ConstraintStage::list_members() {
+  const auto bodies = static_cast<Index>(table_.size());
+  for (Index body = 0; body < bodies; ++body) {
+    if (!acts(body)) continue;
+    Index& island = island_of_[static_cast<std::size_t>(body)];
+    island = island_of_[static_cast<std::size_t>(sets_.root(body))];  // a root comes before the others
+    if (island >= 0) ++islands_[static_cast<std::size_t>(island)].members;
+  }
+  std::size_t count = 0;
+  for (Island& island : islands_) {
+    island.first_member = count;
+    count += std::exchange(island.members, 0);
+  }
+  members_.resize(count);
+  for (Index body = 0; body < bodies; ++body) {
+    if (!acts(body) || island_of_[static_cast<std::size_t>(body)] < 0) continue;
+    Island& island = islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(body)])];
+    members_[island.first_member + island.members++] = body;
+  }
+}
+
+/// The same for the constraints, each island's in their own order.
+void ConstraintStage::list_constraints() {
+  const auto island_with = [&](const Constraint* constraint) -> Island* {
+    const Index root = root_of(constraint);
+    if (root < 0) return nullptr;
+    return &islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(root)])];
+  };
+  for (const Constraint* constraint : all_)
+    if (Island* island = island_with(constraint)) ++island->constraints;
+  std::size_t count = 0;
+  for (Island& island : islands_) {
+    island.first_constraint = count;
+    count += std::exchange(island.constraints, 0);
+  }
+  constraints_.resize(count);
+  for (Constraint* constraint : all_)
+    if (Island* island = island_with(constraint))
+      constraints_[island->first_constraint + island->constraints++] = constraint;
 }
 
 void ConstraintStage::step(Jobs& jobs, const IslandOptions& options) {

@@ -29,6 +29,9 @@ class ConstraintStage {
   /// Forgets it, and all constraints on it.
   void remove_body(Index body);
   BodyStates states() const { return BodyStates(table_); }
+  bool moves(Index body) const { return body >= 0 && table_[static_cast<std::size_t>(body)].group != nullptr; }
+  /// Stops a body, or lets it go on: one that sleeps is no member of any island.
+  void set_asleep(Index body, bool asleep);
   /// Its velocity, place or shape was changed from outside.
   void disturb(Index body) { disturbed_[static_cast<std::size_t>(body)] = true; }
 
@@ -49,18 +52,30 @@ class ConstraintStage {
   /// Sums over the islands of the last step.
   IslandReport report() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
+  /// Of one island, ascending.
+  std::span<const Index> members(int island) const {
+    const Island& at = islands_[static_cast<std::size_t>(island)];
+    return std::span(members_).subspan(at.first_member, at.members);
+  }
+  /// Whether a body is in an island.
+  bool constrained(Index body) const { return !islands_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0; }
   double energy_surplus(Index body) const { return surplus_[static_cast<std::size_t>(body)]; }
 
  private:
   struct Island {
-    std::size_t first_member, members, first_constraint, constraints;
+    std::size_t first_member = 0, members = 0, first_constraint = 0, constraints = 0;
   };
   std::uint32_t place(Entry&& entry);
+  Index root_of(const Constraint* constraint);
+  void number_islands();
+  void list_members();
+  void list_constraints();
   void step_island(std::size_t island, const IslandOptions& options);
   void release_bodies();
-  bool moves(Index body) const { return body >= 0 && table_[static_cast<std::size_t>(body)].group != nullptr; }
+  bool acts(Index body) const { return moves(body) && asleep_[static_cast<std::size_t>(body)] == 0; }
 
   std::vector<ConstrainedBody> table_;
+  std::vector<char> asleep_;
   std::vector<char> disturbed_;  // char: written by different threads
   std::vector<double> surplus_;  // per body: its share of its island's
   std::vector<Entry> entries_;
@@ -70,7 +85,7 @@ class ConstraintStage {
 
   bool stale_ = true;  // the islands
   DisjointSets sets_;
-  std::vector<Index> island_of_;  // per root, and then per body; −1: none
+  std::vector<Index> island_of_;  // per root, and then per body that moves; −1: none
   std::vector<Island> islands_;
   std::vector<Index> members_;
   std::vector<Constraint*> constraints_;

@@ -5,12 +5,15 @@
 #include <cmath>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "constraint_stage.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/exact_motion.h"
 #include "limber/dynamics/reconstruct.h"
+#include "sleep_stage.h"
+#include "step_parts.h"
 
 namespace limber {
 namespace {
@@ -72,6 +75,16 @@ class Hash {
 
 }  // namespace
 
+void SleepOptions::validate() const {
+  const auto number = [](double value, const char* name) {
+    if (!(value >= 0.0 && std::isfinite(value)))
+      throw InvalidArgument(std::string("SleepOptions: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number of at least 0");
+  };
+  number(time, "time");
+  number(speed, "speed");
+}
+
 void WorldOptions::validate() const {
   if (!(step > 0.0 && step <= 1e100))
     throw InvalidArgument("WorldOptions: step is " + std::to_string(step) + " s, expected more than 0, at most 1e100");
@@ -79,7 +92,40 @@ void WorldOptions::validate() const {
   if (max_steps_per_advance < 1)
     throw InvalidArgument("WorldOptions: max_steps_per_advance is " + std::to_string(max_steps_per_advance) +
                           ", expected at least 1");
+  if (substeps < 1)
+    throw InvalidArgument("WorldOptions: substeps is " + std::to_string(substeps) + ", expected at least 1");
+  sleep.validate();
 }
+
+namespace {
+
+double checked(std::optional<double> friction, const char* function) {
+  constexpr double kNotGiven = -1.0;
+  if (friction && !(*friction >= 0.0 && std::isfinite(*friction)))
+    throw InvalidArgument(std::string("World::") + function + ": friction is " + std::to_string(*friction) +
+                          ", expected a finite number of at least 0");
+  return friction.value_or(kNotGiven);
+}
+
+/// Of a ball about the body origin that holds all of a shape, m.
+double radius_of(const Shape& shape) {
+  const auto farthest = [](const std::vector<Vec3>& points) {
+    double r = 0.0;
+    for (const Vec3& p : points) r = std::max(r, p.norm());
+    return r;
+  };
+  if (const auto* ball = std::get_if<Sphere>(&shape)) return ball->radius;
+  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius + capsule->half_length;
+  if (const auto* box = std::get_if<Box>(&shape)) return box->half_extents.norm();
+  if (const auto* hull = std::get_if<ConvexHull>(&shape)) return farthest(hull->points);
+  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return farthest(mesh->vertices);
+  const auto& field = std::get<HeightField>(shape);
+  double height = 0.0;
+  for (const float h : field.heights) height = std::max(height, std::abs(static_cast<double>(h)));
+  return Vec3((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y, height).norm();
+}
+
+}  // namespace
 
 struct World::Impl {
   /// What a BodyId's index names.
@@ -90,6 +136,14 @@ struct World::Impl {
     std::shared_ptr<const Shape> shape{};
     RigidTransform pose{};  // of a static one
     CollisionFilter filter{};
+    double friction = -1.0;  // negative: that of the contact options
+    double radius = 0.0;     // of a shape that moves
+    bool placed = false;     // of a static one: the source has seen where it stands
+  };
+  /// Two bodies that do not meet as long as some joint between them stands.
+  struct Apart {
+    Index a, b;
+    std::uint32_t joint;  // its place
   };
   /// Slots [begin, end) of a group: what one job advances.
   struct Range {
@@ -103,11 +157,20 @@ struct World::Impl {
   std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
   std::vector<Range> ranges;                       // covers all slots of all groups
   ConstraintStage constraints;                     // bodies by their entries' indices
+  SleepStage sleep{constraints};
+  std::optional<StepParts> parts{};
+  std::vector<Apart> apart;
   ContactSource* source = nullptr;
   ContactSet contacts;
   std::vector<ContactPoint> touching;
   std::function<bool(const ContactPoint&)> contact_acts;
+  ContactOptions contact_options;
   std::vector<BodyState> states;  // by entries' indices, for the source
+  std::vector<double> friction;   // the same
+  std::vector<double> still;      // zeros: how far a rigid shape's points move with the modes
+  double energy_removed = 0.0;    // of the step's parts before the last
+  bool solved = true;
+  int iterations = 0, cuts = 0;
   std::vector<ExactMotion> motions;
   std::size_t alive = 0;
   std::uint64_t steps = 0;
@@ -156,10 +219,16 @@ struct World::Impl {
 
   BodyId place(Entry&& made);
   void tell_source(std::uint32_t index);
+  bool are_apart(Index a, Index b) const;
+  void keep_apart(Index a, Index b, std::uint32_t joint);
+  void let_meet(std::uint32_t joint);
+  void wake_bodies_of(std::uint32_t constraint);
+  void write_states();
   void find_contacts();
+  bool wake_what_is_touched();
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
-  void advance_all();
+  void advance_part(int part);
   template <class Real>
   void interpolate(BodyId id, double s, Real* amplitudes) const;
   void prepare_drawing(std::span<const DrawTarget> targets);
@@ -170,7 +239,7 @@ Index World::Impl::group_of(std::shared_ptr<const ModalModel> model) {
   const auto same = [&](const auto& g) { return g && &g->model() == model.get(); };
   auto found = std::find_if(groups.begin(), groups.end(), same);
   if (found == groups.end()) {
-    auto made = std::make_unique<BodyGroup>(std::move(model), options.step);
+    auto made = std::make_unique<BodyGroup>(std::move(model), parts->length());
     found = std::find(groups.begin(), groups.end(), nullptr);
     if (found == groups.end()) found = groups.insert(groups.end(), nullptr);
     *found = std::move(made);
@@ -200,42 +269,98 @@ MaterialFrame World::Impl::joint_side(BodyId id, const JointFrame& in_world, con
 
 /// Registers one body with the source.
 void World::Impl::tell_source(std::uint32_t index) {
-  const Entry& e = entries[index];
+  Entry& e = entries[index];
   if (source == nullptr || !e.alive) return;
   BodyGeometry geometry;
-  if (e.group < 0)
+  if (e.shape)
     geometry.shape = e.shape;
   else
     geometry.model = group(e).shared_model();
   source->add_body(static_cast<Index>(index), geometry, e.filter);
+  e.placed = false;
+}
+
+bool World::Impl::are_apart(Index a, Index b) const {
+  return std::any_of(apart.begin(), apart.end(), [&](const Apart& pair) { return pair.a == a && pair.b == b; });
+}
+
+void World::Impl::keep_apart(Index a, Index b, std::uint32_t joint) {
+  if (source != nullptr && !are_apart(a, b)) source->exclude_pair(a, b, true);
+  apart.push_back({a, b, joint});
+}
+
+/// What a joint that is removed kept apart.
+void World::Impl::let_meet(std::uint32_t joint) {
+  const auto found = std::find_if(apart.begin(), apart.end(), [&](const Apart& pair) { return pair.joint == joint; });
+  if (found == apart.end()) return;
+  const Apart pair = *found;
+  apart.erase(found);
+  if (source != nullptr && !are_apart(pair.a, pair.b)) source->exclude_pair(pair.a, pair.b, false);
+}
+
+void World::Impl::wake_bodies_of(std::uint32_t constraint) {
+  for (const Index body : constraints.entries()[constraint].constraint()->bodies())
+    if (body >= 0) sleep.wake(body);
+}
+
+/// For the source: where bodies are, and how far they may come within the step.
+void World::Impl::write_states() {
+  states.resize(entries.size());
+  motions.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    Entry& e = entries[i];
+    if (!e.alive) continue;
+    if (e.group < 0) {
+      states[i] = {.pose = e.pose, .asleep = std::exchange(e.placed, true)};
+      continue;
+    }
+    const BodyGroup& bodies = group(e);
+    states[i] = {.pose = bodies.frame(e.slot).pose(), .asleep = sleep.asleep(static_cast<Index>(i))};
+    if (!e.shape) states[i].amplitudes = bodies.amplitudes(e.slot);
+    if (states[i].asleep) continue;
+    bodies.predict_motion(e.slot, options.gravity, motions[i]);
+    const RigidFrame& frame = bodies.frame(e.slot);
+    // Without gravity: what lies on something does not fall, and what falls has a velocity.
+    states[i].displacement = parts->length() * frame.velocity();
+    states[i].rotation = parts->length() * frame.angular_velocity(bodies.frame_constants());
+    const SurfaceExtent& extent = bodies.model().collision_extent();
+    if (e.shape && still.size() < extent.shape.size()) still.resize(extent.shape.size(), 0.0);
+    states[i].reach = e.shape ? motions[i].reach(e.radius, std::span(still).first(extent.shape.size()))
+                              : motions[i].reach(extent.radius, extent.shape);
+  }
 }
 
 /// What touches, or may within the step, as rows for the islands.
 void World::Impl::find_contacts() {
   if (source == nullptr) return;
-  states.resize(entries.size());
-  motions.resize(entries.size());
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const Entry& e = entries[i];
-    if (!e.alive) continue;
-    if (e.group < 0) {
-      states[i] = {.pose = e.pose};
-      continue;
-    }
-    const BodyGroup& bodies = group(e);
-    bodies.predict_motion(e.slot, options.gravity, motions[i]);
-    const SurfaceExtent& extent = bodies.model().collision_extent();
-    states[i] = {.pose = bodies.frame(e.slot).pose(),
-                 .amplitudes = bodies.amplitudes(e.slot),
-                 .reach = motions[i].reach(extent.radius, extent.shape)};
-  }
-  source->find_contacts({.states = states}, touching, *jobs);
-  if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
-  contacts.update(constraints.states(), touching);
+  do {
+    write_states();
+    source->find_contacts({.states = states}, touching, *jobs);
+    if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
+  } while (wake_what_is_touched());
+  friction.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    friction[i] = entries[i].friction >= 0.0 ? entries[i].friction : contact_options.friction;
+  contacts.update(constraints.states(), touching, Vec3::Zero(), friction);
   constraints.set_contacts(contacts.constraints());
 }
 
-void World::Impl::advance_all() {
+/// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.
+bool World::Impl::wake_what_is_touched() {
+  bool woke = false;
+  for (const ContactPoint& contact : touching)
+    for (const Index body : {contact.a.body, contact.b.body})
+      if (sleep.asleep(body)) {
+        sleep.wake(body);
+        woke = true;
+      }
+  return woke;
+}
+
+void World::Impl::advance_part(int part) {
+  for (const auto& group : groups)
+    if (group) group->set_within_step(part > 0);
+  parts->begin(part);
   find_contacts();
   constraints.find_islands();
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
@@ -243,8 +368,11 @@ void World::Impl::advance_all() {
     for (std::size_t r = begin; r < end; ++r)
       groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
   });
-  constraints.step(*jobs, {.step = options.step, .gravity = options.gravity});
-  if (source != nullptr) contacts.finish();
+  constraints.step(*jobs, {.step = parts->length(), .gravity = options.gravity});
+  if (source != nullptr) {
+    contacts.finish(sleep.asleep());
+    parts->add_events(part, contacts.events());
+  }
 }
 
 /// Amplitudes between the last two states.
@@ -275,6 +403,7 @@ World::World(const WorldOptions& options, Jobs& jobs) : impl_(std::make_unique<I
   options.validate();
   impl_->options = options;
   impl_->jobs = &jobs;
+  impl_->parts.emplace(impl_->constraints, options.substeps, options.step);
 }
 World::~World() = default;
 World::World(World&&) noexcept = default;
@@ -287,12 +416,24 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_pose(placement.pose, "add_body");
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
+  const double friction = checked(placement.friction, "add_body");
+  if (placement.shape) {
+    validate(*placement.shape);
+    if (std::holds_alternative<HalfSpace>(*placement.shape))
+      throw InvalidArgument("World::add_body: the shape is a half-space, expected one that ends");
+  }
   const Index group = impl_->group_of(std::move(model));
   const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
                                                                          placement.angular_velocity);
-  const BodyId id = impl_->place({.group = group, .slot = slot, .filter = placement.filter});
+  const BodyId id = impl_->place({.group = group,
+                                  .slot = slot,
+                                  .shape = placement.shape,
+                                  .filter = placement.filter,
+                                  .friction = friction,
+                                  .radius = placement.shape ? radius_of(*placement.shape) : 0.0});
   impl_->constraints.set_body(static_cast<Index>(id.index),
                               {.group = &impl_->group(impl_->entries[id.index]), .slot = slot});
+  impl_->sleep.add(static_cast<Index>(id.index));
   impl_->tell_source(id.index);
   impl_->make_ranges();
   return id;
@@ -314,13 +455,16 @@ BodyId World::Impl::place(Entry&& made) {
   return {index, entries[index].generation};
 }
 
-BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose,
-                         const CollisionFilter& filter) {
+BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose, const CollisionFilter& filter,
+                         std::optional<double> friction) {
   if (!shape) throw InvalidArgument("World::add_static: the shape is null");
   validate(*shape);
   require_pose(pose, "add_static");
-  const BodyId id = impl_->place({.group = -1, .shape = std::move(shape), .pose = pose, .filter = filter});
+  const double mu = checked(friction, "add_static");
+  const BodyId id =
+      impl_->place({.group = -1, .shape = std::move(shape), .pose = pose, .filter = filter, .friction = mu});
   impl_->constraints.set_body(static_cast<Index>(id.index), {.pose = pose});
+  impl_->sleep.add(static_cast<Index>(id.index));
   impl_->tell_source(id.index);
   return id;
 }
@@ -328,8 +472,12 @@ BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransfor
 void World::remove_body(BodyId id) {
   if (!impl_->contains(id)) impl_->entry(id, "remove_body");  // tells so
   const Impl::Entry& known = impl_->entries[id.index];
-  if (impl_->source != nullptr) impl_->source->remove_body(static_cast<Index>(id.index));
-  impl_->constraints.remove_body(static_cast<Index>(id.index));
+  const auto index = static_cast<Index>(id.index);
+  impl_->sleep.remove(index);
+  impl_->parts->forget(index);
+  std::erase_if(impl_->apart, [&](const Impl::Apart& pair) { return pair.a == index || pair.b == index; });
+  if (impl_->source != nullptr) impl_->source->remove_body(index);
+  impl_->constraints.remove_body(index);
   if (known.group >= 0) {
     BodyGroup& group = impl_->group(known);
     group.remove(known.slot);
@@ -366,8 +514,19 @@ int World::advance(double real_seconds) {
 }
 
 void World::step() {
-  impl_->advance_all();
-  ++impl_->steps;
+  Impl& m = *impl_;
+  m.energy_removed = 0.0, m.solved = true, m.iterations = m.cuts = 0;
+  for (int part = 0; part < m.parts->count(); ++part) {
+    m.advance_part(part);
+    const IslandReport report = m.constraints.report();
+    m.energy_removed += report.energy_removed;
+    m.solved = m.solved && report.status == SolveStatus::kSolved;
+    m.iterations = std::max(m.iterations, report.iterations);
+    m.cuts += report.cuts;
+  }
+  m.parts->finish();
+  if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
+  ++m.steps;
 }
 
 double World::interpolation_factor() const { return impl_->accumulator / impl_->options.step; }
@@ -383,7 +542,10 @@ void World::apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, 
   BodyGroup& group = impl_->group(e);
   validate(group.model(), at);
   require_finite(newtons, "apply_force", "the force");
-  group.apply_force(e.slot, at, axes == Axes::kWorld ? newtons : group.frame(e.slot).pose().q * newtons);
+  const Vec3 force_W = axes == Axes::kWorld ? newtons : group.frame(e.slot).pose().q * newtons;
+  impl_->sleep.wake(static_cast<Index>(id.index));
+  group.apply_force(e.slot, at, force_W);
+  impl_->parts->hold_force(static_cast<Index>(id.index), at, force_W);
 }
 
 void World::apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes, double delay) {
@@ -395,8 +557,11 @@ void World::apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_
     throw InvalidArgument("World::apply_impulse: delay is " + std::to_string(delay) +
                           " s, expected from 0 to less than " + std::to_string(impl_->options.step));
   const Vec3 impulse_W = axes == Axes::kWorld ? newton_seconds : group.frame(e.slot).pose().q * newton_seconds;
+  const auto body = static_cast<Index>(id.index);
+  impl_->sleep.wake(body);
+  if (!impl_->parts->keep_impulse(body, at, impulse_W, delay)) return;
   group.apply_impulse(e.slot, at, impulse_W, delay);
-  impl_->constraints.disturb(static_cast<Index>(id.index));
+  impl_->constraints.disturb(body);
 }
 
 void World::set_kinematic_frame(BodyId id, const KinematicFrame& target) {
@@ -411,7 +576,8 @@ void World::set_kinematic_frame(BodyId id, const KinematicFrame& target) {
   require_finite(target.acceleration, "set_kinematic_frame", "acceleration");
   require_finite(target.angular_velocity, "set_kinematic_frame", "angular velocity");
   require_finite(target.angular_acceleration, "set_kinematic_frame", "angular acceleration");
-  group.set_parent(e.slot, target);
+  impl_->sleep.wake(static_cast<Index>(id.index));
+  impl_->parts->lead(static_cast<Index>(id.index), target);
 }
 
 // Constraints ---------------------------------------------------------------------------------------------------------
@@ -423,11 +589,13 @@ HandleId World::add_handle(BodyId id, const SurfacePoint& at, const HandleOption
   auto made = std::make_unique<Handle>(MaterialFrame(static_cast<Index>(id.index), model, at),
                                        impl_->group(e).position(e.slot, at), options);
   const std::uint32_t index = impl_->constraints.add(std::move(made));
+  impl_->wake_bodies_of(index);
   return {index, impl_->constraints.entries()[index].generation};
 }
 
 void World::remove_handle(HandleId id) {
   impl_->constraint(id, "remove_handle");
+  impl_->wake_bodies_of(id.index);
   impl_->constraints.remove(id.index);
 }
 
@@ -437,6 +605,7 @@ void World::set_handle_target(HandleId id, const HandleTarget& target) {
   const ConstraintStage::Entry& e = impl_->constraint(id, "set_handle_target");
   require_finite(target.position, "set_handle_target", "position");
   require_finite(target.velocity, "set_handle_target", "velocity");
+  impl_->wake_bodies_of(id.index);
   e.handle->set_target(target);
 }
 
@@ -446,7 +615,7 @@ HandleView World::handle(HandleId id) const {
 }
 
 JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a,
-                         const JointAttachment& on_b) {
+                         const JointAttachment& on_b, bool collide_connected) {
   spec.validate();
   if (a == b) throw InvalidArgument("World::add_joint: both parts are the same");
   for (const JointAttachment* on : {&on_a, &on_b})
@@ -456,11 +625,18 @@ JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointA
   auto made = std::make_unique<JointConstraint>(impl_->joint_side(a, spec.frame, on_a),
                                                 impl_->joint_side(b, spec.frame, on_b), spec);
   const std::uint32_t index = impl_->constraints.add(std::move(made));
+  impl_->wake_bodies_of(index);
+  const bool two = a != BodyId{} && b != BodyId{};
+  if (two && !collide_connected)
+    impl_->keep_apart(static_cast<Index>(std::min(a.index, b.index)), static_cast<Index>(std::max(a.index, b.index)),
+                      index);
   return {index, impl_->constraints.entries()[index].generation};
 }
 
 void World::remove_joint(JointId id) {
   impl_->constraint(id, "remove_joint");
+  impl_->wake_bodies_of(id.index);
+  impl_->let_meet(id.index);
   impl_->constraints.remove(id.index);
 }
 
@@ -468,6 +644,7 @@ bool World::contains(JointId id) const { return impl_->find(id) != nullptr; }
 
 void World::set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation) {
   impl_->constraint(id, "set_joint_actuation").joint->set_actuation(coordinate, actuation);
+  impl_->wake_bodies_of(id.index);
 }
 
 JointView World::joint(JointId id) const {
@@ -490,25 +667,42 @@ ConstraintReport World::constraint_report() const {
   return {.islands = impl_->constraints.island_count(),
           .bodies = r.bodies,
           .rows = r.rows,
-          .iterations = r.iterations,
-          .cuts = r.cuts,
-          .solved = r.status == SolveStatus::kSolved,
-          .energy_removed = r.energy_removed};
+          .iterations = impl_->iterations,
+          .cuts = impl_->cuts,
+          .solved = impl_->solved,
+          .energy_removed = impl_->energy_removed};
 }
 
 void World::set_contact_source(ContactSource* source, const ContactOptions& options) {
   ContactSet contacts(options);
   impl_->constraints.set_contacts({});
   impl_->contacts = std::move(contacts);
+  impl_->contact_options = options;
   impl_->source = source;
+  impl_->sleep.wake_all();
   for (std::uint32_t i = 0; i < impl_->entries.size(); ++i) impl_->tell_source(i);
+  if (source == nullptr) return;
+  for (const Impl::Apart& pair : impl_->apart) source->exclude_pair(pair.a, pair.b, true);
 }
 
-void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) { impl_->contact_acts = std::move(acts); }
+void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) {
+  impl_->contact_acts = std::move(acts);
+  impl_->sleep.wake_all();
+}
 
-std::span<const ContactEvent> World::contact_events() const { return impl_->contacts.events(); }
+std::span<const ContactEvent> World::contact_events() const { return impl_->parts->events(); }
 
 // State ---------------------------------------------------------------------------------------------------------------
+
+bool World::is_asleep(BodyId id) const {
+  impl_->entry(id, "is_asleep");
+  return impl_->sleep.asleep(static_cast<Index>(id.index));
+}
+
+void World::wake(BodyId id) {
+  impl_->entry(id, "wake");
+  impl_->sleep.wake(static_cast<Index>(id.index));
+}
 
 BodyView World::body(BodyId id) const {
   const Impl::Entry& e = impl_->entry(id, "body");
@@ -521,6 +715,8 @@ BodyView World::body(BodyId id) const {
 void World::set_pose(BodyId id, const RigidTransform& pose) {
   const Impl::Entry& e = impl_->entry(id, "set_pose");
   require_pose(pose, "set_pose");
+  impl_->sleep.wake(static_cast<Index>(id.index));
+  impl_->parts->forget_frame(static_cast<Index>(id.index));
   impl_->group(e).set_pose(e.slot, pose);
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
@@ -529,6 +725,8 @@ void World::set_velocity(BodyId id, const Vec3& velocity, const Vec3& angular_ve
   const Impl::Entry& e = impl_->entry(id, "set_velocity");
   require_finite(velocity, "set_velocity", "velocity");
   require_finite(angular_velocity, "set_velocity", "angular velocity");
+  impl_->sleep.wake(static_cast<Index>(id.index));
+  impl_->parts->forget_frame(static_cast<Index>(id.index));
   impl_->group(e).set_velocity(e.slot, velocity, angular_velocity);
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
@@ -540,6 +738,7 @@ void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::s
   require_count(rates.size(), modes, "set_amplitudes", "rates");
   require_finite(amplitudes, "set_amplitudes", "amplitudes");
   require_finite(rates, "set_amplitudes", "rates");
+  impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->group(e).set_amplitudes(e.slot, amplitudes, rates);
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
@@ -566,6 +765,7 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
     }
     return z;
   };
+  impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->group(e).set_amplitudes(e.slot, project(displacements), project(velocities));
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
@@ -656,6 +856,9 @@ std::uint64_t World::state_hash() const {
   for (const Impl::Entry& e : impl_->entries) {
     hash.add(std::uint64_t{e.generation});
     if (!e.alive || e.group < 0) continue;
+    const auto body = static_cast<Index>(&e - impl_->entries.data());
+    hash.add(std::uint64_t{impl_->sleep.asleep(body)});
+    hash.add(impl_->sleep.calm(body));
     const BodyGroup& group = impl_->group(e);
     const RigidFrame& frame = group.frame(e.slot);
     hash.add(frame.pose().q);
@@ -671,6 +874,11 @@ std::uint64_t World::state_hash() const {
     for (int i = 0; e.joint && i < e.joint->coordinates(); ++i)
       hash.add(e.joint->coordinate(i, impl_->constraints.states()));
   }
+  for (const ContactMemory& contact : impl_->contacts.memory()) {
+    hash.add(contact.id);
+    hash.add(contact.force);
+  }
+  for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
   return hash.value();
 }
 

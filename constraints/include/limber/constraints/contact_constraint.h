@@ -76,6 +76,19 @@ struct ContactEvent {
   Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s; zero for kEnded
 };
 
+/// What a scene's contacts remember of a step: with the bodies' states it is all that the next step depends on.
+struct ContactMemory {
+  std::uint64_t id = 0;       ///< of the ContactPoint
+  Index a = -1, b = -1;       ///< bodies
+  Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
+};
+
+/// And of a pair of bodies that strike each other.
+struct StrikeMemory {
+  Index a = -1, b = -1;  ///< bodies
+  double since = 0.0;    ///< how long they have been at it, s
+};
+
 /// All contacts of one scene, remembered from step to step. In every step: update(), then the island solver with
 /// constraints() among the others, then finish(). Once warm nothing allocates.
 class ContactSet {
@@ -95,9 +108,15 @@ class ContactSet {
   std::span<Constraint* const> constraints() const;
 
   /// Books what the step did: after the islands' steps, before the next update().
-  void finish();
+  /// @param asleep by body: whether it sleeps. Its contacts were not given to update(): they are remembered as they
+  /// were, and told neither as lasting nor as ended
+  void finish(std::span<const char> asleep = {});
   /// Contacts that press, or have ceased to, in the last step, ordered by id.
   std::span<const ContactEvent> events() const;
+  /// Contacts that pressed in the last step, ordered by id.
+  std::span<const ContactMemory> memory() const;
+  /// Impacts under way, ordered by (a, b).
+  std::span<const StrikeMemory> strikes() const;
   /// Forgets what it knows of earlier steps.
   void clear();
 

@@ -36,6 +36,8 @@ class Handle final : public Constraint {
 
   void set_target(const HandleTarget& target);
   const HandleTarget& target() const { return next_; }
+  /// Where the target is at the start of the coming step, world, m.
+  const Vec3& target_now() const { return now_; }
   const HandleOptions& options() const { return options_; }
   const MaterialFrame& point() const { return point_; }
   /// Mean force on the body over the last step, world, N.

@@ -88,8 +88,16 @@ class BodyGroup {
   /// @param newton_seconds world axes. @param delay in [0, step), s
   void apply_impulse(Index slot, const SurfacePoint& at, const Vec3& newton_seconds, double delay);
 
-  /// One step of the occupied slots in [begin, end). Allocates and throws nothing.
+  /// One step of the occupied slots in [begin, end) that are awake. Allocates and throws nothing.
   void advance(Index begin, Index end, const Vec3& gravity);
+
+  /// Whether the steps that follow are parts of one that has begun: previous_pose() and previous_amplitudes() stay
+  /// those of its start.
+  void set_within_step(bool within) { within_step_ = within; }
+
+  /// Stops a body where it is: frame and modes at rest, loads forgotten. advance() leaves it alone until it is woken.
+  void put_to_sleep(Index slot);
+  void wake(Index slot) { body(slot).asleep = false; }
 
   /// What advance() would do to one body, at any time within the step. The body stays as it is.
   void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
@@ -181,6 +189,7 @@ class BodyGroup {
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // held over the next step, world
     bool occupied = true;
     bool constrained = false;
+    bool asleep = false;
     bool modes_loaded = false;              // forces_ is not zero
     bool modes_static = false;              // static_amplitudes_ are not zero
     std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
@@ -197,6 +206,7 @@ class BodyGroup {
     double *z = nullptr, *rates = nullptr, *forces = nullptr;
   };
 
+  void keep_previous_state(Index slot);
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
   const Body& body(Index slot) const { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
@@ -228,6 +238,7 @@ class BodyGroup {
 
   std::vector<Body> bodies_;
   std::vector<Index> vacant_;
+  bool within_step_ = false;
   ModeRows amplitudes_, rates_, previous_amplitudes_;
   ModeRows forces_;             // g, held over the next step
   ModeRows static_amplitudes_;  // c, of amplitudes_: the static answer to the last step's constraints

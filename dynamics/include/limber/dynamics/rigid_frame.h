@@ -85,6 +85,8 @@ class RigidFrame {
   /// Where the parent is at the end of the coming step. Without a new one it goes on at its velocity and angular
   /// velocity.
   void set_parent(const KinematicFrame& at_step_end);
+  /// The parent now.
+  const KinematicFrame& parent() const { return parent_; }
 
   /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. What the fixing takes up has no
   /// effect.

@@ -61,11 +61,33 @@ struct JointId {
   friend bool operator==(const JointId&, const JointId&) = default;
 };
 
+/// When bodies are left alone until something happens to them.
+///
+/// An island (bodies tied together by contacts, joints and handles) falls asleep once all its bodies have been at rest
+/// for `time`: no point of the frame faster than `speed`, |v| + |ω| r with r the reach of the surface from the body
+/// origin; a kinetic energy of the modes of at most ½ m speed²; a sum of contact impulses that changes from step to
+/// step by at most m speed; and no handle on it whose target moves by itself. It then stops where it is: positions and
+/// energies stay, to the bit, and it costs nothing but its place in the broad phase.
+///
+/// It wakes as a whole when a body that is awake comes within reach (contacts are found with it), by a load, a new
+/// state, a handle or joint added, removed or changed on any of its bodies, when one of them or a static shape that
+/// they press on is removed, and by World::wake(). A body that creeps more slowly than `speed` is stopped.
+struct SleepOptions {
+  bool enabled = false;
+  double time = 0.5;      ///< s, ≥ 0
+  double speed = 1e-3;    ///< m/s, ≥ 0
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
+};
+
 struct WorldOptions {
-  double step = 1.0 / 60.0;             ///< s; > 0
+  double step = 1.0 / 60.0;  ///< s; > 0
+  /// n ≥ 1: each step is taken as n equal ones, contacts found anew in each. Held forces and targets go on over all of
+  /// them, and events are those of the whole step.
+  int substeps = 1;
   Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s², world
   int max_steps_per_advance = 8;  ///< ≥ 1; time beyond this is dropped (and counted), so a slow frame cannot snowball
-  void validate() const;          ///< @throws InvalidArgument naming the field and its value
+  SleepOptions sleep{};
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
 /// How a body starts. Velocities are of the body origin (docs/notation.md), world axes.
@@ -75,6 +97,11 @@ struct BodyPlacement {
   /// rad/s; kLine: its part along the line counts; kKinematic: of what carries it
   Vec3 angular_velocity = Vec3::Zero();
   CollisionFilter filter{};  ///< whom it meets, where the world has a contact source
+  /// μ, ≥ 0; that of two bodies is √(μ_a μ_b). Not given: ContactOptions::friction.
+  std::optional<double> friction{};
+  /// What others meet in place of the model's collision surface: it moves with the frame and does not deform, and
+  /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.
+  std::shared_ptr<const Shape> shape{};
 };
 
 /// How a joint sits on a deforming body: on a patch of its surface, whose mean displacement and rotation it follows.
@@ -139,12 +166,17 @@ class World {
   // Bodies -----------------------------------------------------------------------------------------------------------
   BodyId add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement = {});
   /// A rigid shape that never moves. Only contains() and remove_body() take its id.
+  /// @param friction as in BodyPlacement
   BodyId add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose = {},
-                    const CollisionFilter& filter = {});
+                    const CollisionFilter& filter = {}, std::optional<double> friction = {});
   void remove_body(BodyId id);  ///< and with it its handles and joints
   bool contains(BodyId id) const;
   std::size_t body_count() const;
   const ModalModel& model(BodyId id) const;
+  /// Whether a body sleeps; see SleepOptions.
+  bool is_asleep(BodyId id) const;
+  /// Wakes a body and all that sleeps with it; one that is awake counts its time at rest anew.
+  void wake(BodyId id);
 
   // Time -------------------------------------------------------------------------------------------------------------
   /// Adds real seconds to the accumulator and takes as many fixed steps as fit. @return steps taken.
@@ -163,7 +195,7 @@ class World {
   /// within the step.
   void apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, Axes axes = Axes::kWorld);
   /// Acts now, at the start of the next step: velocities change at once. @param delay seconds into the next step at
-  /// which the modes get it, in [0, step): exact for the modes; the frame gets it now.
+  /// which the modes get it, in [0, step): exact for the modes; the frame gets it now, or at the start of the substep.
   void apply_impulse(BodyId id, const SurfacePoint& at, const Vec3& newton_seconds, Axes axes = Axes::kWorld,
                      double delay = 0.0);
   /// Where the parent of a body with fixed nodes is at the end of the coming step. A body that is not told goes on at
@@ -184,8 +216,11 @@ class World {
   /// Joins two bodies as they stand: the pose now is the joint's reference, all its coordinates are 0.
   /// @param a, b part b moves relative to part a; BodyId{} is the world, for one of them
   /// @param spec its frame in world axes @throws InvalidArgument if it is not valid, or a and b are the same
+  /// @param collide_connected whether a and b have contacts with each other. They have none as long as any joint
+  /// between
+  ///   them says so: parts overlap where a hinge is
   JointId add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a = {},
-                    const JointAttachment& on_b = {});
+                    const JointAttachment& on_b = {}, bool collide_connected = false);
   void remove_joint(JointId id);
   bool contains(JointId id) const;
   /// Motor, drive and friction of one coordinate.
@@ -202,7 +237,8 @@ class World {
   /// Asked of every contact found, before it acts: false leaves it out of the step. From the thread that calls step();
   /// empty: all act.
   void set_contact_veto(std::function<bool(const ContactPoint&)> acts);
-  /// What pressed, or ceased to, in the last step; bodies by BodyId::index.
+  /// What pressed, or ceased to, in the last step; bodies by BodyId::index. Impulses of substeps are summed. Contacts
+  /// of bodies that sleep are not told; those that press when they wake go on as kLasting.
   std::span<const ContactEvent> contact_events() const;
 
   // State ------------------------------------------------------------------------------------------------------------
@@ -241,7 +277,11 @@ class World {
   RigidTransform interpolated_pose(BodyId id, double interpolation) const;
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
 
-  /// Hash of the whole state (poses, momenta, amplitudes, time) for determinism checks.
+  /// Hash of the whole state, for determinism checks: two worlds with the same calls behind them have the same, for any
+  /// Jobs. It covers what the next step depends on: time, poses, momenta, amplitudes and rates, targets of handles,
+  /// coordinates of joints, what contacts remember (their forces, by id), who sleeps and how long the others have been
+  /// at rest. set_pose(), set_velocity() and set_amplitudes() set a body's own state alone: a body put back to where it
+  /// was meets contacts that remember other forces, and friction that was held starts anew.
   std::uint64_t state_hash() const;
 
  private:

@@ -1,0 +1,172 @@
+#include "step_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limber/dynamics/body_group.h"
+
+namespace limber {
+namespace {
+
+struct ById {
+  static std::uint64_t id(const ContactEvent& event) { return event.id; }
+  template <class Merged>
+  static std::uint64_t id(const Merged& merged) {
+    return merged.event.id;
+  }
+  template <class X, class Y>
+  bool operator()(const X& x, const Y& y) const {
+    return id(x) < id(y);
+  }
+};
+constexpr ById by_id;
+
+/// Where a parent is part way through its step: the parabola of its held acceleration through both ends and a constant
+/// turn, as RigidFrame takes it.
+KinematicFrame between(const KinematicFrame& start, const KinematicFrame& target, double part, double step) {
+  KinematicFrame at = target;
+  if (part >= 1.0) return at;
+  const double t = part * step;
+  const Vec3& a = target.acceleration;
+  const Vec3 velocity = (target.pose.p - start.pose.p) / step - 0.5 * step * a;
+  at.pose.p = start.pose.p + t * velocity + 0.5 * t * t * a;
+  at.pose.q = slerp(start.pose.q, target.pose.q, part);
+  at.velocity = velocity + t * a;
+  at.angular_velocity = (1.0 - part) * start.angular_velocity + part * target.angular_velocity;
+  return at;
+}
+
+}  // namespace
+
+void StepParts::hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W) {
+  if (parts_ > 1) forces_.push_back({body, at, newtons_W, 0, 0.0});
+}
+
+bool StepParts::keep_impulse(Index body, const SurfacePoint& at, const Vec3& newton_seconds_W, double delay) {
+  const int part = std::min(static_cast<int>(delay / length()), parts_ - 1);
+  if (part == 0) return true;
+  const double rest = std::clamp(delay - part * length(), 0.0, std::nextafter(length(), 0.0));
+  impulses_.push_back({body, at, newton_seconds_W, part, rest});
+  return false;
+}
+
+void StepParts::lead(Index body, const KinematicFrame& target) {
+  forget_frame(body);
+  const ConstrainedBody& at = constraints_->states().body(body);
+  leads_.push_back({body, at.group->frame(at.slot).parent(), target});
+}
+
+void StepParts::forget_frame(Index body) {
+  std::erase_if(leads_, [&](const Lead& lead) { return lead.body == body; });
+}
+
+void StepParts::forget(Index body) {
+  forget_frame(body);
+  for (std::vector<Load>* loads : {&forces_, &impulses_})
+    std::erase_if(*loads, [&](const Load& load) { return load.body == body; });
+}
+
+void StepParts::begin(int part) {
+  const BodyStates states = constraints_->states();
+  const auto at = [&](Index body) -> const ConstrainedBody& { return states.body(body); };
+  const double done = static_cast<double>(part + 1) / parts_;
+  for (const Lead& lead : leads_)
+    at(lead.body).group->set_parent(at(lead.body).slot, between(lead.start, lead.target, done, step_));
+  if (parts_ == 1) return;
+  lead_handles(part);
+  if (part == 0) return;
+  for (const Load& force : forces_) at(force.body).group->apply_force(at(force.body).slot, force.at, force.load);
+  for (const Load& impulse : impulses_) {
+    if (impulse.part != part) continue;
+    at(impulse.body).group->apply_impulse(at(impulse.body).slot, impulse.at, impulse.load, impulse.delay);
+    constraints_->disturb(impulse.body);
+  }
+}
+
+/// Targets go straight to where they are at the step's end.
+void StepParts::lead_handles(int part) {
+  const std::vector<ConstraintStage::Entry>& entries = constraints_->entries();
+  if (part == 0) {
+    handles_.clear();
+    for (const ConstraintStage::Entry& entry : entries)
+      handles_.push_back(entry.handle ? HandlePath{entry.handle->target_now(), entry.handle->target()}
+                                      : HandlePath{Vec3::Zero(), {}});
+  }
+  for (std::size_t i = 0; i < handles_.size(); ++i) {
+    if (!entries[i].handle) continue;
+    const auto& [start, target] = handles_[i];
+    const double done = static_cast<double>(part + 1) / parts_;
+    const Vec3 place = part + 1 == parts_ ? target.position : Vec3(start + done * (target.position - start));
+    entries[i].handle->set_target({.position = place});
+  }
+}
+
+void StepParts::finish() {
+  forces_.clear();
+  impulses_.clear();
+  leads_.clear();
+  if (parts_ == 1) return;
+  for (std::size_t i = 0; i < handles_.size(); ++i) {
+    const auto& [start, target] = handles_[i];
+    if (constraints_->entries()[i].handle)
+      constraints_->entries()[i].handle->set_target(
+          {.position = target.position + step_ * target.velocity, .velocity = target.velocity});
+  }
+}
+
+void StepParts::add_events(int part, std::span<const ContactEvent> events) {
+  if (part == 0) {
+    merged_.clear();
+    std::swap(events_, last_events_);
+  }
+  const std::size_t known = merged_.size();
+  for (const ContactEvent& event : events) {
+    const auto end = merged_.begin() + static_cast<std::ptrdiff_t>(known);
+    const auto found = std::lower_bound(merged_.begin(), end, event, by_id);
+    if (found != end && found->event.id == event.id)
+      add_part(event, *found);
+    else
+      merged_.push_back(first_part(event, part));
+  }
+  std::sort(merged_.begin(), merged_.end(), by_id);
+  if (part + 1 == parts_) tell_events();
+}
+
+StepParts::Merged StepParts::first_part(const ContactEvent& event, int part) const {
+  Merged made{event, event.phase != ContactPhase::kEnded, event.phase == ContactPhase::kEnded};
+  if (!made.pressed) return made;
+  const auto last = std::lower_bound(last_events_.begin(), last_events_.end(), event, by_id);
+  const bool pressed_before = last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
+  const bool lasting = pressed_before || (part == 0 && event.phase == ContactPhase::kLasting);
+  made.event.phase = lasting ? ContactPhase::kLasting : ContactPhase::kBegun;
+  return made;
+}
+
+void StepParts::add_part(const ContactEvent& event, Merged& merged) {
+  merged.let_go = event.phase == ContactPhase::kEnded;
+  if (merged.let_go) return;
+  const ContactEvent before = merged.event;
+  merged.event = event;
+  merged.event.impulse += before.impulse;
+  merged.event.phase = merged.pressed ? before.phase : ContactPhase::kLasting;
+  merged.pressed = true;
+}
+
+/// What pressed in any part; and what has let go since it was last told to press.
+void StepParts::tell_events() {
+  events_.clear();
+  for (const ContactEvent& event : released_)
+    if (!std::binary_search(merged_.begin(), merged_.end(), event, by_id)) {
+      events_.push_back(event);
+      events_.back().phase = ContactPhase::kEnded;
+      events_.back().impulse = Vec3::Zero();
+    }
+  released_.clear();
+  for (const Merged& merged : merged_) {
+    events_.push_back(merged.event);
+    if (merged.pressed && merged.let_go) released_.push_back(merged.event);
+  }
+  std::sort(events_.begin(), events_.end(), by_id);
+}
+
+}  // namespace limber

@@ -1,0 +1,79 @@
+// What acts over a whole step, while the step is taken in parts (WorldOptions::substeps).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "constraint_stage.h"
+#include "limber/constraints/contact_constraint.h"
+#include "limber/dynamics/rigid_frame.h"
+#include "limber/dynamics/surface_point.h"
+#include "limber/engine/world.h"
+
+namespace limber {
+
+class StepParts {
+ public:
+  StepParts(ConstraintStage& constraints, int parts, double step)
+      : constraints_(&constraints), parts_(parts), step_(step) {}
+
+  int count() const { return parts_; }
+  double length() const { return step_ / parts_; }
+
+  // Remembered until the step has been taken. The first part's share is the caller's.
+  void hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W);
+  /// @return whether the impulse belongs to the first part; its delay in that part is then `delay` as given
+  bool keep_impulse(Index body, const SurfacePoint& at, const Vec3& newton_seconds_W, double delay);
+  void lead(Index body, const KinematicFrame& target);
+  void forget(Index body);  ///< all of that
+  void forget_frame(Index body);
+
+  /// Sets what acts in one part, 0 … count() − 1.
+  void begin(int part);
+  /// After the last one.
+  void finish();
+
+  /// Takes the events of one part; after the last, events() are those of the step: one for each contact that pressed in
+  /// any part, with the sum of its impulses and the place where it pressed last.
+  void add_events(int part, std::span<const ContactEvent> events);
+  std::span<const ContactEvent> events() const { return events_; }
+
+ private:
+  struct Load {
+    Index body;
+    SurfacePoint at;
+    Vec3 load;  // world, N or N·s
+    int part;   // of an impulse
+    double delay;
+  };
+  struct Lead {
+    Index body;
+    KinematicFrame start, target;
+  };
+  struct HandlePath {
+    Vec3 start;
+    HandleTarget target;
+  };
+  /// A contact over all parts so far.
+  struct Merged {
+    ContactEvent event;
+    bool pressed;  // in some part
+    bool let_go;   // since it last pressed
+  };
+  void lead_handles(int part);
+  Merged first_part(const ContactEvent& event, int part) const;
+  static void add_part(const ContactEvent& event, Merged& merged);
+  void tell_events();
+
+  ConstraintStage* constraints_;
+  int parts_;
+  double step_;
+  std::vector<Load> forces_, impulses_;
+  std::vector<Lead> leads_;
+  std::vector<HandlePath> handles_;  // by place, of the step under way
+  std::vector<Merged> merged_;       // by id
+  std::vector<ContactEvent> events_, last_events_;
+  std::vector<ContactEvent> released_;  // told as pressing, but let go before the step's end
+};
+
+}  // namespace limber

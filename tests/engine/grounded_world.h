@@ -1,0 +1,53 @@
+// A world with the ground and bodies that lie on it.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "limber/collision/contact_finder.h"
+#include "limber/engine/world.h"
+#include "sample_models.h"
+
+namespace limber::testing {
+
+inline constexpr double kGravity = 9.80665;
+
+/// Boxes whose first mode has 3 % of critical damping.
+inline std::shared_ptr<const ModalModel> damped_box(int modes, double hz) {
+  return sample_model({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz});
+}
+
+/// A world with the ground, and its finder.
+struct GroundedWorld {
+  explicit GroundedWorld(const ContactOptions& options = {}, const WorldOptions& world_options = {})
+      : world(world_options) {
+    world.set_contact_source(&finder, options);
+    ground = world.add_static(std::make_shared<Shape>(HalfSpace{}));
+  }
+  void step(int count) {
+    for (int i = 0; i < count; ++i) world.step();
+  }
+  ContactFinder finder;
+  World world;
+  BodyId ground;
+};
+
+/// The lowest vertex of a body's render surface.
+inline double lowest(const World& world, BodyId id) {
+  std::vector<float> positions(3 * static_cast<std::size_t>(world.model(id).render().vertices()));
+  world.reconstruct(id, positions, {});
+  float low = positions[2];
+  for (std::size_t i = 2; i < positions.size(); i += 3) low = std::min(low, positions[i]);
+  return static_cast<double>(low);
+}
+
+/// How far the lowest point of a model at rest shape is below its origin.
+inline double depth_below_origin(const ModalModel& model) {
+  double low = 0.0;
+  for (const auto& p : model.collision().rest) low = std::min(low, static_cast<double>(p.z()));
+  return -low;
+}
+
+}  // namespace limber::testing
