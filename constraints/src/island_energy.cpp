@@ -13,6 +13,8 @@ constexpr double kLargestChange = 0.1;
 constexpr double kPatience = 1e-7;
 // A gain above this many times the energies at hand is nonsense, not motion to be slowed: digits would not be left.
 constexpr double kNonsense = 10.0;
+// m/s: joints and stops that are out of place bring even resting bodies together about this fast.
+constexpr double kRecoverySpeed = 1.0;
 
 /// A body whose parent moves gets work from it that nobody books.
 bool carried(const BodyGroup& group, Index slot) {
@@ -48,13 +50,14 @@ RelativeMotion relative_motion(const BodyGroup& group, Index slot, const CommonM
 }  // namespace
 
 void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
-  before_ = scale_ = 0.0;
+  before_ = scale_ = recovery_ = 0.0;
   driven_ = false;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const BodyEnergy energy = group->energy(slot, gravity);
     before_ += energy.total();
+    recovery_ += c.mass * kRecoverySpeed * kRecoverySpeed;
     scale_ += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
               gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
     driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
@@ -74,11 +77,12 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
   const double work = agent_work + load_work(bodies, options.step);
   const double gain = after - before_ - work + options.energy_surplus;
   // Of what there was, never of what came out: that may be any number where the rows did not come together.
-  const double patience = kPatience * (scale_ + std::max(0.0, work));
+  const double at_hand = scale_ + std::max(0.0, work);
+  const double patience = kPatience * (at_hand > 0.0 ? at_hand : recovery_);
   const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
-  if (excess > kNonsense * (scale_ + std::max(0.0, work))) return {.left = excess};
+  if (excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
   const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies) : CommonMotion{};
   const double removed = remove_relative_energy(bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;

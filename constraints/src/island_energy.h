@@ -12,7 +12,7 @@ struct CommonMotion {
 
 class IslandEnergy {
  public:
-  /// Books the energy before the step, and the scale of all that the bodies then have to trade.
+  /// Books the energy before the step, the scale of all that the bodies then have to trade, and that of coming together.
   void begin(const IslandBodies& bodies, const Vec3& gravity);
   struct Change {
     double removed = 0.0;  ///< J, taken out; negative: given back
@@ -31,7 +31,7 @@ class IslandEnergy {
   double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
                                 double largest_part);
 
-  double before_ = 0.0, scale_ = 0.0;
+  double before_ = 0.0, scale_ = 0.0, recovery_ = 0.0;
   bool driven_ = false;
   std::vector<double> modal_;
 };

@@ -503,7 +503,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   cones = bounded.size() / 3;
   for (Index i = 0; i < rows.size(); ++i)
     if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
-  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 12;
+  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
   factor();
   secant.begin(f.size());
   for (report.iterations = 1;; ++report.iterations) {
@@ -515,7 +515,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     // Cones that do not come together give other impulses every time.
     const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
                                                             : options.max_iterations;
-    if (report.iterations > kIterationsOfStart && can_differentiate())
+    if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate())
       return differentiate(states, constraints, options, report);
     if (report.iterations > most) return take_best(states, constraints, options, report);
     for (std::size_t i = 0; i < f.size(); ++i) next_f[i] -= f[i];
