@@ -1,8 +1,10 @@
 // joint_accuracy: how often joints are read right, and how well.
 //   run:  build/release/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
 //         build/release/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/release/bin/joint_accuracy --limits [--only ASSEMBLY] [--class TEXT] [--verbose]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
-//         on and for the held-out ones; the confusion matrix; every failure with --verbose
+//         on and for the held-out ones; the confusion matrix; every failure with --verbose. With --limits instead: the
+//         ranges of motion of all joints whose type was read right and whose range is known on paper
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -63,9 +65,10 @@ int run(const DetectionOptions& options, bool verbose, const std::string& only, 
             totals.right += j.right() ? 1 : 0;
             if (j.right()) totals.axis.push_back(j.axis_error), totals.origin.push_back(j.origin_error);
             if (verbose && (!j.right() || j.axis_error > group.axis_tolerance || j.origin_error > 1e-3))
-              std::printf("    %-14s %-28s %s: %s read as %s (%.2f), axis %.3f deg, origin %.1e; %s\n", name.c_str(),
-                          group.name.c_str(), j.name.c_str(), kColumns[j.truth], kColumns[j.found], j.confidence,
-                          j.axis_error, j.origin_error, j.reason.c_str());
+              std::printf(
+                  "    %-14s %-28s %s: %s read as %s (%.2f), axis %.3f deg, origin %.1e, pitch off by %.1f %%; %s\n",
+                  name.c_str(), group.name.c_str(), j.name.c_str(), kColumns[j.truth], kColumns[j.found], j.confidence,
+                  j.axis_error, j.origin_error, 100.0 * j.pitch_error, j.reason.c_str());
           }
           for (const std::string& extra : score.extra) {
             ++totals.false_joints;
@@ -85,6 +88,44 @@ int run(const DetectionOptions& options, bool verbose, const std::string& only, 
     std::printf("%-12s", kColumns[i]);
     for (int j = 0; j < 7; ++j) std::printf(" %11d", confusion[{i, j}]);
     std::printf("\n");
+  }
+  return 0;
+}
+
+struct RangeTotals {
+  int all = 0, right = 0;
+  double degrees = 0.0, thousandths = 0.0;  ///< worst of those whose ends match
+};
+
+/// Per class of variants and type of joint: how many ranges are right within 1 degree or a thousandth of the diagonal.
+int run_limits(const DetectionOptions& options, bool verbose, const std::string& only, const std::string& group_text) {
+  TbbJobs jobs;
+  for (const auto* names : {&tuning_names(), &held_out_names()}) {
+    std::printf("%s\n%-34s %-12s %5s %7s %9s %12s\n", names == &tuning_names() ? "tuning" : "held out", "variants",
+                "joint", "n", "right%", "worst deg", "worst 1e-3 d");
+    for (const VariantClass& group : range_variant_classes()) {
+      if (group.name.find(group_text) == std::string::npos) continue;
+      std::map<int, RangeTotals> by_type;
+      for (const std::string& name : *names) {
+        if (!only.empty() && only != name) continue;
+        for (const Variant& variant : group.variants)
+          for (const RangeScore& r : scored_ranges(make(name, variant), options, jobs)) {
+            if (!group.with_balls && r.type == static_cast<int>(JointType::kBall)) continue;
+            RangeTotals& totals = by_type[r.type];
+            ++totals.all;
+            totals.right += r.right() ? 1 : 0;
+            double& worst = r.angle ? totals.degrees : totals.thousandths;
+            if (r.same_type && r.ends_match) worst = std::max(worst, r.error);
+            if (verbose && !r.right())
+              std::printf("    %-14s n %d gap %.3f phase %.1f  %s, %s: %s\n", name.c_str(), variant.segments,
+                          variant.clearance, variant.phase, r.joint.c_str(), r.freedom.c_str(), r.found.c_str());
+          }
+      }
+      for (const auto& [type, t] : by_type)
+        std::printf("%-34s %-12s %5d %7.2f %9.4f %12.4f\n", group.name.c_str(), kColumns[type], t.all,
+                    100.0 * t.right / t.all, t.degrees, t.thousandths);
+      std::fflush(stdout);
+    }
   }
   return 0;
 }
@@ -130,13 +171,15 @@ int time_large() {
 
 int main(int argc, char** argv) {
   limber::DetectionOptions options;
-  bool verbose = false;
+  bool verbose = false, limits = false;
   std::string only, group_text;
   for (int i = 1; i < argc; ++i) {
     const std::string_view arg = argv[i];
     if (arg == "--large") return limber::assemblies::time_large();
     if (arg == "--verbose")
       verbose = true;
+    else if (arg == "--limits")
+      limits = true;
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
     else if (arg == "--contacts" && i + 1 < argc && std::string_view(argv[i + 1]) == "hulls")
@@ -147,10 +190,11 @@ int main(int argc, char** argv) {
       group_text = argv[++i];
     else
       return std::fprintf(stderr,
-                          "joint_accuracy: seen \"%s\", expected --verbose, --only ASSEMBLY, --class TEXT, --contacts "
-                          "NAME or --method NAME\n",
+                          "joint_accuracy: seen \"%s\", expected --limits, --verbose, --only ASSEMBLY, --class TEXT, "
+                          "--contacts NAME or --method NAME\n",
                           argv[i]),
              2;
   }
+  if (limits) return limber::assemblies::run_limits(options, verbose, only, group_text);
   return limber::assemblies::run(options, verbose, only, group_text);
 }

@@ -118,18 +118,31 @@ double gap_limit(const BothSides& sides, double diagonal, double reach) {
   }
 }
 
-void keep_nearer(std::vector<NearSample>& samples, double limit) {
-  std::erase_if(samples, [&](const NearSample& s) { return s.distance > limit; });
-}
+/// Squared sine of the angle by which two surfaces do not look straight at each other.
+double askew(const NearSample& s) { return s.contact.normal.cross(s.contact.facing_normal).squaredNorm(); }
 
 double normal_spread(const BothSides& sides) {
   double spread = 0.0, area = 0.0;
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) {
-      spread += s.contact.area * s.contact.normal.cross(s.contact.facing_normal).squaredNorm();
+      spread += s.contact.area * askew(s);
       area += s.contact.area;
     }
   return spread / area;
+}
+
+/// Leaves out pairs that look past each other while most do not: the face at the end of a nut is near the bolt's flank
+/// and leans by 34 degrees from it. What holds for most is noise, curvature or both, and stays.
+void drop_askew(BothSides& sides) {
+  constexpr double kShare = 0.75, kTimes = 8.0, kAlways = 0.02;  // 8 degrees
+  std::vector<double> all;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) all.push_back(askew(s));
+  if (all.empty()) return;
+  const auto most = all.begin() + static_cast<std::ptrdiff_t>(kShare * static_cast<double>(all.size() - 1));
+  std::nth_element(all.begin(), most, all.end());
+  const double limit = kAlways + kTimes * *most;
+  for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
 /// What is measured over the samples of both sides.
@@ -190,6 +203,47 @@ void quieten(BothSides& sides) {
   average_patches(quiet.a);
   average_patches(quiet.b);
   if (normal_spread(quiet) < kBetter * before) sides = std::move(quiet);
+}
+
+double area_of(const BothSides& sides) {
+  double out = 0.0;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) out += s.contact.area;
+  return out;
+}
+
+/// Σ A n nᵀ / Σ A, eigenvalues ascending: (0, 0, 1) for a flat contact, (0, ½, ½) for a cylinder.
+Vec3 spread_of_directions(const BothSides& sides) {
+  Mat3 sum = Mat3::Zero();
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) sum += s.contact.area * s.contact.normal * s.contact.normal.transpose();
+  return Eigen::SelfAdjointEigenSolver<Mat3>(sum / sum.trace(), Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+/// A part of `sides`: those nearer than the limit, or those further.
+BothSides part_of(BothSides sides, double limit, bool nearer) {
+  for (auto* side : {&sides.a, &sides.b})
+    std::erase_if(*side, [&](const NearSample& s) { return (s.distance <= limit) != nearer; });
+  return sides;
+}
+
+/// The gap of a second, wider contact that the nearest one hides: a bar that passes a flange more closely than the
+/// flange's bearing fits. The nearest contact gives way only if it is flat, so that it guides no motion, and the wider
+/// one guides (its normals span more than a line), agrees, and has several times the area. Plates that lie beside a
+/// small hinge guide nothing: the hinge stays.
+/// @param nearest the limit of the nearest contact. Nothing if that one stands
+std::optional<double> wider_contact(const BothSides& coarse, double nearest, double diagonal, double reach) {
+  constexpr double kFlat = 0.95, kGuides = 0.1, kLarger = 5.0, kMostSpread = 0.03;
+  const BothSides touch = part_of(coarse, nearest, true);
+  BothSides rest = part_of(coarse, nearest, false);
+  if (touch.a.empty() || touch.b.empty() || rest.a.size() < kFewest || rest.b.size() < kFewest) return std::nullopt;
+  const double limit = gap_limit(rest, diagonal, reach);
+  rest = part_of(std::move(rest), limit, true);
+  if (rest.a.size() < kFewest || rest.b.size() < kFewest || area_of(rest) < kLarger * area_of(touch))
+    return std::nullopt;
+  if (spread_of_directions(touch)[2] < kFlat || spread_of_directions(rest)[1] < kGuides) return std::nullopt;
+  if (normal_spread(rest) > kMostSpread) return std::nullopt;
+  return limit;
 }
 
 BothSides sample(const Prepared& a, const Prepared& b, double reach, double facing_cosine, int wanted) {
@@ -255,10 +309,12 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
   const double first_limit = gap_limit(sides, diagonal, reach);
   if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
-  sides = sample(a, b, std::min(reach, 1.5 * first_limit), options.facing_cosine, options.samples);
+  const auto wider = wider_contact(sides, first_limit, diagonal, reach);
+  sides = sample(a, b, std::min(reach, 1.5 * wider.value_or(first_limit)), options.facing_cosine, options.samples);
+  if (wider) sides = part_of(std::move(sides), first_limit, false);
   const double limit = gap_limit(sides, diagonal, reach);
-  keep_nearer(sides.a, limit);
-  keep_nearer(sides.b, limit);
+  sides = part_of(std::move(sides), limit, true);
+  drop_askew(sides);
   drop_hidden(pair, parts, sides);
 
   if (sides.a.size() < kFewest || sides.b.size() < kFewest) return overlap(pair, a, b, coarse);

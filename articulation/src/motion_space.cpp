@@ -50,7 +50,7 @@ MotionSpace::MotionSpace(const std::vector<ContactRegion>& regions) {
   for (const ContactRegion& region : regions)
     for (const auto* side : {&region.on_a, &region.on_b})
       for (const ContactSample& s : *side) {
-        points_.push_back({s.point, s.normal, s.area});
+        points_.push_back({s.point, s.normal, s.facet_point, s.facet_normal, s.area});
         middles_.push_back(0.5 * (s.point + s.facing_point));
         centre_ += s.area * s.point;
         spread_ += s.area * s.normal.cross(s.facing_normal).squaredNorm();
@@ -61,7 +61,8 @@ MotionSpace::MotionSpace(const std::vector<ContactRegion>& regions) {
   double radius = 0.0;
   for (const WeightedPoint& p : points_) radius += p.weight * (p.point - centre_).squaredNorm();
   scale_ = std::sqrt(radius / area);
-  for (WeightedPoint& p : points_) p.point = (p.point - centre_) / scale_;
+  for (WeightedPoint& p : points_)
+    for (Vec3* x : {&p.point, &p.facet_point}) *x = (*x - centre_) / scale_;
 
   const auto weights = balanced_weights(points_);
   C_.setZero();

@@ -17,6 +17,7 @@ using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
 struct WeightedPoint {
   Vec3 point, normal;
+  Vec3 facet_point, facet_normal;  ///< as drawn
   double weight;
 };
 

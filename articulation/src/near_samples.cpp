@@ -142,12 +142,12 @@ void average_patches(std::vector<NearSample>& samples) {
   std::vector<NearSample> out;
   for (const NearSample& s : samples) {
     NearSample mean = s;
-    Vec3 own = s.facet, facing = s.facing_facet;
+    Vec3 own = s.contact.facet_normal, facing = s.facing_facet;
     double count = 1.0;
     for (const std::size_t j : neighbours(samples, s.contact.point, stride, wanted)) {
       const NearSample& other = samples[j];
-      if (other.facet.dot(s.contact.normal) < kSameSide) continue;
-      own += other.facet;
+      if (other.contact.facet_normal.dot(s.contact.normal) < kSameSide) continue;
+      own += other.contact.facet_normal;
       facing += other.facing_facet;
       mean.contact.point += other.contact.point;
       mean.contact.facing_point += other.contact.facing_point;
@@ -181,8 +181,8 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
     if (!facing.found()) return;
     const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
     if (normal.dot(facing_normal) > facing_cosine) return;
-    out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal)},
-                   surface.tree().normal(piece.triangle),
+    out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal), point,
+                    surface.tree().normal(piece.triangle)},
                    other.tree().normal(facing.triangle),
                    facing.distance,
                    std::max(surface.chord_error(piece.triangle), other.chord_error(facing.triangle))});
@@ -202,7 +202,7 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
     const Vec3& facet = surface.tree().normal(piece.triangle);
     if (solid.tree().winding(point) > 0)
       out.push_back(
-          {{point, normal, point, -normal, area, 0.0}, facet, -facet, 0.0, surface.chord_error(piece.triangle)});
+          {{point, normal, point, -normal, area, 0.0, point, facet}, -facet, 0.0, surface.chord_error(piece.triangle)});
   });
   return out;
 }

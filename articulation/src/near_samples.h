@@ -10,7 +10,7 @@ namespace limber {
 
 struct NearSample {
   ContactSample contact;
-  Vec3 facet, facing_facet;  ///< unit normals of the two triangles
+  Vec3 facing_facet;         ///< unit normal of the other triangle
   double distance = 0.0;     ///< unsigned gap
   double chord_error = 0.0;  ///< of the two triangles, the larger
 };

@@ -156,24 +156,73 @@ TEST(DetectJoints, PoseScaleAndOrderChangeNoTypeAndNoAxis) {
   }
 }
 
-TEST(DetectJoints, AShaftDrawnThroughASolidBlockTurnsAndSlides) {
-  GroupedSurface input;
-  const auto add = [&](const std::string& name, const assemblies::Shell& shell) {
+/// Adds a part that is one or more shells.
+void add_part(const std::string& name, const std::vector<assemblies::Shell>& shells, GroupedSurface& input) {
+  const auto before = static_cast<Index>(input.surface.triangles.size());
+  for (const assemblies::Shell& shell : shells) {
     const auto offset = static_cast<Index>(input.surface.vertices.size());
-    input.groups.push_back(
-        {name, "", static_cast<Index>(input.surface.triangles.size()), static_cast<Index>(shell.triangles.size())});
     input.surface.vertices.insert(input.surface.vertices.end(), shell.vertices.begin(), shell.vertices.end());
     for (const Triangle& t : shell.triangles) {
       input.face_of.push_back(static_cast<Index>(input.face_of.size()));
       input.surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
     }
-  };
-  add("block", assemblies::box({-1, -1, -0.5}, {1, 1, 0.5}));
-  add("shaft", assemblies::lathe({{0, -2}, {0.2, -2}, {0.2, 2}, {0, 2}}, 32));
+  }
+  input.groups.push_back({name, "", before, static_cast<Index>(input.surface.triangles.size()) - before});
+}
+
+TEST(DetectJoints, AShaftDrawnThroughASolidBlockTurnsAndSlides) {
+  GroupedSurface input;
+  add_part("block", {assemblies::box({-1, -1, -0.5}, {1, 1, 0.5})}, input);
+  add_part("shaft", {assemblies::lathe({{0, -2}, {0.2, -2}, {0.2, 2}, {0, 2}}, 32)}, input);
   const auto joints = detect_joints(find_components(input));
   ASSERT_EQ(joints.size(), 1u);
   EXPECT_EQ(joints[0].joint.type, JointType::kCylindrical);
   EXPECT_GT(std::abs(joints[0].joint.frame.axes(2, 0)), 1.0 - 1e-9);
+}
+
+// A bearing with a clearance of 2 % of its diameter, and beside it a block that all but touches the flange's back.
+TEST(DetectJoints, AStrayTouchHidesNoWiderBearing) {
+  for (const double stray : {0.0, 0.002, 0.01}) {
+    GroupedSurface input;
+    const double back = 2.6;
+    add_part("housing",
+             {assemblies::lathe({{1.04, -2}, {1.8, -2}, {1.8, 2}, {1.04, 2}}, 32, 0.5),
+              assemblies::box({-0.3, -0.3, back + stray}, {0.3, 0.3, 3})},
+             input);
+    add_part(
+        "shaft",
+        {assemblies::lathe(
+            {{0, -back}, {1.5, -back}, {1.5, -2.04}, {1, -2.04}, {1, 2.04}, {1.5, 2.04}, {1.5, back}, {0, back}}, 32)},
+        input);
+    const auto joints = detect_joints(find_components(input, {.rule = ComponentRule::kGroups}), quick());
+    ASSERT_EQ(joints.size(), 1u) << stray;
+    EXPECT_EQ(joints[0].joint.type, JointType::kRevolute) << stray;
+    EXPECT_GT(std::abs(joints[0].joint.frame.axes(2, 0)), 1.0 - 1e-6);
+  }
+}
+
+// Facets are chords of the helix: with 16 segments their mean radius and slope are off by parts of (π/16)² = 4 %.
+TEST(DetectJoints, ThreadsKeepTheirPitchAndHand) {
+  for (const std::string name : {"screw", "spindle"})
+    for (const int segments : {16, 32})
+      for (const double clearance : {0.0, 0.005, 0.02}) {
+        const auto score = [&] {
+          TbbJobs jobs;
+          return assemblies::scored(make(name, {.segments = segments, .clearance = clearance}), quick(), jobs);
+        }();
+        ASSERT_EQ(score.joints.size(), 1u);
+        EXPECT_EQ(score.joints[0].found, score.joints[0].truth) << name << segments << clearance;
+        EXPECT_LT(score.joints[0].pitch_error, segments == 16 ? 0.03 : 0.02) << name << segments << clearance;
+      }
+}
+
+// One assembly for each kind of stop: arm at posts, head and handle of a bolt, neck in a ring, collar on
+// a foot, rod at a piston, slab at a frame.
+TEST(DetectJoints, RangesOfMotionAreThoseOfTheDrawing) {
+  TbbJobs jobs;
+  for (const std::string name : {"gate", "latch", "drop link", "chair", "piston", "door"})
+    for (const auto& range : assemblies::scored_ranges(make(name, {.clearance = 0.005}), quick(), jobs))
+      EXPECT_TRUE(range.right()) << name << ", " << range.joint << ", " << range.freedom << ": " << range.found;
 }
 
 TEST(DetectJoints, ThreeHingesOfOneDoorAreOneRevoluteJoint) {

@@ -1,5 +1,6 @@
 #include "limber/articulation/slippage.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -134,6 +135,44 @@ TEST(Slippage, WrongArgumentsAreRefused) {
   EXPECT_THROW(analyse_slippage({}), InvalidArgument);
   EXPECT_THROW(analyse_slippage({exact_contact({cylinder(1, 1, 1)})}, {.threshold = 0.0}), InvalidArgument);
   EXPECT_THROW(analyse_slippage({exact_contact({cylinder(1, 1, 1)})}, {.ratio = 1.0}), InvalidArgument);
+}
+
+// What touches on four sides and at its end may be a peg in a blind hole or a drawer at its stop.
+TEST(Slippage, ADrawerAtItsStopIsTheSecondReadingOfABlindPeg) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  std::vector<Patch> walls, all;
+  for (const double side : {-1.0, 1.0}) {
+    walls.push_back(plane(side * 0.5 * x, side * 0.3 * y, z));
+    walls.push_back(plane(side * 0.3 * y, side * z, 0.5 * x));
+  }
+  all = walls;
+  all.push_back(plane(-z, 0.5 * x, -0.3 * y));  // the bottom, outward −z
+  const Slippage stopped = analyse_slippage({exact_contact(all)});
+  ASSERT_EQ(stopped.hypotheses[0].joint.type, JointType::kFixed);
+  ASSERT_EQ(stopped.hypotheses[1].joint.type, JointType::kPrismatic);
+  EXPECT_NEAR(std::abs(stopped.hypotheses[1].joint.frame.axes(2, 0)), 1.0, 1e-9);
+  EXPECT_GT(stopped.hypotheses[1].confidence, 0.2);
+  EXPECT_GT(stopped.hypotheses[0].confidence, 2 * stopped.hypotheses[1].confidence);
+  EXPECT_THAT(stopped.hypotheses[1].reason, testing::HasSubstr("may be a stop"));
+
+  all.push_back(plane(z, 0.5 * x, 0.3 * y));  // held from both ends it is no stop
+  const Slippage held = analyse_slippage({exact_contact(all)});
+  ASSERT_EQ(held.hypotheses[0].joint.type, JointType::kFixed);
+  EXPECT_LT(held.hypotheses[1].confidence, 0.05);
+  EXPECT_EQ(analyse_slippage({exact_contact(walls)}).hypotheses[0].joint.type, JointType::kPrismatic);
+}
+
+// A piston that touches the head turns; it may slide as well if the head is but a stop.
+TEST(Slippage, APistonAtItsDeadCentreMaySlide) {
+  const Patch head = {[](double u, double v) {
+                        const double r = 0.7 * std::sqrt(v), a = 2 * kPi * u;
+                        return Vec3(r * std::cos(a), r * std::sin(a), 0.9);
+                      },
+                      [](double, double) { return Vec3(Vec3::UnitZ()); }};
+  const Slippage piston = analyse_slippage({exact_contact({cylinder(0.7, 0.7, 0.9), head})});
+  ASSERT_EQ(piston.hypotheses[0].joint.type, JointType::kRevolute);
+  ASSERT_EQ(piston.hypotheses[1].joint.type, JointType::kCylindrical);
+  EXPECT_GT(piston.hypotheses[1].confidence, 0.2);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <random>
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180.0;
+constexpr double kOpen = std::numeric_limits<double>::infinity();
 
 /// Where a joint's own drawing is put: z along its axis.
 struct Place {
@@ -54,6 +56,25 @@ class Builder {
     joints.push_back({a, b, type, place.t, place.R.col(2), pitch});
   }
 
+  // How far the joint told last goes. Bearings below are drawn to be free; who puts something in the way says so.
+
+  void turns(double low = -kOpen, double high = kOpen) {
+    set({TrueRange::Freedom::kRotation, joints.back().axis, {low, high}});
+  }
+  void slides(double low = -kOpen, double high = kOpen) { slides_along(joints.back().axis, low, high); }
+  void slides_along(const Vec3& direction, double low = -kOpen, double high = kOpen) {
+    set({TrueRange::Freedom::kTranslation, direction, {low, high}});
+  }
+  void swings(double cone) { set({TrueRange::Freedom::kCone, Vec3::Zero(), {0.0, cone}}); }
+  /// Something stops it at an angle that no short formula gives.
+  void range_unknown() { joints.back().ranges.clear(); }
+
+  void set(const TrueRange& range) {
+    auto& ranges = joints.back().ranges;
+    std::erase_if(ranges, [&](const TrueRange& r) { return r.freedom == range.freedom && r.along == range.along; });
+    ranges.push_back(range);
+  }
+
   int n() const { return v.segments; }
   double gap(double diameter) const { return v.clearance * diameter; }
 
@@ -72,6 +93,7 @@ class Builder {
     add(b, place(lathe({{0, -end}, {R, -end}, {R, -flange}, {r, -flange}, {r, flange}, {R, flange}, {R, end}, {0, end}},
                        n(), 0.0, {1, 1, 0, 0, 0, 1, 1, 1})));
     truth(a, b, JointType::kRevolute, place);
+    turns();
   }
 
   /// A plain shaft through a sleeve.
@@ -79,6 +101,8 @@ class Builder {
     sleeve(a, place, r, h);
     add(b, place(lathe({{0, -reach * h}, {r, -reach * h}, {r, reach * h}, {0, reach * h}}, n(), 0.0, {1, 0, 1, 1})));
     truth(a, b, JointType::kCylindrical, place);
+    turns();
+    slides();
   }
 
   void sleeve(const std::string& part, const Place& place, double r, double h) {
@@ -98,7 +122,25 @@ class Builder {
     add(a, place(lathe(ring, n(), v.phase, {1})));
     add(b, place(ball_with_neck(r, 0.4 * r, 2.5 * r)));
     truth(a, b, JointType::kBall, place);
+    turns();
+    swings(neck_meets_rim(r, half_arc));
   }
+
+  /// How far a neck of 0.4 r leans until its side meets the edge of the ring. Both are polygons; the least is where a
+  /// flat of the ring's or a corner of both is in line.
+  double neck_meets_rim(double r, double half_arc) const {
+    const double inner = r + gap(2 * r), high = inner * std::sin(half_arc), rim = inner * std::cos(half_arc);
+    const double flat = std::cos(kPi / n());
+    const auto lean = [&](double rim_here, double neck_here) {
+      return std::atan2(rim_here, high) - std::asin(neck_here / std::hypot(rim_here, high));
+    };
+    const double neck = 0.4 * r;
+    if (v.phase == 0.5) return std::min(lean(rim * flat, neck), lean(rim, neck * flat));
+    return std::min(lean(rim, neck), lean(rim * flat, neck * flat));
+  }
+
+  /// How far the sleeve of a hinge or slider reaches along its own x.
+  double sleeve_reach(double r) const { return 1.8 * r * std::cos(2 * kPi * std::min(v.phase, 1 - v.phase) / n()); }
 
   Shell ball_with_neck(double r, double neck, double length) const {
     Loop profile;
@@ -121,6 +163,7 @@ class Builder {
                            {rectangle(-w - g, -d - g, w + g, d + g)}, -h, h)));
     add(b, place(box({-w, -d, -reach * h}, {w, d, reach * h})));
     truth(a, b, JointType::kPrismatic, place);
+    slides();
   }
 
   /// A square peg in a blind square hole.
@@ -173,10 +216,12 @@ void lamp(Builder& b) {
   b.bar("column", {0.018, 0, 0.06}, {0.06, 0, 0.06}, 0.008);
   b.bar("column", {0.057, 0, 0.06}, {0.057, 0, 0.15}, 0.008);
   b.hinge("column", "arm 1", at({0.057, 0, 0.165}, y), 0.01, 0.012);
+  b.range_unknown();
   b.bar("arm 1", {0.057, 0.0165, 0.165}, {0.057, 0.04, 0.165}, 0.006);
   b.bar("arm 1", {0.057, 0.04, 0.165}, {-0.1, 0.04, 0.4}, 0.008);
   b.bar("arm 1", {-0.1, 0.04, 0.4}, {-0.1, 0.018, 0.4}, 0.006);
   b.hinge("arm 2", "arm 1", at({-0.1, 0, 0.4}, y), 0.01, 0.012);
+  b.range_unknown();
   b.bar("arm 2", {-0.1, 0, 0.415}, {0.044, 0, 0.498}, 0.006);
   b.ball("arm 2", "shade", at({0.07, 0, 0.5}, -Vec3::UnitZ()), 0.02);
   b.add("shade", at({0.07, 0, 0.45})(
@@ -204,7 +249,10 @@ void chair(Builder& b) {
   b.add("seat", lathe({{q + k, low}, {0.05, low}, {0.2, low + 0.02}, {0.2, low + 0.05}, {0.04, high}, {q + k, high}},
                       b.n(), b.v.phase));
   b.truth("foot", "stem", JointType::kCylindrical, at({0, 0, 0.1}));
+  b.turns();
+  b.slides(0.2 - 0.36);  // the collar comes down on the foot
   b.truth("stem", "seat", JointType::kRevolute, at({0, 0, 0.405}));
+  b.turns();
   // The back leans on a square post that slides in the seat's lug.
   b.prism("lug", "back", at({0.3, 0, 0.42}), 0.02, 0.01, 0.03, 3.0);
 }
@@ -214,18 +262,29 @@ void brush_arm(Builder& b) {
   const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
   b.peg("base", "column", at({0, 0, 0}), 0.03, 0.05, 0.2);
   b.bar("column", {0, 0.02, 0.19}, {0, 0.095, 0.19}, 0.02);
+  const double gap = b.gap(0.06);
   b.hinge("arm", "column", at({0, 0.13, 0.19}, y), 0.02, 0.025);
-  b.bar("arm", {0.03, 0.13, 0.19}, {0.15, 0.13, 0.19}, 0.015);
+  {  // In the plane across the hinge, from its axis: the board comes round to one side of the base or to the other.
+    const double near_edge = 0.17, top = 0.19 + gap, bottom = top + 0.02, half_base = 0.06;
+    const double r = std::hypot(near_edge, bottom), corner = std::hypot(half_base, 0.27);
+    b.turns(std::asin(half_base / r) - std::asin(near_edge / r),
+            2 * kPi - std::acos(top / corner) - std::asin(half_base / corner));
+  }
+  b.bar("arm", {0.01, 0.13, 0.156}, {0.16, 0.13, 0.156}, 0.015);
   b.prism("arm", "slide", at({0.2, 0.13, 0.19}, x), 0.02, 0.015, 0.05, 2.4);
+  b.slides(b.sleeve_reach(0.02) - 0.08);  // its end meets the hinge
   b.bar("slide", {0.31, 0.13, 0.19}, {0.3415, 0.13, 0.19}, 0.012);
   b.slider("slide", "rod", at({0.37, 0.13, 0.19}, z), 0.02, 0.03, 2.5);
+  b.slides(-kOpen, 0.16 - 0.06 - (0.02 + b.gap(0.04)) * std::sin(50 * kDegree));  // the ball's ring meets the sleeve
   b.bar("rod", {0.37, 0.13, 0.12}, {0.37, 0.13, 0.1}, 0.01);
   b.ball("brush", "rod", at({0.37, 0.13, 0.06}, z), 0.02);
   b.add("brush", at({0.37, 0.13, 0.0})(box({-0.06, -0.03, 0.0}, {0.06, 0.03, 0.02})));
   b.bar("brush", {0.345, 0.13, 0.01}, {0.345, 0.13, 0.055}, 0.006);
-  const double gap = b.gap(0.06);
   b.add("board", box({0.17, -0.07, -0.02 - gap}, {0.57, 0.33, -gap}));
   b.truth("board", "brush", JointType::kPlanar, at({0.37, 0.13, -gap / 2}));
+  b.slides_along(x, -kOpen, 0.17 - 0.06);  // the base comes along and meets the board
+  b.slides_along(y);
+  b.turns();
 }
 
 void humanoid(Builder& b) {
@@ -237,10 +296,12 @@ void humanoid(Builder& b) {
   for (const double side : {-1.0, 1.0}) {
     const std::string s = side < 0 ? "left " : "right ";
     b.ball("torso", s + "thigh", at({side * 0.08, 0, 0.88}, -z), 0.04);
+    b.range_unknown();
     b.bar("torso", {side * 0.08, 0.05, 0.88}, {side * 0.08, 0.05, 1.0}, 0.012);
     b.bar(s + "thigh", {side * 0.08, 0, 0.8}, {side * 0.08, 0, 0.54}, 0.06);
     b.bar(s + "thigh", {side * 0.08, 0, 0.55}, {side * 0.08, 0, 0.525}, 0.02);
     b.hinge(s + "thigh", s + "shin", at({side * 0.08, 0, 0.5}, x), 0.018, 0.02);
+    b.range_unknown();
     b.bar(s + "shin", {side * 0.08 + 0.029, 0, 0.5}, {side * 0.08 + 0.05, 0, 0.5}, 0.02);
     b.bar(s + "shin", {side * 0.08 + 0.048, 0, 0.51}, {side * 0.08 + 0.048, 0, 0.1}, 0.02);
     b.add(s + "shin", box({side * 0.08, -0.05, 0.05}, {side * 0.08 + 0.06, 0.1, 0.11}));
@@ -273,6 +334,12 @@ void dog(Builder& b) {
   b.bar("body", {-0.24, 0.024, 0.4}, {-0.29, 0.024, 0.4}, 0.006);
   b.bar("tail", {-0.335, 0, 0.4}, {-0.5, 0, 0.5}, 0.015);
   b.hinge("body", "head", at({0.3, 0, 0.4}, y), 0.02, 0.03);
+  {  // From the axis: the head is the box above (−0.03 … 0.15, 0.08), the body's corners are (−0.05, 0.02), (−0.05,
+     // −0.1).
+    const double lower = std::hypot(0.03, 0.08), corner = std::hypot(0.05, 0.1);
+    b.turns(std::asin(0.02 / lower) + std::atan2(0.08, -0.03) - kPi,
+            std::asin(0.08 / corner) + kPi - std::acos(0.05 / corner));
+  }
   b.bar("body", {0.24, 0, 0.4}, {0.272, 0, 0.4}, 0.02);
   b.bar("head", {0.3, 0.041, 0.4}, {0.3, 0.07, 0.4}, 0.02);
   b.bar("head", {0.3, 0.065, 0.39}, {0.3, 0.065, 0.5}, 0.02);
@@ -291,9 +358,14 @@ void scissors(Builder& b) {
   const double h = t + g / 2 + g, e = h + 0.002, R = 0.007;
   b.add("rivet",
         lathe({{0, -e}, {R, -e}, {R, -h}, {r, -h}, {r, h}, {R, h}, {R, e}, {0, e}}, b.n(), 0.0, {1, 1, 0, 0, 0, 1, 1}));
-  b.truth("blade 1", "blade 2", JointType::kPlanar, at({0, 0, 0}));
+  b.truth("blade 1", "blade 2", JointType::kPlanar, at({0, 0, 0}));  // in a closed chain: the rivet is left out
+  b.slides_along(Vec3::UnitX());
+  b.slides_along(Vec3::UnitY());
+  b.turns();
   b.truth("blade 1", "rivet", JointType::kRevolute, at({0, 0, -t / 2}));
+  b.turns();
   b.truth("blade 2", "rivet", JointType::kRevolute, at({0, 0, t / 2}));
+  b.turns();
 }
 
 /// A slider crank: one closed loop. Every part is one shell but for the block and the crank.
@@ -328,6 +400,7 @@ void piston(Builder& b) {
           lie(extrusion(stadium(0.016, 0.0, length, b.n()),
                         {circle(r + g, b.n(), b.v.phase), circle(q + k, b.n(), b.v.phase, {length, 0})}, -h, h)));
     b.truth("crank", "rod", JointType::kRevolute, p);
+    b.turns();
     // The wrist pin turns in the rod and is caught by the piston's two walls, of which it is a part.
     const Place w = at(wrist, y);
     b.add("piston", w(lathe({{0, -0.014},
@@ -340,6 +413,10 @@ void piston(Builder& b) {
                              {0, 0.014}},
                             b.n())));
     b.truth("rod", "piston", JointType::kRevolute, w);
+    // The rod's side, 0.016 from its axis, meets the lower edge of the piston, (±0.035, 0.022) from the pin.
+    const double now = std::atan2(along.z(), -along.x()),  // below the horizontal
+        meets = std::atan2(0.022, 0.035) - std::asin(0.016 / std::hypot(0.022, 0.035));
+    b.turns(-(kPi - now + meets), now + meets);
   }
   const double bore = 0.035, g = b.gap(2 * bore), low = wrist.z() + 0.022;
   b.add("piston", lathe({{0, low}, {bore, low}, {bore, low + 0.03}, {0, low + 0.03}}, b.n()));
@@ -347,10 +424,11 @@ void piston(Builder& b) {
     b.bar("piston", wrist + Vec3(0, side * 0.0125, -0.004), wrist + Vec3(0, side * 0.0125, 0.026), 0.004);
   b.add("block", lathe({{bore + g, low - 0.01}, {0.05, low - 0.01}, {0.05, low + 0.08}, {bore + g, low + 0.08}}, b.n(),
                        b.v.phase));
-  b.bar("block", {0, -0.048, low + 0.02}, {0, -0.12, low + 0.02}, 0.01);
-  b.bar("block", {0, -0.115, low + 0.025}, {0, -0.115, 0.021}, 0.01);
-  b.bar("block", {0, -0.115, 0.021}, {0, -0.055, 0.021}, 0.006);
+  b.bar("block", {0, -0.048, low + 0.02}, {0, -0.065, low + 0.02}, 0.01);
+  b.bar("block", {0, -0.06, low + 0.025}, {0, -0.06, 0.02}, 0.01);
   b.truth("block", "piston", JointType::kCylindrical, at(Vec3(0, 0, low + 0.015)));
+  b.turns();
+  b.slides();
 }
 
 /// A cabinet with two drawers, one half open and one nearly closed.
@@ -371,6 +449,7 @@ void drawer(Builder& b) {
     // The drawer's own y comes out, its z is up.
     b.add(name, front(at(Vec3(0, i * pitch, 0), Vec3::UnitY(), -Vec3::UnitX())(d)));
     b.truth("cabinet", name, JointType::kPrismatic, {front.R, front(Vec3(0, i * pitch, 0))});
+    b.slides();  // the cabinet has no back
   }
 }
 
@@ -379,12 +458,15 @@ void hitch(Builder& b) {
   const Vec3 z = Vec3::UnitZ(), y = Vec3::UnitY();
   b.ball("coupler", "tongue", at({0, 0, 0}, -z), 0.025, 60 * kDegree);
   b.bar("coupler", {0.03, 0, 0}, {0.2, 0, 0}, 0.02);
-  b.slider("coupler", "pin", at({0.22, 0, 0}, y), 0.015, 0.02, 1.8);
   const double r = 0.015, g = b.gap(2 * r);
-  const double near = 0.0203 + std::max(0.0, g), far = near + 0.012;
+  const double near = 0.0203 + std::max(0.0, g), far = near + 0.012, beside = near + 0.005 - 0.02;
+  b.slider("coupler", "pin", at({0.22, 0, 0}, y), r, 0.02, 1.8);
+  b.slides(-beside);  // the clevis comes along and meets the sleeve
   b.add("clevis", at({0.22, 0, 0}, y, Vec3::UnitX())(extrusion(stadium(0.03, 0.0, 0.15, b.n()),
                                                                {circle(r + g, b.n(), b.v.phase)}, near + 0.005, far)));
   b.truth("clevis", "pin", JointType::kCylindrical, at({0.22, 0.5 * (near + 0.005 + far), 0}, y));
+  b.turns();
+  b.slides(-kOpen, beside);
 }
 
 /// A door on three hinges, its pins on the frame.
@@ -400,6 +482,9 @@ void door(Builder& b) {
   }
   b.joints.clear();
   b.truth("door", "frame", JointType::kRevolute, at({0, 0, 1.0}));
+  const double edge = std::hypot(0.03, 0.05);  // of the frame; the door's face is 0.02 from the plane of the axis
+  const double opens = std::atan2(0.05, -0.03) - std::asin(0.02 / edge);
+  b.turns(-opens, opens);
 }
 
 void sliding_plate(Builder& b) {
@@ -408,8 +493,11 @@ void sliding_plate(Builder& b) {
   b.add("plate", at(Vec3(0.1, 0.05, 0), Vec3::UnitZ(), Vec3(0.9, 0.3, 0))(box({-0.1, -0.1, g}, {0.1, 0.1, g + 0.02})));
   const double k = b.gap(0.06);
   b.add("puck", at(Vec3(-0.2, -0.1, 0))(lathe({{0, k}, {0.03, k}, {0.03, 0.02}, {0, 0.02}}, b.n())));
+  // A square and a circle have no axes of their own: how far they slide along those found no formula tells.
   b.truth("table", "plate", JointType::kPlanar, at({0.1, 0.05, g / 2}));
+  b.turns();
   b.truth("table", "puck", JointType::kPlanar, at({-0.2, -0.1, k / 2}));
+  b.turns();
 }
 
 void welded_pair(Builder& b) { b.peg("block", "post", at({0, 0, 0}), 0.05, 0.08, 0.3); }
@@ -435,7 +523,11 @@ void telescope(Builder& b) {
   b.add("middle", tube(0.025 + g2, 0.03, 0.1, 0.4, 0.0));
   b.add("inner", lathe({{0, 0.25}, {0.025, 0.25}, {0.025, 0.5}, {0, 0.5}}, b.n(), b.v.phase));
   b.truth("outer", "middle", JointType::kCylindrical, at({0, 0, 0.2}));
+  b.turns();
+  b.slides();
   b.truth("middle", "inner", JointType::kCylindrical, at({0, 0, 0.325}));
+  b.turns();
+  b.slides();
 }
 
 /// A ring in a ring in a fork, on journals with flanges.
@@ -458,7 +550,9 @@ void gimbal(Builder& b) {
   b.add("gyro", lathe({{0, -0.01}, {0.05, -0.01}, {0.05, 0.01}, {0, 0.01}}, b.n()));
   b.joints.clear();
   b.truth("fork", "ring", JointType::kRevolute, at(Vec3::Zero(), x));
+  b.turns();
   b.truth("ring", "gyro", JointType::kRevolute, at(Vec3::Zero(), y));
+  b.turns();
 }
 
 /// A dovetail slide, and a wheel turning on a stub axle with a cone at its end. Every part is one shell.
@@ -473,6 +567,7 @@ void dovetail(Builder& b) {
   b.add("rail", extrusion(rail, {}, -0.15, 0.15));
   b.add("carriage", extrusion(tail(0.0), {}, -0.05, 0.08));
   b.truth("rail", "carriage", JointType::kPrismatic, at({0, -0.01, 0.015}));
+  b.slides();
   const double r = 0.012, k = b.gap(2 * r);
   const Place axle = at({0.3, 0, 0}, Vec3::UnitX());
   b.add("axle", axle(lathe({{0, -0.06},
@@ -488,6 +583,7 @@ void dovetail(Builder& b) {
         axle(lathe({{r + k, -0.02}, {0.02 + k, -0.02}, {0.06, -0.015}, {0.06, 0.02}, {0.02, 0.028}, {r + k, 0.02}},
                    b.n(), b.v.phase)));
   b.truth("axle", "wheel", JointType::kRevolute, at({0.3, 0, 0}, Vec3::UnitX()));
+  b.turns();
 }
 
 /// A stack of three plates, and a T-shaped peg in a T-shaped blind hole.
@@ -498,7 +594,9 @@ void stack(Builder& b) {
   b.add("upper", at(Vec3(0.02, 0, 0), Vec3::UnitZ(),
                     Vec3(1, 1, 0))(box({-0.05, -0.05, 0.02 + 2 * g}, {0.05, 0.05, 0.05 + 2 * g})));
   b.truth("lower", "middle", JointType::kPlanar, at({0, 0, g / 2}));
+  b.turns();
   b.truth("middle", "upper", JointType::kPlanar, at({0.02, 0, 0.02 + 1.5 * g}));
+  b.turns();
   const double k = b.gap(0.04);
   const auto tee = [](double o) {
     return Loop{{-0.04 - o, -0.02 - o}, {0.04 + o, -0.02 - o},  {0.04 + o, 0.02 + o},   {0.015 + o, 0.02 + o},
@@ -508,6 +606,7 @@ void stack(Builder& b) {
   b.add("socket", far(extrusion(rectangle(-0.08, -0.06, 0.08, 0.1), {tee(k)}, 0.0, 0.05)));
   b.add("key", far(extrusion(tee(0.0), {}, -0.03, 0.1)));
   b.truth("socket", "key", JointType::kPrismatic, far);
+  b.slides();
 }
 
 /// Two balls on one rod, as in a drop link.
@@ -523,9 +622,82 @@ void drop_link(Builder& b) {
 /// A bolt in a nut.
 void screw(Builder& b) {
   const double r = 0.01, depth = 0.003, pitch = 0.004 / (2 * kPi), g = b.gap(2 * r);
-  b.add("bolt", thread(r, depth, pitch, -0.03, 0.03, b.n(), false));
-  b.add("nut", thread(r + g, depth, pitch, -0.008, 0.008, b.n(), true, 0.02));
+  b.add("bolt", thread(r, depth, pitch, -0.03, 0.03, b.n(), 0.0, false));
+  b.add("nut", thread(r + g, depth, pitch, -0.008, 0.008, b.n(), b.v.phase, true, 0.02));
   b.truth("bolt", "nut", JointType::kCylindrical, at({0, 0, 0}), pitch);
+  b.turns();
+}
+
+// Drawn after the method was settled on all of the above.
+
+/// A left-handed spindle of a coarse pitch between two collars, with its nut off the middle.
+void spindle(Builder& b) {
+  const double r = 0.012, depth = 0.0035, pitch = -0.0075 / (2 * kPi), end = 0.05, low = -0.018, high = 0.006;
+  b.add("spindle", thread(r, depth, pitch, -end, end, b.n(), 0.0, false));
+  for (const double side : {-1.0, 1.0}) {
+    const double z = side * (end + 0.004);
+    b.add("spindle", lathe({{0, z - 0.005}, {0.02, z - 0.005}, {0.02, z + 0.005}, {0, z + 0.005}}, b.n()));
+  }
+  b.add("nut", thread(r + b.gap(2 * r), depth, pitch, low, high, b.n(), b.v.phase, true, 0.025));
+  b.truth("spindle", "nut", JointType::kCylindrical, at({0, 0, 0}), pitch);
+  // The collars' inner faces are 1 mm inside the ends of the thread.
+  b.turns((end - 0.001 - high) / pitch, (-end + 0.001 - low) / pitch);
+}
+
+/// A flat bolt with a head and a handle in its housing.
+void latch(Builder& b) {
+  b.prism("housing", "bolt", at(Vec3::Zero(), Vec3::UnitX()), 0.01, 0.006, 0.025, 2.4);
+  b.add("bolt", box({0.045, -0.009, -0.016}, {0.05, 0.009, 0.016}));
+  b.bar("bolt", {-0.056, 0, 0}, {-0.056, 0, 0.05}, 0.008);
+  b.slides(0.025 - 0.045, 0.052 - 0.025);  // head and handle meet the housing's ends
+}
+
+/// An arm on a post between two stops.
+void gate(Builder& b) {
+  b.hinge("post", "arm", at(Vec3::Zero()), 0.01, 0.015);
+  b.bar("arm", {0, 0, 0.0205}, {0, 0, 0.04}, 0.008);
+  b.bar("arm", {0, 0, 0.036}, {0.12, 0, 0.036}, 0.008);
+  b.add("post", box({-0.1, -0.1, -0.035}, {0.1, 0.1, -0.03}));
+  b.add("post", box({0.07, 0.05, -0.032}, {0.09, 0.09, 0.05}));
+  b.add("post", box({-0.09, -0.08, -0.032}, {-0.06, -0.05, 0.05}));
+  // The arm's sides, 0.004 from the axis, meet the corners (0.09, 0.05) and (−0.06, −0.08).
+  b.turns(std::atan2(-0.08, -0.06) + std::asin(0.004 / 0.1),
+          std::atan2(0.05, 0.09) - std::asin(0.004 / std::hypot(0.09, 0.05)));
+}
+
+/// A wheel in a fork that swivels under a plate.
+void caster(Builder& b) {
+  b.hinge("plate", "fork", at({0, 0, 0.1}), 0.012, 0.012);
+  b.add("plate", box({-0.04, -0.04, 0.13}, {0.04, 0.04, 0.135}));
+  b.bar("fork", {0, 0, 0.083}, {0, 0, 0.075}, 0.01);
+  b.bar("fork", {0, -0.031, 0.075}, {0, 0.031, 0.075}, 0.008);
+  for (const double side : {-1.0, 1.0}) {
+    b.bar("fork", {0, side * 0.028, 0.079}, {0, side * 0.028, 0.0275}, 0.006);
+    b.bar("fork", {0, side * 0.0125, 0.03}, {0, side * 0.031, 0.03}, 0.005);
+  }
+  b.hinge("wheel", "fork", at({0, 0, 0.03}, Vec3::UnitY()), 0.006, 0.01);
+  b.add("wheel", at({0, 0, 0.03},
+                    Vec3::UnitY())(lathe({{0.01, -0.008}, {0.035, -0.008}, {0.035, 0.008}, {0.01, 0.008}}, b.n())));
+}
+
+/// Two yokes on a cross.
+void cardan(Builder& b) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  for (const double end : {-1.0, 1.0}) {
+    const std::string yoke = end < 0 ? "lower yoke" : "upper yoke";
+    const Vec3 along = end < 0 ? x : y;
+    for (const double side : {-1.0, 1.0}) {
+      const Vec3 ear = side * 0.04 * along;
+      b.hinge(yoke, "cross", at(ear, along), 0.006, 0.005);
+      b.bar(yoke, ear + end * 0.008 * z, ear + end * 0.06 * z, 0.006);
+    }
+    b.bar(yoke, -0.043 * along + end * 0.06 * z, 0.043 * along + end * 0.06 * z, 0.006);
+    b.bar(yoke, end * 0.058 * z, end * 0.1 * z, 0.01);
+    b.bar("cross", -0.034 * along, 0.034 * along, 0.006);
+  }
+  b.joints.clear();  // how far it bends no short formula tells
+  b.truth("lower yoke", "cross", JointType::kRevolute, at(Vec3::Zero(), x));
+  b.truth("upper yoke", "cross", JointType::kRevolute, at(Vec3::Zero(), y));
 }
 
 struct Recipe {
@@ -552,7 +724,12 @@ const std::map<std::string, Recipe>& recipes() {
                                                     {"dovetail", {dovetail, false}},
                                                     {"stack", {stack, false}},
                                                     {"drop link", {drop_link, true}},
-                                                    {"screw", {screw, false}}};
+                                                    {"screw", {screw, false}},
+                                                    {"spindle", {spindle, true}},
+                                                    {"latch", {latch, true}},
+                                                    {"gate", {gate, true}},
+                                                    {"caster", {caster, true}},
+                                                    {"cardan", {cardan, true}}};
   return all;
 }
 
@@ -609,12 +786,13 @@ void vary(SurfaceMesh& part, const Variant& v, std::mt19937& random) {
 const std::vector<std::string>& tuning_names() {
   static const std::vector<std::string> names = {"lamp",          "chair",       "brush arm", "humanoid", "dog",
                                                  "scissors",      "piston",      "drawer",    "hitch",    "door",
-                                                 "sliding plate", "welded pair", "snake"};
+                                                 "sliding plate", "welded pair", "snake",     "screw"};
   return names;
 }
 
 const std::vector<std::string>& held_out_names() {
-  static const std::vector<std::string> names = {"telescope", "gimbal", "dovetail", "stack", "drop link", "screw"};
+  static const std::vector<std::string> names = {"telescope", "gimbal", "dovetail", "stack",  "drop link",
+                                                 "spindle",   "latch",  "gate",     "caster", "cardan"};
   return names;
 }
 
@@ -637,6 +815,11 @@ MadeAssembly make(const std::string& name, const Variant& variant) {
     joint.origin = variant.rotation * joint.origin * variant.scale + variant.translation;
     joint.axis = variant.rotation * joint.axis;
     joint.pitch *= variant.scale;
+    for (TrueRange& range : joint.ranges) {
+      range.along = variant.rotation * range.along;
+      if (range.freedom == TrueRange::Freedom::kTranslation)
+        range.range = {variant.scale * range.range.low, variant.scale * range.range.high};
+    }
     out.joints.push_back(joint);
   }
   out.diagonal = box_diagonal(out.surface.surface.vertices);

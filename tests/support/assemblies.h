@@ -29,12 +29,22 @@ struct Variant {
   unsigned seed = 1;
 };
 
+/// How far one freedom of a joint goes, for the parts as they are drawn, facets included: b's motion relative to a,
+/// with the others at 0 and the rest of the assembly as limber/articulation/range_of_motion.h moves it.
+struct TrueRange {
+  enum class Freedom { kRotation, kTranslation, kCone };
+  Freedom freedom = Freedom::kRotation;
+  Vec3 along = Vec3::UnitZ();  ///< about or along which; without meaning for a cone
+  Interval range;              ///< rad, length; a cone: [0, half angle]
+};
+
 struct TrueJoint {
   std::string a, b;
   JointType type = JointType::kFixed;
   Vec3 origin = Vec3::Zero();  ///< centre; any point of the axis; planar: midway between the surfaces
   Vec3 axis = Vec3::UnitZ();   ///< any of the two senses; planar: the normal; without meaning for ball and fixed
   double pitch = 0.0;
+  std::vector<TrueRange> ranges{};  ///< those known on paper
 };
 
 struct MadeAssembly {
@@ -44,7 +54,7 @@ struct MadeAssembly {
   double diagonal = 0.0;  ///< of the bounding box
 };
 
-/// Those that thresholds were chosen on, and those that only judge.
+/// Those that thresholds were chosen on or the method was changed for, and those that only judge.
 const std::vector<std::string>& tuning_names();
 const std::vector<std::string>& held_out_names();
 

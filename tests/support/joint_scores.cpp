@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
+#include <optional>
+
+#include "limber/articulation/range_of_motion.h"
 
 namespace limber::assemblies {
 namespace {
@@ -22,14 +26,92 @@ void measure(const TrueJoint& truth, const JointSpec& found, double diagonal, Jo
     distance = (off - truth.axis * truth.axis.dot(off)).norm();
   if (found.type == JointType::kPlanar) distance = std::abs(truth.axis.dot(off));
   score.origin_error = distance / diagonal;
+  if (truth.pitch != 0.0) score.pitch_error = std::abs(found.pitch / truth.pitch - 1.0);
   score.pitch_right = std::abs(found.pitch - truth.pitch) <= 0.02 * std::abs(truth.pitch);
+}
+
+Assembly taken_apart(const MadeAssembly& made) {
+  return find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
+}
+
+const std::string& name_of(const Assembly& assembly, Index component) {
+  return assembly.components[static_cast<std::size_t>(component)].name;
+}
+
+Interval reversed(const Interval& i) { return {-i.high, -i.low}; }
+
+/// What was found for a freedom, in the truth's own sense of direction; nothing where the joint has no such axis.
+std::optional<Interval> found_range(const TrueRange& truth, const JointSpec& found, bool b_moves) {
+  constexpr double kSameAxis = 0.999;  // cosine
+  const bool planar = found.type == JointType::kPlanar;
+  const auto in_sense = [&](const Interval& range, int axis) -> std::optional<Interval> {
+    const double along = found.frame.axes.col(axis).dot(truth.along);
+    if (std::abs(along) < kSameAxis) return std::nullopt;
+    return (along > 0.0) == b_moves ? range : reversed(range);
+  };
+  const JointLimits& limits = found.limits;
+  switch (truth.freedom) {
+    case TrueRange::Freedom::kCone:
+      return Interval{0.0, limits.cone};
+    case TrueRange::Freedom::kRotation:
+      if (found.type == JointType::kBall) return in_sense(limits.euler[0], 0);
+      return in_sense(limits.rotation, planar ? 2 : 0);
+    case TrueRange::Freedom::kTranslation:
+      for (int axis = 0; axis < (planar ? 2 : 1); ++axis)
+        if (const auto range = in_sense(limits.translation[static_cast<std::size_t>(axis)], axis)) return range;
+  }
+  return std::nullopt;
+}
+
+RangeScore compared(const TrueRange& truth, const std::optional<Interval>& found, double diagonal) {
+  static const char* const kFreedoms[] = {"rotation", "translation", "cone"};
+  RangeScore out;
+  out.freedom = kFreedoms[static_cast<int>(truth.freedom)];
+  out.angle = truth.freedom != TrueRange::Freedom::kTranslation;
+  if (!found) {
+    out.same_type = false;
+    out.found = "no such axis";
+    return out;
+  }
+  const double unit = out.angle ? std::numbers::pi / 180.0 : 1e-3 * diagonal;
+  for (const auto& [expected, got] : {std::pair(truth.range.low, found->low), {truth.range.high, found->high}}) {
+    out.ends_match = out.ends_match && std::isfinite(expected) == std::isfinite(got);
+    if (std::isfinite(expected) && std::isfinite(got)) out.error = std::max(out.error, std::abs(got - expected) / unit);
+  }
+  char text[128];
+  std::snprintf(text, sizeof text, "%.3f to %.3f where %.3f to %.3f is right%s", found->low / unit, found->high / unit,
+                truth.range.low / unit, truth.range.high / unit, out.angle ? " (degrees)" : " (thousandths)");
+  out.found = text;
+  return out;
 }
 
 }  // namespace
 
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs) {
+  const Assembly assembly = taken_apart(made);
+  const auto joints = detect_joints(assembly, options, jobs);
+  const auto ranges = ranges_of_motion(assembly, joints, {}, jobs);
+  std::vector<RangeScore> out;
+  for (const TrueJoint& truth : made.joints)
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      const std::string &a = name_of(assembly, joints[i].a), &b = name_of(assembly, joints[i].b);
+      if (std::minmax(a, b) != std::minmax(truth.a, truth.b) || joints[i].joint.type != truth.type) continue;
+      for (const TrueRange& range : truth.ranges) {
+        const JointSpec& found = ranges[i].joint;
+        const bool same_type = found.type == truth.type;
+        RangeScore score =
+            compared(range, same_type ? found_range(range, found, b == truth.b) : std::nullopt, made.diagonal);
+        score.joint = truth.a + " - " + truth.b;
+        score.type = static_cast<int>(truth.type);
+        if (!same_type) score.found = "became " + std::string(to_string(found.type));
+        out.push_back(score);
+      }
+    }
+  return out;
+}
+
 Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs) {
-  const Assembly assembly =
-      find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
+  const Assembly assembly = taken_apart(made);
   const auto found = detect_joints(assembly, options, jobs);
   std::vector<char> matched(found.size(), 0);
   Score out;
@@ -39,10 +121,7 @@ Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jo
     score.truth = static_cast<int>(truth.type);
     score.found = kNone;
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const auto name = [&](Index c) -> const std::string& {
-        return assembly.components[static_cast<std::size_t>(c)].name;
-      };
-      const auto pair = std::minmax(name(found[i].a), name(found[i].b));
+      const auto pair = std::minmax(name_of(assembly, found[i].a), name_of(assembly, found[i].b));
       if (pair != std::minmax(truth.a, truth.b)) continue;
       matched[i] = 1;
       score.found = static_cast<int>(found[i].joint.type);
@@ -54,25 +133,48 @@ Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jo
   }
   for (std::size_t i = 0; i < found.size(); ++i)
     if (!matched[i])
-      out.extra.push_back(assembly.components[static_cast<std::size_t>(found[i].a)].name + " - " +
-                          assembly.components[static_cast<std::size_t>(found[i].b)].name + " " +
+      out.extra.push_back(name_of(assembly, found[i].a) + " - " + name_of(assembly, found[i].b) + " " +
                           std::string(to_string(found[i].joint.type)) + "; " + found[i].reasons.front() + "; " +
                           found[i].reasons.back());
   return out;
 }
 
-std::vector<VariantClass> variant_classes() {
-  const auto of = [](std::initializer_list<int> segments, std::initializer_list<double> clearances, auto change) {
-    std::vector<Variant> out;
-    for (const int n : segments)
-      for (const double c : clearances)
-        for (const double phase : {0.0, 0.5}) {
-          Variant v{.segments = n, .clearance = c, .phase = phase};
-          change(v);
-          out.push_back(v);
-        }
-    return out;
+namespace {
+
+/// All combinations, each with shafts and holes aligned and turned by half a segment.
+template <class Change>
+std::vector<Variant> of(std::initializer_list<int> segments, std::initializer_list<double> clearances,
+                        Change&& change) {
+  std::vector<Variant> out;
+  for (const int n : segments)
+    for (const double c : clearances)
+      for (const double phase : {0.0, 0.5}) {
+        Variant v{.segments = n, .clearance = c, .phase = phase};
+        change(v);
+        out.push_back(v);
+      }
+  return out;
+}
+
+}  // namespace
+
+std::vector<VariantClass> range_variant_classes() {
+  const auto same = [](Variant&) {};
+  const auto turned = [](Variant& v) {
+    v.swapped = v.shuffled = true;
+    v.scale = 1e-3;
+    v.rotation = Eigen::AngleAxisd(2.1, Vec3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
+    v.translation = 1e-3 * Vec3(3, 6, -3);
   };
+  return {{"32, 64 segments, gap 0 to 2 %", of({32, 64}, {0.0, 0.005, 0.02}, same)},
+          {"32, 64 segments, overlap 0.5 %", of({32, 64}, {-0.005}, same)},
+          {"16 segments", of({16}, {0.0, 0.005, 0.02, -0.005}, same)},
+          {"8 segments, without balls", of({8}, {0.0, 0.005, 0.02, -0.005}, same), 1.0, false},
+          {"0.03 % jitter", of({32}, {0.0, 0.005, 0.02}, [](Variant& v) { v.jitter = 0.0003; })},
+          {"rotated, scaled, shuffled", of({32}, {0.005}, turned)}};
+}
+
+std::vector<VariantClass> variant_classes() {
   const auto same = [](Variant&) {};
   std::vector<VariantClass> out;
   out.push_back({"32-64 segments, gap 0, 0.5 %", of({32, 48, 64}, {0.0, 0.005}, same)});

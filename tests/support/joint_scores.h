@@ -11,10 +11,11 @@
 namespace limber::assemblies {
 
 struct JointScore {
-  std::string name;         ///< "a – b"
-  int truth = 0;            ///< as int of JointType
-  int found = 0;            ///< the same; 6: none
-  bool pitch_right = true;  ///< a screw's, within 2 %; no pitch where there is none
+  std::string name;          ///< "a – b"
+  int truth = 0;             ///< as int of JointType
+  int found = 0;             ///< the same; 6: none
+  bool pitch_right = true;   ///< a screw's, within 2 %; no pitch where there is none
+  double pitch_error = 0.0;  ///< of the true pitch
   double confidence = 0.0;
   double axis_error = 0.0;    ///< degrees; 0 for ball and fixed
   double origin_error = 0.0;  ///< of the assembly's diagonal: ball: distance; revolute, cylindrical: from the axis;
@@ -30,6 +31,21 @@ struct Score {
 
 Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs);
 
+/// One freedom of a joint that was read right, and whose range is known.
+struct RangeScore {
+  std::string joint, freedom;
+  int type = 0;            ///< as int of JointType
+  bool same_type = true;   ///< the limits made no other type of it
+  bool ends_match = true;  ///< open ends are open and stops are stops
+  bool angle = true;       ///< error in degrees; otherwise in thousandths of the assembly's diagonal
+  double error = 0.0;      ///< of the worse end that stops
+  std::string found;       ///< in words
+  bool right() const { return same_type && ends_match && error <= 1.0; }
+};
+
+/// Ranges of motion against those known on paper, for the joints whose type was read right.
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs);
+
 struct VariantClass {
   std::string name;
   std::vector<Variant> variants;
@@ -39,5 +55,8 @@ struct VariantClass {
 
 /// The variants that accuracy is reported for.
 std::vector<VariantClass> variant_classes();
+
+/// Those that ranges of motion are reported for: fewer, since a ball takes some twenty paths.
+std::vector<VariantClass> range_variant_classes();
 
 }  // namespace limber::assemblies

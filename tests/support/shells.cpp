@@ -159,56 +159,90 @@ Shell sphere(double radius, int segments, double phase) {
   return lathe(profile, segments, phase);
 }
 
-Shell thread(double radius, double depth, double pitch, double z0, double z1, int segments, bool nut, double outer) {
-  // One column of vertices per angle; along z a triangle wave that advances with the angle.
-  const double lead = 2.0 * kPi * pitch;
-  const int per_turn = 16, rows = static_cast<int>(std::ceil((z1 - z0) / lead * per_turn));
-  const auto radius_at = [&](double angle, double z) {
-    const double u = (z - pitch * angle) / lead, saw = u - std::floor(u);
-    return radius + depth * (std::abs(2.0 * saw - 1.0) - 0.5);
+namespace {
+
+/// Corners of a thread's section on one side of the axis, from the lower end to the upper.
+struct ThreadColumn {
+  std::vector<Index> vertex;
+  std::vector<int> helix;  ///< which helix each lies on: even the crests, odd the roots; the ends: kLower, kUpper
+  static constexpr int kLower = std::numeric_limits<int>::min(), kUpper = std::numeric_limits<int>::max();
+};
+
+/// Closes the strip between two columns; what lies on the same helix is joined. @param shift of b's numbers
+template <class Push>
+void zip(const ThreadColumn& a, const ThreadColumn& b, int shift, Push&& push) {
+  const auto number = [shift](const ThreadColumn& c, std::size_t i, bool shifted) {
+    const bool end = c.helix[i] == ThreadColumn::kLower || c.helix[i] == ThreadColumn::kUpper;
+    return end || !shifted ? c.helix[i] : c.helix[i] + shift;
   };
+  std::size_t i = 0, k = 0;
+  while (i + 1 < a.vertex.size() || k + 1 < b.vertex.size()) {
+    const int next_a = number(a, std::min(i + 1, a.vertex.size() - 1), false),
+              next_b = number(b, std::min(k + 1, b.vertex.size() - 1), true);
+    if (next_b <= next_a && k + 1 < b.vertex.size()) push(a.vertex[i], b.vertex[k], b.vertex[k + 1]), ++k;
+    if (next_a <= next_b && i + 1 < a.vertex.size()) push(a.vertex[i], b.vertex[k], a.vertex[i + 1]), ++i;
+  }
+}
+
+}  // namespace
+
+Shell thread(double radius, double depth, double pitch, double z0, double z1, int segments, double phase, bool nut,
+             double outer) {
+  // Flanks between helices, as a CAD program meshes them: every edge along the thread lies on a crest or a root.
+  const double lead = 2.0 * kPi * std::abs(pitch);
   Shell out;
-  const auto at = [&](int s, int row) { return static_cast<Index>((s % segments) * (rows + 1) + row); };
-  for (int s = 0; s < segments; ++s)
-    for (int row = 0; row <= rows; ++row) {
-      const double angle = 2.0 * kPi * s / segments, z = z0 + (z1 - z0) * row / rows, r = radius_at(angle, z);
+  std::vector<ThreadColumn> columns;
+  for (int s = 0; s < segments; ++s) {
+    const double angle = 2.0 * kPi * (s + phase) / segments;
+    ThreadColumn& column = columns.emplace_back();
+    const auto add = [&](double z, int helix) {
+      const double u = (z - pitch * angle) / lead, saw = u - std::floor(u);
+      const double r = radius + depth * (std::abs(2.0 * saw - 1.0) - 0.5);
+      column.vertex.push_back(static_cast<Index>(out.vertices.size()));
+      column.helix.push_back(helix);
       out.vertices.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
-    }
+    };
+    const double sliver = 1e-3;  // of half a lead
+    const double low = 2.0 * (z0 - pitch * angle) / lead + sliver, high = 2.0 * (z1 - pitch * angle) / lead - sliver;
+    add(z0, ThreadColumn::kLower);
+    for (int j = static_cast<int>(std::ceil(low)); j < high; ++j) add(0.5 * j * lead + pitch * angle, j);
+    add(z1, ThreadColumn::kUpper);
+  }
   const auto push = [&](Index a, Index b, Index c) {
     out.triangles.push_back(nut ? Triangle{a, c, b} : Triangle{a, b, c});
   };
-  for (int s = 0; s < segments; ++s)
-    for (int row = 0; row < rows; ++row) {
-      push(at(s, row), at(s + 1, row), at(s + 1, row + 1));
-      push(at(s, row), at(s + 1, row + 1), at(s, row + 1));
-    }
+  const auto column = [&](int s) -> const ThreadColumn& { return columns[static_cast<std::size_t>(s % segments)]; };
+  for (int s = 0; s < segments; ++s)  // after a full turn the helices are one thread further
+    zip(column(s), column(s + 1), s + 1 < segments ? 0 : (pitch > 0.0 ? -2 : 2), push);
+  const auto low = [&](int s) { return column(s).vertex.front(); };
+  const auto high = [&](int s) { return column(s).vertex.back(); };
   const auto far = [&](double z, double r) {
     const auto first = static_cast<Index>(out.vertices.size());
     for (int s = 0; s < segments; ++s) {
-      const double angle = 2.0 * kPi * s / segments;
+      const double angle = 2.0 * kPi * (s + phase) / segments;
       out.vertices.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
     }
     return first;
   };
   if (nut) {  // flat ends and an outer wall, which look outward as they stand
-    const Index low = far(z0, outer), high = far(z1, outer);
+    const Index below = far(z0, outer), above = far(z1, outer);
     for (int k = 0; k < segments; ++k) {
       const int n = (k + 1) % segments;
-      const Index quads[3][4] = {{at(k, 0), at(n, 0), low + n, low + k},
-                                 {at(n, rows), at(k, rows), high + k, high + n},
-                                 {low + k, low + n, high + n, high + k}};
+      const Index quads[3][4] = {{low(k), low(n), below + n, below + k},
+                                 {high(n), high(k), above + k, above + n},
+                                 {below + k, below + n, above + n, above + k}};
       for (const auto& q : quads) {
         out.triangles.push_back({q[0], q[1], q[2]});
         out.triangles.push_back({q[0], q[2], q[3]});
       }
     }
   } else {
-    const auto low = static_cast<Index>(out.vertices.size());
+    const auto centre = static_cast<Index>(out.vertices.size());
     out.vertices.emplace_back(0.0, 0.0, z0);
     out.vertices.emplace_back(0.0, 0.0, z1);
     for (int s = 0; s < segments; ++s) {
-      push(low, at(s + 1, 0), at(s, 0));
-      push(low + 1, at(s, rows), at(s + 1, rows));
+      push(centre, low(s + 1), low(s));
+      push(centre + 1, high(s), high(s + 1));
     }
   }
   out.idle.assign(out.triangles.size(), 0);

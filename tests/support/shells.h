@@ -32,8 +32,9 @@ Shell box(const Vec3& low, const Vec3& high);
 Shell sphere(double radius, int segments, double phase = 0.0);
 
 /// A rod with a thread of triangular section, radius r ± depth/2, or a nut around it with the outer radius `outer`.
-/// Advances 2π·pitch per turn, z from z0 to z1.
-Shell thread(double radius, double depth, double pitch, double z0, double z1, int segments, bool nut,
+/// Advances 2π·pitch per turn (left-handed where pitch < 0), z from z0 to z1; edges follow the helices of crest and
+/// root.
+Shell thread(double radius, double depth, double pitch, double z0, double z1, int segments, double phase, bool nut,
              double outer = 0.0);
 
 Loop circle(double radius, int segments, double phase = 0.0, const Eigen::Vector2d& centre = {0.0, 0.0});

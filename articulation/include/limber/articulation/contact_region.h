@@ -19,6 +19,9 @@ struct ContactSample {
   Vec3 facing_normal;  ///< the other surface's outward normal there; unit
   double area = 0.0;   ///< of the surface that this sample stands for
   double gap = 0.0;    ///< distance to the other surface along −facing_normal; negative where the surfaces overlap
+  /// The sample as it was drawn: a point of a triangle and the triangle's own normal. Off by up to half a segment, but
+  /// to both sides alike
+  Vec3 facet_point = point, facet_normal = normal;
 };
 
 /// The contact of two components: samples of both sides.
