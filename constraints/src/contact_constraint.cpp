@@ -193,7 +193,8 @@ class PairContacts final : public Constraint {
 
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override {
     const Contact& first = contacts_.front();
-    if (options_->impact != ImpactModel::kHeldFromTouch || !(flexes(first.a) || flexes(first.b))) return within;
+    const bool struck = options_->impact == ImpactModel::kHeldFromTouch && (flexes(first.a) || flexes(first.b));
+    if (!struck && options_->rule.method != ContactMethod::kVelocityProgram) return within;
     for (const Contact& contact : contacts_) within = touch(states, motions, contact, within);
     return within;
   }
@@ -310,6 +311,7 @@ class PairContacts final : public Constraint {
         law.lower = 0.0;
         law.holds = true;
         law.strikes = strikes_;
+        if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
         law.friction = contact.friction;
       } else {
         law.offset = contact.dent[axis];
@@ -321,6 +323,26 @@ class PairContacts final : public Constraint {
       const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
       rows.add(on_a, on_b, law);
     }
+  }
+
+  /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
+  void make_spring(const BodyStates& states, const Contact& contact, double gap, RowLaw& law) const {
+    const double mass = reduced_mass(states, contact), omega = 2.0 * std::numbers::pi * options_->penalty_frequency;
+    const double k = mass * omega * omega, d = 2.0 * options_->penalty_damping * mass * omega;
+    law.compliance = 1.0 / (step_ * k + d);
+    law.offset = d * law.compliance * std::min(0.0, gap);
+    law.stiffness = k;
+    law.holds = law.strikes = false;
+    law.goes_on = true;
+    law.last_force = contact.axes.col(0).dot(contact.last_force);
+    law.agent_displacement = 0.0;
+  }
+
+  static double reduced_mass(const BodyStates& states, const Contact& contact) {
+    double inverse = 0.0;
+    for (const Side* side : {&contact.a, &contact.b})
+      if (!states.is_static(side->body)) inverse += 1.0 / states.body(side->body).group->frame_constants().mass;
+    return 1.0 / inverse;
   }
 
   std::span<Contact> contacts_;
@@ -343,6 +365,9 @@ void ContactOptions::validate() const {
   number(friction, "friction");
   number(recovery_speed, "recovery_speed");
   number(impact_speed, "impact_speed");
+  number(penalty_frequency, "penalty_frequency");
+  number(penalty_damping, "penalty_damping");
+  if (penalty_frequency == 0.0) throw InvalidArgument("ContactOptions: penalty_frequency is 0, expected more");
 }
 
 struct ContactSet::Impl {
@@ -481,6 +506,8 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
     if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
 }
+
+const ContactOptions& ContactSet::options() const { return impl_->options; }
 
 std::span<const ContactEvent> ContactSet::events() const { return impl_->events; }
 std::span<const ContactMemory> ContactSet::memory() const { return impl_->memory; }

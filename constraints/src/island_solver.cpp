@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "bounded_rows.h"
+#include "contact_program.h"
 #include "difference_newton.h"
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
@@ -103,6 +104,14 @@ struct IslandSolver::Impl {
   EqualityElimination elimination;
   ContactQpSolver qp;
   BoundedRowSolver bounded_rows;
+  ContactProgramSolver programs;
+  ContactRule rule;
+  ProgramReport program_report;
+  std::vector<double> gap_before;     // of the bounded rows
+  std::vector<double> touch_impulse;  // by row, what the velocity program gave at the touch
+  std::vector<double> contact_force;  // by row, N, what it holds over the step
+  std::vector<Index> touching;        // rows of its contacts, three each with friction
+  std::vector<double> mu, A_touch, b_touch, f_touch;
   SecantIteration secant;
   DifferenceNewton newton;
   std::vector<double> slope, tolerance;
@@ -140,6 +149,17 @@ struct IslandSolver::Impl {
   SolveStatus improve_equalities();
   SolveStatus improve_all(bool first);
   SolveStatus solve_bounded(bool first);
+  bool holds_contact_forces() const { return rule.method == ContactMethod::kVelocityProgram; }
+  void solve_touch(const IslandOptions& options, ProgramReport& report);
+  void choose_touching(const IslandOptions& options, bool resting);
+  void assemble_touching();
+  double row_speed(Index row, const IslandOptions& options) const;
+  double row_acceleration(Index row, const IslandOptions& options) const;
+  template <class Side>
+  double modal_sum(Index row, Side&& number) const;
+  SolveStatus solve_touching(std::span<double> into, ProgramReport& report);
+  void apply_touch_impulse();
+  void hold_contact_forces(double length);
   void keep_within_bounds();
   double largest_change() const;
   bool can_differentiate() const;
@@ -304,6 +324,7 @@ void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Const
   bodies.place(StepTime::kEnd);
   rows.clear();
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);
+  if (holds_contact_forces()) hold_contact_forces(options.step);
   bodies.write_jacobian(rows, J);
   find_reaction(StepTime::kEnd, options, end_reaction);
   sum_loads(end_reaction, 0.5 * options.step, 0.0);
@@ -387,6 +408,9 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
   elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
+  gap_before.clear();
+  for (const Index row : bounded)
+    gap_before.push_back(start_gap[static_cast<std::size_t>(row)] - laws[static_cast<std::size_t>(row)].offset);
   const SolveStatus status = solve_bounded(first);
   f_equal.resize(e);
   elimination.recover(f_bounded, f_equal);
@@ -407,6 +431,19 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
   const auto size = static_cast<Eigen::Index>(n);
   Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
       Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
+  if (rule.method == ContactMethod::kGapProgram || (cones > 0 && rule.friction != FrictionModel::kCone)) {
+    const SolveStatus solved = programs.solve({.cones = static_cast<int>(cones),
+                                               .A = A_reduced,
+                                               .b = b_reduced,
+                                               .friction = friction,
+                                               .lower = lower_bounded,
+                                               .upper = upper_bounded,
+                                               .gap_before = gap_before,
+                                               .step = step},
+                                              rule, f_bounded, program_report);
+    for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
+    return solved;
+  }
   const SolveStatus status = bounded_rows.solve({.cones = static_cast<int>(cones),
                                                  .A = A_reduced,
                                                  .b = b_reduced,
@@ -416,6 +453,137 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
                                                 f_bounded);
   for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
   return status;
+}
+
+/// [H03]'s second method: the impulses of least sum that stop what touches, then the forces of least sum that hold what
+/// rests, by velocities and accelerations as they are at the step's start.
+void IslandSolver::Impl::solve_touch(const IslandOptions& options, ProgramReport& report) {
+  touch_impulse.assign(f.size(), 0.0), contact_force.assign(f.size(), 0.0);
+  accelerations.clear();
+  for (Index local = 0; local < bodies.count(); ++local)
+    accelerations.push_back(held_acceleration(*bodies.body(local).group, bodies.body(local).slot, StepTime::kStart,
+                                              bodies.response(local), options.gravity));
+  bodies.write_velocity_metric(metric);
+  choose_touching(options, false);
+  b_touch.clear();
+  for (const Index row : touching) b_touch.push_back(row_speed(row, options));
+  ProgramReport found;
+  solve_touching(touch_impulse, found);
+  report.add(found);
+  apply_touch_impulse();
+  choose_touching(options, true);
+  b_touch.clear();
+  for (const Index row : touching) {
+    const RowLaw& law = laws[static_cast<std::size_t>(row)];
+    // Friction is to take away in the step what still slides.
+    b_touch.push_back(row_acceleration(row, options) + (law.slides ? row_speed(row, options) / options.step : 0.0));
+  }
+  solve_touching(contact_force, found);
+  report.add(found);
+  hold_contact_forces(options.step);
+  for (Index i = 0; i < rows.size(); ++i) laws[static_cast<std::size_t>(i)] = rows.row(i).law;
+  theta = std::ranges::all_of(laws, &RowLaw::contact) ? 0.5 : 1.0;
+}
+
+/// The contacts that are closed; `resting`: and no faster than held forces make of rest in a step.
+void IslandSolver::Impl::choose_touching(const IslandOptions& options, bool resting) {
+  constexpr double kClosed = 1e4;  // in units of the rows' tolerance: 1e-6 of the distances at hand
+  touching.clear(), mu.clear();
+  for (const bool with_friction : {true, false})
+    for (Index i = 0; i < rows.size(); ++i) {
+      const RowLaw& law = laws[static_cast<std::size_t>(i)];
+      if (!law.contact || law.slides || (law.friction > 0.0) != with_friction) continue;
+      if (gap[static_cast<std::size_t>(i)] > kClosed * law.tolerance) continue;
+      if (resting && std::abs(row_speed(i, options)) > held_motion(StepTime::kStart, i, options).speed_of_a_step)
+        continue;
+      for (Index t = 0; t < (with_friction ? 3 : 1); ++t) touching.push_back(i + t);
+      if (with_friction) mu.push_back(law.friction);
+    }
+  lower.assign(touching.size(), 0.0), upper.assign(touching.size(), kUnbounded);
+  lower.resize(std::max(lower.size(), f.size())), upper.resize(std::max(upper.size(), f.size()));
+  assemble_touching();
+}
+
+/// A = J M⁻¹Jᵀ of frames and modes, for the rows that touch.
+void IslandSolver::Impl::assemble_touching() {
+  const std::size_t m = touching.size(), n = metric.size();
+  A_touch.resize(m * m);
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double* x = J.data() + static_cast<std::size_t>(touching[i]) * n;
+      const double* y = J.data() + static_cast<std::size_t>(touching[j]) * n;
+      double sum = 0.0;
+      for (std::size_t k = 0; k < n; ++k) sum += metric[k] * x[k] * y[k];
+      A_touch[i * m + j] = A_touch[j * m + i] = sum;
+    }
+}
+
+template <class Side>
+double IslandSolver::Impl::modal_sum(Index row, Side&& number) const {
+  double sum = 0.0;
+  for (const ConstraintRows::Side& side : rows.row(row).sides) {
+    const Index local = bodies.local(side.body);
+    if (local < 0) continue;
+    const std::span<const double> modal = rows.modal(side);
+    for (std::size_t i = 0; i < modal.size(); ++i) sum += modal[i] * number(bodies.body(local), i);
+  }
+  return sum;
+}
+
+double IslandSolver::Impl::row_speed(Index row, const IslandOptions& options) const {
+  return held_motion(StepTime::kStart, row, options).speed +
+         modal_sum(row, [](const ConstrainedBody& body, std::size_t i) { return body.group->rates(body.slot)[i]; });
+}
+
+/// J a of bodies that nothing touches; the turning of J is left out. Modes that answer statically hold still.
+double IslandSolver::Impl::row_acceleration(Index row, const IslandOptions& options) const {
+  return held_motion(StepTime::kStart, row, options).acceleration +
+         modal_sum(row, [](const ConstrainedBody& body, std::size_t i) {
+           const BodyGroup& group = *body.group;
+           const ModalModelData& data = group.model().data();
+           if (group.velocity_response()[i] == 0.0) return 0.0;
+           return group.held_modal_forces(body.slot)[i] - 2.0 * data.decays[i] * group.rates(body.slot)[i] -
+                  data.eigenvalues[i] * group.amplitudes(body.slot)[i];
+         });
+}
+
+SolveStatus IslandSolver::Impl::solve_touching(std::span<double> into, ProgramReport& report) {
+  f_touch.assign(touching.size(), 0.0);
+  report = {};
+  const SolveStatus status = programs.solve({.cones = static_cast<int>(mu.size()),
+                                             .A = A_touch,
+                                             .b = b_touch,
+                                             .friction = mu,
+                                             .lower = std::span(lower).first(touching.size()),
+                                             .upper = std::span(upper).first(touching.size()),
+                                             .gap_before = {},
+                                             .step = step},
+                                            rule, f_touch, report);
+  for (std::size_t i = 0; i < touching.size(); ++i) into[static_cast<std::size_t>(touching[i])] = f_touch[i];
+  return status;
+}
+
+/// Velocities change at once. Modes that answer statically have none to change.
+void IslandSolver::Impl::apply_touch_impulse() {
+  sum_loads(touch_impulse, 1.0, 1.0);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto& [group, slot, pose] = bodies.body(local);
+    const ConstraintLoad& load = loads[static_cast<std::size_t>(local)];
+    double* modal = modal_loads.data() + (load.modal.data() - modal_loads.data());
+    for (std::size_t i = 0; i < load.modal.size(); ++i) modal[i] *= group->velocity_response()[i];
+    if (std::ranges::any_of(touch_impulse, [](double p) { return p != 0.0; }))
+      group->apply_generalized_impulse(slot, load.impulse, load.moment, load.modal);
+  }
+}
+
+/// Rows of contacts get what the velocity program found, and nothing else.
+void IslandSolver::Impl::hold_contact_forces(double length) {
+  for (Index i = 0; i < rows.size(); ++i) {
+    RowLaw& law = rows.row(i).law;
+    if (!law.contact) continue;
+    const double impulse = length * contact_force[static_cast<std::size_t>(i)];
+    law = {.offset = law.offset, .lower = impulse, .upper = impulse, .tolerance = law.tolerance, .contact = true};
+  }
 }
 
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
@@ -527,6 +695,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
 
 void IslandSolver::Impl::keep_within_bounds() {
   for (std::size_t i = 0; i < f.size(); ++i) f[i] = std::clamp(f[i], lower[i], upper[i]);
+  if (rule.friction == FrictionModel::kHeuristicNoSlip) return;
   for (std::size_t i = 0; i < cones; ++i) {
     const auto n = static_cast<std::size_t>(bounded[3 * i]), t = n + 1, u = n + 2;
     const double largest = friction[i] * (f[n] + step * reaction[n]);
@@ -541,7 +710,7 @@ void IslandSolver::Impl::keep_within_bounds() {
 /// Whether the island is small enough, and its rows have an interval each.
 bool IslandSolver::Impl::can_differentiate() const {
   constexpr std::size_t kMostRows = 96;
-  return f.size() <= kMostRows && cones == 0 && flexibility.empty();
+  return f.size() <= kMostRows && cones == 0 && flexibility.empty() && rule.method != ContactMethod::kGapProgram;
 }
 
 /// From the best impulses seen, with the rows' true derivatives.
@@ -611,7 +780,10 @@ double IslandSolver::Impl::agent_work(const IslandOptions& options) const {
     } else {
       work += given;
     }
-    work += 0.5 * laws[i].stiffness * (start_gap[i] * start_gap[i] - gap[i] * gap[i]);
+    // A spring with one bound pushes on one side alone.
+    const double before = laws[i].lower == 0.0 ? std::min(start_gap[i], 0.0) : start_gap[i];
+    const double after = laws[i].lower == 0.0 ? std::min(gap[i], 0.0) : gap[i];
+    work += 0.5 * laws[i].stiffness * (before * before - after * after);
   }
   work += std::min(recovery_work, largest_recovery_work(recovery, options));
   work += stored_energy;
@@ -687,17 +859,24 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
 void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& options, double whole_step,
                                    IslandReport& report) {
   const BodyStates states(part.table);
+  rule = options.contact;
   gather(part.table, part.members, part.constraints, options);
   set_modal_steps(options.step, whole_step);
   IslandReport done;
   energy.begin(bodies, options.gravity);
+  program_report = {};
+  if (holds_contact_forces()) solve_touch(options, done.programs);
   find_reaction(StepTime::kStart, options, reaction);
   done.status = iterate(states, part.constraints, options, done);
   answer_at_end(states, part.constraints, options);
-  if (options.guard_energy) guard_energy(states, part.constraints, options, done);
+  const bool as_it_is = rule.is_program() && rule.guard == ProgramGuard::kNone;
+  if (options.guard_energy && !as_it_is) guard_energy(states, part.constraints, options, done);
   for (Index local = 0; local < bodies.count(); ++local)
     bodies.body(local).group->commit(bodies.body(local).slot, part.begins, part.ends);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += options.step * reaction[i];
+  for (std::size_t i = 0; holds_contact_forces() && i < f.size(); ++i) f[i] += touch_impulse[i];
+  done.programs.add(program_report);
+  report.programs.add(done.programs);
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
     part.constraints[i]->accept(states, std::span<const double>(f).subspan(begin, end - begin));

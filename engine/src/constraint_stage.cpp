@@ -221,6 +221,7 @@ IslandReport ConstraintStage::report() const {
     sum.bodies += r.bodies;
     sum.rows += r.rows;
     sum.cuts += r.cuts;
+    sum.programs.add(r.programs);
     sum.iterations = std::max(sum.iterations, r.iterations);
     sum.change = std::max(sum.change, r.change);
     sum.energy_removed += r.energy_removed;

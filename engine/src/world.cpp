@@ -171,6 +171,7 @@ struct World::Impl {
   double energy_removed = 0.0;    // of the step's parts before the last
   bool solved = true;
   int iterations = 0, cuts = 0;
+  ProgramReport programs;
   std::vector<ExactMotion> motions;
   std::size_t alive = 0;
   std::uint64_t steps = 0;
@@ -368,7 +369,7 @@ void World::Impl::advance_part(int part) {
     for (std::size_t r = begin; r < end; ++r)
       groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
   });
-  constraints.step(*jobs, {.step = parts->length(), .gravity = options.gravity});
+  constraints.step(*jobs, {.step = parts->length(), .gravity = options.gravity, .contact = contacts.options().rule});
   if (source != nullptr) {
     contacts.finish(sleep.asleep());
     parts->add_events(part, contacts.events());
@@ -516,6 +517,7 @@ int World::advance(double real_seconds) {
 void World::step() {
   Impl& m = *impl_;
   m.energy_removed = 0.0, m.solved = true, m.iterations = m.cuts = 0;
+  m.programs = {};
   for (int part = 0; part < m.parts->count(); ++part) {
     m.advance_part(part);
     const IslandReport report = m.constraints.report();
@@ -523,6 +525,7 @@ void World::step() {
     m.solved = m.solved && report.status == SolveStatus::kSolved;
     m.iterations = std::max(m.iterations, report.iterations);
     m.cuts += report.cuts;
+    m.programs.add(report.programs);
   }
   m.parts->finish();
   if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
@@ -668,6 +671,7 @@ ConstraintReport World::constraint_report() const {
           .bodies = r.bodies,
           .rows = r.rows,
           .iterations = impl_->iterations,
+          .programs = impl_->programs,
           .cuts = impl_->cuts,
           .solved = impl_->solved,
           .energy_removed = impl_->energy_removed};

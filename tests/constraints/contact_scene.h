@@ -38,7 +38,9 @@ class GroundedIsland : public Island {
       : GroundedIsland(sample_model(sample), step, options, normal, gravity) {}
   GroundedIsland(std::shared_ptr<const ModalModel> body, double step, const ContactOptions& options = {},
                  const Vec3& normal = Vec3::UnitZ(), const Vec3& gravity = {0.0, 0.0, -kGravity})
-      : Island(std::move(body), step, gravity), contacts(options), normal_(normal) {}
+      : Island(std::move(body), step, gravity), contacts(options), normal_(normal) {
+    rule = options.rule;
+  }
 
   /// One step: contacts of all corners with the ground, and what is in `others`.
   IslandReport step() {
@@ -53,6 +55,12 @@ class GroundedIsland : public Island {
     return report;
   }
 
+  /// Of all contacts in the last step, on the bodies.
+  Vec3 contact_impulse() const {
+    Vec3 sum = Vec3::Zero();
+    for (const ContactEvent& event : contacts.events()) sum += event.impulse;
+    return sum;
+  }
   double lowest_gap() const {
     double lowest = kUnbounded;
     for (const Index body : members)

@@ -58,9 +58,9 @@ class Island {
   }
 
   IslandReport step() {
-    const IslandReport report =
-        solver.step(table, members, constraints,
-                    {.step = step_, .gravity = gravity_, .undisturbed = steps++ > 0, .energy_surplus = surplus});
+    const IslandReport report = solver.step(
+        table, members, constraints,
+        {.step = step_, .gravity = gravity_, .contact = rule, .undisturbed = steps++ > 0, .energy_surplus = surplus});
     surplus = report.energy_surplus;
     return report;
   }
@@ -111,6 +111,7 @@ class Island {
   std::vector<Constraint*> constraints;
   std::vector<JointConstraint*> joints;
   IslandSolver solver;
+  ContactRule rule;
   int steps = 0;
   double surplus = 0.0;
 

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "limber/constraints/constraint.h"
+#include "limber/constraints/contact_method.h"
 #include "limber/dynamics/contact_source.h"
 
 namespace limber {
@@ -53,7 +54,11 @@ struct ContactOptions {
   /// Used where the models have it. Not yet reliable: resting dents come out within 0.4 %, but can lose their balance
   /// for a step, which shows as overlap that is then recovered from.
   bool residual_compliance = false;
-  ImpactModel impact = ImpactModel::kAbsorbed;
+  ContactRule rule{};  ///< how forces are found; goes to the island solver too (IslandOptions::contact)
+  /// kPenalty: frequency and share of critical damping of each contact's spring under the bodies' reduced mass, Hz, >
+  /// 0, and ≥ 0. k = m (2πν)², c = 2ζ m 2πν.
+  double penalty_frequency = 15.0, penalty_damping = 1.0;
+  ImpactModel impact = ImpactModel::kAbsorbed;  ///< of kGapProgram and kComplementary
   /// m/s, ≥ 0: what comes together more slowly is no impact, so that bouncing ends and what rests stays (θ = 1).
   double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
@@ -117,6 +122,7 @@ class ContactSet {
   std::span<const ContactMemory> memory() const;
   /// Impacts under way, ordered by (a, b).
   std::span<const StrikeMemory> strikes() const;
+  const ContactOptions& options() const;
   /// Forgets what it knows of earlier steps.
   void clear();
 

@@ -11,6 +11,10 @@
 ///      not; and made faster where joints alone have lost energy to the method
 ///   7. the prediction becomes the state
 ///
+/// 4 is the default of four rules for contacts (contact_method.h). ContactMethod::kVelocityProgram finds its impulses
+/// and forces before 1; its contacts' rows then have these forces as both bounds, held over the step (θ = ½) if nothing
+/// else acts in the island.
+///
 /// Where bodies strike and that is asked for (Constraint::next_cut), the step is cut there, four times at most, and 1
 /// to 7 are done for each part.
 ///
@@ -22,6 +26,7 @@
 #include <span>
 
 #include "limber/constraints/constraint.h"
+#include "limber/constraints/contact_method.h"
 #include "limber/constraints/solve_status.h"
 
 namespace limber {
@@ -30,7 +35,8 @@ struct IslandOptions {
   double step = 1.0 / 60.0;     ///< s; that of all groups
   Vec3 gravity = Vec3::Zero();  ///< m/s², world
   int max_iterations = 30;      ///< of Newton's method; ≥ 1
-  bool guard_energy = true;     ///< step 6
+  bool guard_energy = true;     ///< step 6; off where the rule asks for programs as they are
+  ContactRule contact{};        ///< how contacts are solved for
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
   /// are the same: what joints alone lose to the method is then given back by step 6.
   bool undisturbed = false;
@@ -43,6 +49,7 @@ struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
   int cuts = 0;                 ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch)
+  ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance
   double energy_removed = 0.0;  ///< J, by step 6; negative: given back

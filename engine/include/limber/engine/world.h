@@ -132,6 +132,7 @@ struct JointView {
 struct ConstraintReport {
   int islands = 0, bodies = 0, rows = 0;
   int iterations = 0;           ///< the most that an island needed
+  ProgramReport programs{};     ///< linear programs of the contact rule
   int cuts = 0;                 ///< of islands' steps, where bodies struck (ImpactModel::kHeldFromTouch)
   bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
   double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)

@@ -1,0 +1,60 @@
+/// @file limber/constraints/contact_method.h
+/// The rules by which contact forces are found: four for the normals, three for friction. All see the same rows
+/// (contact_constraint.h); J their Jacobian, g₀ and g the gaps at the step's start and end, f impulses, F forces.
+///
+///   kPenalty           f = Δt F,  F = max(0, −k g − c (g − min(0, g₀))/Δt)                      [H03]'s first method
+///   kVelocityProgram   min Σp, J v + A p ≥ 0, p ≥ 0 at the touch; min ΣF, J a + A F ≥ 0, F ≥ 0    [H03]'s second
+///                      for what then rests; A = J M⁻¹Jᵀ of frames and modes
+///   kGapProgram        min Σf, g ≥ 0, f ≥ 0                              the same at the end of the step, force held
+///   kComplementary     0 ≤ f ⊥ g ≥ 0                                     the default
+///
+/// [H03] takes the spring of kPenalty at the step's start, which is stable only for Δt² k A below about 4; here it is
+/// taken at the end, as a compliance 1/(Δt k + c) of the row: stable for every k, c and step, and soft all the same:
+/// n contacts under a weight m g sink in by m g/(n k). kVelocityProgram is exact at the touch (the step is cut there,
+/// four times at most) and does not look at the gap otherwise: what it lets sink stays so. Its forces hold the
+/// accelerations of the step's start, so stiff modes make it rough. Programs that are degenerate or have no solution
+/// never fail a step: slack is bought at a price (linear_program.h) and counted as relaxed.
+#pragma once
+
+#include "limber/constraints/energy_guard.h"
+
+namespace limber {
+
+enum class ContactMethod { kPenalty, kVelocityProgram, kGapProgram, kComplementary };
+
+enum class FrictionModel {
+  /// |f_t| ≤ μ f_n against the slip, with the normals in one problem; true sticking. The programs know no cone: they
+  /// use kHeuristic in its place.
+  kCone,
+  /// After the normals, contact by contact: the impulse that takes away its slip as it then is, at most μ f_n. The
+  /// normals are not looked at again.
+  kHeuristic,
+  /// The same, and then once more all together: normals as in kComplementary, and no slip where kHeuristic stayed below
+  /// μ f_n; what slid keeps its friction. Tangents may then exceed μ f_n.
+  kHeuristicNoSlip,
+};
+
+/// What happens to a linear program's answer that would add energy (energy_guard.h).
+enum class ProgramGuard {
+  kNone,           ///< it stays as [H03] has it; the island's own guard (island_solver.h) is off as well
+  kClamp,          ///< the largest part of it that adds none, blended with the complementary answer
+  kComplementary,  ///< the complementary answer takes its place
+};
+
+struct ContactRule {
+  ContactMethod method = ContactMethod::kComplementary;
+  FrictionModel friction = FrictionModel::kCone;
+  ProgramGuard guard = ProgramGuard::kClamp;
+
+  bool is_program() const { return method == ContactMethod::kVelocityProgram || method == ContactMethod::kGapProgram; }
+};
+
+/// What the linear programs of a step came to; at gap level those of the last iteration.
+struct ProgramReport {
+  EnergyGuardReport guard{};  ///< of solves with at least one force, whatever ProgramGuard does with the answer
+  long different = 0;         ///< of guard.solves: another energy than the complementary answer, by 1e-6 of it
+  long relaxed = 0;           ///< programs without a solution: slack was bought
+  void add(const ProgramReport& other);
+};
+
+}  // namespace limber

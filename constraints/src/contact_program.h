@@ -1,0 +1,46 @@
+// Contacts by [H03]'s rules: a linear program for the normals, a heuristic for friction after it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/constraints/contact_method.h"
+#include "limber/constraints/contact_qp.h"
+#include "limber/constraints/linear_program.h"
+
+namespace limber {
+
+/// w = A f + b of contacts and rows with an interval each; impulses and gaps, impulses and speeds, or forces and
+/// accelerations.
+struct ContactProblem {
+  int cones = 0;                         ///< the first 3 × cones rows: normal and two tangents each
+  std::span<const double> A;             ///< n × n, symmetric positive semidefinite
+  std::span<const double> b;             ///< n
+  std::span<const double> friction;      ///< μ of each cone
+  std::span<const double> lower, upper;  ///< n; those of cones are not read
+  std::span<const double> gap_before;    ///< n, gap level only: gaps at the step's start, less their offsets
+  double step = 0.0;                     ///< s, gap level only
+};
+
+class ContactProgramSolver {
+ public:
+  /// @param f n, on return within bounds. @param report gets the normals' program, if the rule has one
+  SolveStatus solve(const ContactProblem& problem, const ContactRule& rule, std::span<double> f, ProgramReport& report);
+
+ private:
+  void choose_rows(const ContactProblem& problem);
+  SolveStatus solve_normals(const ContactProblem& problem, const ContactRule& rule, std::span<double> f,
+                            ProgramReport& report);
+  void guard(const ContactProblem& problem, const ContactRule& rule, ProgramReport& report);
+  void solve_rest(const ContactProblem& problem, std::span<double> f);
+  void add_friction(const ContactProblem& problem, std::span<double> f);
+  SolveStatus stop_slip(const ContactProblem& problem, std::span<double> f);
+  void take_part(const ContactProblem& problem, std::span<const std::size_t> part, std::span<const double> f);
+
+  std::vector<std::size_t> one_sided_, rest_;  // rows of normals and stops; with an interval
+  std::vector<double> A_, b_, gap_, lower_, upper_, f_program_, f_complementary_, last_, product_;
+  ContactQpSolver qp_;
+  LinearProgramSolver program_;
+};
+
+}  // namespace limber
