@@ -289,8 +289,8 @@ void time_friction(benchmark::State& state, const FrictionOptions& options, bool
   state.counters["sweeps"] = result.sweeps;
   state.counters["residual"] = result.residual;
 }
-void friction_exact(benchmark::State& state) { time_friction(state, {}, false); }
-void friction_exact_warm(benchmark::State& state) { time_friction(state, {}, true); }
+void friction_proximal(benchmark::State& state) { time_friction(state, {}, false); }
+void friction_proximal_warm(benchmark::State& state) { time_friction(state, {}, true); }
 void friction_sweeps(benchmark::State& state) {
   time_friction(state, {.method = FrictionMethod::kBlockGaussSeidel, .max_sweeps = 5000}, false);
 }
@@ -321,8 +321,8 @@ BENCHMARK(gauss_seidel_1e4)->Apply(contact_counts);
 BENCHMARK(handles)->Apply(handle_counts);
 BENCHMARK(handles_new_target)->Apply(handle_counts);
 BENCHMARK(handles_orthogonal_decomposition)->ArgNames({"points", "dof"})->Args({10, 40})->Args({100, 40});
-BENCHMARK(friction_exact)->Apply(stacks);
-BENCHMARK(friction_exact_warm)->Apply(stacks);
+BENCHMARK(friction_proximal)->Apply(stacks);
+BENCHMARK(friction_proximal_warm)->Apply(stacks);
 BENCHMARK(friction_sweeps)->Apply(stacks);
 BENCHMARK(friction_staggered)->Apply(stacks);
 

@@ -9,7 +9,7 @@
 #include "argument_checks.h"
 #include "coulomb_contact.h"
 #include "limber/constraints/contact_qp.h"
-#include "limber/constraints/least_squares.h"
+#include "proximal_solver.h"
 
 namespace limber {
 namespace {
@@ -30,9 +30,6 @@ struct Memory {
   };
   std::vector<Block> blocks;
   std::vector<int> offsets, body_columns;
-  // Newton
-  std::vector<double> jacobian, metric, map, step;
-  LeastSquaresSolver least_squares;
   // staggered
   std::vector<double> A_normal, b_normal, f_normal;
   ContactQpSolver normal_solver;
@@ -304,105 +301,6 @@ class Sweeps {
   double size_ = 0.0;
 };
 
-// Newton steps on the natural map f − P_K(f − û(f)), whose zeros are the solutions. Where contacts are redundant its
-// derivative is singular but the equations agree: the least-norm step stays closest to the forces the sweeps gave.
-class NewtonSteps {
- public:
-  NewtonSteps(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m)
-      : contacts_(contacts), sweeps_(sweeps), memory_(memory), m_(m) {
-    const std::size_t n = 3 * m;
-    memory.jacobian.resize(n * n), memory.metric.assign(n, 1.0), memory.map.resize(n), memory.step.resize(n);
-    memory.best.need(n);
-  }
-
-  // One step, whole or halved a few times; false if none brings the map down.
-  bool step() {
-    constexpr int kLengths = 4;
-    const double before = fill_map();
-    fill_jacobian();
-    const std::size_t n = 3 * m_;
-    memory_.least_squares.factor(memory_.jacobian, memory_.metric, static_cast<int>(n), {.rank_tolerance = 1e-13});
-    memory_.least_squares.solve(memory_.map, memory_.step);
-    double* f = sweeps_.f();
-    double* old = memory_.best.data();
-    std::copy_n(f, n, old);
-    double length = 1.0;
-    for (int tried = 0; tried < kLengths; ++tried, length *= 0.5) {
-      advance(old, length);
-      if (fill_map() <= (1.0 - 0.25 * length) * before) return true;
-    }
-    std::copy_n(old, n, f);
-    contacts_.refresh(f);
-    return false;
-  }
-
- private:
-  double fill_map() {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < m_; ++i) {
-      const Vec3 x = sweeps_.map(i);
-      std::copy_n(x.data(), 3, memory_.map.data() + 3 * i);
-      sum += x.squaredNorm();
-    }
-    return std::sqrt(sum);
-  }
-
-  // Row i: E_i − P_i (E_i − (1 + μ e_n t_iᵀ) A_i), t_i the direction of sliding.
-  void fill_jacobian() {
-    const std::size_t n = 3 * m_;
-    const double* f = sweeps_.f();
-    for (std::size_t i = 0; i < m_; ++i) {
-      const Vec3 u = contacts_.velocity(i, f);
-      const double mu = memory_.mu[i], speed = u.tail<2>().norm();
-      const Mat3 P = cone_projection_derivative(triple(f + 3 * i) - corrected_velocity(u, mu), mu);
-      Mat3 correction = Mat3::Identity();
-      if (speed > 0.0) correction.block<1, 2>(0, 1) = mu / speed * u.tail<2>().transpose();
-      const Mat3 Q = P * correction;
-      for (std::size_t j = 0; j < m_; ++j) {
-        Mat3 block;
-        for (std::size_t r = 0; r < 3; ++r)
-          for (std::size_t c = 0; c < 3; ++c)
-            block(static_cast<int>(r), static_cast<int>(c)) = contacts_.matrix().row(3 * i + r)[3 * j + c];
-        block = (Q * block).eval();
-        if (i == j) block += Mat3::Identity() - P;
-        for (std::size_t r = 0; r < 3; ++r)
-          for (std::size_t c = 0; c < 3; ++c)
-            memory_.jacobian[(3 * i + r) * n + 3 * j + c] = block(static_cast<int>(r), static_cast<int>(c));
-      }
-    }
-  }
-
-  // f = old − length·Jᵀ(J Jᵀ)⁺ map
-  void advance(const double* old, double length) {
-    const std::size_t n = 3 * m_;
-    double* f = sweeps_.f();
-    std::copy_n(old, n, f);
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j < n; ++j) f[j] -= length * memory_.step[i] * memory_.jacobian[i * n + j];
-    contacts_.refresh(f);
-  }
-
-  DenseContacts& contacts_;
-  Sweeps<DenseContacts>& sweeps_;
-  Memory& memory_;
-  std::size_t m_;
-};
-
-void solve_exactly(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m,
-                   const FrictionOptions& options, FrictionResult& result) {
-  constexpr int kSweepsPerRound = 10, kNewtonPerRound = 12;
-  NewtonSteps newton(contacts, sweeps, memory, m);
-  while (!sweeps.run(kSweepsPerRound) && result.sweeps < options.max_sweeps) {
-    for (int n = 0; n < kNewtonPerRound && newton.step(); ++n) {
-      ++result.newton_steps;
-      result.residual = sweeps.residual();
-      if (result.residual <= options.tolerance) return;
-    }
-    for (std::size_t i = 0; i < m; ++i) sweeps.put(i, project_on_cone(triple(sweeps.f() + 3 * i), memory.mu[i]));
-    contacts.refresh(sweeps.f());
-  }
-}
-
 // Alternates the normal and the friction problem.
 class Staggered {
  public:
@@ -521,6 +419,7 @@ FrictionResult refuse(std::span<double> f) {
 
 struct FrictionSolver::Impl {
   Memory memory;
+  ProximalSolver proximal;
 };
 
 FrictionSolver::FrictionSolver() : impl_(std::make_unique<Impl>()) {}
@@ -536,21 +435,23 @@ FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<d
   Memory& memory = impl_->memory;
   if (!take_friction(problem.b, problem.mu, memory) || !all_finite(problem.A.data(), problem.A.size()))
     return refuse(f);
+  if (options.method == FrictionMethod::kProximal) {
+    const ProximalSolver::Result result =
+        impl_->proximal.solve({.cones = problem.contacts, .A = problem.A, .b = problem.b, .friction = problem.mu}, f,
+                              {.tolerance = options.tolerance, .max_sweeps = options.max_sweeps});
+    return {.status = result.status,
+            .sweeps = result.sweeps,
+            .newton_steps = result.newton_steps,
+            .residual = result.residual};
+  }
   DenseContacts contacts(problem, memory);
   FrictionResult result;
   Sweeps<DenseContacts> sweeps(contacts, memory, m, options, result);
   sweeps.start(f);
-  switch (options.method) {
-    case FrictionMethod::kExact:
-      solve_exactly(contacts, sweeps, memory, m, options, result);
-      break;
-    case FrictionMethod::kStaggered:
-      solve_staggered(contacts, sweeps, memory, m, options, result);
-      break;
-    case FrictionMethod::kBlockGaussSeidel:
-      sweeps.run(options.max_sweeps);
-      break;
-  }
+  if (options.method == FrictionMethod::kStaggered)
+    solve_staggered(contacts, sweeps, memory, m, options, result);
+  else
+    sweeps.run(options.max_sweeps);
   return sweeps.finish(f);
 }
 

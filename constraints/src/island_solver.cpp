@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "bounded_rows.h"
@@ -428,6 +429,11 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
     f_bounded[i] = first && i < 3 * cones ? step * laws[at].last_force : f[at] + held_impulse[i];
     lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
   }
+  constexpr double kPart = 0.5;  // of what a gap may be off
+  double noise = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < n; ++i)
+    if (const double own = A_reduced[i * n + i]; own > 0.0)
+      noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
   const auto size = static_cast<Eigen::Index>(n);
   Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
       Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
@@ -449,7 +455,8 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
                                                  .b = b_reduced,
                                                  .friction = friction,
                                                  .lower = lower_bounded,
-                                                 .upper = upper_bounded},
+                                                 .upper = upper_bounded,
+                                                 .noise = noise},
                                                 f_bounded);
   for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
   return status;

@@ -22,7 +22,7 @@ using testing::FrictionSample;
 using testing::make_friction;
 using testing::make_stack;
 
-constexpr FrictionMethod kMethods[] = {FrictionMethod::kExact, FrictionMethod::kBlockGaussSeidel,
+constexpr FrictionMethod kMethods[] = {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel,
                                        FrictionMethod::kStaggered};
 constexpr double kStep = 9.81 / 60.0;  // m/s that gravity adds in a step
 // The residual asked for, times the few units by which velocities differ from it.
@@ -139,7 +139,7 @@ TEST(FrictionCone, DirectionsAreAllAlike) {
     A = (R * A * R.transpose()).eval();
     Eigen::Map<Eigen::VectorXd> b(turned.b.data(), size);
     b = (R * b).eval();
-    for (const FrictionMethod method : {FrictionMethod::kExact, FrictionMethod::kBlockGaussSeidel}) {
+    for (const FrictionMethod method : {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel}) {
       const FrictionOptions options{.method = method, .tolerance = 1e-11, .max_sweeps = 5000};
       const Solved first = solve(s, solver, options), second = solve(turned, solver, options);
       ASSERT_EQ(first.result.status, SolveStatus::kSolved);
@@ -150,7 +150,7 @@ TEST(FrictionCone, DirectionsAreAllAlike) {
   }
 }
 
-TEST(FrictionCone, ExactMethodObeysCoulombsLaw) {
+TEST(FrictionCone, ProximalMethodObeysCoulombsLaw) {
   std::mt19937 random(2);
   FrictionSolver solver;
   int solved_count = 0;
@@ -166,7 +166,46 @@ TEST(FrictionCone, ExactMethodObeysCoulombsLaw) {
   // Points and normals at random with friction up to 1.2 are far harder than what rests on something: there the law may
   // have no solution that these iterations reach, and the result says so.
   RecordProperty("solved_of_200", solved_count);
-  EXPECT_GE(solved_count, kSamples * 95 / 100);
+  EXPECT_GE(solved_count, kSamples * 98 / 100);
+}
+
+/// The sample with every contact twice.
+FrictionSample twice(const FrictionSample& s) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Map<const RowMajor> G(s.G.data(), 3 * s.contacts, s.columns);
+  const Eigen::Map<const Eigen::VectorXd> b(s.b.data(), 3 * s.contacts);
+  return testing::friction_sample_of(G.replicate(2, 1), b.replicate(2, 1), s.mu.front());
+}
+
+/// A stack at rest whose every other box is heavier by a factor.
+FrictionSample stack_of_uneven_boxes(int boxes, double mass_ratio) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const FrictionSample s = make_stack(boxes, 0.02, 0.5);
+  Eigen::MatrixXd G = Eigen::Map<const RowMajor>(s.G.data(), 3 * s.contacts, s.columns);
+  for (int box = 1; box < boxes; box += 2) G.middleCols(6 * box, 6) /= std::sqrt(mass_ratio);
+  return testing::friction_sample_of(G, Eigen::Map<const Eigen::VectorXd>(s.b.data(), 3 * s.contacts), 0.5);
+}
+
+TEST(FrictionCone, RedundantContactsAndUnevenMassesSettle) {
+  // The matrices are singular, and for uneven masses nearly so where they are not.
+  constexpr int kSamples = 60;
+  constexpr double kRatio = 1e4;
+  std::mt19937 random(8);
+  FrictionSolver solver;
+  int settled = 0;
+  for (int n = 0; n < kSamples; ++n) {
+    const FrictionSample s = twice(make_friction(1 + n % 10, n % 24, 0.1 * (n % 8), random));
+    const Solved solved = solve(s, solver, {.tolerance = 1e-9});
+    settled += solved.result.status == SolveStatus::kSolved;
+    EXPECT_LT(violation_of_coulomb(s, solved), 1e-6) << n;
+  }
+  EXPECT_EQ(settled, kSamples);
+  for (int boxes = 1; boxes <= 10; ++boxes) {
+    const FrictionSample s = stack_of_uneven_boxes(boxes, kRatio);
+    const Solved solved = solve(s, solver, {.tolerance = 1e-9});
+    EXPECT_EQ(solved.result.status, SolveStatus::kSolved) << boxes << " residual " << solved.result.residual;
+    EXPECT_LT(solved.u.cwiseAbs().maxCoeff(), kVelocity) << boxes;  // it stands
+  }
 }
 
 TEST(FrictionCone, ForcesNeverAddEnergy) {
@@ -174,7 +213,7 @@ TEST(FrictionCone, ForcesNeverAddEnergy) {
   FrictionSolver solver;
   for (int n = 0; n < 100; ++n) {
     const FrictionSample s = make_friction(1 + n % 12, n % 20, 0.6, random);
-    for (const FrictionMethod method : {FrictionMethod::kExact, FrictionMethod::kBlockGaussSeidel}) {
+    for (const FrictionMethod method : {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel}) {
       const Solved solved = solve(s, solver, {.method = method, .tolerance = 1e-10, .max_sweeps = 2000});
       double energy = 0.0, size = 0.0;
       for (std::size_t i = 0; i < s.b.size(); ++i) {

@@ -64,6 +64,29 @@ TEST(WorldContact, AStackOfTenRigidBoxesStands) {
   }
 }
 
+TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
+  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;  // of a box; below its origin; between boxes, m
+  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;      // m
+  const auto model = damped_box(0, 60.0);
+  for (const int count : {3, 5}) {
+    GroundedWorld scene;
+    World& world = scene.world;
+    std::vector<BodyId> boxes;
+    for (int i = 0; i < count; ++i) {
+      const Vec3 place(0.02 * (i % 2), 0.015 * (i % 3), kBelow + kApart + i * (kHeight + kApart));
+      boxes.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}), place}}));
+    }
+    scene.step(300);
+    std::vector<Vec3> before;
+    for (const BodyId box : boxes) before.push_back(world.body(box).pose.p);
+    scene.step(60);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      EXPECT_LT((world.body(boxes[i]).pose.p - before[i]).norm(), kShift) << count << ", box " << i;
+      EXPECT_NEAR(lowest(world, boxes[i]), static_cast<double>(i) * kHeight, kPenetration) << count << ", box " << i;
+    }
+  }
+}
+
 TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   constexpr double kRise = 1e-6;
   // What overlaps stays so: pushing it apart is work that the island is given.

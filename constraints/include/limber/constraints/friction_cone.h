@@ -10,13 +10,13 @@
 /// (De Saxcé and Feng 1998; Acary and Brogliato 2008). At gap level the normal rows of b and A may be gaps over Δt.
 /// μ = 0 is a contact without friction.
 ///
-/// (1) is not convex: contacts strongly coupled by large friction may not converge by any method here (1–2 % of
-/// problems with random normals and μ up to 1.2; none of the boxes and stacks tried). The status then is
-/// kIterationLimit, and the forces are in their cones all the same.
+/// (1) is not convex: contacts strongly coupled by large friction may not converge by any method here (figures:
+/// docs/contact-solvers.md). The status then is kIterationLimit, and the forces are in their cones all the same.
 ///
 /// Methods, all with (1) as fixed point where they converge:
 /// - kBlockGaussSeidel: one contact after the other, each solved exactly; memory and time linear in contacts × bodies.
-/// - kExact: the same sweeps to find which contacts stick, slide and part, then Newton steps on those equations.
+/// - kProximal: convex problems with the correction held, by the proximal point method, which settles for any rank and
+///   number of contacts; the correction follows, and Newton's method on both ends it. Sweeps where that does not settle.
 /// - kStaggered: alternates the normal problem under fixed friction and the friction problem under fixed normal forces
 ///   (Kaufman et al. 2008); each half is convex.
 #pragma once
@@ -53,10 +53,10 @@ struct BlockFrictionProblem {
   std::span<const double> mu = {};             ///< m
 };
 
-enum class FrictionMethod { kExact, kBlockGaussSeidel, kStaggered };
+enum class FrictionMethod { kProximal, kBlockGaussSeidel, kStaggered };
 
 struct FrictionOptions {
-  FrictionMethod method = FrictionMethod::kExact;
+  FrictionMethod method = FrictionMethod::kProximal;
   double tolerance = 1e-9;  ///< of the residual below; > 0
   int max_sweeps = 500;     ///< sweeps over all contacts, or alternations; ≥ 1
 };
@@ -64,7 +64,7 @@ struct FrictionOptions {
 struct FrictionResult {
   SolveStatus status = SolveStatus::kSolved;
   int sweeps = 0;        ///< sweeps or alternations
-  int newton_steps = 0;  ///< kExact: those that were taken
+  int newton_steps = 0;  ///< kProximal: those that were taken
   double residual = 0.0;  ///< max_i |f_i − P_K(f_i − û_i/a_i)|·√a_i over max_i(|b_i|/√a_i), a_i = trace A_ii / 3
 };
 
