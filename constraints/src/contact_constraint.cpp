@@ -13,7 +13,7 @@ namespace limber {
 namespace {
 
 // Gaps are met to this part of the distances at hand.
-constexpr double kRelativeTolerance = 1e-10;
+constexpr double kRelativeTolerance = 1e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
 // Steps that an impact may last in any case.

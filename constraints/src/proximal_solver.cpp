@@ -471,6 +471,7 @@ void ProximalSolver::Impl::sweep() {
 /// sweeps in between, which find other places to start from.
 void ProximalSolver::Impl::run(const Options& options) {
   constexpr int kConvexSteps = 20, kSweepsPerRound = 10;
+  constexpr double kRoundOff = 10.0;
   secant.begin(cones);
   if (largest(f, n) > 0.0) {
     find_shift();
@@ -479,7 +480,11 @@ void ProximalSolver::Impl::run(const Options& options) {
   const auto unsettled = [&] {
     return result.residual > options.tolerance && result.newton_steps < options.max_newton_steps;
   };
+  double before = std::numeric_limits<double>::infinity();
   for (int step = 0; step < kConvexSteps && unsettled(); ++step) {
+    // Round-off: what is left will not go, by whatever way.
+    if (best_residual <= kRoundOff * options.tolerance && best_residual > 0.5 * before) return;
+    before = best_residual;
     solve_convex(options.tolerance);
     keep();
     for (std::size_t i = 0; i < cones; ++i) shift_step[i] = shift_of(i) - shift[i];
