@@ -54,7 +54,7 @@ TEST(WorldContact, AStackOfTenRigidBoxesStands) {
     const Vec3 place(0.02 * (i % 2), 0.015 * (i % 3), kBelow + kApart + i * (kHeight + kApart));
     boxes.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}), place}}));
   }
-  for (int i = 0; i < 300; ++i) world.step();
+  for (int i = 0; i < kStepsToRest; ++i) world.step();
   std::vector<Vec3> before;
   for (const BodyId box : boxes) before.push_back(world.body(box).pose.p);
   for (int i = 0; i < 60; ++i) world.step();
