@@ -2,10 +2,13 @@
 // and hung from a point; and of the free rotation alone. See README.md.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "cpu_time.h"
+#include "grounded_world.h"
 #include "limber/dynamics/free_rotation.h"
 #include "limber/engine/world.h"
 #include "sample_models.h"
@@ -44,6 +47,32 @@ BENCHMARK_CAPTURE(world_step, undisturbed, Flight::kUndisturbed)
     ->ArgsProduct({{0, 10, 40}, {1, 100, 1000}});
 BENCHMARK_CAPTURE(world_step, forced, Flight::kForced)->ArgNames({"modes", "bodies"})->Args({40, 1000});
 BENCHMARK_CAPTURE(world_step, hung, Flight::kHung)->ArgNames({"modes", "bodies"})->Args({40, 1000});
+
+/// Boxes on the ground, side by side without touching each other, `state.range(0)` of them, asleep or not: what lies
+/// about.
+enum class Rest { kAwake, kAsleep };
+
+void world_rest(benchmark::State& state, Rest rest) {
+  constexpr int kSteps = 60;  // until all sleep
+  const auto bodies = static_cast<int>(state.range(0)), row = static_cast<int>(std::ceil(std::sqrt(bodies)));
+  const auto model = testing::damped_box(6, 60.0);
+  testing::GroundedWorld scene({}, {.sleep = {.enabled = rest == Rest::kAsleep}});
+  std::vector<BodyId> ids;
+  const double height = testing::depth_below_origin(*model);
+  for (int i = 0; i < bodies; ++i)
+    ids.push_back(scene.world.add_body(model, {.pose = {.p = {1.0 * (i % row), 1.0 * (i / row), height}}}));
+  scene.step(kSteps);
+  const auto asleep = [&] {
+    return std::count_if(ids.begin(), ids.end(), [&](BodyId id) { return scene.world.is_asleep(id); });
+  };
+  if (asleep() != (rest == Rest::kAsleep ? bodies : 0)) state.SkipWithError("not as many bodies sleep as should");
+  LeastTime time;
+  for (auto _ : state) time.measure([&] { scene.world.step(); });
+  state.counters["us_per_step"] = 1e6 * time.seconds();
+  state.counters["islands"] = scene.world.constraint_report().islands;
+}
+BENCHMARK_CAPTURE(world_rest, awake, Rest::kAwake)->ArgName("bodies")->Arg(100)->Arg(1000);
+BENCHMARK_CAPTURE(world_rest, asleep, Rest::kAsleep)->ArgName("bodies")->Arg(100)->Arg(1000);
 
 const PrincipalInertia kBody{{1.0, 2.0, 3.0}, {}};
 /// range(0) 0: far from the separatrix (series in q), 1: next to it (in q').

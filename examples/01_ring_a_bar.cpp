@@ -3,7 +3,7 @@
 //          limber-precompute bar.mesh --material steel --modes 5 -o bar.glb
 //   run:   01_ring_a_bar bar.glb
 //   see:   five frequencies beside those of beam theory, and the energy that a strike on a corner gave each
-//   next:  02_picture_of_a_flight
+//   next:  02_let_it_fall
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -4,6 +4,7 @@
 //   run:   06_chain link.glb
 //   see:   eight links on hinges, let go level: half a minute of swinging; the joints' error and the energy. A chain
 //          cracks like a whip: its step is a quarter of a frame, so that no link turns by a radian within it
+//   next:  07_find_contacts
 #include <algorithm>
 #include <cstdio>
 #include <exception>

@@ -121,10 +121,12 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["scene"] = scene.name;
   report["step"] = scene.step;
   report["steps"] = result.steps;
+  report["substeps"] = scene.substeps;
   report["gravity"] = vector(scene.gravity);
   report["models"] = Json::array();
   for (const ModelManifest& m : models.manifest) report["models"].push_back(manifest(m));
   report["bodies"] = bodies(result.trajectory);
+  report["asleep"] = result.asleep;
   report["strikes"] = loads(result.strikes);
   report["forces"] = loads(result.forces);
   report["energy_before"] = result.energy_before;

@@ -62,7 +62,8 @@ class Run {
       : scene_(scene),
         models_(models),
         options_(options),
-        world_({.step = scene.step, .gravity = scene.gravity}, options.jobs ? *options.jobs : serial_jobs()),
+        world_({.step = scene.step, .substeps = scene.substeps, .gravity = scene.gravity, .sleep = scene.sleep},
+               options.jobs ? *options.jobs : serial_jobs()),
         steps_(options.steps < 0 ? scene.steps : options.steps) {
     add_bodies();
     plan_loads();
@@ -224,6 +225,7 @@ class Run {
   RunResult finish() {
     result_.steps = steps_;
     result_.state_hash = world_.state_hash();
+    result_.asleep = std::count_if(ids_.begin(), ids_.end(), [&](BodyId id) { return world_.is_asleep(id); });
     for (const BodyTrack& track : result_.trajectory.bodies) {
       result_.energy_before += track.energies.front().total();
       result_.energy_after += track.energies.back().total();

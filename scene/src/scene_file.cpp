@@ -17,6 +17,7 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
 constexpr std::int64_t kMaxCopies = 100'000;
+constexpr std::int64_t kMaxSubsteps = 1'000'000;
 constexpr Index kMaxIndex = std::numeric_limits<Index>::max();
 constexpr double kToTheEnd = std::numeric_limits<double>::infinity();
 
@@ -312,6 +313,14 @@ void read_assets(const JsonObject& o, const std::filesystem::path& folder, Scene
   }
 }
 
+SleepOptions read_sleep(const JsonObject& o) {
+  SleepOptions sleep{.enabled = true};
+  sleep.time = non_negative(o, "time", sleep.time);
+  sleep.speed = non_negative(o, "speed", sleep.speed);
+  o.finish();
+  return sleep;
+}
+
 SceneLimits read_limits(const JsonObject& o) {
   constexpr LoadKind kKinds[] = {LoadKind::kStatic, LoadKind::kSudden, LoadKind::kResonant};
   SceneLimits limits;
@@ -334,6 +343,8 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   const JsonObject o(document, name);
   Scene scene;
   read_time(o, scene);
+  scene.substeps = static_cast<int>(o.integer("substeps", 1, kMaxSubsteps, scene.substeps));
+  if (o.has("sleep")) scene.sleep = read_sleep(JsonObject(o.at("sleep"), o.where("sleep")));
   scene.gravity = o.vec3("gravity", scene.gravity);
   read_assets(o, folder, scene);
   if (o.has("limits")) scene.limits = read_limits(JsonObject(o.at("limits"), o.where("limits")));

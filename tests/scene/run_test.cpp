@@ -150,6 +150,37 @@ TEST(Run, HowOftenKeysAreKeptDoesNotChangeTheMotion) {
   EXPECT_NE(often.state_hash, play(parse(struck("0.0343"))).state_hash);
 }
 
+/// Of a block that swings about its origin, where the step's length tells.
+TEST(Run, SubstepsAreSmallSteps) {
+  auto data = testing::block_data(1);
+  data.motion = FrameMotion::kPoint;
+  data.center_of_mass = {0.0, 0.0, -0.3};
+  Asset asset;
+  asset.bodies = {std::make_shared<const ModalModel>(std::move(data))};
+  const auto last_pose = [&](const std::string& time) {
+    Scene scene = parse(time + R"(, "bodies": [{"name": "b", "asset": "block",
+                                     "orientation": {"axis": [0, 1, 0], "degrees": 40}}])");
+    scene.gravity = {0.0, 0.0, -9.80665};
+    const RunResult r = run_scene(scene, make_models(scene, {{"block", asset}}), {.key_rate = 0.0});
+    return r.trajectory.bodies[0].poses.back().q;
+  };
+  const auto small = last_pose(R"("step": 0.01, "steps": 40)");
+  const auto parts = last_pose(R"("step": 0.04, "steps": 10, "substeps": 4)");
+  const auto whole = last_pose(R"("step": 0.04, "steps": 10)");
+  EXPECT_EQ(small.w, parts.w);
+  EXPECT_EQ(small.y, parts.y);
+  EXPECT_GT(std::abs(small.w - whole.w), 1e-6);
+}
+
+TEST(Run, ABodyAtRestSleepsUntilItIsStruck) {
+  const std::string sleep = R"("sleep": {"time": 0.05}, )";
+  EXPECT_EQ(play(parse(sleep + struck("0.1")), {.steps = 10}).asleep, 1);
+  EXPECT_EQ(play(parse(struck("0.1")), {.steps = 10}).asleep, 0);
+  const RunResult woken = play(parse(sleep + struck("0.1"))), awake = play(parse(struck("0.1")));
+  EXPECT_EQ(woken.asleep, 0);
+  EXPECT_EQ(woken.trajectory.bodies[0].rates, awake.trajectory.bodies[0].rates);
+}
+
 TEST(Run, EnergyOfAnUndisturbedFlightIsKeptButForDamping) {
   const RunResult r = play(parse(struck("0")));
   const auto& e = r.trajectory.bodies[0].energies;

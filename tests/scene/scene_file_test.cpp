@@ -27,7 +27,7 @@ const std::string kBell = R"({"name": "bell", "asset": "bell"})";
 
 TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
   const Scene s = parse(R"({
-    "step": 0.002, "duration": 1, "gravity": [0, -1, 0],
+    "step": 0.002, "duration": 1, "gravity": [0, -1, 0], "substeps": 3, "sleep": {"time": 0.25, "speed": 0.02},
     "assets": {"bell": "sub/bell.glb"},
     "limits": {"max_modes": 7, "max_force": 10, "min_displacement": 1e-4, "frame_rate": 120, "load": "static"},
     "bodies": [{"name": "left", "asset": "bell", "part": "clapper", "position": [1, 2, 3],
@@ -39,6 +39,10 @@ TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
   EXPECT_EQ(s.step, 0.002);
   EXPECT_EQ(s.steps, 500);
   EXPECT_EQ(s.gravity, Vec3(0, -1, 0));
+  EXPECT_EQ(s.substeps, 3);
+  EXPECT_TRUE(s.sleep.enabled);
+  EXPECT_EQ(s.sleep.time, 0.25);
+  EXPECT_EQ(s.sleep.speed, 0.02);
   EXPECT_EQ(s.assets.at("bell"), std::filesystem::path("folder/sub/bell.glb"));
   ASSERT_TRUE(s.limits);
   EXPECT_EQ(s.limits->max_modes, 7);
@@ -57,6 +61,14 @@ TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
   ASSERT_EQ(s.forces.size(), 1u);
   EXPECT_EQ(s.forces[0].start, 0.1);
   EXPECT_EQ(std::get<NearestTo>(s.forces[0].at).frame, PlaceFrame::kInput);
+}
+
+TEST(SceneFile, BodiesSleepWhereTheSceneSaysSo) {
+  EXPECT_FALSE(parse(scene_with(kBell)).sleep.enabled);
+  const SleepOptions sleep = parse(scene_with(kBell, R"("sleep": {})")).sleep;
+  EXPECT_TRUE(sleep.enabled);
+  EXPECT_EQ(sleep.time, SleepOptions{}.time);
+  EXPECT_EQ(sleep.speed, SleepOptions{}.speed);
 }
 
 TEST(SceneFile, AxisAndDegreesIsTheSameTurnAsItsQuaternion) {
@@ -126,6 +138,11 @@ TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
       {R"({"step": 0.1, "steps": 1, "assets": {"a": ""}})", "assets.a", "a file name"},
       {R"({"step": 0.1, "steps": 1, "assets": {"a": "b"}, "bodies": []})", "bodies", "at least one body"},
       {R"({"step": 0.1, "steps": 1, "assets": {"a": "b"}, "bodies": {}})", "bodies", "an array"},
+      {scene_with(kBell, R"("substeps": 0)"), "substeps", "an integer from 1"},
+      {scene_with(kBell, R"("substeps": 1.5)"), "substeps", "an integer"},
+      {scene_with(kBell, R"("sleep": true)"), "sleep", "an object"},
+      {scene_with(kBell, R"("sleep": {"time": -1})"), "sleep.time", ">= 0"},
+      {scene_with(kBell, R"("sleep": {"sped": 1})"), "sleep", "did you mean \"speed\""},
       {scene_with(kBell, R"("gravty": [0, 0, 0])"), "gravty", "did you mean \"gravity\""},
       {scene_with(kBell, R"("gravity": [0, 0])"), "gravity", "array of 3 numbers"},
       {scene_with(kBell, R"("gravity": [0, 0, null])"), "gravity[2]", "a finite number"},

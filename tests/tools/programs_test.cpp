@@ -74,6 +74,8 @@ TEST_F(Programs, SimulateWritesWhatItIsAskedFor) {
   const auto report = json("r.json");
   EXPECT_EQ(report.at("program"), "limber-simulate");
   EXPECT_EQ(report.at("steps"), 250);
+  EXPECT_EQ(report.at("substeps"), 1);
+  EXPECT_EQ(report.at("asleep"), 0);
   EXPECT_EQ(report.at("bodies").size(), 5u);
   EXPECT_EQ(report.at("strikes").size(), 5u);
   EXPECT_EQ(report.at("strikes").at(0).at("step"), 16);

@@ -61,6 +61,7 @@ struct RunResult {
   Trajectory trajectory;
   std::int64_t steps = 0;
   std::uint64_t state_hash = 0;  ///< World::state_hash() at the end
+  std::int64_t asleep = 0;       ///< bodies that sleep at the end
   /// Those that acted, in the order of the scene's lists (then of the bodies).
   std::vector<LoadReport> strikes, forces;
   double energy_before = 0.0, energy_after = 0.0;  ///< total of all bodies at the first and last key, J

@@ -104,6 +104,8 @@ struct Scene {
   std::string name{};                                     ///< the file's name without folder and extension
   double step = 1.0 / 60.0;                               ///< s
   std::int64_t steps = 0;                                 ///< whole steps
+  int substeps = 1;                                       ///< as WorldOptions::substeps
+  SleepOptions sleep{};                                   ///< as WorldOptions::sleep; on where the file has it
   Vec3 gravity = {0.0, 0.0, -9.80665};                    ///< m/s²
   std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show

@@ -1,7 +1,7 @@
-// 02_picture_of_a_flight: how do deformed vertices get out of limber and into a renderer?
-//   run:   02_picture_of_a_flight bunny.glb flight.pov && povray flight.pov +W1600 +H800 +A
+// 08_picture_of_a_flight: how do deformed vertices get out of limber and into a renderer?
+//   run:   08_picture_of_a_flight bunny.glb flight.pov && povray flight.pov +W1600 +H800 +A
 //   see:   the body at six instants of one flight, struck at its highest point; colour is the distance from rest
-//   next:  03_find_contacts; the header to read is engine/include/limber/engine/world.h
+//   next:  the header to read, engine/include/limber/engine/world.h
 #include <algorithm>
 #include <cstdio>
 #include <numbers>
@@ -149,7 +149,7 @@ fog { fog_type 1 distance 110 * Size rgb <0.93, 0.95, 0.97> }
 
 int main(int argc, char** argv) try {
   if (argc != 3) {
-    std::fputs("usage: 02_picture_of_a_flight ASSET.glb OUT.pov\n", stderr);
+    std::fputs("usage: 08_picture_of_a_flight ASSET.glb OUT.pov\n", stderr);
     return 2;
   }
   const auto model = limber::read_asset(argv[1]).bodies.at(0);
@@ -165,6 +165,6 @@ int main(int argc, char** argv) try {
   std::printf("%s: %zu instants of %d vertices, struck with %.3g N s\n", argv[2], instants.size(),
               model->render().vertices(), (harder * trial).norm());
 } catch (const std::exception& e) {
-  std::fprintf(stderr, "02_picture_of_a_flight: %s\n", e.what());
+  std::fprintf(stderr, "08_picture_of_a_flight: %s\n", e.what());
   return 1;
 }

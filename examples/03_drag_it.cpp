@@ -1,10 +1,10 @@
-// 04_drag_it: how is a body taken by the hand?
+// 03_drag_it: how is a body taken by the hand?
 //   bake:  scripts/make-bar 0.5 0.02 0.01 60 4 4 > bar.mesh
 //          limber-precompute bar.mesh --youngs-modulus 5e6 --poisson-ratio 0.4 --density 1100 --modes 30 -o rubber.glb
-//   run:   04_drag_it rubber.glb
+//   run:   03_drag_it rubber.glb
 //   see:   a rubber bar hung by one end and swung by it: the held point is at its target to round-off in every frame;
 //          then pulled by a mouse spring, and let go
-//   next:  05_hinged_lamp
+//   next:  04_stack
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -47,6 +47,6 @@ int main(int argc, char** argv) try {
   for (int frame = 0; frame < 30; ++frame) world.step();
   std::printf("let go: fell %.2f m in half a second\n", height - world.position(id, end).z());
 } catch (const std::exception& e) {
-  std::fprintf(stderr, "04_drag_it: %s\n", e.what());
+  std::fprintf(stderr, "03_drag_it: %s\n", e.what());
   return 1;
 }

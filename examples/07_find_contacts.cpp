@@ -1,9 +1,9 @@
-// 03_find_contacts: where does a bent body touch, without any world?
+// 07_find_contacts: where does a bent body touch, without any world?
 //   bake:  limber-precompute bunny.obj --scale 0.1 --material rubber --modes 16 -o bunny.glb
-//   run:   03_find_contacts bunny.glb
+//   run:   07_find_contacts bunny.glb
 //   see:   the contacts of a body over a table as its first mode bends it: more of them, then an overlap; ids of those
 //          that stay stay the same, so that a solver can start from last time's forces
-//   next:  docs/collision.md
+//   next:  08_picture_of_a_flight, docs/collision.md
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -51,6 +51,6 @@ int main(int argc, char** argv) try {
                   1e3 * c.gap, c.position.x(), c.position.y(), c.a.triangle);
   }
 } catch (const std::exception& e) {
-  std::fprintf(stderr, "03_find_contacts: %s\n", e.what());
+  std::fprintf(stderr, "07_find_contacts: %s\n", e.what());
   return 1;
 }
