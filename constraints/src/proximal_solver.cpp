@@ -97,7 +97,10 @@ struct ProximalSolver::Impl {
   std::vector<Column> columns;
   DenseLu lu;
   Result result;
+  int max_newton_steps = 0;
   double best_residual = 0.0;
+
+  bool tired() const { return result.newton_steps >= max_newton_steps; }
 
   void place(const BoundedRows& rows, std::span<const double> guess, double tolerance);
   void scale_rows(const BoundedRows& rows);
@@ -326,7 +329,7 @@ bool ProximalSolver::Impl::convex_step(double tolerance) {
     multiply(Ad, d);
     const double now = largest(Ad, n);
     settled = now <= tolerance * size;
-    if (settled || step == kMaxNewton) break;
+    if (settled || step == kMaxNewton || tired()) break;
     if (step > 5 && now > 0.5 * last && now <= 1e-9 * (size + largest(v, n))) break;  // round-off
     last = now;
     find_columns();
@@ -414,6 +417,7 @@ bool ProximalSolver::Impl::coupled_step(double tolerance) {
       std::copy_n(p, n, f);
       return true;
     }
+    if (tired()) return false;
     ++result.newton_steps;
     if (!map_direction()) return false;
     double t = 1.0, after = 0.0;
@@ -477,9 +481,7 @@ void ProximalSolver::Impl::run(const Options& options) {
     find_shift();
     newton_tail(options.tolerance);
   }
-  const auto unsettled = [&] {
-    return result.residual > options.tolerance && result.newton_steps < options.max_newton_steps;
-  };
+  const auto unsettled = [&] { return result.residual > options.tolerance && !tired(); };
   double before = std::numeric_limits<double>::infinity();
   for (int step = 0; step < kConvexSteps && unsettled(); ++step) {
     // Round-off: what is left will not go, by whatever way.
@@ -523,6 +525,7 @@ ProximalSolver::Result ProximalSolver::solve(const BoundedRows& rows, std::span<
   Impl& s = *impl_;
   s.result = {};
   s.rho = kFirstRho;
+  s.max_newton_steps = options.max_newton_steps;
   s.place(rows, f, options.tolerance);
   s.best_residual = std::numeric_limits<double>::infinity();
   s.keep();

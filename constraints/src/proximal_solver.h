@@ -39,7 +39,7 @@ class ProximalSolver {
  public:
   struct Options {
     double tolerance = 1e-9;     ///< of the residual
-    int max_newton_steps = 300;  ///< about: a convex problem begun is ended
+    int max_newton_steps = 300;  ///< ≥ 0
     int max_sweeps = 500;        ///< over all rows, where Newton's method does not settle
   };
   struct Result {
