@@ -1,0 +1,297 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "island_step.h"
+
+namespace limber {
+namespace {
+
+Eigen::Map<const Eigen::VectorXd> as_vector(std::span<const double> v) {
+  return {v.data(), static_cast<Eigen::Index>(v.size())};
+}
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
+
+}  // namespace
+
+SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Constraint* const> constraints,
+                                        const IslandOptions& options, IslandReport& report) {
+  step = options.step;
+  bodies.write_position_metric(step, theta, metric);
+  sort_rows();
+  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
+  factor();
+  secant.begin(f.size());
+  for (report.iterations = 1;; ++report.iterations) {
+    predict(options);
+    measure(states, StepTime::kEnd, constraints, gap);
+    const SolveStatus status = improve(report.iterations == 1);
+    report.change = largest_change();
+    if (report.change <= 1.0) return status;
+    // Cones that do not come together give other impulses every time.
+    const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
+                                                            : options.max_iterations;
+    if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate())
+      return differentiate(states, constraints, options, report);
+    if (report.iterations > most) return take_best(states, constraints, options, report);
+    for (std::size_t i = 0; i < f.size(); ++i) next_f[i] -= f[i];
+    for (Index i = 0; i < rows.size(); ++i) change[static_cast<std::size_t>(i)] /= rows.row(i).law.tolerance;
+    secant.advance(f, next_f, change);
+    keep_within_bounds();
+  }
+}
+
+/// Which rows have bounds, cones first, and what is left of the bounds, which are on the whole impulse.
+void IslandSolver::Impl::sort_rows() {
+  bounded.clear();
+  for (Index i = 0; i < rows.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const RowLaw& law = rows.row(i).law;
+    const double held = step * reaction[at];
+    lower[at] = law.lower - held, upper[at] = law.upper - held;
+    compliance[at] = law.compliance;
+    if (in_cone(law)) bounded.push_back(i);
+  }
+  cones = bounded.size() / 3;
+  for (Index i = 0; i < rows.size(); ++i)
+    if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
+}
+
+/// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
+void IslandSolver::Impl::factor() {
+  if (bounded.empty()) {
+    factor_equalities();
+    return;
+  }
+  order_rows();
+  assemble_ordered();
+  const std::size_t c = bounded.size();
+  A_reduced.resize(c * c), b_reduced.resize(c), ordered_b.resize(f.size());
+  for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
+  friction.resize(cones);
+  for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
+}
+
+void IslandSolver::Impl::factor_equalities() {
+  const std::size_t m = f.size(), n = metric.size();
+  std::size_t soft = 0;
+  for (const double c : compliance) soft += c > 0.0 ? 1 : 0;
+  if (soft == 0) {
+    least_squares.factor(J, metric, static_cast<int>(m));
+    return;
+  }
+  // A row's compliance is a degree of freedom of its own.
+  const std::size_t width = n + soft;
+  wide_J.assign(m * width, 0.0), wide_metric = metric;
+  for (std::size_t i = 0; i < m; ++i) {
+    std::copy_n(J.begin() + static_cast<std::ptrdiff_t>(i * n), n,
+                wide_J.begin() + static_cast<std::ptrdiff_t>(i * width));
+    if (compliance[i] == 0.0) continue;
+    wide_J[i * width + wide_metric.size()] = 1.0;
+    wide_metric.push_back(compliance[i]);
+  }
+  least_squares.factor(wide_J, wide_metric, static_cast<int>(m));
+}
+
+/// Equality rows first, then those with bounds.
+void IslandSolver::Impl::order_rows() {
+  order.clear();
+  for (Index i = 0; i < rows.size(); ++i)
+    if (is_equality(rows.row(i).law)) order.push_back(i);
+  order.insert(order.end(), bounded.begin(), bounded.end());
+  place.resize(f.size());
+  for (std::size_t i = 0; i < f.size(); ++i) place[static_cast<std::size_t>(order[i])] = static_cast<Index>(i);
+}
+
+/// A = J D Jᵀ with compliances and flexibilities, in that order.
+void IslandSolver::Impl::assemble_ordered() {
+  const std::size_t m = f.size(), n = metric.size();
+  weigh();
+  ordered_G.resize(m * n);
+  for (std::size_t i = 0; i < m; ++i)
+    std::copy_n(G.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(order[i]) * n), n,
+                ordered_G.begin() + static_cast<std::ptrdiff_t>(i * n));
+  A.resize(m * m);
+  const Eigen::Map<const RowMajor> B(ordered_G.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
+  Eigen::Map<RowMajor>(A.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(m)).noalias() =
+      B * B.transpose();
+  for (std::size_t i = 0; i < m; ++i) A[i * m + i] += compliance[static_cast<std::size_t>(order[i])];
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(place[static_cast<std::size_t>(g.i)]),
+               j = static_cast<std::size_t>(place[static_cast<std::size_t>(g.j)]);
+    A[i * m + j] += g.value / step;
+    if (i != j) A[j * m + i] += g.value / step;
+  }
+}
+
+/// G = J D^½.
+void IslandSolver::Impl::weigh() {
+  const std::size_t n = metric.size();
+  for (std::size_t i = 0; i < n; ++i) weighted[i] = std::sqrt(metric[i]);
+  for (std::size_t row = 0; row < f.size(); ++row)
+    for (std::size_t i = 0; i < n; ++i) G[row * n + i] = J[row * n + i] * weighted[i];
+}
+
+/// What impulses make of the gaps, compliance left out: J D Jᵀ values.
+void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
+  const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
+  const Eigen::Map<const RowMajor> Jacobian(J.data(), m, n);
+  Eigen::Map<Eigen::VectorXd> x(weighted.data(), n);
+  x.noalias() = Jacobian.transpose() * as_vector(values);
+  x.array() *= as_vector(metric).array();
+  Eigen::Map<Eigen::VectorXd>(gaps.data(), m).noalias() = Jacobian * x;
+}
+
+/// One step of Newton's method from f, to next_f; `change` is what it makes of the gaps.
+SolveStatus IslandSolver::Impl::improve(bool first) {
+  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all(first);
+  for (std::size_t i = 0; i < f.size(); ++i) b[i] = next_f[i] - f[i];
+  respond(b, change);
+  return status;
+}
+
+/// Rows without bounds: A Δf = −(gap − offset + compliance f), in the least-squares sense.
+SolveStatus IslandSolver::Impl::improve_equalities() {
+  for (Index i = 0; i < rows.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const RowLaw& law = rows.row(i).law;
+    next_f[at] = law.offset - gap[at] - law.compliance * (f[at] + step * reaction[at]);
+  }
+  const SolveStatus status = least_squares.solve(next_f, next_f);
+  for (std::size_t i = 0; i < f.size(); ++i) next_f[i] += f[i];
+  return status;
+}
+
+/// Rows with bounds beside the others, which are eliminated first: A f' + b, b = gap − offset − A₀ f.
+SolveStatus IslandSolver::Impl::improve_all(bool first) {
+  respond(f, change);
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    change[i] -= g.value * reaction[j];
+    if (i != j) change[j] -= g.value * reaction[i];
+  }
+  const std::size_t m = f.size(), e = m - bounded.size();
+  for (std::size_t i = 0; i < m; ++i) {
+    const auto at = static_cast<std::size_t>(order[i]);
+    const RowLaw& law = laws[at];
+    ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
+  }
+  elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
+  gap_before.clear();
+  for (const Index row : bounded)
+    gap_before.push_back(start_gap[static_cast<std::size_t>(row)] - laws[static_cast<std::size_t>(row)].offset);
+  const SolveStatus status = solve_bounded(first);
+  f_equal.resize(e);
+  elimination.recover(f_bounded, f_equal);
+  for (std::size_t i = 0; i < m; ++i)
+    next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
+  return status;
+}
+
+/// Bounds and cones are of whole impulses, F = f + Δt reaction: A F + (b − A Δt reaction).
+SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
+  const std::size_t n = bounded.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(bounded[i]);
+    held_impulse[i] = step * reaction[at];
+    f_bounded[i] = first && i < 3 * cones ? step * laws[at].last_force : f[at] + held_impulse[i];
+    lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
+  }
+  constexpr double kPart = 0.5;  // of what a gap may be off
+  double noise = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < n; ++i)
+    if (const double own = A_reduced[i * n + i]; own > 0.0)
+      noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
+  const auto size = static_cast<Eigen::Index>(n);
+  Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
+      Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
+  const BoundedRows problem{.cones = static_cast<int>(cones),
+                            .A = A_reduced,
+                            .b = b_reduced,
+                            .friction = friction,
+                            .lower = lower_bounded,
+                            .upper = upper_bounded,
+                            .noise = noise};
+  const bool by_program =
+      rule.method == ContactMethod::kGapProgram || (cones > 0 && rule.friction != FrictionModel::kCone);
+  const SolveStatus status = by_program ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
+                                        : bounded_rows.solve(problem, f_bounded);
+  for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
+  return status;
+}
+
+double IslandSolver::Impl::largest_change() const {
+  double largest = 0.0;
+  for (Index i = 0; i < rows.size(); ++i)
+    largest = std::max(largest, std::abs(change[static_cast<std::size_t>(i)]) / rows.row(i).law.tolerance);
+  return largest;
+}
+
+void IslandSolver::Impl::keep_within_bounds() {
+  for (std::size_t i = 0; i < f.size(); ++i) f[i] = std::clamp(f[i], lower[i], upper[i]);
+  if (rule.friction == FrictionModel::kHeuristicNoSlip) return;
+  for (std::size_t i = 0; i < cones; ++i) {
+    const auto n = static_cast<std::size_t>(bounded[3 * i]), t = n + 1, u = n + 2;
+    const double largest = friction[i] * (f[n] + step * reaction[n]);
+    const double along = f[t] + step * reaction[t], across = f[u] + step * reaction[u];
+    const double size = std::hypot(along, across);
+    if (!(size > largest)) continue;
+    f[t] += along * (largest / size - 1.0);
+    f[u] += across * (largest / size - 1.0);
+  }
+}
+
+/// Whether the island is small enough, and its rows have an interval each.
+bool IslandSolver::Impl::can_differentiate() const {
+  constexpr std::size_t kMostRows = 96;
+  return f.size() <= kMostRows && cones == 0 && flexibility.empty() && rule.method != ContactMethod::kGapProgram;
+}
+
+/// From the best impulses seen, with the rows' true derivatives.
+SolveStatus IslandSolver::Impl::differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
+                                              const IslandOptions& options, IslandReport& report) {
+  const std::size_t m = f.size(), n = metric.size();
+  take_best(states, constraints, options, report);
+  slope.resize(m), tolerance.resize(m);
+  for (std::size_t i = 0; i < m; ++i) {
+    slope[i] = compliance[i];
+    for (std::size_t j = 0; j < n; ++j) slope[i] += metric[j] * J[i * n + j] * J[i * n + j];
+    tolerance[i] = laws[i].tolerance;
+  }
+  struct Context {
+    Impl& solver;
+    const BodyStates& states;
+    std::span<Constraint* const> constraints;
+    const IslandOptions& options;
+    IslandReport& report;
+  } context{*this, states, constraints, options, report};
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  const auto evaluate = [&context](std::span<const double> impulses, std::span<double> w) {
+    Impl& s = context.solver;
+    if (impulses.data() != s.f.data()) std::copy(impulses.begin(), impulses.end(), s.f.begin());
+    s.predict(context.options);
+    s.measure(context.states, StepTime::kEnd, context.constraints, s.gap);
+    ++context.report.iterations;
+    for (std::size_t i = 0; i < w.size(); ++i)
+      w[i] = s.gap[i] - s.laws[i].offset + s.compliance[i] * (s.f[i] + s.step * s.reaction[i]);
+  };
+  report.change = newton.solve({.slope = slope, .tolerance = tolerance, .lower = lower, .upper = upper}, evaluate, f);
+  return report.change <= 1.0 ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
+}
+
+/// The best impulses seen, where Newton's method does not settle: steps in which bodies turn by a radian and more.
+SolveStatus IslandSolver::Impl::take_best(const BodyStates& states, std::span<Constraint* const> constraints,
+                                          const IslandOptions& options, IslandReport& report) {
+  if (!(report.change <= secant.best())) {
+    report.change = secant.best();
+    std::copy(secant.best_iterate().begin(), secant.best_iterate().end(), f.begin());
+    predict(options);
+    measure(states, StepTime::kEnd, constraints, gap);
+  }
+  return SolveStatus::kIterationLimit;
+}
+
+}  // namespace limber

@@ -1,0 +1,139 @@
+// One step of an island: what its parts share. Each part has a file of its own:
+//
+//   island_solver.cpp    the step as a whole, its cuts, the rows, and the bodies under the rows' impulses
+//   island_reaction.cpp  what rows that hold answer to gravity and other held forces
+//   island_touch.cpp     [H03]'s velocity program, before the rows
+//   island_newton.cpp    Newton's method for the impulses
+//   island_guard.cpp     the energy that may have come in, and what is done about more
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "bounded_rows.h"
+#include "contact_program.h"
+#include "difference_newton.h"
+#include "island_energy.h"
+#include "limber/constraints/contact_qp.h"
+#include "limber/constraints/island_solver.h"
+#include "limber/constraints/least_squares.h"
+#include "secant_iteration.h"
+
+namespace limber {
+
+/// The generalised acceleration of a frame under what is held over the step, without constraints: linear in the loads,
+/// so that the rows' answer balances them exactly where nothing moves.
+struct FrameAcceleration {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+};
+
+inline bool is_equality(const RowLaw& law) {
+  return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded;
+}
+
+struct IslandSolver::Impl {
+  IslandBodies bodies;
+  ConstraintRows rows;
+  std::vector<ExactMotion> motions;    // of the members, where a step may be cut
+  std::vector<ModalStep> modal_steps;  // of the bodies, where they are not those of their groups
+  std::vector<Index> first_row;        // per constraint, and the end
+  std::vector<RowLaw> laws;            // of the rows at the step's start
+  std::vector<double> J, metric, G, weighted, gap, start_gap, b, lower, upper, compliance;
+  std::vector<double> f, next_f, reaction, end_reaction, change;
+  std::vector<FrameAcceleration> accelerations;  // per body, under held forces
+  std::vector<double> frame_G, unit_metric;
+  std::vector<ConstraintLoad> loads;
+  std::vector<double> modal_loads;
+  // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
+  // Among those the contacts with friction come first, three rows each.
+  std::vector<Index> bounded, order, place;
+  std::size_t cones = 0;
+  std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
+  std::vector<double> held_impulse, friction;
+  std::vector<ConstraintRows::Flexibility> flexibility;  // of the rows at the step's start
+  double stored_energy = 0.0;
+  std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
+  LeastSquaresSolver least_squares;
+  EqualityElimination elimination;
+  ContactQpSolver qp;
+  BoundedRowSolver bounded_rows;
+  ContactProgramSolver programs;
+  ContactRule rule;
+  ProgramReport program_report;
+  std::vector<double> gap_before;     // of the bounded rows
+  std::vector<double> touch_impulse;  // by row, what the velocity program gave at the touch
+  std::vector<double> contact_force;  // by row, N, what it holds over the step
+  std::vector<Index> touching;        // rows of its contacts, three each with friction
+  std::vector<double> mu, A_touch, b_touch, f_touch;
+  SecantIteration secant;
+  DifferenceNewton newton;
+  std::vector<double> slope, tolerance;
+  IslandEnergy energy;
+
+  void gather(std::span<const ConstrainedBody> table, std::span<const Index> members,
+              std::span<Constraint* const> constraints, const IslandOptions& options);
+  void measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
+               std::vector<double>& into) const;
+  void weigh();
+  std::size_t weigh_frames();
+  void find_accelerations(StepTime when, const Vec3& gravity);
+  double step = 0.0;
+  double theta = 1.0;  // the part of f that frames get at the step's start; the rest at its end
+  struct HeldMotion {
+    double acceleration = 0.0, speed = 0.0, speed_of_a_step = 0.0;
+  };
+  HeldMotion held_motion(StepTime when, Index row, const IslandOptions& options) const;
+  void find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer);
+  void answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
+  void set_modal_steps(double length, double whole_step);
+  struct Part {
+    std::span<const ConstrainedBody> table;
+    std::span<const Index> members;
+    std::span<Constraint* const> constraints;
+    bool begins, ends;  // the whole step
+  };
+  void take_part(const Part& part, const IslandOptions& options, double whole_step, IslandReport& report);
+  double next_cut(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                  std::span<Constraint* const> constraints, const Vec3& gravity, double left);
+  SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
+                      IslandReport& report);
+  void sort_rows();
+  void factor();
+  void factor_equalities();
+  void order_rows();
+  void assemble_ordered();
+  void respond(std::span<const double> values, std::vector<double>& gaps);
+  SolveStatus improve(bool first);
+  SolveStatus improve_equalities();
+  SolveStatus improve_all(bool first);
+  SolveStatus solve_bounded(bool first);
+  bool holds_contact_forces() const { return rule.method == ContactMethod::kVelocityProgram; }
+  void solve_touch(const IslandOptions& options, ProgramReport& report);
+  void choose_touching(const IslandOptions& options, bool resting);
+  void assemble_touching();
+  double row_speed(Index row, const IslandOptions& options) const;
+  double row_acceleration(Index row, const IslandOptions& options) const;
+  template <class Side>
+  double modal_sum(Index row, Side&& number) const;
+  SolveStatus solve_touching(std::span<double> into, ProgramReport& report);
+  void apply_touch_impulse();
+  void hold_contact_forces(double length);
+  void keep_within_bounds();
+  double largest_change() const;
+  bool can_differentiate() const;
+  SolveStatus differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
+                            const IslandOptions& options, IslandReport& report);
+  SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
+                        const IslandOptions& options, IslandReport& report);
+  void predict(const IslandOptions& options);
+  void sum_loads(std::span<const double> values, double frame_scale, double modal_scale);
+  void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
+  double largest_recovery_work(double distance, const IslandOptions& options) const;
+  double agent_work(const IslandOptions& options) const;
+  bool is_workless() const;
+  void guard_energy(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
+                    IslandReport& report);
+};
+
+}  // namespace limber
