@@ -1,0 +1,138 @@
+// What a World is made of. Its functions have files by what they are about:
+//
+//   world.cpp              bodies, time and loads
+//   world_step.cpp         a step, contacts on the way to the islands
+//   world_constraints.cpp  handles, joints, the source of contacts
+//   world_state.cpp        what can be read and set of bodies, and the hash of all of it
+//   world_drawing.cpp      surfaces between two steps
+#pragma once
+
+#include <string>
+#include <type_traits>
+
+#include "constraint_stage.h"
+#include "limber/core/error.h"
+#include "limber/dynamics/body_group.h"
+#include "limber/dynamics/exact_motion.h"
+#include "limber/dynamics/reconstruct.h"
+#include "limber/engine/world.h"
+#include "sleep_stage.h"
+#include "step_parts.h"
+
+namespace limber {
+
+// What arguments are to be, of the function named.
+void require_finite(const Vec3& v, const char* function, const char* what);
+void require_finite(std::span<const double> values, const char* function, const char* what);
+void require_pose(const RigidTransform& X, const char* function);
+void require_count(std::size_t seen, std::size_t expected, const char* function, const char* what);
+
+struct World::Impl {
+  /// What a BodyId's index names.
+  struct Entry {
+    std::uint32_t generation = 1;
+    bool alive = false;
+    Index group = 0, slot = 0;  // group −1: static
+    std::shared_ptr<const Shape> shape{};
+    RigidTransform pose{};  // of a static one
+    CollisionFilter filter{};
+    double friction = -1.0;  // negative: that of the contact options
+    double radius = 0.0;     // of a shape that moves
+    bool placed = false;     // of a static one: the source has seen where it stands
+  };
+  /// Two bodies that do not meet as long as some joint between them stands.
+  struct Apart {
+    Index a, b;
+    std::uint32_t joint;  // its place
+  };
+  /// Slots [begin, end) of a group: what one job advances.
+  struct Range {
+    Index group, begin, end;
+  };
+
+  WorldOptions options;
+  Jobs* jobs;
+  std::vector<Entry> entries;
+  std::vector<std::uint32_t> vacant_entries;
+  std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
+  std::vector<Range> ranges;                       // covers all slots of all groups
+  ConstraintStage constraints;                     // bodies by their entries' indices
+  SleepStage sleep{constraints};
+  std::optional<StepParts> parts{};
+  std::vector<Apart> apart;
+  ContactSource* source = nullptr;
+  ContactSet contacts;
+  std::vector<ContactPoint> touching;
+  std::function<bool(const ContactPoint&)> contact_acts;
+  ContactOptions contact_options;
+  std::vector<BodyState> states;  // by entries' indices, for the source
+  std::vector<double> friction;   // the same
+  std::vector<double> still;      // zeros: how far a rigid shape's points move with the modes
+  double energy_removed = 0.0;    // of the step's parts before the last
+  bool solved = true;
+  int iterations = 0, cuts = 0;
+  ProgramReport programs;
+  std::vector<ExactMotion> motions;
+  std::size_t alive = 0;
+  std::uint64_t steps = 0;
+  double accumulator = 0.0, dropped = 0.0;
+  // Scratch of drawing, kept so that it is not allocated again.
+  struct Drawn {
+    Index group;
+    std::size_t target;
+  };
+  std::vector<Drawn> drawn;
+  std::vector<double> drawn_amplitudes;
+  std::vector<ReconstructionTarget> reconstruction;
+
+  const Entry& entry(BodyId id, const char* function) const {
+    if (!contains(id))
+      throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) + " (generation " +
+                            std::to_string(id.generation) +
+                            ") does not exist; it was removed or belongs to another world");
+    if (entries[id.index].group < 0)
+      throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) +
+                            " is a static shape; it has no motion");
+    return entries[id.index];
+  }
+  bool contains(BodyId id) const {
+    return id.index < entries.size() && entries[id.index].alive && entries[id.index].generation == id.generation;
+  }
+  BodyGroup& group(const Entry& e) const { return *groups[static_cast<std::size_t>(e.group)]; }
+
+  /// The constraint that an id names, if it is of the kind asked for.
+  template <class Id>
+  const ConstraintStage::Entry* find(Id id) const {
+    if (id.index >= constraints.entries().size()) return nullptr;
+    const ConstraintStage::Entry& e = constraints.entries()[id.index];
+    const bool kind = std::is_same_v<Id, HandleId> ? e.handle != nullptr : e.joint != nullptr;
+    return kind && e.generation == id.generation ? &e : nullptr;
+  }
+  template <class Id>
+  const ConstraintStage::Entry& constraint(Id id, const char* function) const {
+    if (const ConstraintStage::Entry* found = find(id)) return *found;
+    throw InvalidArgument(std::string("World::") + function + ": " +
+                          (std::is_same_v<Id, HandleId> ? "handle " : "joint ") + std::to_string(id.index) +
+                          " (generation " + std::to_string(id.generation) +
+                          ") does not exist; it was removed, with its body or by itself, or belongs to another world");
+  }
+  MaterialFrame joint_side(BodyId id, const JointFrame& in_world, const JointAttachment& on) const;
+
+  BodyId place(Entry&& made);
+  void tell_source(std::uint32_t index);
+  bool are_apart(Index a, Index b) const;
+  void keep_apart(Index a, Index b, std::uint32_t joint);
+  void let_meet(std::uint32_t joint);
+  void wake_bodies_of(std::uint32_t constraint);
+  void write_states();
+  void find_contacts();
+  bool wake_what_is_touched();
+  Index group_of(std::shared_ptr<const ModalModel> model);
+  void make_ranges();
+  void advance_part(int part);
+  template <class Real>
+  void interpolate(BodyId id, double s, Real* amplitudes) const;
+  void prepare_drawing(std::span<const DrawTarget> targets);
+};
+
+}  // namespace limber

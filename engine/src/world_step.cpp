@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <utility>
+
+#include "world_impl.h"
+
+namespace limber {
+
+void World::step() {
+  Impl& m = *impl_;
+  m.energy_removed = 0.0, m.solved = true, m.iterations = m.cuts = 0;
+  m.programs = {};
+  for (int part = 0; part < m.parts->count(); ++part) {
+    m.advance_part(part);
+    const IslandReport report = m.constraints.report();
+    m.energy_removed += report.energy_removed;
+    m.solved = m.solved && report.status == SolveStatus::kSolved;
+    m.iterations = std::max(m.iterations, report.iterations);
+    m.cuts += report.cuts;
+    m.programs.add(report.programs);
+  }
+  m.parts->finish();
+  if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
+  ++m.steps;
+}
+
+void World::Impl::advance_part(int part) {
+  for (const auto& group : groups)
+    if (group) group->set_within_step(part > 0);
+  parts->begin(part);
+  find_contacts();
+  constraints.find_islands();
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  jobs->parallel_for(ranges.size(), 1, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r)
+      groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
+  });
+  constraints.step(*jobs, {.step = parts->length(), .gravity = options.gravity, .contact = contacts.options().rule});
+  if (source != nullptr) {
+    contacts.finish(sleep.asleep());
+    parts->add_events(part, contacts.events());
+  }
+}
+
+/// What touches, or may within the step, as rows for the islands.
+void World::Impl::find_contacts() {
+  if (source == nullptr) return;
+  do {
+    write_states();
+    source->find_contacts({.states = states}, touching, *jobs);
+    if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
+  } while (wake_what_is_touched());
+  friction.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    friction[i] = entries[i].friction >= 0.0 ? entries[i].friction : contact_options.friction;
+  contacts.update(constraints.states(), touching, Vec3::Zero(), friction);
+  constraints.set_contacts(contacts.constraints());
+}
+
+/// For the source: where bodies are, and how far they may come within the step.
+void World::Impl::write_states() {
+  states.resize(entries.size());
+  motions.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    Entry& e = entries[i];
+    if (!e.alive) continue;
+    if (e.group < 0) {
+      states[i] = {.pose = e.pose, .asleep = std::exchange(e.placed, true)};
+      continue;
+    }
+    const BodyGroup& bodies = group(e);
+    states[i] = {.pose = bodies.frame(e.slot).pose(), .asleep = sleep.asleep(static_cast<Index>(i))};
+    if (!e.shape) states[i].amplitudes = bodies.amplitudes(e.slot);
+    if (states[i].asleep) continue;
+    bodies.predict_motion(e.slot, options.gravity, motions[i]);
+    const RigidFrame& frame = bodies.frame(e.slot);
+    // Without gravity: what lies on something does not fall, and what falls has a velocity.
+    states[i].displacement = parts->length() * frame.velocity();
+    states[i].rotation = parts->length() * frame.angular_velocity(bodies.frame_constants());
+    const SurfaceExtent& extent = bodies.model().collision_extent();
+    if (e.shape && still.size() < extent.shape.size()) still.resize(extent.shape.size(), 0.0);
+    states[i].reach = e.shape ? motions[i].reach(e.radius, std::span(still).first(extent.shape.size()))
+                              : motions[i].reach(extent.radius, extent.shape);
+  }
+}
+
+/// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.
+bool World::Impl::wake_what_is_touched() {
+  bool woke = false;
+  for (const ContactPoint& contact : touching)
+    for (const Index body : {contact.a.body, contact.b.body})
+      if (sleep.asleep(body)) {
+        sleep.wake(body);
+        woke = true;
+      }
+  return woke;
+}
+
+}  // namespace limber
