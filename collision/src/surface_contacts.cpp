@@ -150,8 +150,29 @@ bool SurfaceContacts::rests_on_faces(int of, Index v, const PairSurface::Minimum
   if (!aligned && (rim || mine.in_front(v, minimum.direction, kLeaning))) return rim;
   OverlapRule::Exit exit;
   if (!find_supporting_face(of, v, at.triangle, aligned, exit)) return rim;
-  add(of, mine.at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
+  const double gap = exit.normal.dot(p - exit.at.point);
+  // Beside a rim and below the face's plane nothing overlaps unless the surface goes in from there.
+  if (gap < -tolerance_ && !aligned && !enters(of, v, at.triangle)) return rim;
+  add(of, mine.at_vertex(v), exit.at, exit.normal, gap);
   return true;
+}
+
+// Whether an edge of a vertex that is not inside goes in through one of the faces around.
+bool SurfaceContacts::enters(int of, Index v, Index near) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3& p = mine.vertex(v);
+  for (const Index w : mine.surface().vertex_neighbours(v))
+    for (const Index corner : other.surface().triangle(near))
+      for (const Index t : other.surface().vertex_triangles(corner)) {
+        const PairSurface::Face& f = other.face(t);
+        const double from = f.normal.dot(p - f.x[0]), to = f.normal.dot(mine.vertex(w) - f.x[0]);
+        if (!(from >= -tolerance_ && to < -tolerance_)) continue;
+        const Vec3 through = p + std::clamp(from / (from - to), 0.0, 1.0) * (mine.vertex(w) - p);
+        bool within = true;
+        for (std::size_t c = 0; c < 3; ++c) within = within && (through - f.x[c]).dot(f.inward[c]) >= -tolerance_;
+        if (within) return true;
+      }
+  return false;
 }
 
 // Whether a face at a vertex lies in one plane with a face of the other's, the one solid within the other there.

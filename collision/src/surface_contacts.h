@@ -76,6 +76,7 @@ class SurfaceContacts {
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
   bool find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit);
   bool flush(int of, Index v, const FeatureSide& at);
+  bool enters(int of, Index v, Index near);
   void find_enclosed(int of, OverlapRule* rule);
   bool has_inside_end(int of, Index e) const;
   void cross_edges();

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "finder_scenes.h"
@@ -17,18 +18,24 @@ const Vec3 kHalf(0.25, 0.1875, 0.125);  // of the box that all others touch, m: 
 
 std::shared_ptr<const ModalModel> box_model(const Vec3& half) { return wavy_model(shapes::box(-half, half), 0); }
 
-/// All contacts of a box that may move, at `place`, with what stands at the origin.
-std::vector<ContactPoint> contacts_with(const Shape& standing, const Vec3& half, const Vec3& place, double reach,
-                                        const Vec3& displacement = Vec3::Zero()) {
+/// All contacts of a body that may move, at `place`, with what stands at the origin.
+std::vector<ContactPoint> contacts_with(const Shape& standing, std::shared_ptr<const ModalModel> moving,
+                                        const Vec3& place, double reach, const Vec3& displacement = Vec3::Zero()) {
   ContactFinder finder({.clusters = {.max_points = 0}});
   finder.add_body(0, {.model = {}, .shape = std::make_shared<const Shape>(standing)}, {});
-  finder.add_body(1, {.model = box_model(half), .shape = {}}, {});
+  finder.add_body(1, {.model = std::move(moving), .shape = {}}, {});
   const std::array states{
       BodyState{.pose = {{}, Vec3::Zero()}},
       BodyState{.pose = {{}, place}, .reach = reach, .displacement = displacement, .rotation = Vec3::Zero()}};
   std::vector<ContactPoint> contacts;
   finder.find_contacts({.states = states}, contacts, serial_jobs());
   return contacts;
+}
+
+/// Of a box.
+std::vector<ContactPoint> contacts_with(const Shape& standing, const Vec3& half, const Vec3& place, double reach,
+                                        const Vec3& displacement = Vec3::Zero()) {
+  return contacts_with(standing, box_model(half), place, reach, displacement);
 }
 
 /// Four contacts or more, all along n. Crossing edges a nanometre apart tell their direction to 1e-7 only.
@@ -96,6 +103,20 @@ TEST(TouchingFaces, BoxesWithFlushSidesArePushedOutUpwardsHoweverDeep) {
     expect_normals(contacts, -Vec3::UnitZ());
     for (const ContactPoint& c : contacts) EXPECT_NEAR(c.gap, -depth, 1e-12);
   }
+}
+
+// Its tip hangs 1 mm beside the box and below its top; all else stays above. The tip's own edges run over the rim, so
+// that the way out through the top would suit them, but there is nothing to get out of.
+TEST(TouchingFaces, ATipThatHangsBesideABoxWithoutEnteringItDoesNotOverlap) {
+  SurfaceMesh tip;
+  tip.vertices = {{0, 0, 0}, {-0.3, 0.25, 0.4}, {-0.3, -0.25, 0.4}, {0.15, 0, 0.5}};
+  tip.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const double aside = 1e-3;
+  const auto contacts = contacts_with(Box{kHalf}, wavy_model(tip, 0), {kHalf.x() + aside, 0.0, kHalf.z() - 1e-3}, 2e-3);
+  for (const ContactPoint& c : contacts) EXPECT_GE(c.gap, 0.0);
+  EXPECT_TRUE(std::any_of(contacts.begin(), contacts.end(), [&](const ContactPoint& c) {
+    return (c.normal + Vec3::UnitX()).norm() < 1e-9 && std::abs(c.gap - aside) < 1e-9;
+  }));
 }
 
 TEST(TouchingFaces, IdsOfCornersStayAsABoxMovesUpAndDownByRoundOff) {

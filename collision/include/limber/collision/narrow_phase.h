@@ -10,8 +10,9 @@
 ///    face keep the crossings of their outlines while they rock.
 ///
 /// Solids that all but touch (nearer than a hundredth of the edges at hand) have the normals of the faces that lie on
-/// each other: flush stacks press straight down. A vertex whose own surface runs through the plane of the contact, and
-/// rims that touch without an area in common, have none.
+/// each other: flush stacks press straight down. A vertex whose own surface runs through the plane of the contact has
+/// that of a face nearby which it does not run through, if there is one; below that face's plane only where its surface
+/// enters the other body. Rims that touch without an area in common have none.
 ///
 /// Features that are apart and would pass each other within the expected motion (CollisionBody::displacement) may have
 /// the normal of one of their faces in place of the direction between them, if the motion goes less far through that: a
