@@ -22,22 +22,27 @@ function(limber_sanitize target)
   endif()
 endfunction()
 
-# limber_add_module(name SOURCES ... [PUBLIC ...] [PRIVATE ...] [COMPONENT runtime|precompute|scene|...] [NO_SANITIZE])
-# makes target limber_<name>, alias limber::<name>, with include root <dir>/include and private headers in <dir>/src.
+# limber_add_module(name SOURCES ... [PUBLIC ...] [PRIVATE ...] [COMPONENT runtime|precompute|scene|...] [FOLDER dir] [NO_SANITIZE])
+# makes target limber_<name>, alias limber::<name>, with include root <dir>/include and private headers in <dir>/src. Sources are
+# named as seen from the caller's folder; FOLDER is where include/ and src/ lie in it, the folder itself by default.
 function(limber_add_module name)
-  cmake_parse_arguments(arg "NO_SANITIZE" "COMPONENT" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "NO_SANITIZE" "COMPONENT;FOLDER" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "limber_add_module(${name}): unknown argument(s) ${arg_UNPARSED_ARGUMENTS}")
   endif()
   if(NOT arg_COMPONENT)
     message(FATAL_ERROR "limber_add_module(${name}): COMPONENT is missing")
   endif()
+  if(NOT arg_FOLDER)
+    set(arg_FOLDER .)
+  endif()
+  cmake_path(ABSOLUTE_PATH arg_FOLDER NORMALIZE OUTPUT_VARIABLE folder)
   add_library(limber_${name} ${arg_SOURCES})
   add_library(limber::${name} ALIAS limber_${name})
   set_target_properties(limber_${name} PROPERTIES EXPORT_NAME ${name} LIMBER_COMPONENT ${arg_COMPONENT})
   target_include_directories(limber_${name}
-    PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>
-    PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
+    PUBLIC $<BUILD_INTERFACE:${folder}/include> $<INSTALL_INTERFACE:include>
+    PRIVATE ${folder}/src)
   target_link_libraries(limber_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   limber_compile_options(limber_${name})
   if(NOT arg_NO_SANITIZE)
