@@ -1,5 +1,5 @@
-// Time of the broad phase for many bodies: limber's BroadPhase beside FCL's DynamicAABBTreeCollisionManager, on the same
-// boxes in the same run. See README.md.
+// Time of the broad phase for many bodies: limber's BroadPhase beside FCL's DynamicAABBTreeCollisionManager, on the
+// same boxes in the same run. See README.md.
 #include <benchmark/benchmark.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/shape/box.h>

@@ -12,7 +12,8 @@ struct CommonMotion {
 
 class IslandEnergy {
  public:
-  /// Books the energy before the step, the scale of all that the bodies then have to trade, and that of coming together.
+  /// Books the energy before the step, the scale of all that the bodies then have to trade, and that of coming
+  /// together.
   void begin(const IslandBodies& bodies, const Vec3& gravity);
   struct Change {
     double removed = 0.0;  ///< J, taken out; negative: given back

@@ -28,12 +28,18 @@ std::optional<JointType> joint_type_of(std::string_view text) {
 
 JointFreedoms freedoms(JointType type) {
   switch (type) {
-    case JointType::kBall: return {3, 0};
-    case JointType::kRevolute: return {1, 0};
-    case JointType::kCylindrical: return {1, 1};
-    case JointType::kPrismatic: return {0, 1};
-    case JointType::kPlanar: return {1, 2};
-    case JointType::kFixed: break;
+    case JointType::kBall:
+      return {3, 0};
+    case JointType::kRevolute:
+      return {1, 0};
+    case JointType::kCylindrical:
+      return {1, 1};
+    case JointType::kPrismatic:
+      return {0, 1};
+    case JointType::kPlanar:
+      return {1, 2};
+    case JointType::kFixed:
+      break;
   }
   return {0, 0};
 }

@@ -37,9 +37,9 @@ double enclosed_volume(const SurfaceMesh& surface);
 
 /// Integrals over the solid that a closed surface bounds; outward triangles. Meaningless for an open one.
 struct SolidProperties {
-  double volume = 0.0;            ///< m³
-  Vec3 centroid = Vec3::Zero();   ///< m
-  Mat3 inertia = Mat3::Zero();    ///< ∫ (|x|² 1 − x xᵀ) dV about the centroid, m⁵; times the density: kg·m²
+  double volume = 0.0;           ///< m³
+  Vec3 centroid = Vec3::Zero();  ///< m
+  Mat3 inertia = Mat3::Zero();   ///< ∫ (|x|² 1 − x xᵀ) dV about the centroid, m⁵; times the density: kg·m²
 };
 SolidProperties solid_properties(const SurfaceMesh& surface);
 
