@@ -20,7 +20,7 @@ using Json = nlohmann::ordered_json;
 struct Arguments {
   std::string scene;
   std::int64_t steps = -1;
-  std::string record, energies, mode_energies;
+  std::string record, energies, mode_energies, contacts;
   double record_frame_rate = 60.0;
   RecordingOptions recording;
   bool reconstruct = false;
@@ -46,6 +46,9 @@ void declare(CLI::App& app, Arguments& a) {
                "keep morph weights in [0, 1], for viewers that clamp them (Blender, Assimp)");
   app.add_option("--energies", a.energies, "write each body's energies over time")->type_name("FILE.csv");
   app.add_option("--mode-energies", a.mode_energies, "write each mode's energy over time")->type_name("FILE.csv");
+  app.add_option("--contacts", a.contacts,
+                 "write what touched in each step: time, bodies, place, normal, impulse; for scenes with contact")
+      ->type_name("FILE.csv");
   app.add_flag("--reconstruct", a.reconstruct, "also make positions and normals at every key, to time it");
 }
 
@@ -100,6 +103,57 @@ Json loads(const std::vector<LoadReport>& reports) {
   return all;
 }
 
+Json contact(const ContactOptions& c) {
+  return {{"method", to_string(c.rule.method)},
+          {"friction_model", to_string(c.rule.friction)},
+          {"guard", to_string(c.rule.guard)},
+          {"friction", c.friction},
+          {"impact", to_string(c.impact)},
+          {"impact_speed", c.impact_speed},
+          {"recovery_speed", c.recovery_speed},
+          {"residual_compliance", c.residual_compliance},
+          {"penalty_frequency", c.penalty_frequency},
+          {"penalty_damping", c.penalty_damping}};
+}
+
+Json handles(const std::vector<HandleReport>& reports) {
+  Json all = Json::array();
+  for (const HandleReport& h : reports)
+    all.push_back({{"body", h.body},
+                   {"step", h.step},
+                   {"point", vector(h.point)},
+                   {"largest_error", h.largest_error},
+                   {"force", vector(h.force)},
+                   {"largest_force", h.largest_force}});
+  return all;
+}
+
+Json joints(const std::vector<JointReport>& reports) {
+  Json all = Json::array();
+  for (const JointReport& j : reports) {
+    const auto count = static_cast<std::size_t>(j.view.coordinates);
+    const auto first = [&](const std::array<double, 3>& x) {
+      return std::vector<double>(x.begin(), x.begin() + count);
+    };
+    all.push_back({{"a", j.a.empty() ? Json() : Json(j.a)},
+                   {"b", j.b},
+                   {"position", first(j.view.position)},
+                   {"force", first(j.view.force)},
+                   {"lock_force", vector(j.view.lock_force)},
+                   {"largest_distance_error", j.largest_distance_error},
+                   {"largest_angle_error", j.largest_angle_error}});
+  }
+  return all;
+}
+
+Json constraints(const ConstraintSummary& sum) {
+  return {{"unsettled_steps", sum.unsettled},
+          {"energy_removed", sum.energy_removed},
+          {"contacts_begun", sum.begun},
+          {"contacts_ended", sum.ended},
+          {"largest_contact_impulse", sum.largest_impulse}};
+}
+
 Json recording_report(const Arguments& a, const Trajectory& trajectory, const Recording& recording) {
   Json models = Json::array();
   for (const RecordedModel& m : recording.models)
@@ -129,6 +183,10 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["asleep"] = result.asleep;
   report["strikes"] = loads(result.strikes);
   report["forces"] = loads(result.forces);
+  report["handles"] = handles(result.handles);
+  report["joints"] = joints(result.joints);
+  report["contact"] = scene.contact ? contact(*scene.contact) : Json();
+  report["constraints"] = constraints(result.constraints);
   report["energy_before"] = result.energy_before;
   report["energy_after"] = result.energy_after;
   report["state_hash"] = fmt::format("{:016x}", result.state_hash);
@@ -164,10 +222,24 @@ std::string loads_text(const Scene& scene, const RunResult& result) {
   return text;
 }
 
+std::string constraints_text(const Scene& scene, const RunResult& r) {
+  std::string text;
+  for (const HandleReport& h : r.handles)
+    text += fmt::format("  handle  {} from {:.6g} s, off by at most {:.3g} m\n", h.body,
+                        static_cast<double>(h.step) * scene.step, h.largest_error);
+  for (const JointReport& j : r.joints)
+    text += fmt::format("  joint   {} to {}, off by at most {:.3g} m\n", j.a.empty() ? "the world" : j.a, j.b,
+                        j.largest_distance_error);
+  if (scene.contact)
+    text += fmt::format("  contact {} begun, {} ended, largest impulse {:.4g} N s\n", r.constraints.begun,
+                        r.constraints.ended, r.constraints.largest_impulse);
+  return text;
+}
+
 std::string summary(const Scene& scene, const SceneModels& models, const RunResult& r) {
   std::string text = fmt::format("{}: {} steps of {:.6g} s, {} {}\n", scene.name, r.steps, scene.step,
                                  r.trajectory.bodies.size(), r.trajectory.bodies.size() == 1 ? "body" : "bodies");
-  text += models_text(models) + loads_text(scene, r);
+  text += models_text(models) + loads_text(scene, r) + constraints_text(scene, r);
   text += fmt::format("  energy  {:.9g} J before, {:.9g} J after\n", r.energy_before, r.energy_after);
   text += fmt::format("  advance {:.1f} ns per step and body\n", 1e9 * per(r.seconds_advance, body_steps(r)));
   if (r.reconstructed_vertices > 0)
@@ -187,25 +259,37 @@ void record(Program& program, const Arguments& a, const Trajectory& trajectory) 
                             trajectory.key_interval, 1e-6 * static_cast<double>(recording.glb.size())));
 }
 
+void warn_of_unsettled(Program& program, const RunResult& r) {
+  if (r.constraints.unsettled == 0) return;
+  program.warnings().push_back(fmt::format(
+      "in {} of {} steps contacts, joints or handles did not come to their targets; try \"substeps\" or a smaller "
+      "\"step\"",
+      r.constraints.unsettled, r.steps));
+}
+
 void simulate(Program& program, const Arguments& a) {
   const auto began = Clock::now();
   program.progress().stage("reading the scene");
   const Scene scene = read_scene(a.scene);
   program.add_input(a.scene);
-  for (const auto& [name, file] : scene.assets) program.add_input(file);
+  for (const auto& file : files_of(scene)) program.add_input(file);
   const SceneModels models = load_models(scene);
+  program.warnings() = models.warnings;
   program.progress().stage("simulating");
   const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
   const RunResult result = run_scene(scene, models,
                                      {.steps = a.steps,
                                       .key_rate = sampled ? a.record_frame_rate * a.recording.slow_motion : 0.0,
                                       .reconstruct = a.reconstruct,
+                                      .keep_contacts = !a.contacts.empty(),
                                       .progress = [&](double done) { program.progress().fraction(done); }});
   program.print(summary(scene, models, result));
   report_run(program.report(), scene, models, result);
   record(program, a, result.trajectory);
   if (!a.energies.empty()) program.write_file(a.energies, energies_csv(result.trajectory));
   if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
+  if (!a.contacts.empty()) program.write_file(a.contacts, contacts_csv(result.trajectory));
+  warn_of_unsettled(program, result);
   program.report()["seconds"] = {
       {"total", std::chrono::duration<double>(Clock::now() - began).count()},
       {"advance", result.seconds_advance},
@@ -219,8 +303,10 @@ void simulate(Program& program, const Arguments& a) {
 
 int main(int argc, char** argv) {
   using namespace limber::tools;
-  Program program("limber-simulate",
-                  "Plays a scene at a fixed step. Vibration and free flight are exact over a step of any length.");
+  Program program(
+      "limber-simulate",
+      "Plays a scene at a fixed step: bodies that vibrate, fly, touch, hang on joints and are held. Vibration "
+      "and free flight are exact over a step of any length.");
   Arguments arguments;
   declare(program.options(), arguments);
   return program.run(argc, argv, [&] { simulate(program, arguments); });

@@ -8,6 +8,7 @@
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
+#include "shape_surface.h"
 
 namespace limber {
 namespace {
@@ -165,6 +166,46 @@ int add_mesh(GlbBuilder& glb, const Cast& cast, std::size_t number, const Record
   return glb.add_mesh(mesh);
 }
 
+/// A ball that holds all bodies at all keys.
+struct Extent {
+  Vec3 centre = Vec3::Zero();
+  double radius = 0.0;
+};
+
+Extent extent_of(const Trajectory& trajectory) {
+  Vec3 low = trajectory.bodies.front().poses.front().p, high = low;
+  double reach = 0.0;
+  for (const BodyTrack& body : trajectory.bodies) {
+    reach = std::max(reach, diagonal(body.model->render()));
+    for (const RigidTransform& X : body.poses) low = low.cwiseMin(X.p), high = high.cwiseMax(X.p);
+  }
+  return {0.5 * (low + high), 0.5 * (high - low).norm() + reach};
+}
+
+/// What stands still: a node with a mesh each, all of one grey.
+std::vector<int> add_statics(GlbBuilder& glb, const Trajectory& trajectory) {
+  std::vector<int> nodes;
+  if (trajectory.statics.empty()) return nodes;
+  constexpr double kBeyond = 1.5;  // a plane is seen to go on beyond the bodies
+  const int material = glb.add_material(
+      {.name = "static", .base_color = {0.55f, 0.56f, 0.58f, 1.0f}, .roughness = 0.9f, .double_sided = true});
+  const Extent extent = extent_of(trajectory);
+  for (const StaticShape& s : trajectory.statics) {
+    const TriangleMesh surface = surface_of(*s.shape, s.pose.inverse() * extent.centre, kBeyond * extent.radius);
+    std::vector<float> positions;
+    for (const Vec3& p : surface.vertices)
+      for (int a = 0; a < 3; ++a) positions.push_back(narrow(p[a]));
+    const int mesh = glb.add_mesh({.name = s.name,
+                                   .position = glb.add_vertex_vectors(positions),
+                                   .normal = glb.add_vertex_vectors(unit_normals(positions, surface.triangles)),
+                                   .triangles = glb.add_triangles(surface.triangles),
+                                   .material = material});
+    nodes.push_back(
+        glb.add_node({.name = s.name, .mesh = mesh, .translation = s.pose.p, .rotation = normalized(s.pose.q)}));
+  }
+  return nodes;
+}
+
 std::vector<float> translations(const BodyTrack& body) {
   std::vector<float> out;
   for (const RigidTransform& X : body.poses)
@@ -313,6 +354,7 @@ Recording make_recording(const Trajectory& trajectory, const RecordingOptions& o
   }
   warn_of_fast_turns(trajectory, recording.warnings);
   glb.add_animation(animation);
+  for (const int node : add_statics(glb, trajectory)) nodes.push_back(node);
   add_root(glb, trajectory.scene, std::move(nodes));
   glb.set_extras(extras_of(trajectory, casts, options));
   recording.glb = glb.bytes();

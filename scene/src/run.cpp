@@ -5,7 +5,10 @@
 #include <cmath>
 
 #include "frame_movement.h"
+#include "held_points.h"
+#include "limber/collision/contact_finder.h"
 #include "limber/core/error.h"
+#include "step_times.h"
 #include "surface_place.h"
 
 namespace limber {
@@ -14,27 +17,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Times told in decimals are often a whole number of steps but for round-off; such a time is taken as that number.
-constexpr double kRoundOff = 1e-9;
-
-std::int64_t step_at_or_after(double time, double step) {
-  constexpr double kNever = 1e15;  // steps; a load without an end
-  return static_cast<std::int64_t>(std::min(std::ceil(time / step - kRoundOff), kNever));
-}
-
-/// The step in which a time lies, and how long after its start.
-struct TimeInSteps {
-  std::int64_t step = 0;
-  double delay = 0.0;
-};
-
-TimeInSteps time_in_steps(double time, double step) {
-  const auto whole = static_cast<std::int64_t>(std::floor(time / step + kRoundOff));
-  const double delay = time - static_cast<double>(whole) * step;
-  if (delay <= kRoundOff * step) return {whole, 0.0};
-  return {whole, std::min(delay, std::nextafter(step, 0.0))};
-}
 
 struct PlannedStrike {
   TimeInSteps when;
@@ -66,7 +48,10 @@ class Run {
                options.jobs ? *options.jobs : serial_jobs()),
         steps_(options.steps < 0 ? scene.steps : options.steps) {
     add_bodies();
+    add_statics();
+    add_joints();
     plan_loads();
+    plan_handles();
     start_tracks();
   }
 
@@ -76,9 +61,13 @@ class Run {
       move_frames(n);
       strike(n);
       push(n);
+      held_.hold(world_, n);
       const auto began = Clock::now();
       world_.step();
       result_.seconds_advance += seconds_since(began);
+      held_.note(world_, n);
+      note_joints();
+      note_contacts(n);
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
     }
     return finish();
@@ -86,18 +75,59 @@ class Run {
 
  private:
   void add_bodies() {
+    if (scene_.contact) world_.set_contact_source(&finder_, *scene_.contact);
     if (models_.of_body.size() != scene_.bodies.size())
       throw InvalidArgument("run_scene: there are " + std::to_string(models_.of_body.size()) +
                             " models, expected one per body, " + std::to_string(scene_.bodies.size()));
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
       const SceneBody& body = scene_.bodies[i];
-      ids_.push_back(world_.add_body(models_.of_body[i], start_of(body)));
+      BodyPlacement placement = start_of(body);
+      if (i < models_.shape_of_body.size()) placement.shape = models_.shape_of_body[i];
+      ids_.push_back(world_.add_body(models_.of_body[i], placement));
+      number(ids_.back(), i);
       if (std::holds_alternative<std::monostate>(body.movement)) continue;
       if (models_.of_body[i]->data().motion == FrameMotion::kFree)
         throw InputError(body.where + ".motion: the body \"" + body.name +
                          "\" has no fixed nodes, expected none or an asset baked with --fix");
       moved_.push_back({i, start_of(body).pose});
     }
+  }
+
+  /// Contacts tell bodies by the indices of their ids.
+  void number(BodyId id, std::size_t in_trajectory) {
+    number_of_.resize(std::max<std::size_t>(number_of_.size(), id.index + 1));
+    number_of_[id.index] = in_trajectory;
+  }
+
+  void add_statics() {
+    for (std::size_t i = 0; i < scene_.statics.size(); ++i) {
+      const SceneStatic& s = scene_.statics[i];
+      const auto& shape = models_.shape_of_static[i];
+      number(world_.add_static(shape, s.pose, s.filter, s.friction), scene_.bodies.size() + i);
+      result_.trajectory.statics.push_back({s.name, shape, s.pose});
+    }
+  }
+
+  BodyId body_named(const std::string& name) const {
+    BodyId id;
+    if (!name.empty()) for_bodies_named(name, [&](std::size_t body) { id = ids_[body]; });
+    return id;
+  }
+
+  void add_joints() {
+    for (const SceneJoint& j : scene_.joints) {
+      const JointAttachment patch{.radius = j.patch_radius};
+      joints_.push_back(world_.add_joint(body_named(j.a), body_named(j.b), j.spec, patch, patch, j.collide));
+      for (std::size_t c = 0; c < j.coordinates.size(); ++c)
+        world_.set_joint_actuation(joints_.back(), static_cast<int>(c), j.coordinates[c]);
+      result_.joints.push_back({.a = j.a, .b = j.b, .view = {}});
+    }
+  }
+
+  void plan_handles() {
+    for (const SceneHandle& h : scene_.handles)
+      for_bodies_named(h.body, [&](std::size_t body) { held_.plan(h, ids_[body], scene_.bodies[body].name); });
+    held_.begin(scene_.step, steps_);
   }
 
   /// A first pose key at time 0 is where the body starts.
@@ -192,6 +222,35 @@ class Run {
     }
   }
 
+  void note_joints() {
+    for (std::size_t i = 0; i < joints_.size(); ++i) {
+      JointReport& report = result_.joints[i];
+      report.view = world_.joint(joints_[i]);
+      report.largest_distance_error = std::max(report.largest_distance_error, report.view.distance_error);
+      report.largest_angle_error = std::max(report.largest_angle_error, report.view.angle_error);
+    }
+  }
+
+  void note_contacts(std::int64_t n) {
+    ConstraintSummary& sum = result_.constraints;
+    const ConstraintReport report = world_.constraint_report();
+    if (!report.solved) ++sum.unsettled;
+    sum.energy_removed += report.energy_removed;
+    for (const ContactEvent& e : world_.contact_events()) {
+      if (e.phase == ContactPhase::kBegun) ++sum.begun;
+      if (e.phase == ContactPhase::kEnded) ++sum.ended;
+      sum.largest_impulse = std::max(sum.largest_impulse, e.impulse.norm());
+      if (options_.keep_contacts)
+        result_.trajectory.contacts.push_back({.time = static_cast<double>(n + 1) * scene_.step,
+                                               .a = number_of_[static_cast<std::size_t>(e.a)],
+                                               .b = number_of_[static_cast<std::size_t>(e.b)],
+                                               .phase = e.phase,
+                                               .position = e.position,
+                                               .normal = e.normal,
+                                               .impulse = e.impulse});
+    }
+  }
+
   void keep_key(std::int64_t n) {
     result_.trajectory.times.push_back(static_cast<double>(n) * scene_.step);
     for (std::size_t i = 0; i < ids_.size(); ++i) {
@@ -225,6 +284,7 @@ class Run {
   RunResult finish() {
     result_.steps = steps_;
     result_.state_hash = world_.state_hash();
+    result_.handles = held_.reports();
     result_.asleep = std::count_if(ids_.begin(), ids_.end(), [&](BodyId id) { return world_.is_asleep(id); });
     for (const BodyTrack& track : result_.trajectory.bodies) {
       result_.energy_before += track.energies.front().total();
@@ -236,9 +296,13 @@ class Run {
   const Scene& scene_;
   const SceneModels& models_;
   const RunOptions& options_;
+  ContactFinder finder_;  // outlives the world
   World world_;
   std::int64_t steps_ = 0, stride_ = 1;
   std::vector<BodyId> ids_;
+  std::vector<std::size_t> number_of_;  // in the trajectory, by BodyId::index
+  std::vector<JointId> joints_;
+  HeldPoints held_;
   std::vector<PlannedStrike> strikes_;
   std::vector<PlannedForce> forces_;
   std::size_t next_strike_ = 0;

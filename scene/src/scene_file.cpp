@@ -3,132 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <set>
 
+#include "constraint_reading.h"
+#include "contact_reading.h"
 #include "limber/core/error.h"
-#include "limber/internal/strict_json.h"
+#include "scene_reading.h"
 
 namespace limber {
 namespace {
 
 using internal::JsonObject;
+using internal::refuse;
 using Json = nlohmann::json;
 
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
 constexpr std::int64_t kMaxCopies = 100'000;
 constexpr std::int64_t kMaxSubsteps = 1'000'000;
-constexpr Index kMaxIndex = std::numeric_limits<Index>::max();
-constexpr double kToTheEnd = std::numeric_limits<double>::infinity();
-
-[[noreturn]] void refuse(const std::string& where, const std::string& seen, const std::string& expected) {
-  throw InputError(where + ": is " + seen + ", expected " + expected);
-}
-
-std::string shown(double x) { return JsonObject::shown(Json(x)); }
-
-double positive(const JsonObject& o, const std::string& key) {
-  const double x = o.number(key);
-  if (!(x > 0.0)) refuse(o.where(key), shown(x), "a number > 0");
-  return x;
-}
-
-double non_negative(const JsonObject& o, const std::string& key, double otherwise) {
-  const double x = o.number(key, otherwise);
-  if (x < 0.0) refuse(o.where(key), shown(x), "a number >= 0");
-  return x;
-}
-
-Vec3 direction(const JsonObject& o, const std::string& key) {
-  const Vec3 v = o.vec3(key);
-  if (!(v.norm() > 0.0)) refuse(o.where(key), "[0, 0, 0]", "a direction of any length > 0");
-  return v / v.norm();
-}
-
-/// One of a few words. @return its number in `words`
-std::size_t choice(const JsonObject& o, const std::string& key, const std::vector<std::string>& words,
-                   const std::string& otherwise) {
-  const std::string seen = o.text(key, otherwise);
-  const auto found = std::find(words.begin(), words.end(), seen);
-  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  std::string list;
-  for (const auto& w : words) list += (list.empty() ? "\"" : ", \"") + w + "\"";
-  refuse(o.where(key), "\"" + seen + "\"", "one of " + list);
-}
 
 Axes read_axes(const JsonObject& o) {
   return choice(o, "axes", {"world", "body"}, "world") == 0 ? Axes::kWorld : Axes::kBody;
-}
-
-PlaceFrame read_place_frame(const JsonObject& o) {
-  constexpr PlaceFrame kFrames[] = {PlaceFrame::kWorld, PlaceFrame::kBody, PlaceFrame::kInput};
-  return kFrames[choice(o, "frame", {"world", "body", "input"}, "world")];
-}
-
-/// [w, x, y, z] of any length > 0, or {"axis": [x, y, z], "degrees": angle}.
-Quaternion read_orientation(const JsonObject& o) {
-  if (!o.has("orientation")) return {};
-  const Json& value = o.at("orientation");
-  if (value.is_object()) {
-    const JsonObject turn(value, o.where("orientation"));
-    const Vec3 axis = direction(turn, "axis");
-    const double radians = turn.number("degrees") * std::numbers::pi / 180.0;
-    turn.finish();
-    return quaternion_from_rotation_vector(axis * radians);
-  }
-  const auto n = o.numbers("orientation", 4);
-  const Quaternion q{n[0], n[1], n[2], n[3]};
-  if (!(q.norm() > 0.0))
-    refuse(o.where("orientation"), "[0, 0, 0, 0]", "a quaternion [w, x, y, z] or {\"axis\", \"degrees\"}");
-  return normalized(q);
-}
-
-RigidTransform read_pose(const JsonObject& o) { return {read_orientation(o), o.vec3("position", Vec3::Zero())}; }
-
-OnTriangle read_triangle(const JsonObject& o) {
-  OnTriangle at;
-  at.triangle = static_cast<Index>(o.integer("triangle", 0, kMaxIndex));
-  if (!o.has("weights")) {
-    at.weights = {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0};
-    return at;
-  }
-  constexpr double kSumError = 1e-6;  // weights typed by hand with six digits
-  const auto w = o.numbers("weights", 3);
-  const double sum = w[0] + w[1] + w[2];
-  if (*std::min_element(w.begin(), w.end()) < 0.0 || std::abs(sum - 1.0) > kSumError)
-    refuse(o.where("weights"), JsonObject::shown(Json(w)), "three numbers >= 0 with the sum 1");
-  at.weights = {w[0] / sum, w[1] / sum, w[2] / sum};
-  return at;
-}
-
-AlongRay read_ray(const JsonObject& o) {
-  const JsonObject ray(o.at("ray"), o.where("ray"));
-  AlongRay at{.from = ray.vec3("from"), .direction = direction(ray, "direction"), .frame = PlaceFrame::kWorld};
-  ray.finish();
-  at.frame = read_place_frame(o);
-  return at;
-}
-
-SurfacePlace read_place(const JsonObject& parent) {
-  const JsonObject o(parent.at("at"), parent.where("at"));
-  const bool kinds[] = {o.has("triangle"), o.has("vertex"), o.has("nearest"), o.has("ray")};
-  if (std::count(std::begin(kinds), std::end(kinds), true) != 1)
-    refuse(o.where(), JsonObject::shown(parent.at("at")),
-           "exactly one of \"triangle\", \"vertex\", \"nearest\" and \"ray\"");
-  SurfacePlace place;
-  if (kinds[0]) place = read_triangle(o);
-  if (kinds[1]) place = AtVertex{static_cast<Index>(o.integer("vertex", 0, kMaxIndex))};
-  if (kinds[2]) place = NearestTo{.point = o.vec3("nearest"), .frame = read_place_frame(o)};
-  if (kinds[3]) place = read_ray(o);
-  o.finish();
-  return place;
-}
-
-double time_inside(const JsonObject& o, const std::string& key, const Scene& scene) {
-  const double t = o.number(key);
-  if (!(t >= 0.0 && t < scene.duration()))
-    refuse(o.where(key), shown(t), "a time within the scene's duration, [0, " + shown(scene.duration()) + ") s");
-  return t;
 }
 
 Strike read_strike(const Json& value, const std::string& where, const Scene& scene) {
@@ -147,52 +41,13 @@ HeldForce read_force(const Json& value, const std::string& where, const Scene& s
   const JsonObject o(value, where);
   HeldForce f{.body = o.text("body"),
               .start = o.has("start") ? time_inside(o, "start", scene) : 0.0,
-              .duration = kToTheEnd,
+              .duration = held_duration(o, scene, " (or use a strike)"),
               .at = read_place(o),
               .force = o.vec3("force"),
               .axes = read_axes(o),
               .where = where};
-  if (o.has("duration")) f.duration = positive(o, "duration");
-  if (f.duration < scene.step)
-    refuse(o.where("duration"), shown(f.duration), "at least one step, " + shown(scene.step) + " s (or use a strike)");
   o.finish();
   return f;
-}
-
-Shake read_shake(const JsonObject& o) {
-  Shake s{.axis = direction(o, "axis"),
-          .amplitude = positive(o, "amplitude"),
-          .frequency = positive(o, "frequency"),
-          .start = non_negative(o, "start", 0.0),
-          .duration = kToTheEnd};
-  if (o.has("duration")) s.duration = positive(o, "duration");
-  o.finish();
-  return s;
-}
-
-std::vector<PoseKey> read_keys(const JsonObject& motion) {
-  std::vector<PoseKey> keys;
-  motion.for_each("keys", [&](const Json& value, const std::string& where) {
-    const JsonObject o(value, where);
-    keys.push_back({.time = non_negative(o, "time", 0.0), .pose = read_pose(o)});
-    o.finish();
-    if (keys.size() > 1 && !(keys.back().time > keys[keys.size() - 2].time))
-      refuse(where + ".time", shown(keys.back().time), "a time after the key before it");
-  });
-  if (keys.empty()) refuse(motion.where("keys"), "[]", "at least one key");
-  return keys;
-}
-
-FrameMovement read_movement(const JsonObject& body) {
-  if (!body.has("motion")) return {};
-  const JsonObject o(body.at("motion"), body.where("motion"));
-  const bool shake = o.has("shake"), keys = o.has("keys");
-  if (shake == keys) refuse(o.where(), JsonObject::shown(body.at("motion")), "one of \"shake\" and \"keys\"");
-  FrameMovement movement;
-  if (shake) movement = read_shake(JsonObject(o.at("shake"), o.where("shake")));
-  if (keys) movement = read_keys(o);
-  o.finish();
-  return movement;
 }
 
 /// A grid of copies: count along x, y, z and the distances between them. One body where it is not given.
@@ -249,7 +104,7 @@ void add_copies(const SceneBody& original, const Grid& grid, Scene& scene) {
       }
 }
 
-void read_body(const Json& value, const std::string& where, Scene& scene) {
+void read_body(const Json& value, const std::string& where, const std::filesystem::path& folder, Scene& scene) {
   const JsonObject o(value, where);
   SceneBody body;
   body.name = body.group = o.text("name");
@@ -258,7 +113,8 @@ void read_body(const Json& value, const std::string& where, Scene& scene) {
   body.placement = {.pose = read_pose(o),
                     .velocity = o.vec3("velocity", Vec3::Zero()),
                     .angular_velocity = o.vec3("angular_velocity", Vec3::Zero())};
-  body.movement = read_movement(o);
+  read_touch(o, scene, folder, body);
+  body.movement = read_movement(o, true);
   if (body.movement.index() != 0 && (o.has("velocity") || o.has("angular_velocity")))
     throw InputError(where + ": has both a velocity and a \"motion\", expected one of them");
   body.where = where;
@@ -269,19 +125,51 @@ void read_body(const Json& value, const std::string& where, Scene& scene) {
 
 void require_unique_names(const Scene& scene) {
   std::set<std::string> seen;
-  for (const SceneBody& body : scene.bodies)
-    if (!seen.insert(body.name).second)
-      throw InputError(body.where + ".name: \"" + body.name + "\" is the name of another body, expected one name each");
+  const auto require_new = [&](const std::string& name, const std::string& where) {
+    if (!seen.insert(name).second)
+      throw InputError(where + ".name: \"" + name + "\" is the name of another body or static, expected one name each");
+  };
+  for (const SceneBody& body : scene.bodies) require_new(body.name, body.where);
+  for (const SceneStatic& s : scene.statics) require_new(s.name, s.where);
 }
 
-void require_known_body(const Scene& scene, const std::string& name, const std::string& where) {
+/// @return how many bodies have the name
+std::size_t require_known_body(const Scene& scene, const std::string& name, const std::string& where) {
+  const auto named = [&](const SceneBody& body) { return body.name == name || body.group == name; };
+  const auto count = std::count_if(scene.bodies.begin(), scene.bodies.end(), named);
+  if (count > 0) return static_cast<std::size_t>(count);
   std::vector<std::string> known;
-  for (const SceneBody& body : scene.bodies) {
-    if (body.name == name || body.group == name) return;
-    known.push_back(body.name);
-  }
-  throw InputError(where + ".body: \"" + name + "\" is not among the scene's bodies; did you mean \"" +
+  for (const SceneBody& body : scene.bodies) known.push_back(body.name);
+  throw InputError(where + ": \"" + name + "\" is not among the scene's bodies; did you mean \"" +
                    internal::nearest_word(name, known) + "\"?");
+}
+
+void require_one_body(const Scene& scene, const std::string& name, const std::string& where) {
+  const std::size_t count = require_known_body(scene, name, where);
+  if (count > 1)
+    throw InputError(where + ": \"" + name + "\" is the name of " + std::to_string(count) +
+                     " copies, expected one of them, such as \"" + name + "[0]\"");
+}
+
+void require_joined_bodies(const Scene& scene, const SceneJoint& joint) {
+  if (!joint.a.empty()) require_one_body(scene, joint.a, joint.where + ".a");
+  require_one_body(scene, joint.b, joint.where + ".b");
+  if (joint.a == joint.b) refuse(joint.where + ".b", internal::in_quotes(joint.b), "another body than \"a\"");
+}
+
+/// Whatever names a body is read when all are known.
+void read_actions(const JsonObject& o, Scene& scene) {
+  const auto each = [&](const char* key, auto&& read) {
+    if (o.has(key)) o.for_each(key, read);
+  };
+  each("strikes", [&](const Json& v, const std::string& w) { scene.strikes.push_back(read_strike(v, w, scene)); });
+  each("forces", [&](const Json& v, const std::string& w) { scene.forces.push_back(read_force(v, w, scene)); });
+  each("handles", [&](const Json& v, const std::string& w) { scene.handles.push_back(read_handle(v, w, scene)); });
+  each("joints", [&](const Json& v, const std::string& w) { scene.joints.push_back(read_joint(v, w)); });
+  for (const Strike& s : scene.strikes) require_known_body(scene, s.body, s.where + ".body");
+  for (const HeldForce& f : scene.forces) require_known_body(scene, f.body, f.where + ".body");
+  for (const SceneHandle& h : scene.handles) require_known_body(scene, h.body, h.where + ".body");
+  for (const SceneJoint& j : scene.joints) require_joined_bodies(scene, j);
 }
 
 void read_time(const JsonObject& o, Scene& scene) {
@@ -325,7 +213,7 @@ SceneLimits read_limits(const JsonObject& o) {
   constexpr LoadKind kKinds[] = {LoadKind::kStatic, LoadKind::kSudden, LoadKind::kResonant};
   SceneLimits limits;
   limits.max_modes =
-      static_cast<int>(o.integer("max_modes", 0, std::numeric_limits<int>::max(), std::numeric_limits<int>::max()));
+      static_cast<int>(o.integer("max_modes", 1, std::numeric_limits<int>::max(), std::numeric_limits<int>::max()));
   limits.max_force = non_negative(o, "max_force", 0.0);
   limits.min_displacement = non_negative(o, "min_displacement", 0.0);
   limits.frame_rate = non_negative(o, "frame_rate", 0.0);
@@ -348,18 +236,27 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   scene.gravity = o.vec3("gravity", scene.gravity);
   read_assets(o, folder, scene);
   if (o.has("limits")) scene.limits = read_limits(JsonObject(o.at("limits"), o.where("limits")));
-  o.for_each("bodies", [&](const Json& v, const std::string& where) { read_body(v, where, scene); });
+  scene.contact = read_contact(o);
+  if (o.has("statics"))
+    o.for_each("statics",
+               [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, folder)); });
+  o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
   if (scene.bodies.empty()) refuse(o.where("bodies"), "[]", "at least one body");
   require_unique_names(scene);
-  if (o.has("strikes"))
-    o.for_each("strikes",
-               [&](const Json& v, const std::string& w) { scene.strikes.push_back(read_strike(v, w, scene)); });
-  if (o.has("forces"))
-    o.for_each("forces", [&](const Json& v, const std::string& w) { scene.forces.push_back(read_force(v, w, scene)); });
-  for (const Strike& s : scene.strikes) require_known_body(scene, s.body, s.where);
-  for (const HeldForce& f : scene.forces) require_known_body(scene, f.body, f.where);
+  read_actions(o, scene);
   o.finish();
   return scene;
+}
+
+std::vector<std::filesystem::path> files_of(const Scene& scene) {
+  std::set<std::filesystem::path> files;
+  const auto add = [&](const SceneShape& shape) {
+    if (const auto* file = std::get_if<ShapeFile>(&shape)) files.insert(file->path);
+  };
+  for (const auto& [name, file] : scene.assets) files.insert(file);
+  for (const SceneBody& body : scene.bodies) add(body.shape);
+  for (const SceneStatic& s : scene.statics) add(s.shape);
+  return {files.begin(), files.end()};
 }
 
 Scene read_scene(const std::filesystem::path& path) {

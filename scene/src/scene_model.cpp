@@ -6,6 +6,7 @@
 
 #include "limber/core/error.h"
 #include "limber/internal/strict_json.h"
+#include "shape_reading.h"
 
 namespace limber {
 namespace {
@@ -179,6 +180,11 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
     }
     models.of_body.push_back(model);
   }
+  ShapeLoader shapes;
+  for (const SceneBody& body : scene.bodies)
+    models.shape_of_body.push_back(shapes.load(body.shape, body.where, models.warnings));
+  for (const SceneStatic& s : scene.statics)
+    models.shape_of_static.push_back(shapes.load(s.shape, s.where, models.warnings));
   return models;
 }
 

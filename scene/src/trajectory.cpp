@@ -1,3 +1,4 @@
+#include <array>
 #include <cstdio>
 
 #include "limber/model/morph_targets.h"
@@ -22,6 +23,10 @@ std::string field(const std::string& text) {
 
 }  // namespace
 
+const std::string& Trajectory::name(std::size_t body) const {
+  return body < bodies.size() ? bodies[body].name : statics.at(body - bodies.size()).name;
+}
+
 std::span<const double> BodyTrack::amplitudes_at(std::size_t key) const {
   const auto k = static_cast<std::size_t>(model->modes());
   return std::span(amplitudes).subspan(key * k, k);
@@ -42,6 +47,19 @@ std::string energies_csv(const Trajectory& trajectory) {
         csv += "," + number(x);
       csv += "\n";
     }
+  return csv;
+}
+
+std::string contacts_csv(const Trajectory& trajectory) {
+  constexpr std::array kPhases{"begun", "lasting", "ended"};
+  std::string csv = "time_s,phase,a,b,x_m,y_m,z_m,normal_x,normal_y,normal_z,impulse_x_Ns,impulse_y_Ns,impulse_z_Ns\n";
+  for (const ContactRecord& c : trajectory.contacts) {
+    csv += number(c.time) + "," + kPhases[static_cast<std::size_t>(c.phase)] + "," + field(trajectory.name(c.a)) + "," +
+           field(trajectory.name(c.b));
+    for (const Vec3& v : {c.position, c.normal, c.impulse})
+      for (int i = 0; i < 3; ++i) csv += "," + number(v[i]);
+    csv += "\n";
+  }
   return csv;
 }
 

@@ -68,6 +68,23 @@ std::vector<double> morphed(const GlbView& glb, const std::string& attribute, st
 
 Vec3 vertex(const std::vector<double>& xyz, std::size_t v) { return {xyz[3 * v], xyz[3 * v + 1], xyz[3 * v + 2]}; }
 
+TEST(Recording, WhatStandsIsThereWhereItStands) {
+  Trajectory t = swinging_blocks();
+  t.statics = {
+      {"ground", std::make_shared<Shape>(HalfSpace{.normal = Vec3::UnitZ(), .offset = -2.0}), {{}, Vec3::Zero()}},
+      {"post", std::make_shared<Shape>(Capsule{}), {{}, {1.0, 2.0, 3.0}}}};
+  const GlbView glb(make_recording(t).glb);
+  const auto& nodes = glb.json.at("nodes");
+  const auto node = [&](const std::string& name) {
+    return *std::find_if(nodes.begin(), nodes.end(), [&](const auto& n) { return n.at("name") == name; });
+  };
+  EXPECT_EQ(node("post").at("translation"), nlohmann::json({1.0, 2.0, 3.0}));
+  const auto mesh = node("ground").at("mesh").template get<std::size_t>();
+  const auto plane = glb.floats(glb.json.at("meshes").at(mesh).at("primitives").at(0).at("attributes").at("POSITION"));
+  for (std::size_t i = 2; i < plane.size(); i += 3) EXPECT_FLOAT_EQ(plane[i], -2.0f);
+  EXPECT_EQ(nodes.back().at("children").size(), 4u);  // of the root: two bodies, two statics
+}
+
 class RecordingOfWeights : public ::testing::TestWithParam<bool> {
  protected:
   RecordingOfWeights()

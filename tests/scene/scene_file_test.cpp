@@ -63,6 +63,92 @@ TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
   EXPECT_EQ(std::get<NearestTo>(s.forces[0].at).frame, PlaceFrame::kInput);
 }
 
+TEST(SceneFile, ContactIsReadWhereItBelongs) {
+  const Scene s = parse(scene_with(
+      R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},
+          "layers": [0, 2], "meets": [1], "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
+      R"("contact": {"method": "gap_program", "friction": 0.7, "friction_model": "heuristic_no_slip", "guard": "none",
+                     "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2,
+                     "residual_compliance": true, "penalty_frequency": 30, "penalty_damping": 0.5},
+         "statics": [{"name": "ground", "shape": {"half_space": {"normal": [0, 3, 4], "offset": 2}}, "friction": 0,
+                      "position": [1, 2, 3]},
+                     {"name": "hill", "shape": {"height_field": {"spacing": [2, 3], "heights": [[0, 1, 2], [3, 4, 5]]}}},
+                     {"name": "rock", "shape": {"mesh": {"file": "rock.obj", "scale": 0.1}}}])"));
+  ASSERT_TRUE(s.contact);
+  EXPECT_EQ(s.contact->rule.method, ContactMethod::kGapProgram);
+  EXPECT_EQ(s.contact->rule.friction, FrictionModel::kHeuristicNoSlip);
+  EXPECT_EQ(s.contact->rule.guard, ProgramGuard::kNone);
+  EXPECT_EQ(s.contact->impact, ImpactModel::kHeldFromTouch);
+  EXPECT_EQ(s.contact->friction, 0.7);
+  EXPECT_EQ(s.contact->impact_speed, 0.5);
+  EXPECT_EQ(s.contact->recovery_speed, 0.2);
+  EXPECT_TRUE(s.contact->residual_compliance);
+  EXPECT_EQ(s.contact->penalty_frequency, 30.0);
+  EXPECT_EQ(s.contact->penalty_damping, 0.5);
+  ASSERT_EQ(s.statics.size(), 3u);
+  const auto shape_of = [&](int i) { return *std::get<std::shared_ptr<const Shape>>(s.statics[i].shape); };
+  EXPECT_LT((std::get<HalfSpace>(shape_of(0)).normal - Vec3(0, 0.6, 0.8)).norm(), kRoundOff);
+  EXPECT_EQ(std::get<HalfSpace>(shape_of(0)).offset, 2.0);
+  EXPECT_EQ(s.statics[0].friction, 0.0);
+  EXPECT_EQ(s.statics[0].pose.p, Vec3(1, 2, 3));
+  const auto field = std::get<HeightField>(shape_of(1));
+  EXPECT_EQ(field.columns, 3);
+  EXPECT_EQ(field.rows, 2);
+  EXPECT_EQ(field.spacing_y, 3.0);
+  EXPECT_THAT(field.heights, ::testing::ElementsAre(0.f, 1.f, 2.f, 3.f, 4.f, 5.f));
+  EXPECT_EQ(std::get<ShapeFile>(s.statics[2].shape), (ShapeFile{"folder/rock.obj", 0.1, false}));
+  const SceneBody& copy = s.bodies.at(1);
+  EXPECT_EQ(copy.placement.friction, 0.3);
+  EXPECT_EQ(copy.placement.filter.layers, 5u);
+  EXPECT_EQ(copy.placement.filter.mask, 2u);
+  EXPECT_EQ(copy.shape, s.bodies[0].shape);  // one shape for all copies
+  EXPECT_EQ(std::get<Capsule>(*std::get<std::shared_ptr<const Shape>>(copy.shape)).half_length, 3.0);
+}
+
+TEST(SceneFile, NothingTouchesWhereTheSceneSaysNothingOfIt) {
+  EXPECT_FALSE(parse(scene_with(kBell)).contact);
+  EXPECT_TRUE(parse(scene_with(kBell, R"("contact": {})")).contact);
+  EXPECT_TRUE(parse(scene_with(kBell, R"("statics": [{"name": "g", "shape": {"half_space": {}}}])")).contact);
+}
+
+TEST(SceneFile, HandlesAndJointsAreReadWhereTheyBelong) {
+  const Scene s = parse(scene_with(
+      kBell + R"(, {"name": "clapper", "asset": "bell"})",
+      R"("handles": [{"body": "bell", "start": 0.5, "duration": 0.25, "at": {"vertex": 3}, "stiffness": 100, "damping": 2,
+                      "max_force": 50, "directions": [[0, 0, 2]],
+                      "motion": {"keys": [{"time": 0.1, "position": [1, 2, 3]}]}}],
+         "joints": [{"b": "bell", "type": "fixed", "origin": [1, 1, 1]},
+                    {"a": "bell", "b": "clapper", "type": "cylindrical", "origin": [0, 0, 1], "axis": [0, 0, 2],
+                     "limits": {"rotation": [-1, 1], "translation": [null, 0.5]}, "patch_radius": 0.1, "collide": true,
+                     "coordinates": [{"motor": {"velocity": 2, "max_force": 3}, "friction": 0.1},
+                                     {"drive": {"target": 0.2, "stiffness": 5, "damping": 1}}]}])"));
+  ASSERT_EQ(s.handles.size(), 1u);
+  EXPECT_EQ(s.handles[0].start, 0.5);
+  EXPECT_EQ(s.handles[0].duration, 0.25);
+  EXPECT_EQ(s.handles[0].options.stiffness, 100.0);
+  EXPECT_EQ(s.handles[0].options.damping, 2.0);
+  EXPECT_EQ(s.handles[0].options.max_force, 50.0);
+  EXPECT_THAT(s.handles[0].options.directions, ::testing::ElementsAre(Vec3(0, 0, 1)));
+  EXPECT_EQ(std::get<std::vector<PoseKey>>(s.handles[0].movement)[0].pose.p, Vec3(1, 2, 3));
+  ASSERT_EQ(s.joints.size(), 2u);
+  EXPECT_EQ(s.joints[0].a, "");
+  const SceneJoint& j = s.joints[1];
+  EXPECT_EQ(j.spec.type, JointType::kCylindrical);
+  EXPECT_EQ(j.spec.frame.origin, Vec3(0, 0, 1));
+  EXPECT_LT((j.spec.frame.axes.col(0) - Vec3::UnitZ()).norm(), kRoundOff);
+  EXPECT_EQ(j.spec.limits.rotation, (Interval{-1.0, 1.0}));
+  EXPECT_EQ(j.spec.limits.translation[0].high, 0.5);
+  EXPECT_EQ(j.patch_radius, 0.1);
+  EXPECT_TRUE(j.collide);
+  ASSERT_EQ(j.coordinates.size(), 2u);
+  EXPECT_EQ(j.coordinates[0].motor_velocity, 2.0);
+  EXPECT_EQ(j.coordinates[0].motor_max_force, 3.0);
+  EXPECT_EQ(j.coordinates[0].friction, 0.1);
+  EXPECT_EQ(j.coordinates[1].drive_target, 0.2);
+  EXPECT_EQ(j.coordinates[1].drive_stiffness, 5.0);
+  EXPECT_EQ(j.coordinates[1].drive_damping, 1.0);
+}
+
 TEST(SceneFile, BodiesSleepWhereTheSceneSaysSo) {
   EXPECT_FALSE(parse(scene_with(kBell)).sleep.enabled);
   const SleepOptions sleep = parse(scene_with(kBell, R"("sleep": {})")).sleep;
@@ -114,6 +200,19 @@ struct BadScene {
 
 std::string strike(const std::string& inside) {
   return scene_with(kBell, R"("strikes": [{"body": "bell", "impulse": [0, 0, 1], )" + inside + "}]");
+}
+
+std::string static_of(const std::string& shape) {
+  return scene_with(kBell, R"("statics": [{"name": "s", "shape": )" + shape + "}]");
+}
+std::string contact(const std::string& inside) { return scene_with(kBell, R"("contact": {)" + inside + "}"); }
+std::string handle(const std::string& inside) {
+  return scene_with(kBell, R"("handles": [{"body": "bell", "at": {"vertex": 0}, )" + inside + "}]");
+}
+std::string joint(const std::string& inside) {
+  return scene_with(kBell + R"(, {"name": "other", "asset": "bell"}, {"name": "two", "asset": "bell",
+                               "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
+                    R"("joints": [{"b": "bell", "origin": [0, 0, 0], )" + inside + "}]");
 }
 
 TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
@@ -188,8 +287,65 @@ TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
       {scene_with(kBell, R"("forces": [{"body": "bell", "at": {"vertex": 0}, "impulse": [1, 0, 0]}])"), "forces[0]",
        "\"force\" is missing"},
       {scene_with(kBell, R"("limits": {"max_force": 3})"), "limits", "expected both or none"},
-      {scene_with(kBell, R"("limits": {"max_modes": -3})"), "limits.max_modes", "an integer from 0"},
+      {scene_with(kBell, R"("limits": {"max_modes": 0})"), "limits.max_modes", "an integer from 1"},
       {scene_with(kBell, R"("limits": {"framerate": 3})"), "limits", "did you mean \"frame_rate\""},
+      {contact(R"("method": "lcp")"), "contact.method", "\"gap_program\", \"complementary\""},
+      {contact(R"("friction_model": "coulomb")"), "contact.friction_model", "\"cone\""},
+      {contact(R"("guard": 1)"), "contact.guard", "text"},
+      {contact(R"("impact": "elastic")"), "contact.impact", "\"held_from_touch\""},
+      {contact(R"("friction": -0.1)"), "contact.friction", ">= 0"},
+      {contact(R"("penalty_frequency": 0)"), "contact.penalty_frequency", "> 0"},
+      {contact(R"("residual_compliance": 1)"), "contact.residual_compliance", "true or false"},
+      {contact(R"("fricton": 1)"), "contact", "did you mean \"friction\""},
+      {static_of("{}"), "statics[0].shape", "exactly one of"},
+      {static_of("3"), "statics[0].shape", "an object"},
+      {static_of(R"({"cube": {}})"), "statics[0].shape", "\"cube\" is unknown"},
+      {static_of(R"({"sphere": {"radius": 1}, "box": {"half_extents": [1, 1, 1]}})"), "statics[0].shape",
+       "exactly one of"},
+      {static_of(R"({"half_space": {"normal": [0, 0, 0]}})"), "half_space.normal", "> 0"},
+      {static_of(R"({"sphere": {"radius": 0}})"), "sphere.radius", "> 0"},
+      {static_of(R"({"sphere": {"raduis": 1}})"), "shape.sphere", "\"raduis\""},
+      {static_of(R"({"capsule": {"radius": 1, "half_length": -1}})"), "capsule.half_length", ">= 0"},
+      {static_of(R"({"box": {"half_extents": [1, 0, 1]}})"), "box.half_extents", "> 0"},
+      {static_of(R"({"hull": {"points": [[0, 0, 0], [1, 0, 0]]}})"), "shape.hull", "at least 4"},
+      {static_of(R"({"hull": {"points": [[0, 0], [1, 0, 0]]}})"), "hull.points[0]", "array of 3 numbers"},
+      {static_of(R"({"hull": {}})"), "shape.hull", "\"points\" is missing"},
+      {static_of(R"({"mesh": {"file": ""}})"), "mesh.file", "a file name"},
+      {static_of(R"({"mesh": {"file": "a.obj", "scale": 0}})"), "mesh.scale", "> 0"},
+      {static_of(R"({"height_field": {"spacing": [1, 1], "heights": [[1, 2], [3]]}})"), "heights[1]", "2, as in"},
+      {static_of(R"({"height_field": {"spacing": [1, 1], "heights": [[1, 2]]}})"), "height_field", "at least 2"},
+      {static_of(R"({"height_field": {"spacing": [1, 1], "heights": [[1, null], [1, 2]]}})"), "heights[0][1]",
+       "a finite number"},
+      {static_of(R"({"height_field": {"spacing": [1, 0], "heights": []}})"), "height_field.spacing", "> 0"},
+      {scene_with(kBell, R"("statics": [{"shape": {"half_space": {}}}])"), "statics[0]", "\"name\" is missing"},
+      {scene_with(kBell, R"("statics": [{"name": "bell", "shape": {"half_space": {}}}])"), "statics[0].name",
+       "one name each"},
+      {scene_with(kBell, R"("statics": [{"name": "s", "layers": [32], "shape": {"half_space": {}}}])"),
+       "statics[0].layers[0]", "0 to 31"},
+      {scene_with(R"({"name": "x", "asset": "bell", "friction": 0.5})"), "bodies[0].friction", "\"contact\": {}"},
+      {scene_with(R"({"name": "x", "asset": "bell", "shape": {"half_space": {}}})", R"("contact": {})"),
+       "bodies[0].shape", "a shape that ends"},
+      {handle(R"("start": 1)"), "handles[0].start", "[0, 1.0) s"},
+      {handle(R"("duration": 0.001)"), "handles[0].duration", "at least one step"},
+      {handle(R"("damping": 1)"), "handles[0]", "without a stiffness"},
+      {handle(R"("max_force": 0)"), "handles[0].max_force", "> 0"},
+      {handle(R"("directions": [])"), "handles[0].directions", "1 to 3"},
+      {handle(R"("directions": [[1, 0, 0], [1, 1, 0]])"), "handles[0]", "orthonormal"},
+      {handle(R"("directions": [[1, 0, 0], 3])"), "handles[0].directions[1]", "array of 3 numbers"},
+      {handle(R"("motion": {"keys": [{"time": 1}]})"), "handles[0].motion.keys[0]", "\"position\" is missing"},
+      {handle(R"("motion": {"keys": [{"time": 1, "position": [0, 0, 0], "orientation": [1, 0, 0, 0]}]})"),
+       "handles[0].motion.keys[0]", "\"orientation\" is unknown"},
+      {joint(R"("axis": [1, 0, 0])"), "joints[0]", "\"type\" is missing"},
+      {joint(R"("type": "hinge")"), "joints[0].type", "\"revolute\""},
+      {joint(R"("type": "revolute")"), "joints[0]", "\"axis\" is missing"},
+      {joint(R"("type": "ball", "a": "bell")"), "joints[0].b", "another body"},
+      {joint(R"("type": "ball", "a": "othr")"), "joints[0].a", "did you mean \"other\""},
+      {joint(R"("type": "ball", "a": "two")"), "joints[0].a", "such as \"two[0]\""},
+      {joint(R"("type": "ball", "limits": {"rotation": [0, 1]})"), "joints[0].limits.rotation", "no such limit"},
+      {joint(R"("type": "fixed", "coordinates": [{}])"), "joints[0].coordinates", "at most 0"},
+      {joint(R"("type": "ball", "coordinates": [{"motor": {"velocity": 1}}])"), "joints[0].coordinates[0].motor",
+       "\"max_force\" is missing"},
+      {joint(R"("type": "ball", "patch_radius": -1)"), "joints[0].patch_radius", ">= 0"},
   };
   for (const BadScene& bad : scenes) {
     SCOPED_TRACE(bad.text);

@@ -135,6 +135,34 @@ TEST_F(Programs, AManifestTellsWhatTheSceneDidNotNeed) {
   EXPECT_THAT(r.out, HasSubstr("2 modes of 4"));
 }
 
+TEST_F(Programs, SimulateTellsWhatTouchedHungAndWasHeld) {
+  write_file(folder_ / "scene.json", R"({
+    "step": 0.01, "duration": 0.5, "assets": {"block": "block.glb"},
+    "statics": [{"name": "ground", "shape": {"half_space": {}}, "friction": 0.2}],
+    "bodies": [{"name": "falls", "asset": "block", "position": [0, 0, 0.6], "friction": 0.2},
+               {"name": "hangs", "asset": "block", "position": [4, 0, 4]},
+               {"name": "held", "asset": "block", "position": [8, 0, 4]}],
+    "joints": [{"b": "hangs", "type": "ball", "origin": [3, 0, 4]}],
+    "handles": [{"body": "held", "at": {"nearest": [8, 0.5, 4.5]}}]})");
+  const ProgramResult r = simulate({"--contacts", "c.csv", "--report", "r.json", "--record", "out.glb"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, HasSubstr("joint   the world to hangs"));
+  EXPECT_THAT(r.out, HasSubstr("handle  held"));
+  const auto report = json("r.json");
+  EXPECT_EQ(report.at("contact").at("method"), "complementary");
+  EXPECT_EQ(report.at("contact").at("friction_model"), "cone");
+  EXPECT_GT(report.at("constraints").at("contacts_begun"), 0);
+  EXPECT_EQ(report.at("constraints").at("unsettled_steps"), 0);
+  EXPECT_EQ(report.at("joints").at(0).at("position").size(), 3u);
+  EXPECT_TRUE(report.at("joints").at(0).at("a").is_null());
+  EXPECT_LT(report.at("joints").at(0).at("largest_distance_error"), 1e-9);
+  EXPECT_LT(report.at("handles").at(0).at("largest_error"), 1e-9);
+  const std::string contacts = bytes("c.csv");
+  EXPECT_THAT(contacts, HasSubstr(",begun,falls,ground,"));
+  EXPECT_THAT(contacts, HasSubstr(",lasting,falls,ground,"));
+  EXPECT_EQ(contacts.find("hangs"), std::string::npos);
+}
+
 TEST_F(Programs, WrongUsageIsExitCodeTwoInOneLine) {
   expect_one_line(run("limber-simulate", {}), 2, "SCENE.json");
   expect_one_line(simulate({"--stesp", "3"}), 2, "did you mean \"--steps\"");
@@ -165,6 +193,9 @@ TEST_F(Programs, WrongFilesAreExitCodeOneInOneLineAndNothingIsWritten) {
   expect_one_line(with("scene.json"), 1, "scene.json");
   replace_in_scene("\"gravity\"", "\"gravty\"");
   expect_one_line(with("scene.json"), 1, "did you mean \"gravity\"");
+  replace_in_scene("\"gravity\"",
+                   "\"statics\": [{\"name\": \"g\", \"shape\": {\"mesh\": {\"file\": \"none.obj\"}}}], \"gravity\"");
+  expect_one_line(with("scene.json"), 1, "none.obj");
   replace_in_scene("\"vertex\": 3", "\"vertex\": 3000");
   expect_one_line(with("scene.json"), 1, "strikes[1].at.vertex");
   expect_one_line(run("limber-inspect", {"scene.json", "--report", "r.json"}), 1, "scene.json");

@@ -55,6 +55,11 @@ inline std::string in_quotes(std::string_view text) {
   return cut ? out.substr(0, out.size() - 1) + "...\"" : out;
 }
 
+/// One line: place, what was seen, what was expected.
+[[noreturn]] inline void refuse(const std::string& where, const std::string& seen, const std::string& expected) {
+  throw InputError(where + ": is " + seen + ", expected " + expected);
+}
+
 /// Parses text as one JSON document. @param name shown in messages. @throws InputError with line and column; also for a
 /// key that stands twice in one object (a plain parser would silently keep the last).
 inline nlohmann::json parse_json(std::string_view text, const std::string& name) {

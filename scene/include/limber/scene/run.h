@@ -22,6 +22,7 @@ struct RunOptions {
   /// and the end always. 0: keys are kept at the start and the end only. ≥ 0.
   double key_rate = 60.0;
   bool reconstruct = false;                         ///< also reconstruct every body at every key, to time it
+  bool keep_contacts = false;                       ///< fill Trajectory::contacts
   std::function<void(double fraction)> progress{};  ///< called now and then; may be empty
   Jobs* jobs = nullptr;                             ///< null: serial
   void validate() const;                            ///< @throws InvalidArgument naming the field and its value
@@ -41,12 +42,34 @@ struct BodyTrack {
   std::span<const double> rates_at(std::size_t key) const;
 };
 
+/// What stands in a scene without moving.
+struct StaticShape {
+  std::string name;
+  std::shared_ptr<const Shape> shape;
+  RigidTransform pose{};
+};
+
+/// A contact that pressed, or ceased to, in a step.
+struct ContactRecord {
+  double time = 0.0;  ///< s, of the step's end
+  /// Numbers of bodies in Trajectory::bodies, and from bodies.size() on in Trajectory::statics; a < b.
+  std::size_t a = 0, b = 0;
+  ContactPhase phase = ContactPhase::kBegun;
+  Vec3 position = Vec3::Zero();  ///< world, m
+  Vec3 normal = Vec3::Zero();    ///< world, out of b into a
+  Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s
+};
+
 struct Trajectory {
   std::string scene;          ///< name
   double step = 0.0;          ///< s, of the simulation
   double key_interval = 0.0;  ///< s between keys: a multiple of the step (the last interval may be shorter)
   std::vector<double> times;  ///< s, of the keys: ascending from 0, each a whole number of steps
   std::vector<BodyTrack> bodies;
+  std::vector<StaticShape> statics;
+  std::vector<ContactRecord> contacts;  ///< of every step, with RunOptions::keep_contacts
+
+  const std::string& name(std::size_t body) const;  ///< of a body or, from bodies.size() on, of a static shape
 };
 
 /// What a load hit.
@@ -57,6 +80,31 @@ struct LoadReport {
   Vec3 point = Vec3::Zero();  ///< where it acted, world, m
 };
 
+/// What a handle did.
+struct HandleReport {
+  std::string body;
+  std::int64_t step = 0;       ///< 0-based step in which it took hold
+  Vec3 point = Vec3::Zero();   ///< where it took hold, world, m
+  double largest_error = 0.0;  ///< distance from the target along the held directions at the end of a step, m
+  Vec3 force = Vec3::Zero();   ///< on the body in the last step that it held, world, N
+  double largest_force = 0.0;  ///< N
+};
+
+/// What a joint does at the end, and the farthest that it was off.
+struct JointReport {
+  std::string a, b;
+  JointView view;                                                  ///< as of the last step
+  double largest_distance_error = 0.0, largest_angle_error = 0.0;  ///< at the end of a step; m, rad
+};
+
+/// What the constraints of all steps came to.
+struct ConstraintSummary {
+  std::int64_t unsettled = 0;         ///< steps in which an island did not come to its targets
+  double energy_removed = 0.0;        ///< J; see ConstraintReport
+  std::int64_t begun = 0, ended = 0;  ///< contacts
+  double largest_impulse = 0.0;       ///< of a contact in a step, N·s
+};
+
 struct RunResult {
   Trajectory trajectory;
   std::int64_t steps = 0;
@@ -64,12 +112,16 @@ struct RunResult {
   std::int64_t asleep = 0;       ///< bodies that sleep at the end
   /// Those that acted, in the order of the scene's lists (then of the bodies).
   std::vector<LoadReport> strikes, forces;
+  std::vector<HandleReport> handles;  ///< the same
+  std::vector<JointReport> joints;    ///< in the order of the scene's list
+  ConstraintSummary constraints;
   double energy_before = 0.0, energy_after = 0.0;  ///< total of all bodies at the first and last key, J
   double seconds_advance = 0.0;                    ///< wall clock, World::step() alone
   double seconds_reconstruct = 0.0;                ///< wall clock, with RunOptions::reconstruct
   std::int64_t reconstructed_vertices = 0;         ///< vertices times keys
 };
 
+/// Contacts are found by ContactFinder, where the scene has contact.
 /// @throws InputError naming the place in the scene file: a triangle or vertex that the surface does not have, a ray
 /// that misses, a motion for a body without fixed nodes. InvalidArgument for options.
 RunResult run_scene(const Scene& scene, const SceneModels& models, const RunOptions& options = {});
@@ -77,6 +129,10 @@ RunResult run_scene(const Scene& scene, const SceneModels& models, const RunOpti
 /// Energies as CSV: a row per key and body with time_s, body, kinetic_rigid_J, potential_J, kinetic_modal_J, elastic_J,
 /// total_J.
 std::string energies_csv(const Trajectory& trajectory);
+
+/// Contacts as CSV: a row per step and contact that pressed in it or ceased to, with time_s, phase (begun, lasting or
+/// ended), a, b, x_m, y_m, z_m, normal_x, normal_y, normal_z, impulse_x_Ns, impulse_y_Ns, impulse_z_Ns (on a).
+std::string contacts_csv(const Trajectory& trajectory);
 
 /// Energy of every mode, ½(ż² + λz²), as CSV: a row per key; a column time_s, one "BODY elastic+kinetic_J" with the sum
 /// over the body's modes, and one "BODY modeNN FREQUENCYHz_J" per mode.

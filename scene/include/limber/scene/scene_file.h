@@ -1,6 +1,6 @@
 /// @file limber/scene/scene_file.h
-/// Scenes: which bodies there are, how they start, what acts on them and when. Written as JSON; docs/formats/scene.md
-/// describes the file, docs/formats/scene.schema.json is its JSON Schema.
+/// Scenes: which bodies there are, how they start, what they touch and hang on, and what acts on them when. Written as
+/// JSON; docs/formats/scene.md describes the file, docs/formats/scene.schema.json is its JSON Schema.
 ///
 ///   {"step": 0.001, "duration": 2,
 ///    "assets": {"bunny": "bunny.glb"},
@@ -23,6 +23,7 @@
 #include "limber/core/rigid_transform.h"
 #include "limber/engine/world.h"
 #include "limber/model/mode_selection.h"
+#include "limber/model/shape.h"
 
 namespace limber {
 
@@ -90,13 +91,58 @@ struct PoseKey {
 };
 using FrameMovement = std::variant<std::monostate, Shake, std::vector<PoseKey>>;
 
+/// A shape whose points are in a file of a surface (read_mesh.h): the surface itself, or the convex hull of its
+/// vertices.
+struct ShapeFile {
+  std::filesystem::path path{};
+  double scale = 1.0;  ///< metres per unit of the file; > 0
+  bool hull = false;
+  friend bool operator==(const ShapeFile&, const ShapeFile&) = default;
+};
+/// A rigid shape: as the scene tells it, checked, or in a file; null: none.
+using SceneShape = std::variant<std::shared_ptr<const Shape>, ShapeFile>;
+
+/// A rigid shape that never moves.
+struct SceneStatic {
+  std::string name{};  ///< unique among the bodies and these
+  SceneShape shape{};
+  RigidTransform pose{};
+  CollisionFilter filter{};
+  std::optional<double> friction{};  ///< as in World::add_static
+  std::string where{};
+};
+
 struct SceneBody {
   std::string name{};   ///< unique; copy i of a grid is called "name[i]"
   std::string group{};  ///< the name in the file: shared by all copies, equal to `name` without them
   std::string asset{};  ///< key of Scene::assets
   std::variant<Index, std::string> part = Index{0};  ///< which body of the asset: index or name
-  BodyPlacement placement{};
+  BodyPlacement placement{};                         ///< its shape is null: see below
+  SceneShape shape{};                                ///< what others meet in place of the body's surface
   FrameMovement movement{};
+  std::string where{};
+};
+
+/// A point of a body that is held from the first step whose start is not before `start`, as a handle (handle.h). It is
+/// found, and taken where it is, when the hold begins.
+struct SceneHandle {
+  std::string body{};
+  double start = 0.0, duration = 0.0;  ///< s; the duration may be infinite
+  SurfacePlace at{};
+  HandleOptions options{};
+  /// Of the target, world, in times counted from where the hold begins; orientations are not used. A shake is about the
+  /// place where the point was taken; keys go from there to the positions that they tell.
+  FrameMovement movement{};
+  std::string where{};
+};
+
+/// A joint between two bodies as they stand at first, or a body and the world.
+struct SceneJoint {
+  std::string a{}, b{};  ///< bodies; b moves relative to a. An empty a is the world
+  JointSpec spec{};      ///< its frame in world axes
+  double patch_radius = 0.0;
+  bool collide = false;                       ///< whether a and b have contacts with each other
+  std::vector<JointActuation> coordinates{};  ///< of the first so many coordinates
   std::string where{};
 };
 
@@ -109,15 +155,28 @@ struct Scene {
   Vec3 gravity = {0.0, 0.0, -9.80665};                    ///< m/s²
   std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
+  std::optional<ContactOptions> contact{};                ///< absent: bodies pass through each other
+  std::vector<SceneStatic> statics{};                     ///< none without contact
   std::vector<SceneBody> bodies{};
   std::vector<Strike> strikes{};
   std::vector<HeldForce> forces{};
+  std::vector<SceneHandle> handles{};
+  std::vector<SceneJoint> joints{};
 
   double duration() const { return step * static_cast<double>(steps); }
 };
 
-/// Reads and checks everything that can be checked without the assets. Unknown keys are errors that name the nearest
-/// known one. @throws InputError in one line: file, place, seen, expected
+/// All files that a scene names: assets, and shapes of bodies and statics; each once.
+std::vector<std::filesystem::path> files_of(const Scene& scene);
+
+// Words of scene files and reports: the last part of the constant's name, such as "gap_program" or "heuristic_no_slip".
+std::string_view to_string(ContactMethod method);
+std::string_view to_string(FrictionModel model);
+std::string_view to_string(ProgramGuard guard);
+std::string_view to_string(ImpactModel model);
+
+/// Reads and checks everything that can be checked without the assets and the files of shapes. Unknown keys are errors
+/// that name the nearest known one. @throws InputError in one line: file, place, seen, expected
 Scene read_scene(const std::filesystem::path& path);
 
 /// The same from text. @param name shown in messages. @param folder that asset files are relative to

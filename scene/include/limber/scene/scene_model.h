@@ -27,16 +27,21 @@ struct ModelManifest {
   std::size_t multiply_adds_in_asset = 0, multiply_adds = 0;
 };
 
-/// The models of a scene's bodies, one per asset body in use.
+/// The models of a scene's bodies, one per asset body in use, and the shapes of its bodies and statics, one per file.
 struct SceneModels {
-  std::vector<std::shared_ptr<const ModalModel>> of_body;  ///< per Scene::bodies
-  std::vector<ModelManifest> manifest;                     ///< in order of first use
+  std::vector<std::shared_ptr<const ModalModel>> of_body;     ///< per Scene::bodies
+  std::vector<std::shared_ptr<const Shape>> shape_of_body;    ///< the same; null: none
+  std::vector<std::shared_ptr<const Shape>> shape_of_static;  ///< per Scene::statics
+  std::vector<ModelManifest> manifest;                        ///< in order of first use
+  Warnings warnings;                                          ///< of the files of shapes
 };
 
-/// Reads the assets and makes the models. @throws InputError (file, or a body's part that the asset does not have)
+/// Reads the assets and the files of shapes, and makes the models. @throws InputError (file, or a body's part that the
+/// asset does not have)
 SceneModels load_models(const Scene& scene);
 
-/// The same with assets that are in memory. @param assets one per key of Scene::assets
+/// The same with assets that are in memory; shapes are still read from their files. @param assets one per key of
+/// Scene::assets
 SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& assets);
 
 /// A model with some of the modes and without its volume block. @param kept ascending, in range @throws InvalidArgument

@@ -1,0 +1,23 @@
+/// @file contact_reading.h
+/// What a scene says of contact: its rules, what stands in it without moving, and what a body is like to touch.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "limber/internal/strict_json.h"
+#include "limber/scene/scene_file.h"
+
+namespace limber {
+
+/// The member `contact`; without one, the defaults where there are statics, else none.
+std::optional<ContactOptions> read_contact(const internal::JsonObject& scene);
+
+SceneStatic read_static(const nlohmann::json& value, const std::string& where, const std::filesystem::path& folder);
+
+/// `friction`, `shape`, `layers` and `meets` of a body, which only a scene with contact may have.
+void read_touch(const internal::JsonObject& o, const Scene& scene, const std::filesystem::path& folder,
+                SceneBody& body);
+
+}  // namespace limber
