@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -145,6 +146,22 @@ void drop_askew(BothSides& sides) {
   for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
+/// Whether surfaces look at each other, or only edges of theirs do: past an edge the nearest point is a slanting way
+/// off.
+bool look_straight(const BothSides& sides, double diagonal) {
+  constexpr double kStraight = 0.9, kShare = 0.25;  // cosine; of the samples
+  constexpr double kNothing = 1e-6;                 // of the diagonal: a way so short has no direction
+  double straight = 0.0, all = 0.0;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) {
+      const Vec3 way = s.contact.point - s.contact.facing_point;
+      const double across = std::max(std::abs(way.dot(s.contact.normal)), std::abs(way.dot(s.facing_facet)));
+      all += 1.0;
+      if (s.distance <= kNothing * diagonal || across >= kStraight * s.distance) straight += 1.0;
+    }
+  return straight > kShare * all;
+}
+
 /// What is measured over the samples of both sides.
 ContactRegion summarised(const Pair& pair, const BothSides& sides) {
   ContactRegion out;
@@ -220,10 +237,14 @@ Vec3 spread_of_directions(const BothSides& sides) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(sum / sum.trace(), Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-/// A part of `sides`: those nearer than the limit, or those further.
-BothSides part_of(BothSides sides, double limit, bool nearer) {
+/// Gaps that belong together: low < gap ≤ high.
+struct GapRange {
+  double low = -1.0, high = 0.0;
+};
+
+BothSides part_of(BothSides sides, const GapRange& gaps) {
   for (auto* side : {&sides.a, &sides.b})
-    std::erase_if(*side, [&](const NearSample& s) { return (s.distance <= limit) != nearer; });
+    std::erase_if(*side, [&](const NearSample& s) { return s.distance <= gaps.low || s.distance > gaps.high; });
   return sides;
 }
 
@@ -232,18 +253,25 @@ BothSides part_of(BothSides sides, double limit, bool nearer) {
 /// one guides (its normals span more than a line), agrees, and has several times the area. Plates that lie beside a
 /// small hinge guide nothing: the hinge stays.
 /// @param nearest the limit of the nearest contact. Nothing if that one stands
-std::optional<double> wider_contact(const BothSides& coarse, double nearest, double diagonal, double reach) {
+std::optional<double> wider_contact(const BothSides& sides, double nearest, double diagonal, double reach) {
   constexpr double kFlat = 0.95, kGuides = 0.1, kLarger = 5.0, kMostSpread = 0.03;
-  const BothSides touch = part_of(coarse, nearest, true);
-  BothSides rest = part_of(coarse, nearest, false);
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  const BothSides touch = part_of(sides, {.high = nearest});
+  BothSides rest = part_of(sides, {nearest, kAny});
   if (touch.a.empty() || touch.b.empty() || rest.a.size() < kFewest || rest.b.size() < kFewest) return std::nullopt;
   const double limit = gap_limit(rest, diagonal, reach);
-  rest = part_of(std::move(rest), limit, true);
+  rest = part_of(std::move(rest), {nearest, limit});
   if (rest.a.size() < kFewest || rest.b.size() < kFewest || area_of(rest) < kLarger * area_of(touch))
     return std::nullopt;
   if (spread_of_directions(touch)[2] < kFlat || spread_of_directions(rest)[1] < kGuides) return std::nullopt;
   if (normal_spread(rest) > kMostSpread) return std::nullopt;
   return limit;
+}
+
+GapRange contact_gaps(const BothSides& sides, double diagonal, double reach) {
+  const double nearest = gap_limit(sides, diagonal, reach);
+  if (const auto wider = wider_contact(sides, nearest, diagonal, reach)) return {nearest, *wider};
+  return {.high = nearest};
 }
 
 BothSides sample(const Prepared& a, const Prepared& b, double reach, double facing_cosine, int wanted) {
@@ -270,7 +298,8 @@ void drop_hidden(const Pair& pair, const Parts& parts, BothSides& sides) {
 /// A shaft drawn through a solid block without a hole: of the two surfaces inside each other the larger, if it is held
 /// from all round. A shallow cap, whose normals point one way, is an overlap by chance.
 std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Prepared& b, int samples) {
-  if (!a.closed || !b.closed || !a.smooth.tree().box().intersects(b.smooth.tree().box())) return {};
+  const Eigen::AlignedBox3d both = a.smooth.tree().box().intersection(b.smooth.tree().box());
+  if (!a.closed || !b.closed || both.isEmpty() || both.volume() == 0.0) return {};
   BothSides sides = {inside_samples(a.smooth, b.smooth, samples), inside_samples(b.smooth, a.smooth, samples)};
   const auto area = [](const std::vector<NearSample>& side) {
     return side.empty() ? 0.0 : side.front().contact.area * static_cast<double>(side.size());
@@ -307,17 +336,15 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   // A coarse look finds how wide the gap is; a fine one then spends its samples where the contact is.
   const int coarse = std::max(100, options.samples / 4);
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
-  const double first_limit = gap_limit(sides, diagonal, reach);
   if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
-  const auto wider = wider_contact(sides, first_limit, diagonal, reach);
-  sides = sample(a, b, std::min(reach, 1.5 * wider.value_or(first_limit)), options.facing_cosine, options.samples);
-  if (wider) sides = part_of(std::move(sides), first_limit, false);
-  const double limit = gap_limit(sides, diagonal, reach);
-  sides = part_of(std::move(sides), limit, true);
+  const double fine_reach = std::min(reach, 1.5 * contact_gaps(sides, diagonal, reach).high);
+  sides = sample(a, b, fine_reach, options.facing_cosine, options.samples);
+  sides = part_of(std::move(sides), contact_gaps(sides, diagonal, reach));
   drop_askew(sides);
   drop_hidden(pair, parts, sides);
 
   if (sides.a.size() < kFewest || sides.b.size() < kFewest) return overlap(pair, a, b, coarse);
+  if (!look_straight(sides, diagonal)) return {};
   quieten(sides);
   ContactRegion out = summarised(pair, sides);
   if (out.gap > options.largest_gap * out.extent) return {};

@@ -253,29 +253,25 @@ void Search::blocked_pieces(const SurfacePoint& at, bool moving, const std::vect
 }
 
 // Overlap as read is a matter of drawing, not of motion: δ grows until none is left that is wider, as far as it may.
+// What is wide at one δ is wide at all smaller ones, so each point is asked at the δ that those before it left.
 void Search::settle_tolerance() {
   if (tolerances_.across >= tolerances_.largest_overlap) return;
   constexpr double kGrowth = 1.5;
   std::vector<OrbitPiece> pieces;
-  std::vector<std::pair<SurfacePoint, bool>> deep;
   const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfacePoint& at) {
     const double v = speed(at);
     return std::any_of(among.begin(), among.end(), [&](const OrbitPiece& p) { return holds_start(p, v); });
   };
-  const auto is_wide = [&](const SurfacePoint& at, bool moving) {
-    wide_pieces(at, moving, pieces);
-    return is_deep(pieces, at);
-  };
   for (const bool moving : {true, false}) {
     const auto& points = surface(moving).points();
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (is_deep(raw(moving).of(i), points[i]) && is_wide(points[i], moving)) deep.emplace_back(points[i], moving);
+    for (std::size_t i = 0; i < points.size() && !overlapping_; ++i)
+      while (!overlapping_ && is_deep(raw(moving).of(i), points[i])) {
+        wide_pieces(points[i], moving, pieces);
+        if (!is_deep(pieces, points[i])) break;
+        overlapping_ = tolerances_.across >= tolerances_.largest_overlap;
+        tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
+      }
   }
-  while (!deep.empty() && tolerances_.across < tolerances_.largest_overlap) {
-    tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
-    std::erase_if(deep, [&](const auto& d) { return !is_wide(d.first, d.second); });
-  }
-  overlapping_ = !deep.empty();
 }
 
 // Behind a sheet nothing is looked for: of sheets, only the nearest on either side of 0 matter.
@@ -291,8 +287,7 @@ void Search::add(const Witness& witness) {
     (p.low >= 0.0 ? sheet_above_ : sheet_below_) = {p.low, p.high};
     return;
   }
-  blocked_.push_back({p.low, p.high});
-  normalise(blocked_, true);
+  internal::add_apart_at_0(blocked_, {p.low, p.high});
 }
 
 void Search::collect() {
@@ -313,8 +308,7 @@ void Search::collect() {
     }
   }
   for (const Span& sheet : {sheet_below_, sheet_above_})
-    if (std::isfinite(sheet.low)) blocked_.push_back(sheet);
-  normalise(blocked_, true);
+    if (std::isfinite(sheet.low)) internal::add_apart_at_0(blocked_, sheet);
 }
 
 // Over the surface downhill: the point whose orbit is blocked first, by a pattern of steps that halve where none helps.

@@ -1,7 +1,9 @@
 #include "motion_space.h"
 
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
+#include <numeric>
 
 namespace limber {
 namespace {
@@ -13,14 +15,31 @@ std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
   constexpr double kFloor = 0.05;         // of the whole area
   constexpr std::size_t kCompared = 600;  // samples that stand for all
   const std::size_t stride = 1 + points.size() / kCompared;
+  const std::size_t count = (points.size() + stride - 1) / stride;
+  // By coordinate, so that several are compared at once.
+  std::array<std::vector<double>, 3> normals;
+  std::vector<double> areas;
   double compared = 0.0;
-  for (std::size_t j = 0; j < points.size(); j += stride) compared += points[j].weight;
-  std::vector<double> weights;
+  for (std::size_t j = 0; j < points.size(); j += stride) {
+    for (std::size_t k = 0; k < 3; ++k) normals[k].push_back(points[j].normal[static_cast<Index>(k)]);
+    areas.push_back(points[j].weight);
+    compared += points[j].weight;
+  }
+  std::vector<double> weights, alike(count);
+  weights.reserve(points.size());
+  double similar = 0.0;
+  Vec3 last = Vec3::Zero();
   for (const WeightedPoint& p : points) {
-    double similar = kFloor * compared;
-    for (std::size_t j = 0; j < points.size(); j += stride)
-      if (p.normal.dot(points[j].normal) > kSimilar) similar += points[j].weight;
-    weights.push_back(p.weight / std::sqrt(similar));
+    if (p.normal == last) {  // on one flat face
+      weights.push_back(p.weight / similar);
+      continue;
+    }
+    last = p.normal;
+    const double x = p.normal.x(), y = p.normal.y(), z = p.normal.z();
+    for (std::size_t j = 0; j < count; ++j)
+      alike[j] = x * normals[0][j] + y * normals[1][j] + z * normals[2][j] > kSimilar ? areas[j] : 0.0;
+    similar = std::sqrt(kFloor * compared + std::reduce(alike.begin(), alike.end()));
+    weights.push_back(p.weight / similar);
   }
   return weights;
 }

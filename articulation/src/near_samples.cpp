@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <queue>
 #include <utility>
 
 namespace limber {
@@ -15,7 +14,6 @@ struct Piece {
   Index triangle;
   std::array<Vec3, 3> corner;  ///< barycentric
 
-  bool operator<(const Piece& o) const { return radius < o.radius; }
   Vec3 centre() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
   /// Of the whole triangle's area.
   double share() const {
@@ -33,8 +31,8 @@ class NearPart {
 
   NearPart(const SmoothSurface& surface, Keep keep) : surface_(surface), keep_(std::move(keep)) {}
 
-  /// Pieces in the order of their triangles, until there are `most` or the largest has the radius `finest`.
-  /// @param box what matters lies in it
+  /// Pieces in the order of their triangles, until most of their area matters, there are `most`, or the largest has the
+  /// radius `finest`. @param box what matters lies in it
   std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most, double finest) {
     for (std::size_t t = 0; t < surface_.mesh().triangles.size(); ++t) {
       Eigen::AlignedBox3d own;
@@ -43,13 +41,20 @@ class NearPart {
       if (!box.intersects(own)) continue;
       push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}});
     }
-    while (!queue_.empty() && queue_.size() < most && queue_.top().radius > finest) {
-      const Piece piece = queue_.top();
-      queue_.pop();
-      halve(piece);
+    constexpr std::size_t kFirstLook = 512;
+    for (std::size_t next_look = kFirstLook; !heap_.empty() && heap_.size() < most && heap_.front().first > finest;) {
+      if (heap_.size() >= next_look) {
+        if (mostly_matters()) break;
+        next_look = 2 * heap_.size();
+      }
+      std::pop_heap(heap_.begin(), heap_.end());
+      const std::size_t largest = heap_.back().second;
+      heap_.pop_back();
+      halve(Piece(pieces_[largest]));
     }
     std::vector<Piece> out;
-    for (; !queue_.empty(); queue_.pop()) out.push_back(queue_.top());
+    out.reserve(heap_.size());
+    for (const auto& [radius, number] : heap_) out.push_back(pieces_[number]);
     std::sort(out.begin(), out.end(), [](const Piece& a, const Piece& b) {
       if (a.triangle != b.triangle) return a.triangle < b.triangle;
       const Vec3 x = a.centre(), y = b.centre();
@@ -64,7 +69,23 @@ class NearPart {
     piece.radius = 0.0;
     for (const Vec3& c : piece.corner)
       piece.radius = std::max(piece.radius, (surface_.point(piece.triangle, c) - centre).norm());
-    if (keep_(piece.triangle, centre, piece.radius)) queue_.push(piece);
+    if (!keep_(piece.triangle, centre, piece.radius)) return;
+    heap_.emplace_back(piece.radius, pieces_.size());
+    std::push_heap(heap_.begin(), heap_.end());
+    pieces_.push_back(piece);
+  }
+
+  /// Whether smaller pieces would leave out little more: the centres of most matter themselves.
+  bool mostly_matters() const {
+    constexpr double kMost = 0.8;
+    double all = 0.0, matters = 0.0;
+    for (const auto& [radius, number] : heap_) {
+      const Piece& p = pieces_[number];
+      const double area = p.share() * surface_.area(p.triangle);
+      all += area;
+      if (keep_(p.triangle, surface_.point(p.triangle, p.centre()), 0.0)) matters += area;
+    }
+    return matters >= kMost * all;
   }
 
   void halve(const Piece& piece) {
@@ -87,7 +108,8 @@ class NearPart {
 
   const SmoothSurface& surface_;
   Keep keep_;
-  std::priority_queue<Piece> queue_;
+  std::vector<Piece> pieces_;                         ///< all there were
+  std::vector<std::pair<double, std::size_t>> heap_;  ///< radius and number in pieces_, the largest first
 };
 
 /// The i-th of a sequence that fills the unit square evenly (the plastic number's powers; Roberts 2018).
@@ -101,6 +123,16 @@ Vec3 even_barycentric(const Piece& piece, std::size_t i) {
   Eigen::Vector2d u = even_point(i);
   if (u.sum() > 1.0) u = Eigen::Vector2d::Ones() - u;
   return piece.corner[0] + u[0] * (piece.corner[1] - piece.corner[0]) + u[1] * (piece.corner[2] - piece.corner[0]);
+}
+
+/// Whether the way from a point to the nearest one of the other surface leads along a normal rather than along the
+/// surface. Faces side by side in one plane, which meet at an edge, do not face each other.
+/// @param nothing a way so short that it has no direction
+bool leads_across(const Vec3& way, double nothing, const Vec3& normal, const Vec3& facing_facet) {
+  constexpr double kAcross = 0.4;  // cosine: 66 degrees, as far beside the rim as a gap may vary (2.5)
+  const double distance = way.norm();
+  return distance <= nothing ||
+         std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >= kAcross * distance;
 }
 
 /// Calls use(piece, barycentric, area) for `wanted` points spread evenly over the pieces' area.
@@ -179,6 +211,8 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
     constexpr double kFacetFacing = -0.6;  // facets may bend from the smooth normals by half a segment on each side
     const auto facing = other.tree().nearest(point, reach, normal, kFacetFacing);
     if (!facing.found()) return;
+    constexpr double kNothing = 1e-6;
+    if (!leads_across(point - facing.point, kNothing * reach, normal, other.tree().normal(facing.triangle))) return;
     const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
     if (normal.dot(facing_normal) > facing_cosine) return;
     out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal), point,

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "joint_frame.h"
@@ -150,6 +151,43 @@ double pitch_of_facets(const MotionSpace& space, const Vec3& axis, const Vec3& o
   return advancing > 0.0 ? -turning / advancing : otherwise;
 }
 
+/// The pitch with which a contact of more than a turn comes to lie on itself after one: a turn brings every facet of a
+/// thread drawn in whole segments onto another, so that how the facets are cut does not matter. Found by Newton's
+/// method from a pitch that is off by much less than the thread's teeth are wide.
+double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitch) {
+  constexpr int kRounds = 4;
+  constexpr std::size_t kAsked = 800, kFewest = 50;
+  constexpr double kAlike = 0.95;   // cosine
+  constexpr double kNearest = 0.1;  // of the advance of a turn: what is further away is beyond the contact's end
+  constexpr double kMostChange = 0.1;
+  const std::vector<WeightedPoint>& points = space.points();
+  const std::size_t stride = 1 + points.size() / kAsked;
+  double found = pitch;
+  for (int round = 0; round < kRounds; ++round) {
+    const double turn = 2.0 * std::numbers::pi * found, limit = std::pow(kNearest * turn, 2);
+    double residual = 0.0, slope = 0.0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < points.size(); i += stride) {
+      const Vec3 moved = points[i].facet_point + turn * axis;
+      const WeightedPoint* nearest = nullptr;
+      double least = limit;
+      for (const WeightedPoint& q : points)
+        if (const double squared = (q.facet_point - moved).squaredNorm();
+            squared < least && q.facet_normal.dot(points[i].facet_normal) > kAlike)
+          nearest = &q, least = squared;
+      if (nearest == nullptr) continue;
+      const double along = 2.0 * std::numbers::pi * nearest->facet_normal.dot(axis);
+      residual += points[i].weight * along * nearest->facet_normal.dot(moved - nearest->facet_point);
+      slope += points[i].weight * along * along;
+      ++count;
+    }
+    if (count < kFewest || !(slope > 0.0)) return pitch;
+    found -= residual / slope;
+    if (!(std::abs(found / pitch - 1.0) < kMostChange)) return pitch;
+  }
+  return found;
+}
+
 /// The motion that slips best of all, if it turns: ω·v/ω² is its pitch, ω × v/ω² a point of its axis.
 std::optional<Family> fit_screw(const MotionSpace& space) {
   const Motion xi = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors.col(0);
@@ -158,6 +196,7 @@ std::optional<Family> fit_screw(const MotionSpace& space) {
   Family out = rotation_family(omega.normalized(), omega.cross(v) / omega.squaredNorm());
   out.type = JointType::kCylindrical;
   out.pitch = pitch_of_facets(space, out.axis, out.origin, omega.dot(v) / omega.squaredNorm());
+  out.pitch = pitch_over_a_turn(space, out.axis, out.pitch);
   out.motions = xi / omega.norm();
   return out;
 }

@@ -12,18 +12,33 @@ struct Span {
 };
 using Spans = std::vector<Span>;
 
-/// Sorts and joins what touches; what touches at 0 only stays apart on request.
-inline void normalise(Spans& spans, bool apart_at_0 = false) {
+/// Sorts and joins what touches.
+inline void normalise(Spans& spans) {
   std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
   std::size_t kept = 0;
   for (const Span& s : spans) {
-    const bool meets = kept > 0 && s.low <= spans[kept - 1].high;
-    if (meets && !(apart_at_0 && s.low == 0.0 && spans[kept - 1].high == 0.0))
+    if (kept > 0 && s.low <= spans[kept - 1].high)
       spans[kept - 1].high = std::max(spans[kept - 1].high, s.high);
     else
       spans[kept++] = s;
   }
   spans.resize(kept);
+}
+
+/// Adds one span to a normalised set, joined with what it touches; what touches at 0 only stays apart.
+inline void add_apart_at_0(Spans& spans, Span span) {
+  auto first =
+      std::lower_bound(spans.begin(), spans.end(), span.low, [](const Span& s, double low) { return s.high < low; });
+  if (first != spans.end() && first->high == 0.0 && span.low == 0.0) ++first;
+  auto last = first;
+  for (; last != spans.end() && last->low <= span.high && !(last->low == 0.0 && span.high == 0.0); ++last)
+    span = {std::min(span.low, last->low), std::max(span.high, last->high)};
+  if (first == last) {
+    spans.insert(first, span);
+    return;
+  }
+  *first = span;
+  spans.erase(first + 1, last);
 }
 
 /// @pre both normalised
