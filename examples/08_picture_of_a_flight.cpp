@@ -1,7 +1,7 @@
 // 08_picture_of_a_flight: how do deformed vertices get out of limber and into a renderer?
 //   run:   08_picture_of_a_flight bunny.glb flight.pov && povray flight.pov +W1600 +H800 +A
 //   see:   the body at six instants of one flight, struck at its highest point; colour is the distance from rest
-//   next:  the header to read, engine/include/limber/engine/world.h
+//   next:  09_picture_of_a_scene, a whole scene file in pictures
 #include <algorithm>
 #include <cstdio>
 #include <numbers>
@@ -10,6 +10,7 @@
 #include "limber/core/file.h"
 #include "limber/engine/world.h"
 #include "limber/model/asset.h"
+#include "povray.h"
 
 namespace {
 
@@ -97,20 +98,6 @@ double largest_displacement(const std::vector<Instant>& instants) {
   return largest;
 }
 
-template <class... Values>
-void add(std::string& text, const char* format, Values... values) {
-  char buffer[256];
-  text.append(buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof buffer, format, values...)));
-}
-
-void add_vectors(std::string& text, const char* name, const std::vector<float>& xyz) {
-  add(text, "  %s { %zu", name, xyz.size() / 3);
-  for (std::size_t i = 0; i < xyz.size(); i += 3)
-    add(text, ",\n<%.6g,%.6g,%.6g>", static_cast<double>(xyz[i]), static_cast<double>(xyz[i + 1]),
-        static_cast<double>(xyz[i + 2]));
-  text += " }\n";
-}
-
 void add_mesh(std::string& text, const Instant& instant, const std::vector<limber::Triangle>& triangles, double most) {
   text += "mesh2 {\n";
   add_vectors(text, "vertex_vectors", instant.positions);
@@ -125,24 +112,18 @@ void add_mesh(std::string& text, const Instant& instant, const std::vector<limbe
   text += " }\n}\n";
 }
 
-/// Camera, lights and ground for a row of bodies of this size; world axes are right-handed with z up.
+/// Camera, lights and ground for a row of bodies of this size.
 std::string stage(double size) {
-  std::string text = "#version 3.7;\nglobal_settings { assumed_gamma 1.0 }\nbackground { rgb <0.93, 0.95, 0.97> }\n";
-  add(text, "#declare Size = %.6g;\n", size);
-  text += R"(camera {
+  return povray_stage(size) + R"(camera {
   perspective sky z right <-2, 0, 0> up <0, 1, 0> angle 36
   location <0, -9.5, 2.4> * Size look_at <0, 0, 0.45> * Size
 }
-light_source { <-6, -9, 12> * Size rgb 0.95 area_light <3, 0, 0> * Size, <0, 3, 0> * Size, 5, 5 adaptive 1 jitter }
-light_source { <9, -6, 5> * Size rgb 0.30 shadowless }
 plane { z, -0.9 * Size pigment { rgb <0.87, 0.89, 0.92> } finish { diffuse 0.6 ambient 0.3 } }
-fog { fog_type 1 distance 110 * Size rgb <0.93, 0.95, 0.97> }
 #macro Shade(s)
   pigment { rgb (1 - s) * <0.86, 0.80, 0.70> + s * <0.80, 0.14, 0.08> }
   finish { diffuse 0.75 ambient 0.14 specular 0.25 roughness 0.03 }
 #end
 )";
-  return text;
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
-#include "shape_surface.h"
+#include "limber/scene/shape_surface.h"
 
 namespace limber {
 namespace {

@@ -1,4 +1,4 @@
-#include "shape_surface.h"
+#include "limber/scene/shape_surface.h"
 
 #include <cmath>
 #include <numbers>

@@ -373,6 +373,15 @@ TEST(SceneFile, AMissingFileOrAFolderIsToldByName) {
   }
 }
 
+TEST(SceneFile, EverySceneThatIsShippedIsOne) {
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(LIMBER_SOURCE_DIR "/assets/scenes")) {
+    EXPECT_NO_THROW(read_scene(entry.path())) << entry.path();
+    ++scenes;
+  }
+  EXPECT_GE(scenes, 2);
+}
+
 TEST(SceneFile, EveryExampleInItsManualPageIsAScene) {
   const std::string page = read_file(LIMBER_SOURCE_DIR "/docs/formats/scene.md");
   const std::string open = "```json\n", close = "```";

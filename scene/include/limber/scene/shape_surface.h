@@ -1,5 +1,5 @@
-/// @file shape_surface.h
-/// Rigid shapes as triangles to look at.
+/// @file limber/scene/shape_surface.h
+/// Rigid shapes as triangles to look at, for those who draw scenes.
 #pragma once
 
 #include "limber/core/rigid_transform.h"
