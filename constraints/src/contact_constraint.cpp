@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "contact_dents.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/surface_point.h"
 
@@ -46,7 +47,7 @@ struct Contact {
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
-  Vec3 dent = Vec3::Zero();        // G F of the last step along the axes, m
+  Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 };
 
@@ -69,41 +70,11 @@ Mat3 frame_along(const Vec3& n) {
   return axes;
 }
 
-/// The residual flexibility between two points of one body, world axes: what a force at `j` does at `i`.
-Mat3 flexibility(const BodyStates& states, const Side& i, const Side& j) {
-  Mat3 G = Mat3::Zero();
-  const ResidualCompliance& compliance = *i.model->data().residual_compliance;
-  const std::vector<Triangle>& triangles = i.model->collision().triangles;
-  const Triangle &at_i = triangles[static_cast<std::size_t>(i.at.triangle)],
-                 &at_j = triangles[static_cast<std::size_t>(j.at.triangle)];
-  for (std::size_t p = 0; p < 3; ++p)
-    for (std::size_t q = 0; q < 3; ++q)
-      if (const double weight = i.at.weight[p] * j.at.weight[q]; weight != 0.0)
-        G += weight * compliance.block(at_i[p], at_j[q]);
-  const Mat3 R = to_matrix(states.pose(i.body, StepTime::kStart).q);
-  return R * G * R.transpose();
-}
-
 bool flexes(const Side& side) {
   return side.model != nullptr && (side.model->modes() > 0 || side.model->data().residual_compliance.has_value());
 }
 
 bool yields(const Side& side) { return side.model != nullptr && side.model->data().residual_compliance.has_value(); }
-
-/// The same between two contacts: p_a − p_b of the one under the force on a of the other.
-Mat3 flexibility(const BodyStates& states, const Contact& i, const Contact& j) {
-  Mat3 G = Mat3::Zero();
-  const auto add = [&](const Side& at_i, const Side& at_j, double sign) {
-    if (at_i.body == at_j.body && yields(at_i) && yields(at_j)) G += sign * flexibility(states, at_i, at_j);
-  };
-  add(i.a, j.a, 1.0);
-  add(i.b, j.b, 1.0);
-  if (i.a.body == i.b.body) {  // a body that touches itself
-    add(i.a, j.b, -1.0);
-    add(i.b, j.a, -1.0);
-  }
-  return G;
-}
 
 /// Row of the velocity of a side's point along n, its arm ending at `end`, which both sides share.
 RowSide point_row(const BodyStates& states, StepTime when, const Side& side, const Vec3& end, const Vec3& n,
@@ -156,12 +127,13 @@ double longest_rebound(const Side& a, const Side& b) {
 class PairContacts final : public Constraint {
  public:
   /// @param lasted since when the bodies have struck each other, s
-  void set(std::span<Contact> contacts, const ContactOptions& options, double lasted) {
+  void set(std::span<Contact> contacts, const ContactOptions& options, ContactDents& dents, double lasted) {
     contacts_ = contacts;
     options_ = &options;
+    dents_ = &dents;
     lasted_ = lasted;
     const Contact& first = contacts.front();
-    soft_ = options.residual_compliance && (yields(first.a) || yields(first.b));
+    yields_ = {options.residual_compliance && yields(first.a), options.residual_compliance && yields(first.b)};
   }
 
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
@@ -171,10 +143,7 @@ class PairContacts final : public Constraint {
     if (when == StepTime::kStart) begin(states);
     const Index first = rows.size();
     for (const Contact& contact : contacts_) add_contact(states, when, contact, rows);
-    if (!soft_ || when != StepTime::kStart) return;
-    for (std::size_t i = 0; i < contacts_.size(); ++i)
-      for (std::size_t j = 0; j <= i; ++j) couple(first, i, j, rows);
-    rows.add_stored_energy(stored_energy_);
+    if (when == StepTime::kStart) add_flexibility(states, first, rows);
   }
 
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override {
@@ -208,6 +177,10 @@ class PairContacts final : public Constraint {
       contact.last_force = impulse / step_;
       contact.impulse += impulse;
       pressed = pressed || !impulse.isZero(0.0);
+      for (std::size_t side = 0; side < 2; ++side)
+        if (yields_[side])
+          dents_->press(body(contact, side),
+                        {at(contact, side), turn_[side].conjugate() * (sign(side) * contact.last_force)});
     }
     lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
   }
@@ -221,8 +194,22 @@ class PairContacts final : public Constraint {
     for (Contact& contact : contacts_)
       contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
     strikes_ = strikes(states);
-    if (soft_) find_flexibility(states);
+    for (std::size_t side = 0; side < 2; ++side)
+      if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
+    for (Contact& contact : contacts_) {
+      Vec3 dent = Vec3::Zero();
+      for (std::size_t side = 0; side < 2; ++side)
+        if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
+      contact.dent = contact.axes.transpose() * dent;
+    }
   }
+
+  /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
+  static const SurfacePoint& at(const Contact& contact, std::size_t side) {
+    return (side == 0 ? contact.a : contact.b).at;
+  }
+  static Index body(const Contact& contact, std::size_t side) { return (side == 0 ? contact.a : contact.b).body; }
+  static double sign(std::size_t side) { return side == 0 ? 1.0 : -1.0; }
 
   /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.
   double touch(const BodyStates& states, const FreeMotions& motions, const Contact& contact, double within) {
@@ -264,36 +251,21 @@ class PairContacts final : public Constraint {
     });
   }
 
-  void find_flexibility(const BodyStates& states) {
-    const std::size_t m = contacts_.size();
-    flexibility_.resize(m * m);
-    stored_energy_ = 0.0;
-    for (std::size_t i = 0; i < m; ++i)
-      for (std::size_t j = 0; j <= i; ++j) {
-        flexibility_[i * m + j] = flexibility(states, contacts_[i], contacts_[j]);
-        if (j < i) flexibility_[j * m + i] = flexibility_[i * m + j].transpose();
+  /// @param first row of the first contact
+  void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows) {
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (!yields_[side]) continue;
+      const Mat3 R = to_matrix(turn_[side]);
+      Index row = first;
+      for (const Contact& contact : contacts_) {
+        const Mat3 axes = sign(side) * (R.transpose() * contact.axes);
+        dents_->add_rows(states, body(contact, side), {at(contact, side), axes, row, row_count(contact)}, rows);
+        row += row_count(contact);
       }
-    for (std::size_t i = 0; i < m; ++i) {
-      Vec3 dent = Vec3::Zero();
-      for (std::size_t j = 0; j < m; ++j) dent += flexibility_[i * m + j] * contacts_[j].last_force;
-      contacts_[i].dent = contacts_[i].axes.transpose() * dent;
-      stored_energy_ += 0.5 * contacts_[i].last_force.dot(dent);
     }
   }
 
-  void couple(Index first, std::size_t i, std::size_t j, ConstraintRows& rows) const {
-    const Contact &at_i = contacts_[i], &at_j = contacts_[j];
-    const Mat3 G = at_i.axes.transpose() * flexibility_[i * contacts_.size() + j] * at_j.axes;
-    for (Index p = 0; p < row_count(at_i); ++p)
-      for (Index q = 0; q < (i == j ? p + 1 : row_count(at_j)); ++q)
-        rows.add_flexibility(first + first_row(i) + p, first + first_row(j) + q, G(p, q));
-  }
-
   static Index row_count(const Contact& contact) { return contact.friction == 0.0 ? 1 : 3; }
-  Index first_row(std::size_t contact) const {
-    // μ is one for the whole pair.
-    return static_cast<Index>(contact) * row_count(contacts_.front());
-  }
 
   void add_contact(const BodyStates& states, StepTime when, const Contact& contact, ConstraintRows& rows) {
     const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
@@ -347,9 +319,11 @@ class PairContacts final : public Constraint {
 
   std::span<Contact> contacts_;
   const ContactOptions* options_ = nullptr;
-  bool soft_ = false, strikes_ = false;
-  double step_ = 0.0, lasted_ = 0.0, stored_energy_ = 0.0;
-  std::vector<Mat3> flexibility_;
+  ContactDents* dents_ = nullptr;
+  std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
+  std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
+  bool strikes_ = false;
+  double step_ = 0.0, lasted_ = 0.0;
   std::vector<double> modal_a_, modal_b_;
   Passage passage_a_, passage_b_;
 };
@@ -379,6 +353,7 @@ struct ContactSet::Impl {
   std::vector<Constraint*> constraints;
   std::vector<ContactEvent> events, last_events;
   std::vector<ContactEvent> resting, last_resting;  // the last of bodies that sleep
+  ContactDents dents;
 
   void remember(std::span<const char> asleep);
   const ContactMemory* find(std::uint64_t id) const;
@@ -427,13 +402,15 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.contacts.clear();
   s.constraints.clear();
   for (const ContactPoint& point : points)
+    s.dents.reserve(static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
+  for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
   std::size_t begin = 0, pair = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
     const Contact& first = s.contacts[begin];
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
     if (pair == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
-    s.pairs[pair]->set(std::span(s.contacts).subspan(begin, i - begin), s.options,
+    s.pairs[pair]->set(std::span(s.contacts).subspan(begin, i - begin), s.options, s.dents,
                        s.lasted(first.a.body, first.b.body));
     s.constraints.push_back(s.pairs[pair++].get());
     begin = i;
@@ -486,6 +463,7 @@ void ContactSet::finish(std::span<const char> asleep) {
       s.events.back().impulse = Vec3::Zero();
     }
   s.remember(asleep);
+  s.dents.finish(asleep);
   s.strikes.clear();
   for (std::size_t i = 0; i < s.constraints.size(); ++i)
     if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
@@ -520,6 +498,13 @@ void ContactSet::clear() {
   impl_->strikes.clear();
   impl_->events.clear();
   impl_->resting.clear();
+  impl_->dents.clear();
 }
+
+void ContactSet::forget(Index body) { impl_->dents.forget(body); }
+
+std::span<const DentLoad> ContactSet::dent_loads(Index body) const { return impl_->dents.loads(body); }
+
+double ContactSet::dent_energy(const BodyStates& states, Index body) const { return impl_->dents.energy(states, body); }
 
 }  // namespace limber

@@ -188,6 +188,7 @@ void World::remove_body(BodyId id) {
   std::erase_if(impl_->apart, [&](const Impl::Apart& pair) { return pair.a == index || pair.b == index; });
   if (impl_->source != nullptr) impl_->source->remove_body(index);
   impl_->constraints.remove_body(index);
+  impl_->contacts.forget(index);
   if (known.group >= 0) {
     BodyGroup& group = impl_->group(known);
     group.remove(known.slot);

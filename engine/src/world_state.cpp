@@ -103,7 +103,9 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
 
 BodyEnergy World::energy(BodyId id) const {
   const Impl::Entry& e = impl_->entry(id, "energy");
-  return impl_->group(e).energy(e.slot, impl_->options.gravity);
+  BodyEnergy energy = impl_->group(e).energy(e.slot, impl_->options.gravity);
+  energy.elastic += impl_->contacts.dent_energy(impl_->constraints.states(), static_cast<Index>(id.index));
+  return energy;
 }
 
 Vec3 World::angular_momentum(BodyId id) const {
@@ -157,6 +159,8 @@ std::uint64_t World::state_hash() const {
     hash.add(contact.force);
   }
   for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
+  for (std::size_t body = 0; body < impl_->entries.size(); ++body)
+    for (const DentLoad& load : impl_->contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);
   return hash.value();
 }
 

@@ -117,6 +117,50 @@ TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   EXPECT_LT(worst, kRise * scale);
 }
 
+/// What the dropped modes yield to the contacts at rest is what they would yield if they were kept.
+TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
+  constexpr double kHz = 30.0, kFloat = 1e-5;  // of what the dropped modes yield, which is stored in single precision
+  const double decay = 0.05 * 2.0 * std::numbers::pi * kHz;
+  const auto rest_height = [](const SampleOptions& sample, bool residual) {
+    GroundedWorld scene({.friction = 0.0, .residual_compliance = residual});
+    const auto model = sample_model(sample);
+    const BodyId box = scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}});
+    scene.step(300);
+    return scene.world.body(box).pose.p.z();
+  };
+  const SampleOptions few{.modes = 6, .dropped = 14, .lowest_hz = kHz, .decay = decay};
+  const double all = rest_height({.modes = 20, .lowest_hz = kHz, .decay = decay}, false);
+  const double without = rest_height(few, false), with = rest_height(few, true);
+  EXPECT_GT(std::abs(without - all), 1e-6);
+  EXPECT_NEAR(with, all, kFloat * std::abs(without - all));
+}
+
+/// Dents stay with the material, whatever contacts come and go; what they store is counted.
+TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll) {
+  constexpr double kRise = 1e-6;
+  GroundedWorld scene({.recovery_speed = 0.0, .residual_compliance = true});
+  World& world = scene.world;
+  const auto model = sample_model({.modes = 6, .dropped = 14, .lowest_hz = 20.0});
+  std::vector<BodyId> boxes;
+  for (int i = 0; i < 3; ++i)
+    boxes.push_back(world.add_body(
+        model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2 * i, 0.1}), {0.05 * i, 0.0, 0.5 + 0.5 * i}},
+                .velocity = {1.0, 0.0, 0.0}}));
+  const auto energy = [&] {
+    double sum = 0.0;
+    for (const BodyId box : boxes) sum += world.energy(box).total();
+    return sum;
+  };
+  const double scale = 3.0 * model->data().mass * kGravity * kSize;
+  double before = energy(), worst = 0.0;
+  for (int i = 0; i < 180; ++i) {
+    world.step();
+    worst = std::max(worst, energy() - before);
+    before = energy();
+  }
+  EXPECT_LT(worst, kRise * scale);
+}
+
 /// A damped box that is dropped bounces, in steps that are cut where it strikes, and comes to rest.
 TEST(WorldContact, ImpactsInCutStepsGainNoEnergyAndEndAtRest) {
   constexpr double kRise = 1e-6;

@@ -22,6 +22,7 @@ struct Particles {
 struct SampleOptions {
   FrameMotion motion = FrameMotion::kFree;
   int modes = 4;
+  int dropped = 0;         ///< further modes, which answer as the residual compliance of the corners
   double lowest_hz = 3.0;  ///< frequencies are 1, 1.7, 2.4, … times this
   double decay = 0.0;      ///< ξ of every mode, 1/s
   Vec3 half_extent{0.3, 0.2, 0.1};
@@ -79,7 +80,7 @@ inline Particles sample_particles(const SampleOptions& o) {
     for (int axis = 0; axis < 3; ++axis) add(rigid(Vec3::Zero(), Vec3::Unit(axis)));
   if (o.motion == FrameMotion::kLine) add(rigid(Vec3::Zero(), Vec3::UnitX()));
   const std::size_t rigid_count = basis.size();
-  for (int mode = 0; mode < o.modes; ++mode) {
+  for (int mode = 0; mode < o.modes + o.dropped; ++mode) {
     std::vector<Vec3> u;
     for (std::size_t i = 0; i < body.mass.size(); ++i) {
       const double x = static_cast<double>(i) + 0.5;
@@ -91,6 +92,28 @@ inline Particles sample_particles(const SampleOptions& o) {
   basis.erase(basis.begin(), basis.begin() + static_cast<std::ptrdiff_t>(rigid_count));
   body.shape = std::move(basis);
   return body;
+}
+
+inline double sample_eigenvalue(const SampleOptions& o, int mode) {
+  const double omega = 2.0 * std::numbers::pi * o.lowest_hz * (1.0 + 0.7 * mode);
+  return omega * omega;
+}
+
+/// Σ w wᵀ/λ over the dropped modes.
+inline ResidualCompliance sample_residual(const Particles& body, const SampleOptions& o) {
+  constexpr Index kCorners = 8;
+  ResidualCompliance residual(ResidualCompliance::Form::kFull, kCorners);
+  for (Index a = 0; a < kCorners; ++a)
+    for (Index b = 0; b <= a; ++b) {
+      Mat3 G = Mat3::Zero();
+      for (int mode = o.modes; mode < o.modes + o.dropped; ++mode) {
+        const auto& shape = body.shape[static_cast<std::size_t>(mode)];
+        G += shape[static_cast<std::size_t>(a)] * shape[static_cast<std::size_t>(b)].transpose() /
+             sample_eigenvalue(o, mode);
+      }
+      residual.set(a, b, G);
+    }
+  return residual;
 }
 
 inline ModalModelData sample_model_data(const SampleOptions& o) {
@@ -118,8 +141,7 @@ inline ModalModelData sample_model_data(const SampleOptions& o) {
   volume.basis = ModalBasis(static_cast<Index>(body.mass.size()), o.modes);
   volume.mass_times_basis = ModalBasis(static_cast<Index>(body.mass.size()), o.modes);
   for (int mode = 0; mode < o.modes; ++mode) {
-    const double omega = 2.0 * std::numbers::pi * o.lowest_hz * (1.0 + 0.7 * mode);
-    data.eigenvalues.push_back(omega * omega);
+    data.eigenvalues.push_back(sample_eigenvalue(o, mode));
     data.decays.push_back(o.decay);
     Vec3 participation = Vec3::Zero();
     Mat3 moment = Mat3::Zero();
@@ -136,6 +158,7 @@ inline ModalModelData sample_model_data(const SampleOptions& o) {
     data.moments.push_back(moment);
   }
   data.volume_block = std::move(volume);
+  if (o.dropped > 0) data.residual_compliance = sample_residual(body, o);
   return data;
 }
 

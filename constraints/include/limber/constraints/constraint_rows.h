@@ -85,7 +85,8 @@ class ConstraintRows {
   void clear();
   /// @return the row's index. Copies the modal parts.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
-  /// Each pair once, i = j too; for rows with bounds. All values together are a positive semidefinite matrix.
+  /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
+  /// together are a positive semidefinite matrix.
   void add_flexibility(Index i, Index j, double value) { flexibility_.push_back({i, j, value}); }
   /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
   void add_stored_energy(double energy) { stored_energy_ += energy; }

@@ -8,8 +8,10 @@
 /// along the other within the step, so that what sticks does not creep.
 ///
 /// G F is the residual compliance (residual_compliance.h) under the contact forces F = f/Δt: the part of a dent that
-/// the kept modes cannot show. Contacts of one pair of bodies yield to each other's forces. The dent stays from step to
-/// step with the contact's id, and its energy ½ FᵀG F is booked.
+/// the kept modes cannot show. All contacts of a body yield to each other's forces, whichever bodies they are with.
+/// Dents are a state of the body: it remembers the forces of its last step at the material points that they pressed on,
+/// in its own frame, and a contact finds the dent that is there, whether it is an old one or has just come in another's
+/// place. Their energy ½ FᵀG F is booked. What nothing presses any more lets go of it; it is lost.
 ///
 /// An impact, for ImpactModel, is a pair of bodies that begin to press on each other at more than `impact_speed`, of
 /// which one at least can flex (modes or residual compliance). It lasts until none of their contacts presses any more,
@@ -29,6 +31,7 @@
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
 #include "limber/dynamics/contact_source.h"
+#include "limber/dynamics/surface_point.h"
 
 namespace limber {
 
@@ -51,8 +54,7 @@ enum class ImpactModel {
 struct ContactOptions {
   double friction = 0.5;         ///< μ of bodies that do not say; ≥ 0
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
-  /// Used where the models have it. Not yet reliable: resting dents come out within 0.4 %, but can lose their balance
-  /// for a step, which shows as overlap that is then recovered from.
+  /// Used where the models have it.
   bool residual_compliance = false;
   ContactRule rule{};  ///< how forces are found; goes to the island solver too (IslandOptions::contact)
   /// kPenalty: frequency and share of critical damping of each contact's spring under the bodies' reduced mass, Hz, >
@@ -94,6 +96,12 @@ struct StrikeMemory {
   double since = 0.0;    ///< how long they have been at it, s
 };
 
+/// A force that was pressed on a body in the last step, and is what has dented it.
+struct DentLoad {
+  SurfacePoint at{};
+  Vec3 force = Vec3::Zero();  ///< body frame, N
+};
+
 /// All contacts of one scene, remembered from step to step. In every step: update(), then the island solver with
 /// constraints() among the others, then finish(). Once warm nothing allocates.
 class ContactSet {
@@ -122,7 +130,13 @@ class ContactSet {
   std::span<const ContactMemory> memory() const;
   /// Impacts under way, ordered by (a, b).
   std::span<const StrikeMemory> strikes() const;
+  /// The forces that dent a body beyond its modes (residual compliance), as the last step left them.
+  std::span<const DentLoad> dent_loads(Index body) const;
+  /// What that stores, ½ FᵀG F, J: an energy of the body beside that of its modes.
+  double dent_energy(const BodyStates& states, Index body) const;
   const ContactOptions& options() const;
+  /// A body that is removed: its dents go with it.
+  void forget(Index body);
   /// Forgets what it knows of earlier steps.
   void clear();
 

@@ -253,6 +253,7 @@ class World {
   /// show is lost.
   /// @throws InvalidArgument if the asset has no `volume` block (bake with --volume)
   void set_node_displacements(BodyId id, std::span<const double> displacements, std::span<const double> velocities);
+  /// `elastic` holds what contacts store in the residual compliance, too.
   BodyEnergy energy(BodyId id) const;
   Vec3 angular_momentum(BodyId id) const;  ///< world, about the body origin, kg·m²/s (rigid part)
   Vec3 linear_momentum(BodyId id) const;   ///< world, kg·m/s
