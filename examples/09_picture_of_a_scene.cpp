@@ -17,7 +17,7 @@ namespace {
 
 using limber::Vec3;
 
-constexpr double kApart = 1.05;  // from one instant's middle to the next one's, in sizes of the scene
+constexpr double kApart = 1.0;  // from one instant's middle to the next one's, in sizes of the scene
 constexpr const char* kColours[] = {"<0.80, 0.42, 0.15>", "<0.15, 0.38, 0.62>", "<0.28, 0.52, 0.22>",
                                     "<0.62, 0.18, 0.18>", "<0.42, 0.28, 0.55>"};
 
@@ -100,7 +100,7 @@ std::string camera(const View& view, std::size_t instants) {
   std::string text;
   const double across = kApart * view.size * static_cast<double>(instants);
   add(text, "camera {\n  perspective sky z right <%.6g, 0, 0> up <0, 1, 0> angle 40\n", -static_cast<double>(instants));
-  add(text, "  location <0, %.6g, %.6g> look_at <0, 0, %.6g>\n}\n", -1.25 * across, 0.4 * across, view.middle.z());
+  add(text, "  location <0, %.6g, %.6g> look_at <0, 0, %.6g>\n}\n", -1.35 * across, 0.42 * across, view.middle.z());
   return text;
 }
 

@@ -1,8 +1,8 @@
 #include "energy_scenes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
@@ -150,17 +150,8 @@ class Scene {
 EnergyResult run(const EnergyCase& at, int steps) { return Scene(at).run(steps); }
 
 const char* name(EnergyScene scene) {
-  switch (scene) {
-    case EnergyScene::kGround:
-      return "ground";
-    case EnergyScene::kPile:
-      return "pile";
-    case EnergyScene::kHandle:
-      return "handle";
-    case EnergyScene::kChain:
-      return "chain";
-  }
-  return "";
+  constexpr std::array kNames{"ground", "pile", "handle", "chain"};
+  return kNames[static_cast<std::size_t>(scene)];
 }
 
 std::vector<EnergyCase> energy_grid() {
