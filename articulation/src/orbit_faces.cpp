@@ -139,7 +139,7 @@ OrbitFace SideOnPath::face_of(const Candidate& candidate) {
   if (f.flipped) std::swap(f.corners[1], f.corners[2]);
   f.normal = (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
   f.offset = f.normal.dot(f.corners[0]);
-  f.across = std::hypot(f.normal.y(), f.normal.z());
+  f.across = f.normal.tail<2>().norm();
   f.heading = std::atan2(f.normal.z(), f.normal.y());
   if (frame_.kind() != Kind::kTranslation) {
     f.box.low[0] = least_radius(f.corners[0], f.corners[1], f.corners[2]);
@@ -190,6 +190,39 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
   boxes.push_back(box);
 }
 
+std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
+  constexpr double kFlat = 0.94;
+  std::vector<SharpEdge> all;
+  all.reserve(3 * surface.triangles.size());
+  std::vector<Vec3> normals;
+  normals.reserve(surface.triangles.size());
+  for (const Triangle& t : surface.triangles) {
+    const auto number = static_cast<Index>(normals.size());
+    const Vec3 &p = surface.vertices[t[0]], &q = surface.vertices[t[1]], &r = surface.vertices[t[2]];
+    normals.push_back((q - p).cross(r - p).stableNormalized());
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [a, b] = std::minmax(t[i], t[(i + 1) % 3]);
+      all.push_back({a, b, number});
+    }
+  }
+  std::sort(all.begin(), all.end(), [](const SharpEdge& x, const SharpEdge& y) {
+    return std::tie(x.a, x.b, x.triangle) < std::tie(y.a, y.b, y.triangle);
+  });
+  std::vector<SharpEdge> sharp;
+  for (std::size_t i = 0; i < all.size();) {
+    std::size_t end = i;
+    while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
+    if (end - i != 2 || normals[static_cast<std::size_t>(all[i].triangle)].dot(
+                            normals[static_cast<std::size_t>(all[i + 1].triangle)]) < kFlat)
+      sharp.insert(sharp.end(), all.begin() + static_cast<std::ptrdiff_t>(i),
+                   all.begin() + static_cast<std::ptrdiff_t>(end));
+    i = end;
+  }
+  std::stable_sort(sharp.begin(), sharp.end(),
+                   [](const SharpEdge& x, const SharpEdge& y) { return x.triangle < y.triangle; });
+  return sharp;
+}
+
 }  // namespace
 
 OrbitBody orbit_body(const MotionBody& body) {
@@ -203,6 +236,7 @@ OrbitBody orbit_body(const MotionBody& body) {
     out.inside_out = enclosed_volume(with_caps) < 0.0;
   }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
+  out.sharp = std::make_shared<const std::vector<SharpEdge>>(sharp_edges(*body.surface));
   return out;
 }
 

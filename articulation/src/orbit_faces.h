@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -11,13 +12,20 @@
 
 namespace limber::internal {
 
+/// An edge whose two triangles bend by more than 20 degrees, or that has not two of them.
+struct SharpEdge {
+  Index a = 0, b = 0;  ///< vertices of the surface
+  Index triangle = 0;  ///< one that has it
+};
+
 /// A surface made ready for any path.
 struct OrbitBody {
   const SurfaceMesh* surface = nullptr;
   bool closed = true;
   bool inside_out = false;  ///< closed, and its triangles are clockwise seen from outside
   Eigen::AlignedBox3d box{};
-  std::span<const Triangle> caps{};  ///< over small holes
+  std::span<const Triangle> caps{};                       ///< over small holes
+  std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
 
   std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
   const Triangle& triangle(std::size_t i) const {

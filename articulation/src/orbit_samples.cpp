@@ -51,12 +51,15 @@ SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<Or
   if (faces_.empty()) return;
   number_vertices(bodies);
   add_face_points(count);
-  add_edge_points(sharp_edges(), std::max(count / 2, 1));
+  add_edge_points(sharp_edges(bodies), std::max(count / 2, 1));
 }
 
 void SampledSurface::number_vertices(std::span<const OrbitBody> bodies) {
-  std::vector<Index> base{0};
-  for (const OrbitBody& b : bodies) base.push_back(base.back() + static_cast<Index>(b.surface->vertices.size()));
+  std::vector<Index> base(bodies.size() + 1, 0);  // of bodies without faces no vertex is numbered
+  for (const auto& f : faces_)
+    base[static_cast<std::size_t>(f.body) + 1] =
+        static_cast<Index>(bodies[static_cast<std::size_t>(f.body)].surface->vertices.size());
+  std::partial_sum(base.begin(), base.end(), base.begin());
   vertices_.reserve(faces_.size());
   for (const auto& f : faces_) {
     Triangle v = bodies[static_cast<std::size_t>(f.body)].triangle(static_cast<std::size_t>(f.triangle));
@@ -81,25 +84,23 @@ Vec3 SampledSurface::corner(Index face, Index vertex) const {
   return f.corners[f.flipped && found > 0 ? 3 - found : found];
 }
 
-// Sharp: the two faces bend by more than 20 degrees, or there are not two of them.
-std::vector<SampledSurface::Edge> SampledSurface::sharp_edges() const {
-  constexpr double kFlat = 0.94;
-  std::vector<Edge> all;
-  for (std::size_t f = 0; f < vertices_.size(); ++f)
-    for (std::size_t i = 0; i < 3 && !faces_[f].cap; ++i) {
-      const auto [a, b] = std::minmax(vertices_[f][i], vertices_[f][(i + 1) % 3]);
-      all.push_back({a, b, static_cast<Index>(f)});
-    }
-  std::sort(all.begin(), all.end(),
-            [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.face) < std::tie(y.a, y.b, y.face); });
+std::vector<SampledSurface::Edge> SampledSurface::sharp_edges(std::span<const OrbitBody> bodies) const {
   std::vector<Edge> sharp;
-  for (std::size_t i = 0; i < all.size();) {
-    std::size_t end = i;
-    while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
-    const auto normal = [&](std::size_t k) { return faces_[static_cast<std::size_t>(all[k].face)].normal; };
-    if (end - i != 2 || normal(i).dot(normal(i + 1)) < kFlat) sharp.push_back(all[i]);
-    i = end;
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    if (faces_[f].cap) continue;
+    const OrbitBody& body = bodies[static_cast<std::size_t>(faces_[f].body)];
+    const Triangle& own = body.triangle(static_cast<std::size_t>(faces_[f].triangle));
+    const Index base = vertices_[f][0] - own[0];
+    const auto& edges = *body.sharp;
+    for (auto e = std::lower_bound(edges.begin(), edges.end(), faces_[f].triangle,
+                                   [](const SharpEdge&x, Index triangle) { return x.triangle < triangle; });
+         e != edges.end() && e->triangle == faces_[f].triangle; ++e)
+      sharp.push_back({base + e->a, base + e->b, static_cast<Index>(f)});
   }
+  std::sort(sharp.begin(), sharp.end(),
+            [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.face) < std::tie(y.a, y.b, y.face); });
+  const auto same = [](const Edge& x, const Edge& y) { return x.a == y.a && x.b == y.b; };
+  sharp.erase(std::unique(sharp.begin(), sharp.end(), same), sharp.end());
   return sharp;
 }
 
@@ -132,12 +133,18 @@ void SampledSurface::add_edge_points(const std::vector<Edge>& edges, int count) 
     const double length = (b - a).norm();
     points_.push_back({length > 0.0 ? Vec3(b + (along - sums[k]) / length * (b - a)) : a, edges[k].face});
   }
-  const std::size_t stride = 1 + edges.size() / static_cast<std::size_t>(count);
-  for (std::size_t k = 0; k < edges.size(); k += stride) {
-    const auto [a, b] = ends(edges[k]);
-    points_.push_back({a, edges[k].face});
-    points_.push_back({b, edges[k].face});
-  }
+  add_corner_points(edges, 2 * count);
+}
+
+void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most) {
+  std::vector<std::pair<Index, Index>> corners;  // vertex and face
+  for (const Edge& e : edges) corners.insert(corners.end(), {{e.a, e.face}, {e.b, e.face}});
+  std::sort(corners.begin(), corners.end());
+  const auto same = [](const auto& x, const auto& y) { return x.first == y.first; };
+  corners.erase(std::unique(corners.begin(), corners.end(), same), corners.end());
+  const std::size_t stride = 1 + corners.size() / static_cast<std::size_t>(most);
+  for (std::size_t k = 0; k < corners.size(); k += stride)
+    points_.push_back({corner(corners[k].second, corners[k].first), corners[k].second});
 }
 
 SurfacePoint SampledSurface::walk(const SurfacePoint& start, const Vec3& target) const {

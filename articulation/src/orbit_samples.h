@@ -20,7 +20,7 @@ struct SurfacePoint {
 class SampledSurface {
  public:
   /// @param bodies whose triangles `faces` are. @param count points wanted on the faces, half as many on sharp edges
-  /// and as many at most on the ends of these
+  /// and as many at most at the ends of these
   SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count);
 
   const std::vector<OrbitFace>& faces() const { return faces_; }
@@ -37,9 +37,10 @@ class SampledSurface {
   };
 
   void number_vertices(std::span<const OrbitBody> bodies);
-  std::vector<Edge> sharp_edges() const;
+  std::vector<Edge> sharp_edges(std::span<const OrbitBody> bodies) const;
   void add_face_points(int count);
   void add_edge_points(const std::vector<Edge>& edges, int count);
+  void add_corner_points(const std::vector<Edge>& edges, int most);
   Vec3 corner(Index face, Index vertex) const;
 
   std::vector<OrbitFace> faces_;

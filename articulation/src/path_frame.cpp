@@ -48,7 +48,7 @@ PathFrame::PathFrame(const MotionPath& path) : kind_(path.kind), pitch_(path.pit
 
 Orbit PathFrame::orbit_of(const Vec3& p) const {
   if (kind_ == Kind::kTranslation) return {{p.y(), p.z()}, p.x()};
-  return {{std::hypot(p.y(), p.z()), p.x()}, std::atan2(p.z(), p.y())};
+  return {{p.tail<2>().norm(), p.x()}, std::atan2(p.z(), p.y())};
 }
 
 // Helices of one radius differ in x − pitch θ, which is the same after a turn.
@@ -68,7 +68,7 @@ OrbitBox PathFrame::plane_point(const Vec3& p) const {
   if (kind_ == Kind::kTranslation)
     box.add(p.y(), p.z());
   else
-    box.add(std::hypot(p.y(), p.z()), p.x());
+    box.add(p.tail<2>().norm(), p.x());
   return box;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 
 #include "counted_progress.h"
 #include "free_motion_of_bodies.h"
@@ -23,36 +24,69 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Sides ---------------------------------------------------------------------------------------------------------------
 
-/// Groups of components that fixed joints hold together; the joint in question does not count.
-DisjointSets rigid_groups(Index components, const std::vector<DetectedJoint>& joints, std::size_t except) {
+/// The joints as a graph whose nodes are groups of components that fixed joints hold together.
+class JointGraph {
+ public:
+  /// @param except a joint that holds nothing together
+  JointGraph(Index components, const std::vector<DetectedJoint>& joints, std::optional<std::size_t> except = {});
+
+  JointSides sides(const DetectedJoint& joint) const;
+
+ private:
+  /// Per group: whether joints lead there from `start` without passing through `avoided`.
+  std::vector<bool> reached(Index start, Index avoided) const;
+
+  std::vector<Index> group_;                    ///< per component, the group's first
+  std::vector<std::vector<Index>> neighbours_;  ///< per group
+};
+
+JointGraph::JointGraph(Index components, const std::vector<DetectedJoint>& joints, std::optional<std::size_t> except)
+    : neighbours_(static_cast<std::size_t>(components)) {
+  for (const DetectedJoint& j : joints)
+    if (std::min(j.a, j.b) < 0 || std::max(j.a, j.b) >= components || j.a == j.b)
+      throw InvalidArgument("joint_sides: a joint of components " + std::to_string(j.a) + " and " +
+                            std::to_string(j.b) + ", expected two of " + std::to_string(components));
   DisjointSets groups(static_cast<std::size_t>(components));
   for (std::size_t j = 0; j < joints.size(); ++j)
     if (j != except && joints[j].joint.type == JointType::kFixed) groups.join(joints[j].a, joints[j].b);
-  return groups;
-}
-
-/// Per group (by its root): whether joints lead there from `start` without passing through `avoided`.
-std::vector<bool> reached(DisjointSets& groups, Index components, const std::vector<DetectedJoint>& joints, Index start,
-                          Index avoided) {
-  std::vector<std::vector<Index>> neighbours(static_cast<std::size_t>(components));
+  for (Index c = 0; c < components; ++c) group_.push_back(groups.root(c));
   for (const DetectedJoint& j : joints) {
     const Index a = groups.root(j.a), b = groups.root(j.b);
-    neighbours[static_cast<std::size_t>(a)].push_back(b);
-    neighbours[static_cast<std::size_t>(b)].push_back(a);
+    neighbours_[static_cast<std::size_t>(a)].push_back(b);
+    neighbours_[static_cast<std::size_t>(b)].push_back(a);
   }
-  std::vector<bool> seen(static_cast<std::size_t>(components), false);
+}
+
+std::vector<bool> JointGraph::reached(Index start, Index avoided) const {
+  std::vector<bool> seen(neighbours_.size(), false);
   std::vector<Index> open{start};
   seen[static_cast<std::size_t>(start)] = true;
   while (!open.empty()) {
     const Index here = open.back();
     open.pop_back();
-    for (const Index next : neighbours[static_cast<std::size_t>(here)])
+    for (const Index next : neighbours_[static_cast<std::size_t>(here)])
       if (next != avoided && !seen[static_cast<std::size_t>(next)]) {
         seen[static_cast<std::size_t>(next)] = true;
         open.push_back(next);
       }
   }
   return seen;
+}
+
+JointSides JointGraph::sides(const DetectedJoint& joint) const {
+  const Index a = group_[static_cast<std::size_t>(joint.a)], b = group_[static_cast<std::size_t>(joint.b)];
+  JointSides sides;
+  if (a == b) {  // held by fixed joints besides
+    sides.moving = {joint.b};
+    sides.fixed = {joint.a};
+    return sides;
+  }
+  const std::vector<bool> with_a = reached(a, b), with_b = reached(b, a);
+  for (std::size_t c = 0; c < group_.size(); ++c) {
+    const auto g = static_cast<std::size_t>(group_[c]);
+    (!with_b[g] ? sides.fixed : with_a[g] ? sides.left_out : sides.moving).push_back(static_cast<Index>(c));
+  }
+  return sides;
 }
 
 // Paths ---------------------------------------------------------------------------------------------------------------
@@ -114,12 +148,8 @@ std::vector<OrbitBody> bodies_of(const Assembly& assembly) {
 /// One joint of an assembly with its two sides, ready to be moved along paths.
 class Trial {
  public:
-  Trial(const Assembly& assembly, std::span<const OrbitBody> bodies, const std::vector<DetectedJoint>& joints,
-        std::size_t joint)
-      : sides_(joint_sides(static_cast<Index>(assembly.components.size()), joints, joint)),
-        moving_(some_of(bodies, sides_.moving)),
-        fixed_(some_of(bodies, sides_.fixed)) {
-    const DetectedJoint& j = joints[joint];
+  Trial(const Assembly& assembly, std::span<const OrbitBody> bodies, const DetectedJoint& j, JointSides sides)
+      : sides_(std::move(sides)), moving_(some_of(bodies, sides_.moving)), fixed_(some_of(bodies, sides_.fixed)) {
     const Component &a = component(assembly, j.a), &b = component(assembly, j.b);
     size_ = std::min(a.diagonal, b.diagonal);
     sagitta_ = std::max(sagitta_near(j, a), sagitta_near(j, b));
@@ -258,25 +288,7 @@ void RangeOptions::validate() const {
 JointSides joint_sides(Index components, const std::vector<DetectedJoint>& joints, std::size_t joint) {
   if (joint >= joints.size())
     throw InvalidArgument("joint_sides: joint " + std::to_string(joint) + " of " + std::to_string(joints.size()));
-  for (const DetectedJoint& j : joints)
-    if (std::min(j.a, j.b) < 0 || std::max(j.a, j.b) >= components || j.a == j.b)
-      throw InvalidArgument("joint_sides: a joint of components " + std::to_string(j.a) + " and " +
-                            std::to_string(j.b) + ", expected two of " + std::to_string(components));
-  DisjointSets groups = rigid_groups(components, joints, joint);
-  const Index a = groups.root(joints[joint].a), b = groups.root(joints[joint].b);
-  JointSides sides;
-  if (a == b) {  // held by fixed joints besides
-    sides.moving = {joints[joint].b};
-    sides.fixed = {joints[joint].a};
-    return sides;
-  }
-  const std::vector<bool> with_a = reached(groups, components, joints, a, b),
-                          with_b = reached(groups, components, joints, b, a);
-  for (Index c = 0; c < components; ++c) {
-    const auto g = static_cast<std::size_t>(groups.root(c));
-    (!with_b[g] ? sides.fixed : with_a[g] ? sides.left_out : sides.moving).push_back(c);
-  }
-  return sides;
+  return JointGraph(components, joints, joint).sides(joints[joint]);
 }
 
 JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double min_translation,
@@ -341,12 +353,13 @@ JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double m
 
 namespace {
 
-RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodies,
-                       const std::vector<DetectedJoint>& joints, std::size_t joint, const RangeOptions& options,
+RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodies, const JointGraph& graph,
+                       const DetectedJoint& joint, const RangeOptions& options,
                        const std::function<void()>& path_done) {
-  const Trial trial(assembly, bodies, joints, joint);
-  RangeOfMotion out{.joint = joints[joint].joint, .freedoms = {}, .reasons = {}};
+  RangeOfMotion out{.joint = joint.joint, .freedoms = {}, .reasons = {}};
   out.joint.limits = {};
+  if (out.joint.type == JointType::kFixed) return out;
+  const Trial trial(assembly, bodies, joint, graph.sides(joint));
   for (const NamedPath& p : paths_of(out.joint)) {
     out.freedoms.push_back({p.freedom, trial.along(p.path, options.motion)});
     path_done();
@@ -380,20 +393,24 @@ RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodi
 RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
                               const RangeOptions& options) {
   options.validate();
-  return range_of(assembly, bodies_of(assembly), joints, joint, options, [] {});
+  const JointGraph graph(static_cast<Index>(assembly.components.size()), joints);
+  if (joint >= joints.size())
+    throw InvalidArgument("range_of_motion: joint " + std::to_string(joint) + " of " + std::to_string(joints.size()));
+  return range_of(assembly, bodies_of(assembly), graph, joints[joint], options, [] {});
 }
 
 std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                                             const RangeOptions& options, Jobs& jobs) {
   options.validate();
   const std::vector<OrbitBody> bodies = bodies_of(assembly);
+  const JointGraph graph(static_cast<Index>(assembly.components.size()), joints);
   std::vector<RangeOfMotion> out(joints.size());
   std::size_t paths = 0;
   for (const DetectedJoint& j : joints) paths += path_count(j.joint, options);
   internal::CountedProgress progress(paths, options.progress);
   jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t j = begin; j < end; ++j)
-      out[j] = range_of(assembly, bodies, joints, j, options, [&] { progress.done(); });
+      out[j] = range_of(assembly, bodies, graph, joints[j], options, [&] { progress.done(); });
   });
   return out;
 }

@@ -160,18 +160,28 @@ std::vector<Variant> of(std::initializer_list<int> segments, std::initializer_li
 
 std::vector<VariantClass> range_variant_classes() {
   const auto same = [](Variant&) {};
-  const auto turned = [](Variant& v) {
-    v.swapped = v.shuffled = true;
-    v.scale = 1e-3;
-    v.rotation = Eigen::AngleAxisd(2.1, Vec3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
-    v.translation = 1e-3 * Vec3(3, 6, -3);
+  const auto turned = [](double scale) {
+    return [scale](Variant& v) {
+      v.swapped = v.shuffled = true;
+      v.scale = scale;
+      v.rotation = Eigen::AngleAxisd(2.1, Vec3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
+      v.translation = scale * Vec3(3, 6, -3);
+    };
   };
-  return {{"32, 64 segments, gap 0 to 2 %", of({32, 64}, {0.0, 0.005, 0.02}, same)},
+  const auto noisy = [&](double jitter) {
+    return of({32}, {0.0, 0.005, 0.02}, [&](Variant& v) { v.jitter = jitter; });
+  };
+  return {{"32, 64 segments, gap 0", of({32, 64}, {0.0}, same)},
+          {"32, 64 segments, gap 0.5 %", of({32, 64}, {0.005}, same)},
+          {"32, 64 segments, gap 2 %", of({32, 64}, {0.02}, same)},
           {"32, 64 segments, overlap 0.5 %", of({32, 64}, {-0.005}, same)},
-          {"16 segments", of({16}, {0.0, 0.005, 0.02, -0.005}, same)},
+          {"16 segments, gap 0 to 2 %", of({16}, {0.0, 0.005, 0.02}, same)},
+          {"16 segments, overlap 0.5 %", of({16}, {-0.005}, same)},
           {"8 segments, without balls", of({8}, {0.0, 0.005, 0.02, -0.005}, same), 1.0, false},
-          {"0.03 % jitter", of({32}, {0.0, 0.005, 0.02}, [](Variant& v) { v.jitter = 0.0003; })},
-          {"rotated, scaled, shuffled", of({32}, {0.005}, turned)}};
+          {"0.03 % jitter", noisy(0.0003)},
+          {"0.1 % jitter", noisy(0.001)},
+          {"rotated, scaled by 1e-3, shuffled", of({32}, {0.0, 0.005}, turned(1e-3))},
+          {"rotated, scaled by 1e3, shuffled", of({32}, {0.0, 0.005}, turned(1e3))}};
 }
 
 std::vector<VariantClass> variant_classes() {
