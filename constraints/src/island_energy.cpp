@@ -30,16 +30,20 @@ struct RelativeMotion {
   double energy;
 };
 
-Vec3 predicted_center(const BodyGroup& group, Index slot) {
-  return group.predicted_frame(slot).pose() * group.frame_constants().center_of_mass;
+const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
+  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
 }
 
-RelativeMotion relative_motion(const BodyGroup& group, Index slot, const CommonMotion& common) {
+Vec3 center_at(const BodyGroup& group, Index slot, StepTime when) {
+  return frame_at(group, slot, when).pose() * group.frame_constants().center_of_mass;
+}
+
+RelativeMotion relative_motion(const BodyGroup& group, Index slot, StepTime when, const CommonMotion& common) {
   const FrameConstants& c = group.frame_constants();
-  const RigidFrame& frame = group.predicted_frame(slot);
+  const RigidFrame& frame = frame_at(group, slot, when);
   const Mat3 R = to_matrix(frame.pose().q);
   const Vec3 carried_along =
-      common.velocity + common.angular_velocity.cross(predicted_center(group, slot) - common.center);
+      common.velocity + common.angular_velocity.cross(center_at(group, slot, when) - common.center);
   const Vec3 velocity = frame.velocity() - carried_along;
   const Vec3 omega = frame.angular_velocity(c) - common.angular_velocity;
   const Vec3 angular_momentum = R * (c.inertia * (R.transpose() * omega));
@@ -83,7 +87,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
   if (excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
-  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies) : CommonMotion{};
+  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies, StepTime::kEnd) : CommonMotion{};
   const double removed = remove_relative_energy(bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
@@ -114,15 +118,15 @@ bool IslandEnergy::is_free(const IslandBodies& bodies, const ConstraintRows& row
   return true;
 }
 
-CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
+CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies, StepTime when) {
   double mass = 0.0;
   Vec3 first = Vec3::Zero(), momentum = Vec3::Zero();
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     mass += c.mass;
-    first += c.mass * predicted_center(*group, slot);
-    momentum += group->predicted_frame(slot).linear_momentum(c);
+    first += c.mass * center_at(*group, slot, when);
+    momentum += frame_at(*group, slot, when).linear_momentum(c);
   }
   CommonMotion common{.center = first / mass, .velocity = momentum / mass};
   Mat3 inertia = Mat3::Zero();
@@ -130,14 +134,28 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies) {
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
     const FrameConstants& c = group->frame_constants();
-    const RigidFrame& frame = group->predicted_frame(slot);
+    const RigidFrame& frame = frame_at(*group, slot, when);
     const Mat3 R = to_matrix(frame.pose().q);
-    const Vec3 x = predicted_center(*group, slot) - common.center;
+    const Vec3 x = center_at(*group, slot, when) - common.center;
     inertia += R * c.inertia * R.transpose() + c.mass * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
     angular_momentum += frame.angular_momentum(c) + x.cross(c.mass * frame.velocity());
   }
   common.angular_velocity = inertia.llt().solve(angular_momentum);
   return common;
+}
+
+double IslandEnergy::start_motion(const IslandBodies& bodies, const ConstraintRows& rows,
+                                  std::vector<FrameMomentum>& momenta) {
+  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies, StepTime::kStart) : CommonMotion{};
+  double energy = 0.0;
+  momenta.clear();
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto& [group, slot, pose] = bodies.body(local);
+    const RelativeMotion r = relative_motion(*group, slot, StepTime::kStart, common);
+    momenta.push_back({r.momentum, r.angular_momentum});
+    energy += r.energy;
+  }
+  return energy;
 }
 
 /// Scales all velocities relative to the common motion so that their energy, which the split leaves free of mixed
@@ -147,7 +165,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   double kinetic = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    kinetic += relative_motion(*group, slot, common).energy;
+    kinetic += relative_motion(*group, slot, StepTime::kEnd, common).energy;
     for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
   }
   if (!(kinetic > 0.0)) return 0.0;
@@ -155,7 +173,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    const RelativeMotion r = relative_motion(*group, slot, common);
+    const RelativeMotion r = relative_motion(*group, slot, StepTime::kEnd, common);
     const std::span<const double> rates = group->predicted_rates(slot);
     modal_.assign(rates.size(), 0.0);
     for (std::size_t i = 0; i < rates.size(); ++i) modal_[i] = slower * rates[i];

@@ -10,6 +10,11 @@ struct CommonMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 };
 
+/// Of a body's frame, as its impulses are.
+struct FrameMomentum {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+};
+
 class IslandEnergy {
  public:
   /// Books the energy before the step, the scale of all that the bodies then have to trade, and that of coming
@@ -24,10 +29,13 @@ class IslandEnergy {
   /// @param give_back whether what is missing, beyond the modes' damping, is the method's doing: then it is made up for
   Change guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool give_back,
                const IslandOptions& options);
+  /// What the frames have beside the common motion at the step's start. @return its energy, J
+  static double start_motion(const IslandBodies& bodies, const ConstraintRows& rows,
+                             std::vector<FrameMomentum>& momenta);
 
  private:
   static bool is_free(const IslandBodies& bodies, const ConstraintRows& rows);
-  static CommonMotion common_motion(const IslandBodies& bodies);
+  static CommonMotion common_motion(const IslandBodies& bodies, StepTime when);
   static double load_work(const IslandBodies& bodies, double step);
   double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
                                 double largest_part);

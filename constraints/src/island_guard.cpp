@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "island_step.h"
 
@@ -50,26 +51,43 @@ bool IslandSolver::Impl::is_workless() const {
   return true;
 }
 
-/// Where not even standing still is enough, since the rows did not come together and have left bodies bent: less of the
-/// impulses, in the end none. The free step has the energy it began with.
-void IslandSolver::Impl::guard_energy(const BodyStates& states, std::span<Constraint* const> constraints,
-                                      const IslandOptions& options, IslandReport& report) {
+/// What the energy is above what it may be, when all motion at the step's end that may be taken has been.
+double IslandSolver::Impl::close_energy(const IslandOptions& options, IslandReport& report) {
+  const bool settled = report.status == SolveStatus::kSolved;
+  const bool give_back = options.undisturbed && settled && slowed == 0.0 && is_workless();
+  const IslandEnergy::Change done = energy.guard(bodies, rows, agent_work(options), give_back, options);
+  report.energy_removed = done.removed + start_energy * slowed * (2.0 - slowed);
+  report.energy_surplus = done.surplus;
+  return done.left;
+}
+
+/// Rows that came together, and yet the bodies end higher than they may: a swing that turns round within the step. It
+/// is to begin more slowly, at rest in the end. @return whether there is motion to take
+bool IslandSolver::Impl::slow_start(double left) {
+  constexpr double kMore = 1.5;  // of what is left is taken, as the motion taken would not have gone all into height
+  if (slowed == 0.0) start_energy = IslandEnergy::start_motion(bodies, rows, start_momenta);
+  if (slowed == 1.0 || !(start_energy > 0.0)) return false;
+  const double moving = (1.0 - slowed) * (1.0 - slowed) - kMore * left / start_energy;
+  constexpr double kLeast = 0.01;  // of the energy: what is slower may as well rest
+  slowed = moving > kLeast ? 1.0 - std::sqrt(moving) : 1.0;
+  return true;
+}
+
+/// Where neither is enough, since the rows did not come together and have left bodies bent: less of the impulses, in
+/// the end none. The free step has the energy it began with.
+void IslandSolver::Impl::refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints,
+                                         const IslandOptions& options, IslandReport& report) {
   constexpr int kHalvings = 12;
-  bool give_back = options.undisturbed && report.status == SolveStatus::kSolved && is_workless();
-  for (int halving = 0;; ++halving) {
-    const IslandEnergy::Change done = energy.guard(bodies, rows, agent_work(options), give_back, options);
-    report.energy_removed = done.removed;
-    report.energy_surplus = done.surplus;
-    if (!(done.left > 0.0) || halving == kHalvings) return;
-    const bool last = halving + 1 == kHalvings;
+  report.status = SolveStatus::kIterationLimit;
+  for (int halving = 1; halving <= kHalvings; ++halving) {
+    const bool last = halving == kHalvings;
     for (std::size_t i = 0; i < f.size(); ++i) {
       f[i] = last ? 0.0 : 0.5 * f[i];  // not times 0: they need not be finite
       reaction[i] = last ? 0.0 : 0.5 * reaction[i];
     }
-    give_back = false;
-    report.status = SolveStatus::kIterationLimit;
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
+    if (!(close_energy(options, report) > 0.0)) return;
   }
 }
 

@@ -1,6 +1,7 @@
 #include "limber/constraints/island_solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "island_step.h"
@@ -62,18 +63,7 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
 void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& options, double whole_step,
                                    IslandReport& report) {
   const BodyStates states(part.table);
-  rule = options.contact;
-  gather(part.table, part.members, part.constraints, options);
-  set_modal_steps(options.step, whole_step);
-  IslandReport done;
-  energy.begin(bodies, options.gravity);
-  program_report = {};
-  if (holds_contact_forces()) solve_touch(options, done.programs);
-  find_reaction(StepTime::kStart, options, reaction);
-  done.status = iterate(states, part.constraints, options, done);
-  answer_at_end(states, part.constraints, options);
-  const bool as_it_is = rule.is_program() && rule.guard == ProgramGuard::kNone;
-  if (options.guard_energy && !as_it_is) guard_energy(states, part.constraints, options, done);
+  IslandReport done = foresee_guarded(part, options, whole_step);
   for (Index local = 0; local < bodies.count(); ++local)
     bodies.body(local).group->commit(bodies.body(local).slot, part.begins, part.ends);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += options.step * reaction[i];
@@ -90,6 +80,39 @@ void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& option
   report.change = std::max(report.change, done.change);
   report.energy_removed += done.energy_removed;
   report.energy_surplus = done.energy_surplus;
+}
+
+/// What becomes of the members by the end, all but the energy.
+IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& options, double whole_step) {
+  const BodyStates states(part.table);
+  rule = options.contact;
+  gather(part.table, part.members, part.constraints, options);
+  set_modal_steps(options.step, whole_step);
+  IslandReport done;
+  energy.begin(bodies, options.gravity);
+  program_report = {};
+  if (holds_contact_forces()) solve_touch(options, done.programs);
+  find_reaction(StepTime::kStart, options, reaction);
+  done.status = iterate(states, part.constraints, options, done);
+  answer_at_end(states, part.constraints, options);
+  return done;
+}
+
+/// And the energy with it.
+IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandOptions& options, double whole_step) {
+  constexpr int kSlowings = 3;
+  slowed = 0.0;
+  IslandReport done = foresee(part, options, whole_step);
+  if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
+  for (int slowing = 0;; ++slowing) {
+    const double left = close_energy(options, done);
+    if (!(left > 0.0)) return done;
+    const bool settled = done.status == SolveStatus::kSolved && !holds_contact_forces() && std::isfinite(left);
+    if (!settled || slowing == kSlowings || !slow_start(left)) break;
+    done = foresee(part, options, whole_step);
+  }
+  refuse_impulses(BodyStates(part.table), part.constraints, options, done);
+  return done;
 }
 
 /// The first time at which a constraint wants the step cut; all of what is left of it where none does.
@@ -156,6 +179,10 @@ void IslandSolver::Impl::measure(const BodyStates& states, StepTime when, std::s
 void IslandSolver::Impl::predict(const IslandOptions& options) {
   sum_loads(f, theta, 1.0);
   add_loads(reaction, 0.5 * options.step, options.step);
+  for (std::size_t i = 0; slowed > 0.0 && i < loads.size(); ++i) {
+    loads[i].impulse -= slowed * start_momenta[i].linear;
+    loads[i].moment -= slowed * start_momenta[i].angular;
+  }
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)], bodies.modal_step(local));

@@ -70,6 +70,9 @@ struct IslandSolver::Impl {
   DifferenceNewton newton;
   std::vector<double> slope, tolerance;
   IslandEnergy energy;
+  double slowed = 0.0;        // the part of the frames' relative motion that is taken at the step's start
+  double start_energy = 0.0;  // J, of that motion
+  std::vector<FrameMomentum> start_momenta;
 
   void gather(std::span<const ConstrainedBody> table, std::span<const Index> members,
               std::span<Constraint* const> constraints, const IslandOptions& options);
@@ -94,6 +97,8 @@ struct IslandSolver::Impl {
     bool begins, ends;  // the whole step
   };
   void take_part(const Part& part, const IslandOptions& options, double whole_step, IslandReport& report);
+  IslandReport foresee(const Part& part, const IslandOptions& options, double whole_step);
+  IslandReport foresee_guarded(const Part& part, const IslandOptions& options, double whole_step);
   double next_cut(std::span<const ConstrainedBody> table, std::span<const Index> members,
                   std::span<Constraint* const> constraints, const Vec3& gravity, double left);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
@@ -132,8 +137,10 @@ struct IslandSolver::Impl {
   double largest_recovery_work(double distance, const IslandOptions& options) const;
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
-  void guard_energy(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
-                    IslandReport& report);
+  double close_energy(const IslandOptions& options, IslandReport& report);
+  bool slow_start(double left);
+  void refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
+                       IslandReport& report);
 };
 
 }  // namespace limber

@@ -56,5 +56,17 @@ TEST(EnergyOfBars, OfImpulsesThatDidNotComeTogetherIsRefused) {
   EXPECT_LE(r.worst_rise, kRise);
 }
 
+// Steps of a ninth of the swing's period: where it turns round it would end higher than its energy allows, with no
+// motion left there to take. It begins such a step more slowly, and stays where it is held.
+TEST(EnergyOfBars, AHeldOneIsNeverLetGoWhereItTurnsRound) {
+  for (const int modes : {0, 8}) {
+    const EnergyResult r =
+        run({.scene = EnergyScene::kHandle, .youngs_modulus = 1e8, .poisson_ratio = 0.499, .step = 0.1, .modes = modes},
+            200);
+    EXPECT_EQ(r.unsettled, 0) << modes;
+    EXPECT_LE(r.worst_rise, kRise) << modes;
+  }
+}
+
 }  // namespace
 }  // namespace limber::testing

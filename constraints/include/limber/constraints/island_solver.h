@@ -8,7 +8,8 @@
 ///   4. f changes by the solution of  A Δf + gap − offset + compliance f ⊥ bounds,  A = J diag(Δt M⁻¹, H/Δt) Jᵀ
 ///   5. 3 and 4 are repeated (Newton's method with the Jacobian of the start) until the gaps no longer change
 ///   6. if the bodies came out of it with more energy than went in, their relative motion is slowed until they have
-///      not; and made faster where joints alone have lost energy to the method
+///      not, at the step's end or, where they turn round within it, from its start (1 to 5 once more); and made faster
+///      where joints alone have lost energy to the method
 ///   7. the prediction becomes the state
 ///
 /// 4 is the default of four rules for contacts (contact_method.h). ContactMethod::kVelocityProgram finds its impulses
