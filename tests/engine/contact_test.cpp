@@ -334,7 +334,7 @@ TEST(WorldContact, AWarmStepAllocatesNothingByAnyRule) {
     for (int i = 0; i < 200; ++i) world.step();
     const long before = allocations();
     bool touched = false;  // under some rules a box that should rest hops a little
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 60; ++i) {
       world.step();
       touched = touched || !world.contact_events().empty();
     }
