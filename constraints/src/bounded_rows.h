@@ -15,6 +15,8 @@ class BoundedRowSolver {
   /// @param rows A f + b: gaps less offsets at the step's end. @param f n whole impulses, with what is held over the
   /// step; on entry a guess, on return within bounds and cones
   SolveStatus solve(const BoundedRows& rows, std::span<double> f);
+  /// The same for an A in another form; rows.A is not read.
+  SolveStatus solve(const BoundedRows& rows, RowCoupling& coupling, std::span<double> f);
 
  private:
   ContactQpSolver qp_;       // without cones

@@ -282,6 +282,7 @@ class PairContacts final : public Constraint {
         law.agent_displacement = recovery;
         law.lower = 0.0;
         law.holds = true;
+        law.last_force = n.dot(contact.last_force);
         law.strikes = strikes_;
         if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
         law.friction = contact.friction;
@@ -306,7 +307,6 @@ class PairContacts final : public Constraint {
     law.stiffness = k;
     law.holds = law.strikes = false;
     law.goes_on = true;
-    law.last_force = contact.axes.col(0).dot(contact.last_force);
     law.agent_displacement = 0.0;
   }
 

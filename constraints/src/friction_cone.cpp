@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "coulomb_contact.h"
 #include "limber/constraints/contact_qp.h"
 #include "proximal_solver.h"
+#include "sparse_coupling.h"
 
 namespace limber {
 namespace {
@@ -132,7 +134,6 @@ class BlockContacts {
   void place_blocks(const BlockFrictionProblem& problem) {
     const auto columns = static_cast<std::size_t>(problem.columns);
     memory_.offsets.assign(columns, -1);
-    memory_.body_columns.assign(columns, 0);
     memory_.blocks.resize(2 * m_);
     std::size_t widest = 0, rows = 0;
     v_size_ = 0;
@@ -143,13 +144,8 @@ class BlockContacts {
       const auto first = static_cast<std::size_t>(from.first_column);
       if (memory_.offsets[first] < 0) {
         memory_.offsets[first] = static_cast<int>(v_size_);
-        memory_.body_columns[first] = from.columns;
         v_size_ += padded(static_cast<std::size_t>(from.columns));
       }
-      if (memory_.body_columns[first] != from.columns)
-        throw InvalidArgument("FrictionSolver::solve: block " + std::to_string(k) + " has " +
-                              std::to_string(from.columns) + " columns from " + std::to_string(first) +
-                              " on, an earlier one " + std::to_string(memory_.body_columns[first]));
       memory_.blocks[k] = {rows, static_cast<std::size_t>(memory_.offsets[first]),
                            static_cast<std::size_t>(from.columns)};
       widest = std::max(widest, static_cast<std::size_t>(from.columns));
@@ -392,7 +388,7 @@ bool take_friction(Numbers b, Numbers mu, Memory& memory) {
          std::all_of(mu.begin(), mu.end(), [](double x) { return x >= 0.0; });
 }
 
-void check_blocks(const BlockFrictionProblem& problem) {
+void check_blocks(const BlockFrictionProblem& problem, std::vector<int>& body_columns) {
   const auto m = static_cast<std::size_t>(problem.contacts);
   check_length(kName, "blocks", problem.blocks.size(), 2 * m);
   check_optional_length(kName, "D", problem.D.size(), 3 * m);
@@ -402,12 +398,30 @@ void check_blocks(const BlockFrictionProblem& problem) {
           kName, "a block's last column",
           block.first_column >= 0 && block.columns >= 0 && block.columns <= problem.columns - block.first_column,
           block.first_column + block.columns, "at most the number of columns");
+  body_columns.assign(static_cast<std::size_t>(problem.columns), 0);
+  for (std::size_t k = 0; k < 2 * m; ++k) {
+    const FrictionBlock& block = problem.blocks[k];
+    if (block.values == nullptr || block.columns == 0) continue;
+    int& known = body_columns[static_cast<std::size_t>(block.first_column)];
+    if (known == 0) known = block.columns;
+    if (known != block.columns)
+      throw InvalidArgument("FrictionSolver::solve: block " + std::to_string(k) + " has " +
+                            std::to_string(block.columns) + " columns from " + std::to_string(block.first_column) +
+                            " on, an earlier one " + std::to_string(known));
+  }
 }
 
 bool finite_blocks(const BlockFrictionProblem& problem) {
   return std::all_of(problem.blocks.begin(), problem.blocks.end(), [](const FrictionBlock& block) {
     return !block.values || all_finite(block.values, 3 * static_cast<std::size_t>(block.columns));
   });
+}
+
+FrictionResult report(const ProximalSolver::Result& result) {
+  return {.status = result.status,
+          .sweeps = result.sweeps,
+          .newton_steps = result.newton_steps,
+          .residual = result.residual};
 }
 
 FrictionResult refuse(std::span<double> f) {
@@ -420,7 +434,53 @@ FrictionResult refuse(std::span<double> f) {
 struct FrictionSolver::Impl {
   Memory memory;
   ProximalSolver proximal;
+  SparseCoupling sparse;
+  std::vector<std::size_t> nodes;  // by first column; the largest number where there is none
+
+  void place(const BlockFrictionProblem& problem);
 };
+
+/// The problem's blocks as rows of bodies.
+void FrictionSolver::Impl::place(const BlockFrictionProblem& problem) {
+  constexpr auto kNone = std::numeric_limits<std::size_t>::max();
+  const auto m = static_cast<std::size_t>(problem.contacts);
+  const auto acts = [](const FrictionBlock& block) { return block.values != nullptr && block.columns > 0; };
+  const auto node_of = [&](const FrictionBlock& block) -> std::size_t& {
+    return nodes[static_cast<std::size_t>(block.first_column)];
+  };
+  /// Whether the block has a side of its own, and not that of the contact's other one.
+  const auto is_new = [&](std::size_t k) {
+    const FrictionBlock &block = problem.blocks[k], &other = problem.blocks[k - k % 2];
+    return acts(block) && (k % 2 == 0 || !acts(other) || other.first_column != block.first_column);
+  };
+  sparse.begin_structure();
+  nodes.assign(static_cast<std::size_t>(problem.columns), kNone);
+  for (const FrictionBlock& block : problem.blocks)
+    if (acts(block) && node_of(block) == kNone)
+      node_of(block) = sparse.add_node(static_cast<std::size_t>(block.columns));
+  for (std::size_t i = 0; i < m; ++i) {
+    sparse.add_unit(3);
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
+      if (is_new(k)) sparse.add_side(node_of(problem.blocks[k]));
+    if (!problem.D.empty()) sparse.add_side(sparse.add_node(3));
+  }
+  sparse.end_structure();
+  std::size_t sides = 0;
+  for (std::size_t i = 0; i < m; ++i) {
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k) {
+      const FrictionBlock& block = problem.blocks[k];
+      if (!acts(block)) continue;
+      if (is_new(k)) ++sides;
+      const MatrixView rows = sparse.values(sides - 1);
+      const auto columns = static_cast<std::size_t>(block.columns);
+      for (std::size_t r = 0; r < 3; ++r)
+        for (std::size_t c = 0; c < columns; ++c) rows.row(r)[c] += block.values[r * columns + c];
+    }
+    if (problem.D.empty()) continue;
+    const MatrixView rows = sparse.values(sides++);
+    for (std::size_t r = 0; r < 3; ++r) rows.row(r)[r] = std::sqrt(problem.D[3 * i + r]);
+  }
+}
 
 FrictionSolver::FrictionSolver() : impl_(std::make_unique<Impl>()) {}
 FrictionSolver::~FrictionSolver() = default;
@@ -439,10 +499,7 @@ FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<d
     const ProximalSolver::Result result =
         impl_->proximal.solve({.cones = problem.contacts, .A = problem.A, .b = problem.b, .friction = problem.mu}, f,
                               {.tolerance = options.tolerance, .max_sweeps = options.max_sweeps});
-    return {.status = result.status,
-            .sweeps = result.sweeps,
-            .newton_steps = result.newton_steps,
-            .residual = result.residual};
+    return report(result);
   }
   DenseContacts contacts(problem, memory);
   FrictionResult result;
@@ -458,14 +515,19 @@ FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<d
 FrictionResult FrictionSolver::solve(const BlockFrictionProblem& problem, std::span<double> f,
                                      const FrictionOptions& options) {
   check(problem.contacts, problem.b, problem.mu, f, options);
-  check_blocks(problem);
-  if (options.method != FrictionMethod::kBlockGaussSeidel)
-    throw InvalidArgument(
-        "FrictionSolver::solve: blocks are solved by kBlockGaussSeidel only, another method was asked for");
+  check_blocks(problem, impl_->memory.body_columns);
+  if (options.method == FrictionMethod::kStaggered)
+    throw InvalidArgument("FrictionSolver::solve: blocks are not solved by kStaggered, which was asked for");
   Memory& memory = impl_->memory;
   if (!take_friction(problem.b, problem.mu, memory) || !finite_blocks(problem) ||
       !std::all_of(problem.D.begin(), problem.D.end(), [](double x) { return x >= 0.0 && std::isfinite(x); }))
     return refuse(f);
+  if (options.method == FrictionMethod::kProximal) {
+    impl_->place(problem);
+    return report(impl_->proximal.solve({.cones = problem.contacts, .b = problem.b, .friction = problem.mu},
+                                        impl_->sparse, f,
+                                        {.tolerance = options.tolerance, .max_sweeps = options.max_sweeps}));
+  }
   BlockContacts contacts(problem, memory);
   FrictionResult result;
   Sweeps<BlockContacts> sweeps(contacts, memory, static_cast<std::size_t>(problem.contacts), options, result);

@@ -22,18 +22,28 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   step = options.step;
   bodies.write_position_metric(step, theta, metric);
   sort_rows();
-  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
+  constexpr int kIterationsUnsettled = 6, kIterationsUnsettledOfLarge = 3, kIterationsOfStart = 30;
+  // Cones are solved as exactly as the last change of the gaps is worth.
+  constexpr double kFirstSlack = 1e4, kSlackOfChange = 1e-3;
   factor();
   secant.begin(f.size());
+  slack = sparse ? kFirstSlack : 1.0;
   for (report.iterations = 1;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
     const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
-    if (report.change <= 1.0) return status;
+    if (report.change <= 1.0 && slack == 1.0) return status;
     // Cones that do not come together give other impulses every time.
-    const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
-                                                            : options.max_iterations;
+    const int unsettled = sparse ? kIterationsUnsettledOfLarge : kIterationsUnsettled;
+    const int most =
+        status == SolveStatus::kIterationLimit ? std::min(unsettled, options.max_iterations) : options.max_iterations;
+    if (slack > 1.0 && report.iterations <= most) {  // steps of other exactness do not compare
+      slack = std::max(1.0, std::min(kSlackOfChange * report.change, 0.1 * slack));
+      std::copy(next_f.begin(), next_f.end(), f.begin());
+      secant.begin(f.size());
+      continue;
+    }
     if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate())
       return differentiate(states, constraints, options, report);
     if (report.iterations > most) return take_best(states, constraints, options, report);
@@ -57,7 +67,7 @@ void IslandSolver::Impl::sort_rows() {
   }
   cones = bounded.size() / 3;
   for (Index i = 0; i < rows.size(); ++i)
-    if (!is_equality(rows.row(i).law) && !in_cone(rows.row(i).law)) bounded.push_back(i);
+    if ((sparse || !is_equality(rows.row(i).law)) && !in_cone(rows.row(i).law)) bounded.push_back(i);
 }
 
 /// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
@@ -67,9 +77,15 @@ void IslandSolver::Impl::factor() {
     return;
   }
   order_rows();
-  assemble_ordered();
   const std::size_t c = bounded.size();
-  A_reduced.resize(c * c), b_reduced.resize(c), ordered_b.resize(f.size());
+  b_reduced.resize(c), product.resize(c), ordered_b.resize(f.size());
+  if (sparse) {
+    place_coupling(coupling, false);
+    fill_coupling(coupling, false);
+  } else {
+    assemble_ordered();
+    A_reduced.resize(c * c);
+  }
   for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
   friction.resize(cones);
   for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
@@ -100,7 +116,7 @@ void IslandSolver::Impl::factor_equalities() {
 void IslandSolver::Impl::order_rows() {
   order.clear();
   for (Index i = 0; i < rows.size(); ++i)
-    if (is_equality(rows.row(i).law)) order.push_back(i);
+    if (!sparse && is_equality(rows.row(i).law)) order.push_back(i);
   order.insert(order.end(), bounded.begin(), bounded.end());
   place.resize(f.size());
   for (std::size_t i = 0; i < f.size(); ++i) place[static_cast<std::size_t>(order[i])] = static_cast<Index>(i);
@@ -137,6 +153,16 @@ void IslandSolver::Impl::weigh() {
 
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
 void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
+  if (sparse) {
+    for (std::size_t i = 0; i < order.size(); ++i) ordered_b[i] = values[static_cast<std::size_t>(order[i])];
+    coupling.scale({});
+    coupling.multiply(product.data(), ordered_b.data());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const auto at = static_cast<std::size_t>(order[i]);
+      gaps[at] = product[i] - compliance[at] * values[at];
+    }
+    return;
+  }
   const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
   const Eigen::Map<const RowMajor> Jacobian(J.data(), m, n);
   Eigen::Map<Eigen::VectorXd> x(weighted.data(), n);
@@ -179,16 +205,49 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     const RowLaw& law = laws[at];
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
-  elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
+  if (sparse)
+    b_reduced = ordered_b;
+  else
+    elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
   gap_before.clear();
   for (const Index row : bounded)
     gap_before.push_back(start_gap[static_cast<std::size_t>(row)] - laws[static_cast<std::size_t>(row)].offset);
   const SolveStatus status = solve_bounded(first);
   f_equal.resize(e);
-  elimination.recover(f_bounded, f_equal);
+  if (!sparse) elimination.recover(f_bounded, f_equal);
   for (std::size_t i = 0; i < m; ++i)
     next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
   return status;
+}
+
+/// Whether contacts are solved for by linear programs or heuristics.
+bool IslandSolver::Impl::by_program() const {
+  return rule.method == ContactMethod::kGapProgram || (cones > 0 && rule.friction != FrictionModel::kCone);
+}
+
+/// b − A Δt reaction, of the rows with bounds.
+void IslandSolver::Impl::take_held_impulses() {
+  const auto size = static_cast<Eigen::Index>(bounded.size());
+  if (sparse) {
+    coupling.scale({});
+    coupling.multiply(product.data(), held_impulse.data());
+    for (std::size_t i = 0; i < bounded.size(); ++i) b_reduced[i] -= product[i];
+    return;
+  }
+  Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
+      Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
+}
+
+/// What the rows' gaps may be off, as BoundedRows::noise.
+double IslandSolver::Impl::noise_of_gaps() const {
+  const double kPart = 0.5 * slack;
+  double noise = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < bounded.size(); ++i) {
+    const double own = sparse ? coupling.own_block(i, 1)(0, 0) : A_reduced[i * bounded.size() + i];
+    if (own > 0.0)
+      noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
+  }
+  return noise;
 }
 
 /// Bounds and cones are of whole impulses, F = f + Δt reaction: A F + (b − A Δt reaction).
@@ -200,25 +259,18 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
     f_bounded[i] = first && i < 3 * cones ? step * laws[at].last_force : f[at] + held_impulse[i];
     lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
   }
-  constexpr double kPart = 0.5;  // of what a gap may be off
-  double noise = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < n; ++i)
-    if (const double own = A_reduced[i * n + i]; own > 0.0)
-      noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
-  const auto size = static_cast<Eigen::Index>(n);
-  Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
-      Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
+  take_held_impulses();
   const BoundedRows problem{.cones = static_cast<int>(cones),
                             .A = A_reduced,
                             .b = b_reduced,
                             .friction = friction,
                             .lower = lower_bounded,
                             .upper = upper_bounded,
-                            .noise = noise};
-  const bool by_program =
-      rule.method == ContactMethod::kGapProgram || (cones > 0 && rule.friction != FrictionModel::kCone);
-  const SolveStatus status = by_program ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
-                                        : bounded_rows.solve(problem, f_bounded);
+                            .noise = noise_of_gaps()};
+  const SolveStatus status = sparse ? bounded_rows.solve(problem, coupling, f_bounded)
+                             : by_program()
+                                 ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
+                                 : bounded_rows.solve(problem, f_bounded);
   for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
   return status;
 }
@@ -247,7 +299,8 @@ void IslandSolver::Impl::keep_within_bounds() {
 /// Whether the island is small enough, and its rows have an interval each.
 bool IslandSolver::Impl::can_differentiate() const {
   constexpr std::size_t kMostRows = 96;
-  return f.size() <= kMostRows && cones == 0 && flexibility.empty() && rule.method != ContactMethod::kGapProgram;
+  return !sparse && f.size() <= kMostRows && cones == 0 && flexibility.empty() &&
+         rule.method != ContactMethod::kGapProgram;
 }
 
 /// From the best impulses seen, with the rows' true derivatives.

@@ -74,7 +74,8 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
 /// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
   find_accelerations(when, options.gravity);
-  const std::size_t n = weigh_frames();
+  bodies.write_frame_metric(metric);
+  const std::size_t n = sparse ? 0 : weigh_frames();
   bool equalities = true, any = false;
   bool rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
@@ -95,12 +96,28 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
     } else {
       equalities = equalities && is_equality(law);
     }
-    if (lower[at] == 0.0 && upper[at] == 0.0)
+    if (!sparse && lower[at] == 0.0 && upper[at] == 0.0)
       std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
     any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
   }
+  if (any)
+    answer_rows(when, equalities, answer);
+  else
+    std::fill(answer.begin(), answer.end(), 0.0);
+}
+
+/// The answer to accelerations b within the bounds.
+void IslandSolver::Impl::answer_rows(StepTime when, bool equalities, std::vector<double>& answer) {
+  if (sparse) {
+    fill_coupling(frame_coupling, true);
+    for (std::size_t i = 0; i < answer.size(); ++i)
+      answer[i] = when == StepTime::kStart ? laws[i].last_force : reaction[i];
+    frames.solve({.b = b, .lower = lower, .upper = upper}, frame_coupling, answer,
+                 {.tolerance = 1e-9, .max_sweeps = 0});
+    return;
+  }
   std::fill(answer.begin(), answer.end(), 0.0);
-  if (!any) return;
+  const std::size_t n = frame_G.size() / f.size();
   if (equalities) {
     unit_metric.assign(n, 1.0);
     least_squares.factor(frame_G, unit_metric, static_cast<int>(f.size()));
@@ -120,7 +137,6 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
 
 /// J M^−½ of the frames alone: the modes answer to held forces by themselves. @return its columns
 std::size_t IslandSolver::Impl::weigh_frames() {
-  bodies.write_frame_metric(metric);
   std::size_t n = 0;
   for (Index local = 0; local < bodies.count(); ++local)
     n += static_cast<std::size_t>(bodies.response(local).translations + bodies.response(local).rotations);

@@ -159,12 +159,15 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
-  J.resize(m * n), metric.resize(n), G.resize(m * n), weighted.resize(n);
+  sparse = is_large();
+  metric.resize(n), weighted.resize(n);
+  if (!sparse) J.resize(m * n), G.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
   f.assign(m, 0.0), reaction.assign(m, 0.0), end_reaction.assign(m, 0.0);
-  bodies.write_jacobian(rows, J);
+  if (!sparse) bodies.write_jacobian(rows, J);
   measure(states, StepTime::kStart, constraints, gap);
   start_gap = gap;
+  if (sparse) place_coupling(frame_coupling, true);
 }
 
 void IslandSolver::Impl::measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
@@ -223,7 +226,7 @@ void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Const
   rows.clear();
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);
   if (holds_contact_forces()) hold_contact_forces(options.step);
-  bodies.write_jacobian(rows, J);
+  if (!sparse) bodies.write_jacobian(rows, J);
   find_reaction(StepTime::kEnd, options, end_reaction);
   sum_loads(end_reaction, 0.5 * options.step, 0.0);
   if (theta < 1.0) add_loads(f, 1.0 - theta, 0.0);

@@ -4,6 +4,7 @@
 //   island_reaction.cpp  what rows that hold answer to gravity and other held forces
 //   island_touch.cpp     [H03]'s velocity program, before the rows
 //   island_newton.cpp    Newton's method for the impulses
+//   island_sparse.cpp    the rows of islands of many bodies
 //   island_guard.cpp     the energy that may have come in, and what is done about more
 #pragma once
 
@@ -19,6 +20,7 @@
 #include "limber/constraints/island_solver.h"
 #include "limber/constraints/least_squares.h"
 #include "secant_iteration.h"
+#include "sparse_coupling.h"
 
 namespace limber {
 
@@ -54,6 +56,13 @@ struct IslandSolver::Impl {
   std::vector<ConstraintRows::Flexibility> flexibility;  // of the rows at the step's start
   double stored_energy = 0.0;
   std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
+  // Islands of many rows: J and its frames' part in blocks instead, all rows in one problem; no dense matrix is made.
+  bool sparse = false;
+  SparseCoupling coupling, frame_coupling;
+  std::vector<std::size_t> nodes;  // of the bodies
+  std::vector<double> one_row, product;
+  double slack = 1.0;  // of the rows' tolerance, which this iteration's cones may be off
+  ProximalSolver frames;
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
@@ -81,6 +90,11 @@ struct IslandSolver::Impl {
   void weigh();
   std::size_t weigh_frames();
   void find_accelerations(StepTime when, const Vec3& gravity);
+  void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
+  bool is_large() const;
+  std::size_t node_width(Index local, bool frames_alone) const;
+  void place_coupling(SparseCoupling& into, bool frames_alone);
+  void fill_coupling(SparseCoupling& into, bool frames_alone);
   double step = 0.0;
   double theta = 1.0;  // the part of f that frames get at the step's start; the rest at its end
   struct HeldMotion {
@@ -113,6 +127,9 @@ struct IslandSolver::Impl {
   SolveStatus improve_equalities();
   SolveStatus improve_all(bool first);
   SolveStatus solve_bounded(bool first);
+  bool by_program() const;
+  void take_held_impulses();
+  double noise_of_gaps() const;
   bool holds_contact_forces() const { return rule.method == ContactMethod::kVelocityProgram; }
   void solve_touch(const IslandOptions& options, ProgramReport& report);
   void choose_touching(const IslandOptions& options, bool resting);

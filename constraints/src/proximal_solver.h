@@ -21,6 +21,7 @@
 #include <span>
 
 #include "limber/constraints/solve_status.h"
+#include "row_coupling.h"
 
 namespace limber {
 
@@ -41,6 +42,9 @@ class ProximalSolver {
     double tolerance = 1e-9;     ///< of the residual
     int max_newton_steps = 300;  ///< ≥ 0
     int max_sweeps = 500;        ///< over all rows, where Newton's method does not settle
+    /// > 0: shorter steps where Newton's method does not come to its end; rows that contradict each other by no more
+    /// than this, as part of the residual, are met half way, and the status is kRelaxed
+    double contradiction = 0.0;
   };
   struct Result {
     SolveStatus status = SolveStatus::kSolved;
@@ -56,6 +60,8 @@ class ProximalSolver {
   /// @pre all numbers of the rows finite but for bounds, lower ≤ upper, lengths as said
   /// @param f n; on entry a guess, on return within bounds and cones, whatever the status
   Result solve(const BoundedRows& rows, std::span<double> f, const Options& options);
+  /// The same for an A that is given otherwise, cones first; rows.A is not read.
+  Result solve(const BoundedRows& rows, RowCoupling& coupling, std::span<double> f, const Options& options);
 
  private:
   struct Impl;

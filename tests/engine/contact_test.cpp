@@ -6,6 +6,7 @@
 #include "counted_new.h"
 #include "grounded_world.h"
 #include "limber/core/error.h"
+#include "pile.h"
 
 namespace limber::testing {
 namespace {
@@ -13,8 +14,10 @@ namespace {
 constexpr double kSize = 0.6;  // of the sample box, m
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int kStepsToRest = 60;  // of the largest stack; the sanitizers take twenty times as long
+constexpr int kPileBoxes = 9;
 #else
 constexpr int kStepsToRest = 300;
+constexpr int kPileBoxes = 18;
 #endif
 
 TEST(WorldContact, AFallingBoxComesToRestOnTheGround) {
@@ -91,6 +94,21 @@ TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
       EXPECT_NEAR(lowest(world, boxes[i]), static_cast<double>(i) * kHeight, kPenetration) << count << ", box " << i;
     }
   }
+}
+
+// An island of more than a hundred contacts is solved in blocks.
+TEST(WorldContact, APileOfBoxesComesToRest) {
+  constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
+  Pile pile(kPileBoxes, -1, false);
+  for (int i = 0; i < 90; ++i) pile.step_once();
+  std::vector<Vec3> before;
+  for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
+  for (int i = 0; i < 30; ++i) pile.step_once();
+  EXPECT_TRUE(pile.world.constraint_report().solved);
+  EXPECT_GE(pile.contacts, 3 * kPileBoxes);
+  EXPECT_GT(pile.deepest, -kPenetration);
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT((pile.world.body(pile.bodies[i]).pose.p - before[i]).norm(), kShift) << i;
 }
 
 TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {

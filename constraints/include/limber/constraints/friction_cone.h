@@ -17,6 +17,7 @@
 /// - kBlockGaussSeidel: one contact after the other, each solved exactly; memory and time linear in contacts × bodies.
 /// - kProximal: convex problems with the correction held, by the proximal point method, which settles for any rank and
 ///   number of contacts; the correction follows, and Newton's method on both ends it. Sweeps where that does not settle.
+///   In full by an LU of the rows, in blocks by a sparse one of the bodies' degrees of freedom.
 /// - kStaggered: alternates the normal problem under fixed friction and the friction problem under fixed normal forces
 ///   (Kaufman et al. 2008); each half is convex.
 #pragma once
@@ -81,9 +82,10 @@ class FrictionSolver {
   /// whatever the status), or zero for kInvalidInput.
   /// @throws InvalidArgument if a span's length does not fit, or an option is out of range
   FrictionResult solve(const FrictionProblem& problem, std::span<double> f, const FrictionOptions& options = {});
-  /// Always by block Gauss–Seidel. @throws InvalidArgument as above, or for another method than kBlockGaussSeidel
-  FrictionResult solve(const BlockFrictionProblem& problem, std::span<double> f,
-                       const FrictionOptions& options = {.method = FrictionMethod::kBlockGaussSeidel});
+  /// The same solution without A. kProximal factors a matrix of the bodies' degrees of freedom with a block where two
+  /// bodies touch. @throws InvalidArgument as above, for two blocks of one first column but different
+  /// widths, or for kStaggered
+  FrictionResult solve(const BlockFrictionProblem& problem, std::span<double> f, const FrictionOptions& options = {});
 
  private:
   struct Impl;

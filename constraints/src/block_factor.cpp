@@ -1,0 +1,237 @@
+#include "block_factor.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace limber {
+namespace {
+
+constexpr std::size_t kBits = 64;
+
+void insert(std::uint64_t* set, std::size_t i) { set[i / kBits] |= std::uint64_t{1} << (i % kBits); }
+void erase(std::uint64_t* set, std::size_t i) { set[i / kBits] &= ~(std::uint64_t{1} << (i % kBits)); }
+
+template <class Visit>
+void for_each(const std::uint64_t* set, std::size_t words, Visit&& visit) {
+  for (std::size_t w = 0; w < words; ++w)
+    for (std::uint64_t bits = set[w]; bits != 0; bits &= bits - 1)
+      visit(w * kBits + static_cast<std::size_t>(std::countr_zero(bits)));
+}
+
+}  // namespace
+
+void BlockFactor::begin_pattern(std::span<const std::size_t> widths) {
+  widths_.assign(widths.begin(), widths.end());
+  words_ = (widths_.size() + kBits - 1) / kBits;
+  adjacency_.assign(words_ * widths_.size(), 0);
+}
+
+void BlockFactor::add_edge(std::size_t i, std::size_t j) {
+  if (i == j) return;
+  insert(neighbours(i), j);
+  insert(neighbours(j), i);
+}
+
+void BlockFactor::end_pattern() {
+  find_order();
+  place_columns();
+  runs_.clear();
+  for (const Column& column : columns_)
+    for (std::size_t e = 0; e < column.entries; ++e) find_runs(column, column.first_entry + e);
+}
+
+/// After this the neighbours of a node are those that it had when it was eliminated.
+void BlockFactor::find_order() {
+  const std::size_t n = widths_.size();
+  const auto width_of = [&](std::size_t node) {
+    std::size_t sum = 0;
+    for_each(neighbours(node), words_, [&](std::size_t j) { sum += widths_[j]; });
+    return sum;
+  };
+  degree_.resize(n), place_.assign(n, n), columns_.clear();
+  for (std::size_t i = 0; i < n; ++i) degree_[i] = width_of(i);
+  for (std::size_t step = 0; step < n; ++step) {
+    std::size_t next = n;
+    for (std::size_t i = 0; i < n; ++i)
+      if (place_[i] == n && (next == n || degree_[i] < degree_[next])) next = i;
+    place_[next] = step;
+    columns_.push_back({.node = next, .width = widths_[next]});
+    const std::uint64_t* around = neighbours(next);
+    for_each(around, words_, [&](std::size_t j) {
+      std::uint64_t* of = neighbours(j);
+      for (std::size_t w = 0; w < words_; ++w) of[w] |= around[w];
+      erase(of, j);
+      erase(of, next);
+    });
+    for_each(around, words_, [&](std::size_t j) { degree_[j] = width_of(j); });
+  }
+}
+
+void BlockFactor::place_columns() {
+  entries_.clear();
+  numbers_ = 0;
+  std::size_t widest = 0;
+  for (Column& column : columns_) {
+    column.first_entry = entries_.size();
+    for_each(neighbours(column.node), words_, [&](std::size_t j) { entries_.push_back({.column = place_[j]}); });
+    column.entries = entries_.size() - column.first_entry;
+    const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(column.first_entry);
+    std::sort(begin, entries_.end(), [](const Entry& a, const Entry& b) { return a.column < b.column; });
+    column.stride = padded(column.width);
+    for (auto entry = begin; entry != entries_.end(); ++entry) {
+      entry->at = column.stride;
+      column.stride += padded(columns_[entry->column].width);
+    }
+    column.offset = numbers_;
+    numbers_ += column.width * column.stride;
+    widest = std::max(widest, column.width);
+  }
+  for (AlignedBuffer* values : {&upper_, &lower_, &divided_}) values->need(numbers_);
+  coefficients_.resize(widest), inverse_.resize(widest * widest), exchange_.resize(widest);
+  first_.resize(widths_.size());
+  size_ = 0;
+  for (const Column& column : columns_) {
+    first_[column.node] = size_;
+    size_ += padded(column.width);
+  }
+}
+
+/// What elimination of the column takes from the row of one that meets it: the entries from that one on.
+void BlockFactor::find_runs(const Column& column, std::size_t entry) {
+  Entry& own = entries_[entry];
+  own.first_run = runs_.size();
+  const Column& target = columns_[own.column];
+  std::size_t at = target.first_entry;
+  for (std::size_t e = entry; e < column.first_entry + column.entries; ++e) {
+    const Entry& from = entries_[e];
+    std::size_t to = 0;
+    if (e != entry) {
+      while (entries_[at].column != from.column) ++at;
+      to = entries_[at].at;
+    }
+    const std::size_t count = padded(columns_[from.column].width);
+    if (runs_.size() > own.first_run && runs_.back().from + runs_.back().count == from.at &&
+        runs_.back().to + runs_.back().count == to)
+      runs_.back().count += count;
+    else
+      runs_.push_back({from.at, to, count});
+  }
+  own.runs = runs_.size() - own.first_run;
+}
+
+BlockFactor::Block BlockFactor::block(std::size_t i, std::size_t j) const {
+  const Column& column = columns_[place_[i]];
+  if (i == j) return {column.offset, column.stride};
+  const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(column.first_entry);
+  const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(column.entries), place_[j],
+                                      [](const Entry& e, std::size_t c) { return e.column < c; });
+  return {column.offset + found->at, column.stride};
+}
+
+void BlockFactor::set_identity() {
+  std::fill_n(upper_.data(), padded(numbers_), 0.0);
+  std::fill_n(lower_.data(), padded(numbers_), 0.0);
+  for (const Column& column : columns_)
+    for (std::size_t i = 0; i < column.width; ++i) upper_.data()[column.offset + i * column.stride + i] = 1.0;
+}
+
+/// The diagonal block's inverse, row by row, to inverse_: Gauss–Jordan with row exchanges.
+bool BlockFactor::invert_pivot(const Column& column) {
+  const std::size_t n = column.width;
+  for (std::size_t i = 0; i < n; ++i)
+    std::copy_n(upper_.data() + column.offset + i * column.stride, n, &inverse_[i * n]);
+  for (std::size_t k = 0; k < n; ++k) {
+    std::size_t p = k;
+    for (std::size_t i = k + 1; i < n; ++i)
+      if (std::abs(inverse_[i * n + k]) > std::abs(inverse_[p * n + k])) p = i;
+    exchange_[k] = p;
+    double* row = &inverse_[k * n];
+    if (p != k) std::swap_ranges(row, row + n, &inverse_[p * n]);
+    if (!(std::abs(row[k]) > 0.0) || !std::isfinite(row[k])) return false;
+    const double pivot = 1.0 / row[k];
+    row[k] = 1.0;
+    for (std::size_t j = 0; j < n; ++j) row[j] *= pivot;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      double* other = &inverse_[i * n];
+      const double part = std::exchange(other[k], 0.0);
+      for (std::size_t j = 0; j < n; ++j) other[j] -= part * row[j];
+    }
+  }
+  for (std::size_t k = n; k-- > 0;)
+    if (exchange_[k] != k)
+      for (std::size_t i = 0; i < n; ++i) std::swap(inverse_[i * n + k], inverse_[i * n + exchange_[k]]);
+  return true;
+}
+
+bool BlockFactor::factor(double* lower) {
+  used_lower_ = lower;
+  double *U = upper_.data(), *W = divided_.data();
+  const bool general = lower != U;
+  double* zero = row_.need(numbers_ == 0 ? kPad : padded(size_));
+  std::fill_n(zero, padded(size_), 0.0);
+  for (const Column& column : columns_) {
+    if (!invert_pivot(column)) return false;
+    const std::size_t n = column.width, head = padded(n), tail = column.stride - head;
+    const MatrixView rows{U + column.offset + head, column.stride};
+    for (std::size_t i = 0; i < n; ++i) {
+      std::copy_n(&inverse_[i * n], n, W + column.offset + i * column.stride);
+      if (tail > 0)
+        combine_rows(W + column.offset + i * column.stride + head, zero, rows, nullptr, &inverse_[i * n], n, tail);
+    }
+    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
+      const Entry& entry = entries_[e];
+      const Column& target = columns_[entry.column];
+      const auto subtract = [&](double* to, const double* left, double* right) {
+        for (std::size_t r = 0; r < target.width; ++r) {
+          for (std::size_t q = 0; q < n; ++q)
+            coefficients_[q] = -left[column.offset + q * column.stride + entry.at + r];
+          double* row = to + target.offset + r * target.stride;
+          for (std::size_t k = entry.first_run; k < entry.first_run + entry.runs; ++k)
+            combine_rows(row + runs_[k].to, row + runs_[k].to, {right + column.offset + runs_[k].from, column.stride},
+                         nullptr, coefficients_.data(), n, runs_[k].count);
+        }
+      };
+      subtract(U, lower, W);
+      if (general) subtract(lower, W, lower);
+    }
+  }
+  return true;
+}
+
+void BlockFactor::solve(double* x) {
+  const double *L = used_lower_, *W = divided_.data();
+  double* y = row_.need(padded(size_));
+  for (const Column& column : columns_) {
+    double* own = x + first_[column.node];
+    for (std::size_t i = 0; i < column.width; ++i) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < column.width; ++j) sum += W[column.offset + i * column.stride + j] * own[j];
+      y[i] = sum;
+    }
+    std::copy_n(y, column.width, own);
+    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
+      const Column& later = columns_[entries_[e].column];
+      double* to = x + first_[later.node];
+      for (std::size_t q = 0; q < column.width; ++q) {
+        const double* row = L + column.offset + q * column.stride + entries_[e].at;
+        for (std::size_t j = 0; j < later.width; ++j) to[j] -= own[q] * row[j];
+      }
+    }
+  }
+  for (std::size_t c = columns_.size(); c-- > 0;) {
+    const Column& column = columns_[c];
+    double* own = x + first_[column.node];
+    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
+      const Column& later = columns_[entries_[e].column];
+      const double* from = x + first_[later.node];
+      for (std::size_t q = 0; q < column.width; ++q) {
+        const double* row = W + column.offset + q * column.stride + entries_[e].at;
+        for (std::size_t j = 0; j < later.width; ++j) own[q] -= row[j] * from[j];
+      }
+    }
+  }
+}
+
+}  // namespace limber
