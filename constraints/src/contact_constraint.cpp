@@ -17,6 +17,10 @@ namespace {
 constexpr double kRelativeTolerance = 1e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
+// Of what a force moves the reduced mass of two bodies within a step: so far each contact of bodies that flex yields by
+// itself. Loads that many contacts could share in many ways then have one answer that changes little where gaps change
+// by a picometre; what rests sinks by less than kGive g Δt², 3e-7 m at 60 steps a second.
+constexpr double kGive = 1e-4;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
@@ -47,6 +51,7 @@ struct Contact {
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
+  double give = 0.0;               // what the contact yielded to it by itself, m/N
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 };
@@ -175,6 +180,7 @@ class PairContacts final : public Constraint {
       Vec3 impulse = impulses[row++] * contact.axes.col(0);
       for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
       contact.last_force = impulse / step_;
+      contact.give = give_;
       contact.impulse += impulse;
       pressed = pressed || !impulse.isZero(0.0);
       for (std::size_t side = 0; side < 2; ++side)
@@ -196,11 +202,17 @@ class PairContacts final : public Constraint {
     strikes_ = strikes(states);
     for (std::size_t side = 0; side < 2; ++side)
       if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
+    deepest_dent_ = 0.0;
+    const Contact& first = contacts_.front();
+    give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty
+                ? kGive * step_ * step_ / reduced_mass(states, first)
+                : 0.0;
     for (Contact& contact : contacts_) {
       Vec3 dent = Vec3::Zero();
       for (std::size_t side = 0; side < 2; ++side)
         if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
-      contact.dent = contact.axes.transpose() * dent;
+      contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
+      deepest_dent_ = std::max(deepest_dent_, contact.dent[0]);
     }
   }
 
@@ -251,8 +263,18 @@ class PairContacts final : public Constraint {
     });
   }
 
+  /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
+  void add_give(Index first, ConstraintRows& rows) const {
+    if (give_ == 0.0) return;
+    for (Index row = first; row < rows.size(); ++row) rows.add_flexibility(row, row, give_);
+    double stored = 0.0;
+    for (const Contact& contact : contacts_) stored += 0.5 * contact.give * contact.last_force.squaredNorm();
+    rows.add_stored_energy(stored);
+  }
+
   /// @param first row of the first contact
   void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows) {
+    add_give(first, rows);
     for (std::size_t side = 0; side < 2; ++side) {
       if (!yields_[side]) continue;
       const Mat3 R = to_matrix(turn_[side]);
@@ -277,7 +299,8 @@ class PairContacts final : public Constraint {
       RowLaw law{.tolerance = tolerance, .contact = true};
       if (axis == 0) {
         const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
-        const double recovery = std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
+        const double recovery =
+            std::min(kRecovery * std::max(0.0, -gap - deepest_dent_), step_ * options_->recovery_speed);
         law.offset = std::min(0.0, gap) + recovery;
         law.agent_displacement = recovery;
         law.lower = 0.0;
@@ -324,6 +347,8 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false;
   double step_ = 0.0, lasted_ = 0.0;
+  double give_ = 0.0;          // of each contact of bodies that flex, m/N
+  double deepest_dent_ = 0.0;  // of the bodies' contacts, m: what the kept modes do not show of their shapes
   std::vector<double> modal_a_, modal_b_;
   Passage passage_a_, passage_b_;
 };
@@ -354,6 +379,7 @@ struct ContactSet::Impl {
   std::vector<ContactEvent> events, last_events;
   std::vector<ContactEvent> resting, last_resting;  // the last of bodies that sleep
   ContactDents dents;
+  std::vector<double> give_energy;  // by body
 
   void remember(std::span<const char> asleep);
   const ContactMemory* find(std::uint64_t id) const;
@@ -384,7 +410,7 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
   contact.start_position = point.position + origin;
-  if (const ContactMemory* known = find(point.id)) contact.last_force = known->force;
+  if (const ContactMemory* known = find(point.id)) contact.last_force = known->force, contact.give = known->give;
   contacts.push_back(contact);
 }
 
@@ -401,8 +427,11 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
+  std::size_t bodies = s.give_energy.size();
   for (const ContactPoint& point : points)
-    s.dents.reserve(static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
+    bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
+  s.give_energy.resize(bodies);
+  s.dents.reserve(bodies);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
   std::size_t begin = 0, pair = 0;
@@ -479,10 +508,18 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
   memory.clear();
   for (const Contact& contact : contacts)
     if (!contact.impulse.isZero(0.0))
-      memory.push_back({contact.id, contact.a.body, contact.b.body, contact.last_force});
+      memory.push_back({.id = contact.id,
+                        .a = contact.a.body,
+                        .b = contact.b.body,
+                        .force = contact.last_force,
+                        .give = contact.give,
+                        .yielding = flexes(contact.a) ? contact.a.body : contact.b.body});
   for (const ContactMemory& last : last_memory)
     if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
+  std::ranges::fill(give_energy, 0.0);
+  for (const ContactMemory& m : memory)
+    if (m.give > 0.0) give_energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
 }
 
 const ContactOptions& ContactSet::options() const { return impl_->options; }
@@ -505,6 +542,9 @@ void ContactSet::forget(Index body) { impl_->dents.forget(body); }
 
 std::span<const DentLoad> ContactSet::dent_loads(Index body) const { return impl_->dents.loads(body); }
 
-double ContactSet::dent_energy(const BodyStates& states, Index body) const { return impl_->dents.energy(states, body); }
+double ContactSet::dent_energy(const BodyStates& states, Index body) const {
+  const auto i = static_cast<std::size_t>(body);
+  return impl_->dents.energy(states, body) + (i < impl_->give_energy.size() ? impl_->give_energy[i] : 0.0);
+}
 
 }  // namespace limber

@@ -55,6 +55,12 @@ class GroundedIsland : public Island {
     return report;
   }
 
+  /// With what the contacts store.
+  double energy() const {
+    double sum = Island::energy();
+    for (const Index body : members) sum += contacts.dent_energy(states(), body);
+    return sum;
+  }
   /// Of all contacts in the last step, on the bodies.
   Vec3 contact_impulse() const {
     Vec3 sum = Vec3::Zero();

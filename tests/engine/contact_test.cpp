@@ -111,6 +111,35 @@ TEST(WorldContact, APileOfBoxesComesToRest) {
     EXPECT_LT((pile.world.body(pile.bodies[i]).pose.p - before[i]).norm(), kShift) << i;
 }
 
+/// Flexible boxes share loads between their contacts in many ways; each step finds one of them, and they come to rest.
+TEST(WorldContact, StacksOfFlexibleBoxesThatAreDroppedStandAndEveryStepSettles) {
+  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;  // of a box; below its origin; between boxes, m
+  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;      // m
+  for (const int dropped : {0, 14}) {
+    const auto model = sample_model({.modes = 6, .dropped = dropped, .lowest_hz = 60.0, .decay = 12.0});
+    GroundedWorld scene;
+    World& world = scene.world;
+    std::vector<BodyId> boxes;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 place(0.02 * (i % 2), 0.015 * (i % 3), kBelow + kApart + i * (kHeight + kApart));
+      boxes.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}), place}}));
+    }
+    int unsettled = 0;
+    for (int i = 0; i < kStepsToRest; ++i) {
+      world.step();
+      unsettled += world.constraint_report().solved ? 0 : 1;
+    }
+    EXPECT_EQ(unsettled, 0) << dropped;
+    std::vector<Vec3> before;
+    for (const BodyId box : boxes) before.push_back(world.body(box).pose.p);
+    scene.step(60);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      EXPECT_LT((world.body(boxes[i]).pose.p - before[i]).norm(), kShift) << dropped << ", box " << i;
+      EXPECT_NEAR(lowest(world, boxes[i]), static_cast<double>(i) * kHeight, kPenetration) << dropped << ", box " << i;
+    }
+  }
+}
+
 TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   constexpr double kRise = 1e-6;
   // What overlaps stays so: pushing it apart is work that the island is given.
