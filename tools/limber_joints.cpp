@@ -92,18 +92,19 @@ void declare_detection(CLI::App& options, Arguments& a) {
   options.add_option("--method", a.method, "\"paper\": slippage by one fixed ratio of eigenvalues, as in [X09]")
       ->check(CLI::IsMember({"default", "paper"}))
       ->capture_default_str();
-  options.add_option("--samples", a.detection.contact.samples, "points on each side of a contact")
+  options.add_option("--samples", a.detection.contact.samples, "points on each side of a contact, 100 to 100000")
       ->type_name("N")
+      ->check(CLI::Range(100, 100000))
       ->capture_default_str();
   options.add_option("--search", a.detection.contact.search, "largest gap of a contact")
       ->type_name("PART_OF_DIAGONAL")
       ->check(positive_number())
       ->capture_default_str();
-  options.add_option("--threshold", a.detection.slippage.threshold, "largest slippage of a freedom")
+  options.add_option("--threshold", a.detection.slippage.threshold, "largest slippage of a freedom, below 1")
       ->type_name("MU")
       ->check(positive_number())
       ->capture_default_str();
-  options.add_option("--ratio", a.detection.slippage.ratio, "of eigenvalues, for --method paper")
+  options.add_option("--ratio", a.detection.slippage.ratio, "of eigenvalues, more than 1; for --method paper")
       ->type_name("G")
       ->check(positive_number())
       ->capture_default_str();

@@ -7,6 +7,7 @@
 #include "grouped_parts.h"
 #include "limber/articulation/assembly.h"
 #include "limber/articulation/free_motion.h"
+#include "limber/mesh/winding_number.h"
 #include "shapes.h"
 
 namespace limber {
@@ -28,17 +29,6 @@ SurfaceMesh ball_with_hole(double angle) {
     return std::atan2(std::hypot(middle.y(), middle.z()), middle.x()) < angle;
   });
   return ball;
-}
-
-/// The generalised winding number: solid angles of all triangles over 4π, by van Oosterom and Strackee (1983).
-double winding_number(const SurfaceMesh& surface, const Vec3& p) {
-  double angles = 0.0;
-  for (const Triangle& t : surface.triangles) {
-    const Vec3 a = surface.vertices[t[0]] - p, b = surface.vertices[t[1]] - p, c = surface.vertices[t[2]] - p;
-    const double x = a.norm(), y = b.norm(), z = c.norm();
-    angles += 2.0 * std::atan2(a.dot(b.cross(c)), x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y);
-  }
-  return angles / (4.0 * kPi);
 }
 
 TEST(Holes, ASmallOneLeavesASolidWithAnInside) {

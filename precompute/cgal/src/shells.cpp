@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "limber/core/disjoint_sets.h"
+#include "limber/mesh/winding_number.h"
 
 namespace limber {
 namespace {
@@ -48,24 +48,12 @@ std::vector<Shell> separate_shells(const SurfaceMesh& surface) {
   return shells;
 }
 
-/// Whether a closed surface goes round a point not on it: its solid angle there is ±4π, else 0
-/// (van Oosterom and Strackee 1983 for one triangle's).
-bool goes_round(const SurfaceMesh& surface, const Vec3& p) {
-  double solid_angle = 0.0;
-  for (const Triangle& t : surface.triangles) {
-    const Vec3 a = surface.vertices[t[0]] - p, b = surface.vertices[t[1]] - p, c = surface.vertices[t[2]] - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    solid_angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return std::abs(solid_angle) > 2.0 * std::numbers::pi;
-}
-
 void find_nesting(std::vector<Shell>& shells) {
   for (Shell& inner : shells)
     for (std::size_t o = 0; o < shells.size(); ++o) {
       const Shell& outer = shells[o];
       if (&outer == &inner || !outer.box.contains(inner.box)) continue;
-      if (!goes_round(outer.surface, inner.surface.vertices.front())) continue;
+      if (std::abs(winding_number(outer.surface, inner.surface.vertices.front())) < 0.5) continue;
       ++inner.depth;
       if (inner.parent < 0 || std::abs(outer.volume) < std::abs(shells[inner.parent].volume))
         inner.parent = static_cast<int>(o);
