@@ -104,8 +104,6 @@ void run(const Scene& scene, double seconds) {
     }
     if (i > 0) rise = std::max(rise, (now - energy) / scale);
     energy = now;
-                   (now - energy) / scale, report.rows, report.iterations, report.solved, 1e6 * took,
-                   world.body(bodies.back()).velocity.norm());
   }
   double moved = 0.0, fastest = 0.0;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
