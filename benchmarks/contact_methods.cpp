@@ -10,14 +10,13 @@
 
 #include "bar_model.h"
 #include "cpu_time.h"
-#include "limber/collision/contact_finder.h"
-#include "limber/engine/world.h"
+#include "grounded_world.h"
 #include "sample_models.h"
 
 namespace limber::testing {
 namespace {
 
-constexpr double kStep = 1.0 / 60.0, kGravity = 9.80665;
+constexpr double kStep = 1.0 / 60.0;
 constexpr int kSteps = 300;
 
 struct Scene {
@@ -76,32 +75,16 @@ constexpr Rule kRules[] = {
     {"complementary, cone", {}},
 };
 
-double lowest(const World& world, BodyId id, std::vector<float>& positions) {
-  positions.resize(3 * static_cast<std::size_t>(world.model(id).render().vertices()));
-  world.reconstruct(id, positions, {});
-  float low = positions[2];
-  for (std::size_t i = 2; i < positions.size(); i += 3) low = std::min(low, positions[i]);
-  return static_cast<double>(low);
-}
-
 void run(const Scene& scene, const Rule& rule) {
-  ContactFinder finder;
-  World world({.step = kStep});
-  world.set_contact_source(&finder, {.recovery_speed = 0.0, .rule = rule.rule});
-  world.add_static(std::make_shared<Shape>(HalfSpace{}));
+  GroundedWorld grounded({.recovery_speed = 0.0, .rule = rule.rule}, {.step = kStep});
+  World& world = grounded.world;
   std::vector<BodyId> bodies;
   scene.fill(world, bodies);
   double mass = 0.0, start = 0.0, before = 0.0, rise = 0.0, deepest = 0.0, seconds = 0.0, fastest = 0.0;
-  const auto energy = [&] {
-    double sum = 0.0;
-    for (const BodyId id : bodies) sum += world.energy(id).total();
-    return sum;
-  };
   for (const BodyId id : bodies) mass += world.model(id).data().mass;
-  start = before = energy();
+  start = before = total_energy(world, bodies);
   const double scale = std::max(mass * kGravity * scene.size, start);
   ProgramReport programs;
-  std::vector<float> positions;
   int unsolved = 0;
   for (int i = 0; i < kSteps; ++i) {
     const double begin = thread_seconds();
@@ -110,10 +93,11 @@ void run(const Scene& scene, const Rule& rule) {
     const ConstraintReport report = world.constraint_report();
     programs.add(report.programs);
     unsolved += report.solved ? 0 : 1;
-    rise = std::max(rise, (energy() - before) / scale);
-    before = energy();
+    const double now = total_energy(world, bodies);
+    rise = std::max(rise, (now - before) / scale);
+    before = now;
     for (const BodyId id : bodies) {
-      deepest = std::min(deepest, lowest(world, id, positions));
+      deepest = std::min(deepest, lowest(world, id));
       if (i >= kSteps - 30) fastest = std::max(fastest, world.body(id).velocity.norm());
     }
   }

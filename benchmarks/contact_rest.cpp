@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "cpu_time.h"
-#include "limber/collision/contact_finder.h"
-#include "limber/engine/world.h"
+#include "grounded_world.h"
 #include "limber/model/asset.h"
 #include "limber/precompute/bake.h"
 #include "tet_box.h"
@@ -20,7 +19,7 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kStep = 1.0 / 60.0, kGravity = 9.80665, kDampingRatio = 0.03;
+constexpr double kStep = 1.0 / 60.0, kDampingRatio = 0.03;
 const Material kRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
 
 struct Scene {
@@ -55,19 +54,9 @@ struct Extent {
   }
 };
 
-double lowest(const World& world, BodyId id, std::vector<float>& positions) {
-  positions.resize(3 * static_cast<std::size_t>(world.model(id).render().vertices()));
-  world.reconstruct(id, positions, {});
-  float low = positions[2];
-  for (std::size_t i = 2; i < positions.size(); i += 3) low = std::min(low, positions[i]);
-  return static_cast<double>(low);
-}
-
 void run(const Scene& scene, double seconds) {
-  ContactFinder finder;
-  World world({.step = kStep});
-  world.set_contact_source(&finder, {.residual_compliance = scene.residual});
-  world.add_static(std::make_shared<Shape>(HalfSpace{}));
+  GroundedWorld grounded({.residual_compliance = scene.residual}, {.step = kStep});
+  World& world = grounded.world;
   const Extent extent(*scene.model);
   const double height = extent.high.z() - extent.low.z(), size = (extent.high - extent.low).maxCoeff();
   std::vector<BodyId> bodies;
@@ -81,7 +70,6 @@ void run(const Scene& scene, double seconds) {
   const int steps = static_cast<int>(std::lround(seconds / kStep));
   const double scale = scene.count * scene.model->data().mass * kGravity * size;
   std::vector<Vec3> before(bodies.size());
-  std::vector<float> positions;
   double spent = 0.0, slowest = 0.0, deepest = 0.0, rise = 0.0, energy = 0.0;
   long iterations = 0;
   int unsettled = 0, late = 0, rows = 0;
@@ -97,11 +85,9 @@ void run(const Scene& scene, double seconds) {
     rows = std::max(rows, report.rows);
     unsettled += report.solved ? 0 : 1;
     late += !report.solved && i >= steps - 60 ? 1 : 0;
-    double now = 0.0;
-    for (const BodyId id : bodies) {
-      now += world.energy(id).total();
-      if (i >= steps - 60) deepest = std::min(deepest, lowest(world, id, positions));
-    }
+    for (const BodyId id : bodies)
+      if (i >= steps - 60) deepest = std::min(deepest, lowest(world, id));
+    const double now = total_energy(world, bodies);
     if (i > 0) rise = std::max(rise, (now - energy) / scale);
     energy = now;
   }

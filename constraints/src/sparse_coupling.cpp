@@ -139,6 +139,21 @@ void SparseCoupling::add_product(const Unit& unit, const Mat3& N, bool symmetric
   }
 }
 
+/// dy = −d − N G dx with M dx = −Gᵀd, M factored; N by unit.
+void SparseCoupling::step_of_rows(std::span<const ProjectionDerivative> P, const std::vector<Mat3>& N, const double* d,
+                                  double* dy) {
+  double* dx = step_.data();
+  gather(d, dx);
+  for (std::size_t i = 0; i < factor_.size(); ++i) dx[i] = -dx[i];
+  factor_.solve(dx);
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const Unit& unit = units_[u];
+    Vec3 change = Vec3::Zero();
+    if (P[u].columns > 0) change = N[u] * seen(unit, dx);
+    for (std::size_t r = 0; r < unit.rows; ++r) dy[unit.first + r] = -d[unit.first + r] - change[static_cast<int>(r)];
+  }
+}
+
 bool SparseCoupling::convex_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) {
   factor_.set_identity();
   for (std::size_t u = 0; u < units_.size(); ++u) {
@@ -147,16 +162,7 @@ bool SparseCoupling::convex_step(std::span<const ProjectionDerivative> P, double
     if (P[u].columns > 0) add_product(units_[u], left_[u], true);
   }
   if (!factor_.factor_symmetric()) return false;
-  double* dx = step_.data();
-  gather(d, dx);
-  for (std::size_t i = 0; i < factor_.size(); ++i) dx[i] = -dx[i];
-  factor_.solve(dx);
-  for (std::size_t u = 0; u < units_.size(); ++u) {
-    const Unit& unit = units_[u];
-    Vec3 change = Vec3::Zero();
-    if (P[u].columns > 0) change = left_[u] * seen(unit, dx);
-    for (std::size_t r = 0; r < unit.rows; ++r) dy[unit.first + r] = -d[unit.first + r] - change[static_cast<int>(r)];
-  }
+  step_of_rows(P, left_, d, dy);
   return true;
 }
 
@@ -181,17 +187,7 @@ bool SparseCoupling::map_step(std::span<const ProjectionDerivative> P, double rh
     std::copy_n(own.data(), unit.rows, weighted + unit.first);
   }
   if (!factor_.factor_general()) return false;
-  double* dx = step_.data();
-  gather(weighted, dx);
-  for (std::size_t i = 0; i < factor_.size(); ++i) dx[i] = -dx[i];
-  factor_.solve(dx);
-  for (std::size_t u = 0; u < units_.size(); ++u) {
-    const Unit& unit = units_[u];
-    Vec3 change = Vec3::Zero();
-    if (P[u].columns > 0) change = right_[u] * seen(unit, dx);
-    for (std::size_t r = 0; r < unit.rows; ++r)
-      dy[unit.first + r] = -weighted[unit.first + r] - change[static_cast<int>(r)];
-  }
+  step_of_rows(P, right_, weighted, dy);
   return true;
 }
 

@@ -64,6 +64,7 @@ class SparseCoupling final : public RowCoupling {
   Vec3 seen(const Unit& unit, const double* x) const;
   void gather(const double* rows, double* x) const;
   void add_product(const Unit& unit, const Mat3& N, bool symmetric);
+  void step_of_rows(std::span<const ProjectionDerivative> P, const std::vector<Mat3>& N, const double* d, double* dy);
 
   std::size_t rows_ = 0, numbers_ = 0;
   std::vector<std::size_t> widths_, unit_of_;

@@ -150,19 +150,7 @@ TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   for (int i = 0; i < 3; ++i)
     boxes.push_back(world.add_body(
         model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2 * i, 0.1}), {0.05 * i, 0.0, 0.5 + 0.5 * i}}}));
-  const auto energy = [&] {
-    double sum = 0.0;
-    for (const BodyId box : boxes) sum += world.energy(box).total();
-    return sum;
-  };
-  const double scale = 3.0 * model->data().mass * kGravity * kSize;
-  double before = energy(), worst = 0.0;
-  for (int i = 0; i < 180; ++i) {
-    world.step();
-    worst = std::max(worst, energy() - before);
-    before = energy();
-  }
-  EXPECT_LT(worst, kRise * scale);
+  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSize);
 }
 
 /// What the dropped modes yield to the contacts at rest is what they would yield if they were kept.
@@ -194,19 +182,7 @@ TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll
     boxes.push_back(world.add_body(
         model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2 * i, 0.1}), {0.05 * i, 0.0, 0.5 + 0.5 * i}},
                 .velocity = {1.0, 0.0, 0.0}}));
-  const auto energy = [&] {
-    double sum = 0.0;
-    for (const BodyId box : boxes) sum += world.energy(box).total();
-    return sum;
-  };
-  const double scale = 3.0 * model->data().mass * kGravity * kSize;
-  double before = energy(), worst = 0.0;
-  for (int i = 0; i < 180; ++i) {
-    world.step();
-    worst = std::max(worst, energy() - before);
-    before = energy();
-  }
-  EXPECT_LT(worst, kRise * scale);
+  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSize);
 }
 
 /// A damped box that is dropped bounces, in steps that are cut where it strikes, and comes to rest.

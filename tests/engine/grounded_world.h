@@ -43,6 +43,24 @@ inline double lowest(const World& world, BodyId id) {
   return static_cast<double>(low);
 }
 
+inline double total_energy(const World& world, const std::vector<BodyId>& bodies) {
+  double sum = 0.0;
+  for (const BodyId body : bodies) sum += world.energy(body).total();
+  return sum;
+}
+
+/// The most by which the bodies' energy rises in one of the next steps, J.
+inline double largest_rise(World& world, const std::vector<BodyId>& bodies, int steps) {
+  double before = total_energy(world, bodies), worst = 0.0;
+  for (int i = 0; i < steps; ++i) {
+    world.step();
+    const double now = total_energy(world, bodies);
+    worst = std::max(worst, now - before);
+    before = now;
+  }
+  return worst;
+}
+
 /// How far the lowest point of a model at rest shape is below its origin.
 inline double depth_below_origin(const ModalModel& model) {
   double low = 0.0;
