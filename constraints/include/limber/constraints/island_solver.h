@@ -12,8 +12,9 @@
 ///      where joints alone have lost energy to the method
 ///   7. the prediction becomes the state
 ///
-/// Islands of more than 150 rows are solved in blocks by body, by the same method, and less patiently: a step that does
-/// not settle soon is left with the best impulses found, and the report says so.
+/// Islands of more than 150 rows, none of which yields to forces on others or itself (add_flexibility: contacts of
+/// bodies that flex do), are solved in blocks by body, by the same method, and less patiently: a step that does not
+/// settle soon is left with the best impulses found, and the report says so.
 ///
 /// 4 is the default of four rules for contacts (contact_method.h). ContactMethod::kVelocityProgram finds its impulses
 /// and forces before 1; its contacts' rows then have these forces as both bounds, held over the step (θ = ½) if nothing
