@@ -16,6 +16,9 @@ constexpr double kParallelTouchingSine = 1e-4;
 // Up to this part of the edges at hand, overlap of bodies with flush sides is pushed out along the other faces.
 constexpr double kAlignedDepth = 0.5;
 
+// Crossings of edges whose normal has at least this cosine with a way out of the loop they are on, 26°, go along it.
+constexpr double kSameWay = 0.9;
+
 bool apart(const Aabb& a, const Aabb& b, double margin) {
   return ((a.low - b.high).array() > margin).any() || ((b.low - a.high).array() > margin).any();
 }
@@ -31,7 +34,7 @@ void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool 
   for (int of = 0; of < 2; ++of) {
     seeds_[of].clear();
     const auto vertices = static_cast<std::size_t>(side_[of]->surface().vertices());
-    if (visited_[of].size() < vertices) visited_[of].resize(vertices);
+    if (visited_[of].size() < vertices) visited_[of].resize(vertices), exit_normal_[of].resize(vertices);
   }
   if (generation_ > std::numeric_limits<std::uint32_t>::max() - 4) {
     for (std::vector<std::uint32_t>& stamps : visited_) std::fill(stamps.begin(), stamps.end(), 0u);
@@ -378,7 +381,7 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   if (within < -tolerance_) return;
   if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], (p - mine.vertex(ends[behind])).norm()});
   // An edge that only begins or ends on the face, or meets its rim, touches it.
-  if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}});
+  if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});
 }
 
 // From the ends of piercing edges over the mesh to every vertex that is inside the other surface.
@@ -413,6 +416,7 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
   if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, kSteep))
     find_supporting_face(of, v, nearest.triangle, flush(of, v, exit.at), exit);
   overlap_ = true;
+  exit_normal_[of][static_cast<std::size_t>(v)] = exit.normal;
   add(of, side_[of]->at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
 }
 
@@ -449,45 +453,95 @@ void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
   }
 }
 
-bool SurfaceContacts::has_inside_end(int of, Index e) const {
-  const std::array<Index, 2> ends = side_[of]->surface().edge(e).vertices;
-  return std::any_of(ends.begin(), ends.end(),
-                     [&](Index v) { return visited_[of][static_cast<std::size_t>(v)] == generation_ + 1; });
-}
-
-// Edges of two solids that have passed through each other: of each piercing edge the crossing that is least deep. Where
-// a vertex inside tells of it already only those that all but touch, which are corners of the area that rests.
+// Edges of two solids that have passed through each other. Surfaces intersect along closed loops, and what is to be
+// freed is the part that a loop encloses: all crossings along the ways out of it count, so that bars laid across each
+// other rest on every crossing of their outlines however deep each is.
 void SurfaceContacts::cross_edges() {
   if (!side_[0]->sided() || !side_[1]->sided()) return;
-  std::sort(piercings_.begin(), piercings_.end(), [](const Piercing& a, const Piercing& b) {
-    return std::tie(a.of, a.edge, a.face) < std::tie(b.of, b.edge, b.face);
-  });
-  for (std::size_t first = 0; first < piercings_.size();) {
-    const auto [of, edge, face, heights] = piercings_[first];
-    EdgePair best{};
-    best.distance = std::numeric_limits<double>::infinity();
-    std::size_t next = first;
-    for (; next < piercings_.size() && piercings_[next].of == of && piercings_[next].edge == edge; ++next)
-      take_shallower_crossing(piercings_[next], best);
-    if (best.distance < std::numeric_limits<double>::infinity()) {
-      overlap_ = true;
-      add_edges(best, -best.direction);
-    }
-    first = next;
+  find_loops();
+  for (std::size_t first = 0, next = 0; first < piercings_.size(); first = next) {
+    while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
+    cross_edges_of_loop(first, next);
   }
 }
 
-void SurfaceContacts::take_shallower_crossing(const Piercing& piercing, EdgePair& best) {
+// Where two triangles intersect, an edge of one goes through the other at each end: piercings with a triangle pair in
+// common belong to one loop. Sorts them by loop.
+void SurfaceContacts::find_loops() {
+  const auto sort_piercings = [this] {
+    std::sort(piercings_.begin(), piercings_.end(), [](const Piercing& a, const Piercing& b) {
+      return std::tie(a.loop, a.of, a.edge, a.face) < std::tie(b.loop, b.of, b.edge, b.face);
+    });
+  };
+  sort_piercings();
+  crossed_.clear();
+  for (std::size_t i = 0; i < piercings_.size(); ++i) {
+    const Piercing& p = piercings_[i];
+    for (const Index t : side_[p.of]->surface().edge(p.edge).triangles)
+      if (t >= 0)
+        crossed_.push_back({p.of == 0 ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+  }
+  std::sort(crossed_.begin(), crossed_.end(), [](const Crossed& a, const Crossed& b) {
+    return std::tie(a.triangles, a.piercing) < std::tie(b.triangles, b.piercing);
+  });
+  loops_.reset(piercings_.size());
+  for (std::size_t i = 1; i < crossed_.size(); ++i)
+    if (crossed_[i].triangles == crossed_[i - 1].triangles) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
+  for (std::size_t i = 0; i < piercings_.size(); ++i) piercings_[i].loop = loops_.root(static_cast<Index>(i));
+  sort_piercings();
+}
+
+void SurfaceContacts::cross_edges_of_loop(std::size_t first, std::size_t end) {
+  crossings_.clear();
+  for (std::size_t i = first; i < end; ++i) find_crossings(piercings_[i]);
+  find_ways_out(first, end);
+  for (const EdgePair& crossing : crossings_) {
+    const Vec3 n = -crossing.direction;
+    if (std::none_of(ways_out_.begin(), ways_out_.end(), [&](const Vec3& way) { return n.dot(way) > kSameWay; }))
+      continue;
+    overlap_ = true;
+    add_edges(crossing, n);
+  }
+}
+
+// Of a piercing edge with the edges of the face.
+void SurfaceContacts::find_crossings(const Piercing& piercing) {
   for (int c = 0; c < 3; ++c) {
     const Index f = side_[1 - piercing.of]->surface().edge_of(piercing.face, c);
     const EdgePair pair = piercing.of == 0 ? nearest_of_edges(piercing.edge, f) : nearest_of_edges(f, piercing.edge);
-    if ((has_inside_end(piercing.of, piercing.edge) || has_inside_end(1 - piercing.of, f)) &&
-        !(pair.distance <= kTouching * shorter_edge(pair)))
-      continue;
-    if (pair.distance < best.distance && side_[1]->in_normal_cone(pair.f, -pair.direction) &&
+    if (pair.distance < std::numeric_limits<double>::infinity() && side_[1]->in_normal_cone(pair.f, -pair.direction) &&
         side_[0]->in_normal_cone(pair.e, pair.direction))
-      best = pair;
+      crossings_.push_back(pair);
   }
+}
+
+// The directions in which vertices leave that are inside next to the loop. Without any, the direction of the crossing
+// along which the loop, and with it the region that both bodies share, is least wide.
+void SurfaceContacts::find_ways_out(std::size_t first, std::size_t end) {
+  ways_out_.clear();
+  for (std::size_t i = first; i < end; ++i) {
+    const int of = piercings_[i].of;
+    for (const Index v : side_[of]->surface().edge(piercings_[i].edge).vertices)
+      if (visited_[of][static_cast<std::size_t>(v)] == generation_ + 1)
+        ways_out_.push_back((of == 0 ? 1.0 : -1.0) * exit_normal_[of][static_cast<std::size_t>(v)]);
+  }
+  if (!ways_out_.empty() || crossings_.empty()) return;
+  const EdgePair* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const EdgePair& crossing : crossings_) {
+    const double width = std::max(width_of_loop(first, end, crossing.direction), crossing.distance);
+    if (width < least) least = width, best = &crossing;
+  }
+  ways_out_.push_back(-best->direction);
+}
+
+double SurfaceContacts::width_of_loop(std::size_t first, std::size_t end, const Vec3& n) const {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t i = first; i < end; ++i) {
+    const double height = n.dot(piercings_[i].point);
+    low = std::min(low, height), high = std::max(high, height);
+  }
+  return high - low;
 }
 
 // Surfaces that intersect where nothing tells inside from outside, such as a sheet: back out of the pierced face, the

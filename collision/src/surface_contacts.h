@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "limber/collision/tree_traversal.h"
+#include "limber/core/disjoint_sets.h"
 #include "pair_surface.h"
 
 namespace limber {
@@ -36,6 +37,13 @@ class SurfaceContacts {
     int of;
     Index edge, face;
     std::array<double, 2> heights;  // of the edge's ends over the face
+    Vec3 point;
+    Index loop;  // where the surfaces intersect; see find_loops()
+  };
+  // A pair of intersecting triangles, by side, and an edge of one that goes through the other.
+  struct Crossed {
+    TrianglePair triangles;
+    Index piercing;
   };
   struct Seed {
     Index vertex;
@@ -78,9 +86,12 @@ class SurfaceContacts {
   bool flush(int of, Index v, const FeatureSide& at);
   bool enters(int of, Index v, Index near);
   void find_enclosed(int of, OverlapRule* rule);
-  bool has_inside_end(int of, Index e) const;
   void cross_edges();
-  void take_shallower_crossing(const Piercing& piercing, EdgePair& best);
+  void find_loops();
+  void cross_edges_of_loop(std::size_t first, std::size_t end);
+  void find_crossings(const Piercing& piercing);
+  void find_ways_out(std::size_t first, std::size_t end);
+  double width_of_loop(std::size_t first, std::size_t end, const Vec3& n) const;
   void push_out_of_faces();
 
   void add(int of, const FeatureSide& mine, const FeatureSide& other, const Vec3& out_of_other, double gap);
@@ -91,8 +102,13 @@ class SurfaceContacts {
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
   std::vector<Piercing> piercings_;
+  std::vector<Crossed> crossed_;
+  DisjointSets loops_;
+  std::vector<EdgePair> crossings_;  // of one loop
+  std::vector<Vec3> ways_out_;       // of one loop: normals out of b
   std::vector<Seed> seeds_[2];
   std::vector<std::uint32_t> visited_[2];  // generation_: looked at, outside; generation_ + 1: inside
+  std::vector<Vec3> exit_normal_[2];       // of vertices inside: out of the other
   std::uint32_t generation_ = 0;
 };
 

@@ -466,6 +466,37 @@ TEST(NarrowPhase, EdgesThatCrossWithoutAVertexInsideMakeAnEdgeContact) {
   }
 }
 
+TEST(NarrowPhase, BarsLaidAcrossEachOtherTouchWhereverTheirRimsHaveCrossed) {
+  // One bar along y, tilted, over one along x: of the four crossings of its lower rim with the upper rim of the other
+  // those that overlap are contacts, each as deep as its own lines are, and none pushes the bars sideways.
+  const double half = 0.1;
+  const auto bar = [&](const Vec3& extent) { return testing::wavy_model(shapes::box(-extent, extent), 0); };
+  Body lower(bar({1.0, half, half})), upper(bar({half, 1.0, half}));
+  lower.place({});
+  Random random(28);
+  int found = 0, deep = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Vec3 tilt(random.uniform(-0.1, 0.1), random.uniform(-0.3, 0.3), random.uniform(-0.5, 0.5));
+    upper.place({quaternion_from_rotation_vector(tilt), {0.0, 0.0, 2.0 * half + random.uniform(-0.01, 0.03)}});
+    const auto contacts = contacts_of(upper, lower, 0.0);
+    for (const ContactPoint& c : contacts) ASSERT_GT(c.normal.z(), 0.9) << "trial " << trial;
+    for (const double x : {-half, half})
+      for (const double y : {-half, half}) {
+        const Vec3 u = upper.pose.q * Vec3::UnitY(), p = upper.pose * Vec3(x, 0.0, -half);
+        const double height = p.z() + (y - p.y()) / u.y() * u.z() - half;  // of the upper line over the lower one
+        if (height > -1e-3) continue;
+        const Vec3 n = Vec3::UnitX().cross(u).normalized();
+        const double gap = height * n.z();
+        ++found, deep += gap < -0.02 ? 1 : 0;
+        EXPECT_TRUE(std::any_of(contacts.begin(), contacts.end(),
+                                [&](const ContactPoint& c) { return std::abs(c.gap - gap) < 1e-7; }))
+            << "trial " << trial << ", gap " << gap;
+      }
+  }
+  EXPECT_GT(found, 300);
+  EXPECT_GT(deep, 50);
+}
+
 TEST(NarrowPhase, NormalsOfNeighbouringVerticesDoNotTurnAround) {
   // A soft block sinks ever deeper into a rigid box: what is inside is pushed up as long as the top is nearest.
   Body block(testing::block_model(0)), box(Shape{Box{Vec3(2.0, 2.0, 2.0)}});

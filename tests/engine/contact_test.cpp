@@ -140,6 +140,30 @@ TEST(WorldContact, StacksOfFlexibleBoxesThatAreDroppedStandAndEveryStepSettles) 
   }
 }
 
+/// Bars that fall across each other have no vertex within the other: the crossings of their rims carry them.
+TEST(WorldContact, FlexibleBarsDroppedAcrossEachOtherLieStill) {
+  constexpr double kLength = 0.6, kDepth = 1e-3 * kLength, kShift = 1e-4;
+  const auto bar = sample_model({.modes = 6, .lowest_hz = 60.0, .decay = 12.0, .half_extent = {0.3, 0.06, 0.05}});
+  const double low = depth_below_origin(*bar);
+  for (const double roll : {0.1, 0.3, 0.5}) {
+    GroundedWorld scene;
+    const Quaternion across = quaternion_from_rotation_vector({0.0, 0.0, 1.2}),
+                     tilted = quaternion_from_rotation_vector({roll, 0.1, 0.0});
+    scene.world.add_body(bar, {.pose = {{}, {0.0, 0.0, low}}});
+    const BodyId upper = scene.world.add_body(bar, {.pose = {across * tilted, {0.0, 0.0, 3.0 * low + 0.05}}});
+    scene.step(90);
+    double deepest = 0.0;
+    scene.world.set_contact_veto([&](const ContactPoint& contact) {
+      deepest = std::min(deepest, contact.gap);
+      return true;
+    });
+    const Vec3 place = scene.world.body(upper).pose.p;
+    scene.step(60);
+    EXPECT_GT(deepest, -kDepth) << "rolled by " << roll;
+    EXPECT_LT((scene.world.body(upper).pose.p - place).norm(), kShift) << "rolled by " << roll;
+  }
+}
+
 TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   constexpr double kRise = 1e-6;
   // What overlaps stays so: pushing it apart is work that the island is given.

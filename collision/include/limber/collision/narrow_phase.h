@@ -25,8 +25,10 @@
 /// Where surfaces intersect, the vertices of each inside the other are contacts too, of negative gap, with the nearest
 /// point of the other surface (see OverlapMethod): they are found by spreading over the mesh from where triangles
 /// intersect, so deep ones are found as well, and whole bodies that lie within others. Inside and outside are told by
-/// angle-weighted pseudonormals (Bærentzen and Aanæs, IEEE TVCG 11(3), 2005). Edges that cross without a vertex inside
-/// give an edge–edge contact of negative gap.
+/// angle-weighted pseudonormals (Bærentzen and Aanæs, IEEE TVCG 11(3), 2005). Edges that have crossed give edge–edge
+/// contacts of negative gap: surfaces intersect along closed loops, and of each loop the crossings count whose normal
+/// is within 26° of that of a vertex inside next to it or, if there is none, of the crossing along which the loop is
+/// least wide.
 ///
 /// Balls and capsules are a point and a segment with a radius: their gaps are those of the core less the radius.
 /// Against a half-space all vertices (of a ball or capsule: centres) count. Convex rigid shapes against each other have
