@@ -56,26 +56,30 @@ struct ContactClusters::Impl {
   double deep_gap = 0.0;  ///< contacts with gaps up to here are deep
   std::vector<PlanePoint> place, points, hull, all_corners, kept, old, trial, trial_hull;
 
-  void find_patches(double radius);
+  double spacing = 0.0;
+
+  void find_patches();
   void reduce_patch();
   void project();
   void choose();
   void add_corners();
-  bool previous_will_do();
+  void cover();
+  bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const;
+  bool previous_will_do(std::size_t corners);
   Span span_of(const std::vector<PlanePoint>& some, bool deep_only);
   bool deep(const PlanePoint& p) const { return contacts[static_cast<std::size_t>(p.item)].gap <= deep_gap; }
 };
 
-/// In ascending id, each joins the first patch whose first contact is like it and near it, or begins one: as long as
-/// the same ids are there, the same ones lead.
-void ContactClusters::Impl::find_patches(double radius) {
+/// In ascending id, each joins the first patch whose first contact is like it, or begins one: as long as the same ids
+/// are there, the same ones lead.
+void ContactClusters::Impl::find_patches() {
   leaders.clear();
   patch_of.clear();
   for (const ContactPoint& c : contacts) {
     Index patch = 0;
     for (; static_cast<std::size_t>(patch) < leaders.size(); ++patch) {
       const ContactPoint& leader = contacts[static_cast<std::size_t>(leaders[static_cast<std::size_t>(patch)])];
-      if (c.normal.dot(leader.normal) >= min_cosine && (c.position - leader.position).norm() <= radius) break;
+      if (c.normal.dot(leader.normal) >= min_cosine) break;
     }
     if (static_cast<std::size_t>(patch) == leaders.size()) leaders.push_back(static_cast<Index>(&c - contacts.data()));
     patch_of.push_back(patch);
@@ -120,15 +124,41 @@ void ContactClusters::Impl::add_corners() {
   }
 }
 
-bool ContactClusters::Impl::previous_will_do() {
+bool ContactClusters::Impl::near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const {
+  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) {
+    const double x = p.x - q.x, y = p.y - q.y;
+    return x * x + y * y <= distance * distance;
+  });
+}
+
+/// Adds what is farther than the spacing from all that are kept, the deepest first.
+void ContactClusters::Impl::cover() {
+  if (std::isinf(spacing)) return;
+  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
+  for (;;) {
+    const PlanePoint* chosen = nullptr;
+    for (const PlanePoint& p : place)
+      if ((chosen == nullptr || gap(p) < gap(*chosen)) && !near_any(p, kept, spacing)) chosen = &p;
+    if (chosen == nullptr) return;
+    kept.push_back(*chosen);
+  }
+}
+
+/// @param corners how many of the best choice are corners; the others cover what lies between
+bool ContactClusters::Impl::previous_will_do(std::size_t corners) {
+  constexpr double kFarther = 1.1;  // may they lie than the spacing
   old.clear();
   for (const PlanePoint& p : place)
     if (std::binary_search(previous.begin(), previous.end(), contacts[static_cast<std::size_t>(p.item)].id))
       old.push_back(p);
-  if (old.size() != kept.size() || std::none_of(old.begin(), old.end(), [&](const auto& p) { return deep(p); }))
-    return false;
-  return span_of(old, true).at_least(options.hysteresis, span_of(kept, true)) &&
-         span_of(old, false).at_least(options.hysteresis, span_of(kept, false));
+  const std::size_t covering = kept.size() - corners;
+  return old.size() >= corners && old.size() <= kept.size() + covering / 2 &&
+         std::any_of(old.begin(), old.end(), [&](const auto& p) { return deep(p); }) &&
+         span_of(old, true).at_least(options.hysteresis, span_of(kept, true)) &&
+         span_of(old, false).at_least(options.hysteresis, span_of(kept, false)) &&
+         (std::isinf(spacing) || std::all_of(place.begin(), place.end(), [&](const PlanePoint& p) {
+            return near_any(p, old, kFarther * spacing);
+          }));
 }
 
 /// Fills `kept` from `place`; see the header.
@@ -150,7 +180,9 @@ void ContactClusters::Impl::choose() {
     largest_polygon(hull, options.max_points, kept);
     add_corners();
   }
-  if (previous_will_do()) kept.swap(old);
+  const std::size_t corners = kept.size();
+  cover();
+  if (previous_will_do(corners)) kept.swap(old);
 }
 
 void ContactClusters::Impl::reduce_patch() {
@@ -168,7 +200,7 @@ ContactClusters::~ContactClusters() = default;
 ContactClusters::ContactClusters(ContactClusters&&) noexcept = default;
 ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = default;
 
-void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, double patch_radius,
+void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
                              std::span<const std::uint64_t> previous) {
   Impl& m = *impl_;
   m.contacts = std::span(contacts).subspan(first);
@@ -176,7 +208,8 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
   std::sort(m.contacts.begin(), m.contacts.end(),
             [](const ContactPoint& a, const ContactPoint& b) { return a.id < b.id; });
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
-  m.find_patches(patch_radius);
+  m.spacing = spacing;
+  m.find_patches();
   m.keep.assign(m.contacts.size(), 0);
   for (std::size_t patch = 0; patch < m.leaders.size(); ++patch) {
     m.members.clear();

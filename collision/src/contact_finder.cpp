@@ -140,9 +140,8 @@ void check_length(const char* name, double length) {
 
 void ContactFinderOptions::validate() const {
   clusters.validate();
-  if (!(patch_radius > 0.0))
-    throw InvalidArgument("ContactFinderOptions: patch_radius is " + std::to_string(patch_radius) +
-                          ", expected above 0");
+  if (!(spacing > 0.0))
+    throw InvalidArgument("ContactFinderOptions: spacing is " + std::to_string(spacing) + ", expected above 0");
 }
 
 struct ContactFinder::Impl {
@@ -201,7 +200,7 @@ struct ContactFinder::Impl {
   void find_in_pairs(Jobs& jobs);
   void find_in_pair(const BodyPair& pair, Worker& worker, std::vector<ContactPoint>& contacts) const;
   CollisionBody collision_body(Index body, Worker& worker) const;
-  double patch_radius(const BodyPair& pair) const;
+  double spacing(const BodyPair& pair) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
   void find_impacts_in_pairs(Jobs& jobs);
@@ -351,10 +350,10 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   return result;
 }
 
-double ContactFinder::Impl::patch_radius(const BodyPair& pair) const {
+double ContactFinder::Impl::spacing(const BodyPair& pair) const {
   const Body &a = at(pair.a), &b = at(pair.b);
   if (a.modes() == 0 && b.modes() == 0) return std::numeric_limits<double>::infinity();
-  return options.patch_radius * std::min(a.diagonal, b.diagonal);
+  return options.spacing * std::min(a.diagonal, b.diagonal);
 }
 
 std::span<const std::uint64_t> ContactFinder::Impl::kept_last_time(const BodyPair& pair) const {
@@ -375,7 +374,7 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
     worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
-  worker.clusters.reduce(contacts, first, patch_radius(pair), kept_last_time(pair));
+  worker.clusters.reduce(contacts, first, spacing(pair), kept_last_time(pair));
 }
 
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {

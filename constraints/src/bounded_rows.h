@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "limber/constraints/contact_qp.h"
 #include "proximal_solver.h"
@@ -19,8 +20,11 @@ class BoundedRowSolver {
   SolveStatus solve(const BoundedRows& rows, RowCoupling& coupling, std::span<double> f);
 
  private:
-  ContactQpSolver qp_;       // without cones
-  ProximalSolver proximal_;  // with
+  SolveStatus solve_cones(const BoundedRows& rows, std::span<double> f);
+
+  ContactQpSolver qp_;         // without cones
+  ProximalSolver proximal_;    // with
+  std::vector<double> other_;  // impulses of a second attempt
 };
 
 }  // namespace limber

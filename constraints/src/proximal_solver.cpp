@@ -464,7 +464,7 @@ ProximalSolver::Result ProximalSolver::solve(const BoundedRows& rows, RowCouplin
   s.result = {};
   s.contradicts = false;
   s.contradiction = options.contradiction;
-  s.rho = kFirstRho;
+  s.rho = options.first_rho;
   s.max_newton_steps = options.max_newton_steps;
   s.place(rows, f, options.tolerance);
   s.best_residual = std::numeric_limits<double>::infinity();

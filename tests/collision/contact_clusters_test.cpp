@@ -206,16 +206,39 @@ TEST(ContactClusters, OutcomeDoesNotDependOnTheOrderOfContacts) {
   }
 }
 
-TEST(ContactClusters, FeetFarApartAndSidesOfUnlikeNormalsArePatchesOfTheirOwn) {
+TEST(ContactClusters, SidesOfUnlikeNormalsArePatchesOfTheirOwn) {
   std::vector<ContactPoint> contacts;
   for (const double foot : {0.0, 10.0})
     for (int i = 0; i < 25; ++i)
       contacts.push_back(contact(contacts.size(), {foot + 0.1 * (i % 5), 0.1 * (i / 5), 0.0}));
   for (int i = 0; i < 25; ++i)
     contacts.push_back(contact(contacts.size(), {0.0, 0.1 * (i % 5), 0.1 * (i / 5)}, 0.0, Vec3::UnitX()));
-  EXPECT_EQ(reduced(contacts, {}, 1.0).size(), 12u);
-  EXPECT_EQ(reduced(contacts, {}, kInfinity).size(), 8u);
-  EXPECT_EQ(reduced(contacts, {.max_normal_angle = 0.5 * std::numbers::pi}, kInfinity).size(), 8u);
+  EXPECT_EQ(reduced(contacts).size(), 8u);
+  EXPECT_EQ(reduced(contacts, {.max_normal_angle = 0.5 * std::numbers::pi}).size(), 8u);
+}
+
+TEST(ContactClusters, WhatLiesBetweenCornersIsCoveredToTheSpacing) {
+  constexpr double kSpacing = 0.5;
+  const auto distance = [](const ContactPoint& c, const std::vector<ContactPoint>& kept) {
+    double least = kInfinity;
+    for (const ContactPoint& k : kept) least = std::min(least, (c.position - k.position).norm());
+    return least;
+  };
+  std::vector<ContactPoint> contacts;  // 21 × 21 on a square of 2 × 2, which sags in the middle
+  for (int i = 0; i < 441; ++i) contacts.push_back(contact(contacts.size(), {0.1 * (i % 21), 0.1 * (i / 21), 0.0}));
+  const auto sag = [&](double most) {
+    for (ContactPoint& c : contacts) c.gap = most * std::sin(0.5 * std::numbers::pi * c.position.x());
+  };
+  sag(-1e-5);
+  const auto kept = reduced(contacts, {}, kSpacing);
+  EXPECT_LE(kept.size(), 25u);  // discs of this radius cover the square from 16 on
+  for (const ContactPoint& c : contacts) EXPECT_LE(distance(c, kept), kSpacing + kRoundOff);
+  // The same ones carry on as the gaps change; where there are none of them, others are found.
+  sag(1e-5);
+  EXPECT_EQ(ids(reduced(contacts, {}, kSpacing, ids(kept))), ids(kept));
+  contacts.erase(contacts.begin(), contacts.begin() + 210);
+  const auto half = reduced(contacts, {}, kSpacing, ids(kept));
+  for (const ContactPoint& c : contacts) EXPECT_LE(distance(c, half), 1.1 * kSpacing + kRoundOff);
 }
 
 TEST(ContactClusters, ContactsInOnePlaceOrOnOneLineAreThinnedToItsEnds) {

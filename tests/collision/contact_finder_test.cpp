@@ -444,7 +444,7 @@ TEST(ContactFinder, WrongBodiesAreRefused) {
   EXPECT_THROW(finder.set_filter(0, {}), InvalidArgument);
   EXPECT_THROW(finder.exclude_pair(2, 2, true), InvalidArgument);
   EXPECT_THROW(finder.exclude_pair(2, 3, true), InvalidArgument);
-  EXPECT_THROW(ContactFinder({.patch_radius = 0.0}), InvalidArgument);
+  EXPECT_THROW(ContactFinder({.spacing = 0.0}), InvalidArgument);
   EXPECT_THROW(ContactFinder({.clusters = {.max_points = -1}}), InvalidArgument);
 }
 

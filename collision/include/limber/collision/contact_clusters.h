@@ -1,7 +1,7 @@
 /// @file limber/collision/contact_clusters.h
 /// Many contacts of two bodies, thinned to the few that carry the same forces and torques.
 ///
-/// Contacts of like normals that lie near each other are a *patch*. A patch is pushed by forces along its normal, and
+/// Contacts of like normals are a *patch*. A patch is pushed by forces along its normal, and
 /// whatever pressure acts within a convex region, some forces at the corners of that region have the same sum and the
 /// same torque. So of each patch the corners are kept:
 ///
@@ -12,9 +12,12 @@
 ///     quadrilateral one by one.)
 ///  2. Where fewer than n are deep, such as where an edge rests, others are added one by one, each the one that the
 ///     area of all grows by most.
+///  3. Bodies that bend sag between four corners. Where a contact is farther than a given spacing from all that are
+///     kept, the deepest of such is kept as well, until there are none.
 ///
 /// Contacts that were kept last time are kept again as long as their areas are at least `hysteresis` times those of the
-/// best choice, so that warm starts find them again. Two cylinders that touch along a line keep the line's ends.
+/// best choice, and they cover the patch with a tenth more spacing and not many more contacts, so that warm starts find
+/// them again. Two cylinders that touch along a line keep the line's ends.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +30,7 @@
 namespace limber {
 
 struct ContactClusterOptions {
-  int max_points = 4;              ///< n, most contacts of a patch, ≥ 1; 0: all are kept
+  int max_points = 4;              ///< n, most corners of a patch, ≥ 1; 0: all contacts are kept
   double max_normal_angle = 0.35;  ///< rad, between a contact and its patch's first, (0, π/2]; 0.35: 20°
   double depth_tolerance = 1e-3;   ///< of the patch's extent; ≥ 0
   double hysteresis = 0.9;         ///< in [0, 1]; 1: last time's only where nothing is better
@@ -45,10 +48,10 @@ class ContactClusters {
 
   /// Thins contacts[first …], all of one pair of bodies, and leaves them ascending in id. The outcome does not depend
   /// on their order before.
-  /// @param patch_radius m: no contact of a patch is farther from the patch's first, that of the lowest id; > 0,
-  ///   infinity allowed
+  /// @param spacing m: seen along its normal, no contact of a patch that is left out is farther than this (by a tenth
+  ///   more where those of last time are kept) from one that is kept; > 0, infinity: corners alone
   /// @param previous ids that were kept for this pair last time, ascending
-  void reduce(std::vector<ContactPoint>& contacts, std::size_t first, double patch_radius,
+  void reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
               std::span<const std::uint64_t> previous);
 
  private:

@@ -31,10 +31,10 @@ struct ContactFinderOptions {
   NarrowPhaseOptions narrow_phase{};
   /// How contacts are thinned; {.max_points = 0} gives all.
   ContactClusterOptions clusters{};
-  /// Extent of a patch where a body deforms: no contact is farther from its first than this share of the smaller body's
-  /// diagonal at rest; > 0. Smaller ones follow a bent surface more closely, with more contacts. Two rigid bodies have
-  /// one patch for each direction of the normal.
-  double patch_radius = 0.25;
+  /// Where a body deforms: no contact is left out that is farther from those kept of its patch than this share of the
+  /// smaller body's diagonal at rest; > 0. Smaller ones follow a bent surface more closely, with more contacts. Two
+  /// rigid bodies keep the corners of each patch alone.
+  double spacing = 0.125;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
