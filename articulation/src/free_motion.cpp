@@ -86,6 +86,12 @@ class Search {
 
   void find_raw();
   void settle_tolerance();
+  /// A point of one side.
+  struct PointOf {
+    std::size_t number = 0;
+    bool moving = true;
+  };
+  std::vector<PointOf> longest_first() const;
   void collect();
   bool adds(const OrbitPiece& piece) const;
   void add(const Witness& witness);
@@ -95,14 +101,14 @@ class Search {
   void refine();
   FreeMotion result() const;
 
+  /// The faces that orbits within a distance of this one can meet.
   void gather(const Orbit& orbit, bool moving, double around, std::vector<Index>& near) const;
+  /// @param near what gather() found around it
   void raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index>& near, std::vector<OrbitPiece>& out) const;
-  void wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const;
-  /// @param near what gather() found within δ of the point's orbit
-  void wide_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
-                   std::vector<OrbitPiece>& out) const;
-  void blocked_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
-                      std::vector<OrbitPiece>& out) const;
+  void raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const;
+  /// @param pieces as raw_pieces() gave them for this point's orbit; what is wide of them stays
+  void keep_wide(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const;
+  void keep_blocked(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const;
   void clip_at_start(std::vector<OrbitPiece>& pieces, double speed) const;
   bool holds_start(const OrbitPiece& piece, double speed) const;
   Witness descend(Witness start, bool low, const Span& gap) const;
@@ -131,6 +137,12 @@ void Search::gather(const Orbit& orbit, bool moving, double around, std::vector<
   (moving ? fixed_ : moving_).index.gather(orbit, around + tolerances_.nudge, near);
 }
 
+void Search::raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const {
+  thread_local std::vector<Index> near;
+  gather(orbit, moving, 0.0, near);
+  raw_pieces(orbit, moving, near, out);
+}
+
 // A moving point meets the fixed side at t; a fixed point meets the moving side as if that stood still, at −t.
 void Search::raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index>& near,
                         std::vector<OrbitPiece>& out) const {
@@ -141,15 +153,12 @@ void Search::raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index
 }
 
 void Search::find_raw() {
-  std::vector<Index> near;
   std::vector<OrbitPiece> pieces;
   for (const bool moving : {true, false}) {
     RawPieces& raw = moving ? raw_moving_ : raw_fixed_;
     raw.first = {0};
     for (const SurfacePoint& at : surface(moving).points()) {
-      const Orbit orbit = frame_.orbit_of(at.p);
-      gather(orbit, moving, 0.0, near);
-      raw_pieces(orbit, moving, near, pieces);
+      raw_pieces(frame_.orbit_of(at.p), moving, pieces);
       raw.pieces.insert(raw.pieces.end(), pieces.begin(), pieces.end());
       raw.first.push_back(raw.pieces.size());
     }
@@ -187,14 +196,7 @@ void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double d
 }
 
 // Overlap wider than δ: orbits moved by δ in eight directions across meet the other side as well.
-void Search::wide_pieces(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& out) const {
-  thread_local std::vector<Index> near;
-  gather(frame_.orbit_of(at.p), moving, tolerances_.across, near);
-  wide_pieces(at, moving, near, out);
-}
-
-void Search::wide_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
-                         std::vector<OrbitPiece>& out) const {
+void Search::keep_wide(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const {
   constexpr double kDiagonal = std::numbers::sqrt2 / 2.0;
   constexpr std::array<std::array<double, 2>, 8> kAcross{{{1, 0},
                                                           {-1, 0},
@@ -206,12 +208,13 @@ void Search::wide_pieces(const SurfacePoint& at, bool moving, const std::vector<
                                                           {-kDiagonal, kDiagonal}}};
   const Orbit orbit = frame_.orbit_of(at.p);
   const double v = frame_.speed(orbit), delta = tolerances_.across;
-  raw_pieces(orbit, moving, near, out);
-  if (out.empty()) return;
+  if (pieces.empty()) return;
   // So near to the axis that δ is a good part of a turn, nothing can be told.
   const double by = kSlope * delta / v;
-  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < 0.5)) return out.clear();
-  Spans wide = dilated(out, by);
+  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < 0.5)) return pieces.clear();
+  Spans wide = dilated(pieces, by);
+  thread_local std::vector<Index> near;
+  gather(orbit, moving, delta, near);
   thread_local std::vector<OrbitPiece> beside;
   for (std::size_t k = 0; k < kAcross.size(); ++k) {
     const std::size_t which = (k + first_across_) % kAcross.size();
@@ -221,9 +224,9 @@ void Search::wide_pieces(const SurfacePoint& at, bool moving, const std::vector<
     wide = intersection(wide, dilated(beside, by));
     if (!wide.empty()) continue;
     first_across_ = which;
-    return out.clear();
+    return pieces.clear();
   }
-  keep_confirmed(out, wide, delta / v);
+  keep_confirmed(pieces, wide, delta / v);
 }
 
 bool Search::holds_start(const OrbitPiece& piece, double v) const {
@@ -243,13 +246,13 @@ void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
   }
 }
 
-void Search::blocked_pieces(const SurfacePoint& at, bool moving, const std::vector<Index>& near,
-                            std::vector<OrbitPiece>& out) const {
+void Search::keep_blocked(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const {
   const double v = speed(at);
-  wide_pieces(at, moving, near, out);
+  keep_wide(at, moving, pieces);
   // Sheets that slide on each other cross at grazing angles.
-  std::erase_if(out, [&](const OrbitPiece& p) { return holds_start(p, v) || (p.sheet != 0 && p.slope_low > kSlope); });
-  clip_at_start(out, v);
+  std::erase_if(pieces,
+                [&](const OrbitPiece& p) { return holds_start(p, v) || (p.sheet != 0 && p.slope_low > kSlope); });
+  clip_at_start(pieces, v);
 }
 
 // Overlap as read is a matter of drawing, not of motion: δ grows until none is left that is wider, as far as it may.
@@ -266,7 +269,8 @@ void Search::settle_tolerance() {
     const auto& points = surface(moving).points();
     for (std::size_t i = 0; i < points.size() && !overlapping_; ++i)
       while (!overlapping_ && is_deep(raw(moving).of(i), points[i])) {
-        wide_pieces(points[i], moving, pieces);
+        pieces.assign(raw(moving).of(i).begin(), raw(moving).of(i).end());
+        keep_wide(points[i], moving, pieces);
         if (!is_deep(pieces, points[i])) break;
         overlapping_ = tolerances_.across >= tolerances_.largest_overlap;
         tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
@@ -290,22 +294,33 @@ void Search::add(const Witness& witness) {
   internal::add_apart_at_0(blocked_, {p.low, p.high});
 }
 
+// Points whose orbits meet most come first: what they tell covers most of what the others could.
+std::vector<Search::PointOf> Search::longest_first() const {
+  std::vector<std::pair<double, PointOf>> all;
+  for (const bool moving : {true, false})
+    for (std::size_t i = 0; i < surface(moving).points().size(); ++i) {
+      double longest = -1.0;
+      for (const OrbitPiece& p : raw(moving).of(i)) longest = std::max(longest, p.high - p.low);
+      if (longest >= 0.0) all.push_back({longest, {i, moving}});
+    }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<PointOf> out;
+  for (const auto& [longest, point] : all) out.push_back(point);
+  return out;
+}
+
 void Search::collect() {
   std::vector<OrbitPiece> pieces;
-  std::vector<Index> near;
-  for (const bool moving : {true, false}) {
-    const auto& points = surface(moving).points();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const SurfacePoint& at = points[i];
-      const auto own = raw(moving).of(i);
-      // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
-      if (std::none_of(own.begin(), own.end(), [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
-        continue;
-      gather(frame_.orbit_of(at.p), moving, tolerances_.across, near);
-      blocked_pieces(at, moving, near, pieces);
-      for (const OrbitPiece& p : pieces)
-        if (adds(p)) add({p, at, moving});
-    }
+  for (const auto& [i, moving] : longest_first()) {
+    const SurfacePoint& at = surface(moving).points()[i];
+    const auto own = raw(moving).of(i);
+    // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
+    if (std::none_of(own.begin(), own.end(), [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
+      continue;
+    pieces.assign(own.begin(), own.end());
+    keep_blocked(at, moving, pieces);
+    for (const OrbitPiece& p : pieces)
+      if (adds(p)) add({p, at, moving});
   }
   for (const Span& sheet : {sheet_below_, sheet_above_})
     if (std::isfinite(sheet.low)) internal::add_apart_at_0(blocked_, sheet);
@@ -316,7 +331,6 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
   constexpr int kDirections = 6, kMostSteps = 400;
   constexpr double kTurn = 0.4;  // rad; from pattern to pattern, so that the directions do not stay the same
   std::vector<OrbitPiece> pieces;
-  std::vector<Index> near;
   const SampledSurface& over = surface(best.moving);
   const double finest = 0.1 * tolerances_.across;
   double step = over.spacing();
@@ -332,11 +346,9 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
       const auto improves = [&](const OrbitPiece& p) {
         return low ? p.low < best.piece.low && p.high > gap.low : p.high > best.piece.high && p.low < gap.high;
       };
-      const Orbit orbit = frame_.orbit_of(next.p);
-      gather(orbit, best.moving, tolerances_.across, near);
-      raw_pieces(orbit, best.moving, near, pieces);
+      raw_pieces(frame_.orbit_of(next.p), best.moving, pieces);
       if (std::none_of(pieces.begin(), pieces.end(), improves)) continue;
-      blocked_pieces(next, best.moving, near, pieces);
+      keep_blocked(next, best.moving, pieces);
       for (const OrbitPiece& p : pieces)
         if (improves(p) && (low ? p.low > gap.low : p.high < gap.high)) {
           best = {p, next, best.moving};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <utility>
 
 namespace limber {
@@ -13,6 +15,7 @@ struct Piece {
   double radius;  ///< about its centre
   Index triangle;
   std::array<Vec3, 3> corner;  ///< barycentric
+  double distance;             ///< the nearest place that counts is no further from the centre
 
   Vec3 centre() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
   /// Of the whole triangle's area.
@@ -26,10 +29,12 @@ struct Piece {
 /// Cuts a surface down to what may matter: halves triangles, the largest first, and drops pieces on the way.
 class NearPart {
  public:
-  /// Whether some of a piece of this triangle, within this radius of the centre, may matter.
-  using Keep = std::function<bool(Index triangle, const Vec3& centre, double radius)>;
+  /// The distance from this point of this triangle to some place, of those that count, within a limit, if there is one.
+  using SomePlace = std::function<std::optional<double>(Index triangle, const Vec3& from, double limit)>;
 
-  NearPart(const SmoothSurface& surface, Keep keep) : surface_(surface), keep_(std::move(keep)) {}
+  /// @param reach what matters has a place that counts within this distance
+  NearPart(const SmoothSurface& surface, double reach, SomePlace some_place)
+      : surface_(surface), reach_(reach), some_place_(std::move(some_place)) {}
 
   /// Pieces in the order of their triangles, until most of their area matters, there are `most`, or the largest has the
   /// radius `finest`. @param box what matters lies in it
@@ -39,7 +44,7 @@ class NearPart {
       for (const Index v : surface_.mesh().triangles[t])
         own.extend(surface_.mesh().vertices[static_cast<std::size_t>(v)]);
       if (!box.intersects(own)) continue;
-      push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}});
+      push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, kUnknown});
     }
     constexpr std::size_t kFirstLook = 512;
     for (std::size_t next_look = kFirstLook; !heap_.empty() && heap_.size() < most && heap_.front().first > finest;) {
@@ -64,26 +69,37 @@ class NearPart {
   }
 
  private:
+  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+  /// @param piece `distance` bounds that from its centre
   void push(Piece piece) {
     const Vec3 centre = surface_.point(piece.triangle, piece.centre());
     piece.radius = 0.0;
     for (const Vec3& c : piece.corner)
       piece.radius = std::max(piece.radius, (surface_.point(piece.triangle, c) - centre).norm());
-    if (!keep_(piece.triangle, centre, piece.radius)) return;
+    if (!lies_within(piece, centre, reach_ + piece.radius)) return;
     heap_.emplace_back(piece.radius, pieces_.size());
     std::push_heap(heap_.begin(), heap_.end());
     pieces_.push_back(piece);
   }
 
+  /// Whether a place that counts lies within a limit of the piece's centre. Mostly the bound on the distance tells.
+  bool lies_within(Piece& piece, const Vec3& centre, double limit) const {
+    if (piece.distance <= limit) return true;
+    const std::optional<double> found = some_place_(piece.triangle, centre, limit);
+    if (found) piece.distance = *found;
+    return found.has_value();
+  }
+
   /// Whether smaller pieces would leave out little more: the centres of most matter themselves.
-  bool mostly_matters() const {
+  bool mostly_matters() {
     constexpr double kMost = 0.8;
     double all = 0.0, matters = 0.0;
     for (const auto& [radius, number] : heap_) {
-      const Piece& p = pieces_[number];
+      Piece& p = pieces_[number];
       const double area = p.share() * surface_.area(p.triangle);
       all += area;
-      if (keep_(p.triangle, surface_.point(p.triangle, p.centre()), 0.0)) matters += area;
+      if (lies_within(p, surface_.point(p.triangle, p.centre()), reach_)) matters += area;
     }
     return matters >= kMost * all;
   }
@@ -102,12 +118,15 @@ class NearPart {
     for (const std::size_t replaced : {longest, next}) {
       Piece half = piece;
       half.corner[replaced] = middle;
+      half.distance +=
+          (surface_.point(piece.triangle, half.centre()) - surface_.point(piece.triangle, piece.centre())).norm();
       push(half);
     }
   }
 
   const SmoothSurface& surface_;
-  Keep keep_;
+  double reach_;
+  SomePlace some_place_;
   std::vector<Piece> pieces_;                         ///< all there were
   std::vector<std::pair<double, std::size_t>> heap_;  ///< radius and number in pieces_, the largest first
 };
@@ -196,14 +215,15 @@ void average_patches(std::vector<NearSample>& samples) {
 
 std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
                                      double facing_cosine, int wanted) {
-  const auto may_face = [&](Index triangle, const Vec3& centre, double radius) {
+  const auto facing_place = [&](Index triangle, const Vec3& from, double limit) {
     constexpr double kLooseFacing = -0.5;  // of facets; the smooth normals decide later
-    return other.tree().is_within(centre, reach + radius, surface.tree().normal(triangle), kLooseFacing);
+    return other.tree().some_within(from, limit, surface.tree().normal(triangle), kLooseFacing);
   };
   Eigen::AlignedBox3d box = other.tree().box();
   box.min().array() -= reach;
   box.max().array() += reach;
-  const auto pieces = NearPart(surface, may_face).pieces(box, static_cast<std::size_t>(wanted), 0.25 * reach);
+  const auto pieces =
+      NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted), 0.25 * reach);
 
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
@@ -226,10 +246,11 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
 
 std::vector<NearSample> inside_samples(const SmoothSurface& surface, const SmoothSurface& solid, int wanted) {
   const Eigen::AlignedBox3d& box = solid.tree().box();
-  const auto may_be_inside = [&](Index, const Vec3& centre, double radius) {
-    return box.squaredExteriorDistance(centre) <= radius * radius;
+  const auto box_within = [&](Index, const Vec3& from, double limit) -> std::optional<double> {
+    const double distance = box.exteriorDistance(from);
+    return distance <= limit ? std::optional(distance) : std::nullopt;
   };
-  const auto pieces = NearPart(surface, may_be_inside).pieces(box, static_cast<std::size_t>(wanted), 0.0);
+  const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted), 0.0);
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
     const Vec3 point = surface.point(piece.triangle, barycentric), normal = surface.normal(piece.triangle, barycentric);

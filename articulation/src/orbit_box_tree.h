@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstdint>
 #include <vector>
 
 #include "limber/core/types.h"
@@ -30,8 +32,8 @@ struct OrbitBox {
   }
 };
 
-/// Boxes split at the median. Queries answer with places in order(), which is near in place for what is near in the
-/// plane.
+/// Boxes packed along a Hilbert curve through their centres, eight to a node (Kamel and Faloutsos 1993). Queries answer
+/// with places in order(), ascending; what is near in place is near in the plane.
 class OrbitBoxTree {
  public:
   explicit OrbitBoxTree(const std::vector<OrbitBox>& boxes);
@@ -40,43 +42,60 @@ class OrbitBoxTree {
   const std::vector<Index>& order() const { return order_; }
   const OrbitBox& box(Index place) const { return boxes_[static_cast<std::size_t>(place)]; }
 
-  /// Calls use(place) for each box that overlaps, until it returns true; returns whether it did.
+  /// Calls use(place) for each box that overlaps, to within the rounding of single precision, until it returns true;
+  /// returns whether it did.
   template <class Use>
   bool any_overlapping(const OrbitBox& box, Use&& use) const {
-    if (nodes_.empty() || !nodes_.front().box.overlaps(box)) return false;
-    std::array<Index, 64> stack;  // a tree split at the median is never that deep
-    std::size_t depth = 0;
-    stack[depth++] = 0;
-    const auto visit = [&](Index id) {
-      if (nodes_[static_cast<std::size_t>(id)].box.overlaps(box)) stack[depth++] = id;
+    if (boxes_.empty()) return false;
+    struct Entry {
+      std::size_t level, node;
     };
+    std::array<Entry, kWidth * 12> stack;  // a level leaves seven entries; 8¹¹ boxes are more than an Index counts
+    std::size_t depth = 0;
+    stack[depth++] = {levels_.size() - 1, 0};
+    const Rounded rounded(box);
     while (depth > 0) {
-      const Index id = stack[--depth];
-      const Node& node = nodes_[static_cast<std::size_t>(id)];
-      if (node.right >= 0) {
-        visit(node.right);
-        visit(id + 1);
+      const auto [level, node] = stack[--depth];
+      Lanes lanes = nodes_[levels_[level] + node].overlapping(rounded);
+      if (level > 0) {
+        for (; lanes != 0; lanes &= ~last_of(lanes)) stack[depth++] = {level - 1, kWidth * node + lane(last_of(lanes))};
         continue;
       }
-      for (Index place = node.first; place < node.first + node.count; ++place)
-        if (boxes_[static_cast<std::size_t>(place)].overlaps(box) && use(place)) return true;
+      for (; lanes != 0; lanes &= lanes - 1) {
+        if (use(static_cast<Index>(kWidth * node + lane(lanes)))) return true;
+      }
     }
     return false;
   }
 
  private:
+  static constexpr std::size_t kWidth = 8;
+  using Lanes = std::uint64_t;  ///< a byte each, 0 or 1
+  static std::size_t lane(Lanes first) { return static_cast<std::size_t>(std::countr_zero(first)) / 8; }
+  static Lanes last_of(Lanes lanes) { return std::bit_floor(lanes); }
+
+  /// A box in single precision that holds the one given.
+  struct Rounded {
+    explicit Rounded(const OrbitBox& box);
+    std::array<float, 2> low{}, high{};
+  };
+  /// Eight boxes, of children or as given; those that are not there overlap nothing.
   struct Node {
-    OrbitBox box;
-    Index first = 0, count = 0;  ///< of a leaf
-    Index right = -1;            ///< of an inner node; left is the next node
+    Node();
+    void set(std::size_t lane, const Rounded& box);
+    Rounded around() const;
+    Lanes overlapping(const Rounded& box) const {
+      std::array<unsigned char, kWidth> lanes;
+      for (std::size_t i = 0; i < kWidth; ++i)
+        lanes[i] = static_cast<unsigned char>((low[0][i] <= box.high[0]) & (box.low[0] <= high[0][i]) &
+                                              (low[1][i] <= box.high[1]) & (box.low[1] <= high[1][i]));
+      return std::bit_cast<Lanes>(lanes);
+    }
+    std::array<std::array<float, kWidth>, 2> low, high;
   };
-  struct Entry {
-    OrbitBox box;
-    Index number = 0;
-  };
-  Index build(std::vector<Entry>& entries, Index first, Index count);
 
   std::vector<Node> nodes_;
+  std::vector<std::size_t> levels_;  ///< the first node of each, leaves first, the root last
   std::vector<OrbitBox> boxes_;
   std::vector<Index> order_;
 };

@@ -14,23 +14,43 @@ using Kind = MotionPath::Kind;
 constexpr double kPi = std::numbers::pi;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+/// A vertex in path coordinates.
+struct Corner {
+  Vec3 p;
+  OrbitBox plane;           ///< a point
+  double angle = kUnknown;  ///< about the axis, once it was asked for
+};
+
 /// A triangle in reach, as little of it as tells whether it matters.
 struct Candidate {
   Index body = 0, triangle = 0;
+  Triangle corners{};
 };
 
-/// One body's vertices in path coordinates.
-struct BodyOnPath {
-  std::vector<Vec3> vertices;
-  std::vector<OrbitBox> plane;  ///< a point each
-  std::vector<double> angle;    ///< about the axis, once it was asked for
+/// Numbers for those vertices of a surface that are asked for, without a look at the others.
+class VertexNumbers {
+ public:
+  /// The number given to a vertex before, or that of make(), which is kept. @param vertices how many there are
+  template <class Make>
+  Index number(Index vertex, std::size_t vertices, Make&& make) {
+    if (numbers_.size() < vertices) numbers_.resize(vertices, -1);
+    Index& known = numbers_[static_cast<std::size_t>(vertex)];
+    if (known < 0) known = make(), used_.push_back(vertex);
+    return known;
+  }
+  void forget() {
+    for (const Index v : used_) numbers_[static_cast<std::size_t>(v)] = -1;
+    used_.clear();
+  }
+
+ private:
+  std::vector<Index> numbers_, used_;  ///< −1 where there is none
 };
 
 /// The bodies of one side along a path.
 class SideOnPath {
  public:
-  SideOnPath(const PathFrame& frame, std::span<const OrbitBody> bodies)
-      : frame_(frame), bodies_(bodies), on_path_(bodies.size()) {
+  SideOnPath(const PathFrame& frame, std::span<const OrbitBody> bodies) : frame_(frame), bodies_(bodies) {
     around_.reserve(bodies.size());
     for (const OrbitBody& body : bodies) around_.push_back(frame.box_around(body.box));
   }
@@ -43,8 +63,8 @@ class SideOnPath {
     return out;
   }
 
-  /// Takes the bodies that may come within `reach` to path coordinates. @return the reach of their vertices
-  OrbitBox transform(const OrbitBox& reach);
+  /// The same by the boxes of their clusters of triangles.
+  OrbitBox close_reach(const OrbitBox& reach) const;
 
   /// Finds the triangles that orbits within `reach` can meet.
   void select(const OrbitBox& reach);
@@ -65,6 +85,11 @@ class SideOnPath {
   }
 
  private:
+  /// Calls use(body, box around the orbits, triangles) for clusters that may come within `reach`.
+  template <class Use>
+  void visit(const OrbitBox& reach, Use&& use) const;
+  void add_candidate(Index body, Index triangle, VertexNumbers& numbers, const OrbitBox& reach,
+                     std::vector<OrbitBox>& boxes);
   OrbitFace face_of(const Candidate& candidate);
   void set_sector(OrbitFace& face);
   double angle(const OrbitFace& face, std::size_t corner);
@@ -73,70 +98,82 @@ class SideOnPath {
   const PathFrame& frame_;
   std::span<const OrbitBody> bodies_;
   std::vector<OrbitBox> around_;
-  std::vector<BodyOnPath> on_path_;  ///< without vertices where out of reach
+  std::vector<Corner> corners_;
   std::vector<Candidate> candidates_;
   std::optional<OrbitBoxTree> tree_;
 };
 
-OrbitBox SideOnPath::transform(const OrbitBox& reach) {
-  OrbitBox out;
+template <class Use>
+void SideOnPath::visit(const OrbitBox& reach, Use&& use) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     if (!around_[b].overlaps(reach)) continue;
-    BodyOnPath& body = on_path_[b];
-    const std::vector<Vec3>& points = bodies_[b].surface->vertices;
-    body.vertices.reserve(points.size()), body.plane.reserve(points.size());
-    for (const Vec3& p : points) {
-      body.vertices.push_back(frame_.to_path(p));
-      body.plane.push_back(frame_.plane_point(body.vertices.back()));
-      out.add(body.plane.back());
-    }
-    if (frame_.kind() != Kind::kTranslation) body.angle.assign(points.size(), kUnknown);
+    OrbitBox around;
+    bodies_[b].clusters->visit(
+        [&](const Eigen::AlignedBox3d& box) {
+          around = frame_.box_around(box);
+          return around.overlaps(reach);
+        },
+        [&](std::span<const Index> triangles) { use(static_cast<Index>(b), around, triangles); });
   }
-  if (frame_.kind() != Kind::kTranslation) out.low[0] = 0.0;  // faces pass nearer to the axis than their corners
-  if (frame_.kind() == Kind::kScrew) out.low[1] = -1e300, out.high[1] = 1e300;
+}
+
+OrbitBox SideOnPath::close_reach(const OrbitBox& reach) const {
+  OrbitBox out;
+  visit(reach, [&](Index, const OrbitBox& around, std::span<const Index>) { out.add(around); });
   return out;
 }
 
 void SideOnPath::select(const OrbitBox& reach) {
+  thread_local VertexNumbers numbers;
   std::vector<OrbitBox> boxes;
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    const BodyOnPath& body = on_path_[b];
-    if (body.vertices.empty()) continue;
-    for (std::size_t t = 0; t < bodies_[b].triangles(); ++t) {
-      const auto& [i, j, k] = bodies_[b].triangle(t);
-      OrbitBox box = body.plane[static_cast<std::size_t>(i)];
-      box.add(body.plane[static_cast<std::size_t>(j)]), box.add(body.plane[static_cast<std::size_t>(k)]);
-      if (frame_.kind() != Kind::kTranslation) box.low[0] = 0.0;
-      if (!box.overlaps(reach)) continue;
-      const Candidate candidate{static_cast<Index>(b), static_cast<Index>(t)};
-      if (frame_.kind() == Kind::kScrew) {
-        add_helices(candidate, boxes);
-        continue;
-      }
-      if (frame_.kind() == Kind::kRotation)
-        box.low[0] =
-            least_radius(body.vertices[static_cast<std::size_t>(i)], body.vertices[static_cast<std::size_t>(j)],
-                         body.vertices[static_cast<std::size_t>(k)]);
-      if (!box.overlaps(reach)) continue;
-      candidates_.push_back(candidate);
-      boxes.push_back(box);
-    }
-  }
+  Index last = -1;
+  visit(reach, [&](Index body, const OrbitBox&, std::span<const Index> triangles) {
+    if (body != last) numbers.forget();
+    last = body;
+    for (const Index t : triangles) add_candidate(body, t, numbers, reach, boxes);
+  });
+  numbers.forget();
   tree_.emplace(boxes);
+}
+
+void SideOnPath::add_candidate(Index body, Index triangle, VertexNumbers& numbers, const OrbitBox& reach,
+                               std::vector<OrbitBox>& boxes) {
+  const OrbitBody& of = bodies_[static_cast<std::size_t>(body)];
+  const std::vector<Vec3>& vertices = of.surface->vertices;
+  Candidate candidate{body, triangle};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Index v = of.triangle(static_cast<std::size_t>(triangle))[i];
+    candidate.corners[i] = numbers.number(v, vertices.size(), [&] {
+      const Vec3 p = frame_.to_path(vertices[static_cast<std::size_t>(v)]);
+      corners_.push_back({p, frame_.plane_point(p)});
+      return static_cast<Index>(corners_.size() - 1);
+    });
+  }
+  const auto corner = [&](std::size_t i) -> const Corner& {
+    return corners_[static_cast<std::size_t>(candidate.corners[i])];
+  };
+  OrbitBox box = corner(0).plane;
+  box.add(corner(1).plane), box.add(corner(2).plane);
+  if (frame_.kind() != Kind::kTranslation) box.low[0] = 0.0;  // faces pass nearer to the axis than their corners
+  if (frame_.kind() == Kind::kScrew) return add_helices(candidate, boxes);
+  if (!box.overlaps(reach)) return;
+  if (frame_.kind() == Kind::kRotation) box.low[0] = least_radius(corner(0).p, corner(1).p, corner(2).p);
+  if (!box.overlaps(reach)) return;
+  candidates_.push_back(candidate);
+  boxes.push_back(box);
 }
 
 OrbitFace SideOnPath::face_of(const Candidate& candidate) {
   const OrbitBody& body = bodies_[static_cast<std::size_t>(candidate.body)];
   const auto number = static_cast<std::size_t>(candidate.triangle);
-  const BodyOnPath& on_path = on_path_[static_cast<std::size_t>(candidate.body)];
   OrbitFace f;
   f.body = candidate.body;
   f.triangle = candidate.triangle;
   f.cap = number >= body.surface->triangles.size();
   f.flipped = body.inside_out;
-  for (std::size_t i = 0; i < 3; ++i)
-    f.corners[i] = on_path.vertices[static_cast<std::size_t>(body.triangle(number)[i])];
-  if (f.flipped) std::swap(f.corners[1], f.corners[2]);
+  f.vertices = candidate.corners;
+  if (f.flipped) std::swap(f.vertices[1], f.vertices[2]);
+  for (std::size_t i = 0; i < 3; ++i) f.corners[i] = corners_[static_cast<std::size_t>(f.vertices[i])].p;
   f.normal = (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).stableNormalized();
   f.offset = f.normal.dot(f.corners[0]);
   f.across = f.normal.tail<2>().norm();
@@ -149,9 +186,7 @@ OrbitFace SideOnPath::face_of(const Candidate& candidate) {
 }
 
 double SideOnPath::angle(const OrbitFace& face, std::size_t corner) {
-  const auto b = static_cast<std::size_t>(face.body);
-  const Triangle& t = bodies_[b].triangle(static_cast<std::size_t>(face.triangle));
-  double& known = on_path_[b].angle[static_cast<std::size_t>(t[face.flipped && corner > 0 ? 3 - corner : corner])];
+  double& known = corners_[static_cast<std::size_t>(face.vertices[corner])].angle;
   if (std::isnan(known)) known = std::atan2(face.corners[corner].z(), face.corners[corner].y());
   return known;
 }
@@ -236,6 +271,7 @@ OrbitBody orbit_body(const MotionBody& body) {
     out.inside_out = enclosed_volume(with_caps) < 0.0;
   }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
+  out.clusters = std::make_shared<const TriangleClusters>(*body.surface, body.caps);
   out.sharp = std::make_shared<const std::vector<SharpEdge>>(sharp_edges(*body.surface));
   return out;
 }
@@ -252,7 +288,7 @@ std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const 
   SideOnPath a(frame, moving), b(frame, fixed);
   const OrbitBox everywhere{{-kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere}};
   const OrbitBox near_a = b.rough_reach(grown(a.rough_reach(everywhere)));
-  const OrbitBox reach_a = a.transform(grown(near_a)), reach_b = b.transform(grown(reach_a));
+  const OrbitBox reach_a = a.close_reach(grown(near_a)), reach_b = b.close_reach(grown(reach_a));
   a.select(grown(reach_b));
   b.select(grown(reach_a));
   const double turn = frame.kind() == Kind::kScrew ? 2.0 * kPi * std::abs(frame.pitch()) : 0.0;

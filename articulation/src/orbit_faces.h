@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "path_frame.h"
+#include "triangle_clusters.h"
 
 namespace limber::internal {
 
@@ -26,6 +27,7 @@ struct OrbitBody {
   Eigen::AlignedBox3d box{};
   std::span<const Triangle> caps{};                       ///< over small holes
   std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
+  std::shared_ptr<const TriangleClusters> clusters{};     ///< of all triangles, with caps; copies share them
 
   std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
   const Triangle& triangle(std::size_t i) const {
@@ -40,6 +42,7 @@ struct OrbitFace {
   Vec3 normal;                         ///< outward, unit; 0 without an area
   double offset = 0.0;                 ///< normal · corner
   double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
+  Triangle vertices{};                 ///< of the corners, numbered over all faces of a side
   Index body = 0, triangle = 0;
   bool cap = false;                             ///< over a hole: solid behind it, and no surface
   bool flipped = false;                         ///< the second and third corner have changed places

@@ -43,20 +43,23 @@ OrbitIndex::OrbitIndex(const PathFrame& frame, std::span<const OrbitBody> bodies
     : frame_(frame), tree_(boxes_of(faces)) {
   for (const OrbitBody& body : bodies) closed_.push_back(body.closed);
   faces_.reserve(faces.size());
-  for (const Index number : tree_.order()) faces_.emplace_back(faces[static_cast<std::size_t>(number)]);
+  for (const Index number : tree_.order()) faces_.emplace_back(faces[static_cast<std::size_t>(number)], frame.kind());
 }
 
-OrbitIndex::Face::Face(const OrbitFace& face)
+OrbitIndex::Face::Face(const OrbitFace& face, Kind kind)
     : plane{face.normal, face.offset},
+      low(face.across * face.cosine_low),
+      high(face.across * face.cosine_high),
       across(face.across),
       heading(face.heading),
-      cosine_low(face.cosine_low),
-      cosine_high(face.cosine_high),
       bearing(face.bearing),
       sector(face.sector),
       body(face.body) {
   for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3 &a = face.corners[i], inward = face.normal.cross(face.corners[(i + 1) % 3] - a);
+    const Vec3& a = face.corners[i];
+    Vec3 inward = face.normal.cross(face.corners[(i + 1) % 3] - a);
+    if (kind == Kind::kTranslation)
+      inward = std::copysign(1.0, face.normal.x()) * Vec3::UnitX().cross(face.corners[(i + 1) % 3] - a);
     sides[i] = {inward, inward.dot(a)};
   }
   std::tie(low_x, high_x) = std::minmax({face.corners[0].x(), face.corners[1].x(), face.corners[2].x()});
@@ -84,23 +87,22 @@ void OrbitIndex::gather(const Orbit& orbit, double around, std::vector<Index>& n
 
 void OrbitIndex::crossings(const Orbit& orbit, const std::vector<Index>& near, std::vector<Crossing>& out) const {
   out.clear();
-  const OrbitBox point = frame_.box_of(orbit);
-  for (const Index face : near)
-    if (tree_.box(face).overlaps(point)) cross(faces_[static_cast<std::size_t>(face)], orbit, out);
+  switch (frame_.kind()) {
+    case Kind::kRotation:
+      for (const Index face : near) cross_circle(faces_[static_cast<std::size_t>(face)], orbit, out);
+      break;
+    case Kind::kTranslation:
+      for (const Index face : near) cross_line(faces_[static_cast<std::size_t>(face)], orbit, out);
+      break;
+    case Kind::kScrew: {
+      const OrbitBox point = frame_.box_of(orbit);
+      for (const Index face : near)
+        if (tree_.box(face).overlaps(point)) cross_helix(faces_[static_cast<std::size_t>(face)], orbit, out);
+    }
+  }
   std::sort(out.begin(), out.end(), [](const Crossing& a, const Crossing& b) {
     return std::tie(a.body, a.t, a.sign) < std::tie(b.body, b.t, b.sign);
   });
-}
-
-void OrbitIndex::cross(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const {
-  switch (frame_.kind()) {
-    case Kind::kRotation:
-      return cross_circle(face, orbit, out);
-    case Kind::kTranslation:
-      return cross_line(face, orbit, out);
-    case Kind::kScrew:
-      return cross_helix(face, orbit, out);
-  }
 }
 
 // Plane n·q = c with q = (x, r cos θ, r sin θ):  r h cos(θ − β) = c − n_x x,  h = |(n_y, n_z)|, β its angle. Most faces
@@ -109,9 +111,10 @@ void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<
   constexpr double kAlong = 1e-9;  // sine of the angle below which the circle runs along the plane
   const auto [r, x] = orbit.plane;
   const Vec3& n = face.plane.normal;
+  const double distance = face.plane.offset - n.x() * x;
+  if ((distance < r * face.low) | (distance > r * face.high)) return;
   if (!(face.across > kAlong) || !(r > 0.0)) return;
-  const double cosine = (face.plane.offset - n.x() * x) / (r * face.across);
-  if (!(cosine >= face.cosine_low && cosine <= face.cosine_high)) return;
+  const double cosine = std::clamp(distance / (r * face.across), -1.0, 1.0);
   const double sine = std::sqrt(std::max(1.0 - cosine * cosine, 0.0)), to_plane = r / face.across;
   for (const int side : {-1, 1}) {
     const double s = side * sine;
@@ -127,8 +130,9 @@ void OrbitIndex::cross_line(const Face& face, const Orbit& orbit, std::vector<Cr
   const Vec3& n = face.plane.normal;
   if (!(std::abs(n.x()) > kAlong)) return;
   const auto [y, z] = orbit.plane;
+  if (!face.holds({0.0, y, z})) return;
   const double x = (face.plane.offset - n.y() * y - n.z() * z) / n.x();
-  if (face.holds({x, y, z})) out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x())});
+  out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x())});
 }
 
 // The same plane along x = x₀ + pitch t:  f(t) = r h cos(θ₀ + t − β) + n_x pitch t + n_x x₀ − c. Between the zeros of

@@ -42,16 +42,17 @@ class OrbitIndex {
     double offset = 0.0;
     double height(const Vec3& p) const { return normal.dot(p) - offset; }
   };
-  /// What it takes to cross a face.
-  struct Face {
-    explicit Face(const OrbitFace& face);
+  /// What it takes to cross a face; what tells that a circle misses it lies in one line of the cache.
+  struct alignas(64) Face {
+    Face(const OrbitFace& face, MotionPath::Kind kind);
     /// Whether a point of the plane lies inside the triangle; on a side counts.
     bool holds(const Vec3& p) const {
-      return sides[0].height(p) >= 0.0 && sides[1].height(p) >= 0.0 && sides[2].height(p) >= 0.0;
+      return (sides[0].height(p) >= 0.0) & (sides[1].height(p) >= 0.0) & (sides[2].height(p) >= 0.0);
     }
     Plane plane;
-    double across, heading, cosine_low, cosine_high;  ///< see OrbitFace
-    std::array<Plane, 3> sides;                       ///< across the face, inward
+    double low, high;            ///< of `across` times the cosine of θ − heading
+    double across, heading;      ///< see OrbitFace
+    std::array<Plane, 3> sides;  ///< across the face, inward; for translations across the orbit plane
     double bearing, sector, low_x, high_x;
     Index body;
   };
@@ -63,7 +64,6 @@ class OrbitIndex {
   };
 
   void crossings(const Orbit& orbit, const std::vector<Index>& near, std::vector<Crossing>& out) const;
-  void cross(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const;
   void cross_circle(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const;
   void cross_line(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const;
   void cross_helix(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const;

@@ -49,39 +49,30 @@ std::size_t at_measure(const std::vector<double>& sums, double measure) {
 SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count)
     : faces_(std::move(faces)) {
   if (faces_.empty()) return;
-  number_vertices(bodies);
+  find_faces_around();
   add_face_points(count);
   add_edge_points(sharp_edges(bodies), std::max(count / 2, 1));
 }
 
-void SampledSurface::number_vertices(std::span<const OrbitBody> bodies) {
-  std::vector<Index> base(bodies.size() + 1, 0);  // of bodies without faces no vertex is numbered
-  for (const auto& f : faces_)
-    base[static_cast<std::size_t>(f.body) + 1] =
-        static_cast<Index>(bodies[static_cast<std::size_t>(f.body)].surface->vertices.size());
-  std::partial_sum(base.begin(), base.end(), base.begin());
-  vertices_.reserve(faces_.size());
-  for (const auto& f : faces_) {
-    Triangle v = bodies[static_cast<std::size_t>(f.body)].triangle(static_cast<std::size_t>(f.triangle));
-    for (Index& i : v) i += base[static_cast<std::size_t>(f.body)];
-    vertices_.push_back(v);
-  }
-  first_around_.assign(static_cast<std::size_t>(base.back()) + 1, 0);
-  for (const Triangle& t : vertices_)
-    for (const Index v : t) ++first_around_[static_cast<std::size_t>(v) + 1];
+void SampledSurface::find_faces_around() {
+  Index vertices = 0;
+  for (const OrbitFace& f : faces_)
+    vertices = std::max(vertices, *std::max_element(f.vertices.begin(), f.vertices.end()) + 1);
+  first_around_.assign(static_cast<std::size_t>(vertices) + 1, 0);
+  for (const OrbitFace& f : faces_)
+    for (const Index v : f.vertices) ++first_around_[static_cast<std::size_t>(v) + 1];
   std::partial_sum(first_around_.begin(), first_around_.end(), first_around_.begin());
-  around_.resize(3 * vertices_.size());
+  around_.resize(3 * faces_.size());
   std::vector<Index> next(first_around_.begin(), first_around_.end() - 1);
-  for (std::size_t f = 0; f < vertices_.size(); ++f)
-    for (const Index v : vertices_[f])
+  for (std::size_t f = 0; f < faces_.size(); ++f)
+    for (const Index v : faces_[f].vertices)
       around_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
 }
 
 Vec3 SampledSurface::corner(Index face, Index vertex) const {
-  const Triangle& v = vertices_[static_cast<std::size_t>(face)];
-  const auto found = static_cast<std::size_t>(std::find(v.begin(), v.end(), vertex) - v.begin());
   const OrbitFace& f = faces_[static_cast<std::size_t>(face)];
-  return f.corners[f.flipped && found > 0 ? 3 - found : found];
+  return f
+      .corners[static_cast<std::size_t>(std::find(f.vertices.begin(), f.vertices.end(), vertex) - f.vertices.begin())];
 }
 
 std::vector<SampledSurface::Edge> SampledSurface::sharp_edges(std::span<const OrbitBody> bodies) const {
@@ -90,12 +81,17 @@ std::vector<SampledSurface::Edge> SampledSurface::sharp_edges(std::span<const Or
     if (faces_[f].cap) continue;
     const OrbitBody& body = bodies[static_cast<std::size_t>(faces_[f].body)];
     const Triangle& own = body.triangle(static_cast<std::size_t>(faces_[f].triangle));
-    const Index base = vertices_[f][0] - own[0];
+    const auto number = [&](Index vertex) {
+      const auto i = static_cast<std::size_t>(std::find(own.begin(), own.end(), vertex) - own.begin());
+      return faces_[f].vertices[faces_[f].flipped && i > 0 ? 3 - i : i];
+    };
     const auto& edges = *body.sharp;
     for (auto e = std::lower_bound(edges.begin(), edges.end(), faces_[f].triangle,
                                    [](const SharpEdge&x, Index triangle) { return x.triangle < triangle; });
-         e != edges.end() && e->triangle == faces_[f].triangle; ++e)
-      sharp.push_back({base + e->a, base + e->b, static_cast<Index>(f)});
+         e != edges.end() && e->triangle == faces_[f].triangle; ++e) {
+      const auto [a, b] = std::minmax({number(e->a), number(e->b)});
+      sharp.push_back({a, b, static_cast<Index>(f)});
+    }
   }
   std::sort(sharp.begin(), sharp.end(),
             [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.face) < std::tie(y.a, y.b, y.face); });
@@ -152,7 +148,7 @@ SurfacePoint SampledSurface::walk(const SurfacePoint& start, const Vec3& target)
   SurfacePoint here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
   for (int step = 0; step < kMostFaces; ++step) {
     SurfacePoint best = here;
-    for (const Index v : vertices_[static_cast<std::size_t>(here.face)])
+    for (const Index v : faces_[static_cast<std::size_t>(here.face)].vertices)
       for (Index k = first_around_[v]; k < first_around_[v + 1]; ++k) {
         const Index f = around_[static_cast<std::size_t>(k)];
         const Vec3 p = nearest_point(faces_[static_cast<std::size_t>(f)], target);

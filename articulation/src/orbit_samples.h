@@ -32,11 +32,11 @@ class SampledSurface {
 
  private:
   struct Edge {
-    Index a = 0, b = 0;  ///< joint vertex numbers, a < b
+    Index a = 0, b = 0;  ///< as OrbitFace numbers vertices, a < b
     Index face = 0;
   };
 
-  void number_vertices(std::span<const OrbitBody> bodies);
+  void find_faces_around();
   std::vector<Edge> sharp_edges(std::span<const OrbitBody> bodies) const;
   void add_face_points(int count);
   void add_edge_points(const std::vector<Edge>& edges, int count);
@@ -44,7 +44,6 @@ class SampledSurface {
   Vec3 corner(Index face, Index vertex) const;
 
   std::vector<OrbitFace> faces_;
-  std::vector<Triangle> vertices_;            ///< per face, numbers of its corners over all bodies
   std::vector<Index> first_around_, around_;  ///< faces around each vertex
   std::vector<SurfacePoint> points_;
   double spacing_ = 0.0;

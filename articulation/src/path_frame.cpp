@@ -99,7 +99,7 @@ OrbitBox PathFrame::box_around(const Eigen::AlignedBox3d& box) const {
     for (const double side : {-1.0, 1.0}) out.add(centre.y() + side * half.y(), centre.z() + side * half.z());
     return out;
   }
-  const double middle = std::hypot(centre.y(), centre.z()), around = std::hypot(half.y(), half.z());
+  const double middle = centre.tail<2>().norm(), around = half.tail<2>().norm();
   for (const double side : {-1.0, 1.0})
     out.add(std::max(middle + side * around, 0.0), kind_ == Kind::kScrew ? side * 1e300 : centre.x() + side * half.x());
   return out;

@@ -158,11 +158,12 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& p, double limit, const V
   return best;
 }
 
-bool TriangleTree::is_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const {
-  bool found = false;
+std::optional<double> TriangleTree::some_within(const Vec3& p, double limit, const Vec3& direction,
+                                                double cosine) const {
+  std::optional<double> found;
   double squared_limit = limit * limit;
   search(p, squared_limit, direction, cosine, [&](const Placed&, const Vec3&, const Vec3&, double squared) {
-    found = squared <= squared_limit;
+    if (squared <= squared_limit) found = std::sqrt(squared);
     return !found;
   });
   return found;

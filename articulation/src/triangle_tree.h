@@ -1,6 +1,7 @@
 /// Nearest points of a triangulated surface. Private to the module.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,8 +26,8 @@ class TriangleTree {
   /// The nearest point within `limit` on a triangle whose unit normal m has direction·m ≤ cosine.
   Nearest nearest(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
 
-  /// Whether there is one. Quicker than looking for the nearest.
-  bool is_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
+  /// The distance of some such point, if there is one. Quicker than looking for the nearest.
+  std::optional<double> some_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
 
   /// How often the surface winds around p, by a ray; of one that its caps close 1 inside and 0 outside.
   int winding(const Vec3& p) const;
