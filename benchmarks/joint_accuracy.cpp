@@ -1,16 +1,20 @@
 // joint_accuracy: how often joints are read right, and how well.
 //   run:  build/release/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
 //         build/release/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
-//         build/release/bin/joint_accuracy --limits [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/release/bin/joint_accuracy --limits [--samples N] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/release/bin/joint_accuracy --change [--only ASSEMBLY]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose. With --limits instead: the
-//         ranges of motion of all joints whose type was read right and whose range is known on paper
+//         ranges of motion of all joints whose type was read right and whose range is known on paper. With --change: by
+//         how much axes turn when the same parts are moved, scaled or reordered
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <functional>
 #include <map>
 #include <numbers>
 
@@ -98,7 +102,8 @@ struct RangeTotals {
 };
 
 /// Per class of variants and type of joint: how many ranges are right within 1 degree or a thousandth of the diagonal.
-int run_limits(const DetectionOptions& options, bool verbose, const std::string& only, const std::string& group_text) {
+int run_limits(const DetectionOptions& options, const RangeOptions& ranges, bool verbose, const std::string& only,
+               const std::string& group_text) {
   TbbJobs jobs;
   for (const auto* names : {&tuning_names(), &held_out_names()}) {
     std::printf("%s\n%-34s %-12s %5s %7s %9s %12s\n", names == &tuning_names() ? "tuning" : "held out", "variants",
@@ -109,7 +114,7 @@ int run_limits(const DetectionOptions& options, bool verbose, const std::string&
       for (const std::string& name : *names) {
         if (!only.empty() && only != name) continue;
         for (const Variant& variant : group.variants)
-          for (const RangeScore& r : scored_ranges(make(name, variant), options, jobs)) {
+          for (const RangeScore& r : scored_ranges(make(name, variant), options, jobs, ranges)) {
             if (!group.with_balls && r.type == static_cast<int>(JointType::kBall)) continue;
             RangeTotals& totals = by_type[r.type];
             ++totals.all;
@@ -126,6 +131,43 @@ int run_limits(const DetectionOptions& options, bool verbose, const std::string&
                     100.0 * t.right / t.all, t.degrees, t.thousandths);
       std::fflush(stdout);
     }
+  }
+  return 0;
+}
+
+/// What moving, scaling and reordering changes, of the types and axes that are found: against the unmoved variant, and
+/// not against the truth.
+int run_change(const DetectionOptions& options, const std::string& only) {
+  TbbJobs jobs;
+  struct Kind {
+    const char* name;
+    std::function<void(Variant&)> change;
+  };
+  const Mat3 rotation = Eigen::AngleAxisd(2.1, Vec3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
+  const std::vector<Kind> kinds = {
+      {"rotated and shifted", [&](Variant& v) { v.rotation = rotation, v.translation = Vec3(3, 6, -3); }},
+      {"scaled by 1e-3", [](Variant& v) { v.scale = 1e-3; }},
+      {"scaled by 1e3", [](Variant& v) { v.scale = 1e3; }},
+      {"parts swapped", [](Variant& v) { v.swapped = true; }},
+      {"faces shuffled", [](Variant& v) { v.shuffled = true; }}};
+  std::printf("%-22s %6s %8s %14s  %s\n", "change", "joints", "types", "axis turns deg", "where");
+  for (const Kind& kind : kinds) {
+    Change all;
+    for (const auto* names : {&tuning_names(), &held_out_names()})
+      for (const std::string& name : *names) {
+        if (!only.empty() && only != name) continue;
+        for (const int segments : {16, 32})
+          for (const double clearance : {0.0, 0.005, 0.02}) {
+            Variant still{.segments = segments, .clearance = clearance}, moved = still;
+            kind.change(moved);
+            const Change here = change_of_joints(make(name, still), make(name, moved), moved.rotation, options, jobs);
+            all.joints += here.joints;
+            all.types += here.types;
+            if (here.axis > all.axis) all.axis = here.axis, all.worst = name + ": " + here.worst;
+          }
+      }
+    std::printf("%-22s %6d %8d %14.5f  %s\n", kind.name, all.joints, all.types, all.axis, all.worst.c_str());
+    std::fflush(stdout);
   }
   return 0;
 }
@@ -171,7 +213,8 @@ int time_large() {
 
 int main(int argc, char** argv) {
   limber::DetectionOptions options;
-  bool verbose = false, limits = false;
+  limber::RangeOptions ranges;
+  bool verbose = false, limits = false, change = false;
   std::string only, group_text;
   for (int i = 1; i < argc; ++i) {
     const std::string_view arg = argv[i];
@@ -180,6 +223,10 @@ int main(int argc, char** argv) {
       verbose = true;
     else if (arg == "--limits")
       limits = true;
+    else if (arg == "--change")
+      change = true;
+    else if (arg == "--samples" && i + 1 < argc)
+      ranges.motion.samples = std::atoi(argv[++i]);
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
     else if (arg == "--contacts" && i + 1 < argc && std::string_view(argv[i + 1]) == "hulls")
@@ -189,12 +236,15 @@ int main(int argc, char** argv) {
     else if (arg == "--class" && i + 1 < argc)
       group_text = argv[++i];
     else
-      return std::fprintf(stderr,
-                          "joint_accuracy: seen \"%s\", expected --limits, --verbose, --only ASSEMBLY, --class TEXT, "
-                          "--contacts NAME or --method NAME\n",
-                          argv[i]),
+      return std::fprintf(
+                 stderr,
+                 "joint_accuracy: seen \"%s\", expected --limits, --change, --samples N, --verbose, --only ASSEMBLY, "
+                 "--class TEXT, "
+                 "--contacts NAME or --method NAME\n",
+                 argv[i]),
              2;
   }
-  if (limits) return limber::assemblies::run_limits(options, verbose, only, group_text);
+  if (change) return limber::assemblies::run_change(options, only);
+  if (limits) return limber::assemblies::run_limits(options, ranges, verbose, only, group_text);
   return limber::assemblies::run(options, verbose, only, group_text);
 }

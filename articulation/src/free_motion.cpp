@@ -54,6 +54,8 @@ struct Witness {
 };
 
 struct Tolerances {
+  double least = 0.0;            ///< δ to start with, length
+  double facets = 0.0;           ///< what δ is more because of facets, length
   double across = 0.0;           ///< δ, length
   double largest_overlap = 0.0;  ///< length
   double nudge = 0.0;            ///< length, far below both
@@ -69,6 +71,8 @@ class Search {
   FreeMotion run() {
     find_raw();
     settle_tolerance();
+    // What lies facet on facet as read comes to lie corner on facet.
+    tolerances_.across = std::min(tolerances_.across + tolerances_.facets, tolerances_.largest_overlap);
     collect();
     refine();
     return result();
@@ -111,7 +115,11 @@ class Search {
   void keep_blocked(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const;
   void clip_at_start(std::vector<OrbitPiece>& pieces, double speed) const;
   bool holds_start(const OrbitPiece& piece, double speed) const;
-  Witness descend(Witness start, bool low, const Span& gap) const;
+  template <class PiecesOf>
+  Witness downhill(Witness start, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const;
+  Witness first_blocked(const Witness& seed, bool low, const Span& gap) const;
+  Witness first_touching(const Witness& blocked, bool low, const Span& gap) const;
+  bool stands_against(const SurfacePoint& at, bool moving) const;
   void refine_end(Span& span, bool low, const Span& gap, std::size_t seeds, Witness& end);
   MotionStop stop_of(const Witness& witness) const;
   double speed(const SurfacePoint& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
@@ -259,7 +267,7 @@ void Search::keep_blocked(const SurfacePoint& at, bool moving, std::vector<Orbit
 // What is wide at one δ is wide at all smaller ones, so each point is asked at the δ that those before it left.
 void Search::settle_tolerance() {
   if (tolerances_.across >= tolerances_.largest_overlap) return;
-  constexpr double kGrowth = 1.5;
+  constexpr double kGrowth = 1.25;
   std::vector<OrbitPiece> pieces;
   const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfacePoint& at) {
     const double v = speed(at);
@@ -327,12 +335,12 @@ void Search::collect() {
 }
 
 // Over the surface downhill: the point whose orbit is blocked first, by a pattern of steps that halve where none helps.
-Witness Search::descend(Witness best, bool low, const Span& gap) const {
+template <class PiecesOf>
+Witness Search::downhill(Witness best, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const {
   constexpr int kDirections = 6, kMostSteps = 400;
   constexpr double kTurn = 0.4;  // rad; from pattern to pattern, so that the directions do not stay the same
-  std::vector<OrbitPiece> pieces;
   const SampledSurface& over = surface(best.moving);
-  const double finest = 0.1 * tolerances_.across;
+  std::vector<OrbitPiece> pieces;
   double step = over.spacing();
   int steps = 0;
   for (int level = 0; step > finest && steps < kMostSteps; ++level) {
@@ -346,9 +354,7 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
       const auto improves = [&](const OrbitPiece& p) {
         return low ? p.low < best.piece.low && p.high > gap.low : p.high > best.piece.high && p.low < gap.high;
       };
-      raw_pieces(frame_.orbit_of(next.p), best.moving, pieces);
-      if (std::none_of(pieces.begin(), pieces.end(), improves)) continue;
-      keep_blocked(next, best.moving, pieces);
+      pieces_of(next, improves, pieces);
       for (const OrbitPiece& p : pieces)
         if (improves(p) && (low ? p.low > gap.low : p.high < gap.high)) {
           best = {p, next, best.moving};
@@ -358,6 +364,41 @@ Witness Search::descend(Witness best, bool low, const Span& gap) const {
     if (!better) step *= 0.5;
   }
   return best;
+}
+
+Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) const {
+  const double finest = 0.1 * tolerances_.across;
+  return downhill(seed, low, gap, finest, [&](const SurfacePoint& next, auto&& improves, std::vector<OrbitPiece>& out) {
+    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
+    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
+    keep_blocked(next, seed.moving, out);
+  });
+}
+
+// A blocked point has the other body all around it, to a distance δ. What belongs to the same overlap may meet it
+// before: the surface within δ of the point, where both surfaces stand against the motion rather than along it.
+Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap) const {
+  const double finest = 0.05 * tolerances_.least, delta = tolerances_.across;
+  const Orbit centre = frame_.orbit_of(blocked.point.p);
+  // Two surfaces as steep as stops may be explain no more than this.
+  const double earlier = 2.0 * kSlope * delta / frame_.speed(centre);
+  const double from = blocked.piece.low - earlier, to = blocked.piece.high + earlier;
+  return downhill(blocked, low, gap, finest, [&](const SurfacePoint& next, auto&&, std::vector<OrbitPiece>& out) {
+    const Orbit orbit = frame_.orbit_of(next.p);
+    out.clear();
+    if (std::hypot(orbit.plane[0] - centre.plane[0], orbit.plane[1] - centre.plane[1]) > delta) return;
+    if (!stands_against(next, blocked.moving)) return;
+    raw_pieces(orbit, blocked.moving, out);
+    std::erase_if(out, [&](const OrbitPiece& p) {
+      return low ? p.slope_low > kSlope || p.low < from : p.slope_high > kSlope || p.high > to;
+    });
+  });
+}
+
+bool Search::stands_against(const SurfacePoint& at, bool moving) const {
+  const Vec3& normal = surface(moving).faces()[static_cast<std::size_t>(at.face)].normal;
+  const double along = std::abs(normal.dot(frame_.direction(at.p)));
+  return along * std::sqrt(1.0 + kSlope * kSlope) >= 1.0;
 }
 
 void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_seeds, Witness& end) {
@@ -372,7 +413,7 @@ void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_
   if (seeds.empty()) return;
   end = seeds.front();
   for (const Witness& seed : seeds)
-    if (const Witness found = descend(seed, low, gap); first(found, end)) end = found;
+    if (const Witness found = first_touching(first_blocked(seed, low, gap), low, gap); first(found, end)) end = found;
   (low ? span.low : span.high) = low ? end.piece.low : end.piece.high;
 }
 
@@ -461,9 +502,11 @@ FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitB
   const double size = std::min(diagonal(moving), diagonal(fixed));
   const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
   const double least = given(options.tolerance, kDefaultTolerance * size);
-  Tolerances t{.across = least + sagitta,
+  Tolerances t{.least = least,
+               .facets = sagitta,
+               .across = least,
                .largest_overlap = given(options.largest_overlap, kDefaultLargestOverlap * size)};
-  t.largest_overlap = std::max(t.largest_overlap, t.across);
+  t.largest_overlap = std::max(t.largest_overlap, least + sagitta);
   t.nudge = 1e-2 * least;
 
   const PathFrame frame(path);

@@ -91,6 +91,11 @@ double PathFrame::speed(const Orbit& orbit) const {
   return 1.0;
 }
 
+Vec3 PathFrame::direction(const Vec3& p) const {
+  if (kind_ == Kind::kTranslation) return Vec3::UnitX();
+  return Vec3(kind_ == Kind::kScrew ? pitch_ : 0.0, -p.z(), p.y()).stableNormalized();
+}
+
 OrbitBox PathFrame::box_around(const Eigen::AlignedBox3d& box) const {
   OrbitBox out;
   if (box.isEmpty()) return out;

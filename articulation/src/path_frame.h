@@ -38,6 +38,7 @@ class PathFrame {
   /// Holds the orbits that meet a box, given in the input's coordinates; a screw's along x from −1e300 to 1e300.
   OrbitBox box_around(const Eigen::AlignedBox3d& box) const;
   double speed(const Orbit& orbit) const;  ///< length per unit of t
+  Vec3 direction(const Vec3& p) const;     ///< of motion at p, path coordinates, unit; 0 on the axis of a rotation
   MotionPath::Kind kind() const { return kind_; }
   double pitch() const { return pitch_; }
 

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
 #include <numbers>
 
 #include "assemblies.h"
@@ -122,36 +121,22 @@ TEST(DetectJoints, BeadsThatTouchAtAPointMakeNoJoint) {
   for (const int segments : {8, 16, 32, 64}) EXPECT_TRUE(joints_of(make("snake", {.segments = segments})).empty());
 }
 
+// Against the same parts as they stood before, not against the truth: what a method adds of its own.
 TEST(DetectJoints, PoseScaleAndOrderChangeNoTypeAndNoAxis) {
-  const Variant plain{.clearance = 0.005};
-  Variant moved = plain;
+  TbbJobs jobs;
+  const Variant still{.clearance = 0.005};
+  Variant moved = still;
   moved.rotation = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
   moved.shuffled = moved.swapped = true;
   for (const double scale : {1e-3, 1e3}) {
     moved.scale = scale;
     moved.translation = scale * Vec3(5, -3, 2);
     for (const std::string name : {"brush arm", "stack", "piston"}) {
-      const MadeAssembly before = make(name, plain), after = make(name, moved);
-      const Assembly parts_before = taken_apart(before), parts_after = taken_apart(after);
-      TbbJobs jobs;
-      std::map<std::pair<std::string, std::string>, JointSpec> known;
-      const auto key = [](const Assembly& parts, const DetectedJoint& j) {
-        const std::pair<std::string, std::string> names = std::minmax(
-            parts.components[static_cast<std::size_t>(j.a)].name, parts.components[static_cast<std::size_t>(j.b)].name);
-        return names;
-      };
-      for (const auto& j : detect_joints(parts_before, quick(), jobs)) known[key(parts_before, j)] = j.joint;
-      const auto found = detect_joints(parts_after, quick(), jobs);
-      ASSERT_EQ(found.size(), known.size()) << name;
-      for (const auto& j : found) {
-        const auto& expected = known.at(key(parts_after, j));
-        EXPECT_EQ(j.joint.type, expected.type) << name;
-        if (expected.type == JointType::kBall || expected.type == JointType::kFixed) continue;
-        const int column = expected.type == JointType::kPlanar ? 2 : 0;
-        const Vec3 axis = moved.rotation * expected.frame.axes.col(column);
-        constexpr double kAxis = 0.05 * std::numbers::pi / 180.0;
-        EXPECT_LT(axis.cross(Vec3(j.joint.frame.axes.col(column))).norm(), kAxis) << name;
-      }
+      const assemblies::Change change =
+          assemblies::change_of_joints(make(name, still), make(name, moved), moved.rotation, quick(), jobs);
+      EXPECT_GT(change.joints, 0) << name;
+      EXPECT_EQ(change.types, 0) << name;
+      EXPECT_LT(change.axis, 0.05) << name << ", " << change.worst;
     }
   }
 }
@@ -233,6 +218,16 @@ TEST(DetectJoints, RangesOfMotionAreThoseOfTheDrawing) {
   for (const std::string name : {"gate", "latch", "drop link", "chair", "piston", "door"})
     for (const auto& range : assemblies::scored_ranges(make(name, {.clearance = 0.005}), quick(), jobs))
       EXPECT_TRUE(range.right()) << name << ", " << range.joint << ", " << range.freedom << ": " << range.found;
+}
+
+// Facets that come to lie corner on facet overlap by more than as read, and a ring drawn smaller than its ball overlaps
+// it all around: neither may stop the ball, nor let its neck run into the ring.
+TEST(DetectJoints, ANeckStopsAtItsRingHoweverRoughTheBallIsDrawn) {
+  TbbJobs jobs;
+  for (const Variant& rough : {Variant{.segments = 16, .clearance = 0.0}, {.segments = 32, .clearance = -0.005}})
+    for (const auto& range : assemblies::scored_ranges(make("drop link", rough), quick(), jobs))
+      EXPECT_TRUE(range.right()) << rough.segments << ", " << range.joint << ", " << range.freedom << ": "
+                                 << range.found;
 }
 
 TEST(DetectJoints, ThreeHingesOfOneDoorAreOneRevoluteJoint) {

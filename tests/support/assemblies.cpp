@@ -127,9 +127,11 @@ class Builder {
   }
 
   /// How far a neck of 0.4 r leans until its side meets the edge of the ring. Both are polygons; the least is where a
-  /// flat of the ring's or a corner of both is in line.
+  /// flat of the ring's or a corner of both is in line. Where the ring overlaps the ball, its edge lies inside the
+  /// ball, and it is the corners at which the neck leaves the ball that first come down to the ring's face.
   double neck_meets_rim(double r, double half_arc) const {
     const double inner = r + gap(2 * r), high = inner * std::sin(half_arc), rim = inner * std::cos(half_arc);
+    if (inner < r) return std::acos(high / r) - std::asin(0.4);
     const double flat = std::cos(kPi / n());
     const auto lean = [&](double rim_here, double neck_here) {
       return std::atan2(rim_here, high) - std::asin(neck_here / std::hypot(rim_here, high));

@@ -87,10 +87,11 @@ RangeScore compared(const TrueRange& truth, const std::optional<Interval>& found
 
 }  // namespace
 
-std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs) {
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs,
+                                      const RangeOptions& range_options) {
   const Assembly assembly = taken_apart(made);
   const auto joints = detect_joints(assembly, options, jobs);
-  const auto ranges = ranges_of_motion(assembly, joints, {}, jobs);
+  const auto ranges = ranges_of_motion(assembly, joints, range_options, jobs);
   std::vector<RangeScore> out;
   for (const TrueJoint& truth : made.joints)
     for (std::size_t i = 0; i < joints.size(); ++i) {
@@ -107,6 +108,32 @@ std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionO
         out.push_back(score);
       }
     }
+  return out;
+}
+
+Change change_of_joints(const MadeAssembly& still, const MadeAssembly& moved, const Mat3& rotation,
+                        const DetectionOptions& options, Jobs& jobs) {
+  const Assembly before = taken_apart(still), after = taken_apart(moved);
+  const auto joints = detect_joints(before, options, jobs), others = detect_joints(after, options, jobs);
+  const auto names = [](const Assembly& assembly, const DetectedJoint& j) {
+    const std::string &a = name_of(assembly, j.a), &b = name_of(assembly, j.b);
+    return std::pair<std::string, std::string>(std::min(a, b), std::max(a, b));
+  };
+  Change out;
+  for (const DetectedJoint& j : joints) {
+    ++out.joints;
+    const auto same = std::find_if(others.begin(), others.end(), [&](const DetectedJoint& o) {
+      return names(after, o) == names(before, j) && o.joint.type == j.joint.type;
+    });
+    if (same == others.end()) ++out.types;
+    if (same == others.end() || j.joint.type == JointType::kBall || j.joint.type == JointType::kFixed) continue;
+    const int column = j.joint.type == JointType::kPlanar ? 2 : 0;
+    const Vec3 axis = rotation * j.joint.frame.axes.col(column), other = same->joint.frame.axes.col(column);
+    const double turned = std::atan2(axis.cross(other).norm(), std::abs(axis.dot(other))) * 180.0 / std::numbers::pi;
+    if (turned <= out.axis) continue;
+    out.axis = turned;
+    out.worst = name_of(before, j.a) + " - " + name_of(before, j.b);
+  }
   return out;
 }
 

@@ -7,6 +7,7 @@
 
 #include "assemblies.h"
 #include "limber/articulation/detect_joints.h"
+#include "limber/articulation/range_of_motion.h"
 
 namespace limber::assemblies {
 
@@ -31,6 +32,17 @@ struct Score {
 
 Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs);
 
+/// What moving, scaling or reordering an assembly changes in the joints that are found.
+struct Change {
+  int joints = 0;     ///< of the unmoved assembly
+  int types = 0;      ///< of these come out as another type, or not at all
+  double axis = 0.0;  ///< degrees, the most by which an axis (planar: the normal) turns beyond the motion itself
+  std::string worst;  ///< the joint of that axis
+};
+/// @param moved the same parts as `still` but for pose, scale and order
+Change change_of_joints(const MadeAssembly& still, const MadeAssembly& moved, const Mat3& rotation,
+                        const DetectionOptions& options, Jobs& jobs);
+
 /// One freedom of a joint that was read right, and whose range is known.
 struct RangeScore {
   std::string joint, freedom;
@@ -44,7 +56,8 @@ struct RangeScore {
 };
 
 /// Ranges of motion against those known on paper, for the joints whose type was read right.
-std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs);
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs,
+                                      const RangeOptions& ranges = {});
 
 struct VariantClass {
   std::string name;

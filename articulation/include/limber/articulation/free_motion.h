@@ -13,8 +13,9 @@
 ///
 /// Parts that fit together touch, overlap a little, or slide on facets that stand for a round surface. So an overlap
 /// counts only if it is wider than a tolerance δ *across* the motion: moved by δ across its orbit in any direction,
-/// the point still meets the other body. δ starts at `tolerance` or the sagitta of the facets, and grows to the overlap
-/// found as read, up to `largest_overlap`. Along the motion nothing is lost: a stop is found where it is.
+/// the point still meets the other body. δ is `tolerance`, grown to the overlap found as read, plus the sagitta of the
+/// facets, up to `largest_overlap`. Along the motion nothing is lost: the stop is where the surface within δ of such a
+/// point first meets the other body.
 ///
 /// Closed surfaces bound solids; open ones are sheets that block where they are crossed, and hide what lies behind.
 /// Source: [X09] 3.3 bisects by collision tests, which sees one interval only; orbits are not in the paper.
@@ -48,7 +49,7 @@ struct MotionBody {
 struct FreeMotionOptions {
   double tolerance = 0.0;        ///< δ to start with, length; ≥ 0; 0: 2e-4 of the smaller body's diagonal
   double largest_overlap = 0.0;  ///< δ at most, length; ≥ 0; 0: 2e-2 of the smaller body's diagonal
-  int samples = 2000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
+  int samples = 1000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
   bool reachable_only = false;   ///< saves the work of following the ends of `others`
   void validate() const;         ///< @throws InvalidArgument naming the field
 };
