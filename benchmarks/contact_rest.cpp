@@ -2,6 +2,8 @@
 // mode, and any body from an asset, dropped on the ground through World and ContactFinder at 60 steps a second. Prints
 // Markdown. Figures: docs/contact.md.
 //   contact_rest [SECONDS [SCENE [ASSET]]]    seconds per scene (5), part of the names of the scenes wanted, a body
+// Penetration is that of the surfaces that touch, of all their contacts and not of the few that are kept. Drift is how
+// far a body has moved since the fifth second.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -29,6 +31,7 @@ struct Scene {
   double gap;  // between bodies, m
   bool askew;
   bool residual;
+  bool side_by_side = false;  // in layers of four
 };
 
 std::shared_ptr<const ModalModel> baked(const Vec3& size, const std::array<int, 3>& cells, int modes, bool residual) {
@@ -54,28 +57,83 @@ struct Extent {
   }
 };
 
+/// All contacts of the bodies of a world, not thinned.
+class Overlap {
+ public:
+  Overlap(const World& world, const std::vector<BodyId>& bodies, BodyId ground) : world_(world), bodies_(bodies) {
+    finder_.add_body(static_cast<Index>(ground.index), {.shape = std::make_shared<Shape>(HalfSpace{})}, {});
+    for (const BodyId id : bodies) {
+      // Not owned: the world outlives this.
+      const std::shared_ptr<const ModalModel> model(std::shared_ptr<void>(), &world.model(id));
+      finder_.add_body(static_cast<Index>(id.index), {.model = model}, {});
+      states_.resize(std::max<std::size_t>(states_.size(), id.index + 1));
+    }
+  }
+  double deepest() {
+    for (const BodyId id : bodies_) {
+      const BodyView view = world_.body(id);
+      states_[id.index] = {.pose = view.pose, .amplitudes = view.amplitudes};
+    }
+    finder_.find_contacts({.states = states_, .margin = 0.0}, contacts_, serial_jobs());
+    double most = 0.0;
+    for (const ContactPoint& contact : contacts_) most = std::max(most, -contact.gap);
+    return most;
+  }
+
+ private:
+  const World& world_;
+  const std::vector<BodyId>& bodies_;
+  ContactFinder finder_{{.clusters = {.max_points = 0}}};
+  std::vector<BodyState> states_;
+  std::vector<ContactPoint> contacts_;
+};
+
+double farthest_from(const World& world, const std::vector<BodyId>& bodies, const std::vector<Vec3>& places) {
+  double farthest = 0.0;
+  for (std::size_t b = 0; b < places.size(); ++b)
+    farthest = std::max(farthest, (world.body(bodies[b]).pose.p - places[b]).norm());
+  return farthest;
+}
+
+std::vector<Vec3> places_of(const World& world, const std::vector<BodyId>& bodies) {
+  std::vector<Vec3> places;
+  for (const BodyId id : bodies) places.push_back(world.body(id).pose.p);
+  return places;
+}
+
+/// Where body i of a scene begins: upon each other, or in layers of four.
+Vec3 place_of(const Scene& scene, const Extent& extent, int i) {
+  const double height = extent.high.z() - extent.low.z(), size = (extent.high - extent.low).maxCoeff();
+  if (scene.side_by_side) {
+    const int layer = i / 4;
+    return Vec3(0.55 * size * (i % 2 == 0 ? 1 : -1) + 0.1 * size * layer, 0.55 * size * (i % 4 < 2 ? 1 : -1),
+                -extent.low.z() + scene.gap + layer * (size + scene.gap));
+  }
+  return Vec3(0.03 * size * (i % 2), 0.025 * size * (i % 3),
+              -extent.low.z() + scene.gap + i * (height + scene.gap) + (scene.askew ? size : 0.0));
+}
+
 void run(const Scene& scene, double seconds) {
   GroundedWorld grounded({.residual_compliance = scene.residual}, {.step = kStep});
   World& world = grounded.world;
   const Extent extent(*scene.model);
-  const double height = extent.high.z() - extent.low.z(), size = (extent.high - extent.low).maxCoeff();
+  const double size = (extent.high - extent.low).maxCoeff();
   std::vector<BodyId> bodies;
   for (int i = 0; i < scene.count; ++i) {
-    const Vec3 place(0.03 * size * (i % 2), 0.025 * size * (i % 3),
-                     -extent.low.z() + scene.gap + i * (height + scene.gap));
     const Vec3 turn = scene.askew ? Vec3(0.5, 0.6, 0.0) : Vec3(0.0, 0.0, 0.05 * i);
-    bodies.push_back(world.add_body(
-        scene.model, {.pose = {quaternion_from_rotation_vector(turn), place + Vec3(0, 0, scene.askew ? size : 0.0)}}));
+    bodies.push_back(
+        world.add_body(scene.model, {.pose = {quaternion_from_rotation_vector(turn), place_of(scene, extent, i)}}));
   }
+  Overlap overlap(world, bodies, grounded.ground);
   const int steps = static_cast<int>(std::lround(seconds / kStep));
   const double scale = scene.count * scene.model->data().mass * kGravity * size;
-  std::vector<Vec3> before(bodies.size());
+  std::vector<Vec3> before, fifth;
   double spent = 0.0, slowest = 0.0, deepest = 0.0, rise = 0.0, energy = 0.0;
   long iterations = 0;
   int unsettled = 0, late = 0, rows = 0;
   for (int i = 0; i < steps; ++i) {
-    if (i == steps - 60)
-      for (std::size_t b = 0; b < bodies.size(); ++b) before[b] = world.body(bodies[b]).pose.p;
+    if (i == std::max(0, steps - 60)) before = places_of(world, bodies);
+    if (i == 5 * 60) fifth = places_of(world, bodies);
     const double begin = thread_seconds();
     world.step();
     const double took = thread_seconds() - begin;
@@ -85,20 +143,17 @@ void run(const Scene& scene, double seconds) {
     rows = std::max(rows, report.rows);
     unsettled += report.solved ? 0 : 1;
     late += !report.solved && i >= steps - 60 ? 1 : 0;
-    for (const BodyId id : bodies)
-      if (i >= steps - 60) deepest = std::min(deepest, lowest(world, id));
+    if (i >= steps - 60) deepest = std::max(deepest, overlap.deepest());
     const double now = total_energy(world, bodies);
     if (i > 0) rise = std::max(rise, (now - energy) / scale);
     energy = now;
   }
-  double moved = 0.0, fastest = 0.0;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    moved = std::max(moved, (world.body(bodies[b]).pose.p - before[b]).norm());
-    fastest = std::max(fastest, world.body(bodies[b]).velocity.norm());
-  }
-  std::printf("| %s | %d | %.1e | %.1e | %.1e | %.1e | %d | %d | %d | %.1f | %.0f | %.0f |\n", scene.name.c_str(),
-              static_cast<int>(scene.model->modes()), -deepest / size, moved, fastest, rise, unsettled, late, rows,
-              static_cast<double>(iterations) / steps, 1e6 * spent / steps, 1e6 * slowest);
+  double fastest = 0.0;
+  for (const BodyId id : bodies) fastest = std::max(fastest, world.body(id).velocity.norm());
+  std::printf("| %s | %d | %.1e | %.1e | %.1e | %.1e | %.1e | %d | %d | %d | %.1f | %.0f | %.0f |\n",
+              scene.name.c_str(), static_cast<int>(scene.model->modes()), deepest / size,
+              farthest_from(world, bodies, before), farthest_from(world, bodies, fifth), fastest, rise, unsettled, late,
+              rows, static_cast<double>(iterations) / steps, 1e6 * spent / steps, 1e6 * slowest);
   std::fflush(stdout);
 }
 
@@ -111,9 +166,10 @@ int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 5.0;
   const std::string wanted = argc > 2 ? argv[2] : "";
   std::printf(
-      "| scene | modes | deepest / size | moved in the last second, m | fastest, m/s | largest rise of energy in a "
+      "| scene | modes | penetration / size | moved in the last second, m | drift, m | fastest, m/s | largest rise of "
+      "energy in a "
       "step / scale | steps not settled | of the last 60 | rows | iterations | µs a step | slowest "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   std::vector<Scene> scenes;
   for (const bool residual : {false, true}) {
     const std::string with = residual ? ", residual" : "";
@@ -133,9 +189,12 @@ int main(int argc, char** argv) {
     add("3 fine dropped", fine, 3, far, false);
     add("10 coarse laid", coarse, 10, close, false);
     add("10 fine laid", fine, 10, close, false);
-    if (argc > 3)
-      add(
-          "asset", [&] { return read_asset(argv[3]).bodies.at(0); }, 1, 0.0, true);
+    if (argc > 3) {
+      const auto asset = [&] { return read_asset(argv[3]).bodies.at(0); };
+      add("asset", asset, 1, 0.0, true);
+      add("8 assets dropped", asset, 8, 0.02, false);
+      if (!scenes.empty() && scenes.back().count == 8) scenes.back().side_by_side = true;
+    }
   }
   for (const Scene& scene : scenes) run(scene, seconds);
   return 0;
