@@ -9,6 +9,9 @@ namespace {
 
 // Faces meet, rather than an edge or corner and something, where the normal is within 14° of one's.
 constexpr double kAligned = 0.97;
+// A face is the reference in place of the other body's only where it fits the normal by this much better: faces that
+// lie flush are told apart by round-off, and with the reference the names of all their contacts change.
+constexpr double kReferencePreference = 1e-4;
 // Edges must be this much less deep than faces to decide the direction: faces give steadier contacts.
 constexpr double kEdgePreference = 0.95;
 // Capsules side by side, within 10°, touch along their length.
@@ -143,7 +146,7 @@ void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
   const ConvexFace *on_a = facing(side_[0], -normal), *on_b = facing(side_[1], normal);
   const double fit_a = on_a == nullptr ? -1.0 : -side_[0].normal(*on_a).dot(normal);
   const double fit_b = on_b == nullptr ? -1.0 : side_[1].normal(*on_b).dot(normal);
-  const int reference = fit_a > fit_b + kRoundOff ? 0 : 1;
+  const int reference = fit_a > fit_b + kReferencePreference ? 0 : 1;
   if (std::max(fit_a, fit_b) < kAligned) return;
   const Side &side = side_[reference], &other = side_[1 - reference];
   const ConvexFace& face = reference == 0 ? *on_a : *on_b;

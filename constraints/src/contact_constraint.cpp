@@ -51,6 +51,7 @@ struct Contact {
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
+  Vec3 held_force = Vec3::Zero();  // what of it goes on
   double give = 0.0;               // what the contact yielded to it by itself, m/N
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
@@ -179,7 +180,9 @@ class PairContacts final : public Constraint {
     for (Contact& contact : contacts_) {
       Vec3 impulse = impulses[row++] * contact.axes.col(0);
       for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
+      const Vec3 before = contact.last_force;
       contact.last_force = impulse / step_;
+      contact.held_force = lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force;
       contact.give = give_;
       contact.impulse += impulse;
       pressed = pressed || !impulse.isZero(0.0);
@@ -305,7 +308,6 @@ class PairContacts final : public Constraint {
         law.agent_displacement = recovery;
         law.lower = 0.0;
         law.holds = true;
-        law.last_force = n.dot(contact.last_force);
         law.strikes = strikes_;
         if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
         law.friction = contact.friction;
@@ -313,8 +315,9 @@ class PairContacts final : public Constraint {
         law.offset = contact.dent[axis];
         law.slides = true;
         law.goes_on = true;
-        law.last_force = n.dot(contact.last_force);
       }
+      law.last_force = n.dot(contact.last_force);
+      law.held_force = n.dot(contact.held_force);
       const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
       const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
       rows.add(on_a, on_b, law);
@@ -410,7 +413,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
   contact.start_position = point.position + origin;
-  if (const ContactMemory* known = find(point.id)) contact.last_force = known->force, contact.give = known->give;
+  if (const ContactMemory* known = find(point.id))
+    contact.last_force = known->force, contact.held_force = known->held, contact.give = known->give;
   contacts.push_back(contact);
 }
 
@@ -512,6 +516,7 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
                         .a = contact.a.body,
                         .b = contact.b.body,
                         .force = contact.last_force,
+                        .held = contact.held_force,
                         .give = contact.give,
                         .yielding = flexes(contact.a) ? contact.a.body : contact.b.body});
   for (const ContactMemory& last : last_memory)

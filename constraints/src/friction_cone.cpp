@@ -8,6 +8,7 @@
 
 #include "aligned_buffer.h"
 #include "argument_checks.h"
+#include "cone_splitting.h"
 #include "coulomb_contact.h"
 #include "limber/constraints/contact_qp.h"
 #include "proximal_solver.h"
@@ -437,7 +438,11 @@ struct FrictionSolver::Impl {
   SparseCoupling sparse;
   std::vector<std::size_t> nodes;  // by first column; the largest number where there is none
 
+  ConeSplitting splitting;
+  std::vector<double> w, unit;
+
   void place(const BlockFrictionProblem& problem);
+  FrictionResult split(const BlockFrictionProblem& problem, std::span<double> f, const FrictionOptions& options);
 };
 
 /// The problem's blocks as rows of bodies.
@@ -482,6 +487,32 @@ void FrictionSolver::Impl::place(const BlockFrictionProblem& problem) {
   }
 }
 
+FrictionResult FrictionSolver::Impl::split(const BlockFrictionProblem& problem, std::span<double> f,
+                                           const FrictionOptions& options) {
+  constexpr int kAtATime = 10;
+  place(problem);
+  const std::size_t n = f.size();
+  for (std::size_t i = 0; i < n; i += 3)
+    if (!triple(&f[i]).allFinite()) std::fill_n(&f[i], 3, 0.0);
+  splitting.begin({.cones = problem.contacts, .friction = memory.mu}, sparse);
+  splitting.units_of(problem.b, unit);
+  double *x = memory.v.need(n), *Ax = memory.u.need(n);
+  std::fill_n(x, padded(n), 0.0);
+  w.resize(n);
+  FrictionResult result;
+  for (;; result.sweeps += kAtATime) {
+    std::copy(f.begin(), f.end(), x);
+    sparse.scale({});
+    sparse.multiply(Ax, x);
+    for (std::size_t i = 0; i < n; ++i) w[i] = Ax[i] + problem.b[i];
+    result.residual = splitting.residual(f, w, unit);
+    if (result.residual <= options.tolerance) return result;
+    if (result.sweeps >= options.max_sweeps || !splitting.advance(problem.b, kAtATime, f)) break;
+  }
+  result.status = SolveStatus::kIterationLimit;
+  return result;
+}
+
 FrictionSolver::FrictionSolver() : impl_(std::make_unique<Impl>()) {}
 FrictionSolver::~FrictionSolver() = default;
 FrictionSolver::FrictionSolver(FrictionSolver&&) noexcept = default;
@@ -492,6 +523,8 @@ FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<d
   check(problem.contacts, problem.b, problem.mu, f, options);
   const auto m = static_cast<std::size_t>(problem.contacts);
   check_length(kName, "A", problem.A.size(), 9 * m * m);
+  if (options.method == FrictionMethod::kSplitting)
+    throw InvalidArgument("FrictionSolver::solve: rows in full are not solved by kSplitting, which was asked for");
   Memory& memory = impl_->memory;
   if (!take_friction(problem.b, problem.mu, memory) || !all_finite(problem.A.data(), problem.A.size()))
     return refuse(f);
@@ -528,6 +561,7 @@ FrictionResult FrictionSolver::solve(const BlockFrictionProblem& problem, std::s
                                         impl_->sparse, f,
                                         {.tolerance = options.tolerance, .max_sweeps = options.max_sweeps}));
   }
+  if (options.method == FrictionMethod::kSplitting) return impl_->split(problem, f, options);
   BlockContacts contacts(problem, memory);
   FrictionResult result;
   Sweeps<BlockContacts> sweeps(contacts, memory, static_cast<std::size_t>(problem.contacts), options, result);

@@ -76,11 +76,16 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
   find_accelerations(when, options.gravity);
   bodies.write_frame_metric(metric);
   const std::size_t n = sparse ? 0 : weigh_frames();
-  bool equalities = true, any = false;
+  bool equalities = true, any = sparse, solves = !sparse;
   bool rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
+    if (sparse && law.contact && law.holds) {
+      hold_contact(when, i);
+      i += law.friction > 0.0 ? 2 : 0;
+      continue;
+    }
     const HeldMotion held = held_motion(when, i, options);
     const bool lies = rests(law, gap[at], held.speed, held.speed_of_a_step);
     if (law.friction > 0.0) rested = lies;
@@ -99,11 +104,28 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
     if (!sparse && lower[at] == 0.0 && upper[at] == 0.0)
       std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
     any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
+    solves = solves || lower[at] < upper[at];
   }
-  if (any)
+  if (any && solves)
     answer_rows(when, equalities, answer);
+  else if (any)
+    std::copy(lower.begin(), lower.end(), answer.begin());  // all of it goes on
   else
     std::fill(answer.begin(), answer.end(), 0.0);
+}
+
+/// A contact of a large island: its force goes on, of which position n + 1 sees nothing, as what it gets at the end of
+/// step n it gets at the start of the next as well.
+void IslandSolver::Impl::hold_contact(StepTime when, Index normal) {
+  const auto first = static_cast<std::size_t>(normal);
+  const std::size_t count = laws[first].friction > 0.0 ? 3 : 1;
+  double before = 0.0, now = 0.0;
+  for (std::size_t i = first; i < first + count; ++i) {
+    lower[i] = when == StepTime::kStart ? laws[i].held_force : f[i] / step + reaction[i];
+    before += laws[i].last_force * laws[i].last_force, now += lower[i] * lower[i];
+  }
+  const double part = when == StepTime::kStart ? 1.0 : lasting_part(std::sqrt(before), std::sqrt(now));
+  for (std::size_t i = first; i < first + count; ++i) lower[i] *= part, upper[i] = lower[i], b[i] = 0.0;
 }
 
 /// The answer to accelerations b within the bounds.

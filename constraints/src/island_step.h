@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bounded_rows.h"
+#include "cone_splitting.h"
 #include "contact_program.h"
 #include "difference_newton.h"
 #include "island_energy.h"
@@ -62,6 +63,7 @@ struct IslandSolver::Impl {
   std::vector<std::size_t> nodes;  // of the bodies
   std::vector<double> one_row, product;
   double slack = 1.0;  // of the rows' tolerance, which this iteration's cones may be off
+  ConeSplitting splitting;
   ProximalSolver frames;
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
@@ -90,6 +92,7 @@ struct IslandSolver::Impl {
   void weigh();
   std::size_t weigh_frames();
   void find_accelerations(StepTime when, const Vec3& gravity);
+  void hold_contact(StepTime when, Index normal);
   void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
   bool is_large() const;
   std::size_t node_width(Index local, bool frames_alone) const;
@@ -146,6 +149,9 @@ struct IslandSolver::Impl {
   bool can_differentiate() const;
   SolveStatus differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
                             const IslandOptions& options, IslandReport& report);
+  SolveStatus iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
+                               const IslandOptions& options, IslandReport& report);
+  void begin_splitting();
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);

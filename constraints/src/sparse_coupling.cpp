@@ -191,6 +191,25 @@ bool SparseCoupling::map_step(std::span<const ProjectionDerivative> P, double rh
   return true;
 }
 
+bool SparseCoupling::factor_shifted(double shift) {
+  shift_ = shift;
+  factor_.set_identity();
+  for (const Unit& unit : units_) add_product(unit, Mat3::Identity() / shift, true);
+  return factor_.factor_symmetric();
+}
+
+/// (G Gᵀ + c)⁻¹ = (1 − G (1 + GᵀG/c)⁻¹ Gᵀ/c)/c
+void SparseCoupling::solve_shifted(double* x) {
+  double* motion = motion_.data();
+  gather(x, motion);
+  factor_.solve(motion);
+  for (const Unit& unit : units_) {
+    const Vec3 own = seen(unit, motion) / shift_;
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      x[unit.first + r] = (x[unit.first + r] - own[static_cast<int>(r)]) / shift_;
+  }
+}
+
 void SparseCoupling::begin_sweeps(const double* f) { gather(f, motion_.data()); }
 
 Vec3 SparseCoupling::answer(std::size_t first, std::size_t) const {

@@ -42,6 +42,10 @@ class SparseCoupling final : public RowCoupling {
   void multiply(double* out, const double* x) override;
   bool convex_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
   bool map_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
+  /// Makes solve_shifted() ready, for A as it is scaled. @return false: not found
+  bool factor_shifted(double shift);
+  /// x ← (A + shift)⁻¹ x. Padded.
+  void solve_shifted(double* x);
   void begin_sweeps(const double* f) override;
   Vec3 answer(std::size_t first, std::size_t count) const override;
   void move(std::size_t first, std::size_t count, const Vec3& change) override;
@@ -73,6 +77,7 @@ class SparseCoupling final : public RowCoupling {
   std::vector<Place> places_;
   std::vector<Mat3> left_, right_;  // of map_step(): K⁻¹ and K⁻¹N
   BlockFactor factor_;
+  double shift_ = 1.0;
   const double* used_ = nullptr;  // given_ or scaled_
   AlignedBuffer given_, scaled_, product_, motion_, step_, rows_memory_;
 };

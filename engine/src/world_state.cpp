@@ -157,6 +157,7 @@ std::uint64_t World::state_hash() const {
   for (const ContactMemory& contact : impl_->contacts.memory()) {
     hash.add(contact.id);
     hash.add(contact.force);
+    hash.add(contact.held);
   }
   for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
   for (std::size_t body = 0; body < impl_->entries.size(); ++body)

@@ -47,6 +47,7 @@ struct RowLaw {
   /// The row's force goes on from step to step: springs, motors, friction. `last_force` is that of the last step.
   bool goes_on = false;
   double last_force = 0.0;
+  double held_force = 0.0;  ///< of contacts: what of it went on beyond the last step's end
   /// How far the agent behind the row (a hand, a motor) moves what it holds within the step, in the gap's unit: the
   /// work f/Δt times this may enter the system.
   double agent_displacement = 0.0;
@@ -62,6 +63,10 @@ struct RowLaw {
   /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
   bool slides = false;
 };
+
+/// What part of a contact's force goes on beyond the step's end in large islands: no more than it was in the step
+/// before, so that what a blow adds does not. @param before, now its sizes in the last step and in this one, N
+inline double lasting_part(double before, double now) { return now > before ? before / now : 1.0; }
 
 /// The rows of one island, made anew every step in memory that is kept.
 class ConstraintRows {

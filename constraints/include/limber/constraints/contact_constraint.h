@@ -94,6 +94,7 @@ struct ContactMemory {
   std::uint64_t id = 0;       ///< of the ContactPoint
   Index a = -1, b = -1;       ///< bodies
   Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
+  Vec3 held = Vec3::Zero();   ///< what of it goes on into the next step
   double give = 0.0;          ///< what the contact yielded to it by itself, m/N; ½ give F² is stored there
   Index yielding = -1;        ///< the body that this energy is counted with
 };
