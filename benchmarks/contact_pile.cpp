@@ -17,7 +17,8 @@ void run_second(limber::testing::Pile& pile, int second) {
   using namespace limber;
   std::vector<Vec3> before;
   for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
-  double total = 0.0, worst = 0.0, deepest = 0.0, shift = 0.0;
+  double total = 0.0, worst = 0.0, deepest = 0.0, shift = 0.0, rise = 0.0;
+  double energy = testing::total_energy(pile.world, pile.bodies);
   int unsettled = 0;
   for (int i = 0; i < kStepsOfSecond; ++i) {
     const double begin = thread_seconds();
@@ -25,11 +26,14 @@ void run_second(limber::testing::Pile& pile, int second) {
     const double took = thread_seconds() - begin;
     total += took, worst = std::max(worst, took), deepest = std::max(deepest, -pile.deepest);
     unsettled += pile.world.constraint_report().solved ? 0 : 1;
+    const double now = testing::total_energy(pile.world, pile.bodies);
+    rise = std::max(rise, now - energy);
+    energy = now;
   }
   for (std::size_t i = 0; i < before.size(); ++i)
     shift = std::max(shift, (pile.world.body(pile.bodies[i]).pose.p - before[i]).norm());
-  std::printf("| %d | %.1f | %.1f | %d | %d | %.1e | %.1e |\n", second, 1e3 * total / kStepsOfSecond, 1e3 * worst,
-              pile.contacts, unsettled, deepest / testing::kPileSize, shift);
+  std::printf("| %d | %.1f | %.1f | %d | %d | %.1e | %.1e | %.1e |\n", second, 1e3 * total / kStepsOfSecond,
+              1e3 * worst, pile.contacts, unsettled, deepest / testing::kPileSize, shift, rise);
   std::fflush(stdout);
 }
 
@@ -46,8 +50,8 @@ int main(int argc, char** argv) {
   limber::testing::Pile pile(count, modes, rolls);
   std::printf(
       "| second | ms a step, mean | worst | contacts | steps not settled of 60 | deepest / size | farthest moved, m "
-      "|\n");
-  std::printf("|---|---|---|---|---|---|---|\n");
+      "| largest rise of energy, J |\n");
+  std::printf("|---|---|---|---|---|---|---|---|\n");
   for (int second = 1; second <= seconds; ++second) run_second(pile, second);
   return 0;
 }

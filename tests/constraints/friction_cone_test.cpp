@@ -238,7 +238,8 @@ TEST(FrictionCone, BlocksGiveTheFixedPointOfTheFullMatrix) {
     const BlockFrictionProblem problem{
         .contacts = s.contacts, .columns = s.columns, .blocks = blocks, .b = s.b, .mu = s.mu};
     const Solved exact = solve(s, solver, {.tolerance = 1e-12, .max_sweeps = 20'000});
-    for (const FrictionMethod method : {FrictionMethod::kBlockGaussSeidel, FrictionMethod::kProximal}) {
+    for (const FrictionMethod method :
+         {FrictionMethod::kBlockGaussSeidel, FrictionMethod::kProximal, FrictionMethod::kSplitting}) {
       std::fill(f.begin(), f.end(), 0.0);
       ASSERT_EQ(solver.solve(problem, f, {.method = method, .tolerance = 1e-12, .max_sweeps = 20'000}).status,
                 SolveStatus::kSolved)
@@ -306,7 +307,7 @@ TEST(FrictionCone, HundredsOfContactsInBlocks) {
       .contacts = stacks * s.contacts, .columns = stacks * s.columns, .blocks = blocks, .b = b, .mu = mu};
   for (const FrictionOptions& options :
        {FrictionOptions{.method = FrictionMethod::kBlockGaussSeidel, .tolerance = 1e-6, .max_sweeps = 3000},
-        FrictionOptions{.tolerance = 1e-9}}) {
+        FrictionOptions{.method = FrictionMethod::kSplitting, .tolerance = 1e-6}, FrictionOptions{.tolerance = 1e-9}}) {
     std::fill(f.begin(), f.end(), 0.0);
     const auto result = solver.solve(problem, f, options);
     EXPECT_EQ(result.status, SolveStatus::kSolved) << result.residual << " after " << result.sweeps;
@@ -361,6 +362,43 @@ TEST(FrictionCone, SameBitsEveryTimeAndNoAllocationOnceWarm) {
     other.solve(problem_of(large), f, options);
     EXPECT_EQ(testing::allocations(), before) << static_cast<int>(method);
   }
+}
+
+TEST(FrictionCone, BlocksGiveTheSameBitsEveryTimeAndDoNotAllocateOnceWarm) {
+  FrictionSolver solver;
+  const FrictionSample large = make_stack(6, 0.1, 0.5), small = make_stack(2, 0.3, 0.4);
+  std::vector<double> large_values, small_values;
+  const auto large_blocks = blocks_of(large, 6, large_values), small_blocks = blocks_of(small, 6, small_values);
+  const auto solve_blocks = [&](const FrictionSample& s, const std::vector<FrictionBlock>& blocks,
+                                const FrictionOptions& options, std::vector<double>& f) {
+    std::ranges::fill(f, 0.0);
+    solver.solve({.contacts = s.contacts, .columns = s.columns, .blocks = blocks, .b = s.b, .mu = s.mu}, f, options);
+  };
+  for (const FrictionMethod method :
+       {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel, FrictionMethod::kSplitting}) {
+    const FrictionOptions options{.method = method, .max_sweeps = 50};
+    std::vector<double> first(small.b.size()), again(small.b.size()), f(large.b.size());
+    solve_blocks(small, small_blocks, options, first);
+    solve_blocks(large, large_blocks, options, f);
+    const long before = testing::allocations();
+    solve_blocks(small, small_blocks, options, again);
+    solve_blocks(large, large_blocks, options, f);
+    EXPECT_EQ(testing::allocations(), before) << static_cast<int>(method);
+    EXPECT_EQ(first, again) << static_cast<int>(method);
+  }
+}
+
+TEST(FrictionCone, EachMethodRefusesTheFormThatItDoesNotSolve) {
+  FrictionSolver solver;
+  const FrictionSample s = make_stack(1, 0.1, 0.5);
+  std::vector<double> values, f(s.b.size());
+  const auto blocks = blocks_of(s, 6, values);
+  EXPECT_THROW(solver.solve(problem_of(s), f, {.method = FrictionMethod::kSplitting}), InvalidArgument);
+  EXPECT_THROW(
+      solver.solve(
+          BlockFrictionProblem{.contacts = s.contacts, .columns = s.columns, .blocks = blocks, .b = s.b, .mu = s.mu}, f,
+          {.method = FrictionMethod::kStaggered}),
+      InvalidArgument);
 }
 
 }  // namespace

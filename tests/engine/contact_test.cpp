@@ -111,6 +111,63 @@ TEST(WorldContact, APileOfBoxesComesToRest) {
     EXPECT_LT((pile.world.body(pile.bodies[i]).pose.p - before[i]).norm(), kShift) << i;
 }
 
+TEST(WorldContact, AWarmStepOfAPileAllocatesNothing) {
+  Pile pile(kPileBoxes, -1, false);
+  for (int i = 0; i < 90; ++i) pile.step_once();
+  // Pushed from the side, so that contacts slide and the forces of the last step do not fit.
+  const auto push = [&] {
+    for (const BodyId body : pile.bodies) pile.world.apply_impulse(body, SurfacePoint{}, {0.5, 0.2, 0.0});
+    for (int i = 0; i < 10; ++i) pile.step_once();
+  };
+  push();
+  const long before = allocations();
+  push();
+  EXPECT_EQ(allocations() - before, 0);
+  EXPECT_GE(pile.contacts, 3 * kPileBoxes);
+}
+
+/// Bricks that fly towards each other and end in one lump: an island of more than fifty contacts.
+TEST(WorldContact, BodiesThatMeetInALumpKeepTheirMomenta) {
+  ContactFinder finder;
+  World world({.gravity = Vec3::Zero()});
+  world.set_contact_source(&finder, {.recovery_speed = 0.0});
+  const auto model = sample_model({.modes = 0, .half_extent = Vec3(0.15, 0.12, 0.09)});
+  const auto brick = std::make_shared<const Shape>(Box{.half_extents = {0.15, 0.12, 0.09}});
+  std::vector<BodyId> bodies;
+  for (int i = 0; i < 27; ++i) {
+    const Vec3 at(0.5 * (i % 3 - 1), 0.45 * (i / 3 % 3 - 1), 0.4 * (i / 9 - 1));
+    bodies.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.1 * i, 0.0, 0.0}), at},
+                                            .velocity = -3.0 * at + Vec3(0.0, 0.2, 0.1 * std::sin(i)),
+                                            .angular_velocity = {0.0, 0.0, std::cos(i)},
+                                            .shape = brick}));
+  }
+  const auto momentum = [&] {
+    Vec3 sum = Vec3::Zero();
+    for (const BodyId body : bodies) sum += world.linear_momentum(body);
+    return sum;
+  };
+  const auto angular_momentum = [&] {
+    Vec3 sum = Vec3::Zero();
+    for (const BodyId body : bodies)
+      sum += world.angular_momentum(body) + world.body(body).pose.p.cross(world.linear_momentum(body));
+    return sum;
+  };
+  std::size_t most = 0;
+  const Vec3 linear = momentum(), angular = angular_momentum();
+  double energy = total_energy(world, bodies);
+  const double scale = energy;
+  for (int i = 0; i < 60; ++i) {
+    world.step();
+    most = std::max(most, world.contact_events().size());
+    const double now = total_energy(world, bodies);
+    EXPECT_LE(now, energy + 1e-6 * scale) << i;
+    energy = now;
+  }
+  EXPECT_GT(most, 50u);
+  EXPECT_LT((momentum() - linear).norm(), 1e-10 * linear.norm());
+  EXPECT_LT((angular_momentum() - angular).norm(), 1e-10 * angular.norm());
+}
+
 /// Flexible boxes share loads between their contacts in many ways; each step finds one of them, and they come to rest.
 TEST(WorldContact, StacksOfFlexibleBoxesThatAreDroppedStandAndEveryStepSettles) {
   constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;  // of a box; below its origin; between boxes, m
