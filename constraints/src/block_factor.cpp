@@ -95,6 +95,16 @@ void BlockFactor::place_columns() {
     first_[column.node] = size_;
     size_ += padded(column.width);
   }
+  blocks_.clear();
+  for (const Column& column : columns_)
+    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
+      const Column& later = columns_[entries_[e].column];
+      blocks_.push_back({.rows = column.width,
+                         .column = first_[later.node],
+                         .width = padded(later.width),
+                         .values = column.offset + entries_[e].at,
+                         .stride = column.stride});
+    }
 }
 
 /// What elimination of the column takes from the row of one that meets it: the entries from that one on.
@@ -211,26 +221,15 @@ void BlockFactor::solve(double* x) {
       y[i] = sum;
     }
     std::copy_n(y, column.width, own);
-    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
-      const Column& later = columns_[entries_[e].column];
-      double* to = x + first_[later.node];
-      for (std::size_t q = 0; q < column.width; ++q) {
-        const double* row = L + column.offset + q * column.stride + entries_[e].at;
-        for (std::size_t j = 0; j < later.width; ++j) to[j] -= own[q] * row[j];
-      }
-    }
+    for (std::size_t i = 0; i < column.width; ++i) y[i] = -own[i];
+    gather_blocks(x, blocks_.data() + column.first_entry, column.entries, L, y);
   }
   for (std::size_t c = columns_.size(); c-- > 0;) {
     const Column& column = columns_[c];
     double* own = x + first_[column.node];
-    for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
-      const Column& later = columns_[entries_[e].column];
-      const double* from = x + first_[later.node];
-      for (std::size_t q = 0; q < column.width; ++q) {
-        const double* row = W + column.offset + q * column.stride + entries_[e].at;
-        for (std::size_t j = 0; j < later.width; ++j) own[q] -= row[j] * from[j];
-      }
-    }
+    std::fill_n(y, column.width, 0.0);
+    spread_blocks(y, blocks_.data() + column.first_entry, column.entries, W, x);
+    for (std::size_t q = 0; q < column.width; ++q) own[q] -= y[q];
   }
 }
 

@@ -71,6 +71,7 @@ class BlockFactor {
   std::vector<Column> columns_;
   std::vector<Entry> entries_;
   std::vector<Run> runs_;
+  std::vector<RowBlock> blocks_;           // the entries' in the rows of their column
   AlignedBuffer upper_, lower_, divided_;  // U, Lᵀ, D⁻¹U
   AlignedBuffer pivot_, row_;
   std::vector<double> coefficients_, inverse_;

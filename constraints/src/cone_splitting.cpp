@@ -23,7 +23,7 @@ void ConeSplitting::begin(const BoundedRows& rows, SparseCoupling& coupling) {
   rows_ = rows, coupling_ = &coupling;
   cones_ = static_cast<std::size_t>(rows.cones), n_ = coupling.rows();
   factored_ = false;
-  double** vectors[] = {&b_, &x_, &z_, &y_, &f_};
+  double** vectors[] = {&b_, &x_, &z_, &f_};
   const std::size_t stride = padded(n_);
   double* next = memory_.need(std::size(vectors) * stride);
   std::fill_n(next, std::size(vectors) * stride, 0.0);
@@ -40,10 +40,14 @@ void ConeSplitting::scale_rows() {
   }
 }
 
+/// In scaled numbers, like all of iterate().
+double ConeSplitting::clamped(std::size_t row, double force) const {
+  return std::clamp(force, rows_.lower[row] * scale_[row], rows_.upper[row] * scale_[row]);
+}
+
 void ConeSplitting::project(const double* from, double* to) const {
   for (std::size_t i = 0; i < cones_; ++i) put(project_on_cone(triple(from + 3 * i), rows_.friction[i]), to + 3 * i);
-  for (std::size_t i = 3 * cones_; i < n_; ++i)
-    to[i] = std::clamp(from[i], rows_.lower[i] * scale_[i], rows_.upper[i] * scale_[i]);
+  for (std::size_t i = 3 * cones_; i < n_; ++i) to[i] = clamped(i, from[i]);
 }
 
 double ConeSplitting::residual(std::span<const double> f, std::span<const double> w,
@@ -59,7 +63,7 @@ double ConeSplitting::residual(std::span<const double> f, std::span<const double
   }
   for (std::size_t i = 3 * cones_; i < n_; ++i) {
     const double s = scale_[i], force = s * f[i];
-    const double off = force - std::clamp(force - w[i] / s, s * rows_.lower[i], s * rows_.upper[i]);
+    const double off = force - clamped(i, force - w[i] / s);
     worst = std::max(worst, s * std::abs(off) / unit[i]);
   }
   return worst;
@@ -92,19 +96,22 @@ bool ConeSplitting::advance(std::span<const double> b, int iterations, std::span
 void ConeSplitting::start(std::span<const double> f) {
   for (std::size_t i = 0; i < n_; ++i) x_[i] = f[i] * scale_[i];
   project(x_, z_);
-  coupling_->multiply(y_, z_);
-  for (std::size_t i = 0; i < n_; ++i) y_[i] += b_[i];
-  for (std::size_t i = 0; i < cones_; ++i) put(corrected_velocity(triple(y_ + 3 * i), rows_.friction[i]), y_ + 3 * i);
-  for (std::size_t i = 0; i < n_; ++i) x_[i] = z_[i] - y_[i] / kRho;
+  coupling_->multiply(f_, z_);
+  for (std::size_t i = 0; i < n_; ++i) f_[i] += b_[i];
+  for (std::size_t i = 0; i < cones_; ++i) put(corrected_velocity(triple(f_ + 3 * i), rows_.friction[i]), f_ + 3 * i);
+  for (std::size_t i = 0; i < n_; ++i) x_[i] = z_[i] - f_[i] / kRho;
 }
 
 void ConeSplitting::iterate() {
-  project(x_, z_);
-  for (std::size_t i = 0; i < n_; ++i) {
-    y_[i] = kRho * (x_[i] - z_[i]);
-    f_[i] = kRho * z_[i] - y_[i] - b_[i];
+  for (std::size_t i = 0; i < cones_; ++i) {
+    const Vec3 x = triple(x_ + 3 * i), z = project_on_cone(x, rows_.friction[i]), y = kRho * (x - z);
+    put(z, z_ + 3 * i);
+    put(kRho * z - triple(b_ + 3 * i) - corrected_velocity(y, rows_.friction[i]), f_ + 3 * i);
   }
-  for (std::size_t i = 0; i < cones_; ++i) f_[3 * i] -= rows_.friction[i] * std::hypot(y_[3 * i + 1], y_[3 * i + 2]);
+  for (std::size_t i = 3 * cones_; i < n_; ++i) {
+    z_[i] = clamped(i, x_[i]);
+    f_[i] = kRho * (2.0 * z_[i] - x_[i]) - b_[i];
+  }
   coupling_->solve_shifted(f_);
   for (std::size_t i = 0; i < n_; ++i) x_[i] += kRelaxation * (f_[i] - z_[i]);
 }

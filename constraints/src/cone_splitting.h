@@ -38,6 +38,7 @@ class ConeSplitting {
 
  private:
   void scale_rows();
+  double clamped(std::size_t row, double force) const;
   void project(const double* from, double* to) const;
   void start(std::span<const double> f);
   void iterate();
@@ -50,7 +51,7 @@ class ConeSplitting {
   // Scaled to A_ii = 1 as in proximal_solver.cpp: forces by `scale_`, velocities by its inverse.
   std::vector<double> scale_;
   AlignedBuffer memory_;
-  double *b_ = nullptr, *x_ = nullptr, *z_ = nullptr, *y_ = nullptr, *f_ = nullptr;
+  double *b_ = nullptr, *x_ = nullptr, *z_ = nullptr, *f_ = nullptr;
 };
 
 }  // namespace limber

@@ -74,14 +74,6 @@ class Sliding {
 
 }  // namespace
 
-Vec3 project_on_cone(const Vec3& x, double mu) {
-  const double s = x.tail<2>().norm();
-  if (s <= mu * x[0]) return x;
-  if (mu * s <= -x[0]) return Vec3::Zero();
-  const double n = (x[0] + mu * s) / (1.0 + mu * mu);
-  return {n, mu * n * x[1] / s, mu * n * x[2] / s};
-}
-
 Mat3 cone_projection_derivative(const Vec3& x, double mu) {
   const double s = x.tail<2>().norm();
   if (mu > 0.0 && s <= mu * x[0]) return Mat3::Identity();

@@ -7,7 +7,13 @@
 namespace limber {
 
 /// The point of {|x_t| ≤ μ x_n} nearest to x.
-Vec3 project_on_cone(const Vec3& x, double mu);
+inline Vec3 project_on_cone(const Vec3& x, double mu) {
+  const double s = x.tail<2>().norm();
+  if (s <= mu * x[0]) return x;
+  if (mu * s <= -x[0]) return Vec3::Zero();
+  const double n = (x[0] + mu * s) / (1.0 + mu * mu);
+  return {n, mu * n * x[1] / s, mu * n * x[2] / s};
+}
 
 /// A derivative of project_on_cone() (at the kinks one of them).
 Mat3 cone_projection_derivative(const Vec3& x, double mu);

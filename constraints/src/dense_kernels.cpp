@@ -221,6 +221,31 @@ HWY_ATTR void MultiplyRows(double* out, MatrixView M, const int* rows, const dou
   for (; i < count; ++i) MultiplyBlock<1>(out, M, rows, x, i, n);
 }
 
+HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b)
+    for (std::size_t j = 0; j < b->width; j += kLanes) {
+      Vector sum = hn::Load(d, x + b->column + j);
+      for (std::size_t r = 0; r < b->rows; ++r)
+        sum = hn::MulAdd(hn::Set(d, y[b->row + r]), hn::Load(d, G + b->values + r * b->stride + j), sum);
+      hn::Store(sum, d, x + b->column + j);
+    }
+}
+
+HWY_ATTR void SpreadBlocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b)
+    for (std::size_t r = 0; r < b->rows; ++r) {
+      const double *row = G + b->values + r * b->stride, *from = x + b->column;
+      Vector sum[kVectors];
+      for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+      for (std::size_t j = 0; j < b->width; j += kPad)
+        for (std::size_t v = 0; v < kVectors; ++v)
+          sum[v] = hn::MulAdd(hn::Load(d, from + j + v * kLanes), hn::Load(d, row + j + v * kLanes), sum[v]);
+      y[b->row + r] += SumOfBlock(sum);
+    }
+}
+
 }  // namespace limber::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -239,6 +264,8 @@ HWY_EXPORT(Exchange);
 HWY_EXPORT(Gram);
 HWY_EXPORT(SubtractOuter);
 HWY_EXPORT(MultiplyRows);
+HWY_EXPORT(GatherBlocks);
+HWY_EXPORT(SpreadBlocks);
 
 bool all_finite(const double* x, std::size_t n) { return HWY_DYNAMIC_DISPATCH(AllFinite)(x, n); }
 
@@ -289,6 +316,14 @@ void subtract_outer(MatrixView C, const double* x, std::size_t first, std::size_
 
 void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n) {
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(out, M, rows, x, count, padded(n));
+}
+
+void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
+  HWY_DYNAMIC_DISPATCH(GatherBlocks)(x, blocks, count, G, y);
+}
+
+void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+  HWY_DYNAMIC_DISPATCH(SpreadBlocks)(y, blocks, count, G, x);
 }
 
 void transpose(MatrixView T, MatrixView M, std::size_t rows, std::size_t n) {

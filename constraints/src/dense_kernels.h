@@ -47,6 +47,18 @@ void add_scaled(double* y, double a, const double* x, std::size_t n);
 void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
                   std::size_t count, std::size_t n);
 
+/// A few rows of a sparse matrix where they are not zero: rows from `row` and columns from `column` on, in numbers from
+/// `values` on, `stride` apart from row to row. Width and stride padded.
+struct RowBlock {
+  std::size_t row = 0, rows = 0, column = 0, width = 0, values = 0, stride = 0;
+};
+
+/// x += Gᵀ y, block after block.
+void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y);
+
+/// y += G x, block after block.
+void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x);
+
 /// (x, y) ← (c x + s y, c y − s x)
 void rotate(double* x, double* y, double c, double s, std::size_t n);
 

@@ -73,6 +73,27 @@ bool IslandSolver::Impl::slow_start(double left) {
   return true;
 }
 
+/// Large islands of contacts, whose gaps may be off by more than others': in a pile at rest that is energy, with no
+/// motion to take it from. Forces that are smaller by a part that no gap shows let the pile down by as much.
+/// @return whether they do
+bool IslandSolver::Impl::yield(const BodyStates& states, std::span<Constraint* const> constraints,
+                               const IslandOptions& options, IslandReport& report) {
+  if (!splits) return false;
+  next_f = f, change = reaction;
+  const auto scale = [&](double part) {
+    for (std::size_t i = 0; i < f.size(); ++i) f[i] = part * next_f[i], reaction[i] = part * change[i];
+  };
+  for (const double share : {1e-6, 1e-5, 1e-4}) {  // of ½gΔt², at 60 steps a second 0.14 µm at most
+    scale(1.0 - share);
+    predict(options);
+    measure(states, StepTime::kEnd, constraints, gap);
+    answer_at_end(states, constraints, options);
+    if (!(close_energy(options, report) > 0.0)) return true;
+  }
+  scale(1.0);
+  return false;
+}
+
 /// Where neither is enough, since the rows did not come together and have left bodies bent: less of the impulses, in
 /// the end none. The free step has the energy it began with.
 void IslandSolver::Impl::refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints,

@@ -30,8 +30,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   // Cones are solved as exactly as the last change of the gaps is worth.
   constexpr double kFirstSlack = 1e4, kSlackOfChange = 1e-3;
   factor();
-  if (sparse && std::ranges::all_of(laws, &RowLaw::contact))
-    return iterate_contacts(states, constraints, options, report);
+  if (splits) return iterate_contacts(states, constraints, options, report);
   secant.begin(f.size());
   slack = sparse ? kFirstSlack : 1.0;
   for (report.iterations = 1;; ++report.iterations) {

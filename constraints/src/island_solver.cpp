@@ -106,7 +106,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0)) return done;
+    if (!(left > 0.0) || yield(BodyStates(part.table), part.constraints, options, done)) return done;
     const bool settled = done.status == SolveStatus::kSolved && !holds_contact_forces() && std::isfinite(left);
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
@@ -160,6 +160,7 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   sparse = is_large();
+  splits = sparse && std::ranges::all_of(laws, &RowLaw::contact);
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n), G.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);

@@ -62,7 +62,8 @@ struct IslandSolver::Impl {
   SparseCoupling coupling, frame_coupling;
   std::vector<std::size_t> nodes;  // of the bodies
   std::vector<double> one_row, product;
-  double slack = 1.0;  // of the rows' tolerance, which this iteration's cones may be off
+  double slack = 1.0;   // of the rows' tolerance, which this iteration's cones may be off
+  bool splits = false;  // with nothing but contacts among the rows
   ConeSplitting splitting;
   ProximalSolver frames;
   LeastSquaresSolver least_squares;
@@ -162,6 +163,8 @@ struct IslandSolver::Impl {
   bool is_workless() const;
   double close_energy(const IslandOptions& options, IslandReport& report);
   bool slow_start(double left);
+  bool yield(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
+             IslandReport& report);
   void refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                        IslandReport& report);
 };

@@ -33,6 +33,15 @@ void SparseCoupling::end_structure() {
     for (std::size_t a = unit.first_side; a < unit.first_side + unit.sides; ++a)
       for (std::size_t b = unit.first_side; b < a; ++b) factor_.add_edge(sides_[a].node, sides_[b].node);
   factor_.end_pattern();
+  blocks_.clear();
+  for (const Unit& unit : units_)
+    for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s)
+      blocks_.push_back({.row = unit.first,
+                         .rows = unit.rows,
+                         .column = factor_.first(sides_[s].node),
+                         .width = padded(widths_[sides_[s].node]),
+                         .values = sides_[s].offset,
+                         .stride = padded(widths_[sides_[s].node])});
   places_.clear();
   for (Unit& unit : units_) {
     unit.first_place = places_.size();
@@ -104,13 +113,14 @@ Vec3 SparseCoupling::seen(const Unit& unit, const double* x) const {
 
 void SparseCoupling::gather(const double* rows, double* x) const {
   std::fill_n(x, padded(factor_.size()), 0.0);
-  for (const Unit& unit : units_) add_to_motion(unit, rows + unit.first, x);
+  gather_blocks(x, blocks_.data(), blocks_.size(), used_, rows);
 }
 
 void SparseCoupling::multiply(double* out, const double* x) {
   double* motion = motion_.data();
   gather(x, motion);
-  for (const Unit& unit : units_) std::copy_n(seen(unit, motion).data(), unit.rows, out + unit.first);
+  std::fill_n(out, rows_, 0.0);
+  spread_blocks(out, blocks_.data(), blocks_.size(), used_, motion);
 }
 
 /// M += Gᵀ N G of a unit.
@@ -203,11 +213,11 @@ void SparseCoupling::solve_shifted(double* x) {
   double* motion = motion_.data();
   gather(x, motion);
   factor_.solve(motion);
-  for (const Unit& unit : units_) {
-    const Vec3 own = seen(unit, motion) / shift_;
-    for (std::size_t r = 0; r < unit.rows; ++r)
-      x[unit.first + r] = (x[unit.first + r] - own[static_cast<int>(r)]) / shift_;
-  }
+  double* own = rows_memory_.data();
+  std::fill_n(own, rows_, 0.0);
+  spread_blocks(own, blocks_.data(), blocks_.size(), used_, motion);
+  const double inverse = 1.0 / shift_;
+  for (std::size_t i = 0; i < rows_; ++i) x[i] = inverse * (x[i] - inverse * own[i]);
 }
 
 void SparseCoupling::begin_sweeps(const double* f) { gather(f, motion_.data()); }

@@ -74,6 +74,7 @@ class SparseCoupling final : public RowCoupling {
   std::vector<std::size_t> widths_, unit_of_;
   std::vector<Unit> units_;
   std::vector<Side> sides_;
+  std::vector<RowBlock> blocks_;  // of the sides, with their places in vectors of motion
   std::vector<Place> places_;
   std::vector<Mat3> left_, right_;  // of map_step(): K⁻¹ and K⁻¹N
   BlockFactor factor_;
