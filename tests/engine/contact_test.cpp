@@ -15,9 +15,11 @@ constexpr double kSize = 0.6;  // of the sample box, m
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int kStepsToRest = 60;  // of the largest stack; the sanitizers take twenty times as long
 constexpr int kPileBoxes = 9;
+constexpr int kStepsOfLump = 20;
 #else
 constexpr int kStepsToRest = 300;
 constexpr int kPileBoxes = 18;
+constexpr int kStepsOfLump = 60;
 #endif
 
 TEST(WorldContact, AFallingBoxComesToRestOnTheGround) {
@@ -157,7 +159,7 @@ TEST(WorldContact, BodiesThatMeetInALumpKeepTheirMomenta) {
   const Vec3 linear = momentum(), angular = angular_momentum();
   double energy = total_energy(world, bodies);
   const double scale = energy;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < kStepsOfLump; ++i) {
     world.step();
     most = std::max(most, world.contact_events().size());
     const double now = total_energy(world, bodies);
