@@ -419,7 +419,7 @@ void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_
 
 void Search::refine() {
   constexpr std::size_t kSeeds = 6, kSeedsBehind = 2;  // those of free intervals behind an obstacle matter less
-  constexpr std::size_t kMostSpans = 32;               // more are noise, whose ends nobody wants to know
+  constexpr std::size_t kMostSpans = 8;                // of more, rows of parts or noise, the nearest ends matter
   const std::size_t count = blocked_.size();
   const bool nearest_only = reachable_only_ || count > kMostSpans;
   ends_.resize(count);
