@@ -47,8 +47,8 @@ GroupedSurface touching_boxes() { return together({{"", box({0, 0, 0}, {1, 1, 1}
 TEST(Components, PartsThatTouchExactlyStayApart) {
   const Assembly assembly = find_components(touching_boxes());
   ASSERT_EQ(assembly.components.size(), 2u);
-  EXPECT_THAT(names(assembly), testing::ElementsAre("part 1", "part 2"));
-  EXPECT_THAT(assembly.components[1].faces, testing::ElementsAre(FaceRange{12, 12}));
+  EXPECT_THAT(names(assembly), ::testing::ElementsAre("part 1", "part 2"));
+  EXPECT_THAT(assembly.components[1].faces, ::testing::ElementsAre(FaceRange{12, 12}));
   EXPECT_TRUE(assembly.components[0].closed);
   EXPECT_DOUBLE_EQ(assembly.components[0].diagonal, std::sqrt(3.0));
 }
@@ -66,17 +66,17 @@ TEST(Components, ShellsUnderOneNameAreProposedForMerging) {
   const Assembly assembly = find_components(together({{"bolt", box({0, 0, 0}, {1, 1, 1})},
                                                       {"bolt", box({3, 0, 0}, {4, 1, 1})},
                                                       {"plate", box({6, 0, 0}, {7, 1, 1})}}));
-  EXPECT_THAT(names(assembly), testing::ElementsAre("bolt", "bolt 2", "plate"));
+  EXPECT_THAT(names(assembly), ::testing::ElementsAre("bolt", "bolt 2", "plate"));
   ASSERT_EQ(assembly.proposals.size(), 1u);
-  EXPECT_THAT(assembly.proposals[0].components, testing::ElementsAre(0, 1));
+  EXPECT_THAT(assembly.proposals[0].components, ::testing::ElementsAre(0, 1));
 }
 
 TEST(Components, MergedAndRenamedPartsKeepAllTheirFaces) {
   const auto input =
       together({{"a", box({0, 0, 0}, {1, 1, 1})}, {"b", box({3, 0, 0}, {4, 1, 1})}, {"c", box({6, 0, 0}, {7, 1, 1})}});
   const Assembly assembly = find_components(input, {.merge = {{"c", "a"}}, .rename = {{"c", "frame"}}});
-  EXPECT_THAT(names(assembly), testing::ElementsAre("frame", "b"));
-  EXPECT_THAT(assembly.components[0].faces, testing::ElementsAre(FaceRange{0, 12}, FaceRange{24, 12}));
+  EXPECT_THAT(names(assembly), ::testing::ElementsAre("frame", "b"));
+  EXPECT_THAT(assembly.components[0].faces, ::testing::ElementsAre(FaceRange{0, 12}, FaceRange{24, 12}));
   EXPECT_THROW(find_components(input, {.merge = {{"a", "d"}}}), InvalidArgument);
   EXPECT_THROW(find_components(input, {.rename = {{"a", "b"}}}), InvalidArgument);
 }
@@ -84,9 +84,9 @@ TEST(Components, MergedAndRenamedPartsKeepAllTheirFaces) {
 TEST(Components, GroupsAndMaterialsCanRule) {
   auto input =
       together({{"a", box({0, 0, 0}, {1, 1, 1})}, {"b", box({3, 0, 0}, {4, 1, 1})}, {"a", box({6, 0, 0}, {7, 1, 1})}});
-  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kGroups})), testing::ElementsAre("a", "b"));
+  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kGroups})), ::testing::ElementsAre("a", "b"));
   for (auto& group : input.groups) group.material = "steel";
-  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kMaterials})), testing::ElementsAre("steel"));
+  EXPECT_THAT(names(find_components(input, {.rule = ComponentRule::kMaterials})), ::testing::ElementsAre("steel"));
 }
 
 }  // namespace

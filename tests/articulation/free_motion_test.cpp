@@ -7,6 +7,7 @@
 #include <chrono>
 #include <numbers>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "parts.h"
 
@@ -14,8 +15,9 @@ namespace limber {
 namespace {
 
 using Kind = MotionPath::Kind;
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180.0;
+using testing::kDegree;
+using testing::kPi;
+
 constexpr double kRightAngle = kPi / 2.0;
 /// Ends are followed down to a tenth of the tolerance across, which is 2e-4 of the smaller body's diagonal.
 constexpr double kEnd = 1e-4;

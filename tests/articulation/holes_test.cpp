@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "constants.h"
 #include "grouped_parts.h"
 #include "limber/articulation/assembly.h"
 #include "limber/articulation/free_motion.h"
@@ -13,7 +14,7 @@
 namespace limber {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using testing::kPi;
 
 Component component_of(const SurfaceMesh& surface) {
   GroupedSurface input;

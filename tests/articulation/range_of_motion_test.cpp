@@ -6,6 +6,7 @@
 
 #include <numbers>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "parts.h"
 
@@ -17,9 +18,10 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180.0;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kDegree;
+using testing::kInfinity;
+using testing::kPi;
+
 /// What limits are held to: 1 degree, 1e-3 of the diagonal.
 constexpr double kAngle = 1.0 * kDegree;
 constexpr double kLength = 1e-3;

@@ -10,6 +10,7 @@
 #include <map>
 #include <numbers>
 
+#include "constants.h"
 #include "glb_view.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -22,7 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kInfinity;
+
 /// Both readers work in doubles, but rotations pass through products of a few of them.
 constexpr double kRoundOff = 1e-9;
 /// Meshes are float32.
@@ -34,7 +36,7 @@ Component box_component(const std::string& name, const Vec3& low, const Vec3& hi
   return c;
 }
 
-DetectedJoint joint_of(Index a, Index b, JointType type, const Vec3& origin, const Vec3& rotation) {
+DetectedJoint placed_joint(Index a, Index b, JointType type, const Vec3& origin, const Vec3& rotation) {
   DetectedJoint j;
   j.a = a, j.b = b;
   j.joint.type = type;
@@ -52,7 +54,7 @@ struct Machine {
     assembly.diagonal = 20.0;
     const auto add = [&](Index a, Index b, JointType type) -> JointSpec& {
       joints.push_back(
-          joint_of(a, b, type, {2.0 * std::min(a, b) + 1.5, 0.3, -0.2}, {0.4 * a + 0.1, 1.0 - 0.3 * b, 0.5}));
+          placed_joint(a, b, type, {2.0 * std::min(a, b) + 1.5, 0.3, -0.2}, {0.4 * a + 0.1, 1.0 - 0.3 * b, 0.5}));
       return joints.back().joint;
     };
     add(0, 1, JointType::kRevolute).limits.rotation = {-0.5, 1.25};
@@ -304,8 +306,8 @@ TEST_F(RobotFiles, ClosedChainsAreConstraintsInMjcfAndRemarksInUrdf) {
   }
   std::vector<DetectedJoint> joints;
   for (Index i = 0; i < 4; ++i) {
-    DetectedJoint j =
-        joint_of(std::min(i, (i + 3) % 4), std::max(i, (i + 3) % 4), JointType::kRevolute, corners[i], Vec3::Zero());
+    DetectedJoint j = placed_joint(std::min(i, (i + 3) % 4), std::max(i, (i + 3) % 4), JointType::kRevolute, corners[i],
+                                   Vec3::Zero());
     j.joint.frame.axes << Vec3::UnitZ(), Vec3::UnitX(), Vec3::UnitY();
     joints.push_back(j);
   }
@@ -357,7 +359,8 @@ TEST_F(RobotFiles, WrongArgumentsAreTold) {
   EXPECT_THROW(urdf_file(m.assembly, m.joints, {.density = 0.0}), InvalidArgument);
   EXPECT_THROW(mjcf_file(m.assembly, m.joints, {.metres_per_unit = -1.0}), InvalidArgument);
   EXPECT_THROW(mjcf_file({}, {}), InvalidArgument);
-  EXPECT_THROW(urdf_file(m.assembly, {joint_of(0, 9, JointType::kBall, Vec3::Zero(), Vec3::Zero())}), InvalidArgument);
+  EXPECT_THROW(urdf_file(m.assembly, {placed_joint(0, 9, JointType::kBall, Vec3::Zero(), Vec3::Zero())}),
+               InvalidArgument);
 }
 
 TEST(AssemblyGlb, PartsAreNodesAndAxesArePointers) {

@@ -7,12 +7,13 @@
 #include <functional>
 #include <numbers>
 
+#include "constants.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using testing::kPi;
 
 /// A contact whose two sides are the same exact surface x(u, v) over the unit square, with normals.
 struct Patch {
@@ -153,7 +154,7 @@ TEST(Slippage, ADrawerAtItsStopIsTheSecondReadingOfABlindPeg) {
   EXPECT_NEAR(std::abs(stopped.hypotheses[1].joint.frame.axes(2, 0)), 1.0, 1e-9);
   EXPECT_GT(stopped.hypotheses[1].confidence, 0.2);
   EXPECT_GT(stopped.hypotheses[0].confidence, 2 * stopped.hypotheses[1].confidence);
-  EXPECT_THAT(stopped.hypotheses[1].reason, testing::HasSubstr("may be a stop"));
+  EXPECT_THAT(stopped.hypotheses[1].reason, ::testing::HasSubstr("may be a stop"));
 
   all.push_back(plane(z, 0.5 * x, 0.3 * y));  // held from both ends it is no stop
   const Slippage held = analyse_slippage({exact_contact(all)});

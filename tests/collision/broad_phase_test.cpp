@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "constants.h"
 #include "counted_new.h"
 #include "instruction_sets.h"
 #include "limber/core/error.h"
@@ -17,7 +18,7 @@
 namespace limber {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kInfinity;
 
 /// The same bodies in a BroadPhase and in a plain list, where every pair is looked at.
 class Both {

@@ -7,13 +7,15 @@
 #include <numbers>
 #include <random>
 
+#include "constants.h"
 #include "counted_new.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kInfinity;
+
 constexpr double kSas = 2.0 / std::numbers::pi;  ///< of a convex region's area, in some quadrilateral in it
 constexpr double kRoundOff = 1e-12;
 

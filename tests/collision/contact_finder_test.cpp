@@ -24,7 +24,7 @@ using testing::heap;
 using testing::Random;
 
 constexpr double kMargin = 0.02;
-constexpr double kRoundOff = 1e-13;  ///< of the scenes' few metres: some hundred roundings
+constexpr double kSceneRoundOff = 1e-13;  ///< of the scenes' few metres: some hundred roundings
 
 BodyGeometry shape(const Shape& s) { return {.model = {}, .shape = std::make_shared<const Shape>(s)}; }
 
@@ -42,7 +42,7 @@ bool same_bits(const std::vector<ContactPoint>& a, const std::vector<ContactPoin
   });
 }
 
-std::set<std::uint64_t> ids(const std::vector<ContactPoint>& contacts) {
+std::set<std::uint64_t> id_set(const std::vector<ContactPoint>& contacts) {
   std::set<std::uint64_t> result;
   for (const ContactPoint& c : contacts) result.insert(c.id);
   return result;
@@ -64,20 +64,20 @@ TEST(ContactFinder, ContactsAreWhatTheContractSays) {
   ASSERT_GT(contacts.size(), 100u);
   const auto key = [](const ContactPoint& c) { return std::tuple(c.a.body, c.b.body, c.id); };
   EXPECT_TRUE(std::is_sorted(contacts.begin(), contacts.end(), [&](auto& c, auto& d) { return key(c) < key(d); }));
-  EXPECT_EQ(ids(contacts).size(), contacts.size());
+  EXPECT_EQ(id_set(contacts).size(), contacts.size());
   for (const ContactPoint& c : contacts) {
     EXPECT_LT(c.a.body, c.b.body);
     EXPECT_LE(c.gap, kMargin);
-    EXPECT_NEAR(c.normal.norm(), 1.0, kRoundOff);
+    EXPECT_NEAR(c.normal.norm(), 1.0, kSceneRoundOff);
     const Vec3 p_a = scene.poses[static_cast<std::size_t>(c.a.body)] * c.a.point_B;
     const Vec3 p_b = scene.poses[static_cast<std::size_t>(c.b.body)] * c.b.point_B;
-    EXPECT_NEAR(c.normal.dot(p_a - p_b), c.gap, kRoundOff);
-    EXPECT_LT((0.5 * (p_a + p_b) - origin - c.position).norm(), kRoundOff);
+    EXPECT_NEAR(c.normal.dot(p_a - p_b), c.gap, kSceneRoundOff);
+    EXPECT_LT((0.5 * (p_a + p_b) - origin - c.position).norm(), kSceneRoundOff);
     for (const ContactSide* side : {&c.a, &c.b}) {
       const auto& model = scene.geometries[static_cast<std::size_t>(side->body)].model;
       EXPECT_EQ(side->triangle >= 0, model != nullptr);
       if (!model) continue;
-      EXPECT_NEAR(side->weight[0] + side->weight[1] + side->weight[2], 1.0, kRoundOff);
+      EXPECT_NEAR(side->weight[0] + side->weight[1] + side->weight[2], 1.0, kSceneRoundOff);
       Vec3 p = Vec3::Zero();  // r + U z at the barycentric point, by the asset's own numbers
       const ModalSurface& surface = model->collision();
       const auto& z = scene.amplitudes[static_cast<std::size_t>(side->body)];
@@ -88,7 +88,7 @@ TEST(ContactFinder, ContactsAreWhatTheContractSays) {
           corner += z[m] * surface.basis.shape(v, static_cast<Index>(m)).cast<double>();
         p += side->weight[i] * corner;
       }
-      EXPECT_LT((p - side->point_B).norm(), kRoundOff);
+      EXPECT_LT((p - side->point_B).norm(), kSceneRoundOff);
     }
   }
 }
@@ -176,13 +176,13 @@ TEST(ContactFinder, ABoxAtRestOnTheFloorHasItsFourCorners) {
   ASSERT_EQ(contacts.size(), 4u);
   Vec3 sum = Vec3::Zero();
   for (const ContactPoint& c : contacts) {
-    EXPECT_NEAR(std::abs(c.position.x()), 0.5, kRoundOff);
-    EXPECT_NEAR(std::abs(c.position.y()), 0.4, kRoundOff);
-    EXPECT_NEAR(c.gap, 0.0, kRoundOff);
-    EXPECT_LT((c.normal + Vec3::UnitZ()).norm(), kRoundOff);  // a is the floor: it is pushed down
+    EXPECT_NEAR(std::abs(c.position.x()), 0.5, kSceneRoundOff);
+    EXPECT_NEAR(std::abs(c.position.y()), 0.4, kSceneRoundOff);
+    EXPECT_NEAR(c.gap, 0.0, kSceneRoundOff);
+    EXPECT_LT((c.normal + Vec3::UnitZ()).norm(), kSceneRoundOff);  // a is the floor: it is pushed down
     sum += c.position;
   }
-  EXPECT_LT(sum.norm(), kRoundOff);
+  EXPECT_LT(sum.norm(), kSceneRoundOff);
 }
 
 TEST(ContactFinder, OnlySleepersBesideAwakeBodiesAreLookedAt) {
@@ -308,7 +308,7 @@ TEST(ContactFinder, BodiesInTheSamePlaceGiveFiniteContactsInBoundedNumber) {
   scene.add_all_to(finder);
   for (const ContactPoint& c : contacts_of(finder, scene, 0.01)) {
     EXPECT_TRUE(std::isfinite(c.gap) && c.position.allFinite());
-    EXPECT_NEAR(c.normal.norm(), 1.0, kRoundOff);
+    EXPECT_NEAR(c.normal.norm(), 1.0, kSceneRoundOff);
   }
 }
 
@@ -355,14 +355,14 @@ TEST(ContactFinder, IdsStayWhileABodySlidesAndBends) {
   scene.add(BodyGeometry{.model = bent_ball(4), .shape = {}}, {{}, {2, 0, 0.45}}, {0.01, 0.02, 0.0, 0.01});
   ContactFinder finder;
   scene.add_all_to(finder);
-  auto last = ids(contacts_of(finder, scene, kMargin));
+  auto last = id_set(contacts_of(finder, scene, kMargin));
   std::size_t stayed = 0, all = 0;
   for (int step = 0; step < 100; ++step) {
     scene.poses[1].p.x() += 0.001;
     scene.poses[2].p.x() += 0.001;
     scene.poses[2].q = quaternion_from_rotation_vector({0.0, 0.0, 0.002 * step});
     for (double& z : scene.amplitudes[2]) z *= 1.01;
-    const auto now = ids(contacts_of(finder, scene, kMargin));
+    const auto now = id_set(contacts_of(finder, scene, kMargin));
     all += now.size();
     stayed += static_cast<std::size_t>(
         std::count_if(now.begin(), now.end(), [&](std::uint64_t id) { return last.contains(id); }));
@@ -379,7 +379,7 @@ TEST(ContactFinder, ThinnedContactsAreAmongAllAndHoldTheDeepestOfEachPair) {
   scene.add_all_to(whole);
   const auto few = contacts_of(thinned, scene, kMargin), all = contacts_of(whole, scene, kMargin);
   EXPECT_LT(few.size(), all.size());
-  const auto all_ids = ids(all);
+  const auto all_ids = id_set(all);
   for (const ContactPoint& c : few) EXPECT_TRUE(all_ids.contains(c.id));
   EXPECT_EQ(pairs(few), pairs(all));
   std::map<std::pair<Index, Index>, double> deepest_of_few, deepest_of_all;

@@ -17,12 +17,12 @@ namespace {
 
 using testing::Random;
 
-std::shared_ptr<const CollisionSurface> wavy(const SurfaceMesh& mesh, Index modes, int leaf_triangles = 4) {
+std::shared_ptr<const CollisionSurface> wavy_surface(const SurfaceMesh& mesh, Index modes, int leaf_triangles = 4) {
   return std::make_shared<const CollisionSurface>(testing::wavy_model(mesh, modes),
                                                   CollisionSurfaceOptions{.leaf_triangles = leaf_triangles});
 }
 std::shared_ptr<const CollisionSurface> wavy_sphere(int splits, Index modes, int leaf_triangles = 4) {
-  return wavy(shapes::sphere(Vec3(0.3, -0.2, 0.1), 1.0, splits), modes, leaf_triangles);
+  return wavy_surface(shapes::sphere(Vec3(0.3, -0.2, 0.1), 1.0, splits), modes, leaf_triangles);
 }
 
 /// No vertex below a node lies outside its box, compared without any tolerance.
@@ -111,7 +111,7 @@ TEST(DeformedSurface, BoxesEncloseFarFromTheOriginAndAtTinyScales) {
   for (const double scale : {1e-9, 1.0, 1e9}) {
     SurfaceMesh mesh = shapes::sphere(Vec3(50.0, -20.0, 3.0), 1.0, 2);
     for (Vec3& p : mesh.vertices) p *= scale;
-    const auto surface = wavy(mesh, 9);
+    const auto surface = wavy_surface(mesh, 9);
     DeformedSurface body;
     for (int trial = 0; trial < 50; ++trial)
       for (const BoundsChoice choice : {BoundsChoice::kAmplitudes, BoundsChoice::kRefit}) {
@@ -170,7 +170,7 @@ TEST(DeformedSurface, DegenerateSurfacesAreEnclosed) {
   SurfaceMesh doubled{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}, {1, 0, 0}, {0, 0, 1}},
                       {{0, 1, 2}, {3, 4, 5}, {0, 3, 5}}};
   for (const SurfaceMesh& mesh : {one, flat, doubled}) {
-    const auto surface = wavy(mesh, 5, 1);
+    const auto surface = wavy_surface(mesh, 5, 1);
     DeformedSurface body;
     for (int trial = 0; trial < 100; ++trial) {
       body.bind(surface, random.amplitudes(5, 10.0), trial % 2 ? BoundsChoice::kAmplitudes : BoundsChoice::kRefit);

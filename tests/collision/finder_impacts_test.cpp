@@ -16,7 +16,7 @@ namespace {
 using testing::ContactScene;
 using testing::Random;
 
-constexpr double kStep = 1.0 / 60.0, kMargin = 1e-4;
+constexpr double kStep = 1.0 / 60.0, kImpactMargin = 1e-4;
 
 /// A scene with a motion for each body that moves.
 struct MovingScene {
@@ -36,7 +36,7 @@ struct MovingScene {
   std::vector<Impact> impacts(ContactSource& finder, Jobs& jobs = serial_jobs()) {
     std::vector<Impact> result;
     point();
-    finder.find_impacts(scene.states(), pointers, kStep, kMargin, result, jobs);
+    finder.find_impacts(scene.states(), pointers, kStep, kImpactMargin, result, jobs);
     return result;
   }
   void point() {
@@ -80,8 +80,8 @@ TEST(ContactFinderImpacts, BallsOnACourseForEachOtherMeetWhenTheirGapIsFlownThro
   EXPECT_EQ(impacts[0].a, 0);
   EXPECT_EQ(impacts[0].b, 1);
   EXPECT_FALSE(impacts[0].resting);
-  EXPECT_GE(impacts[0].time, (gap - kMargin) / (2 * speed) - 1e-12);
-  EXPECT_LE(impacts[0].time, (gap - 0.5 * kMargin) / (2 * speed) + 1e-12);
+  EXPECT_GE(impacts[0].time, (gap - kImpactMargin) / (2 * speed) - 1e-12);
+  EXPECT_LE(impacts[0].time, (gap - 0.5 * kImpactMargin) / (2 * speed) + 1e-12);
 }
 
 TEST(ContactFinderImpacts, ManyBodiesTogetherHaveTheImpactsOfEachPairAloneInOrderOfTime) {
@@ -131,7 +131,7 @@ TEST(ContactFinderImpacts, ASleeperIsHitAndContactsAfterwardsAreThoseOfItsState)
   EXPECT_TRUE(testing::contacts_of(finder, moving.scene, 0.01).empty());
   const auto impacts = moving.impacts(finder);
   ASSERT_EQ(impacts.size(), 1u);
-  EXPECT_NEAR(impacts[0].time, 0.4 / 60.0, kMargin / 60.0);
+  EXPECT_NEAR(impacts[0].time, 0.4 / 60.0, kImpactMargin / 60.0);
   EXPECT_TRUE(testing::contacts_of(finder, moving.scene, 0.01).empty());  // still where the state says
   moving.scene.poses[1] = moving.motions[1].path().pose(impacts[0].time);
   EXPECT_FALSE(testing::contacts_of(finder, moving.scene, 0.01).empty());
@@ -147,7 +147,7 @@ TEST(ContactFinderImpacts, AFloorThatMovesMeetsWhatItMovesTo) {
   const auto impacts = moving.impacts(finder);
   ASSERT_EQ(impacts.size(), 1u);
   EXPECT_EQ(impacts[0].b, 1);
-  EXPECT_NEAR(impacts[0].time, 0.01, kMargin / 30.0);
+  EXPECT_NEAR(impacts[0].time, 0.01, kImpactMargin / 30.0);
 }
 
 TEST(ContactFinderImpacts, AWarmQueryAllocatesNothing) {
@@ -157,7 +157,9 @@ TEST(ContactFinderImpacts, AWarmQueryAllocatesNothing) {
   moving.point();
   const auto& states = moving.scene.states();
   std::vector<Impact> impacts;
-  const auto query = [&] { finder.find_impacts(states, moving.pointers, kStep, kMargin, impacts, serial_jobs()); };
+  const auto query = [&] {
+    finder.find_impacts(states, moving.pointers, kStep, kImpactMargin, impacts, serial_jobs());
+  };
   query();
   const long before = testing::allocations();
   query();
@@ -175,13 +177,13 @@ TEST(ContactFinderImpacts, WrongMotionsAreRefused) {
   const auto find = [&](double step, double margin) {
     finder.find_impacts(states, moving.pointers, step, margin, impacts, serial_jobs());
   };
-  EXPECT_NO_THROW(find(kStep, kMargin));
-  EXPECT_THROW(find(2.0 * kStep, kMargin), InvalidArgument);  // the motions end before
-  EXPECT_THROW(find(-1.0, kMargin), InvalidArgument);
+  EXPECT_NO_THROW(find(kStep, kImpactMargin));
+  EXPECT_THROW(find(2.0 * kStep, kImpactMargin), InvalidArgument);  // the motions end before
+  EXPECT_THROW(find(-1.0, kImpactMargin), InvalidArgument);
   EXPECT_THROW(find(kStep, std::nan("")), InvalidArgument);
   finder.add_body(6, {.model = testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 1), 2), .shape = {}}, {});
   moving.pointers.push_back(moving.pointers.back());
-  EXPECT_THROW(find(kStep, kMargin), InvalidArgument);  // a motion without modes for a body of two
+  EXPECT_THROW(find(kStep, kImpactMargin), InvalidArgument);  // a motion without modes for a body of two
 }
 
 }  // namespace

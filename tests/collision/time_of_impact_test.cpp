@@ -10,6 +10,7 @@
 #include <random>
 
 #include "block_model.h"
+#include "constants.h"
 #include "counted_new.h"
 #include "limber/collision/closest_features.h"
 #include "limber/collision/collision_surface.h"
@@ -26,8 +27,8 @@ namespace {
 using std::numbers::pi;
 using Status = ImpactTime::Status;
 
-constexpr double kFrame = 1.0 / 60.0;
-const Vec3 kDown{0.0, 0.0, -9.80665};
+using testing::kDown;
+using testing::kFrame;
 
 ExactMotion mover(const RigidMotion& motion, double step) {
   ExactMotion m;

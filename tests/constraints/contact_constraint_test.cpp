@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "constants.h"
 #include "contact_rules.h"
 #include "contact_scene.h"
 #include "counted_new.h"
@@ -14,7 +15,6 @@ namespace limber::testing {
 namespace {
 
 constexpr double kSize = 0.6;  // of the sample box, m
-constexpr double kDisplayStep = 1.0 / 60.0;
 
 RigidTransform above(double height, const Vec3& turn = Vec3::Zero()) {
   return {quaternion_from_rotation_vector(turn), {0.0, 0.0, height}};
@@ -25,7 +25,7 @@ TEST(Contact, ABoxComesToRestOnTheGround) {
   for (const int modes : {0, 20}) {
     // 3 % of critical damping in the first mode.
     const double hz = 30.0;
-    GroundedIsland island({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz}, kDisplayStep);
+    GroundedIsland island({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz}, kFrame);
     island.add_body(above(0.5, {0.3, 0.2, 0.1}));
     for (int i = 0; i < 300; ++i) island.step();
     const Vec3 before = island.group.frame(0).pose().p;
@@ -80,7 +80,7 @@ TEST(Contact, FreeBodiesThatCollideKeepLinearAndAngularMomentum) {
   constexpr double kRelative = 1e-10;
   for (const int modes : {0, 12})
     for (const double friction : {0.0, 0.6}) {
-      Island island({.modes = modes, .lowest_hz = 20.0}, kDisplayStep, Vec3::Zero());
+      Island island({.modes = modes, .lowest_hz = 20.0}, kFrame, Vec3::Zero());
       island.add_body({quaternion_from_rotation_vector({0.1, 0.2, 0.0}), {-0.4, 0.0, 0.0}}, {3.0, 0.5, 0.0},
                       {2.0, 1.0, 4.0});
       island.add_body({quaternion_from_rotation_vector({0.0, -0.1, 0.3}), {0.4, 0.1, 0.05}}, {-2.0, 0.0, 0.3},
@@ -122,7 +122,7 @@ TEST(Contact, ABlockOnASlopeBelowTheFrictionAngleDoesNotCreep) {
   constexpr double kFriction = 0.5;
   for (const int modes : {0, 12}) {
     const double angle = 0.9 * std::atan(kFriction), hz = 40.0;
-    GroundedIsland island({.modes = modes, .lowest_hz = hz, .decay = 0.05 * 2.0 * std::numbers::pi * hz}, kDisplayStep,
+    GroundedIsland island({.modes = modes, .lowest_hz = hz, .decay = 0.05 * 2.0 * std::numbers::pi * hz}, kFrame,
                           {.friction = kFriction}, slope(angle));
     lay_on(island, angle);
     for (int i = 0; i < 120; ++i) island.step();
@@ -135,14 +135,14 @@ TEST(Contact, ABlockOnASlopeBelowTheFrictionAngleDoesNotCreep) {
 TEST(Contact, ABlockOnASteeperSlopeSlidesAsCoulombSays) {
   constexpr double kRelative = 1e-3;
   constexpr double kFriction = 0.3, kAngle = 0.5;
-  GroundedIsland island({.modes = 0}, kDisplayStep, {.friction = kFriction}, slope(kAngle));
+  GroundedIsland island({.modes = 0}, kFrame, {.friction = kFriction}, slope(kAngle));
   lay_on(island, kAngle);
   // Friction is found as an impulse first and held from the second step on: motion starts up to a step late.
   for (int i = 0; i < 2; ++i) island.step();
   const Vec3 start = island.group.frame(0).pose().p, speed = island.group.frame(0).velocity();
   constexpr int kSteps = 60;
   for (int i = 0; i < kSteps; ++i) island.step();
-  const double t = kSteps * kDisplayStep;
+  const double t = kSteps * kFrame;
   const double acceleration = kGravity * (std::sin(kAngle) - kFriction * std::cos(kAngle));
   const Vec3 down{-std::cos(kAngle), 0.0, -std::sin(kAngle)};
   EXPECT_NEAR((island.group.frame(0).velocity() - speed).dot(down), acceleration * t, kRelative * acceleration * t);
@@ -152,7 +152,7 @@ TEST(Contact, ABlockOnASteeperSlopeSlidesAsCoulombSays) {
 
 TEST(Contact, TheGroundCarriesTheWeight) {
   constexpr double kRelative = 1e-9;
-  GroundedIsland island({.modes = 0}, kDisplayStep);
+  GroundedIsland island({.modes = 0}, kFrame);
   lay_on(island, 0.0);
   for (int i = 0; i < 10; ++i) island.step();
   Vec3 impulse = Vec3::Zero();
@@ -160,13 +160,13 @@ TEST(Contact, TheGroundCarriesTheWeight) {
     EXPECT_EQ(event.phase, ContactPhase::kLasting);
     impulse += event.impulse;
   }
-  const double weight = island.model->data().mass * kGravity * kDisplayStep;
+  const double weight = island.model->data().mass * kGravity * kFrame;
   EXPECT_NEAR(impulse.z(), weight, kRelative * weight);
   EXPECT_LT(impulse.head<2>().norm(), kRelative * weight);
 }
 
 TEST(Contact, EventsTellWhenContactsBeginAndEnd) {
-  GroundedIsland island({.modes = 0}, kDisplayStep);
+  GroundedIsland island({.modes = 0}, kFrame);
   island.add_body(above(0.2));
   int begun = 0, ended = 0;
   for (int i = 0; i < 60; ++i) {
@@ -185,7 +185,7 @@ TEST(Contact, EventsTellWhenContactsBeginAndEnd) {
 TEST(Contact, BodiesThatOverlapArePushedApartSlowly) {
   constexpr double kSpeed = 0.05, kDepth = 0.03;
   constexpr double kSlack = 1.01;  // round-off of the turn that uneven masses bring
-  GroundedIsland island({.modes = 0}, kDisplayStep, {.recovery_speed = kSpeed});
+  GroundedIsland island({.modes = 0}, kFrame, {.recovery_speed = kSpeed});
   lay_on(island, 0.0);
   RigidTransform pose = island.group.frame(0).pose();
   pose.p.z() -= kDepth;
@@ -193,7 +193,7 @@ TEST(Contact, BodiesThatOverlapArePushedApartSlowly) {
   double before = island.lowest_gap();
   for (int i = 0; i < 120; ++i) {
     island.step();
-    EXPECT_LE(island.lowest_gap() - before, kSlack * kSpeed * kDisplayStep);
+    EXPECT_LE(island.lowest_gap() - before, kSlack * kSpeed * kFrame);
     before = island.lowest_gap();
   }
   EXPECT_GT(before, -1e-3 * kSize);
@@ -202,7 +202,7 @@ TEST(Contact, BodiesThatOverlapArePushedApartSlowly) {
 
 TEST(Contact, AWarmStepAllocatesNothingByAnyRule) {
   for (const ContactRule& rule : all_contact_rules()) {
-    GroundedIsland island({.modes = 6, .lowest_hz = 20.0, .decay = 5.0}, kDisplayStep, {.rule = rule});
+    GroundedIsland island({.modes = 6, .lowest_hz = 20.0, .decay = 5.0}, kFrame, {.rule = rule});
     island.add_body(above(0.4, {0.3, 0.1, 0.0}));
     for (int i = 0; i < 120; ++i) island.step();
     const std::vector<ContactPoint> found = island.found;

@@ -5,14 +5,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "constants.h"
 #include "contact_scene.h"
 
 namespace limber::testing {
 namespace {
 
-constexpr double kSize = 0.6, kDisplayStep = 1.0 / 60.0;
+constexpr double kBoxSize = 0.6;  // m
 
-GroundedIsland dropped_box(const ContactOptions& options, int modes, double step = kDisplayStep) {
+GroundedIsland dropped_box(const ContactOptions& options, int modes, double step = kFrame) {
   const double hz = 30.0;
   GroundedIsland scene({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz}, step, options);
   scene.add_body({quaternion_from_rotation_vector({0.3, 0.2, 0.1}), {0.0, 0.0, 0.5}});
@@ -26,7 +27,7 @@ TEST(ContactMethod, TheWeightIsCarriedInTheEnd) {
     for (int i = 0; i < 300; ++i) scene.step();
     Vec3 impulse = Vec3::Zero();
     for (int i = 0; i < 60; ++i) scene.step(), impulse += scene.contact_impulse();
-    const double weight = scene.model->data().mass * kGravity * 60.0 * kDisplayStep;
+    const double weight = scene.model->data().mass * kGravity * 60.0 * kFrame;
     EXPECT_NEAR(impulse.z(), weight, 0.01 * weight) << static_cast<int>(method);
     EXPECT_LT(scene.group.frame(0).velocity().norm(), 0.02) << static_cast<int>(method);
   }
@@ -53,8 +54,8 @@ double deepest(ContactMethod method) {
 }
 
 TEST(ContactMethod, TheComplementaryOneDoesNotSinkInTheGapProgramDoesALittle) {
-  EXPECT_LT(deepest(ContactMethod::kComplementary), 1e-3 * kSize);
-  EXPECT_LT(deepest(ContactMethod::kGapProgram), 2e-2 * kSize);
+  EXPECT_LT(deepest(ContactMethod::kComplementary), 1e-3 * kBoxSize);
+  EXPECT_LT(deepest(ContactMethod::kGapProgram), 2e-2 * kBoxSize);
 }
 
 /// Energy of tumbling boxes, by the largest rise in a step.
@@ -62,7 +63,7 @@ double largest_rise(const ContactRule& rule, ProgramReport& programs) {
   double worst = 0.0;
   for (const int modes : {0, 12})
     for (const double spin : {-3.0, 2.0, 5.0}) {
-      GroundedIsland scene({.modes = modes, .lowest_hz = 30.0}, kDisplayStep, {.recovery_speed = 0.0, .rule = rule});
+      GroundedIsland scene({.modes = modes, .lowest_hz = 30.0}, kFrame, {.recovery_speed = 0.0, .rule = rule});
       scene.add_body({quaternion_from_rotation_vector({0.4, 0.5, 0.0}), {0.0, 0.0, 0.45}}, {1.0, 0.0, -2.0},
                      {1.0, spin, -1.0});
       const double scale = scene.energy_scale();
@@ -93,7 +94,7 @@ struct Slide {
 };
 Slide slide(const FrictionModel model, double angle) {
   const Vec3 normal(-std::sin(angle), 0.0, std::cos(angle));
-  GroundedIsland scene({.modes = 0}, kDisplayStep, {.friction = kFriction, .rule = {.friction = model}}, normal);
+  GroundedIsland scene({.modes = 0}, kFrame, {.friction = kFriction, .rule = {.friction = model}}, normal);
   const Quaternion turn = quaternion_from_rotation_vector({0.0, -angle, 0.0});
   double below = 0.0;
   for (Index v = 0; v < 8; ++v)
@@ -110,7 +111,7 @@ TEST(ContactMethod, UnderHeuristicFrictionABlockSlidesAsItShouldButDoesNotStick)
   const double angle = 1.4 * std::atan(kFriction);
   const double expected = 2.0 * kGravity * (std::sin(angle) - kFriction * std::cos(angle));  // after two seconds
   for (const FrictionModel model : {FrictionModel::kHeuristic, FrictionModel::kHeuristicNoSlip}) {
-    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), 0.05 * kSize);
+    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), 0.05 * kBoxSize);
     EXPECT_NEAR(slide(model, angle).velocity.norm(), expected, expected / 7.0);
   }
 }

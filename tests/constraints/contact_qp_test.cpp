@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "constants.h"
 #include "contact_problems.h"
 #include "counted_new.h"
 #include "limber/core/error.h"
@@ -18,26 +19,26 @@ namespace limber {
 namespace {
 
 using testing::ContactSample;
+using testing::kInfinity;
 using testing::make_contacts;
 using testing::Touching;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kResidual = 1e-10;  // what the solver promises of its conditions, relative
 
-struct Solved {
+struct SolvedQp {
   ContactQpResult result = {};
   std::vector<double> f;
 };
 
-Solved solve_dense(const ContactSample& s, ContactQpSolver& solver, std::vector<double> guess = {}) {
-  Solved solved{.f = std::move(guess)};
+SolvedQp solve_dense(const ContactSample& s, ContactQpSolver& solver, std::vector<double> guess = {}) {
+  SolvedQp solved{.f = std::move(guess)};
   solved.f.resize(static_cast<std::size_t>(s.contacts));
   solved.result = solver.solve(ContactQp{.size = s.contacts, .A = s.A, .b = s.b}, solved.f);
   return solved;
 }
 
-Solved solve_factored(const ContactSample& s, ContactQpSolver& solver, std::vector<double> D = {}) {
-  Solved solved{.f = std::vector<double>(static_cast<std::size_t>(s.contacts))};
+SolvedQp solve_factored(const ContactSample& s, ContactQpSolver& solver, std::vector<double> D = {}) {
+  SolvedQp solved{.f = std::vector<double>(static_cast<std::size_t>(s.contacts))};
   solved.result = solver.solve(
       FactoredContactQp{.size = s.contacts, .dimension = s.dimension, .G = s.G, .D = D, .b = s.b}, solved.f);
   return solved;
@@ -101,7 +102,7 @@ TEST(ContactQp, AgreesWithEveryContactSetTried) {
   for (int n = 0; n < 300; ++n) {
     const auto kind = static_cast<Touching>(n % 3);
     const ContactSample s = make_contacts(1 + n % 8, n % 5, kind, random);
-    const Solved dense = solve_dense(s, solver), factored = solve_factored(s, solver);
+    const SolvedQp dense = solve_dense(s, solver), factored = solve_factored(s, solver);
     ASSERT_EQ(dense.result.status, SolveStatus::kSolved) << n;
     const Eigen::VectorXd f = best_of_all_sets(s);
     // w is unique even where f is not
@@ -119,7 +120,7 @@ TEST(ContactQp, RankDeficientSetsMeetTheirConditions) {
     const auto kind = static_cast<Touching>(n % 3);
     const int m = 4 + n % 125;
     const ContactSample s = make_contacts(m, (n / 3) % 3 * 20, kind, random);
-    for (const Solved& solved : {solve_dense(s, solver), solve_factored(s, solver)}) {
+    for (const SolvedQp& solved : {solve_dense(s, solver), solve_factored(s, solver)}) {
       ASSERT_EQ(solved.result.status, SolveStatus::kSolved) << n;
       EXPECT_LT(complementarity(s, solved.f), kResidual) << n;
       EXPECT_LT(solved.result.residual, kResidual) << n;
@@ -169,8 +170,8 @@ TEST(ContactQp, AGuessNearTheSolutionTakesFewIterations) {
   std::mt19937 random(4);
   ContactQpSolver solver;
   const ContactSample s = make_contacts(60, 40, Touching::kAround, random);
-  const Solved cold = solve_dense(s, solver);
-  const Solved warm = solve_dense(s, solver, cold.f);
+  const SolvedQp cold = solve_dense(s, solver);
+  const SolvedQp warm = solve_dense(s, solver, cold.f);
   EXPECT_GT(cold.result.iterations, 10);
   EXPECT_EQ(warm.result.iterations, 0);
   for (std::size_t i = 0; i < cold.f.size(); ++i) EXPECT_NEAR(warm.f[i], cold.f[i], 1e-9);
@@ -247,7 +248,7 @@ TEST(ContactQp, DependentRowsWithoutACommonSolutionAreSolvedIfBoundsAllow) {
   ContactQpSolver solver;
   const ContactSample s{.contacts = 2, .A = {1, 1, 1, 1}, .b = {-1, -0.9}};
   EXPECT_THAT(solve_dense(s, solver).f, ::testing::ElementsAre(1.0, 0.0));
-  const Solved from_the_other = solve_dense(s, solver, {0.0, 0.5});
+  const SolvedQp from_the_other = solve_dense(s, solver, {0.0, 0.5});
   EXPECT_EQ(from_the_other.result.status, SolveStatus::kSolved);
   EXPECT_THAT(from_the_other.f, ::testing::ElementsAre(1.0, 0.0));
 }
@@ -255,7 +256,7 @@ TEST(ContactQp, DependentRowsWithoutACommonSolutionAreSolvedIfBoundsAllow) {
 TEST(ContactQp, ResidualComplianceSharesTheLoadOfEqualContacts) {
   ContactQpSolver solver;
   const ContactSample s{.contacts = 4, .dimension = 1, .G = {1, 1, 1, 1}, .b = {-1, -1, -1, -1}};
-  const Solved solved = solve_factored(s, solver, {0.1, 0.1, 0.1, 0.1});
+  const SolvedQp solved = solve_factored(s, solver, {0.1, 0.1, 0.1, 0.1});
   for (const double f : solved.f) EXPECT_NEAR(f, 1.0 / 4.1, 1e-14);
 }
 
@@ -263,7 +264,7 @@ TEST(ContactQp, NumbersThatAreNotFiniteAreAResultNotAnException) {
   ContactQpSolver solver;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ContactSample s{.contacts = 2, .A = {1, nan, nan, 1}, .b = {-1, -1}};
-  const Solved in_A = solve_dense(s, solver, {1.0, 1.0});
+  const SolvedQp in_A = solve_dense(s, solver, {1.0, 1.0});
   EXPECT_EQ(in_A.result.status, SolveStatus::kInvalidInput);
   EXPECT_THAT(in_A.f, ::testing::Each(0.0));
   s.A = {1, 0, 0, 1}, s.b = {kInfinity, 0};

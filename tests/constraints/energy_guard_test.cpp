@@ -8,12 +8,13 @@
 #include <limits>
 #include <random>
 
+#include "constants.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
-constexpr double kRoundOff = 64 * std::numeric_limits<double>::epsilon();
+using testing::kFewRoundings;
 
 TEST(EnergyGuard, TwoUnequalContactsAreBroughtToZeroWork) {
   // Pushing at the light contact is cheap for the program, f = (0, 1/9), and adds 50/81 J; f = (1, 0) loses ½ J.
@@ -21,15 +22,15 @@ TEST(EnergyGuard, TwoUnequalContactsAreBroughtToZeroWork) {
   const std::array<double, 2> b = {-1, 0}, program = {0, 1.0 / 9.0}, complementary = {1, 0};
   std::array<double, 2> f{};
   const auto result = guard_energy(VelocityLevelEnergy{A, b}, program, complementary, f);
-  EXPECT_NEAR(result.energy_program, 50.0 / 81.0, kRoundOff);
-  EXPECT_NEAR(result.energy_complementary, -0.5, kRoundOff);
+  EXPECT_NEAR(result.energy_program, 50.0 / 81.0, kFewRoundings);
+  EXPECT_NEAR(result.energy_complementary, -0.5, kFewRoundings);
   // Along f₀ + s d d = (−1, 1/9): φ₁ = d·(b + A f₀) = 1, φ₂ = ½ dᵀA d = ½(1 − 2 +
   // 100/81)
   const double phi2 = 0.5 * (100.0 / 81.0 - 1.0);
-  EXPECT_NEAR(result.blend, (std::sqrt(1.0 + 2.0 * phi2) - 1.0) / (2.0 * phi2), kRoundOff);
-  EXPECT_NEAR(result.energy, 0.0, kRoundOff);
-  EXPECT_NEAR(f[0], 1.0 - result.blend, kRoundOff);
-  EXPECT_NEAR(f[1], result.blend / 9.0, kRoundOff);
+  EXPECT_NEAR(result.blend, (std::sqrt(1.0 + 2.0 * phi2) - 1.0) / (2.0 * phi2), kFewRoundings);
+  EXPECT_NEAR(result.energy, 0.0, kFewRoundings);
+  EXPECT_NEAR(f[0], 1.0 - result.blend, kFewRoundings);
+  EXPECT_NEAR(f[1], result.blend / 9.0, kFewRoundings);
 }
 
 TEST(EnergyGuard, BlendIsTheLargestSafeOneOfAScan) {
@@ -66,9 +67,9 @@ TEST(EnergyGuard, GapLevelCountsTheWorkOverTheStep) {
         guard_energy(GapLevelEnergy{.A = A, .b = b, .gap_before = gap, .A_rigid = rigid, .step = h, .theta = theta},
                      program, complementary, f);
     const auto gained = [&](double impulse) { return 0.5 * m * (std::pow(v + impulse / m, 2) - v * v); };
-    EXPECT_NEAR(result.energy_program, gained(program[0]), kRoundOff * 13.0 * 13.0);
-    EXPECT_NEAR(result.energy_complementary, gained(complementary[0]), kRoundOff * 13.0 * 13.0);
-    EXPECT_NEAR(gained(f[0]), 0.0, kRoundOff * 13.0 * 13.0);
+    EXPECT_NEAR(result.energy_program, gained(program[0]), kFewRoundings * 13.0 * 13.0);
+    EXPECT_NEAR(result.energy_complementary, gained(complementary[0]), kFewRoundings * 13.0 * 13.0);
+    EXPECT_NEAR(gained(f[0]), 0.0, kFewRoundings * 13.0 * 13.0);
   }
 }
 

@@ -30,7 +30,7 @@ constexpr double kVelocity = 1e-8;
 
 FrictionProblem problem_of(const FrictionSample& s) { return {.contacts = s.contacts, .A = s.A, .b = s.b, .mu = s.mu}; }
 
-struct Solved {
+struct SolvedCones {
   FrictionResult result = {};
   std::vector<double> f = {};
   Eigen::VectorXd u = {};
@@ -44,8 +44,8 @@ Eigen::VectorXd velocities(const FrictionSample& s, const std::vector<double>& f
          Eigen::Map<const Eigen::VectorXd>(s.b.data(), n);
 }
 
-Solved solve(const FrictionSample& s, FrictionSolver& solver, const FrictionOptions& options) {
-  Solved solved{.f = std::vector<double>(s.b.size())};
+SolvedCones solve(const FrictionSample& s, FrictionSolver& solver, const FrictionOptions& options) {
+  SolvedCones solved{.f = std::vector<double>(s.b.size())};
   solved.result = solver.solve(problem_of(s), solved.f, options);
   solved.u = velocities(s, solved.f);
   return solved;
@@ -76,7 +76,7 @@ std::vector<FrictionBlock> blocks_of(const FrictionSample& s, int columns, std::
 }
 
 /// Coulomb's law at every contact: the largest violation, in units of velocity with unit effective mass.
-double violation_of_coulomb(const FrictionSample& s, const Solved& solved) {
+double violation_of_coulomb(const FrictionSample& s, const SolvedCones& solved) {
   double worst = 0.0;
   for (int i = 0; i < s.contacts; ++i) {
     const double mu = s.mu[static_cast<std::size_t>(i)];
@@ -97,7 +97,7 @@ TEST(FrictionCone, BlockOnASlopeSticksBelowTheFrictionAngleAndSlidesAbove) {
     for (const double slope : {0.0, 0.2, 0.4, 0.6, 1.0}) {
       const double mu = 0.5;
       const FrictionSample s = make_stack(1, slope, mu);
-      const Solved solved = solve(s, solver, {.method = method, .tolerance = 1e-11, .max_sweeps = 5000});
+      const SolvedCones solved = solve(s, solver, {.method = method, .tolerance = 1e-11, .max_sweeps = 5000});
       const bool sticks = std::tan(slope) < mu;
       const double speed = sticks ? 0.0 : kStep * (std::sin(slope) - mu * std::cos(slope));
       Vec3 sum = Vec3::Zero();
@@ -117,7 +117,7 @@ TEST(FrictionCone, TallBlockTipsWhereItsCentreLeavesTheBase) {
   FrictionSolver solver;
   for (const double slope : {0.7, 0.85}) {
     const FrictionSample s = make_stack(1, slope, 5.0);
-    const Solved solved = solve(s, solver, {.tolerance = 1e-11, .max_sweeps = 5000});
+    const SolvedCones solved = solve(s, solver, {.tolerance = 1e-11, .max_sweeps = 5000});
     EXPECT_EQ(solved.result.status, SolveStatus::kSolved);
     EXPECT_EQ(solved.velocity(0)[0] > 1e-4, slope > std::atan(1.0));  // the upper edge
     EXPECT_NEAR(solved.velocity(1).norm(), 0.0, kVelocity);           // the lower one holds
@@ -141,7 +141,7 @@ TEST(FrictionCone, DirectionsAreAllAlike) {
     b = (R * b).eval();
     for (const FrictionMethod method : {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel}) {
       const FrictionOptions options{.method = method, .tolerance = 1e-11, .max_sweeps = 5000};
-      const Solved first = solve(s, solver, options), second = solve(turned, solver, options);
+      const SolvedCones first = solve(s, solver, options), second = solve(turned, solver, options);
       ASSERT_EQ(first.result.status, SolveStatus::kSolved);
       const Eigen::VectorXd f = Eigen::Map<const Eigen::VectorXd>(first.f.data(), size);
       EXPECT_LT((R * f - Eigen::Map<const Eigen::VectorXd>(second.f.data(), size)).norm(), kVelocity * (1.0 + f.norm()))
@@ -158,7 +158,7 @@ TEST(FrictionCone, ProximalMethodObeysCoulombsLaw) {
   for (int n = 0; n < kSamples; ++n) {
     const double mu = n % 4 == 0 ? 0.0 : 0.2 * (n % 7);
     const FrictionSample s = make_friction(1 + n % 16, n % 24, mu, random);
-    const Solved solved = solve(s, solver, {.tolerance = 1e-10, .max_sweeps = 2000});
+    const SolvedCones solved = solve(s, solver, {.tolerance = 1e-10, .max_sweeps = 2000});
     solved_count += solved.result.status == SolveStatus::kSolved;
     if (solved.result.status != SolveStatus::kSolved) continue;
     EXPECT_LT(violation_of_coulomb(s, solved), 1e-6) << n << " m " << s.contacts << " mu " << mu;
@@ -195,14 +195,14 @@ TEST(FrictionCone, RedundantContactsAndUnevenMassesSettle) {
   int settled = 0;
   for (int n = 0; n < kSamples; ++n) {
     const FrictionSample s = twice(make_friction(1 + n % 10, n % 24, 0.1 * (n % 8), random));
-    const Solved solved = solve(s, solver, {.tolerance = 1e-9});
+    const SolvedCones solved = solve(s, solver, {.tolerance = 1e-9});
     settled += solved.result.status == SolveStatus::kSolved;
     EXPECT_LT(violation_of_coulomb(s, solved), 1e-6) << n;
   }
   EXPECT_EQ(settled, kSamples);
   for (int boxes = 1; boxes <= 10; ++boxes) {
     const FrictionSample s = stack_of_uneven_boxes(boxes, kRatio);
-    const Solved solved = solve(s, solver, {.tolerance = 1e-9});
+    const SolvedCones solved = solve(s, solver, {.tolerance = 1e-9});
     EXPECT_EQ(solved.result.status, SolveStatus::kSolved) << boxes << " residual " << solved.result.residual;
     EXPECT_LT(solved.u.cwiseAbs().maxCoeff(), kVelocity) << boxes;  // it stands
   }
@@ -214,7 +214,7 @@ TEST(FrictionCone, ForcesNeverAddEnergy) {
   for (int n = 0; n < 100; ++n) {
     const FrictionSample s = make_friction(1 + n % 12, n % 20, 0.6, random);
     for (const FrictionMethod method : {FrictionMethod::kProximal, FrictionMethod::kBlockGaussSeidel}) {
-      const Solved solved = solve(s, solver, {.method = method, .tolerance = 1e-10, .max_sweeps = 2000});
+      const SolvedCones solved = solve(s, solver, {.method = method, .tolerance = 1e-10, .max_sweeps = 2000});
       double energy = 0.0, size = 0.0;
       for (std::size_t i = 0; i < s.b.size(); ++i) {
         energy += 0.5 * solved.f[i] * (s.b[i] + solved.u[static_cast<Eigen::Index>(i)]);
@@ -232,12 +232,12 @@ TEST(FrictionCone, BlocksGiveTheFixedPointOfTheFullMatrix) {
     const FrictionSample s = make_friction(1 + n % 5, 18, 0.4, random);
     const FrictionOptions options{
         .method = FrictionMethod::kBlockGaussSeidel, .tolerance = 1e-12, .max_sweeps = 20'000};
-    const Solved full = solve(s, solver, options);
+    const SolvedCones full = solve(s, solver, options);
     std::vector<double> values, f(s.b.size());
     const auto blocks = blocks_of(s, s.columns, values);
     const BlockFrictionProblem problem{
         .contacts = s.contacts, .columns = s.columns, .blocks = blocks, .b = s.b, .mu = s.mu};
-    const Solved exact = solve(s, solver, {.tolerance = 1e-12, .max_sweeps = 20'000});
+    const SolvedCones exact = solve(s, solver, {.tolerance = 1e-12, .max_sweeps = 20'000});
     for (const FrictionMethod method :
          {FrictionMethod::kBlockGaussSeidel, FrictionMethod::kProximal, FrictionMethod::kSplitting}) {
       std::fill(f.begin(), f.end(), 0.0);
@@ -258,7 +258,7 @@ TEST(FrictionCone, WithoutFrictionItIsTheComplementaryProblem) {
   ContactQpSolver normal_solver;
   for (int n = 0; n < 30; ++n) {
     const FrictionSample s = make_friction(2 + n % 8, 12, 0.0, random);
-    const Solved solved = solve(s, solver, {.tolerance = 1e-11, .max_sweeps = 5000});
+    const SolvedCones solved = solve(s, solver, {.tolerance = 1e-11, .max_sweeps = 5000});
     ASSERT_EQ(solved.result.status, SolveStatus::kSolved);
     const auto m = static_cast<std::size_t>(s.contacts);
     std::vector<double> A(m * m), b(m), f(m);
@@ -278,7 +278,7 @@ TEST(FrictionCone, WithoutFrictionItIsTheComplementaryProblem) {
 TEST(FrictionCone, AStackOfTenStandsStillOnASlope) {
   FrictionSolver solver;
   const FrictionSample s = make_stack(10, 0.02, 0.5);
-  const Solved solved = solve(s, solver, {.tolerance = 1e-9, .max_sweeps = 2000});
+  const SolvedCones solved = solve(s, solver, {.tolerance = 1e-9, .max_sweeps = 2000});
   EXPECT_EQ(solved.result.status, SolveStatus::kSolved) << solved.result.residual;
   EXPECT_LT(solved.u.cwiseAbs().maxCoeff(), kVelocity);
   // Once its forces are known, a step costs one look at them.
@@ -324,7 +324,7 @@ TEST(FrictionCone, StaggeredProjectionsAgreeWhereTheySettle) {
   constexpr int kSamples = 60;
   for (int n = 0; n < kSamples; ++n) {
     const FrictionSample s = make_friction(1 + n % 6, 18, 0.3, random);
-    const Solved staggered =
+    const SolvedCones staggered =
         solve(s, solver, {.method = FrictionMethod::kStaggered, .tolerance = 1e-10, .max_sweeps = 500});
     if (staggered.result.status != SolveStatus::kSolved) continue;
     ++settled;
@@ -338,7 +338,7 @@ TEST(FrictionCone, BadNumbersAreAResultNotAnException) {
   FrictionSolver solver;
   FrictionSample s = make_stack(1, 0.1, 0.5);
   s.b[3] = std::numeric_limits<double>::quiet_NaN();
-  const Solved solved = solve(s, solver, {});
+  const SolvedCones solved = solve(s, solver, {});
   EXPECT_EQ(solved.result.status, SolveStatus::kInvalidInput);
   EXPECT_THAT(solved.f, ::testing::Each(0.0));
   s = make_stack(1, 0.1, -0.5);
@@ -354,7 +354,7 @@ TEST(FrictionCone, SameBitsEveryTimeAndNoAllocationOnceWarm) {
   const FrictionSample large = make_friction(12, 10, 0.5, random), small = make_friction(4, 20, 0.5, random);
   for (const FrictionMethod method : kMethods) {
     const FrictionOptions options{.method = method, .max_sweeps = 50};
-    const Solved first = solve(small, solver, options);
+    const SolvedCones first = solve(small, solver, options);
     solve(large, other, options);
     EXPECT_EQ(solve(small, other, options).f, first.f);
     std::vector<double> f(large.b.size());

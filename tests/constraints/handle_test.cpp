@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "constants.h"
 #include "islands.h"
 #include "limber/core/error.h"
 
@@ -12,11 +13,11 @@ namespace limber {
 namespace {
 
 using testing::Island;
+using testing::kFrame;
 using testing::kGravity;
 
-constexpr double kFrame = 1.0 / 60.0;
-constexpr double kSize = 0.6;    // m, of the sample body
-constexpr double kExact = 1e-9;  // of the size: what a held point may be off by
+constexpr double kBodySize = 0.6;  // m, of the sample body
+constexpr double kExact = 1e-9;    // of the size: what a held point may be off by
 const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 const SurfacePoint kOther{.triangle = 8, .weight = {0.1, 0.1, 0.8}};
 
@@ -32,8 +33,8 @@ TEST(Handle, HeldPointIsAtItsTargetAtAnyStiffnessOnATurningBody) {
         handle.set_target({.position = target});
         const IslandReport report = island.step();
         ASSERT_EQ(report.status, SolveStatus::kSolved) << hz << ' ' << step;
-        ASSERT_LT((island.group.position(0, kCorner) - target).norm(), kExact * kSize);
-        ASSERT_LT(handle.error(), kExact * kSize);
+        ASSERT_LT((island.group.position(0, kCorner) - target).norm(), kExact * kBodySize);
+        ASSERT_LT(handle.error(), kExact * kBodySize);
       }
     }
 }
@@ -47,7 +48,7 @@ TEST(Handle, SeveralAndRedundantOnesAreMetTogether) {
     for (Handle* handle : handles)
       handle->set_target({.position = handle->target().position + Vec3(0.0, 0.002, 0.001)});
     EXPECT_EQ(island.step().status, SolveStatus::kSolved);
-    for (const Handle* handle : handles) EXPECT_LT(handle->error(), kExact * kSize);
+    for (const Handle* handle : handles) EXPECT_LT(handle->error(), kExact * kBodySize);
   }
 }
 
@@ -60,7 +61,7 @@ TEST(Handle, ConflictingOnesMeetInTheMiddle) {
   one.set_target({.position = at + Vec3(0.0, 0.0, 0.02)});
   other.set_target({.position = at - Vec3(0.0, 0.0, 0.01)});
   for (int i = 0; i < 60; ++i) island.step();
-  EXPECT_LT((island.group.position(0, kCorner) - at - Vec3(0.0, 0.0, 0.005)).norm(), 1e-6 * kSize);
+  EXPECT_LT((island.group.position(0, kCorner) - at - Vec3(0.0, 0.0, 0.005)).norm(), 1e-6 * kBodySize);
 }
 
 TEST(Handle, HoldsInItsDirectionsAlone) {
@@ -70,7 +71,7 @@ TEST(Handle, HoldsInItsDirectionsAlone) {
   island.hold(0, kCorner, {.directions = {Vec3::UnitZ()}});
   for (int i = 0; i < 30; ++i) island.step();
   const Vec3 moved = island.group.position(0, kCorner) - before;
-  EXPECT_LT(std::abs(moved.z()), kExact * kSize);
+  EXPECT_LT(std::abs(moved.z()), kExact * kBodySize);
   EXPECT_GT(moved.x(), 0.1);
 }
 
@@ -104,7 +105,7 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
       ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << k;
     }
     EXPECT_NEAR(mean, weight, 2e-2 * weight) << "what swings below it pulls by its weight in the mean; " << k;
-    EXPECT_NEAR(spring.error(), spring.force().norm() / k, 0.2 * weight / k + kExact * kSize) << k;
+    EXPECT_NEAR(spring.error(), spring.force().norm() / k, 0.2 * weight / k + kExact * kBodySize) << k;
   }
 }
 

@@ -6,14 +6,13 @@
 #include <utility>
 #include <vector>
 
+#include "constants.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/island_solver.h"
 #include "limber/constraints/joint_constraint.h"
 #include "sample_models.h"
 
 namespace limber::testing {
-
-inline constexpr double kGravity = 9.80665;
 
 /// Ends of the sample body along x, where links are joined, m.
 inline const Vec3 kLeftEnd{-0.3, 0.0, 0.0}, kRightEnd{0.3, 0.0, 0.0};

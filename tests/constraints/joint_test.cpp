@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "constants.h"
 #include "islands.h"
 #include "limber/core/error.h"
 
@@ -12,11 +13,11 @@ namespace {
 using testing::add_chain;
 using testing::hinge_axes;
 using testing::Island;
+using testing::kFrame;
 using testing::kGravity;
 using testing::kLeftEnd;
 using testing::kRightEnd;
 
-constexpr double kFrame = 1.0 / 60.0;
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int kLongRun = 4000;  // the sanitizers take twenty times as long
 #else

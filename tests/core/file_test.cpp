@@ -14,13 +14,13 @@ namespace limber {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class FileTest : public testing::Test {
+class FileTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder = fs::path(testing::TempDir()) /
-             ("limber_file_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    folder = fs::path(::testing::TempDir()) /
+             ("limber_file_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(folder);
     fs::create_directories(folder);
   }

@@ -8,9 +8,9 @@
 namespace limber::internal {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string message_of(const std::function<void()>& action) {
   try {
@@ -43,7 +43,7 @@ TEST(StrictJson, ReadsWhatIsThere) {
   EXPECT_EQ(o.vec3("v"), Vec3(1, 2, 3));
   std::vector<std::string> places;
   o.for_each("list", [&](const auto&, const std::string& place) { places.push_back(place); });
-  EXPECT_THAT(places, testing::ElementsAre("f.list[0]", "f.list[1]"));
+  EXPECT_THAT(places, ::testing::ElementsAre("f.list[0]", "f.list[1]"));
   o.finish();
 }
 
@@ -78,7 +78,7 @@ TEST(StrictJson, AMissingKeyTellsWhatStandsThereInstead) {
   EXPECT_THAT(message_of([&] { JsonObject(document, "f").number("youngs_modulus"); }),
               HasSubstr("\"youngs_modulus\" is missing; what stands there is \"youngs_moduls\""));
   EXPECT_THAT(message_of([&] { JsonObject(document, "f").number("poisson_ratio"); }),
-              testing::EndsWith("\"poisson_ratio\" is missing"));
+              ::testing::EndsWith("\"poisson_ratio\" is missing"));
 }
 
 TEST(StrictJson, WrongTypesTellWhatWasSeenAndExpected) {

@@ -6,19 +6,20 @@
 #include <complex>
 #include <limits>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "sample_models.h"
 
 namespace limber {
 namespace {
 
+using testing::kDown;
+using testing::kEpsilon;
 using testing::Particles;
 using testing::sample_model;
 using testing::sample_particles;
 using testing::SampleOptions;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-const Vec3 kDown{0.0, 0.0, -9.80665};
 const Quaternion kTurned = quaternion_from_rotation_vector({0.7, -0.4, 1.1});
 
 /// −Σ m w_i·Rᵀ(ẍ − g) of the rest shape, moved along o(t) + R(t) r, by differences in time.

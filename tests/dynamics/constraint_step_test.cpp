@@ -3,15 +3,16 @@
 #include <cmath>
 #include <vector>
 
+#include "constants.h"
 #include "limber/dynamics/body_group.h"
 #include "sample_models.h"
 
 namespace limber {
 namespace {
 
+using testing::kDown;
 using testing::sample_model;
 
-const Vec3 kDown{0.0, 0.0, -9.80665};
 const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 constexpr FrameMotion kMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine,
                                     FrameMotion::kKinematic};

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "constants.h"
 #include "counted_new.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
@@ -15,18 +16,19 @@
 namespace limber {
 namespace {
 
+using testing::kDown;
+using testing::kEpsilon;
 using testing::sample_model;
 using testing::SampleOptions;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 /// Two orders of evaluation of the same closed forms.
 constexpr double kRoundOff = 1e-13;
 /// What a bound may fall short of a sample by: the samples' own round-off.
 constexpr double kSampleError = 1e-12;
-const Vec3 kDown{0.0, 0.0, -9.80665};
-const FrameMotion kMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic};
+const FrameMotion kAllMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine,
+                                   FrameMotion::kKinematic};
 const RigidTransform kPlace{quaternion_from_rotation_vector({0.7, -0.4, 1.1}), {1.0, -2.0, 3.0}};
-const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 
 /// A body that turns, flies, flexes and carries loads.
 struct Loaded {
@@ -37,9 +39,9 @@ struct Loaded {
     group.set_amplitudes(slot, z, rates);
   }
   void load() {
-    group.apply_force(slot, kCorner, {2.0, -1.0, 3.0});
-    group.apply_impulse(slot, kCorner, {0.05, 0.02, -0.03}, 0.4 * group.step_length());
-    group.apply_impulse(slot, kCorner, {-0.02, 0.02, 0.01}, 0.7 * group.step_length());
+    group.apply_force(slot, kMarked, {2.0, -1.0, 3.0});
+    group.apply_impulse(slot, kMarked, {0.05, 0.02, -0.03}, 0.4 * group.step_length());
+    group.apply_impulse(slot, kMarked, {-0.02, 0.02, 0.01}, 0.7 * group.step_length());
   }
   ExactMotion predict() const {
     ExactMotion motion;
@@ -72,7 +74,7 @@ void expect_committed(const Loaded& body, const MotionState& end) {
 }
 
 TEST(ExactMotion, AtTheStepsEndItIsWhatAdvanceCommits) {
-  for (const FrameMotion kind : kMotions)
+  for (const FrameMotion kind : kAllMotions)
     for (const double h : {1.0 / 240.0, 1.0 / 60.0, 0.5}) {
       Loaded body(kind, h);
       for (int step = 0; step < 6; ++step) {
@@ -112,7 +114,7 @@ TEST(ExactMotion, WhatAnsweredConstraintsStaticallyLetsGoAndCountsInTheReach) {
 }
 
 TEST(ExactMotion, AtTheStartItIsTheBodyAsItStands) {
-  for (const FrameMotion kind : kMotions) {
+  for (const FrameMotion kind : kAllMotions) {
     Loaded body(kind, 0.02);
     MotionState start;
     body.predict().evaluate(0.0, start);
@@ -127,7 +129,7 @@ TEST(ExactMotion, AtTheStartItIsTheBodyAsItStands) {
 TEST(ExactMotion, WithinTheStepAFreeBodyIsWhereAShorterStepTakesIt) {
   const double h = 0.1;
   Loaded body(FrameMotion::kFree, h);
-  const SurfacePoint struck = kCorner;
+  const SurfacePoint struck = kMarked;
   body.group.apply_impulse(body.slot, struck, {0.05, 0.02, -0.03}, 0.3 * h);
   const ExactMotion motion = body.predict();
   for (const double part : {0.1, 0.29, 0.31, 0.77}) {
@@ -157,7 +159,7 @@ TEST(ExactMotion, WithinTheStepAFreeBodyIsWhereAShorterStepTakesIt) {
 
 TEST(ExactMotion, RatesAreTheDerivativesOfThePositions) {
   const double dt = 1e-6;
-  for (const FrameMotion kind : kMotions) {
+  for (const FrameMotion kind : kAllMotions) {
     Loaded body(kind, 0.05);
     body.load();
     const ExactMotion motion = body.predict();
@@ -282,12 +284,12 @@ TEST(MotionBounds, OfAFrameHoldAndAreNeverVacuous) {
   const auto vector = [&] { return Vec3(unit(random), unit(random), unit(random)); };
   double worst_travel = 0.0, worst_turn = 0.0, worst_speed = 0.0, worst_bend = 0.0;
   for (int n = 0; n < 300; ++n) {
-    const FrameMotion kind = kMotions[n % 4];
+    const FrameMotion kind = kAllMotions[n % 4];
     const Vec3 half(0.3, 0.3 * std::pow(10.0, -unit(random) * unit(random)), n % 3 == 0 ? 0.3 : 0.05);
     const double h = std::pow(10.0, -1.0 - unit(random));
     BodyGroup group(sample_model({.motion = kind, .modes = 2, .half_extent = half}), h);
     const Index slot = group.add(kPlace, 5.0 * vector(), 20.0 * vector());
-    if (n % 8 >= 4) group.apply_force(slot, kCorner, 30.0 * vector());
+    if (n % 8 >= 4) group.apply_force(slot, kMarked, 30.0 * vector());
     ExactMotion motion;
     group.predict_motion(slot, kDown, motion);
     const double t0 = 0.3 * h, t1 = n % 2 == 0 ? h : std::min(0.9 * h, motion.smooth_until(t0));
@@ -333,7 +335,7 @@ TEST(MotionBounds, NoPointOfTheSurfaceLeavesItsReachOrBreaksItsSpeedLimit) {
   const auto vector = [&] { return Vec3(unit(random), unit(random), unit(random)); };
   double worst = 0.0;
   for (int n = 0; n < 120; ++n) {
-    const FrameMotion kind = kMotions[n % 4];
+    const FrameMotion kind = kAllMotions[n % 4];
     const double h = std::pow(10.0, -1.5 - 0.5 * unit(random)), flexing = std::pow(10.0, unit(random) - 2.0);
     const auto model = sample_model({.motion = kind, .modes = 5, .lowest_hz = 4.0, .decay = 2.0});
     BodyGroup group(model, h);
@@ -341,8 +343,8 @@ TEST(MotionBounds, NoPointOfTheSurfaceLeavesItsReachOrBreaksItsSpeedLimit) {
     std::vector<double> z(5), rates(5);
     for (std::size_t i = 0; i < 5; ++i) z[i] = flexing * unit(random), rates[i] = 30.0 * flexing * unit(random);
     group.set_amplitudes(slot, z, rates);
-    if (n % 3 == 0) group.apply_impulse(slot, kCorner, vector(), 0.5 * h);
-    if (n % 5 == 0) group.apply_force(slot, kCorner, 10.0 * vector());
+    if (n % 3 == 0) group.apply_impulse(slot, kMarked, vector(), 0.5 * h);
+    if (n % 5 == 0) group.apply_force(slot, kMarked, 10.0 * vector());
     ExactMotion motion;
     group.predict_motion(slot, kDown, motion);
     const SurfaceExtent& extent = model->collision_extent();

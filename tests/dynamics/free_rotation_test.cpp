@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "taylor_top.h"
 
@@ -16,9 +17,8 @@ namespace limber {
 namespace {
 
 using testing::angle_between;
+using testing::kEpsilon;
 using testing::TaylorTop;
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 struct Top {
   std::string name;

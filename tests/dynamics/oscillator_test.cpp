@@ -13,6 +13,7 @@
 #include <random>
 #include <vector>
 
+#include "constants.h"
 #include "instruction_sets.h"
 #include "limber/core/error.h"
 
@@ -80,7 +81,7 @@ double free_error(const ScaledFlow& a, const ScaledFlow& b) {
   return static_cast<double>(size(size(a.z_z - b.z_z, a.z_v - b.z_v), size(a.v_z - b.v_z, a.v_v - b.v_v)));
 }
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+using testing::kEpsilon;
 
 /// The accuracy that oscillator.h promises: four ulps of the phase (one of λ alone moves it by ε·√λ h/2), and 1e-12.
 double promised(const Mode& mode, double h) { return 1e-12 + 4.0 * kEpsilon * std::sqrt(mode.lambda) * h; }
@@ -107,8 +108,8 @@ void for_every_regime(const std::function<void(const Mode&, double h)>& claim) {
     for (const double ratio : damping_ratios())
       for (const double phase : phases()) {
         const double omega = std::sqrt(lambda);
-        SCOPED_TRACE(testing::Message() << "lambda " << lambda << ", damping ratio 1 + " << ratio - 1.0 << ", phase "
-                                        << phase);
+        SCOPED_TRACE(::testing::Message()
+                     << "lambda " << lambda << ", damping ratio 1 + " << ratio - 1.0 << ", phase " << phase);
         claim({.lambda = lambda, .decay = ratio * omega}, phase / omega);
       }
 }
@@ -168,7 +169,7 @@ TEST(Oscillator, ComplexPairOfThePaperGivesTheSameAwayFromCriticalDamping) {
   constexpr double kPairError = 1e-12;
   for (const double ratio : {0.0, 1e-6, 0.1, 0.5, 0.9, 1.1, 2.0})
     for (const double phase : {1e-3, 0.1, 1.0, 3.0, 10.0, 50.0}) {
-      SCOPED_TRACE(testing::Message() << "damping ratio " << ratio << ", phase " << phase);
+      SCOPED_TRACE(::testing::Message() << "damping ratio " << ratio << ", phase " << phase);
       const double omega = 40.0, h = phase / omega, z0 = 0.6 / omega, v0 = 0.8;
       const Mode mode{.lambda = omega * omega, .decay = ratio * omega};
       const Complex root = std::sqrt(Complex(mode.decay * mode.decay - mode.lambda));
@@ -191,7 +192,7 @@ TEST(Oscillator, MechanismCoastsAndFalls) {
 TEST(Oscillator, DampedMechanismIsExact) {
   for (const double decay : {1e-12, 1e-3, 1.0, 1e3, 1e12})
     for (const double h : {1e-9, 1e-3, 1.0, 1e6}) {
-      SCOPED_TRACE(testing::Message() << "decay " << decay << ", step " << h);
+      SCOPED_TRACE(::testing::Message() << "decay " << decay << ", step " << h);
       const Wide rate = 2 * Wide(decay), t = h, S = -expm1(-rate * t) / rate;
       const auto relative = [](double value, const Wide& exact) {
         return static_cast<double>((value - exact) / exact);
@@ -212,7 +213,7 @@ TEST(Oscillator, HeldResponseIsNeverNegativeAndNothingOverflows) {
   for (const double lambda : sizes)
     for (const double decay : sizes)
       for (const double h : sizes) {
-        SCOPED_TRACE(testing::Message() << "lambda " << lambda << ", decay " << decay << ", step " << h);
+        SCOPED_TRACE(::testing::Message() << "lambda " << lambda << ", decay " << decay << ", step " << h);
         const ModePropagator p = propagator({lambda, decay}, h);
         EXPECT_GE(p.z_g, 0.0);
         EXPECT_LE(std::abs(p.z_z), 1.0 + 4.0 * kEpsilon);

@@ -87,8 +87,8 @@ TEST(Reconstruct, EqualsTheDoubleSumWithinFloatRoundingOnEveryInstructionSet) {
     for (const Index vertices : {1, 3, 15, 16, 17, 100})
       for (const Index modes : {0, 1, 7, 32, 300})
         for (const int count : {1, 2, 3, 7, 8, 13}) {
-          SCOPED_TRACE(testing::Message() << hwy::TargetName(target) << ": " << vertices << " vertices, " << modes
-                                          << " modes, " << count << " instances");
+          SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ": " << vertices << " vertices, " << modes
+                                            << " modes, " << count << " instances");
           const ModalSurface surface = random_surface(vertices, modes);
           const Instances instances(surface, count);
           reconstruct(surface, instances.targets);
@@ -107,9 +107,9 @@ TEST(Reconstruct, WritesNothingPastTheLastVertex) {
         for (const auto* arrays : {&instances.positions, &instances.normals})
           for (const auto& array : *arrays) {
             const std::span<const float> guard = std::span(array).last(Instances::kGuard);
-            EXPECT_THAT(guard, testing::Each(Instances::kUntouched)) << vertices << " vertices";
+            EXPECT_THAT(guard, ::testing::Each(Instances::kUntouched)) << vertices << " vertices";
             EXPECT_THAT(std::span(array).first(array.size() - guard.size()),
-                        testing::Each(testing::Ne(Instances::kUntouched)));
+                        ::testing::Each(::testing::Ne(Instances::kUntouched)));
           }
       }
   });
@@ -172,7 +172,7 @@ class BackwardsJobs final : public Jobs {
 TEST(Batch, ManyEqualsOneByOne) {
   for_each_instruction_set([](std::int64_t target) {
     for (const Index modes : {0, 5, 40, 2000}) {
-      SCOPED_TRACE(testing::Message() << hwy::TargetName(target) << ", " << modes << " modes");
+      SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ", " << modes << " modes");
       const ModalSurface surface = random_surface(777, modes);
       const Instances together(surface, 23, true), alone(surface, 23, true), backwards(surface, 23, true);
       reconstruct(surface, together.targets);
@@ -201,7 +201,7 @@ TEST(Reconstruct, RejectsMissingArraysAndWrongSurfaces) {
   wrong = random_surface(5, 2), wrong.triangles[1][2] = 5;
   EXPECT_THROW(reconstruct(wrong, instances.targets), InvalidArgument);
   EXPECT_THROW(reconstruct(random_surface(1, 8193), instances.targets), InvalidArgument);
-  EXPECT_THAT(instances.positions, testing::Each(testing::Each(Instances::kUntouched)));
+  EXPECT_THAT(instances.positions, ::testing::Each(::testing::Each(Instances::kUntouched)));
   EXPECT_NO_THROW(reconstruct(surface, {}));
 }
 
@@ -259,7 +259,7 @@ TEST(VertexNormals, WeighByAreaAndPointUpWhereThereIsNone) {
   EXPECT_FLOAT_EQ(normals[0], 2.0f / std::sqrt(5.0f));
   EXPECT_FLOAT_EQ(normals[1], 0.0f);
   EXPECT_FLOAT_EQ(normals[2], 1.0f / std::sqrt(5.0f));
-  EXPECT_THAT(std::span(normals).last(3), testing::ElementsAre(0.0f, 0.0f, 1.0f));
+  EXPECT_THAT(std::span(normals).last(3), ::testing::ElementsAre(0.0f, 0.0f, 1.0f));
 }
 
 TEST(VertexNormals, RejectArraysAndIndicesThatDoNotFit) {

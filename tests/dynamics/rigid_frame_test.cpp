@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "constants.h"
 #include "sample_models.h"
 #include "taylor_top.h"
 
@@ -13,11 +14,10 @@ namespace limber {
 namespace {
 
 using testing::angle_between;
+using testing::kDown;
+using testing::kEpsilon;
+using testing::kGravity;
 using testing::sample_model_data;
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kGravity = 9.80665;
-const Vec3 kDown{0.0, 0.0, -kGravity};
 
 void step(RigidFrame& frame, const FrameConstants& c, const FrameLoad& load, double h) {
   const Vec3 first_moment = c.mass * c.center_of_mass;

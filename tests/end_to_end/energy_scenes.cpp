@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "constants.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
 #include "limber/precompute/bake.h"
@@ -14,7 +15,6 @@ namespace limber::testing {
 namespace {
 
 const Vec3 kSize{0.3, 0.1, 0.1};  // of a bar, m
-constexpr double kGravity = 9.80665;
 constexpr double kDensity = 1000.0;
 
 /// @param weight times the density, and the stiffness with it, so that the frequencies stay

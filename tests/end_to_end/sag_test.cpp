@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "constants.h"
 #include "dense_fem.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
@@ -14,23 +15,24 @@
 namespace limber {
 namespace {
 
-constexpr double kGravity = 9.80665;
+using testing::kGravity;
+
 const Material kRubber{.youngs_modulus = 2e7, .poisson_ratio = 0.3, .density = 1000.0};
-const Vec3 kSize{0.6, 0.05, 0.05};
+const Vec3 kBeam{0.6, 0.05, 0.05};
 constexpr int kCells = 12, kInset = 1;  // along the bar; cells from its ends to the supports
 
-TetMesh bar() { return testing::tet_box(kCells, 1, 1, kSize); }
+TetMesh beam() { return testing::tet_box(kCells, 1, 1, kBeam); }
 
 /// Nodes of the lower face a number of cells from the left end.
 std::vector<Index> lower_nodes(int cell) {
-  const double x = kSize.x() * cell / kCells;
-  return testing::nodes_where(bar(), [x](const Vec3& n) { return std::abs(n.x() - x) < 1e-9 && n.z() < 1e-9; });
+  const double x = kBeam.x() * cell / kCells;
+  return testing::nodes_where(beam(), [x](const Vec3& n) { return std::abs(n.x() - x) < 1e-9 && n.z() < 1e-9; });
 }
 
 /// How far the middle of the lower face is below where it rests, from the whole model: four nodes held upwards, nothing
 /// sideways but what fixes the bar in its place.
 double sag_of_whole_model() {
-  auto [K, M] = testing::dense_model(bar(), std::array{kRubber}, true);
+  auto [K, M] = testing::dense_model(beam(), std::array{kRubber}, true);
   Eigen::VectorXd load = Eigen::VectorXd::Zero(K.rows());
   for (Eigen::Index i = 2; i < load.size(); i += 3) load -= kGravity * M.col(i);
   const auto hold = [&](Index node, int axis) {
@@ -56,7 +58,7 @@ double sag_of_world(int modes, bool residual) {
   o.residual.surface = true;
   o.damping = RayleighDamping::from_ratio(0.3, 30.0, 300.0);
   Warnings warnings;
-  const TetMesh mesh = bar();
+  const TetMesh mesh = beam();
   const auto model = bake({.name = "bar", .mesh = mesh}, o, warnings).asset.bodies[0];
   ContactFinder finder;
   World world;
@@ -65,8 +67,8 @@ double sag_of_world(int modes, bool residual) {
   const Vec3 origin = model->data().origin_in_input;
   const Quaternion across = quaternion_from_rotation_vector({0.5 * EIGEN_PI, 0.0, 0.0});  // from z to y
   for (const int cell : {kInset, kCells - kInset}) {
-    const Vec3 below(kSize.x() * cell / kCells, 0.5 * kSize.y(), -kRadius);
-    world.add_static(std::make_shared<Shape>(Capsule{.radius = kRadius, .half_length = kSize.y()}),
+    const Vec3 below(kBeam.x() * cell / kCells, 0.5 * kBeam.y(), -kRadius);
+    world.add_static(std::make_shared<Shape>(Capsule{.radius = kRadius, .half_length = kBeam.y()}),
                      {across, below - origin});
   }
   const BodyId id = world.add_body(model);
@@ -88,7 +90,7 @@ double sag_of_world(int modes, bool residual) {
 
 TEST(Sag, OfABarOnTwoSupportsIsThatOfTheWholeModel) {
   const double whole = sag_of_whole_model();
-  ASSERT_GT(whole, 5e-4 * kSize.x());
+  ASSERT_GT(whole, 5e-4 * kBeam.x());
   for (const int modes : {20, 40}) {
     EXPECT_NEAR(sag_of_world(modes, true), whole, 0.01 * whole) << modes;
     EXPECT_NEAR(sag_of_world(modes, false), whole, 0.05 * whole) << modes;

@@ -6,13 +6,12 @@
 #include <numbers>
 #include <vector>
 
+#include "constants.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
 #include "sample_models.h"
 
 namespace limber::testing {
-
-inline constexpr double kGravity = 9.80665;
 
 /// Boxes whose first mode has 3 % of critical damping.
 inline std::shared_ptr<const ModalModel> damped_box(int modes, double hz) {

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
 #include "sample_models.h"
@@ -18,11 +19,11 @@ namespace limber {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::kEpsilon;
 using testing::sample_model;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 const Vec3 kNoGravity = Vec3::Zero();
-const SurfacePoint kPoint{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 const Quaternion kTurned = quaternion_from_rotation_vector({0.7, -0.4, 1.1});
 
 std::vector<double> copy(std::span<const double> values) { return {values.begin(), values.end()}; }
@@ -52,8 +53,8 @@ TEST(World, MomentumOfAStruckBodyEqualsTheImpulse) {
   World world({.gravity = kNoGravity});
   const BodyId body = world.add_body(sample_model(), {.pose = {.q = kTurned}});
   const Vec3 impulse{0.3, -1.0, 2.0};
-  const Vec3 moment = world.position(body, kPoint).cross(impulse);
-  world.apply_impulse(body, kPoint, impulse);
+  const Vec3 moment = world.position(body, kMarked).cross(impulse);
+  world.apply_impulse(body, kMarked, impulse);
   for (int i = 0; i < 600; ++i) world.step();
   EXPECT_LT((world.linear_momentum(body) - impulse).norm(), 1e-12 * impulse.norm());
   EXPECT_LT((world.angular_momentum(body) - moment).norm(), 1e-12 * moment.norm());
@@ -69,9 +70,9 @@ TEST(World, ImpulseDoesTheWorkOfItsPoint) {
     const Vec3 impulse{0.3, -1.0, 2.0};
     const Vec3 impulse_W = axes == Axes::kWorld ? impulse : world.body(body).pose.q * impulse;
     const double energy = world.energy(body).total();
-    const Vec3 before = world.velocity(body, kPoint);
-    world.apply_impulse(body, kPoint, impulse, axes);
-    const double work = 0.5 * impulse_W.dot(before + world.velocity(body, kPoint));
+    const Vec3 before = world.velocity(body, kMarked);
+    world.apply_impulse(body, kMarked, impulse, axes);
+    const double work = 0.5 * impulse_W.dot(before + world.velocity(body, kMarked));
     EXPECT_NEAR(world.energy(body).total() - energy, work, 64 * kEpsilon * world.energy(body).total());
   }
 }
@@ -82,12 +83,12 @@ TEST(World, PointVelocityIsTheRateOfItsPosition) {
   const BodyId body =
       world.add_body(sample_model(), {.pose = {.q = kTurned}, .velocity = {1, 2, 3}, .angular_velocity = {1, 2, 3}});
   world.set_amplitudes(body, std::vector<double>{0.02, 0.01, -0.03, 0.02}, std::vector<double>{0.3, 0.1, 0.2, -0.4});
-  const Vec3 before = world.position(body, kPoint);
+  const Vec3 before = world.position(body, kMarked);
   world.step();
-  const Vec3 velocity = world.velocity(body, kPoint);
+  const Vec3 velocity = world.velocity(body, kMarked);
   world.step();
   // Central difference: h² of the third derivative, which is about ω³u ≈ 1e4, and round-off ε/h.
-  EXPECT_LT(((world.position(body, kPoint) - before) / (2.0 * h) - velocity).norm(), 1e-6 * velocity.norm());
+  EXPECT_LT(((world.position(body, kMarked) - before) / (2.0 * h) - velocity).norm(), 1e-6 * velocity.norm());
 }
 
 TEST(World, StruckBodyRingsAtItsFrequencies) {
@@ -110,7 +111,7 @@ TEST(World, StruckBodyRingsAtItsFrequencies) {
 TEST(World, UndampedFreeBodyKeepsItsEnergyFor10000Steps) {
   World world({.gravity = kNoGravity});
   const BodyId body = world.add_body(sample_model({.modes = 40}));
-  world.apply_impulse(body, kPoint, {0.3, -1.0, 2.0});
+  world.apply_impulse(body, kMarked, {0.3, -1.0, 2.0});
   const double start = world.energy(body).total();
   ASSERT_GT(world.energy(body).kinetic_modal, 0.1 * start);
   double error = 0.0;
@@ -126,7 +127,7 @@ TEST(World, HugeStepsAndTinyOnesLeadToTheSameState) {
   const auto run = [](int steps_per_second) {
     World world({.step = 1.0 / steps_per_second});
     const BodyId body = world.add_body(sample_model({.decay = 0.01}), {.angular_velocity = {1, 2, 3}});
-    world.apply_impulse(body, kPoint, {0.3, -1.0, 2.0});
+    world.apply_impulse(body, kMarked, {0.3, -1.0, 2.0});
     for (int i = 0; i < 10 * steps_per_second; ++i) world.step();
     const BodyView view = world.body(body);
     std::vector<double> state = copy(view.amplitudes);
@@ -145,8 +146,8 @@ TEST(World, HugeStepsAndTinyOnesLeadToTheSameState) {
 TEST(World, RigidBodyIsABodyWithoutModes) {
   World world;
   const BodyId body = world.add_body(sample_model({.modes = 0}), {.angular_velocity = {0, 0, 1}});
-  world.apply_impulse(body, kPoint, {0, 0, 1}, Axes::kBody, 0.001);
-  world.apply_force(body, kPoint, {0, 0, 1});
+  world.apply_impulse(body, kMarked, {0, 0, 1}, Axes::kBody, 0.001);
+  world.apply_force(body, kMarked, {0, 0, 1});
   world.step();
   EXPECT_TRUE(world.body(body).amplitudes.empty());
   std::vector<float> positions(24);
@@ -199,8 +200,8 @@ TEST(World, HundredInstancesMoveBitForBitAsEachAlone) {
   World together;
   std::vector<BodyId> bodies;
   const auto load = [](World& world, BodyId id, int i, int step) {
-    if ((i + step) % 7 == 0) world.apply_force(id, kPoint, {0.1 * i, -0.2, 0.3});
-    if ((i + step) % 11 == 0) world.apply_impulse(id, kPoint, {0.01 * i, 0.2, -0.1}, Axes::kBody, 0.004);
+    if ((i + step) % 7 == 0) world.apply_force(id, kMarked, {0.1 * i, -0.2, 0.3});
+    if ((i + step) % 11 == 0) world.apply_impulse(id, kMarked, {0.01 * i, 0.2, -0.1}, Axes::kBody, 0.004);
   };
   const auto placement = [](int i) {
     return BodyPlacement{.pose = {.q = kTurned, .p = {1.0 * i, 0, 0}}, .angular_velocity = {0.1 * i, 1, 2}};
@@ -252,8 +253,8 @@ std::uint64_t hash_after_600_steps(Jobs& jobs) {
     bodies.push_back(world.add_body(i % 3 == 0 ? hung : free, {.angular_velocity = {0.1 * i, 1, 2}}));
   for (int step = 0; step < 600; ++step) {
     const BodyId struck = bodies[static_cast<std::size_t>(step * 37 % 400)];
-    world.apply_impulse(struck, kPoint, {0.1, 0.2, 0.3}, Axes::kBody, 0.001);
-    world.apply_force(bodies[static_cast<std::size_t>(step * 53 % 400)], kPoint, {1, 0, -1});
+    world.apply_impulse(struck, kMarked, {0.1, 0.2, 0.3}, Axes::kBody, 0.001);
+    world.apply_force(bodies[static_cast<std::size_t>(step * 53 % 400)], kMarked, {1, 0, -1});
     world.step();
   }
   return world.state_hash();
@@ -273,7 +274,7 @@ TEST(World, StateHashTellsStatesApart) {
   World world;
   const BodyId body = world.add_body(sample_model());
   const std::uint64_t start = world.state_hash();
-  world.apply_impulse(body, kPoint, {0, 0, 1e-300});
+  world.apply_impulse(body, kMarked, {0, 0, 1e-300});
   EXPECT_NE(world.state_hash(), start);
 }
 
@@ -367,7 +368,7 @@ TEST(World, DrawingManyAtOnceGivesWhatDrawingEachGives) {
   std::vector<BodyId> bodies;
   for (int i = 0; i < 21; ++i) {
     bodies.push_back(world.add_body(i % 3 == 0 ? b : a, {.pose = {.q = kTurned}, .angular_velocity = {0, 0.1 * i, 0}}));
-    world.apply_impulse(bodies.back(), kPoint, {0.1 * i, 0, 0.1});
+    world.apply_impulse(bodies.back(), kMarked, {0.1 * i, 0, 0.1});
   }
   world.step();
   std::vector<std::vector<float>> positions(21, std::vector<float>(24)), normals = positions;
@@ -389,7 +390,7 @@ TEST(World, BodyFarAwayIsDrawnAsSharplyAsNearby) {
   const auto model = sample_model();
   const BodyId here = world.add_body(model, {.pose = {.q = kTurned}}),
                there = world.add_body(model, {.pose = {kTurned, far}});
-  for (const BodyId id : {here, there}) world.apply_impulse(id, kPoint, {0.1, 0.2, 0.3});
+  for (const BodyId id : {here, there}) world.apply_impulse(id, kMarked, {0.1, 0.2, 0.3});
   for (int i = 0; i < 60; ++i) world.step();
   std::vector<float> near_positions(24), far_positions(24), near_normals(24), far_normals(24);
   world.reconstruct(here, near_positions, near_normals);
@@ -416,10 +417,10 @@ TEST(World, RefusesWhatIsNotANumberAndLeavesTheStateAlone) {
   const BodyId body = world.add_body(sample_model());
   const std::uint64_t before = world.state_hash();
   const std::vector<double> good(4, 0.0), bad{0.0, nan, 0.0, 0.0}, nodes(81, 0.0);
-  EXPECT_THAT(message_of([&] { world.apply_force(body, kPoint, {nan, 0, 0}); }), HasSubstr("the force is (nan"));
-  EXPECT_THAT(message_of([&] { world.apply_impulse(body, kPoint, {0, infinity, 0}); }), HasSubstr("the impulse"));
+  EXPECT_THAT(message_of([&] { world.apply_force(body, kMarked, {nan, 0, 0}); }), HasSubstr("the force is (nan"));
+  EXPECT_THAT(message_of([&] { world.apply_impulse(body, kMarked, {0, infinity, 0}); }), HasSubstr("the impulse"));
   EXPECT_THAT(message_of([&] {
-                world.apply_impulse(body, kPoint, {0, 0, 1}, Axes::kWorld, 1.0);
+                world.apply_impulse(body, kMarked, {0, 0, 1}, Axes::kWorld, 1.0);
               }),
               HasSubstr("delay is 1"));
   EXPECT_THAT(message_of([&] { world.apply_force(body, {.triangle = 12}, {0, 0, 1}); }), HasSubstr("expected 0 to 11"));

@@ -9,7 +9,7 @@ namespace limber {
 namespace {
 
 using namespace samples;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string off(const SurfaceMesh& s) {
   std::string out = "OFF\n" + std::to_string(s.vertices.size()) + " " + std::to_string(s.triangles.size()) + " 0\n";
@@ -57,7 +57,7 @@ TEST(AssimpReader, PlacesMeshesByTheirNodesAndKeepsTheOutsideOut) {
   for (const Vec3& x : s.vertices) low = std::min(low, x[0]), high = std::max(high, x[0]);
   EXPECT_DOUBLE_EQ(low, -1.0);
   EXPECT_DOUBLE_EQ(high, 3.0);
-  EXPECT_THAT(warnings, testing::IsEmpty());
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
 }
 
 TEST(AssimpReader, AgreesWithLimbersOwnReaders) {
@@ -98,8 +98,8 @@ TEST(AssimpReader, FailsInOneLineAndPrintsNothing) {
     }
     return std::string();
   };
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
   for (const auto& [name, bytes] :
        std::vector<std::pair<std::string, std::string>>{{"cut.gltf", R"({"asset": {"version": "2.0")"},
                                                         {"junk.glb", std::string("glTF\2\0\0\0\xff\xff\xff\xff", 12)},
@@ -112,8 +112,8 @@ TEST(AssimpReader, FailsInOneLineAndPrintsNothing) {
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
   EXPECT_THAT(message_of(folder / "missing.glb"), HasSubstr("No such file"));
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(AnyMesh, IsTetsOrASurface) {

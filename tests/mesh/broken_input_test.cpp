@@ -13,7 +13,7 @@ namespace limber {
 namespace {
 
 using namespace samples;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// What reading says, empty if it goes well.
 std::string complaint(const fs::path& path) {

@@ -10,11 +10,11 @@ namespace limber {
 namespace {
 
 using namespace samples;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
-class Format : public testing::Test {
+class Format : public ::testing::Test {
  protected:
   TetMesh tets(const std::string& name, const std::string& bytes) {
     return read_tet_mesh(folder_.write(name, bytes), warnings);

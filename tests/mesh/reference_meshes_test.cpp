@@ -15,9 +15,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Volumes are sums of some 1e4 terms: round-off of each, and of the sums.
-constexpr double kSumRoundOff = 1e-12;
+constexpr double kReferenceRoundOff = 1e-12;
 
-class ReferenceMesh : public testing::TestWithParam<const char*> {};
+class ReferenceMesh : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
   const fs::path folder = fs::path(LIMBER_SHARED_DIR) / "reference-modal";
@@ -26,11 +26,11 @@ TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
 
   Warnings warnings;
   auto mesh = read_tet_mesh(folder / expected["mesh"].get<std::string>(), warnings);
-  EXPECT_THAT(warnings, testing::IsEmpty());
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
   EXPECT_EQ(mesh.nodes.size(), expected["nodes_in_file"].get<std::size_t>());
   EXPECT_EQ(mesh.tets.size(), expected["tets"].get<std::size_t>());
   EXPECT_NEAR(volume_properties(mesh).volume, expected["total_volume"].get<double>(),
-              kSumRoundOff * expected["total_volume"].get<double>());
+              kReferenceRoundOff * expected["total_volume"].get<double>());
   const auto body = connected_components(mesh);
   EXPECT_EQ(1 + *std::max_element(body.begin(), body.end()), expected["components"].get<int>());
 
@@ -38,7 +38,7 @@ TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
   for (const Region& r : mesh.regions) region_names.push_back(r.name);
   for (const auto& material : expected["materials"]) {
     if (!material.contains("tag")) continue;
-    EXPECT_THAT(region_names, testing::Contains(std::to_string(material["tag"].get<int>())));
+    EXPECT_THAT(region_names, ::testing::Contains(std::to_string(material["tag"].get<int>())));
   }
 
   const auto& fixed = expected["fixed"];
@@ -53,8 +53,8 @@ TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, ReferenceMesh,
-                         testing::Values("bar_cantilever", "composite_medit", "pinned_node", "small_300",
-                                         "two_bodies"));
+                         ::testing::Values("bar_cantilever", "composite_medit", "pinned_node", "small_300",
+                                           "two_bodies"));
 
 TEST(BunnySurface, IsAClosedManifoldOfOnePiece) {
   const fs::path bunny = "/usr/share/glmark2/models/bunny.obj";

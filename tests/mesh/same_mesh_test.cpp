@@ -24,7 +24,7 @@ TEST(EveryFormat, GivesTheSameTets) {
     if (sample.name.ends_with(".vtk")) expected.node_groups = without(expected.node_groups, "5");
     Warnings warnings;
     expect_same(read_tet_mesh(sample.write(folder), warnings), expected);
-    EXPECT_THAT(warnings, testing::IsEmpty());
+    EXPECT_THAT(warnings, ::testing::IsEmpty());
     EXPECT_EQ(mesh_kind(folder / sample.name), MeshKind::kTets);
   }
 }
@@ -42,7 +42,7 @@ TEST(EveryFormat, GivesTheSameSurface) {
     }
     EXPECT_EQ(surface.vertices.size(), 8u);
     EXPECT_TRUE(surface_quality(surface).closed_manifold());
-    EXPECT_THAT(warnings, testing::IsEmpty());
+    EXPECT_THAT(warnings, ::testing::IsEmpty());
     EXPECT_EQ(mesh_kind(folder / sample.name), MeshKind::kSurface);
   }
 }
@@ -98,7 +98,7 @@ TEST(WriteGmsh, ReadsBackToTheSameBits) {
   mesh.node_groups.push_back(
       {"upper #2", {4, 5, 6, 7, 8, 9, 10, 11}});  // each region is a group too, its name permitting
   expect_same(back, mesh);
-  EXPECT_THAT(warnings, testing::IsEmpty());
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
 }
 
 TEST(WriteGmsh, RefusesWhatItCannotSay) {

@@ -11,7 +11,7 @@ namespace limber {
 namespace {
 
 using namespace samples;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// The surface with three vertices of its own for each triangle.
 SurfaceMesh torn(const SurfaceMesh& surface) {
@@ -77,7 +77,7 @@ TEST(ValidateSurface, DropsTrianglesThatNameAVertexTwiceAndKeepsNeedles) {
   Warnings warnings;
   validate(s, "\"s\"", warnings);
   EXPECT_EQ(s.triangles.size(), 13u);
-  EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("1 triangles name a vertex twice")));
+  EXPECT_THAT(warnings, ::testing::ElementsAre(HasSubstr("1 triangles name a vertex twice")));
   s.triangles[2][1] = 9;
   EXPECT_THROW(validate(s, "\"s\"", warnings), InputError);
   s = cube_surface();

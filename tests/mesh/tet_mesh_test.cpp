@@ -11,7 +11,7 @@ namespace limber {
 namespace {
 
 using namespace samples;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // Sums over 144 tets: 144 ε = 3e-14, and moments about a corner are three times those about the centre.
 constexpr double kSumRoundOff = 1e-13;
@@ -77,7 +77,7 @@ TEST(Boundary, OfABlockIsClosedLooksOutwardAndEnclosesItsVolume) {
 TEST(Boundary, LeavesInnerNodesOut) {
   const auto boundary = boundary_surface(block(2, 2, 2, 1.0));
   EXPECT_EQ(boundary.node_of.size(), 26u);  // all but the middle one
-  EXPECT_THAT(boundary.node_of, testing::Not(testing::Contains(13)));
+  EXPECT_THAT(boundary.node_of, ::testing::Not(::testing::Contains(13)));
 }
 
 TEST(Components, AreTetsThatShareANode) {
@@ -93,21 +93,21 @@ TEST(Components, AreTetsThatShareANode) {
     }
   };
   add({5, 0, 0});
-  EXPECT_THAT(connected_components(mesh), testing::ElementsAreArray({0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1}));
+  EXPECT_THAT(connected_components(mesh), ::testing::ElementsAreArray({0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1}));
   for (Tet& t : mesh.tets)
     for (Index& n : t)
       if (n == 8) n = 7;  // one node in common: one body
-  EXPECT_THAT(connected_components(mesh), testing::Each(0));
+  EXPECT_THAT(connected_components(mesh), ::testing::Each(0));
 }
 
 TEST(Components, PartsJoinedAtANodeOrAnEdgeAreOneBodyButTwoParts) {
   TetMesh mesh;
   mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}, {1, 1, 1}};
   mesh.tets = {{0, 1, 2, 3}, {0, 4, 5, 6}, {1, 2, 3, 7}};  // the second shares a node with the first, the third a face
-  EXPECT_THAT(connected_components(mesh), testing::ElementsAre(0, 0, 0));
-  EXPECT_THAT(face_connected_parts(mesh), testing::ElementsAre(0, 1, 0));
+  EXPECT_THAT(connected_components(mesh), ::testing::ElementsAre(0, 0, 0));
+  EXPECT_THAT(face_connected_parts(mesh), ::testing::ElementsAre(0, 1, 0));
   mesh.tets[1] = {0, 1, 5, 6};  // now an edge
-  EXPECT_THAT(face_connected_parts(mesh), testing::ElementsAre(0, 1, 0));
+  EXPECT_THAT(face_connected_parts(mesh), ::testing::ElementsAre(0, 1, 0));
 }
 
 TEST(Components, TakenOutCarryTheirRegionsAndGroups) {
@@ -115,11 +115,11 @@ TEST(Components, TakenOutCarryTheirRegionsAndGroups) {
   std::vector<Index> upper(mesh.tets.size());
   for (std::size_t i = 0; i < upper.size(); ++i) upper[i] = mesh.tet_region[i];
   const auto part = extract_component(mesh, upper, 1);
-  EXPECT_THAT(part.node_of, testing::ElementsAre(4, 5, 6, 7, 8, 9, 10, 11));
-  EXPECT_THAT(part.tet_of, testing::ElementsAre(6, 7, 8, 9, 10, 11));
-  EXPECT_THAT(part.mesh.tet_region, testing::Each(1));
-  ASSERT_EQ(part.mesh.node_groups.size(), 2u);                                    // the floor has no node here
-  EXPECT_THAT(part.mesh.node_groups[0].nodes, testing::ElementsAre(0, 1, 2, 3));  // of region 21: the shared face
+  EXPECT_THAT(part.node_of, ::testing::ElementsAre(4, 5, 6, 7, 8, 9, 10, 11));
+  EXPECT_THAT(part.tet_of, ::testing::ElementsAre(6, 7, 8, 9, 10, 11));
+  EXPECT_THAT(part.mesh.tet_region, ::testing::Each(1));
+  ASSERT_EQ(part.mesh.node_groups.size(), 2u);                                      // the floor has no node here
+  EXPECT_THAT(part.mesh.node_groups[0].nodes, ::testing::ElementsAre(0, 1, 2, 3));  // of region 21: the shared face
   for (std::size_t i = 0; i < part.mesh.tets.size(); ++i)
     EXPECT_DOUBLE_EQ(signed_volume(part.mesh, static_cast<Index>(i)), signed_volume(mesh, part.tet_of[i]));
   EXPECT_THROW(extract_component(mesh, std::vector<Index>(3), 0), InvalidArgument);
@@ -133,7 +133,7 @@ TEST(UnusedNodes, AreDroppedAndTheRestStaysAsItWas) {
   mesh.node_groups = {{"floor", {0, 1, 2, 3, 4}}, {"nowhere", {2, 13}}};
   const auto before = volume_properties(mesh);
   const auto node_of = drop_unused_nodes(mesh);
-  EXPECT_THAT(node_of, testing::ElementsAre(0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
+  EXPECT_THAT(node_of, ::testing::ElementsAre(0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
   TetMesh expected = two_cubes();
   expected.nodes.pop_back();
   expected.node_groups = {{"floor", {0, 1, 2, 3}}};
@@ -147,7 +147,7 @@ TEST(Validate, TurnsLeftHandedTetsAndSaysHowMany) {
   std::swap(mesh.tets[7][1], mesh.tets[7][3]);
   Warnings warnings;
   validate(mesh, "\"m\"", warnings);
-  EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("\"m\": 2 of 12 tetrahedra were left-handed")));
+  EXPECT_THAT(warnings, ::testing::ElementsAre(HasSubstr("\"m\": 2 of 12 tetrahedra were left-handed")));
   for (Index i = 0; i < 12; ++i) EXPECT_GT(signed_volume(mesh, i), 0.0);
   EXPECT_NEAR(volume_properties(mesh).volume, 0.002, 0.002 * kSumRoundOff);
 }
@@ -197,7 +197,7 @@ TEST(Validate, CallsATetFlatByItsShapeNotItsSize) {
   TetMesh slim = block(1, 1, 1, 1.0);
   move(slim, Vec3(1, 1, 1e-11).asDiagonal(), Vec3::Zero());
   validate(slim, "\"m\"", warnings);
-  EXPECT_THAT(warnings, testing::IsEmpty());
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ namespace limber {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// The message of the InputError that reading gives; "accepted" if it gives none. Any other exception fails the test.
 std::string reading(const std::string& bytes) {
@@ -137,7 +137,7 @@ TEST(Asset, ShapesOfAnySizeKeepTheirBytesThroughFile) {
 }
 
 TEST(Asset, GoesThroughAFile) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "limber_asset_test.glb";
+  const auto path = std::filesystem::path(::testing::TempDir()) / "limber_asset_test.glb";
   write_asset(path, example::asset());
   expect_same_bytes(asset_bytes(read_asset(path)), asset_bytes(example::asset()));
   std::filesystem::remove(path);

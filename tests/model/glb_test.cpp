@@ -14,7 +14,7 @@ namespace limber {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 const std::vector<float> kTrianglePositions{0, 0, 0, 1, 0, 0, 0, 2, 0};
 const std::vector<float> kTriangleNormals{0, 0, 1, 0, 0, 1, 0, 0, 1};

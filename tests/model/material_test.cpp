@@ -9,17 +9,18 @@
 #include <filesystem>
 #include <functional>
 
+#include "constants.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 
 namespace limber {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
-constexpr double kRoundOff = 64 * std::numeric_limits<double>::epsilon();
+using testing::kFewRoundings;
 
 template <class E>
 std::string message_of(const std::function<void()>& action) {
@@ -36,8 +37,8 @@ TEST(Material, LameConstantsAreThoseOfElasticityTheory) {
   const Material m{.youngs_modulus = 7e10, .poisson_ratio = 0.33, .density = 2700.0};
   const double along = 1e-3, across = -0.33e-3, trace = along + 2.0 * across;
   const double stress = m.lame_lambda() * trace + 2.0 * m.shear_modulus() * along;
-  EXPECT_NEAR(stress, 7e10 * along, kRoundOff * 7e10);
-  EXPECT_NEAR(m.lame_lambda() * trace + 2.0 * m.shear_modulus() * across, 0.0, kRoundOff * 7e10);
+  EXPECT_NEAR(stress, 7e10 * along, kFewRoundings * 7e10);
+  EXPECT_NEAR(m.lame_lambda() * trace + 2.0 * m.shear_modulus() * across, 0.0, kFewRoundings * 7e10);
 }
 
 TEST(Material, ValidatingNamesPlaceFieldAndValue) {
@@ -107,7 +108,7 @@ TEST(Material, UnknownPresetSuggestsTheNearest) {
   EXPECT_THAT(message_of<InvalidArgument>([] { material_preset("bad\nname"); }), Not(HasSubstr("\n")));
 }
 
-class ReadMaterials : public testing::Test {
+class ReadMaterials : public ::testing::Test {
  protected:
   ~ReadMaterials() override { std::filesystem::remove(path); }
   MaterialTable table(const std::string& text) {
@@ -118,8 +119,8 @@ class ReadMaterials : public testing::Test {
     return message_of<InputError>([&] { table(text); });
   }
   const std::filesystem::path path =
-      std::filesystem::path(testing::TempDir()) /
-      ("limber_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".json");
+      std::filesystem::path(::testing::TempDir()) /
+      ("limber_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".json");
 };
 
 TEST_F(ReadMaterials, NumbersAndPresetsByRegion) {

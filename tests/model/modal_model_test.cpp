@@ -6,17 +6,18 @@
 #include <functional>
 #include <limits>
 
+#include "constants.h"
 #include "example_model.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kInfinity;
 
 /// What the model says of the example with one thing changed; "accepted" if nothing.
 std::string said_of(const std::function<void(ModalModelData&)>& change,

@@ -8,16 +8,18 @@
 #include <limits>
 #include <numbers>
 
+#include "constants.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
-constexpr double kRoundOff = 64 * std::numeric_limits<double>::epsilon();
+using testing::kFewRoundings;
+
 constexpr double kUnseeable = 1e30;  // m: no motion reaches it, so that every mode is dropped and its displacement told
 
 double lambda_of(double hz) { return std::pow(2.0 * std::numbers::pi * hz, 2); }
@@ -42,7 +44,7 @@ std::vector<ModeStrength> modes_at(const std::vector<double>& hz) {
 }
 
 TEST(ModeSelection, StaticForceShowsForceOverStiffness) {
-  EXPECT_NEAR(displacement_of(spring(3.0, 500.0), 10.0, LoadKind::kStatic), 10.0 / 500.0, kRoundOff);
+  EXPECT_NEAR(displacement_of(spring(3.0, 500.0), 10.0, LoadKind::kStatic), 10.0 / 500.0, kFewRoundings);
 }
 
 TEST(ModeSelection, SuddenForceShowsTheOvershootOfAnUndampedSpring) {
@@ -51,7 +53,7 @@ TEST(ModeSelection, SuddenForceShowsTheOvershootOfAnUndampedSpring) {
   double largest = 0.0;
   for (int i = 0; i <= 1000; ++i)
     largest = std::max(largest, f / k * (1.0 - std::cos(2.0 * std::numbers::pi * i / 1000)));
-  EXPECT_NEAR(displacement_of(spring(3.0, k), f, LoadKind::kSudden), largest, kRoundOff);
+  EXPECT_NEAR(displacement_of(spring(3.0, k), f, LoadKind::kSudden), largest, kFewRoundings);
 }
 
 TEST(ModeSelection, ResonantForceShowsThePeakOfTheFrequencyResponse) {
@@ -87,7 +89,7 @@ TEST(ModeSelection, DropsWhatCannotBeSeenWhereverItStands) {
   ASSERT_EQ(s.dropped.size(), 1u);
   EXPECT_EQ(s.dropped[0].mode, 1);
   EXPECT_EQ(s.dropped[0].reason, DropReason::kTooSmall);
-  EXPECT_NEAR(s.dropped[0].value, 60000.0 * 1e-6 / lambda_of(200.0), kRoundOff * s.dropped[0].value);
+  EXPECT_NEAR(s.dropped[0].value, 60000.0 * 1e-6 / lambda_of(200.0), kFewRoundings * s.dropped[0].value);
   EXPECT_EQ(s.dropped[0].limit, 1e-4);
 
   modes[2].max_observable = just_seen * (1.0 - 1e-12);
@@ -102,7 +104,7 @@ TEST(ModeSelection, FrameRateLooksAtTheDampedFrequency) {
   EXPECT_THAT(s.kept, ElementsAre(0, 2, 3));
   ASSERT_EQ(s.dropped.size(), 1u);
   EXPECT_EQ(s.dropped[0].reason, DropReason::kTooFast);
-  EXPECT_NEAR(s.dropped[0].value, 31.0, 31.0 * kRoundOff);
+  EXPECT_NEAR(s.dropped[0].value, 31.0, 31.0 * kFewRoundings);
   EXPECT_EQ(s.dropped[0].limit, 30.0);
 }
 
@@ -177,7 +179,7 @@ TEST(ModeSelection, EveryModeIsKeptOrDroppedOnce) {
   std::vector<int> times(modes.size(), 0);
   for (const Index i : s.kept) ++times.at(static_cast<std::size_t>(i));
   for (const DroppedMode& d : s.dropped) ++times.at(static_cast<std::size_t>(d.mode));
-  EXPECT_THAT(times, testing::Each(1));
+  EXPECT_THAT(times, ::testing::Each(1));
   EXPECT_LE(s.kept.size(), 7u);
 }
 

@@ -16,7 +16,7 @@ constexpr float kFloatRoundOff = 32 * std::numeric_limits<float>::epsilon();
 
 /// A tetrahedron of four corners that share vertices, so that normals are averages of slanted faces.
 const std::vector<float> kPositions{0.1f, 0, 0, 1.2f, 0.1f, 0, 0, 0.9f, 0.2f, 0.3f, 0.1f, 1.1f};
-const std::vector<Triangle> kFaces{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+const std::vector<Triangle> kTetFaces{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
 
 Vec3 at(const std::vector<float>& xyz, std::size_t vertex) {
   return Vec3f(xyz[3 * vertex], xyz[3 * vertex + 1], xyz[3 * vertex + 2]).cast<double>();
@@ -44,8 +44,8 @@ TEST(MorphTargets, NormalsOfABoxAreItsAxes) {
 
 TEST(MorphTargets, NormalsTurnWithASurfaceThatTurns) {
   const Vec3 spin(0.3, -0.7, 0.2);
-  const auto changes = normal_changes(kPositions, field([&](const Vec3& p) { return Vec3(spin.cross(p)); }), kFaces);
-  const auto normals = unit_normals(kPositions, kFaces);
+  const auto changes = normal_changes(kPositions, field([&](const Vec3& p) { return Vec3(spin.cross(p)); }), kTetFaces);
+  const auto normals = unit_normals(kPositions, kTetFaces);
   for (std::size_t v = 0; v < 4; ++v)
     EXPECT_LT((at(changes, v) - spin.cross(at(normals, v))).norm(), kFloatRoundOff) << v;
 }
@@ -53,7 +53,7 @@ TEST(MorphTargets, NormalsTurnWithASurfaceThatTurns) {
 TEST(MorphTargets, NormalsStayWhenASurfaceMovesOrGrows) {
   for (const auto& f : {std::function<Vec3(const Vec3&)>([](const Vec3&) { return Vec3(1.0, -2.0, 0.5); }),
                         std::function<Vec3(const Vec3&)>([](const Vec3& p) { return Vec3(0.7 * p); })}) {
-    const auto changes = normal_changes(kPositions, field(f), kFaces);
+    const auto changes = normal_changes(kPositions, field(f), kTetFaces);
     for (const float c : changes) EXPECT_LT(std::abs(c), kFloatRoundOff);
   }
 }
@@ -64,8 +64,8 @@ TEST(MorphTargets, NormalChangesAreTheDerivativeOfTheNormals) {
   const float h = 1.0f / 256;
   std::vector<float> ahead = kPositions, behind = kPositions;
   for (std::size_t i = 0; i < moves.size(); ++i) ahead[i] += h * moves[i], behind[i] -= h * moves[i];
-  const auto n1 = unit_normals(ahead, kFaces), n0 = unit_normals(behind, kFaces),
-             changes = normal_changes(kPositions, moves, kFaces);
+  const auto n1 = unit_normals(ahead, kTetFaces), n0 = unit_normals(behind, kTetFaces),
+             changes = normal_changes(kPositions, moves, kTetFaces);
   // A central difference of float32 normals: h² of curvature (here of size ten) and round-off over 2h.
   const float kDifference = 10 * h * h + 4 * std::numeric_limits<float>::epsilon() / (2 * h);
   for (std::size_t i = 0; i < moves.size(); ++i) EXPECT_NEAR(changes[i], (n1[i] - n0[i]) / (2 * h), kDifference) << i;
@@ -73,8 +73,8 @@ TEST(MorphTargets, NormalChangesAreTheDerivativeOfTheNormals) {
 
 TEST(MorphTargets, NormalChangesAreSquareToTheNormal) {
   const auto changes =
-      normal_changes(kPositions, field([](const Vec3& p) { return Vec3(p.z(), p.x() * p.y(), 1.0); }), kFaces);
-  const auto normals = unit_normals(kPositions, kFaces);
+      normal_changes(kPositions, field([](const Vec3& p) { return Vec3(p.z(), p.x() * p.y(), 1.0); }), kTetFaces);
+  const auto normals = unit_normals(kPositions, kTetFaces);
   for (std::size_t v = 0; v < 4; ++v) EXPECT_LT(std::abs(at(changes, v).dot(at(normals, v))), kFloatRoundOff);
 }
 
@@ -92,7 +92,7 @@ TEST(MorphTargets, VertexWithoutAreaHasANormalNevertheless) {
 TEST(MorphTargets, WrongArraysAreRefused) {
   EXPECT_THROW(unit_normals(kPositions, std::vector<Triangle>{{0, 1, 4}}), InvalidArgument);
   EXPECT_THROW(unit_normals(kPositions, std::vector<Triangle>{{0, 1, -1}}), InvalidArgument);
-  EXPECT_THROW(normal_changes(kPositions, std::vector<float>(3), kFaces), InvalidArgument);
+  EXPECT_THROW(normal_changes(kPositions, std::vector<float>(3), kTetFaces), InvalidArgument);
 }
 
 TEST(MorphTargets, NamesSortAsTheModesDo) {

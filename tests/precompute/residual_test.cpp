@@ -17,21 +17,21 @@ using limber::testing::DenseModel;
 using limber::testing::nodes_where;
 using limber::testing::tet_box;
 
-constexpr double kFloat = 2e-6;  // shapes and compliances are stored in single precision
-const Material kRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
-const Vec3 kSize{0.3, 0.2, 0.1};
+constexpr double kSingle = 2e-6;  // shapes and compliances are stored in single precision
+const Material kBoxRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
+const Vec3 kBoxSize{0.3, 0.2, 0.1};
 
-TetMesh box() { return tet_box(3, 2, 2, kSize); }
+TetMesh box() { return tet_box(3, 2, 2, kBoxSize); }
 
 BakeOptions options_for(int modes) {
   BakeOptions o;
-  o.materials = {{"*", kRubber}};
+  o.materials = {{"*", kBoxRubber}};
   o.analysis.modes = modes;
   o.limits.max_modes = modes;
   return o;
 }
 
-std::shared_ptr<const ModalModel> bake_box(const BakeOptions& options, BodyReport* report = nullptr) {
+std::shared_ptr<const ModalModel> baked_box(const BakeOptions& options, BodyReport* report = nullptr) {
   Warnings warnings;
   const BakeResult r = bake({.name = "box", .mesh = box()}, options, warnings);
   if (report) *report = r.bodies[0];
@@ -40,7 +40,7 @@ std::shared_ptr<const ModalModel> bake_box(const BakeOptions& options, BodyRepor
 
 /// Σ w wᵀ/λ over all elastic modes, from a dense generalised eigenproblem: another way to K⁺.
 Eigen::MatrixXd dense_compliance(std::span<const Index> fixed) {
-  const DenseModel model = dense_model(box(), std::vector<Material>{kRubber}, true);
+  const DenseModel model = dense_model(box(), std::vector<Material>{kBoxRubber}, true);
   std::vector<Index> free;
   for (Index dof = 0; dof < model.K.rows(); ++dof)
     if (std::find(fixed.begin(), fixed.end(), dof / 3) == fixed.end()) free.push_back(dof);
@@ -90,7 +90,7 @@ TEST_P(ResidualOfBox, KeptModesAndResidualTogetherAreTheWholeCompliance) {
   BakeOptions o = options(10);
   o.residual.surface = true;
   BodyReport report;
-  const auto model = bake_box(o, &report);
+  const auto model = baked_box(o, &report);
   ASSERT_TRUE(model->data().residual_compliance);
   const ResidualCompliance& residual = *model->data().residual_compliance;
   ASSERT_EQ(residual.form(), ResidualCompliance::Form::kFull);
@@ -101,16 +101,16 @@ TEST_P(ResidualOfBox, KeptModesAndResidualTogetherAreTheWholeCompliance) {
     for (Index b = 0; b < residual.vertices(); ++b) {
       const Mat3 sum = static_compliance_of_modes(*model, a, b) + residual.block(a, b);
       const Mat3 exact = all.block<3, 3>(3 * node[a], 3 * node[b]);
-      ASSERT_LE((sum - exact).norm(), kFloat * all.diagonal().maxCoeff()) << a << " " << b;
+      ASSERT_LE((sum - exact).norm(), kSingle * all.diagonal().maxCoeff()) << a << " " << b;
     }
 }
 
 TEST_P(ResidualOfBox, LocalFormIsTheDiagonalOfTheFullOne) {
   BakeOptions o = options(10);
   o.residual.surface = true;
-  const auto full = bake_box(o);
+  const auto full = baked_box(o);
   o.residual.max_full_bytes = 0.0;
-  const auto local = bake_box(o);
+  const auto local = baked_box(o);
   const ResidualCompliance& r = *local->data().residual_compliance;
   ASSERT_EQ(r.form(), ResidualCompliance::Form::kLocal);
   EXPECT_EQ(r.values().size(), 9u * static_cast<std::size_t>(r.vertices()));
@@ -121,11 +121,11 @@ TEST_P(ResidualOfBox, LocalFormIsTheDiagonalOfTheFullOne) {
 TEST_P(ResidualOfBox, ResidualModesMakeChosenNodesExactWhateverIsKept) {
   BakeOptions o = options(5);
   const std::vector<Index> chosen =
-      nodes_where(box(), [](const Vec3& x) { return x.x() > kSize.x() - 1e-9 && x.z() < 1e-9; });
+      nodes_where(box(), [](const Vec3& x) { return x.x() > kBoxSize.x() - 1e-9 && x.z() < 1e-9; });
   o.residual.nodes = {NodesByIndex{chosen}};
   o.volume_block = true;
   BodyReport report;
-  const auto model = bake_box(o, &report);
+  const auto model = baked_box(o, &report);
   EXPECT_EQ(report.residual.modes, static_cast<Index>(3 * chosen.size()));
   ASSERT_EQ(model->modes(), 5 + report.residual.modes);
 
@@ -136,7 +136,7 @@ TEST_P(ResidualOfBox, ResidualModesMakeChosenNodesExactWhateverIsKept) {
     for (Index b = 0; b < model->collision().vertices(); ++b) {
       if (!is_chosen(b)) continue;
       const Mat3 exact = all.block<3, 3>(3 * node[a], 3 * node[b]);
-      EXPECT_LE((static_compliance_of_modes(*model, a, b) - exact).norm(), kFloat * all.diagonal().maxCoeff());
+      EXPECT_LE((static_compliance_of_modes(*model, a, b) - exact).norm(), kSingle * all.diagonal().maxCoeff());
     }
 }
 
@@ -144,14 +144,14 @@ TEST_P(ResidualOfBox, ResidualModesAreMassNormalisedWithTheKeptOnes) {
   BakeOptions o = options(5);
   o.residual.nodes = {NodesByIndex{{0, 35}}};
   o.volume_block = true;
-  const auto model = bake_box(o);
+  const auto model = baked_box(o);
   const ModalVolume& volume = *model->data().volume_block;
   for (Index i = 0; i < model->modes(); ++i)
     for (Index j = 0; j < model->modes(); ++j) {
       double product = 0.0;
       for (Index n = 0; n < volume.basis.vertices(); ++n)
         product += volume.basis.shape(n, i).cast<double>().dot(volume.mass_times_basis.shape(n, j).cast<double>());
-      EXPECT_NEAR(product, i == j ? 1.0 : 0.0, kFloat) << i << " " << j;
+      EXPECT_NEAR(product, i == j ? 1.0 : 0.0, kSingle) << i << " " << j;
     }
 }
 
@@ -169,23 +169,23 @@ TEST(Residual, OfABodyWithAllItsModesIsNothing) {
   BakeOptions o = options_for(1000);
   o.residual.surface = true;
   o.limits.max_modes = 250;
-  const auto model = bake_box(o);
+  const auto model = baked_box(o);
   const double largest = dense_compliance({}).diagonal().maxCoeff();
-  for (const float value : model->data().residual_compliance->values()) EXPECT_LE(std::abs(value), kFloat * largest);
+  for (const float value : model->data().residual_compliance->values()) EXPECT_LE(std::abs(value), kSingle * largest);
 }
 
 TEST(Residual, CoarserCollisionSurfaceKeepsToTheBoundary) {
   BakeOptions o = options_for(4);
   Warnings warnings;
   o.collision_triangles = 100;
-  const BakeResult r = bake({.name = "box", .mesh = tet_box(8, 6, 4, kSize)}, o, warnings);
+  const BakeResult r = bake({.name = "box", .mesh = tet_box(8, 6, 4, kBoxSize)}, o, warnings);
   const ModalModel& model = *r.asset.bodies[0];
   ASSERT_TRUE(model.data().collision);
   EXPECT_LE(model.collision().triangles.size(), 100u);
   EXPECT_LT(model.collision().triangles.size(), model.render().triangles.size());
   EXPECT_LE(r.bodies[0].collision_error, 1e-6);  // a box is flat: nothing moves
   for (const Vec3f& x : model.collision().rest) {
-    const Vec3 beyond = x.cast<double>().cwiseAbs() - 0.5 * kSize;
+    const Vec3 beyond = x.cast<double>().cwiseAbs() - 0.5 * kBoxSize;
     EXPECT_NEAR(beyond.maxCoeff(), 0.0, 1e-7);
   }
 }

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "block_model.h"
+#include "constants.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/scene/run.h"
@@ -19,8 +20,7 @@ namespace {
 using testing::block_asset;
 using testing::kBlockLength;
 using testing::kBlockMass;
-
-constexpr double kGravity = 9.80665;
+using testing::kGravity;
 
 /// A scene of blocks, 2 m × 1 m × 1 m, without modes.
 std::string rigid(const std::string& inside, const std::string& steps = "100") {

@@ -26,7 +26,7 @@ constexpr double kFloat = 2e-7;
 
 constexpr Index kModes = 3;
 
-Scene parse(const std::string& inside) {
+Scene parsed(const std::string& inside) {
   return parse_scene(R"({"gravity": [0, 0, 0], "assets": {"block": "block.glb"}, )" + inside + "}", "\"test.json\"",
                      "");
 }
@@ -60,7 +60,7 @@ TEST_P(StrikeAtTime, RingsAsItsClosedFormFromExactlyThatTime) {
   const double time = GetParam();
   std::ostringstream text;
   text << std::setprecision(17) << time;
-  const RunResult r = play(parse(struck(text.str())));
+  const RunResult r = play(parsed(struck(text.str())));
   const BodyTrack& track = r.trajectory.bodies[0];
   ASSERT_EQ(r.trajectory.times.size(), 21u);
   const double scale = largest_rate_scale(track);
@@ -81,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(Run, StrikeAtTime, ::testing::Values(0.0, 0.03, 0.0342,
 
 TEST(Run, AFreeBodyTakesTheMomentumOfAStrikeThroughItsCentre) {
   const RunResult r =
-      play(parse(R"("step": 0.01, "steps": 10, "bodies": [{"name": "b", "asset": "block"}], "strikes": [{
+      play(parsed(R"("step": 0.01, "steps": 10, "bodies": [{"name": "b", "asset": "block"}], "strikes": [{
       "body": "b", "time": 0, "at": {"ray": {"from": [0, 5, 0], "direction": [0, -2, 0]}}, "impulse": [0, -0.6, 0]}])"));
   const BodyTrack& track = r.trajectory.bodies[0];
   EXPECT_NEAR((track.poses.back().p - Vec3(0.0, -0.6 / kBlockMass * 0.1, 0.0)).norm(), 0.0, 1e-14);
@@ -91,7 +91,8 @@ TEST(Run, AFreeBodyTakesTheMomentumOfAStrikeThroughItsCentre) {
 }
 
 TEST(Run, AForceHeldForSomeStepsIsTheResponseToAHeldForce) {
-  const RunResult r = play(parse(R"("step": 0.01, "steps": 30, "bodies": [{"name": "b", "asset": "block"}], "forces": [{
+  const RunResult r =
+      play(parsed(R"("step": 0.01, "steps": 30, "bodies": [{"name": "b", "asset": "block"}], "forces": [{
       "body": "b", "start": 0.05, "duration": 0.1, "at": {"nearest": [0, 0.5, 0]}, "force": [0, 4, 0]}])"));
   const BodyTrack& track = r.trajectory.bodies[0];
   for (Index m = 0; m < kModes; ++m) {
@@ -112,17 +113,17 @@ TEST(Run, PlacesInBodyInputAndWorldFramesMeetAtTheSamePoint) {
   for (const char* at : {R"({"nearest": [1, 0.5, 0.5], "frame": "body"})", R"({"nearest": [0.5, 3, 3.5]})",
                          R"({"nearest": [11, 20.5, 30.5], "frame": "input"})", R"({"vertex": 66})",
                          R"({"ray": {"from": [0.5, 3, 9], "direction": [0, 0, -1]}})"}) {
-    const RunResult r = play(parse(R"("step": 0.01, "steps": 1, "bodies": [{"name": "b", "asset": "block",
+    const RunResult r = play(parsed(R"("step": 0.01, "steps": 1, "bodies": [{"name": "b", "asset": "block",
         "position": [1, 2, 3], "orientation": {"axis": [0, 0, 1], "degrees": 90}}],
         "strikes": [{"body": "b", "time": 0, "impulse": [0, 0, 0.001], "at": )" +
-                                   std::string(at) + "}]"));
+                                    std::string(at) + "}]"));
     ASSERT_EQ(r.strikes.size(), 1u) << at;
     EXPECT_NEAR((r.strikes[0].point - Vec3(0.5, 3.0, 3.5)).norm(), 0.0, 1e-6) << at;
   }
 }
 
 TEST(Run, AStrikeOnAGridStrikesEveryCopyAlike) {
-  const RunResult r = play(parse(R"("step": 0.01, "steps": 5, "bodies": [{"name": "b", "asset": "block",
+  const RunResult r = play(parsed(R"("step": 0.01, "steps": 5, "bodies": [{"name": "b", "asset": "block",
       "copies": {"count": [3, 1, 1], "spacing": [4, 0, 0]}}],
       "strikes": [{"body": "b", "time": 0.011, "at": {"vertex": 3}, "impulse": [0, 0.1, 0]},
                   {"body": "b[1]", "time": 0.02, "at": {"vertex": 3}, "impulse": [0, 0.1, 0]}])"));
@@ -133,7 +134,7 @@ TEST(Run, AStrikeOnAGridStrikesEveryCopyAlike) {
 }
 
 TEST(Run, KeysAreWholeStepsWithTheStartAndTheEndAlways) {
-  const Scene scene = parse(struck("0"));
+  const Scene scene = parsed(struck("0"));
   EXPECT_EQ(play(scene, {.key_rate = 30.0}).trajectory.times,
             (std::vector<double>{0, 0.03, 0.06, 0.09, 0.12, 0.15, 0.18, 0.2}));
   EXPECT_EQ(play(scene, {.key_rate = 0.0}).trajectory.times, (std::vector<double>{0, 0.2}));
@@ -143,11 +144,11 @@ TEST(Run, KeysAreWholeStepsWithTheStartAndTheEndAlways) {
 }
 
 TEST(Run, HowOftenKeysAreKeptDoesNotChangeTheMotion) {
-  const Scene scene = parse(struck("0.0342"));
+  const Scene scene = parsed(struck("0.0342"));
   const RunResult often = play(scene), seldom = play(scene, {.key_rate = 0.0, .reconstruct = true});
   EXPECT_EQ(often.state_hash, seldom.state_hash);
   EXPECT_EQ(often.trajectory.bodies[0].rates_at(20)[0], seldom.trajectory.bodies[0].rates_at(1)[0]);
-  EXPECT_NE(often.state_hash, play(parse(struck("0.0343"))).state_hash);
+  EXPECT_NE(often.state_hash, play(parsed(struck("0.0343"))).state_hash);
 }
 
 /// Of a block that swings about its origin, where the step's length tells.
@@ -158,7 +159,7 @@ TEST(Run, SubstepsAreSmallSteps) {
   Asset asset;
   asset.bodies = {std::make_shared<const ModalModel>(std::move(data))};
   const auto last_pose = [&](const std::string& time) {
-    Scene scene = parse(time + R"(, "bodies": [{"name": "b", "asset": "block",
+    Scene scene = parsed(time + R"(, "bodies": [{"name": "b", "asset": "block",
                                      "orientation": {"axis": [0, 1, 0], "degrees": 40}}])");
     scene.gravity = {0.0, 0.0, -9.80665};
     const RunResult r = run_scene(scene, make_models(scene, {{"block", asset}}), {.key_rate = 0.0});
@@ -174,15 +175,15 @@ TEST(Run, SubstepsAreSmallSteps) {
 
 TEST(Run, ABodyAtRestSleepsUntilItIsStruck) {
   const std::string sleep = R"("sleep": {"time": 0.05}, )";
-  EXPECT_EQ(play(parse(sleep + struck("0.1")), {.steps = 10}).asleep, 1);
-  EXPECT_EQ(play(parse(struck("0.1")), {.steps = 10}).asleep, 0);
-  const RunResult woken = play(parse(sleep + struck("0.1"))), awake = play(parse(struck("0.1")));
+  EXPECT_EQ(play(parsed(sleep + struck("0.1")), {.steps = 10}).asleep, 1);
+  EXPECT_EQ(play(parsed(struck("0.1")), {.steps = 10}).asleep, 0);
+  const RunResult woken = play(parsed(sleep + struck("0.1"))), awake = play(parsed(struck("0.1")));
   EXPECT_EQ(woken.asleep, 0);
   EXPECT_EQ(woken.trajectory.bodies[0].rates, awake.trajectory.bodies[0].rates);
 }
 
 TEST(Run, EnergyOfAnUndisturbedFlightIsKeptButForDamping) {
-  const RunResult r = play(parse(struck("0")));
+  const RunResult r = play(parsed(struck("0")));
   const auto& e = r.trajectory.bodies[0].energies;
   EXPECT_EQ(r.energy_before, e.front().total());
   for (std::size_t key = 2; key < e.size(); ++key) {
@@ -193,7 +194,7 @@ TEST(Run, EnergyOfAnUndisturbedFlightIsKeptButForDamping) {
 
 std::string error_of(const std::string& inside) {
   try {
-    play(parse(inside));
+    play(parsed(inside));
   } catch (const InputError& e) {
     return e.what();
   }
@@ -238,8 +239,8 @@ TEST(Run, AShakenBodyFollowsTheForcedOscillationWithSecondOrderInTheStep) {
     return -pA * omega / (root * root * h) * (std::cos(root * (end - h)) - std::cos(root * end));
   };
   const auto error = [&](int steps) {
-    const Scene scene = parse("\"step\": " + std::to_string(end / steps) + ", \"steps\": " + std::to_string(steps) +
-                              R"(, "bodies": [{"name": "b", "asset": "block",
+    const Scene scene = parsed("\"step\": " + std::to_string(end / steps) + ", \"steps\": " + std::to_string(steps) +
+                               R"(, "bodies": [{"name": "b", "asset": "block",
                               "motion": {"shake": {"axis": [0, 1, 0], "amplitude": 0.01, "frequency": 3}}}])");
     const RunResult r = run_scene(scene, make_models(scene, {{"block", asset}}), {.key_rate = 0.0});
     return std::abs(r.trajectory.bodies[0].amplitudes_at(1)[0] - forced - begun(end / steps));
@@ -250,7 +251,7 @@ TEST(Run, AShakenBodyFollowsTheForcedOscillationWithSecondOrderInTheStep) {
 }
 
 TEST(Run, EnergiesAreTabledForEveryKeyAndBody) {
-  const RunResult r = play(parse(struck("0")), {.key_rate = 10.0});
+  const RunResult r = play(parsed(struck("0")), {.key_rate = 10.0});
   const std::string bodies = energies_csv(r.trajectory), modes = mode_energies_csv(r.trajectory);
   EXPECT_EQ(std::count(bodies.begin(), bodies.end(), '\n'), 1 + 3);
   EXPECT_EQ(std::count(modes.begin(), modes.end(), '\n'), 1 + 3);
@@ -259,7 +260,7 @@ TEST(Run, EnergiesAreTabledForEveryKeyAndBody) {
 }
 
 TEST(Run, WrongOptionsAreRefused) {
-  const Scene scene = parse(struck("0"));
+  const Scene scene = parsed(struck("0"));
   EXPECT_THROW(play(scene, {.steps = -2}), InvalidArgument);
   EXPECT_THROW(play(scene, {.key_rate = std::nan("")}), InvalidArgument);
   EXPECT_THROW(run_scene(scene, {}), InvalidArgument);

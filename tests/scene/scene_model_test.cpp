@@ -11,7 +11,7 @@ namespace {
 
 using testing::block_asset;
 
-Scene scene_with(const std::string& limits, const std::string& bodies = R"({"name": "b", "asset": "block"})") {
+Scene model_scene(const std::string& limits, const std::string& bodies = R"({"name": "b", "asset": "block"})") {
   return parse_scene(R"({"step": 0.01, "steps": 1, "assets": {"block": "some/block.glb"}, "bodies": [)" + bodies + "]" +
                          (limits.empty() ? "" : ", \"limits\": " + limits) + "}",
                      "\"test.json\"", "");
@@ -19,7 +19,7 @@ Scene scene_with(const std::string& limits, const std::string& bodies = R"({"nam
 
 TEST(SceneModel, WithoutLimitsTheModelIsTheAssetsOwn) {
   const Asset asset = block_asset(4);
-  const SceneModels models = make_models(scene_with(""), {{"block", asset}});
+  const SceneModels models = make_models(model_scene(""), {{"block", asset}});
   EXPECT_EQ(models.of_body[0], asset.bodies[0]);
   ASSERT_EQ(models.manifest.size(), 1u);
   EXPECT_TRUE(models.manifest[0].dropped.empty());
@@ -28,7 +28,7 @@ TEST(SceneModel, WithoutLimitsTheModelIsTheAssetsOwn) {
 
 TEST(SceneModel, ModesFasterThanTheFramesAreLeftOutWithTheirReason) {
   // 5, 20, 45, 80 Hz against half of 60 Hz.
-  const SceneModels models = make_models(scene_with(R"({"frame_rate": 60})"), {{"block", block_asset(4)}});
+  const SceneModels models = make_models(model_scene(R"({"frame_rate": 60})"), {{"block", block_asset(4)}});
   const ModelManifest& m = models.manifest[0];
   EXPECT_EQ(m.modes_in_asset, 4);
   EXPECT_EQ(m.modes, 2);
@@ -45,7 +45,7 @@ TEST(SceneModel, ModesFasterThanTheFramesAreLeftOutWithTheirReason) {
 TEST(SceneModel, ModesThatTheLargestForceCannotShowAreLeftOut) {
   // Mode i shows at most 2 F |w|²/λ with |w|² = 2/3: 6.75e-4 and 4.2e-5 m for 0.5 N and the first two modes.
   const SceneModels models =
-      make_models(scene_with(R"({"max_force": 0.5, "min_displacement": 1e-4})"), {{"block", block_asset(4)}});
+      make_models(model_scene(R"({"max_force": 0.5, "min_displacement": 1e-4})"), {{"block", block_asset(4)}});
   EXPECT_EQ(models.manifest[0].modes, 1);
   EXPECT_NEAR(models.manifest[0].dropped[0].value,
               2.0 * 0.5 * (2.0 / 3.0) / (1600.0 * std::numbers::pi * std::numbers::pi), 1e-10);
@@ -95,7 +95,7 @@ TEST(SceneModel, BodiesOfOneAssetShareOneModelAndPartsAreFoundByName) {
   Asset two = block_asset(2, "first");
   two.bodies.push_back(testing::block_model(3, "second"));
   const SceneModels models =
-      make_models(scene_with(R"({"max_modes": 1})", R"({"name": "a", "asset": "block", "part": "second"},
+      make_models(model_scene(R"({"max_modes": 1})", R"({"name": "a", "asset": "block", "part": "second"},
       {"name": "b", "asset": "block", "part": 1}, {"name": "c", "asset": "block"})"),
                   {{"block", two}});
   EXPECT_EQ(models.of_body[0], models.of_body[1]);
