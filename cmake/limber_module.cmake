@@ -10,6 +10,10 @@ function(limber_compile_options target)
     # GCC 12 sees an overlap in every optimised `"text" + string` (its bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
   endif()
+  if(CMAKE_UNITY_BUILD)
+    # Of files compiled together: what one file's anonymous namespace holds is neither shared nor shadowed by another's.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow)
+  endif()
   if(LIMBER_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
@@ -38,6 +42,9 @@ function(limber_add_module name)
   endif()
   cmake_path(ABSOLUTE_PATH arg_FOLDER NORMALIZE OUTPUT_VARIABLE folder)
   add_library(limber_${name} ${arg_SOURCES})
+  set(kernels ${arg_SOURCES})  # these include themselves once for every instruction set
+  list(FILTER kernels INCLUDE REGEX "_kernels\\.cpp$")
+  set_source_files_properties(${kernels} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   add_library(limber::${name} ALIAS limber_${name})
   set_target_properties(limber_${name} PROPERTIES EXPORT_NAME ${name} LIMBER_COMPONENT ${arg_COMPONENT})
   target_include_directories(limber_${name}

@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "limber/core/error.h"
+#include "number_text.h"
 
 namespace limber {
 namespace {
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 std::vector<Vec3> points_of(const std::vector<ContactRegion>& regions) {
   std::vector<Vec3> points;
@@ -39,7 +34,8 @@ std::string contact_in_words(const std::vector<ContactRegion>& regions) {
   std::size_t samples = 0;
   double gap = 0.0;
   for (const ContactRegion& r : regions) samples += r.on_a.size() + r.on_b.size(), gap = std::max(gap, r.gap);
-  return "the surfaces face each other at " + std::to_string(samples) + " samples, median gap " + number(gap);
+  return "the surfaces face each other at " + std::to_string(samples) + " samples, median gap " +
+         internal::number_text(gap);
 }
 
 DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {

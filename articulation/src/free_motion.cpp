@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "constants.h"
 #include "free_motion_of_bodies.h"
 #include "limber/core/error.h"
 #include "orbit_index.h"
@@ -14,6 +15,8 @@
 namespace limber {
 namespace {
 
+using internal::kInfinity;
+using internal::kPi;
 using internal::Orbit;
 using internal::OrbitBody;
 using internal::OrbitFace;
@@ -25,8 +28,6 @@ using internal::Span;
 using internal::Spans;
 using internal::SurfacePoint;
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kDefaultTolerance = 2e-4;       // of the smaller body's diagonal
 constexpr double kDefaultLargestOverlap = 2e-2;  // the same
 /// The steepest slope (see OrbitPiece) at which a surface is a stop; beyond it, it slides.

@@ -7,11 +7,12 @@
 #include <optional>
 #include <tuple>
 
+#include "constants.h"
+
 namespace limber::internal {
 namespace {
 
 using Kind = MotionPath::Kind;
-constexpr double kPi = std::numbers::pi;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// A vertex in path coordinates.

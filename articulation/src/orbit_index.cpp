@@ -5,11 +5,12 @@
 #include <numbers>
 #include <tuple>
 
+#include "constants.h"
+
 namespace limber::internal {
 namespace {
 
 using Kind = MotionPath::Kind;
-constexpr double kPi = std::numbers::pi;
 
 /// Tangent of the angle whose cosine is given.
 double slope_of(double cosine) { return std::sqrt(std::max(1.0 - cosine * cosine, 0.0)) / std::abs(cosine); }

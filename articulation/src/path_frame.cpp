@@ -4,11 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "constants.h"
+
 namespace limber::internal {
 namespace {
 
 using Kind = MotionPath::Kind;
-constexpr double kPi = std::numbers::pi;
 
 /// Distance of the origin from a segment in the plane.
 double distance_to_segment(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "constants.h"
 #include "counted_progress.h"
 #include "free_motion_of_bodies.h"
 #include "limber/core/disjoint_sets.h"
@@ -16,11 +17,10 @@ namespace limber {
 namespace {
 
 using internal::degrees_text;
+using internal::kInfinity;
 using internal::number_text;
 using internal::OrbitBody;
 using Kind = MotionPath::Kind;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Sides ---------------------------------------------------------------------------------------------------------------
 

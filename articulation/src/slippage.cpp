@@ -9,6 +9,7 @@
 #include "joint_frame.h"
 #include "limber/core/error.h"
 #include "motion_space.h"
+#include "number_text.h"
 
 namespace limber {
 namespace {
@@ -263,28 +264,23 @@ std::vector<Judged> judged_families(const MotionSpace& space, double threshold) 
 
 // Words.
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2g", value);
-  return text;
-}
-
 std::string reason(const Judged& judged, double threshold) {
   const JointFreedoms free = freedoms(judged.family.type);
   std::string text;
   if (judged.family.type == JointType::kFixed)
     text = "no motion slips";
   else if (judged.family.pitch != 0.0)
-    text = "a turn with an advance slips: slippage " + number(judged.slippage);
+    text = "a turn with an advance slips: slippage " + internal::number_text(judged.slippage);
   else {
     if (free.rotations > 0) text += std::to_string(free.rotations) + (free.rotations > 1 ? " rotations" : " rotation");
     if (free.rotations > 0 && free.translations > 0) text += " and ";
     if (free.translations > 0)
       text += std::to_string(free.translations) + (free.translations > 1 ? " translations" : " translation");
-    text += " slip: slippage at most " + number(judged.slippage);
+    text += " slip: slippage at most " + internal::number_text(judged.slippage);
   }
-  if (judged.family.motions.cols() < 6) text += ", every other motion at least " + number(judged.blocked);
-  return text + " (threshold " + number(threshold) + ")";
+  if (judged.family.motions.cols() < 6)
+    text += ", every other motion at least " + internal::number_text(judged.blocked);
+  return text + " (threshold " + internal::number_text(threshold) + ")";
 }
 
 JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double threshold) {

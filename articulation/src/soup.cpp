@@ -47,7 +47,7 @@ std::vector<Index> representatives(const std::vector<Vec3>& vertices, double tol
 }
 
 /// One triangle at an edge.
-struct Side {
+struct SoupSide {
   Index low, high;  ///< the edge's vertices
   bool forward;     ///< whether the triangle runs from low to high
   Index triangle;
@@ -55,8 +55,8 @@ struct Side {
   Vec3 normal;  ///< outward, unit
 };
 
-std::vector<Side> sides_of(const SurfaceMesh& surface, const std::vector<Index>& representative) {
-  std::vector<Side> sides;
+std::vector<SoupSide> sides_of(const SurfaceMesh& surface, const std::vector<Index>& representative) {
+  std::vector<SoupSide> sides;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)
     for (std::size_t a = 0; a < 3; ++a) {
       const auto at = [&](std::size_t k) {
@@ -70,19 +70,20 @@ std::vector<Side> sides_of(const SurfaceMesh& surface, const std::vector<Index>&
       const Vec3 into = ((r - p) - edge * edge.dot(r - p)).normalized();
       sides.push_back({std::min(i, j), std::max(i, j), i < j, static_cast<Index>(t), into, edge.cross(into)});
     }
-  std::stable_sort(sides.begin(), sides.end(),
-                   [](const Side& a, const Side& b) { return std::pair(a.low, a.high) < std::pair(b.low, b.high); });
+  std::stable_sort(sides.begin(), sides.end(), [](const SoupSide& a, const SoupSide& b) {
+    return std::pair(a.low, a.high) < std::pair(b.low, b.high);
+  });
   return sides;
 }
 
 /// The angle of the material between two triangles at an edge, 0 … 2π.
-double material_angle(const Side& from, const Side& to) {
+double material_angle(const SoupSide& from, const SoupSide& to) {
   const double angle = std::atan2(-to.into.dot(from.normal), to.into.dot(from.into));
   return angle < 0.0 ? angle + 2.0 * std::numbers::pi : angle;
 }
 
 /// Pairs the triangles at one edge so that each pair bounds the least wedge of material.
-void join_at_edge(std::span<const Side> sides, DisjointSets& sets) {
+void join_at_edge(std::span<const SoupSide> sides, DisjointSets& sets) {
   struct Pair {
     double angle;
     std::size_t i, j;

@@ -12,7 +12,7 @@ using Kind = Feature::Kind;
 // Lines whose angle has a sine below this are taken as parallel: the ends decide then, and what is lost is their length
 // times this.
 constexpr double kParallelSine = 1e-13;
-constexpr double kRoundOff = 32 * std::numeric_limits<double>::epsilon();
+constexpr double kDistanceRoundOff = 32 * std::numeric_limits<double>::epsilon();
 
 // Where the foot of p falls on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
 double line_parameter(const Vec3& p, const Vec3& s0, const Vec3& s1) {
@@ -106,7 +106,7 @@ Piercing pierce(const SegmentPoints& s, const TrianglePoints& t) {
     if (n.dot((t[(i + 1) % 3] - t[i]).cross(p - t[i])) < 0.0) return {};
   // The plane of a sliver is round-off in one direction: what it says is taken only where the triangle is indeed met.
   const SurfaceFoot foot = closest_on_triangle(p, t);
-  const double round_off = kRoundOff * (s[0].norm() + s[1].norm() + t[0].norm());
+  const double round_off = kDistanceRoundOff * (s[0].norm() + s[1].norm() + t[0].norm());
   return {(p - foot.point).norm() <= round_off, parameter, foot};
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kLargest =
     1e30;  ///< m; squares of what is made of it stay finite in single precision's exponent range
-constexpr double kFlat = 1e-12;
+constexpr double kNoArea = 1e-12;
 
 std::vector<Triangle> grid_triangles(Index columns, Index rows) {
   std::vector<Triangle> triangles;
@@ -209,7 +209,7 @@ void CollisionSurface::mark_degenerate() {
   for (const auto& [a, b, c] : triangles_) {
     const Vec3 ab = rest(b) - rest(a), ac = rest(c) - rest(a), bc = rest(c) - rest(b);
     const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), bc.squaredNorm()});
-    degenerate_.push_back(ab.cross(ac).norm() <= kFlat * longest ? 1 : 0);
+    degenerate_.push_back(ab.cross(ac).norm() <= kNoArea * longest ? 1 : 0);
   }
 }
 

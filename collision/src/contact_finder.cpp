@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kPairsPerChunk = 4;
 constexpr std::size_t kBodiesPerChunk = 64;
 
-struct Body {
+struct FoundBody {
   bool present = false;
   std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
   std::shared_ptr<const RigidGeometry> rigid{};
@@ -106,7 +106,7 @@ std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
 }
 
 /// All but the amplitudes' size, which binding them shows: see bind_state().
-void check_state(Index index, const Body& body, const BodyState& state) {
+void check_state(Index index, const FoundBody& body, const BodyState& state) {
   constexpr double kUnit = 1e-6;
   const Quaternion& q = state.pose.q;
   if (!state.pose.p.allFinite()) refuse(index, "pose.p is not finite", "finite coordinates");
@@ -120,7 +120,7 @@ void check_state(Index index, const Body& body, const BodyState& state) {
 }
 
 /// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
-void bind_state(DeformedSurface& surface, Index index, const Body& body, std::span<const double> z) {
+void bind_state(DeformedSurface& surface, Index index, const FoundBody& body, std::span<const double> z) {
   try {
     surface.bind(body.modal->surface, z, BoundsChoice::kAmplitudes);
   } catch (const InvalidArgument& e) {
@@ -149,7 +149,7 @@ struct ContactFinder::Impl {
 
   ContactFinderOptions options;
   GeometryCache geometries;
-  std::vector<Body> bodies;
+  std::vector<FoundBody> bodies;
   std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
   BroadPhase broad_phase;
   Workers workers;
@@ -169,7 +169,7 @@ struct ContactFinder::Impl {
   std::vector<PairIds> kept_pairs;
   std::vector<std::uint64_t> kept_ids;
 
-  Body& present(Index body, const char* function) {
+  FoundBody& present(Index body, const char* function) {
     if (!contains(body))
       throw InvalidArgument("ContactFinder::" + std::string(function) + ": index " + std::to_string(body) +
                             " holds no body, expected one that was added");
@@ -178,8 +178,8 @@ struct ContactFinder::Impl {
   bool contains(Index body) const {
     return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).present;
   }
-  Body& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
-  const Body& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  FoundBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
+  const FoundBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
   const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
   const ExactMotion* motion(Index body) const {
     return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
@@ -259,7 +259,7 @@ void ContactFinder::Impl::make_boxes(Jobs& jobs) {
 /// Of a body to be placed, in the world, from its amplitudes alone.
 void ContactFinder::Impl::make_box(std::size_t entry, Worker& worker) {
   const Index index = to_place[entry];
-  const Body& body = at(index);
+  const FoundBody& body = at(index);
   if (motion(index) != nullptr) {
     boxes[entry] = swept_box(index, worker);
   } else if (body.modal) {
@@ -273,7 +273,7 @@ void ContactFinder::Impl::make_box(std::size_t entry, Worker& worker) {
 /// Half-spaces that move may come anywhere.
 Aabb ContactFinder::Impl::swept_box(Index index, Worker& worker) const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const Body& body = at(index);
+  const FoundBody& body = at(index);
   if (body.is_half_space()) return {Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)};
   if (!body.modal) return swept(body.rigid->bounds(), {}, *motion(index));
   RigidTransform pose;
@@ -286,7 +286,7 @@ Aabb ContactFinder::Impl::swept_box(Index index, Worker& worker) const {
 void ContactFinder::Impl::place() {
   for (std::size_t i = 0; i < to_place.size(); ++i) {
     const Index index = to_place[i];
-    Body& body = at(index);
+    FoundBody& body = at(index);
     const bool moves = motion(index) != nullptr;
     if (body.is_half_space() && !moves) {
       HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), state(index).pose);
@@ -337,7 +337,7 @@ void ContactFinder::Impl::check_sleepers_in_pairs() {
 }
 
 CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
-  const Body& body = at(index);
+  const FoundBody& body = at(index);
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
   if (!s.asleep) result.displacement = s.displacement, result.rotation = s.rotation;
@@ -351,7 +351,7 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
 }
 
 double ContactFinder::Impl::spacing(const BodyPair& pair) const {
-  const Body &a = at(pair.a), &b = at(pair.b);
+  const FoundBody &a = at(pair.a), &b = at(pair.b);
   if (a.modes() == 0 && b.modes() == 0) return std::numeric_limits<double>::infinity();
   return options.spacing * std::min(a.diagonal, b.diagonal);
 }
@@ -406,7 +406,7 @@ void ContactFinder::Impl::drop_still_pairs() {
 }
 
 MovingBody ContactFinder::Impl::moving_body(Index index) const {
-  const Body& body = at(index);
+  const FoundBody& body = at(index);
   MovingBody result{.geometry = body.rigid.get(), .motion = motion(index)};
   if (body.modal) result.surface = body.modal->surface;
   if (result.motion == nullptr) result.pose = state(index).pose, result.amplitudes = state(index).amplitudes;
@@ -451,7 +451,7 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
   if (body < 0 || m.contains(body))
     throw InvalidArgument("ContactFinder::add_body: index " + std::to_string(body) + (body < 0 ? "" : " holds a body") +
                           ", expected a free index of at least 0");
-  Body fresh{.present = true};
+  FoundBody fresh{.present = true};
   if (geometry.model) {
     fresh.modal = m.geometries.get(geometry.model);
     fresh.diagonal = 2.0 * fresh.modal->surface->rest_bounds().half_extents().norm();
@@ -473,7 +473,7 @@ void ContactFinder::remove_body(Index body) {
 }
 
 void ContactFinder::set_filter(Index body, const CollisionFilter& filter) {
-  const Body& known = impl_->present(body, "set_filter");
+  const FoundBody& known = impl_->present(body, "set_filter");
   impl_->broad_phase.set_filter(body, filter);
   impl_->set_finds_itself(body, filter.self && known.modal);
 }

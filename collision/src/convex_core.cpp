@@ -12,7 +12,7 @@ namespace limber {
 namespace {
 
 // Points nearer to a face than this part of the hull's size are on it; so are normals nearer than this one normal.
-constexpr double kFlat = 1e-10;
+constexpr double kNoThickness = 1e-10;
 
 struct HullFace {
   Triangle corners;
@@ -62,7 +62,7 @@ class HullBuilder {
     const Index c = farthest([&](const Vec3& p) { return axis.cross(p - point(a)).norm(); });
     const Vec3 n = axis.cross(point(c) - point(a));
     const Index d = farthest([&](const Vec3& p) { return std::abs(n.dot(p - point(a))); });
-    if (!(std::abs(n.dot(point(d) - point(a))) > kFlat * size_ * n.norm()) || !(n.norm() > kFlat * size_))
+    if (!(std::abs(n.dot(point(d) - point(a))) > kNoThickness * size_ * n.norm()) || !(n.norm() > kNoThickness * size_))
       throw InvalidArgument("ConvexHull: the points lie in one plane, expected a hull with volume");
     const bool below = n.dot(point(d) - point(a)) < 0.0;
     const Triangle base = below ? Triangle{a, b, c} : Triangle{a, c, b};
@@ -76,7 +76,7 @@ class HullBuilder {
   }
 
   void add(Index p) {
-    const auto visible = [&](const HullFace& f) { return f.normal.dot(point(p)) - f.offset > kFlat * size_; };
+    const auto visible = [&](const HullFace& f) { return f.normal.dot(point(p)) - f.offset > kNoThickness * size_; };
     std::set<HalfEdge> rim;
     for (const HullFace& f : faces_)
       if (visible(f))
@@ -105,7 +105,7 @@ std::vector<Index> flat_groups(const std::vector<HullFace>& faces) {
     if (twin == owner.end()) continue;
     const Vec3 &n = faces[static_cast<std::size_t>(f)].normal,
                &m = faces[static_cast<std::size_t>(twin->second)].normal;
-    if ((n - m).norm() < 1e3 * kFlat) groups.join(f, twin->second);
+    if ((n - m).norm() < 1e3 * kNoThickness) groups.join(f, twin->second);
   }
   return groups.labels();
 }
@@ -113,7 +113,7 @@ std::vector<Index> flat_groups(const std::vector<HullFace>& faces) {
 void add_edge_direction(ConvexCore& core, const Vec3& d) {
   const Vec3 unit = d.normalized();
   if (std::none_of(core.edge_directions.begin(), core.edge_directions.end(),
-                   [&](const Vec3& e) { return e.cross(unit).norm() < 1e3 * kFlat; }))
+                   [&](const Vec3& e) { return e.cross(unit).norm() < 1e3 * kNoThickness; }))
     core.edge_directions.push_back(unit);
 }
 

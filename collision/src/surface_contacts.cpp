@@ -9,7 +9,7 @@ namespace limber {
 namespace {
 
 // Edges whose angle has a sine below this are parallel: their ends make the contacts.
-constexpr double kParallelSine = 1e-12;
+constexpr double kParallelEdges = 1e-12;
 // The same for edges that all but touch, whose common perpendicular is lost sooner.
 constexpr double kParallelTouchingSine = 1e-4;
 
@@ -258,7 +258,7 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
   const Vec3 u = a1 - a0, w = b1 - b0, r = b0 - a0;
   const Vec3 n = u.cross(w);
   const double n2 = n.squaredNorm(), u2 = u.squaredNorm(), w2 = w.squaredNorm();
-  if (!(n2 > kParallelSine * kParallelSine * u2 * w2)) return pair;
+  if (!(n2 > kParallelEdges * kParallelEdges * u2 * w2)) return pair;
   const double s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
   const double end_s = tolerance_ / std::sqrt(u2), end_t = tolerance_ / std::sqrt(w2);
   if (!(s > end_s && s < 1.0 - end_s && t > end_t && t < 1.0 - end_t)) return pair;

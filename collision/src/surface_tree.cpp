@@ -13,17 +13,17 @@
 namespace limber {
 namespace {
 
-constexpr double kUnitRoundOff = 0x1p-24;
+constexpr double kSingleRoundOff = 0x1p-24;
 /// What single precision may lose to underflow, per term, with flush-to-zero.
 constexpr double kUnderflow = 0x1p-126;
 
 /// Relative error of a sum of k + 1 rounded products of rounded factors, in any order; a few terms to spare.
 double sum_error(Index modes) {
   const double n = static_cast<double>(modes) + 16.0;
-  return n * kUnitRoundOff / (1.0 - n * kUnitRoundOff);
+  return n * kSingleRoundOff / (1.0 - n * kSingleRoundOff);
 }
 
-float rounded_up(double x) {
+float nearest_above(double x) {
   const float f = static_cast<float>(x);
   return static_cast<double>(f) < x ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
@@ -148,8 +148,8 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
   }
   float* const constants = constants_.data() + n * kNodeConstants + static_cast<std::size_t>(axis);
   constants[0] = c;
-  constants[4] = rounded_up((half + error * (std::abs(static_cast<double>(c)) + half)) * (1.0 + error) + underflow);
-  constants[8] = rounded_up((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));
+  constants[4] = nearest_above((half + error * (std::abs(static_cast<double>(c)) + half)) * (1.0 + error) + underflow);
+  constants[8] = nearest_above((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));
 }
 
 }  // namespace limber

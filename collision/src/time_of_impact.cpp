@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Round-off of a pose and of what is done with it, in ε of its coordinates.
-constexpr double kRoundOff = 32.0 * std::numeric_limits<double>::epsilon();
+constexpr double kMotionRoundOff = 32.0 * std::numeric_limits<double>::epsilon();
 /// The gap that an advancement leaves, of the margin.
 constexpr double kKept = 0.5;
 /// An advancement of less than this part of the time looked ahead asks for a nearer look, if that would be sharper.
@@ -236,7 +236,7 @@ class Pair {
     b.start(swap ? first : second);
     last_.reset();
     go_to(0.0, step);
-    return kRoundOff * (a.position().norm() + b.position().norm() + a.arm() + b.arm());
+    return kMotionRoundOff * (a.position().norm() + b.position().norm() + a.arm() + b.arm());
   }
 
   void go_to(double t, double until) {

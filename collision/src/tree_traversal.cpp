@@ -13,7 +13,7 @@ namespace {
 
 /// Slack on tests between boxes, relative to the sizes in them: far above the round-off of a double rotation, far below
 /// that of the single-precision boxes.
-constexpr double kRoundOff = 1e-14;
+constexpr double kBoxRoundOff = 1e-14;
 
 /// Where box B lies as seen from A, for the separating axis test along the axes of both.
 struct Separation {
@@ -30,7 +30,7 @@ struct Separation {
     const double along_b = (from_b.cwiseAbs() - hb - magnitude.transpose() * ha).maxCoeff();
     const double size =
         p.cwiseAbs().maxCoeff() + a.center().cwiseAbs().maxCoeff() + b.center().cwiseAbs().sum() + ha.sum() + hb.sum();
-    return std::max(along_a, along_b) - kRoundOff * size;
+    return std::max(along_a, along_b) - kBoxRoundOff * size;
   }
 };
 

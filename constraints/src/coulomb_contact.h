@@ -6,6 +6,9 @@
 
 namespace limber {
 
+/// The vector that begins at x.
+inline Vec3 triple(const double* x) { return {x[0], x[1], x[2]}; }
+
 /// The point of {|x_t| ≤ μ x_n} nearest to x.
 inline Vec3 project_on_cone(const Vec3& x, double mu) {
   const double s = x.tail<2>().norm();

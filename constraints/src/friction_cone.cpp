@@ -19,9 +19,7 @@ namespace {
 
 using Numbers = std::span<const double>;
 
-Vec3 triple(const double* x) { return {x[0], x[1], x[2]}; }
-
-struct Memory {
+struct ConeMemory {
   MatrixBuffer A, G;
   AlignedBuffer b, u, v, zero, D, f, best, trial;
   std::vector<double> scale, mu;  // √a_i, μ_i
@@ -44,7 +42,7 @@ struct Memory {
 // u = A f + b with A in full, kept up to date.
 class DenseContacts {
  public:
-  DenseContacts(const FrictionProblem& problem, Memory& memory) : memory_(memory) {
+  DenseContacts(const FrictionProblem& problem, ConeMemory& memory) : memory_(memory) {
     m_ = static_cast<std::size_t>(problem.contacts);
     const std::size_t n = 3 * m_;
     A_ = memory.A.need(n, n);
@@ -86,7 +84,7 @@ class DenseContacts {
     }
   }
 
-  Memory& memory_;
+  ConeMemory& memory_;
   std::size_t m_;
   MatrixView A_{};
   double* u_ = nullptr;
@@ -96,7 +94,7 @@ class DenseContacts {
 // The same without A: v = Gᵀf of all bodies is kept, and u_i = b_i + D_i f_i + G_i v.
 class BlockContacts {
  public:
-  BlockContacts(const BlockFrictionProblem& problem, Memory& memory) : memory_(memory) {
+  BlockContacts(const BlockFrictionProblem& problem, ConeMemory& memory) : memory_(memory) {
     m_ = static_cast<std::size_t>(problem.contacts);
     place_blocks(problem);
     scales(problem);
@@ -119,7 +117,7 @@ class BlockContacts {
   Vec3 velocity(std::size_t i, const double* f) const {
     Vec3 u;
     for (std::size_t c = 0; c < 3; ++c) u[static_cast<int>(c)] = b_[3 * i + c] + D_[3 * i + c] * f[3 * i + c];
-    for (const Memory::Block* block = &memory_.blocks[2 * i]; block != &memory_.blocks[2 * i] + 2; ++block) {
+    for (const ConeMemory::Block* block = &memory_.blocks[2 * i]; block != &memory_.blocks[2 * i] + 2; ++block) {
       if (block->columns == 0) continue;
       double part[3];
       multiply_rows(part, {G_.row(block->first_row), G_.stride}, nullptr, v_ + block->offset, 3, block->columns);
@@ -196,14 +194,14 @@ class BlockContacts {
 
   void add_to_motion(std::size_t i, const double* force) {
     for (std::size_t k = 2 * i; k < 2 * i + 2; ++k) {
-      const Memory::Block& block = memory_.blocks[k];
+      const ConeMemory::Block& block = memory_.blocks[k];
       if (block.columns == 0) continue;
       double* v = v_ + block.offset;
       combine_rows(v, v, {G_.row(block.first_row), G_.stride}, nullptr, force, 3, block.columns);
     }
   }
 
-  Memory& memory_;
+  ConeMemory& memory_;
   std::size_t m_ = 0, v_size_ = 0;
   MatrixView G_{};
   double* v_ = nullptr;
@@ -215,7 +213,7 @@ class BlockContacts {
 template <class Contacts>
 class Sweeps {
  public:
-  Sweeps(Contacts& contacts, Memory& memory, std::size_t m, const FrictionOptions& options, FrictionResult& result)
+  Sweeps(Contacts& contacts, ConeMemory& memory, std::size_t m, const FrictionOptions& options, FrictionResult& result)
       : contacts_(contacts), memory_(memory), m_(m), options_(options), result_(result) {
     f_ = memory.f.need(3 * m);
     for (std::size_t i = 0; i < m; ++i) size_ = std::max(size_, triple(contacts.b() + 3 * i).norm());
@@ -290,7 +288,7 @@ class Sweeps {
 
  private:
   Contacts& contacts_;
-  Memory& memory_;
+  ConeMemory& memory_;
   std::size_t m_;
   const FrictionOptions& options_;
   FrictionResult& result_;
@@ -301,7 +299,7 @@ class Sweeps {
 // Alternates the normal and the friction problem.
 class Staggered {
  public:
-  Staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m)
+  Staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, ConeMemory& memory, std::size_t m)
       : contacts_(contacts), sweeps_(sweeps), memory_(memory), m_(m) {
     memory.A_normal.resize(m * m), memory.b_normal.resize(m), memory.f_normal.resize(m);
     for (std::size_t i = 0; i < m; ++i)
@@ -348,12 +346,12 @@ class Staggered {
  private:
   DenseContacts& contacts_;
   Sweeps<DenseContacts>& sweeps_;
-  Memory& memory_;
+  ConeMemory& memory_;
   std::size_t m_;
 };
 
 // The alternation need not settle: the best forces on the way are kept.
-void solve_staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Memory& memory, std::size_t m,
+void solve_staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, ConeMemory& memory, std::size_t m,
                      const FrictionOptions& options, FrictionResult& result) {
   Staggered staggered(contacts, sweeps, memory, m);
   double* best = memory.best.need(3 * m);
@@ -371,19 +369,19 @@ void solve_staggered(DenseContacts& contacts, Sweeps<DenseContacts>& sweeps, Mem
   std::copy_n(best, 3 * m, sweeps.f());
 }
 
-constexpr const char* kName = "FrictionSolver::solve";
+constexpr const char* kSolverName = "FrictionSolver::solve";
 
 void check(int contacts, Numbers b, Numbers mu, Numbers f, const FrictionOptions& options) {
-  check_option(kName, "contacts", contacts >= 0, contacts, "0 or more");
+  check_option(kSolverName, "contacts", contacts >= 0, contacts, "0 or more");
   const auto m = static_cast<std::size_t>(contacts);
-  check_length(kName, "b", b.size(), 3 * m);
-  check_length(kName, "mu", mu.size(), m);
-  check_length(kName, "f", f.size(), 3 * m);
-  check_option(kName, "tolerance", options.tolerance > 0.0, options.tolerance, "> 0");
-  check_option(kName, "max_sweeps", options.max_sweeps >= 1, options.max_sweeps, "1 or more");
+  check_length(kSolverName, "b", b.size(), 3 * m);
+  check_length(kSolverName, "mu", mu.size(), m);
+  check_length(kSolverName, "f", f.size(), 3 * m);
+  check_option(kSolverName, "tolerance", options.tolerance > 0.0, options.tolerance, "> 0");
+  check_option(kSolverName, "max_sweeps", options.max_sweeps >= 1, options.max_sweeps, "1 or more");
 }
 
-bool take_friction(Numbers b, Numbers mu, Memory& memory) {
+bool take_friction(Numbers b, Numbers mu, ConeMemory& memory) {
   memory.mu.assign(mu.begin(), mu.end());
   return all_finite(b.data(), b.size()) && all_finite(mu.data(), mu.size()) &&
          std::all_of(mu.begin(), mu.end(), [](double x) { return x >= 0.0; });
@@ -391,12 +389,12 @@ bool take_friction(Numbers b, Numbers mu, Memory& memory) {
 
 void check_blocks(const BlockFrictionProblem& problem, std::vector<int>& body_columns) {
   const auto m = static_cast<std::size_t>(problem.contacts);
-  check_length(kName, "blocks", problem.blocks.size(), 2 * m);
-  check_optional_length(kName, "D", problem.D.size(), 3 * m);
+  check_length(kSolverName, "blocks", problem.blocks.size(), 2 * m);
+  check_optional_length(kSolverName, "D", problem.D.size(), 3 * m);
   for (const FrictionBlock& block : problem.blocks)
     if (block.values)
       check_option(
-          kName, "a block's last column",
+          kSolverName, "a block's last column",
           block.first_column >= 0 && block.columns >= 0 && block.columns <= problem.columns - block.first_column,
           block.first_column + block.columns, "at most the number of columns");
   body_columns.assign(static_cast<std::size_t>(problem.columns), 0);
@@ -425,7 +423,7 @@ FrictionResult report(const ProximalSolver::Result& result) {
           .residual = result.residual};
 }
 
-FrictionResult refuse(std::span<double> f) {
+FrictionResult refuse_cones(std::span<double> f) {
   std::fill(f.begin(), f.end(), 0.0);
   return {.status = SolveStatus::kInvalidInput};
 }
@@ -433,7 +431,7 @@ FrictionResult refuse(std::span<double> f) {
 }  // namespace
 
 struct FrictionSolver::Impl {
-  Memory memory;
+  ConeMemory memory;
   ProximalSolver proximal;
   SparseCoupling sparse;
   std::vector<std::size_t> nodes;  // by first column; the largest number where there is none
@@ -522,12 +520,12 @@ FrictionResult FrictionSolver::solve(const FrictionProblem& problem, std::span<d
                                      const FrictionOptions& options) {
   check(problem.contacts, problem.b, problem.mu, f, options);
   const auto m = static_cast<std::size_t>(problem.contacts);
-  check_length(kName, "A", problem.A.size(), 9 * m * m);
+  check_length(kSolverName, "A", problem.A.size(), 9 * m * m);
   if (options.method == FrictionMethod::kSplitting)
     throw InvalidArgument("FrictionSolver::solve: rows in full are not solved by kSplitting, which was asked for");
-  Memory& memory = impl_->memory;
+  ConeMemory& memory = impl_->memory;
   if (!take_friction(problem.b, problem.mu, memory) || !all_finite(problem.A.data(), problem.A.size()))
-    return refuse(f);
+    return refuse_cones(f);
   if (options.method == FrictionMethod::kProximal) {
     const ProximalSolver::Result result =
         impl_->proximal.solve({.cones = problem.contacts, .A = problem.A, .b = problem.b, .friction = problem.mu}, f,
@@ -551,10 +549,10 @@ FrictionResult FrictionSolver::solve(const BlockFrictionProblem& problem, std::s
   check_blocks(problem, impl_->memory.body_columns);
   if (options.method == FrictionMethod::kStaggered)
     throw InvalidArgument("FrictionSolver::solve: blocks are not solved by kStaggered, which was asked for");
-  Memory& memory = impl_->memory;
+  ConeMemory& memory = impl_->memory;
   if (!take_friction(problem.b, problem.mu, memory) || !finite_blocks(problem) ||
       !std::all_of(problem.D.begin(), problem.D.end(), [](double x) { return x >= 0.0 && std::isfinite(x); }))
-    return refuse(f);
+    return refuse_cones(f);
   if (options.method == FrictionMethod::kProximal) {
     impl_->place(problem);
     return report(impl_->proximal.solve({.cones = problem.contacts, .b = problem.b, .friction = problem.mu},

@@ -11,7 +11,7 @@ namespace limber {
 namespace {
 
 // Positions are met to this part of the distances at hand: Newton's method ends where round-off begins.
-constexpr double kRelativeTolerance = 1e-11;
+constexpr double kHandleTolerance = 1e-11;
 
 std::vector<Vec3> all_directions() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
 
@@ -55,7 +55,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
-               .tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min()};
+               .tolerance = kHandleTolerance * length + std::numeric_limits<double>::min()};
     law.agent_displacement = n.dot(next_.position - target);
     if (options_.stiffness > 0.0) {
       const double implicit = step * options_.stiffness + options_.damping;

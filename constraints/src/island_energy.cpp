@@ -30,10 +30,6 @@ struct RelativeMotion {
   double energy;
 };
 
-const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
-  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
-}
-
 Vec3 center_at(const BodyGroup& group, Index slot, StepTime when) {
   return frame_at(group, slot, when).pose() * group.frame_constants().center_of_mass;
 }

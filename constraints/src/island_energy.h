@@ -5,6 +5,11 @@
 
 namespace limber {
 
+/// The frame before the step, or as predicted for its end.
+inline const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
+  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
+}
+
 /// The motion that the whole island has: a rigid one if nothing holds it, else none.
 struct CommonMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();

@@ -6,10 +6,6 @@
 namespace limber {
 namespace {
 
-const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
-  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
-}
-
 FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime when, const BodyResponse& r,
                                     const Vec3& gravity) {
   const FrameConstants& c = group.frame_constants();

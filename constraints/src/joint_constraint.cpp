@@ -13,9 +13,9 @@ namespace limber {
 namespace {
 
 // Newton's method ends here: angles in rad, distances as a part of the joint's arms.
-constexpr double kTolerance = 1e-11;
+constexpr double kJointTolerance = 1e-11;
 // Parts out of place come together at this speed, m/s and rad/s.
-constexpr double kRecoverySpeed = 1.0;
+constexpr double kLimitRecoverySpeed = 1.0;
 // Euler angles are singular at ±90° of the second; closer than this to it their rows keep a finite size.
 constexpr double kLeastEulerDeterminant = 1e-3;
 
@@ -248,7 +248,7 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
 
 RowLaw JointConstraint::law_of(const RowPlan& plan, double gap, double tolerance) const {
   RowLaw law{.tolerance = tolerance};
-  const double recovery = kRecoverySpeed * step_;
+  const double recovery = kLimitRecoverySpeed * step_;
   switch (plan.measure) {
     case Measure::kMotor:
     case Measure::kDrive:
@@ -320,7 +320,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
     const bool distance =
         plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
         ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) && !is_angle(plan.axis));
-    const double tolerance = distance ? kTolerance * length : kTolerance;
+    const double tolerance = distance ? kJointTolerance * length : kJointTolerance;
     RowLaw law = law_of(plan, gap(at, plan), tolerance);
     law.tolerance = tolerance;
     add(states, when, at, plan, law, rows);

@@ -19,8 +19,6 @@ constexpr double kFirstRho = 1e4, kLargestRho = 1e10;
 // Steps are solved to this part of the tolerance of the whole.
 constexpr double kInner = 1e-2;
 
-Vec3 triple(const double* x) { return {x[0], x[1], x[2]}; }
-
 double largest(const double* x, std::size_t n) {
   double most = 0.0;
   for (std::size_t i = 0; i < n; ++i) most = std::max(most, std::abs(x[i]));

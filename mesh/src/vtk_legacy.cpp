@@ -12,7 +12,14 @@ namespace limber {
 namespace {
 
 /// Cell types of VTK that limber knows by name.
-enum CellType : int { kTriangle = 5, kStrip = 6, kPolygon = 7, kPixel = 8, kQuad = 9, kTet = 10 };
+enum CellType : int {
+  kTriangleCell = 5,
+  kStripCell = 6,
+  kPolygonCell = 7,
+  kPixelCell = 8,
+  kQuadCell = 9,
+  kTetCell = 10
+};
 
 /// Types 11 to 14 are first-order solids; the quadratic and higher ones of a surface or a solid lie from 22 on.
 bool is_curve_or_point(int type) {
@@ -183,11 +190,13 @@ class VtkReader {
 
   void check_cell(Index cell, int type) const {
     const auto size = cells_[cell].size();
-    const std::size_t wanted = type == kTriangle ? 3 : type == kTet || type == kQuad || type == kPixel ? 4 : 0;
+    const std::size_t wanted = type == kTriangleCell                                         ? 3
+                               : type == kTetCell || type == kQuadCell || type == kPixelCell ? 4
+                                                                                             : 0;
     if (wanted != 0 && size != wanted)
       in_.fail("cell " + std::to_string(cell) + " of type " + std::to_string(type) + " has " + std::to_string(size) +
                " points, expected " + std::to_string(wanted));
-    if (wanted == 0 && type != kStrip && type != kPolygon && !is_curve_or_point(type))
+    if (wanted == 0 && type != kStripCell && type != kPolygonCell && !is_curve_or_point(type))
       in_.fail("cell " + std::to_string(cell) + " has type " + std::to_string(type) +
                "; of cells only 4-node tetrahedra (10) and flat polygons (5, 6, 7, 8, 9) are read: remesh with "
                "first-order tetrahedra");
@@ -197,15 +206,15 @@ class VtkReader {
     const CellField* field = region_field();
     for (std::size_t i = 0; i < types_.size(); ++i) {
       const auto c = cells_[i];
-      if (types_[i] == kTet) {
+      if (types_[i] == kTetCell) {
         mesh_.tets.tets.push_back({c[0], c[1], c[2], c[3]});
         regions_.push(0, field ? field->values[i] : 0, [](int tag) { return std::to_string(tag); });
-      } else if (types_[i] == kPixel) {
+      } else if (types_[i] == kPixelCell) {
         mesh_.polygons.push(std::array{c[0], c[1], c[3], c[2]});
-      } else if (types_[i] == kStrip) {
+      } else if (types_[i] == kStripCell) {
         push_strip(c);
-      } else if (types_[i] >= kTriangle) {
-        if (types_[i] <= kQuad) mesh_.polygons.push(c);
+      } else if (types_[i] >= kTriangleCell) {
+        if (types_[i] <= kQuadCell) mesh_.polygons.push(c);
       }
     }
     GroupCollector().finish(mesh_.tets);

@@ -2,6 +2,7 @@
 #include <cstring>
 #include <set>
 
+#include "accessor_type.h"
 #include "asset_format.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -20,7 +21,6 @@ using nlohmann::json;
 constexpr std::size_t kMaxFileSize = 0xFFFFFFFF;             // what a GLB header can tell
 constexpr std::size_t kMaxJsonSize = std::size_t{64} << 20;  // parsed JSON takes some twenty times its text
 constexpr std::int64_t kMaxCount = 0x7FFFFFFF;               // an Index
-constexpr int kFloat = 5126, kUint32 = 5125;
 const std::string kNotAnAsset =
     ": a file that another tool rewrote is a picture of the asset, no longer the asset; bake it again with "
     "limber-precompute";
@@ -227,8 +227,8 @@ class BodyReader {
     data_.render.rest = items_of<Vec3f>(vectors(attributes, "POSITION", vertices));
     (void)vectors(attributes, "NORMAL", vertices);
     attributes.finish();
-    data_.render.triangles = items_of<Triangle>(
-        pieces_.accessor(primitive, "indices", kUint32, "SCALAR", 3 * triangles, sizeof(Triangle) * triangles));
+    data_.render.triangles = items_of<Triangle>(pieces_.accessor(primitive, "indices", internal::kUint32, "SCALAR",
+                                                                 3 * triangles, sizeof(Triangle) * triangles));
     read_targets(primitive, vertices);
     (void)primitive.has("material");
     primitive.finish();
@@ -290,7 +290,7 @@ class BodyReader {
   }
 
   std::string_view vectors(const JsonObject& attributes, const std::string& key, std::size_t vertices) {
-    return pieces_.accessor(attributes, key, kFloat, "VEC3", vertices, sizeof(Vec3f) * vertices);
+    return pieces_.accessor(attributes, key, internal::kFloat, "VEC3", vertices, sizeof(Vec3f) * vertices);
   }
 
   /// All modes of a basis, unscaled, mode after mode; absent if there is no mode.

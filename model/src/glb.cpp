@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "accessor_type.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -20,7 +21,6 @@ static_assert(std::endian::native == std::endian::little, "GLB is little-endian 
 
 constexpr std::uint32_t kMagic = 0x46546C67, kVersion = 2, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
 constexpr std::size_t kHeaderSize = 12, kChunkHeaderSize = 8;
-constexpr int kFloat = 5126, kUint32 = 5125;
 constexpr int kVertexBuffer = 34962, kIndexBuffer = 34963;
 constexpr float kUnitTolerance = 5e-4f;  // what the Khronos validator grants unit vectors
 
@@ -143,7 +143,7 @@ struct GlbBuilder::Impl {
     const int view = add_view(values.data(), values.size_bytes(), target);
     const std::size_t count = values.size() / components;
     accessors.push_back({{"bufferView", view},
-                         {"componentType", kFloat},
+                         {"componentType", internal::kFloat},
                          {"count", count},
                          {"type", type},
                          {"min", low},
@@ -233,7 +233,7 @@ int GlbBuilder::add_triangles(std::span<const Triangle> triangles) {
   if (low < 0) refuse("triangles: the vertex index " + std::to_string(low) + " is negative");
   const int view = impl_->add_view(triangles.data(), triangles.size_bytes(), kIndexBuffer);
   impl_->accessors.push_back({{"bufferView", view},
-                              {"componentType", kUint32},
+                              {"componentType", internal::kUint32},
                               {"count", 3 * triangles.size()},
                               {"type", "SCALAR"},
                               {"min", {low}},

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "largest_shape.h"
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
@@ -27,13 +28,6 @@ double diagonal(const ModalSurface& surface) {
   Vec3f low = surface.rest.front(), high = low;
   for (const Vec3f& p : surface.rest) low = low.cwiseMin(p), high = high.cwiseMax(p);
   return (high - low).cast<double>().norm();
-}
-
-double largest_shape(const ModalSurface& surface, Index mode) {
-  double largest = 0.0;
-  for (Index v = 0; v < surface.vertices(); ++v)
-    largest = std::max(largest, surface.basis.shape(v, mode).cast<double>().norm());
-  return largest;
 }
 
 /// All bodies of one model.
@@ -82,7 +76,7 @@ RecordedModel choose_modes(const Trajectory& trajectory, const Cast& cast, const
   const double visible = options.invisible * diagonal(cast.model->render());
   for (Index m = 0; m < cast.model->modes(); ++m) {
     const double largest = largest_amplitude(trajectory, cast, m);
-    if (!(largest * largest_shape(cast.model->render(), m) > visible)) continue;
+    if (!(largest * internal::largest_shape(cast.model->render(), m) > visible)) continue;
     record.recorded.push_back(m);
     record.scales.push_back(largest);
     if (too_fast(cast.model->data(), static_cast<std::size_t>(m), trajectory.key_interval))

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "largest_shape.h"
 #include "limber/core/error.h"
 #include "limber/internal/strict_json.h"
 #include "shape_reading.h"
@@ -38,19 +39,12 @@ std::vector<T> pick(const std::vector<T>& all, std::span<const Index> kept) {
   return out;
 }
 
-double largest_shape(const ModalSurface& surface, Index mode) {
-  double largest = 0.0;
-  for (Index v = 0; v < surface.vertices(); ++v)
-    largest = std::max(largest, surface.basis.shape(v, mode).cast<double>().norm());
-  return largest;
-}
-
 /// Loads act on the render surface, contacts on the collision surface.
 std::vector<ModeStrength> strengths(const ModalModel& model) {
   std::vector<ModeStrength> out;
   for (Index i = 0; i < model.modes(); ++i) {
-    const double shown = largest_shape(model.render(), i);
-    const double touched = model.data().collision ? largest_shape(model.collision(), i) : shown;
+    const double shown = internal::largest_shape(model.render(), i);
+    const double touched = model.data().collision ? internal::largest_shape(model.collision(), i) : shown;
     out.push_back({.eigenvalue = model.data().eigenvalues[static_cast<std::size_t>(i)],
                    .decay = model.data().decays[static_cast<std::size_t>(i)],
                    .max_observable = shown,
