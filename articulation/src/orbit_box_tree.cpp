@@ -7,12 +7,12 @@
 namespace limber::internal {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kInfiniteFloat = std::numeric_limits<float>::infinity();
 
 /// The largest float not above a number, or the least not below it.
 float rounded_down(double x) {
   const auto near = static_cast<float>(std::max(x, -1e38));
-  return near <= x ? near : std::nextafter(near, -kInfinity);
+  return near <= x ? near : std::nextafter(near, -kInfiniteFloat);
 }
 float rounded_up(double x) { return -rounded_down(-x); }
 
@@ -37,7 +37,7 @@ OrbitBoxTree::Rounded::Rounded(const OrbitBox& box) {
 }
 
 OrbitBoxTree::Node::Node() {
-  for (std::size_t i = 0; i < 2; ++i) low[i].fill(kInfinity), high[i].fill(-kInfinity);
+  for (std::size_t i = 0; i < 2; ++i) low[i].fill(kInfiniteFloat), high[i].fill(-kInfiniteFloat);
 }
 
 void OrbitBoxTree::Node::set(std::size_t lane, const Rounded& box) {

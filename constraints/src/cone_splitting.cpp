@@ -14,7 +14,6 @@ namespace {
 constexpr double kRho = 0.1;
 constexpr double kRelaxation = 1.6;  // α
 
-Vec3 triple(const double* x) { return {x[0], x[1], x[2]}; }
 void put(const Vec3& v, double* to) { std::copy_n(v.data(), 3, to); }
 
 }  // namespace
