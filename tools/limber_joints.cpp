@@ -7,6 +7,7 @@
 #include <chrono>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "limber/articulation/detect_joints.h"
@@ -30,6 +31,7 @@ struct Arguments {
   double scale = 0.0, density = 1000.0, min_confidence = 0.0, overlap = 0.0;
   bool explain = false, no_limits = false;
   DetectionOptions detection;
+  std::optional<double> hull_growth;
   RangeOptions range;
 };
 
@@ -85,10 +87,11 @@ void declare_detection(CLI::App& options, Arguments& a) {
           "how contacts are found: by a cluster of the smallest gaps, or as in [X09] in the hulls of convex pieces")
       ->check(CLI::IsMember({"nearest", "hulls"}))
       ->capture_default_str();
-  options.add_option("--growth", a.detection.contact.hull_growth, "of hulls, for --contacts hulls")
+  options
+      .add_option("--growth", a.hull_growth,
+                  "of hulls, for --contacts hulls, at most --search; default: 0.01, or --search if that is less")
       ->type_name("PART_OF_DIAGONAL")
-      ->check(positive_number())
-      ->capture_default_str();
+      ->check(positive_number());
   options.add_option("--method", a.method, "\"paper\": slippage by one fixed ratio of eigenvalues, as in [X09]")
       ->check(CLI::IsMember({"default", "paper"}))
       ->capture_default_str();
@@ -102,11 +105,11 @@ void declare_detection(CLI::App& options, Arguments& a) {
       ->capture_default_str();
   options.add_option("--threshold", a.detection.slippage.threshold, "largest slippage of a freedom, below 1")
       ->type_name("MU")
-      ->check(positive_number())
+      ->check(proper_fraction())
       ->capture_default_str();
   options.add_option("--ratio", a.detection.slippage.ratio, "of eigenvalues, more than 1; for --method paper")
       ->type_name("G")
-      ->check(positive_number())
+      ->check(number_above_one())
       ->capture_default_str();
   options.add_option("--min-confidence", a.min_confidence, "leave out joints below, 0 to 1")
       ->type_name("C")
@@ -200,6 +203,14 @@ DetectionOptions detection_options(const Arguments& a, Program& program) {
   options.min_confidence = a.min_confidence;
   if (a.method == "paper") options.slippage.method = SlippageMethod::kFixedRatio;
   if (a.contacts == "hulls") options.contact.method = ContactMethod::kHulls;
+  if (a.hull_growth) options.contact.hull_growth = *a.hull_growth;
+  if (options.contact.hull_growth > options.contact.search) {
+    if (a.hull_growth)
+      throw InvalidArgument(
+          fmt::format("--growth {} is more than --search {}: hulls must not grow beyond what is searched",
+                      *a.hull_growth, options.contact.search));
+    options.contact.hull_growth = options.contact.search;
+  }
   const double share = a.no_limits ? 1.0 : kDetectionShare;
   options.progress = [&program, share, stage = std::string()](double done, std::string_view what) mutable {
     if (stage != what) program.progress().stage(stage = what);

@@ -47,7 +47,6 @@ class ConeSplitting {
   SparseCoupling* coupling_ = nullptr;
   std::size_t cones_ = 0, n_ = 0;
   bool factored_ = false;
-  double rho_ = 0.1;
   // Scaled to A_ii = 1 as in proximal_solver.cpp: forces by `scale_`, velocities by its inverse.
   std::vector<double> scale_;
   AlignedBuffer memory_;

@@ -134,6 +134,9 @@ TEST_F(JointsProgram, WrongUseIsToldInOneLineAndLeavesNothing) {
   expect_one_line(run({"lever.obj", "-o", "j.json", "--merge", "part 1"}), 2, "--merge");
   expect_one_line(run({"lever.obj", "-o", "lever.obj"}), 2, "lever.obj");
   expect_one_line(run({"lever.obj", "-o", "j.json", "--samples", "3"}), 2, "samples");
+  expect_one_line(run({"lever.obj", "-o", "j.json", "--threshold", "2"}), 2, "--threshold: is 2, expected");
+  expect_one_line(run({"lever.obj", "-o", "j.json", "--ratio", "0.5"}), 2, "--ratio: is 0.5, expected");
+  expect_one_line(run({"lever.obj", "-o", "j.json", "--growth", "1"}), 2, "--growth 1 is more than --search");
   expect_one_line(run({"lever.obj", "-o", "j.json", "--unit", "parsec"}), 2, "parsec");
   write_file(folder_ / "k.json", "{\"components\": [], \"joints\": [{\"a\": 0}]}");
   expect_one_line(run({"lever.obj", "-o", "j.json", "--keep", "k.json"}), 1, "joints[0].a");

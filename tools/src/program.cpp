@@ -33,12 +33,12 @@ std::vector<std::string> long_names(const CLI::App& app) {
   return names;
 }
 
-CLI::Validator number_check(const std::string& expected, bool zero_too) {
+template <class Holds>
+CLI::Validator number_check(const std::string& expected, Holds holds) {
   return CLI::Validator(
       [=](const std::string& text) {
         double value = 0.0;
-        const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value) &&
-                          (value > 0.0 || (zero_too && value == 0.0));
+        const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && holds(value);
         return good ? std::string() : "is " + text + ", expected " + expected;
       },
       "", expected);
@@ -129,8 +129,20 @@ int Program::refuse_usage(const CLI::ParseError& error) {
   return fail(kWrongUsage, message + " (see " + name_ + " --help)");
 }
 
-CLI::Validator positive_number() { return number_check("a finite number > 0", false); }
+CLI::Validator positive_number() {
+  return number_check("a finite number > 0", [](double x) { return x > 0.0; });
+}
 
-CLI::Validator non_negative_number() { return number_check("a finite number >= 0", true); }
+CLI::Validator non_negative_number() {
+  return number_check("a finite number >= 0", [](double x) { return x >= 0.0; });
+}
+
+CLI::Validator number_above_one() {
+  return number_check("a finite number > 1", [](double x) { return x > 1.0; });
+}
+
+CLI::Validator proper_fraction() {
+  return number_check("a number > 0 and < 1", [](double x) { return x > 0.0 && x < 1.0; });
+}
 
 }  // namespace limber::tools

@@ -80,8 +80,10 @@ class Program {
   std::vector<std::filesystem::path> input_paths_, output_paths_;
 };
 
-/// Validators for options: a finite number > 0, or ≥ 0. (CLI11 reads "nan" and "inf" as numbers.)
+/// Validators for options: a finite number > 0, ≥ 0, > 1, or between 0 and 1. (CLI11 reads "nan" and "inf" as numbers.)
 CLI::Validator positive_number();
 CLI::Validator non_negative_number();
+CLI::Validator number_above_one();
+CLI::Validator proper_fraction();
 
 }  // namespace limber::tools
