@@ -6,17 +6,17 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include "assemblies.h"
+#include "constants.h"
 #include "shells.h"
 
 namespace limber::assemblies {
 
-inline constexpr double kPi = std::numbers::pi;
-inline constexpr double kDegree = kPi / 180.0;
+using testing::kDegree;
+using testing::kPi;
 inline constexpr double kOpen = std::numeric_limits<double>::infinity();
 
 /// Where a joint's own drawing is put: z along its axis.

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
+
+#include "constants.h"
 
 namespace limber::assemblies {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using testing::kPi;
 using Point = Eigen::Vector2d;
 
 double turn(const Point& a, const Point& b, const Point& c) {
