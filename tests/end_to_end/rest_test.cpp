@@ -13,9 +13,9 @@ namespace limber::testing {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__)
-constexpr int kBoxes = 3, kSteps = 10;  // the sanitizers take twenty times as long
+constexpr int kBoxes = 3, kRestSteps = 10;  // the sanitizers take twenty times as long
 #else
-constexpr int kBoxes = 5, kSteps = 30;
+constexpr int kBoxes = 5, kRestSteps = 30;
 #endif
 
 std::shared_ptr<const ModalModel> rubber_box(const Vec3& size, const std::array<int, 3>& cells, int modes,
@@ -45,7 +45,7 @@ TEST(Rest, RubberBoxesLaidUponEachOtherStand) {
   const Vec3 top = scene.world.body(boxes.back()).pose.p;
   int unsettled = 0;
   double before = total_energy(scene.world, boxes), rise = 0.0;
-  for (int i = 0; i < kSteps; ++i) {
+  for (int i = 0; i < kRestSteps; ++i) {
     scene.step(1);
     unsettled += scene.world.constraint_report().solved ? 0 : 1;
     const double now = total_energy(scene.world, boxes);
