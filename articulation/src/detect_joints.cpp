@@ -35,7 +35,7 @@ std::string contact_in_words(const std::vector<ContactRegion>& regions) {
   double gap = 0.0;
   for (const ContactRegion& r : regions) samples += r.on_a.size() + r.on_b.size(), gap = std::max(gap, r.gap);
   return "the surfaces face each other at " + std::to_string(samples) + " samples, median gap " +
-         internal::number_text(gap);
+         internal::number_text(gap, 3);
 }
 
 DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {

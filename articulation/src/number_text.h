@@ -10,10 +10,10 @@
 
 namespace limber::internal {
 
-/// Four digits; "0.05", "1.234e-07".
-inline std::string number_text(double x) {
+/// "0.05", "1.234e-07".
+inline std::string number_text(double x, int digits = 4) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.4g", x);
+  std::snprintf(text, sizeof text, "%.*g", digits, x);
   return text;
 }
 

@@ -264,23 +264,25 @@ std::vector<Judged> judged_families(const MotionSpace& space, double threshold) 
 
 // Words.
 
+/// As many digits as slippages are good for.
+std::string slippage_text(double value) { return internal::number_text(value, 2); }
+
 std::string reason(const Judged& judged, double threshold) {
   const JointFreedoms free = freedoms(judged.family.type);
   std::string text;
   if (judged.family.type == JointType::kFixed)
     text = "no motion slips";
   else if (judged.family.pitch != 0.0)
-    text = "a turn with an advance slips: slippage " + internal::number_text(judged.slippage);
+    text = "a turn with an advance slips: slippage " + slippage_text(judged.slippage);
   else {
     if (free.rotations > 0) text += std::to_string(free.rotations) + (free.rotations > 1 ? " rotations" : " rotation");
     if (free.rotations > 0 && free.translations > 0) text += " and ";
     if (free.translations > 0)
       text += std::to_string(free.translations) + (free.translations > 1 ? " translations" : " translation");
-    text += " slip: slippage at most " + internal::number_text(judged.slippage);
+    text += " slip: slippage at most " + slippage_text(judged.slippage);
   }
-  if (judged.family.motions.cols() < 6)
-    text += ", every other motion at least " + internal::number_text(judged.blocked);
-  return text + " (threshold " + internal::number_text(threshold) + ")";
+  if (judged.family.motions.cols() < 6) text += ", every other motion at least " + slippage_text(judged.blocked);
+  return text + " (threshold " + slippage_text(threshold) + ")";
 }
 
 JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double threshold) {

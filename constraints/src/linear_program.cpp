@@ -42,7 +42,7 @@ struct LinearProgramSolver::Impl {
   double* values = nullptr;          // the values beside it
   std::vector<int> basic, nonbasic;  // the variable of each row and column
   std::vector<char> flipped;         // per y: the tableau holds bound − y instead
-  double bound = kNoBound;         // of every y: slack's price; ∞ until the program proves infeasible
+  double bound = kNoBound;           // of every y: slack's price; ∞ until the program proves infeasible
   bool has_basis = false;
   std::vector<int> entering, rows;  // of restore_basis() and set_costs()
   std::vector<double> coefficients;

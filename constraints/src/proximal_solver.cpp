@@ -14,8 +14,8 @@
 namespace limber {
 namespace {
 
-// Of the proximal term, for rows scaled to A_ii = 1. Larger: fewer proximal steps, and more digits lost in each.
-constexpr double kFirstRho = 1e4, kLargestRho = 1e10;
+// The proximal term that rows of any difficulty begin with, and its end.
+constexpr double kFirstRho = ProximalSolver::Options{}.first_rho, kLargestRho = 1e10;
 // Steps are solved to this part of the tolerance of the whole.
 constexpr double kInner = 1e-2;
 

@@ -45,8 +45,9 @@ class ProximalSolver {
     /// > 0: shorter steps where Newton's method does not come to its end; rows that contradict each other by no more
     /// than this, as part of the residual, are met half way, and the status is kRelaxed
     double contradiction = 0.0;
-    double first_rho =
-        1e4;  ///< > 0: of the first proximal terms, for rows scaled to A_ii = 1; grows where steps are slow
+    /// > 0: of the first proximal terms, for rows scaled to A_ii = 1; grows where steps are slow. Larger: fewer
+    /// proximal steps, and more digits lost in each.
+    double first_rho = 1e4;
   };
   struct Result {
     SolveStatus status = SolveStatus::kSolved;

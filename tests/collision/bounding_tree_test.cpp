@@ -12,18 +12,14 @@
 #include "random_states.h"
 #include "shapes.h"
 #include "soup.h"
-#include "wavy_model.h"
+#include "wavy_surface.h"
 
 namespace limber {
 namespace {
 
 using testing::Random;
+using testing::wavy_surface;
 using Surface = std::shared_ptr<const CollisionSurface>;
-
-Surface wavy(const SurfaceMesh& mesh, Index modes, int leaf_triangles = 4) {
-  return std::make_shared<const CollisionSurface>(testing::wavy_model(mesh, modes),
-                                                  CollisionSurfaceOptions{.leaf_triangles = leaf_triangles});
-}
 
 TrianglePoints moved(const RigidTransform& X, TrianglePoints x) {
   for (Vec3& p : x) p = X * p;
@@ -45,9 +41,9 @@ void expect_pairs_as_brute_force(DeformedSurface& a, DeformedSurface& b, const R
 
 TEST(TreeTraversal, PairsHoldEveryPairWithinTheMargin) {
   Random random(2);
-  const Surface round = wavy(shapes::sphere(Vec3::Zero(), 1.0, 1), 8, 2),
-                long_one = wavy(shapes::box({-2, -0.1, -0.2}, {2, 0.1, 0.2}), 3),
-                off_center = wavy(shapes::sphere(Vec3(1.0, 2.0, 3.0), 0.7, 2), 5, 4);
+  const Surface round = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 1), 8, 2),
+                long_one = wavy_surface(shapes::box({-2, -0.1, -0.2}, {2, 0.1, 0.2}), 3),
+                off_center = wavy_surface(shapes::sphere(Vec3(1.0, 2.0, 3.0), 0.7, 2), 5, 4);
   DeformedSurface a, b;
   for (int trial = 0; trial < 18; ++trial) {
     const Surface& first = trial % 2 ? round : off_center;
@@ -61,7 +57,7 @@ TEST(TreeTraversal, PairsHoldEveryPairWithinTheMargin) {
 }
 
 TEST(TreeTraversal, TheSameBodyInTheSamePlaceMeetsItselfEverywhere) {
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 2), 4);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 2), 4);
   DeformedSurface a, b;
   a.bind(s, std::vector<double>(4, 0.1));
   b.bind(s, std::vector<double>(4, 0.1));
@@ -73,7 +69,7 @@ TEST(TreeTraversal, TheSameBodyInTheSamePlaceMeetsItselfEverywhere) {
 
 TEST(TreeTraversal, PairsDoNotDependOnWhoIsFirstOrOnHowBoxesAreMade) {
   Random random(12);
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 3), 16);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 3), 16);
   for (int trial = 0; trial < 20; ++trial) {
     const auto y = random.amplitudes(16, 0.1), z = random.amplitudes(16, 0.1);
     const RigidTransform X_AB = random.pose(1.2);
@@ -97,7 +93,7 @@ TEST(TreeTraversal, PairsDoNotDependOnWhoIsFirstOrOnHowBoxesAreMade) {
 }
 
 TEST(TreeTraversal, FarBodiesCostTwoBoxesAndNoVertex) {
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 3), 8);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 3), 8);
   DeformedSurface a, b;
   a.bind(s, std::vector<double>(8, 0.01));
   b.bind(s, std::vector<double>(8, 0.01));
@@ -110,7 +106,7 @@ TEST(TreeTraversal, FarBodiesCostTwoBoxesAndNoVertex) {
 
 TEST(TreeTraversal, RegionsHoldEveryTriangleThatReachesIn) {
   Random random(13);
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 2), 6);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 2), 6);
   DeformedSurface a;
   for (int trial = 0; trial < 100; ++trial) {
     a.bind(s, random.amplitudes(6, 0.3));
@@ -141,7 +137,7 @@ TEST(TreeTraversal, RegionsHoldEveryTriangleThatReachesIn) {
 
 TEST(TreeTraversal, NearestPointIsTheNearestOfAllTriangles) {
   Random random(14);
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 2), 6);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 2), 6);
   DeformedSurface a;
   for (int trial = 0; trial < 200; ++trial) {
     a.bind(s, random.amplitudes(6, trial % 7 ? 0.3 : 20.0), static_cast<BoundsChoice>(trial % 3));
@@ -162,7 +158,7 @@ TEST(TreeTraversal, NearestPointIsTheNearestOfAllTriangles) {
 
 TEST(TreeTraversal, NearestPairIsTheNearestOfAllPairs) {
   Random random(15);
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 1), 5, 2);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 1), 5, 2);
   DeformedSurface a, b;
   for (int trial = 0; trial < 40; ++trial) {
     a.bind(s, random.amplitudes(5, 0.2));
@@ -206,7 +202,7 @@ TEST(TreeTraversal, SelfPairsHoldWhatBruteForceFinds) {
       bar.triangles.push_back({4 * i + c, 4 * i + d, 4 * i + 4 + d});
       bar.triangles.push_back({4 * i + c, 4 * i + 4 + d, 4 * i + 4 + c});
     }
-  const Surface s = wavy(bar, 6, 2);
+  const Surface s = wavy_surface(bar, 6, 2);
   DeformedSurface a;
   int touching = 0;
   for (int trial = 0; trial < 12; ++trial) {
@@ -242,7 +238,7 @@ TEST(TreeTraversal, PartsFarApartAtRestAreNoPairs) {
   SurfaceMesh two = shapes::sphere(Vec3(-5.0, 0.0, 0.0), 1.0, 2);
   const auto of_first = static_cast<Index>(two.triangles.size());
   shapes::append(shapes::sphere(Vec3(5.0, 0.0, 0.0), 1.0, 2), two);
-  const Surface s = wavy(two, 4);
+  const Surface s = wavy_surface(two, 4);
   DeformedSurface a;
   a.bind(s, std::vector<double>(4, 0.1));
   std::vector<TrianglePair> pairs;
@@ -272,7 +268,7 @@ TEST(TreeTraversal, DegenerateSurfacesAreWalked) {
 }
 
 TEST(TreeTraversal, WarmWalksAllocateNothing) {
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 3), 8);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 3), 8);
   DeformedSurface a, b;
   const std::vector<double> z(8, 0.02);
   std::vector<TrianglePair> pairs;
@@ -293,7 +289,7 @@ TEST(TreeTraversal, WarmWalksAllocateNothing) {
 }
 
 TEST(TreeTraversal, RefusesANegativeMargin) {
-  const Surface s = wavy(shapes::sphere(Vec3::Zero(), 1.0, 1), 2);
+  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 1), 2);
   DeformedSurface a, b;
   a.bind(s, std::vector<double>(2, 0.0));
   b.bind(s, std::vector<double>(2, 0.0));

@@ -10,17 +10,14 @@
 #include "limber/core/error.h"
 #include "random_states.h"
 #include "shapes.h"
-#include "wavy_model.h"
+#include "wavy_surface.h"
 
 namespace limber {
 namespace {
 
 using testing::Random;
+using testing::wavy_surface;
 
-std::shared_ptr<const CollisionSurface> wavy_surface(const SurfaceMesh& mesh, Index modes, int leaf_triangles = 4) {
-  return std::make_shared<const CollisionSurface>(testing::wavy_model(mesh, modes),
-                                                  CollisionSurfaceOptions{.leaf_triangles = leaf_triangles});
-}
 std::shared_ptr<const CollisionSurface> wavy_sphere(int splits, Index modes, int leaf_triangles = 4) {
   return wavy_surface(shapes::sphere(Vec3(0.3, -0.2, 0.1), 1.0, splits), modes, leaf_triangles);
 }

@@ -14,14 +14,12 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kSize = 0.6;  // of the sample box, m
-
 RigidTransform above(double height, const Vec3& turn = Vec3::Zero()) {
   return {quaternion_from_rotation_vector(turn), {0.0, 0.0, height}};
 }
 
 TEST(Contact, ABoxComesToRestOnTheGround) {
-  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;  // m
+  constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   for (const int modes : {0, 20}) {
     // 3 % of critical damping in the first mode.
     const double hz = 30.0;
@@ -118,7 +116,7 @@ void lay_on(GroundedIsland& island, double angle) {
 }
 
 TEST(Contact, ABlockOnASlopeBelowTheFrictionAngleDoesNotCreep) {
-  constexpr double kCreep = 1e-6 * kSize;  // m per second
+  constexpr double kCreep = 1e-6 * kSampleSize;  // m per second
   constexpr double kFriction = 0.5;
   for (const int modes : {0, 12}) {
     const double angle = 0.9 * std::atan(kFriction), hz = 40.0;
@@ -196,8 +194,8 @@ TEST(Contact, BodiesThatOverlapArePushedApartSlowly) {
     EXPECT_LE(island.lowest_gap() - before, kSlack * kSpeed * kFrame);
     before = island.lowest_gap();
   }
-  EXPECT_GT(before, -1e-3 * kSize);
-  EXPECT_LT(before, 1e-3 * kSize);
+  EXPECT_GT(before, -1e-3 * kSampleSize);
+  EXPECT_LT(before, 1e-3 * kSampleSize);
 }
 
 TEST(Contact, AWarmStepAllocatesNothingByAnyRule) {

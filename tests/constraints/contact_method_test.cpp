@@ -11,8 +11,6 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kBoxSize = 0.6;  // m
-
 GroundedIsland dropped_box(const ContactOptions& options, int modes, double step = kFrame) {
   const double hz = 30.0;
   GroundedIsland scene({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz}, step, options);
@@ -54,8 +52,8 @@ double deepest(ContactMethod method) {
 }
 
 TEST(ContactMethod, TheComplementaryOneDoesNotSinkInTheGapProgramDoesALittle) {
-  EXPECT_LT(deepest(ContactMethod::kComplementary), 1e-3 * kBoxSize);
-  EXPECT_LT(deepest(ContactMethod::kGapProgram), 2e-2 * kBoxSize);
+  EXPECT_LT(deepest(ContactMethod::kComplementary), 1e-3 * kSampleSize);
+  EXPECT_LT(deepest(ContactMethod::kGapProgram), 2e-2 * kSampleSize);
 }
 
 /// Energy of tumbling boxes, by the largest rise in a step.
@@ -111,7 +109,7 @@ TEST(ContactMethod, UnderHeuristicFrictionABlockSlidesAsItShouldButDoesNotStick)
   const double angle = 1.4 * std::atan(kFriction);
   const double expected = 2.0 * kGravity * (std::sin(angle) - kFriction * std::cos(angle));  // after two seconds
   for (const FrictionModel model : {FrictionModel::kHeuristic, FrictionModel::kHeuristicNoSlip}) {
-    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), 0.05 * kBoxSize);
+    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), 0.05 * kSampleSize);
     EXPECT_NEAR(slide(model, angle).velocity.norm(), expected, expected / 7.0);
   }
 }

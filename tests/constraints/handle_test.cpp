@@ -15,26 +15,26 @@ namespace {
 using testing::Island;
 using testing::kFrame;
 using testing::kGravity;
+using testing::kMarked;
+using testing::kSampleSize;
+using testing::kSecond;
 
-constexpr double kBodySize = 0.6;  // m, of the sample body
-constexpr double kExact = 1e-9;    // of the size: what a held point may be off by
-const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
-const SurfacePoint kOther{.triangle = 8, .weight = {0.1, 0.1, 0.8}};
+constexpr double kExact = 1e-9;  // of the size: what a held point may be off by
 
 TEST(Handle, HeldPointIsAtItsTargetAtAnyStiffnessOnATurningBody) {
   for (const double hz : {0.5, 5.0, 29.0, 100.0, 1e5})
     for (const double step : {1e-3, kFrame}) {
       Island island({.modes = 12, .lowest_hz = hz, .decay = 0.2}, step);
       island.add_body({}, {0.2, 0.1, 0.0}, {3.0, -2.0, 4.0});
-      Handle& handle = island.hold(0, kCorner);
+      Handle& handle = island.hold(0, kMarked);
       Vec3 target = handle.target().position;
       for (int i = 0; i < 100; ++i) {
         target += step * Vec3(0.3 * std::cos(i * step), 0.2, -0.1);
         handle.set_target({.position = target});
         const IslandReport report = island.step();
         ASSERT_EQ(report.status, SolveStatus::kSolved) << hz << ' ' << step;
-        ASSERT_LT((island.group.position(0, kCorner) - target).norm(), kExact * kBodySize);
-        ASSERT_LT(handle.error(), kExact * kBodySize);
+        ASSERT_LT((island.group.position(0, kMarked) - target).norm(), kExact * kSampleSize);
+        ASSERT_LT(handle.error(), kExact * kSampleSize);
       }
     }
 }
@@ -43,12 +43,12 @@ TEST(Handle, HeldPointIsAtItsTargetAtAnyStiffnessOnATurningBody) {
 TEST(Handle, SeveralAndRedundantOnesAreMetTogether) {
   Island island({.modes = 12, .lowest_hz = 10.0, .decay = 0.5}, kFrame);
   island.add_body({});
-  std::vector<Handle*> handles = {&island.hold(0, kCorner), &island.hold(0, kOther), &island.hold(0, kCorner)};
+  std::vector<Handle*> handles = {&island.hold(0, kMarked), &island.hold(0, kSecond), &island.hold(0, kMarked)};
   for (int i = 0; i < 60; ++i) {
     for (Handle* handle : handles)
       handle->set_target({.position = handle->target().position + Vec3(0.0, 0.002, 0.001)});
     EXPECT_EQ(island.step().status, SolveStatus::kSolved);
-    for (const Handle* handle : handles) EXPECT_LT(handle->error(), kExact * kBodySize);
+    for (const Handle* handle : handles) EXPECT_LT(handle->error(), kExact * kSampleSize);
   }
 }
 
@@ -56,22 +56,22 @@ TEST(Handle, SeveralAndRedundantOnesAreMetTogether) {
 TEST(Handle, ConflictingOnesMeetInTheMiddle) {
   Island island({.modes = 6, .lowest_hz = 10.0, .decay = 0.5}, kFrame);
   island.add_body({});
-  Handle &one = island.hold(0, kCorner), &other = island.hold(0, kCorner);
+  Handle &one = island.hold(0, kMarked), &other = island.hold(0, kMarked);
   const Vec3 at = one.target().position;
   one.set_target({.position = at + Vec3(0.0, 0.0, 0.02)});
   other.set_target({.position = at - Vec3(0.0, 0.0, 0.01)});
   for (int i = 0; i < 60; ++i) island.step();
-  EXPECT_LT((island.group.position(0, kCorner) - at - Vec3(0.0, 0.0, 0.005)).norm(), 1e-6 * kBodySize);
+  EXPECT_LT((island.group.position(0, kMarked) - at - Vec3(0.0, 0.0, 0.005)).norm(), 1e-6 * kSampleSize);
 }
 
 TEST(Handle, HoldsInItsDirectionsAlone) {
   Island island({.modes = 0}, kFrame, Vec3::Zero());
   island.add_body({}, {0.3, 0.0, 0.2});
-  const Vec3 before = island.group.position(0, kCorner);
-  island.hold(0, kCorner, {.directions = {Vec3::UnitZ()}});
+  const Vec3 before = island.group.position(0, kMarked);
+  island.hold(0, kMarked, {.directions = {Vec3::UnitZ()}});
   for (int i = 0; i < 30; ++i) island.step();
-  const Vec3 moved = island.group.position(0, kCorner) - before;
-  EXPECT_LT(std::abs(moved.z()), kExact * kBodySize);
+  const Vec3 moved = island.group.position(0, kMarked) - before;
+  EXPECT_LT(std::abs(moved.z()), kExact * kSampleSize);
   EXPECT_GT(moved.x(), 0.1);
 }
 
@@ -80,7 +80,7 @@ TEST(Handle, FixedHandsGiveNoEnergy) {
     for (const double step : {1e-3, kFrame, 0.05}) {
       Island island({.modes = 10, .lowest_hz = hz}, step);
       island.add_body({}, Vec3::Zero(), {1.0, 2.0, -1.0});
-      island.hold(0, kCorner);
+      island.hold(0, kMarked);
       double before = island.energy(), rise = 0.0;
       for (int i = 0; i < 300; ++i) {
         island.step();
@@ -95,7 +95,7 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
   for (const double k : {10.0, 1e3, 1e6, 1e12}) {
     Island island({.modes = 8, .lowest_hz = 8.0, .decay = 2.0}, kFrame);
     island.add_body({});
-    Handle& spring = island.hold(0, kCorner, {.stiffness = k, .damping = 0.05 * k});
+    Handle& spring = island.hold(0, kMarked, {.stiffness = k, .damping = 0.05 * k});
     const double weight = island.model->data().mass * kGravity;
     constexpr int kSteps = 6000;
     double mean = 0.0;
@@ -105,14 +105,14 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
       ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << k;
     }
     EXPECT_NEAR(mean, weight, 2e-2 * weight) << "what swings below it pulls by its weight in the mean; " << k;
-    EXPECT_NEAR(spring.error(), spring.force().norm() / k, 0.2 * weight / k + kExact * kBodySize) << k;
+    EXPECT_NEAR(spring.error(), spring.force().norm() / k, 0.2 * weight / k + kExact * kSampleSize) << k;
   }
 }
 
 TEST(Handle, PullsNoHarderThanItsForce) {
   Island island({.modes = 4, .lowest_hz = 20.0}, kFrame, Vec3::Zero());
   island.add_body({});
-  Handle& hand = island.hold(0, kCorner, {.max_force = 2.0});
+  Handle& hand = island.hold(0, kMarked, {.max_force = 2.0});
   hand.set_target({.position = hand.target().position + Vec3(10.0, 0.0, 0.0)});
   for (int i = 0; i < 60; ++i) {
     island.step();
@@ -142,7 +142,7 @@ TEST(Handle, NothingBlowsUpInFiveHundredRandomRuns) {
     }
     for (int i = 0; i < 100; ++i) {
       island.step();
-      ASSERT_LT(island.group.velocity(0, kCorner).norm(), 50.0 * kSpeed) << run << ' ' << hz;
+      ASSERT_LT(island.group.velocity(0, kMarked).norm(), 50.0 * kSpeed) << run << ' ' << hz;
     }
     for (std::size_t m = 0; m < 10; ++m) ASSERT_LT(std::abs(island.group.amplitudes(0)[m]), 1.0) << run << ' ' << hz;
   }

@@ -15,10 +15,10 @@ using testing::Island;
 using testing::kDown;
 using testing::kFrame;
 using testing::kGravity;
+using testing::kMarked;
+using testing::kSecond;
 
 constexpr double kHeldError = 1e-10;
-const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
-const SurfacePoint kSecond{.triangle = 8, .weight = {0.1, 0.1, 0.8}};
 
 /// A turning, bent, vibrating body.
 struct Moving : Island {

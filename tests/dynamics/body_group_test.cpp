@@ -39,8 +39,7 @@ double inertial_force(const Particles& body, std::size_t mode, const KinematicFr
 }
 
 TEST(SampleModels, ShapesAreMassOrthonormalAndFreeOfTheMotionsLeftFree) {
-  for (const FrameMotion motion :
-       {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic}) {
+  for (const FrameMotion motion : testing::kAllMotions) {
     const Particles body = sample_particles({.motion = motion, .modes = 40});
     for (std::size_t i = 0; i < 40; ++i) {
       Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();

@@ -10,12 +10,10 @@
 namespace limber {
 namespace {
 
+using testing::kAllMotions;
 using testing::kDown;
+using testing::kMarked;
 using testing::sample_model;
-
-const SurfacePoint kCorner{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
-constexpr FrameMotion kMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine,
-                                    FrameMotion::kKinematic};
 
 /// Two equal groups of one moving body each.
 struct Twins {
@@ -24,7 +22,7 @@ struct Twins {
     for (BodyGroup* group : {&one, &other}) {
       group->add({quaternion_from_rotation_vector({0.3, 0.1, -0.7}), {1.0, 2.0, 3.0}}, {0.1, 0.2, 0.3},
                  {2.0, -1.0, 0.5});
-      group->apply_impulse(0, kCorner, {0.1, -0.3, 0.2}, 0.0);
+      group->apply_impulse(0, kMarked, {0.1, -0.3, 0.2}, 0.0);
     }
   }
   std::shared_ptr<const ModalModel> model;
@@ -45,12 +43,12 @@ void expect_same_bits(const BodyGroup& a, const BodyGroup& b) {
 }
 
 TEST(ConstraintStep, WithoutAConstraintItIsTheFreeStepBitForBit) {
-  for (const FrameMotion motion : kMotions) {
+  for (const FrameMotion motion : kAllMotions) {
     Twins twins(motion);
     for (int step = 0; step < 20; ++step) {
       for (BodyGroup* group : {&twins.one, &twins.other}) {
-        if (step == 5) group->apply_force(0, kCorner, {1.0, 2.0, 3.0});
-        if (step == 9) group->apply_impulse(0, kCorner, {0.1, 0.0, 0.2}, 0.004);
+        if (step == 5) group->apply_force(0, kMarked, {1.0, 2.0, 3.0});
+        if (step == 9) group->apply_impulse(0, kMarked, {0.1, 0.0, 0.2}, 0.004);
       }
       twins.one.advance(0, 1, kDown);
       twins.other.predict(0, kDown);
@@ -61,7 +59,7 @@ TEST(ConstraintStep, WithoutAConstraintItIsTheFreeStepBitForBit) {
 }
 
 TEST(ConstraintStep, APredictionLeavesTheBodyAsItIs) {
-  for (const FrameMotion motion : kMotions) {
+  for (const FrameMotion motion : kAllMotions) {
     Twins twins(motion);
     const std::vector<double> modal(11, 0.3);
     for (int step = 0; step < 5; ++step) {
@@ -76,20 +74,20 @@ TEST(ConstraintStep, APredictionLeavesTheBodyAsItIs) {
 
 /// The load of a force, of which the frame gets its impulse at the step's start.
 TEST(ConstraintStep, AnImpulseMovesTheFrameLikeAnImpulseAndTheModesLikeAHeldForce) {
-  for (const FrameMotion motion : kMotions) {
+  for (const FrameMotion motion : kAllMotions) {
     Twins struck(motion), held(motion);
     const double h = struck.one.step_length();
     BodyGroup& group = struck.other;
     const Vec3 J(0.4, -0.2, 0.7);
     const Quaternion q_WB = group.frame(0).pose().q;
-    const Vec3 arm = q_WB * deformed_point(*struck.model, kCorner, group.amplitudes(0));
+    const Vec3 arm = q_WB * deformed_point(*struck.model, kMarked, group.amplitudes(0));
     std::vector<double> modal(11, 0.0);
-    add_modal_force(*struck.model, kCorner, q_WB.conjugate() * J, modal);
+    add_modal_force(*struck.model, kMarked, q_WB.conjugate() * J, modal);
     group.predict(0, Vec3::Zero(), {.impulse = J, .moment = arm.cross(J), .modal = modal});
 
-    struck.one.apply_impulse(0, kCorner, J, 0.0);
+    struck.one.apply_impulse(0, kMarked, J, 0.0);
     struck.one.advance(0, 1, Vec3::Zero());
-    held.one.apply_force(0, kCorner, J / h);
+    held.one.apply_force(0, kMarked, J / h);
     held.one.advance(0, 1, Vec3::Zero());
 
     constexpr double kRoundOff = 1e-13;
@@ -112,7 +110,7 @@ TEST(ConstraintStep, ModesAboveTheNyquistRateAnswerStaticallyAndForget) {
   BodyGroup loaded(stiff, h), free(stiff, h);
   for (BodyGroup* g : {&loaded, &free}) {
     g->add({}, Vec3::Zero(), Vec3::Zero());
-    g->apply_impulse(0, kCorner, {0.1, 0.2, 0.3}, 0.0);
+    g->apply_impulse(0, kMarked, {0.1, 0.2, 0.3}, 0.0);
   }
   const std::vector<double> load(6, 5.0);
   for (int step = 0; step < 8; ++step) {

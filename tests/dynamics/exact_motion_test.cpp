@@ -16,8 +16,10 @@
 namespace limber {
 namespace {
 
+using testing::kAllMotions;
 using testing::kDown;
 using testing::kEpsilon;
+using testing::kMarked;
 using testing::sample_model;
 using testing::SampleOptions;
 
@@ -25,10 +27,7 @@ using testing::SampleOptions;
 constexpr double kRoundOff = 1e-13;
 /// What a bound may fall short of a sample by: the samples' own round-off.
 constexpr double kSampleError = 1e-12;
-const FrameMotion kAllMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine,
-                                   FrameMotion::kKinematic};
 const RigidTransform kPlace{quaternion_from_rotation_vector({0.7, -0.4, 1.1}), {1.0, -2.0, 3.0}};
-const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 
 /// A body that turns, flies, flexes and carries loads.
 struct Loaded {

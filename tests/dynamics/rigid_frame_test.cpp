@@ -268,8 +268,7 @@ TEST(RigidFrame, KinematicFrameGoesWhereItIsToldAndElseCoasts) {
 }
 
 TEST(RigidFrame, KineticEnergyIsThatOfTheParticles) {
-  for (const FrameMotion motion :
-       {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic}) {
+  for (const FrameMotion motion : testing::kAllMotions) {
     const testing::SampleOptions options{.motion = motion};
     const FrameConstants c(sample_model_data(options));
     const testing::Particles body = testing::sample_particles(options);

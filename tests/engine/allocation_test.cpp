@@ -13,8 +13,7 @@ namespace {
 TEST(World, StepDoesNotAllocateOnceWarm) {
   World world;
   std::vector<BodyId> bodies;
-  for (const FrameMotion motion :
-       {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine, FrameMotion::kKinematic}) {
+  for (const FrameMotion motion : testing::kAllMotions) {
     const auto model = testing::sample_model({.motion = motion});
     for (int i = 0; i < 100; ++i) bodies.push_back(world.add_body(model, {.angular_velocity = {1, 2, 3}}));
   }
@@ -22,7 +21,7 @@ TEST(World, StepDoesNotAllocateOnceWarm) {
   std::vector<DrawTarget> targets;
   for (std::size_t i = 0; i < bodies.size(); ++i)
     targets.push_back({bodies[i], std::span(positions).subspan(24 * i, 24), std::span(normals).subspan(24 * i, 24)});
-  const SurfacePoint at{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
+  const SurfacePoint& at = testing::kMarked;
   const auto frame = [&] {
     for (const BodyId id : bodies) {
       world.apply_force(id, at, {1, 2, 3});

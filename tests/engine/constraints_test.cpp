@@ -13,10 +13,10 @@
 namespace limber {
 namespace {
 
+using testing::kMarked;
+using testing::kSampleSize;
 using testing::sample_model;
 
-const SurfacePoint kPoint{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
-constexpr double kLink = 0.6;    // m, length of a sample body
 constexpr double kExact = 1e-9;  // of a length
 
 JointSpec hinge_at(const Vec3& origin) {
@@ -34,8 +34,8 @@ struct Chain {
 Chain add_chain(World& world, const std::shared_ptr<const ModalModel>& model, int links, const Vec3& from) {
   Chain chain;
   for (int i = 0; i < links; ++i) {
-    const Vec3 start = from + i * kLink * Vec3::UnitX();
-    chain.links.push_back(world.add_body(model, {.pose = {.p = start + 0.5 * kLink * Vec3::UnitX()}}));
+    const Vec3 start = from + i * kSampleSize * Vec3::UnitX();
+    chain.links.push_back(world.add_body(model, {.pose = {.p = start + 0.5 * kSampleSize * Vec3::UnitX()}}));
     chain.joints.push_back(world.add_joint(i == 0 ? BodyId{} : chain.links[static_cast<std::size_t>(i) - 1],
                                            chain.links.back(), hinge_at(start), {.radius = 0.25}, {.radius = 0.25}));
   }
@@ -51,29 +51,29 @@ double total_energy(const World& world, const Chain& chain) {
 TEST(Constraints, DraggedPointIsWhereTheHandIs) {
   World world;
   const BodyId body = world.add_body(sample_model({.modes = 8, .lowest_hz = 12.0, .decay = 0.5}));
-  const HandleId hand = world.add_handle(body, kPoint);
-  Vec3 target = world.position(body, kPoint);
+  const HandleId hand = world.add_handle(body, kMarked);
+  Vec3 target = world.position(body, kMarked);
   for (int i = 0; i < 120; ++i) {
     target += Vec3(0.001, 0.002 * std::sin(0.1 * i), 0.003);
     world.set_handle_target(hand, {.position = target});
     world.step();
-    ASSERT_LT((world.position(body, kPoint) - target).norm(), kExact);
+    ASSERT_LT((world.position(body, kMarked) - target).norm(), kExact);
   }
   EXPECT_GT(world.handle(hand).force.z(), 0.0);
   EXPECT_EQ(world.constraint_report().islands, 1);
   EXPECT_TRUE(world.constraint_report().solved);
   world.remove_handle(hand);
   EXPECT_FALSE(world.contains(hand));
-  const double z = world.position(body, kPoint).z();
+  const double z = world.position(body, kMarked).z();
   for (int i = 0; i < 60; ++i) world.step();
-  EXPECT_LT(world.position(body, kPoint).z(), z - 0.5) << "let go, it falls";
+  EXPECT_LT(world.position(body, kMarked).z(), z - 0.5) << "let go, it falls";
 }
 
 TEST(Constraints, ChainOfFlexibleLinksHangsTogetherAndGainsNothing) {
   World world;
   const Chain chain = add_chain(world, sample_model({.modes = 8, .lowest_hz = 25.0, .decay = 0.5}), 4, {0, 0, 2});
   double before = total_energy(world, chain);
-  const double scale = 4.0 * world.model(chain.links[0]).data().mass * 9.80665 * kLink;
+  const double scale = 4.0 * world.model(chain.links[0]).data().mass * 9.80665 * kSampleSize;
   for (int i = 0; i < 600; ++i) {
     world.step();
     for (const JointId joint : chain.joints) {
@@ -94,7 +94,8 @@ TEST(Constraints, MostStepsSettleWhereLinksTurnByMoreThanARadianInEach) {
   const Chain chain = add_chain(world, sample_model({.modes = 0}), 3, {0, 0, 2});
   const double spin = 1.3 / world.options().step;  // rad/s
   for (std::size_t i = 0; i < chain.links.size(); ++i)
-    world.set_velocity(chain.links[i], {0.0, 0.0, -spin * kLink * (static_cast<double>(i) + 0.5)}, {0.0, spin, 0.0});
+    world.set_velocity(chain.links[i], {0.0, 0.0, -spin * kSampleSize * (static_cast<double>(i) + 0.5)},
+                       {0.0, spin, 0.0});
   int unsettled = 0;
   for (int i = 0; i < kSteps; ++i) {
     world.step();
@@ -127,7 +128,7 @@ TEST(Constraints, BodiesWithoutConstraintsFallAsBefore) {
 TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {
   World world;
   const Chain chain = add_chain(world, sample_model(), 3, Vec3::Zero());
-  const HandleId hand = world.add_handle(chain.links[1], kPoint);
+  const HandleId hand = world.add_handle(chain.links[1], kMarked);
   world.step();
   world.remove_body(chain.links[1]);
   EXPECT_FALSE(world.contains(hand));
@@ -138,7 +139,7 @@ TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {
   const double z = world.body(chain.links[2]).pose.p.z();
   for (int i = 0; i < 30; ++i) world.step();
   EXPECT_LT(world.body(chain.links[2]).pose.p.z(), z - 0.5) << "the last link falls";
-  const HandleId other = world.add_handle(chain.links[0], kPoint);
+  const HandleId other = world.add_handle(chain.links[0], kMarked);
   EXPECT_TRUE(world.contains(other));
   EXPECT_FALSE(world.contains(hand)) << "an id stays invalid though its place is used again";
 }
@@ -146,9 +147,9 @@ TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {
 TEST(Constraints, RefuseWhatIsNotThere) {
   World world;
   const BodyId body = world.add_body(sample_model());
-  EXPECT_THROW(world.add_handle(BodyId{7, 1}, kPoint), InvalidArgument);
+  EXPECT_THROW(world.add_handle(BodyId{7, 1}, kMarked), InvalidArgument);
   EXPECT_THROW(world.add_handle(body, {.triangle = 99}), InvalidArgument);
-  EXPECT_THROW(world.add_handle(body, kPoint, {.max_force = -1.0}), InvalidArgument);
+  EXPECT_THROW(world.add_handle(body, kMarked, {.max_force = -1.0}), InvalidArgument);
   EXPECT_THROW(world.add_joint(body, body, {}), InvalidArgument);
   EXPECT_THROW(world.add_joint(BodyId{}, BodyId{}, {}), InvalidArgument);
   EXPECT_THROW(world.add_joint(BodyId{}, body, {}, {}, {.radius = -1.0}), InvalidArgument);
@@ -173,7 +174,7 @@ std::uint64_t hash_after_200_steps(Jobs& jobs) {
   std::vector<HandleId> hands;
   for (int i = 0; i < 12; ++i) {
     const Chain chain = add_chain(world, model, 1 + i % 4, {0.0, 2.0 * i, 0.0});
-    hands.push_back(world.add_handle(chain.links.back(), kPoint, {.stiffness = 200.0, .damping = 3.0}));
+    hands.push_back(world.add_handle(chain.links.back(), kMarked, {.stiffness = 200.0, .damping = 3.0}));
   }
   for (int step = 0; step < 200; ++step) {
     for (const HandleId hand : hands)
@@ -200,7 +201,7 @@ TEST(Constraints, StepDoesNotAllocateOnceWarm) {
   const BodyId door = world.add_body(model, {.pose = {.p = {0.3, 3.0, 0.0}}});
   const JointId joint = world.add_joint(BodyId{}, door, limited);
   world.set_joint_actuation(joint, 0, {.motor_velocity = 1.0, .motor_max_force = 2.0, .friction = 0.1});
-  const HandleId hand = world.add_handle(chain.links.back(), kPoint, {.stiffness = 100.0, .damping = 1.0});
+  const HandleId hand = world.add_handle(chain.links.back(), kMarked, {.stiffness = 100.0, .damping = 1.0});
   const auto frame = [&] {
     world.set_handle_target(hand, {.position = world.handle(hand).target.position + Vec3(0.0, 0.001, 0.002)});
     world.step();

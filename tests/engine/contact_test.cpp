@@ -11,7 +11,6 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kSize = 0.6;  // of the sample box, m
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int kStepsToRest = 60;  // of the largest stack; the sanitizers take twenty times as long
 constexpr int kPileBoxes = 9;
@@ -30,13 +29,13 @@ TEST(WorldContact, AFallingBoxComesToRestOnTheGround) {
     for (int i = 0; i < 300; ++i) world.step();
     const Vec3 before = world.body(box).pose.p;
     for (int i = 0; i < 60; ++i) world.step();
-    EXPECT_GT(lowest(world, box), -1e-3 * kSize) << modes;
+    EXPECT_GT(lowest(world, box), -1e-3 * kSampleSize) << modes;
     EXPECT_LT((world.body(box).pose.p - before).norm(), 1e-4) << modes;
   }
 }
 
 TEST(WorldContact, ABoxOnABoxStands) {
-  constexpr double kHeight = 0.2, kPenetration = 1e-3 * kSize, kShift = 1e-4;  // m
+  constexpr double kHeight = 0.2, kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   for (const int modes : {0, 6}) {
     GroundedWorld scene;
     World& world = scene.world;
@@ -55,8 +54,8 @@ TEST(WorldContact, ABoxOnABoxStands) {
 
 TEST(WorldContact, AStackOfTenRigidBoxesStands) {
   constexpr int kBoxes = 10;
-  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 1e-5;  // of a box; below its origin; between boxes, m
-  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;      // m
+  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 1e-5;    // of a box; below its origin; between boxes, m
+  constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   GroundedWorld scene;
   World& world = scene.world;
   const auto model = damped_box(0, 60.0);
@@ -76,8 +75,8 @@ TEST(WorldContact, AStackOfTenRigidBoxesStands) {
 }
 
 TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
-  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;  // of a box; below its origin; between boxes, m
-  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;      // m
+  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;    // of a box; below its origin; between boxes, m
+  constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   const auto model = damped_box(0, 60.0);
   for (const int count : {3, 5}) {
     GroundedWorld scene;
@@ -173,8 +172,8 @@ TEST(WorldContact, BodiesThatMeetInALumpKeepTheirMomenta) {
 
 /// Flexible boxes share loads between their contacts in many ways; each step finds one of them, and they come to rest.
 TEST(WorldContact, StacksOfFlexibleBoxesThatAreDroppedStandAndEveryStepSettles) {
-  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;  // of a box; below its origin; between boxes, m
-  constexpr double kPenetration = 1e-3 * kSize, kShift = 1e-4;      // m
+  constexpr double kHeight = 0.2, kBelow = 0.11385, kApart = 0.02;    // of a box; below its origin; between boxes, m
+  constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   for (const int dropped : {0, 14}) {
     const auto model = sample_model({.modes = 6, .dropped = dropped, .lowest_hz = 60.0, .decay = 12.0});
     GroundedWorld scene;
@@ -234,7 +233,7 @@ TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   for (int i = 0; i < 3; ++i)
     boxes.push_back(world.add_body(
         model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2 * i, 0.1}), {0.05 * i, 0.0, 0.5 + 0.5 * i}}}));
-  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSize);
+  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSampleSize);
 }
 
 /// What the dropped modes yield to the contacts at rest is what they would yield if they were kept.
@@ -266,7 +265,7 @@ TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll
     boxes.push_back(world.add_body(
         model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2 * i, 0.1}), {0.05 * i, 0.0, 0.5 + 0.5 * i}},
                 .velocity = {1.0, 0.0, 0.0}}));
-  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSize);
+  EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSampleSize);
 }
 
 /// A damped box that is dropped bounces, in steps that are cut where it strikes, and comes to rest.
@@ -317,11 +316,11 @@ TEST(WorldContact, StaticShapesAndBodiesComeAndGo) {
   const BodyId table = world.add_static(std::make_shared<Shape>(Box{{1.0, 1.0, 0.1}}), {{}, {0.0, 0.0, 1.0}});
   const BodyId box = world.add_body(damped_box(0, 30.0), {.pose = {{}, {0.0, 0.0, 1.3}}});
   for (int i = 0; i < 120; ++i) world.step();
-  EXPECT_NEAR(lowest(world, box), 1.1, 1e-3 * kSize);
+  EXPECT_NEAR(lowest(world, box), 1.1, 1e-3 * kSampleSize);
   world.remove_body(table);
   EXPECT_FALSE(world.contains(table));
   for (int i = 0; i < 120; ++i) world.step();
-  EXPECT_NEAR(lowest(world, box), 0.0, 1e-3 * kSize);
+  EXPECT_NEAR(lowest(world, box), 0.0, 1e-3 * kSampleSize);
   world.remove_body(box);
   world.step();
   for (const ContactEvent& contact : world.contact_events()) EXPECT_EQ(contact.phase, ContactPhase::kEnded);

@@ -9,7 +9,6 @@ namespace limber::testing {
 namespace {
 
 constexpr int kParts = 4;
-const SurfacePoint kAt{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 
 /// A box that falls on the ground, at a step of 1/60 s in parts, or at the small step.
 struct FallingBox : GroundedWorld {
@@ -35,13 +34,13 @@ TEST(Substeps, ComeToTheBitsOfAsManySmallStepsWithContactAndHeldForces) {
   const Vec3 force(0.5, -0.2, 0.1), impulse(0.0, 0.1, 0.2);
   for (int i = 0; i < 90; ++i) {
     const bool pushed = i > 20 && i < 40;
-    if (pushed) whole.world.apply_force(whole.box, kAt, force);
+    if (pushed) whole.world.apply_force(whole.box, kMarked, force);
     const double part = small.world.options().step;
-    if (i == 45) whole.world.apply_impulse(whole.box, kAt, impulse, Axes::kWorld, 2.0 * part);
+    if (i == 45) whole.world.apply_impulse(whole.box, kMarked, impulse, Axes::kWorld, 2.0 * part);
     whole.step(1);
     for (int p = 0; p < kParts; ++p) {
-      if (pushed) small.world.apply_force(small.box, kAt, force);
-      if (i == 45 && p == 2) small.world.apply_impulse(small.box, kAt, impulse, Axes::kWorld);
+      if (pushed) small.world.apply_force(small.box, kMarked, force);
+      if (i == 45 && p == 2) small.world.apply_impulse(small.box, kMarked, impulse, Axes::kWorld);
       small.step(1);
     }
     expect_same_state(whole.world, whole.box, small.world, small.box);
@@ -98,13 +97,13 @@ TEST(Substeps, EveryContactIsToldToBeginBeforeItLastsOrEnds) {
 TEST(Substeps, HandlesFollowAStraightLineAndMeetTheirTargetAtTheStepsEnd) {
   World world({.substeps = kParts});
   const BodyId box = world.add_body(damped_box(4, 30.0));
-  const HandleId hand = world.add_handle(box, kAt);
-  const Vec3 start = world.position(box, kAt);
+  const HandleId hand = world.add_handle(box, kMarked);
+  const Vec3 start = world.position(box, kMarked);
   for (int i = 1; i <= 30; ++i) {
     const Vec3 target = start + Vec3(0.01 * i, 0.0, 0.005 * i);
     world.set_handle_target(hand, {.position = target, .velocity = {0.6, 0.0, 0.3}});
     world.step();
-    EXPECT_LT((world.position(box, kAt) - target).norm(), 1e-9);
+    EXPECT_LT((world.position(box, kMarked) - target).norm(), 1e-9);
     EXPECT_LT((world.handle(hand).target.position - target - Vec3(0.01, 0.0, 0.005)).norm(), 1e-12);
   }
 }

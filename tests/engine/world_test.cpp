@@ -20,10 +20,10 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::kEpsilon;
+using testing::kMarked;
 using testing::sample_model;
 
 const Vec3 kNoGravity = Vec3::Zero();
-const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}};
 const Quaternion kTurned = quaternion_from_rotation_vector({0.7, -0.4, 1.1});
 
 std::vector<double> copy(std::span<const double> values) { return {values.begin(), values.end()}; }

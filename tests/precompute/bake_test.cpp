@@ -7,34 +7,23 @@
 #include <numbers>
 
 #include "limber/core/error.h"
-#include "tet_box.h"
+#include "rubber_box.h"
 
 namespace limber {
 namespace {
 
+using limber::testing::bake_box;
+using limber::testing::kBoxSize;
+using limber::testing::kRubber;
+using limber::testing::kSteel;
 using limber::testing::nodes_where;
+using limber::testing::rubber;
 using limber::testing::tet_box;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double kRoundOff = 1e-12;
 constexpr double kFloat = 4e-7;  // shapes are stored in single precision
-const Material kRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
-const Material kSteel{.youngs_modulus = 2e11, .poisson_ratio = 0.3, .density = 7850.0};
-const Vec3 kSize{0.3, 0.2, 0.1};
-
-BakeOptions rubber(int modes = 12) {
-  BakeOptions o;
-  o.materials = {{"*", kRubber}};
-  o.analysis.modes = modes;
-  o.limits.max_modes = modes;
-  return o;
-}
-
-BakeResult bake_box(const BakeOptions& options, TetMesh mesh = tet_box(3, 2, 2, kSize)) {
-  Warnings warnings;
-  return bake({.name = "box", .mesh = std::move(mesh)}, options, warnings);
-}
 
 std::shared_ptr<const ModalModel> only_body(const BakeResult& r) { return r.asset.bodies.at(0); }
 
@@ -54,12 +43,12 @@ TEST(Bake, FreeBoxHasTheMassCentreAndInertiaOfABox) {
   const BakeResult r = bake_box(rubber());
   const auto body = only_body(r);
   const ModalModelData& d = body->data();
-  const double mass = kRubber.density * kSize.prod();
+  const double mass = kRubber.density * kBoxSize.prod();
   EXPECT_EQ(d.motion, FrameMotion::kFree);
   EXPECT_NEAR(d.mass, mass, kRoundOff * mass);
-  EXPECT_LT((d.origin_in_input - kSize / 2).norm(), kRoundOff);
+  EXPECT_LT((d.origin_in_input - kBoxSize / 2).norm(), kRoundOff);
   for (int a = 0; a < 3; ++a) {
-    const double expected = mass / 12.0 * (kSize.squaredNorm() - kSize[a] * kSize[a]);
+    const double expected = mass / 12.0 * (kBoxSize.squaredNorm() - kBoxSize[a] * kBoxSize[a]);
     EXPECT_NEAR(d.inertia(a, a), expected, kRoundOff * expected);
   }
   EXPECT_EQ(r.bodies.at(0).zero_modes, 6);
@@ -70,7 +59,7 @@ TEST(Bake, AllModesOfAClampedBodyCarryAllItsFreeMass) {
   // Σ p_i p_iᵀ = Rᵀ M W Wᵀ M R: with every mode W Wᵀ = M⁻¹ on the free nodes, so the sum is their mass (lumped).
   BakeOptions o = rubber(10000);
   o.fixed = {face_at_zero_x()};
-  const TetMesh mesh = tet_box(2, 1, 1, kSize);
+  const TetMesh mesh = tet_box(2, 1, 1, kBoxSize);
   const auto body = only_body(bake_box(o, mesh));
   const ModalModelData& d = body->data();
   EXPECT_EQ(d.motion, FrameMotion::kKinematic);
@@ -87,20 +76,20 @@ TEST(Bake, FreeModesCarryNoAngularMomentum) {
   // ∫ρ x × w_i = 0, the antisymmetric part of the moments: modes are M-orthogonal to rotations.
   const auto body = only_body(bake_box(rubber()));
   const ModalModelData& d = body->data();
-  for (const Mat3& m : d.moments) EXPECT_LT((m - m.transpose()).norm(), 1e-9 * std::sqrt(d.mass) * kSize.norm());
+  for (const Mat3& m : d.moments) EXPECT_LT((m - m.transpose()).norm(), 1e-9 * std::sqrt(d.mass) * kBoxSize.norm());
 }
 
 TEST(Bake, OneHeldNodeIsAPivotTwoAreAHingeThreeAreAClamp) {
-  const TetMesh mesh = tet_box(3, 2, 2, kSize);
+  const TetMesh mesh = tet_box(3, 2, 2, kBoxSize);
   BakeOptions o = rubber(4);
   o.fixed = {NodesByIndex{{0}}};
   const auto pivot_body = only_body(bake_box(o, mesh));
   const ModalModelData& pivot = pivot_body->data();
   EXPECT_EQ(pivot.motion, FrameMotion::kPoint);
   EXPECT_LT((pivot.origin_in_input - mesh.nodes[0]).norm(), kRoundOff);
-  EXPECT_LT((pivot.center_of_mass - kSize / 2).norm(), kRoundOff);
+  EXPECT_LT((pivot.center_of_mass - kBoxSize / 2).norm(), kRoundOff);
   // Parallel axes, about the corner: I_xx = m/3 (b² + c²).
-  const double expected = pivot.mass / 3.0 * (kSize.y() * kSize.y() + kSize.z() * kSize.z());
+  const double expected = pivot.mass / 3.0 * (kBoxSize.y() * kBoxSize.y() + kBoxSize.z() * kBoxSize.z());
   EXPECT_NEAR(pivot.inertia(0, 0), expected, kRoundOff * expected);
 
   o.fixed = {NodesByIndex{{0, 3}}};  // both on the x axis
@@ -114,12 +103,12 @@ TEST(Bake, OneHeldNodeIsAPivotTwoAreAHingeThreeAreAClamp) {
 }
 
 TEST(Bake, RegionsHaveTheirOwnMaterials) {
-  TetMesh mesh = tet_box(2, 1, 1, kSize);
+  TetMesh mesh = tet_box(2, 1, 1, kBoxSize);
   mesh.regions = {{.name = "soft", .tag = 1}, {.name = "legs", .tag = 7}};
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) mesh.tet_region[t] = t < mesh.tets.size() / 2 ? 0 : 1;
   BakeOptions o = rubber(3);
   o.materials = {{"soft", kRubber}, {"7", kSteel}};
-  const double half = kSize.prod() / 2;
+  const double half = kBoxSize.prod() / 2;
   const auto body = only_body(bake_box(o, mesh));
   const ModalModelData& d = body->data();
   EXPECT_NEAR(d.mass, half * (kRubber.density + kSteel.density), kRoundOff * d.mass);
@@ -134,7 +123,7 @@ TEST(Bake, RegionsHaveTheirOwnMaterials) {
 
 /// Two boxes apart, with an unused node between them in the list.
 TetMesh two_boxes() {
-  TetMesh mesh = tet_box(2, 1, 1, kSize), other = tet_box(1, 1, 1, kSize);
+  TetMesh mesh = tet_box(2, 1, 1, kBoxSize), other = tet_box(1, 1, 1, kBoxSize);
   mesh.nodes.emplace_back(9.0, 9.0, 9.0);
   const auto offset = static_cast<Index>(mesh.nodes.size());
   for (const Vec3& x : other.nodes) mesh.nodes.push_back(x + Vec3(0.0, 1.0, 0.0));
@@ -152,7 +141,7 @@ TEST(Bake, SeparateComponentsAreSeparateBodiesAndUnusedNodesAreDropped) {
   ASSERT_EQ(r.bodies.size(), 2u);
   EXPECT_EQ(r.asset.bodies[0]->name(), "pair_1");
   EXPECT_EQ(r.bodies[0].nodes + r.bodies[1].nodes, 12 + 8);
-  EXPECT_NEAR(r.bodies[1].center_of_mass.y(), 1.0 + kSize.y() / 2, kRoundOff);
+  EXPECT_NEAR(r.bodies[1].center_of_mass.y(), 1.0 + kBoxSize.y() / 2, kRoundOff);
   EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 of 21 nodes belong to no tetrahedron")));
 }
 
@@ -175,7 +164,7 @@ TEST(Bake, ARenderSurfaceOfTwoBodiesIsDealtOutTriangleByTriangle) {
 TEST(Bake, AnEmbeddedVertexMovesByInterpolation) {
   // A vertex at the middle of an edge of the mesh moves by the mean of its ends: compare with the boundary surface's
   // own.
-  const TetMesh mesh = tet_box(3, 2, 2, kSize);
+  const TetMesh mesh = tet_box(3, 2, 2, kBoxSize);
   const BakeResult plain = bake_box(rubber(6), mesh);
   SurfaceMesh one;
   one.vertices = {mesh.nodes[0], mesh.nodes[1], (mesh.nodes[0] + mesh.nodes[1]) / 2};
@@ -227,7 +216,7 @@ TEST(RayleighDamping, HasTheRatioAskedForAtBothFrequencies) {
 }
 
 TEST(NodeSelector, SelectsByGroupBoxAndNumber) {
-  TetMesh mesh = tet_box(2, 1, 1, kSize);
+  TetMesh mesh = tet_box(2, 1, 1, kBoxSize);
   mesh.node_groups = {{.name = "end", .nodes = {2, 5}}};
   EXPECT_THAT(select_nodes(mesh, parse_node_selector("group:end")), ElementsAre(2, 5));
   EXPECT_THAT(select_nodes(mesh, parse_node_selector("nodes:7,0,7")), ElementsAre(0, 7));
@@ -239,7 +228,7 @@ TEST(NodeSelector, RefusesWhatItCannotRead) {
   for (const char* text : {"", "end", "group:", "box:1,2,3", "box:0,0,0,1,1,x", "box:1,0,0,0,1,1", "box:nan,0,0,1,1,1",
                            "nodes:", "nodes:1,,2", "nodes:1.5", "nodes:99999999999", "sphere:1"})
     EXPECT_THAT(message_of([&] { parse_node_selector(text); }), HasSubstr("expected group:NAME")) << text;
-  const TetMesh mesh = tet_box(1, 1, 1, kSize);
+  const TetMesh mesh = tet_box(1, 1, 1, kBoxSize);
   EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesOfGroup{"end"}); }), HasSubstr("it has none"));
   EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesByIndex{{8}}); }), HasSubstr("expected 0 to 7"));
   EXPECT_THAT(message_of([&] { select_nodes(mesh, NodesInBox{{5, 5, 5}, {6, 6, 6}}); }), HasSubstr("no node"));

@@ -11,15 +11,14 @@
 #include "constants.h"
 #include "dense_fem.h"
 #include "limber/core/error.h"
-#include "tet_box.h"
+#include "rubber_box.h"
 
 namespace limber {
 namespace {
 
 using testing::kFewRoundings;
+using testing::kSteel;
 using testing::tet_box;
-
-const Material kBlockSteel{.youngs_modulus = 200e9, .poisson_ratio = 0.3, .density = 7850.0};
 
 /// Runs the ranges backwards and cut differently, as another pool of threads might.
 class BackwardJobs final : public Jobs {
@@ -65,19 +64,19 @@ TEST(TetStiffness, AgreesWithTheHessianOfTheStrainEnergy) {
 
 TEST(Stiffness, AgreesWithADenseAssembly) {
   const TetMesh mesh = crooked_box();
-  const auto K = dense(assemble_stiffness(mesh, std::span(&kBlockSteel, 1)));
-  const auto reference = testing::dense_model(mesh, std::span(&kBlockSteel, 1), true).K;
+  const auto K = dense(assemble_stiffness(mesh, std::span(&kSteel, 1)));
+  const auto reference = testing::dense_model(mesh, std::span(&kSteel, 1), true).K;
   EXPECT_LT((K - reference).cwiseAbs().maxCoeff(), kFewRoundings * reference.cwiseAbs().maxCoeff());
 }
 
 TEST(Stiffness, IsSymmetricToTheBit) {
-  const auto K = dense(assemble_stiffness(crooked_box(), std::span(&kBlockSteel, 1)));
+  const auto K = dense(assemble_stiffness(crooked_box(), std::span(&kSteel, 1)));
   EXPECT_TRUE(K == K.transpose());
 }
 
 TEST(Stiffness, RigidMotionsMakeNoForce) {
   const TetMesh mesh = crooked_box();
-  const auto K = dense(assemble_stiffness(mesh, std::span(&kBlockSteel, 1)));
+  const auto K = dense(assemble_stiffness(mesh, std::span(&kSteel, 1)));
   for (int motion = 0; motion < 6; ++motion) {
     Eigen::VectorXd u(K.rows());
     for (std::size_t i = 0; i < mesh.nodes.size(); ++i)
@@ -89,25 +88,25 @@ TEST(Stiffness, RigidMotionsMakeNoForce) {
 TEST(Stiffness, StretchedBarStoresTheEnergyOfUniformStrain) {
   // u = (εx, −νεy, −νεz) is uniaxial stress: energy E ε²/2 per volume.
   const TetMesh mesh = crooked_box();
-  const auto K = dense(assemble_stiffness(mesh, std::span(&kBlockSteel, 1)));
-  const double strain = 1e-3, nu = kBlockSteel.poisson_ratio;
+  const auto K = dense(assemble_stiffness(mesh, std::span(&kSteel, 1)));
+  const double strain = 1e-3, nu = kSteel.poisson_ratio;
   Eigen::VectorXd u(K.rows());
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i)
     u.segment<3>(3 * i) = strain * mesh.nodes[i].cwiseProduct(Vec3(1.0, -nu, -nu));
-  const double energy = kBlockSteel.youngs_modulus * strain * strain / 2.0 * volume_properties(mesh).volume;
+  const double energy = kSteel.youngs_modulus * strain * strain / 2.0 * volume_properties(mesh).volume;
   EXPECT_NEAR(0.5 * u.dot(K * u), energy, kFewRoundings * energy);
 }
 
 TEST(Stiffness, BitsDoNotDependOnHowTheWorkIsCut) {
   const TetMesh mesh = tet_box(12, 1.0);
   BackwardJobs backward;
-  const auto a = assemble_stiffness(mesh, std::span(&kBlockSteel, 1));
-  const auto b = assemble_stiffness(mesh, std::span(&kBlockSteel, 1), backward);
+  const auto a = assemble_stiffness(mesh, std::span(&kSteel, 1));
+  const auto b = assemble_stiffness(mesh, std::span(&kSteel, 1), backward);
   EXPECT_EQ(a.column_start, b.column_start);
   EXPECT_EQ(a.row, b.row);
   EXPECT_EQ(a.value, b.value);
-  const auto c = assemble_mass(mesh, std::span(&kBlockSteel, 1), MassKind::kConsistent);
-  const auto d = assemble_mass(mesh, std::span(&kBlockSteel, 1), MassKind::kConsistent, backward);
+  const auto c = assemble_mass(mesh, std::span(&kSteel, 1), MassKind::kConsistent);
+  const auto d = assemble_mass(mesh, std::span(&kSteel, 1), MassKind::kConsistent, backward);
   EXPECT_EQ(c.row, d.row);
   EXPECT_EQ(c.value, d.value);
 }
@@ -116,8 +115,8 @@ TEST(Mass, AgreesWithQuadrature) {
   const TetMesh mesh = crooked_box();
   for (const bool lumped : {true, false}) {
     const auto M =
-        dense(assemble_mass(mesh, std::span(&kBlockSteel, 1), lumped ? MassKind::kLumped : MassKind::kConsistent));
-    const auto reference = testing::dense_model(mesh, std::span(&kBlockSteel, 1), lumped).M;
+        dense(assemble_mass(mesh, std::span(&kSteel, 1), lumped ? MassKind::kLumped : MassKind::kConsistent));
+    const auto reference = testing::dense_model(mesh, std::span(&kSteel, 1), lumped).M;
     for (Eigen::Index i = 0; i < M.rows(); ++i)
       for (Eigen::Index j = 0; j < M.cols(); ++j)
         EXPECT_NEAR(M(i, j), reference(3 * i + 1, 3 * j + 1), kFewRoundings * reference.maxCoeff());
@@ -128,7 +127,7 @@ TEST(Mass, RowsSumToTheTotalMassAndLumpingKeepsThem) {
   TetMesh mesh = crooked_box();
   mesh.regions.push_back({.name = "heavy"});
   for (std::size_t e = 0; e < mesh.tets.size(); e += 3) mesh.tet_region[e] = 1;
-  const std::array materials{kBlockSteel, Material{.youngs_modulus = 1e9, .poisson_ratio = 0.2, .density = 19300.0}};
+  const std::array materials{kSteel, Material{.youngs_modulus = 1e9, .poisson_ratio = 0.2, .density = 19300.0}};
   double mass = 0.0;
   for (std::size_t e = 0; e < mesh.tets.size(); ++e)
     mass += materials[mesh.tet_region[e]].density * signed_volume(mesh, static_cast<Index>(e));

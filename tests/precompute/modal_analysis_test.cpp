@@ -8,21 +8,20 @@
 
 #include "dense_fem.h"
 #include "limber/core/error.h"
-#include "tet_box.h"
+#include "rubber_box.h"
 
 namespace limber {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::kSteel;
 using testing::nodes_where;
 using testing::tet_box;
 
-const Material kBeamSteel{.youngs_modulus = 200e9, .poisson_ratio = 0.3, .density = 7850.0};
-
 /// With one material everywhere and no remarks.
 ModalAnalysis analyse(const TetMesh& mesh, const ModalAnalysisOptions& options, std::span<const Index> fixed = {},
-                      const Material& material = kBeamSteel) {
+                      const Material& material = kSteel) {
   Warnings warnings;
   const std::vector<Material> materials(mesh.regions.size(), material);
   return analyse_modes(mesh, materials, fixed, options, warnings);
@@ -56,9 +55,9 @@ TEST(ModalAnalysis, FreeBoxAgreesWithADenseSolver) {
   for (const bool lumped : {true, false}) {
     Warnings warnings;
     const auto found =
-        analyse_modes(mesh, std::span(&kBeamSteel, 1), {},
+        analyse_modes(mesh, std::span(&kSteel, 1), {},
                       {.modes = 30, .mass = lumped ? MassKind::kLumped : MassKind::kConsistent}, warnings);
-    const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kBeamSteel, 1), lumped));
+    const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kSteel, 1), lumped));
     ASSERT_GE(found.eigenvalues.size(), 30u);
     expect_sound(found);
     EXPECT_EQ(found.rigid_modes, 6);
@@ -73,7 +72,7 @@ TEST(ModalAnalysis, FreeBoxAgreesWithADenseSolver) {
 TEST(ModalAnalysis, ShapesAreOrthonormalInADenseMassMatrixAndOrthogonalToRigidMotions) {
   const TetMesh mesh = tet_box(4, 3, 3, {0.5, 0.3, 0.2});
   const auto found = analyse(mesh, {.modes = 12, .mass = MassKind::kConsistent});
-  const auto M = testing::dense_model(mesh, std::span(&kBeamSteel, 1), false).M;
+  const auto M = testing::dense_model(mesh, std::span(&kSteel, 1), false).M;
   const auto k = static_cast<Eigen::Index>(found.eigenvalues.size());
   const Eigen::Map<const Eigen::MatrixXd> W(found.shapes.data(), M.rows(), k);
   const Eigen::Map<const Eigen::MatrixXd> MW(found.mass_times_shapes.data(), M.rows(), k);
@@ -103,8 +102,7 @@ TEST(ModalAnalysis, HeldBodiesAgreeWithADenseSolverAndKeepTheFreedomThatTheirNod
        {Case{{7}, FrameMotion::kPoint, 3}, Case{{7, 41}, FrameMotion::kLine, 1}, Case{edge, FrameMotion::kLine, 1},
         Case{{0, 3, 41}, FrameMotion::kKinematic, 0}, Case{face, FrameMotion::kKinematic, 0}}) {
     const auto found = analyse(mesh, {.modes = 20}, c.fixed);
-    const auto reference =
-        testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kBeamSteel, 1), true), c.fixed);
+    const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kSteel, 1), true), c.fixed);
     expect_sound(found);
     EXPECT_EQ(found.motion, c.motion);
     EXPECT_EQ(found.rigid_modes, c.rigid);
@@ -132,8 +130,8 @@ TEST(ModalAnalysis, OneTetHasItsSixModesAndSaysThatThereAreNoMore) {
   mesh.tet_region = {0};
   mesh.regions = {{.name = "*"}};
   Warnings warnings;
-  const auto found = analyse_modes(mesh, std::span(&kBeamSteel, 1), {}, {.modes = 64}, warnings);
-  const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kBeamSteel, 1), true));
+  const auto found = analyse_modes(mesh, std::span(&kSteel, 1), {}, {.modes = 64}, warnings);
+  const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kSteel, 1), true));
   expect_sound(found);
   ASSERT_EQ(found.eigenvalues.size(), 6u);
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(found.eigenvalues[i], reference[6 + i], kDenseError * reference[6 + i]) << i;
@@ -148,7 +146,7 @@ TEST(ModalAnalysis, BodyWithOneFreeNodeHasThreeModesAndAFixedOneHasNone) {
   EXPECT_EQ(three.eigenvalues.size(), 3u);
   const auto all = nodes_where(mesh, [](const Vec3&) { return true; });
   Warnings warnings;
-  const auto none = analyse_modes(mesh, std::span(&kBeamSteel, 1), all, {}, warnings);
+  const auto none = analyse_modes(mesh, std::span(&kSteel, 1), all, {}, warnings);
   EXPECT_EQ(none.motion, FrameMotion::kKinematic);
   EXPECT_THAT(none.eigenvalues, IsEmpty());
   EXPECT_THAT(none.shapes, IsEmpty());
@@ -203,9 +201,8 @@ TEST(Mechanism, ZeroModesAreThoseOfADenseSolverHoweverThePartsAreJoined) {
     TetMesh mesh;
     for (const Vec3& corner : c.corners) add_box(mesh, corner);
     Warnings warnings;
-    const auto found = analyse_modes(mesh, std::span(&kBeamSteel, 1), c.fixed, {.modes = 6}, warnings);
-    const auto reference =
-        testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kBeamSteel, 1), true), c.fixed);
+    const auto found = analyse_modes(mesh, std::span(&kSteel, 1), c.fixed, {.modes = 6}, warnings);
+    const auto reference = testing::dense_eigenvalues(testing::dense_model(mesh, std::span(&kSteel, 1), true), c.fixed);
     const double first_elastic = 1e-6 * reference.maxCoeff();  // the ratio is below 1e4 for these few tets
     const int zeros = static_cast<int>((reference.array() < first_elastic).count());
     EXPECT_EQ(found.rigid_modes + found.mechanisms, zeros) << c.what;
@@ -226,7 +223,7 @@ TEST(Mechanism, ShapesDeformNothingAndAreOrthogonalToTheRigidOnes) {
   add_box(mesh, {1, 1, 1}, 3);
   const auto found = analyse(mesh, {.modes = 4});
   ASSERT_EQ(found.mechanisms, 3);
-  const auto dense = testing::dense_model(mesh, std::span(&kBeamSteel, 1), true);
+  const auto dense = testing::dense_model(mesh, std::span(&kSteel, 1), true);
   const Eigen::Map<const Eigen::MatrixXd> W(found.shapes.data(), dense.K.rows(), 7);
   const auto hinges = W.leftCols(3);
   EXPECT_LT((dense.K * hinges).norm(), 1e-14 * dense.K.norm() * hinges.norm());
@@ -238,7 +235,7 @@ TEST(Mechanism, HundredsOfLoosePiecesAreRefusedWithAdvice) {
   for (int i = 0; i < 320; ++i) add_box(mesh, Vec3::Constant(i));
   Warnings warnings;
   try {
-    analyse_modes(mesh, std::span(&kBeamSteel, 1), {}, {}, warnings);
+    analyse_modes(mesh, std::span(&kSteel, 1), {}, {}, warnings);
     FAIL();
   } catch (const ComputationError& e) {
     EXPECT_THAT(e.what(), HasSubstr("remesh"));
@@ -248,11 +245,11 @@ TEST(Mechanism, HundredsOfLoosePiecesAreRefusedWithAdvice) {
 // Scales and extremes ------------------------------------------------------------------------------------------------
 
 TEST(Scale, StiffnessAndSizeOnlyScaleTheFrequencies) {
-  const auto lambda_unit = [](double E, double size) { return E / kBeamSteel.density / (size * size); };
+  const auto lambda_unit = [](double E, double size) { return E / kSteel.density / (size * size); };
   const auto reference = analyse(tet_box(8, 3, 3, {1.0, 0.3, 0.25}), {.modes = 20, .mass = MassKind::kConsistent});
   for (const double E : {1e2, 1e7, 1e12})
     for (const double size : {1e-3, 1.0, 1e3}) {
-      const Material m{.youngs_modulus = E, .poisson_ratio = 0.3, .density = kBeamSteel.density};
+      const Material m{.youngs_modulus = E, .poisson_ratio = 0.3, .density = kSteel.density};
       const auto found =
           analyse(tet_box(8, 3, 3, size * Vec3(1.0, 0.3, 0.25)), {.modes = 20, .mass = MassKind::kConsistent}, {}, m);
       expect_sound(found);
@@ -273,7 +270,7 @@ TEST(Scale, SoftPartOnAStiffOneKeepsItsDigitsAtAnyRatio) {
                           mesh.nodes[mesh.tets[e][2]].x() + mesh.nodes[mesh.tets[e][3]].x()) > 2.0;
   std::vector<std::vector<double>> per_stiffness;
   for (const double ratio : {1e-9, 1e-10, 1e-11}) {
-    const std::array materials{kBeamSteel,
+    const std::array materials{kSteel,
                                Material{.youngs_modulus = ratio * 200e9, .poisson_ratio = 0.3, .density = 1000.0}};
     Warnings warnings;
     const auto found = analyse_modes(mesh, materials, {}, {.modes = 10}, warnings);
@@ -344,7 +341,7 @@ TEST(ModalAnalysis, RefusesWhatIsNoSingleBody) {
   add_box(two, {0, 0, 0});
   add_box(two, {5, 0, 0});
   const auto analyse_it = [&](const TetMesh& mesh, std::span<const Index> fixed, ModalAnalysisOptions options) {
-    analyse_modes(mesh, std::span(&kBeamSteel, 1), fixed, options, warnings);
+    analyse_modes(mesh, std::span(&kSteel, 1), fixed, options, warnings);
   };
   EXPECT_THROW(analyse_it(two, {}, {}), InvalidArgument);
   TetMesh orphan = tet_box(1, 1.0);

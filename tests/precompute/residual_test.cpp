@@ -6,41 +6,32 @@
 
 #include "dense_fem.h"
 #include "limber/core/error.h"
-#include "limber/precompute/bake.h"
-#include "tet_box.h"
+#include "rubber_box.h"
 
 namespace limber {
 namespace {
 
+using limber::testing::bake_box;
+using limber::testing::box;
 using limber::testing::dense_model;
 using limber::testing::DenseModel;
+using limber::testing::kBoxSize;
+using limber::testing::kRubber;
 using limber::testing::nodes_where;
+using limber::testing::rubber;
 using limber::testing::tet_box;
 
 constexpr double kSingle = 2e-6;  // shapes and compliances are stored in single precision
-const Material kBoxRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
-const Vec3 kBoxSize{0.3, 0.2, 0.1};
-
-TetMesh box() { return tet_box(3, 2, 2, kBoxSize); }
-
-BakeOptions options_for(int modes) {
-  BakeOptions o;
-  o.materials = {{"*", kBoxRubber}};
-  o.analysis.modes = modes;
-  o.limits.max_modes = modes;
-  return o;
-}
 
 std::shared_ptr<const ModalModel> baked_box(const BakeOptions& options, BodyReport* report = nullptr) {
-  Warnings warnings;
-  const BakeResult r = bake({.name = "box", .mesh = box()}, options, warnings);
+  const BakeResult r = bake_box(options);
   if (report) *report = r.bodies[0];
   return r.asset.bodies[0];
 }
 
 /// Σ w wᵀ/λ over all elastic modes, from a dense generalised eigenproblem: another way to K⁺.
 Eigen::MatrixXd dense_compliance(std::span<const Index> fixed) {
-  const DenseModel model = dense_model(box(), std::vector<Material>{kBoxRubber}, true);
+  const DenseModel model = dense_model(box(), std::vector<Material>{kRubber}, true);
   std::vector<Index> free;
   for (Index dof = 0; dof < model.K.rows(); ++dof)
     if (std::find(fixed.begin(), fixed.end(), dof / 3) == fixed.end()) free.push_back(dof);
@@ -76,7 +67,7 @@ class ResidualOfBox : public ::testing::TestWithParam<bool> {
  protected:
   bool held() const { return GetParam(); }
   BakeOptions options(int modes) const {
-    BakeOptions o = options_for(modes);
+    BakeOptions o = rubber(modes);
     if (held()) o.fixed = {NodesInBox{{-1e-9, -1.0, -1.0}, {1e-9, 1.0, 1.0}}};
     return o;
   }
@@ -156,7 +147,7 @@ TEST_P(ResidualOfBox, ResidualModesAreMassNormalisedWithTheKeptOnes) {
 }
 
 TEST(Residual, OfFixedNodesIsNothingAndTold) {
-  BakeOptions o = options_for(5);
+  BakeOptions o = rubber(5);
   o.fixed = {NodesByIndex{{0, 1, 2, 3}}};
   o.residual.nodes = {NodesByIndex{{2, 3}}};
   Warnings warnings;
@@ -166,7 +157,7 @@ TEST(Residual, OfFixedNodesIsNothingAndTold) {
 }
 
 TEST(Residual, OfABodyWithAllItsModesIsNothing) {
-  BakeOptions o = options_for(1000);
+  BakeOptions o = rubber(1000);
   o.residual.surface = true;
   o.limits.max_modes = 250;
   const auto model = baked_box(o);
@@ -175,7 +166,7 @@ TEST(Residual, OfABodyWithAllItsModesIsNothing) {
 }
 
 TEST(Residual, CoarserCollisionSurfaceKeepsToTheBoundary) {
-  BakeOptions o = options_for(4);
+  BakeOptions o = rubber(4);
   Warnings warnings;
   o.collision_triangles = 100;
   const BakeResult r = bake({.name = "box", .mesh = tet_box(8, 6, 4, kBoxSize)}, o, warnings);

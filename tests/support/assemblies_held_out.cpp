@@ -44,7 +44,7 @@ void gimbal(Builder& b) {
   b.turns();
 }
 
-/// A dovetail slide, and a wheel turning on a stub axle with a cone at its end. Every part is one shell.
+/// A dovetail slide, and a wheel turning on a short axle with a cone at its end. Every part is one shell.
 void dovetail(Builder& b) {
   const double w = 0.03, g = b.gap(2 * w);
   const auto tail = [&](double o) {

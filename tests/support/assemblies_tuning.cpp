@@ -179,15 +179,19 @@ void piston(Builder& b) {
   {
     const double r = 0.009, g = b.gap(2 * r), h = 0.007;
     const Place p = at(crank_pin, y);
-    b.add("crank", p(lathe({{0, -0.024},
-                            {0.013, -0.024},
-                            {0.013, -h - g},
-                            {r, -h - g},
-                            {r, h + g},
-                            {0.013, h + g},
-                            {0.013, 0.015},
-                            {0, 0.015}},
-                           b.n())));
+    // A pin between two flanges, from `low` to `high` along its axis.
+    const auto spool = [&](double flange, double pin, double half, double low, double high) {
+      return lathe({{0, low},
+                    {flange, low},
+                    {flange, -half},
+                    {pin, -half},
+                    {pin, half},
+                    {flange, half},
+                    {flange, high},
+                    {0, high}},
+                   b.n());
+    };
+    b.add("crank", p(spool(0.013, r, h + g, -0.024, 0.015)));
     const Vec3 along = (wrist - crank_pin).normalized();
     const double length = (wrist - crank_pin).norm(), q = 0.007, k = b.gap(2 * q);
     // The rod lies in the plane of the crank: x along the rod, z along y.
@@ -199,15 +203,7 @@ void piston(Builder& b) {
     b.turns();
     // The wrist pin turns in the rod and is caught by the piston's two walls, of which it is a part.
     const Place w = at(wrist, y);
-    b.add("piston", w(lathe({{0, -0.014},
-                             {0.012, -0.014},
-                             {0.012, -h - k},
-                             {q, -h - k},
-                             {q, h + k},
-                             {0.012, h + k},
-                             {0.012, 0.014},
-                             {0, 0.014}},
-                            b.n())));
+    b.add("piston", w(spool(0.012, q, h + k, -0.014, 0.014)));
     b.truth("rod", "piston", JointType::kRevolute, w);
     // The rod's side, 0.016 from its axis, meets the lower edge of the piston, (±0.035, 0.022) from the pin.
     const double now = std::atan2(along.z(), -along.x()),  // below the horizontal

@@ -8,9 +8,17 @@
 #include <numbers>
 #include <vector>
 
+#include "limber/dynamics/surface_point.h"
 #include "limber/model/modal_model.h"
 
 namespace limber::testing {
+
+inline constexpr double kSampleSize = 0.6;  ///< m, the longest edge of a sample body as it is by default
+/// Two points of its surface, neither on an edge.
+inline const SurfacePoint kMarked{.triangle = 3, .weight = {0.2, 0.5, 0.3}},
+    kSecond{.triangle = 8, .weight = {0.1, 0.1, 0.8}};
+inline constexpr FrameMotion kAllMotions[] = {FrameMotion::kFree, FrameMotion::kPoint, FrameMotion::kLine,
+                                              FrameMotion::kKinematic};
 
 /// The lumped masses of a sample body and its modes at them, in double precision.
 struct Particles {

@@ -16,10 +16,10 @@
 /// bodies that flex do), are solved in blocks by body. There 2 leaves contacts out: a contact's force goes on instead,
 /// half at the end of a step and half at the start of the next, as far as it is no more than in the step before; where
 /// bodies are by the ends of steps does not depend on it. If nothing but contacts acts, 4 is a few iterations of an
-/// operator splitting at a time, from the last step's forces on, until true gaps and forces fit to 1e-7 of the distances
-/// at hand (dense: 1e-9); else it is the same method as for small islands, less patiently. A step that does not settle
-/// soon is left with the impulses found, and the report says so. What the tolerance of gaps leaves 6 without motion to
-/// take it from is paid by forces that are smaller by a part of at most 1e-4.
+/// operator splitting at a time, from the last step's forces on, until true gaps and forces fit to 1e-7 of the
+/// distances at hand (dense: 1e-9); else it is the same method as for small islands, less patiently. A step that does
+/// not settle soon is left with the impulses found, and the report says so. What the tolerance of gaps leaves 6 without
+/// motion to take it from is paid by forces that are smaller by a part of at most 1e-4.
 ///
 /// 4 is the default of four rules for contacts (contact_method.h). ContactMethod::kVelocityProgram finds its impulses
 /// and forces before 1; its contacts' rows then have these forces as both bounds, held over the step (θ = ½) if nothing
