@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "constants.h"
+#include "encounters.h"
 #include "free_motion_of_bodies.h"
 #include "limber/core/error.h"
 #include "orbit_index.h"
@@ -30,8 +31,16 @@ using internal::SurfacePoint;
 
 constexpr double kDefaultTolerance = 2e-4;       // of the smaller body's diagonal
 constexpr double kDefaultLargestOverlap = 2e-2;  // the same
-/// The steepest slope (see OrbitPiece) at which a surface is a stop; beyond it, it slides.
+/// The steepest slope (see OrbitPiece) at which any surface is a stop; beyond it, those that are one-sided are, such as
+/// a screw's collar, and all others slide.
 constexpr double kSlope = 2.0;
+
+bool stands(double slope, bool one_sided) { return slope <= kSlope || one_sided; }
+/// Of the surface where a piece begins or ends; ∞ where it slides.
+double slope_of_end(const OrbitPiece& p, bool low) {
+  const double slope = low ? p.slope_low : p.slope_high;
+  return stands(slope, low ? p.one_sided_low : p.one_sided_high) ? slope : kInfinity;
+}
 
 double diagonal(std::span<const OrbitBody> bodies) {
   Eigen::AlignedBox3d box;
@@ -120,7 +129,8 @@ class Search {
   Witness downhill(Witness start, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const;
   Witness first_blocked(const Witness& seed, bool low, const Span& gap) const;
   Witness first_touching(const Witness& blocked, bool low, const Span& gap) const;
-  bool stands_against(const SurfacePoint& at, bool moving) const;
+  /// Of the surface at a point, as in OrbitPiece; ∞ where it slides.
+  double slope_at(const SurfacePoint& at, bool moving) const;
   void refine_end(Span& span, bool low, const Span& gap, std::size_t seeds, Witness& end);
   MotionStop stop_of(const Witness& witness) const;
   double speed(const SurfacePoint& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
@@ -157,7 +167,8 @@ void Search::raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index
                         std::vector<OrbitPiece>& out) const {
   (moving ? fixed_ : moving_).index.pieces(orbit, tolerances_.nudge, near, out);
   if (moving) return;
-  for (OrbitPiece& p : out) p = {-p.high, -p.low, p.body, -p.sheet, p.slope_high, p.slope_low};
+  for (OrbitPiece& p : out)
+    p = {-p.high, -p.low, p.body, -p.sheet, p.slope_high, p.slope_low, p.one_sided_high, p.one_sided_low};
   std::reverse(out.begin(), out.end());
 }
 
@@ -189,17 +200,23 @@ void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double d
   constexpr double kMargin = 1.1;  // surfaces curve
   const double by = kSlope * delta;
   const auto explains = [&](double slope, double later) {
-    return slope <= kSlope && later <= kMargin * slope * delta + (kMargin - 1.0) * delta;
+    return slope < kInfinity && later <= kMargin * slope * delta + (kMargin - 1.0) * delta;
   };
   std::vector<OrbitPiece> kept;
   for (const OrbitPiece& p : pieces)
     for (const Span& s : wide) {
       if (s.high < p.low - by || s.low > p.high + by) continue;
       Span core{s.low + by, s.high - by};
-      if (core.low > core.high) core.low = core.high = 0.5 * (core.low + core.high);
-      if (core.low < p.low || explains(p.slope_low, core.low - p.low)) core.low = p.low;
-      if (core.high > p.high || explains(p.slope_high, p.high - core.high)) core.high = p.high;
-      if (core.low <= core.high) kept.push_back({core.low, core.high, p.body, p.sheet, p.slope_low, p.slope_high});
+      if (core.low > core.high) {
+        // The slopes of stops may explain it; what slides at both ends passes beside them.
+        if (slope_of_end(p, true) == kInfinity && slope_of_end(p, false) == kInfinity) continue;
+        core.low = core.high = 0.5 * (core.low + core.high);
+      }
+      if (core.low < p.low || explains(slope_of_end(p, true), core.low - p.low)) core.low = p.low;
+      if (core.high > p.high || explains(slope_of_end(p, false), p.high - core.high)) core.high = p.high;
+      if (core.low > core.high) continue;
+      kept.push_back(p);
+      kept.back().low = core.low, kept.back().high = core.high;
     }
   pieces = std::move(kept);
 }
@@ -259,8 +276,9 @@ void Search::keep_blocked(const SurfacePoint& at, bool moving, std::vector<Orbit
   const double v = speed(at);
   keep_wide(at, moving, pieces);
   // Sheets that slide on each other cross at grazing angles.
-  std::erase_if(pieces,
-                [&](const OrbitPiece& p) { return holds_start(p, v) || (p.sheet != 0 && p.slope_low > kSlope); });
+  std::erase_if(pieces, [&](const OrbitPiece& p) {
+    return holds_start(p, v) || (p.sheet != 0 && slope_of_end(p, true) == kInfinity);
+  });
   clip_at_start(pieces, v);
 }
 
@@ -381,25 +399,28 @@ Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) co
 Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap) const {
   const double finest = 0.05 * tolerances_.least, delta = tolerances_.across;
   const Orbit centre = frame_.orbit_of(blocked.point.p);
-  // Two surfaces as steep as stops may be explain no more than this.
-  const double earlier = 2.0 * kSlope * delta / frame_.speed(centre);
+  // How much earlier two surfaces explain; a blocked point may lie on one that slides.
+  const double own = slope_at(blocked.point, blocked.moving), met = slope_of_end(blocked.piece, low);
+  const auto explained = [](double slope) { return slope < kInfinity ? std::max(slope, kSlope) : kSlope; };
+  const double earlier = (explained(own) + explained(met)) * delta / frame_.speed(centre);
   const double from = blocked.piece.low - earlier, to = blocked.piece.high + earlier;
   return downhill(blocked, low, gap, finest, [&](const SurfacePoint& next, auto&&, std::vector<OrbitPiece>& out) {
     const Orbit orbit = frame_.orbit_of(next.p);
     out.clear();
     if (std::hypot(orbit.plane[0] - centre.plane[0], orbit.plane[1] - centre.plane[1]) > delta) return;
-    if (!stands_against(next, blocked.moving)) return;
+    if (slope_at(next, blocked.moving) == kInfinity) return;
     raw_pieces(orbit, blocked.moving, out);
     std::erase_if(out, [&](const OrbitPiece& p) {
-      return low ? p.slope_low > kSlope || p.low < from : p.slope_high > kSlope || p.high > to;
+      return slope_of_end(p, low) == kInfinity || (low ? p.low < from : p.high > to);
     });
   });
 }
 
-bool Search::stands_against(const SurfacePoint& at, bool moving) const {
-  const Vec3& normal = surface(moving).faces()[static_cast<std::size_t>(at.face)].normal;
-  const double along = std::abs(normal.dot(frame_.direction(at.p)));
-  return along * std::sqrt(1.0 + kSlope * kSlope) >= 1.0;
+double Search::slope_at(const SurfacePoint& at, bool moving) const {
+  const OrbitFace& face = surface(moving).faces()[static_cast<std::size_t>(at.face)];
+  const double along = std::abs(face.normal.dot(frame_.direction(at.p)));
+  const double slope = std::sqrt(std::max(1.0 - along * along, 0.0)) / along;
+  return stands(slope, face.one_sided) ? slope : kInfinity;
 }
 
 void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_seeds, Witness& end) {
@@ -496,6 +517,50 @@ void FreeMotionOptions::validate() const {
     throw InvalidArgument("FreeMotionOptions: samples is " + std::to_string(samples) + ", expected 100 to 1000000");
 }
 
+namespace {
+
+std::vector<OrbitBody> some_of(std::span<const OrbitBody> bodies, const std::vector<Index>& which) {
+  std::vector<OrbitBody> out;
+  for (const Index b : which) out.push_back(bodies[static_cast<std::size_t>(b)]);
+  return out;
+}
+
+FreeMotion motion_among(const PathFrame& frame, std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed,
+                        const Tolerances& t, const FreeMotionOptions& options) {
+  auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
+  const Side moving_side(frame, moving, std::move(moving_faces), options.samples);
+  const Side fixed_side(frame, fixed, std::move(fixed_faces), options.samples);
+  return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();
+}
+
+/// Whether an interval lies within [low, high], 0 in it; @param period of the path, or 0
+bool lies_within(const Interval& i, double low, double high, double period) {
+  for (const double turned : {0.0, period, -period})
+    if (i.low + turned >= low && i.high + turned <= high) return true;
+  return false;
+}
+
+/// What lies beyond the nearest bodies cannot change where the motion ends: they are looked at alone, and more of them
+/// only if it does not end among them.
+FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBody> moving,
+                                std::span<const OrbitBody> fixed, const Tolerances& t,
+                                const FreeMotionOptions& options) {
+  constexpr std::size_t kNearest = 4, kGrowth = 4;
+  const internal::Encounters encounters(frame, moving, fixed, t.largest_overlap + t.nudge);
+  for (std::size_t pairs = kNearest;; pairs *= kGrowth) {
+    const auto near = encounters.nearest(pairs);
+    FreeMotion m = motion_among(frame, some_of(moving, near.moving), some_of(fixed, near.fixed), t, options);
+    if (m.reachable.low < near.low || m.reachable.high > near.high) continue;
+    for (MotionStop* stop : {&m.low, &m.high})
+      if (stop->body >= 0) stop->body = near.fixed[static_cast<std::size_t>(stop->body)];
+    const double period = frame.kind() == MotionPath::Kind::kRotation ? 2.0 * kPi : 0.0;
+    std::erase_if(m.others, [&](const Interval& i) { return !lies_within(i, near.low, near.high, period); });
+    return m;
+  }
+}
+
+}  // namespace
+
 namespace internal {
 
 FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed, const MotionPath& path,
@@ -510,11 +575,7 @@ FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitB
   t.largest_overlap = std::max(t.largest_overlap, least + sagitta);
   t.nudge = 1e-2 * least;
 
-  const PathFrame frame(path);
-  auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
-  const Side moving_side(frame, moving, std::move(moving_faces), options.samples);
-  const Side fixed_side(frame, fixed, std::move(fixed_faces), options.samples);
-  return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();
+  return motion_among_nearest(PathFrame(path), moving, fixed, t, options);
 }
 
 }  // namespace internal

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <tuple>
 
@@ -226,8 +227,30 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
   boxes.push_back(box);
 }
 
+/// Cosine of 20 degrees: a smaller bend continues a surface.
+constexpr double kFlat = 0.94;
+
+/// @param faces of one side, whose vertices are numbered together
+void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
+  std::vector<int> sides;
+  for (OrbitFace& face : faces) {
+    sides.push_back(side_of_motion(frame, face.normal, face.corners));
+    face.one_sided = sides.back() != 0;
+  }
+  if (std::all_of(sides.begin(), sides.end(), [](int side) { return side == 0; })) return;
+  const FacesAround around(faces);
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (const Index vertex : faces[f].vertices) {
+      if (!faces[f].one_sided) break;
+      const auto others = around.of(vertex);
+      faces[f].one_sided = std::none_of(others.begin(), others.end(), [&](Index other) {
+        const auto o = static_cast<std::size_t>(other);
+        return sides[o] != sides[f] && faces[o].normal.dot(faces[f].normal) > kFlat;
+      });
+    }
+}
+
 std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
-  constexpr double kFlat = 0.94;
   std::vector<SharpEdge> all;
   all.reserve(3 * surface.triangles.size());
   std::vector<Vec3> normals;
@@ -260,6 +283,31 @@ std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
 }
 
 }  // namespace
+
+int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners) {
+  constexpr double kLeast = 0.0175;  // sine of 1 degree
+  double low = kUnknown, high = kUnknown;
+  for (const Vec3& corner : corners) {
+    const double along = normal.dot(frame.direction(corner));
+    low = std::fmin(low, along), high = std::fmax(high, along);
+  }
+  return low >= kLeast ? 1 : high <= -kLeast ? -1 : 0;
+}
+
+FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
+  Index vertices = 0;
+  for (const OrbitFace& f : faces)
+    vertices = std::max(vertices, *std::max_element(f.vertices.begin(), f.vertices.end()) + 1);
+  first_.assign(static_cast<std::size_t>(vertices) + 1, 0);
+  for (const OrbitFace& f : faces)
+    for (const Index v : f.vertices) ++first_[static_cast<std::size_t>(v) + 1];
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  faces_.resize(3 * faces.size());
+  std::vector<Index> next(first_.begin(), first_.end() - 1);
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (const Index v : faces[f].vertices)
+      faces_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
+}
 
 OrbitBody orbit_body(const MotionBody& body) {
   OrbitBody out{body.surface, body.closed};
@@ -305,7 +353,10 @@ std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const 
       return other.any_overlapping(box, found);
     };
   };
-  return {a.faces(meets(b.tree())), b.faces(meets(a.tree()))};
+  std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> out{a.faces(meets(b.tree())), b.faces(meets(a.tree()))};
+  set_one_sided(frame, out.first);
+  set_one_sided(frame, out.second);
+  return out;
 }
 
 }  // namespace limber::internal

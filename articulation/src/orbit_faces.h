@@ -44,11 +44,35 @@ struct OrbitFace {
   double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
   Triangle vertices{};                 ///< of the corners, numbered over all faces of a side
   Index body = 0, triangle = 0;
-  bool cap = false;                             ///< over a hole: solid behind it, and no surface
-  bool flipped = false;                         ///< the second and third corner have changed places
+  bool cap = false;      ///< over a hole: solid behind it, and no surface
+  bool flipped = false;  ///< the second and third corner have changed places
+  /// The motion runs against it, or away from it, all over it and over what continues it. On a facet of a surface that
+  /// the motion carries along itself the normal velocity changes its sign; so a face that lies along the motion is told
+  /// from one that slides.
+  bool one_sided = false;
   double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
   double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
   OrbitBox box{};                               ///< of the orbits that meet it
+};
+
+/// +1, −1: the motion leaves the outside of a triangle, or its inside, at all corners; 0: neither, or it lies along the
+/// motion to within a degree, which may be noise. @param normal unit. All in path coordinates
+int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners);
+
+/// The faces around each vertex of a side.
+class FacesAround {
+ public:
+  FacesAround() = default;
+  explicit FacesAround(const std::vector<OrbitFace>& faces);
+  /// @param vertex as OrbitFace numbers them
+  std::span<const Index> of(Index vertex) const {
+    const auto first = static_cast<std::size_t>(first_[static_cast<std::size_t>(vertex)]),
+               end = static_cast<std::size_t>(first_[static_cast<std::size_t>(vertex) + 1]);
+    return std::span(faces_).subspan(first, end - first);
+  }
+
+ private:
+  std::vector<Index> first_{0}, faces_;
 };
 
 /// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:

@@ -55,7 +55,8 @@ OrbitIndex::Face::Face(const OrbitFace& face, Kind kind)
       heading(face.heading),
       bearing(face.bearing),
       sector(face.sector),
-      body(face.body) {
+      body(face.body),
+      one_sided(face.one_sided) {
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& a = face.corners[i];
     Vec3 inward = face.normal.cross(face.corners[(i + 1) % 3] - a);
@@ -122,7 +123,7 @@ void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<
     if (!face.holds({x, to_plane * (n.y() * cosine - n.z() * s), to_plane * (n.z() * cosine + n.y() * s)})) continue;
     // d/dθ cos(θ − β) = −sin: + half goes inward
     out.push_back({wrapped(face.heading + side * std::acos(cosine) - orbit.phase), face.body, side,
-                   slope_of(face.across * sine)});
+                   slope_of(face.across * sine), face.one_sided});
   }
 }
 
@@ -133,7 +134,7 @@ void OrbitIndex::cross_line(const Face& face, const Orbit& orbit, std::vector<Cr
   const auto [y, z] = orbit.plane;
   if (!face.holds({0.0, y, z})) return;
   const double x = (face.plane.offset - n.y() * y - n.z() * z) / n.x();
-  out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x())});
+  out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x()), face.one_sided});
 }
 
 // The same plane along x = x₀ + pitch t:  f(t) = r h cos(θ₀ + t − β) + n_x pitch t + n_x x₀ − c. Between the zeros of
@@ -177,7 +178,7 @@ void OrbitIndex::cross_helix_part(const Face& face, const Orbit& orbit, const Sp
     const double t = zero_between(f, cuts[i], at_low, cuts[i + 1], at_high);
     if (!face.holds(point(t))) continue;
     const double rate = n.x() * pitch - r * h * std::sin(orbit.phase + t - beta);
-    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, slope_of(rate / std::hypot(r, pitch))});
+    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, slope_of(rate / std::hypot(r, pitch)), face.one_sided});
   }
 }
 
@@ -214,7 +215,8 @@ void OrbitIndex::pieces(const Orbit& orbit, double nudge, const std::vector<Inde
       add_solid(std::span(found).subspan(i, end - i), out);
     else
       for (std::size_t k = i; k < end; ++k)
-        out.push_back({found[k].t, found[k].t, found[k].body, found[k].sign, found[k].slope, found[k].slope});
+        out.push_back({found[k].t, found[k].t, found[k].body, found[k].sign, found[k].slope, found[k].slope,
+                       found[k].one_sided, found[k].one_sided});
     i = end;
   }
   std::sort(out.begin(), out.end(), [](const OrbitPiece& a, const OrbitPiece& b) {
@@ -228,14 +230,16 @@ void OrbitIndex::add_solid(std::span<const Crossing> of_body, std::vector<OrbitP
   int winding = 0, least = 0;
   for (const Crossing& c : of_body) least = std::min(least, winding += c.sign);
   winding = circle ? -least : 0;
-  double start = -kPi, slope = 0.0;
+  Crossing entered{.t = -kPi};
   for (const Crossing& c : of_body) {
     const int before = winding;
     winding += c.sign;
-    if (before == 0 && winding != 0) start = c.t, slope = c.slope;
-    if (before != 0 && winding == 0) out.push_back({start, c.t, c.body, 0, slope, c.slope});
+    if (before == 0 && winding != 0) entered = c;
+    if (before != 0 && winding == 0)
+      out.push_back({entered.t, c.t, c.body, 0, entered.slope, c.slope, entered.one_sided, c.one_sided});
   }
-  if (winding != 0) out.push_back({start, kPi, of_body.front().body, 0, slope, 0.0});
+  if (winding != 0)
+    out.push_back({entered.t, kPi, of_body.front().body, 0, entered.slope, 0.0, entered.one_sided, false});
 }
 
 }  // namespace limber::internal

@@ -21,6 +21,7 @@ struct OrbitPiece {
   /// Tangent of the angle between the orbit and the surface's normal where the piece begins and ends: how much later,
   /// in length, an orbit meets the surface per length that it lies beside.
   double slope_low = 0.0, slope_high = 0.0;
+  bool one_sided_low = false, one_sided_high = false;  ///< of the faces there: see OrbitFace
 };
 
 /// Triangles of a set of bodies that some orbit of interest can meet, as a tree.
@@ -55,12 +56,14 @@ class OrbitIndex {
     std::array<Plane, 3> sides;  ///< across the face, inward; for translations across the orbit plane
     double bearing, sector, low_x, high_x;
     Index body;
+    bool one_sided;
   };
   struct Crossing {
     double t = 0.0;
     Index body = 0;
     int sign = 0;  ///< +1 against the outward normal (entering), −1 along it
     double slope = 0.0;
+    bool one_sided = false;
   };
 
   void crossings(const Orbit& orbit, const std::vector<Index>& near, std::vector<Crossing>& out) const;

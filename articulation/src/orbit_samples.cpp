@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace limber::internal {
 namespace {
@@ -49,24 +48,9 @@ std::size_t at_measure(const std::vector<double>& sums, double measure) {
 SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count)
     : faces_(std::move(faces)) {
   if (faces_.empty()) return;
-  find_faces_around();
+  around_ = FacesAround(faces_);
   add_face_points(count);
   add_edge_points(sharp_edges(bodies), std::max(count / 2, 1));
-}
-
-void SampledSurface::find_faces_around() {
-  Index vertices = 0;
-  for (const OrbitFace& f : faces_)
-    vertices = std::max(vertices, *std::max_element(f.vertices.begin(), f.vertices.end()) + 1);
-  first_around_.assign(static_cast<std::size_t>(vertices) + 1, 0);
-  for (const OrbitFace& f : faces_)
-    for (const Index v : f.vertices) ++first_around_[static_cast<std::size_t>(v) + 1];
-  std::partial_sum(first_around_.begin(), first_around_.end(), first_around_.begin());
-  around_.resize(3 * faces_.size());
-  std::vector<Index> next(first_around_.begin(), first_around_.end() - 1);
-  for (std::size_t f = 0; f < faces_.size(); ++f)
-    for (const Index v : faces_[f].vertices)
-      around_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
 }
 
 Vec3 SampledSurface::corner(Index face, Index vertex) const {
@@ -149,8 +133,7 @@ SurfacePoint SampledSurface::walk(const SurfacePoint& start, const Vec3& target)
   for (int step = 0; step < kMostFaces; ++step) {
     SurfacePoint best = here;
     for (const Index v : faces_[static_cast<std::size_t>(here.face)].vertices)
-      for (Index k = first_around_[v]; k < first_around_[v + 1]; ++k) {
-        const Index f = around_[static_cast<std::size_t>(k)];
+      for (const Index f : around_.of(v)) {
         const Vec3 p = nearest_point(faces_[static_cast<std::size_t>(f)], target);
         if ((p - target).squaredNorm() < (best.p - target).squaredNorm()) best = {p, f};
       }

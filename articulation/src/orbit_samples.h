@@ -36,7 +36,6 @@ class SampledSurface {
     Index face = 0;
   };
 
-  void find_faces_around();
   std::vector<Edge> sharp_edges(std::span<const OrbitBody> bodies) const;
   void add_face_points(int count);
   void add_edge_points(const std::vector<Edge>& edges, int count);
@@ -44,7 +43,7 @@ class SampledSurface {
   Vec3 corner(Index face, Index vertex) const;
 
   std::vector<OrbitFace> faces_;
-  std::vector<Index> first_around_, around_;  ///< faces around each vertex
+  FacesAround around_;
   std::vector<SurfacePoint> points_;
   double spacing_ = 0.0;
 };

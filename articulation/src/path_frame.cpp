@@ -97,10 +97,14 @@ Vec3 PathFrame::direction(const Vec3& p) const {
   return Vec3(kind_ == Kind::kScrew ? pitch_ : 0.0, -p.z(), p.y()).stableNormalized();
 }
 
+std::pair<Vec3, Vec3> PathFrame::box_of(const Eigen::AlignedBox3d& box) const {
+  return {to_path(box.center()), axes_.transpose().cwiseAbs() * (0.5 * box.sizes())};
+}
+
 OrbitBox PathFrame::box_around(const Eigen::AlignedBox3d& box) const {
   OrbitBox out;
   if (box.isEmpty()) return out;
-  const Vec3 centre = to_path(box.center()), half = axes_.transpose().cwiseAbs() * (0.5 * box.sizes());
+  const auto [centre, half] = box_of(box);
   if (kind_ == Kind::kTranslation) {
     for (const double side : {-1.0, 1.0}) out.add(centre.y() + side * half.y(), centre.z() + side * half.z());
     return out;

@@ -10,6 +10,7 @@
 #include "constants.h"
 #include "limber/core/error.h"
 #include "parts.h"
+#include "shells.h"
 
 namespace limber {
 namespace {
@@ -130,6 +131,70 @@ TEST(FreeMotion, ScrewStopsWhereItsHeadArrives) {
       turn(screw, block, path, facet_sagitta(block, Vec3::Constant(-10), Vec3::Constant(10)), {.samples = 400});
   EXPECT_NEAR(m.reachable.low, (2.0 - 5.0) / 0.5, 10 * kEnd);
   EXPECT_EQ(m.reachable.high, std::numeric_limits<double>::infinity());
+}
+
+TEST(FreeMotion, CollarThatLiesAlongAScrewsMotionStopsItAllTheSame) {
+  // A bolt in a nut from −1 to 1, with a collar from 3 on, twice as wide: its face is inclined to the motion by 1 : 8
+  // to 1 : 16. What may overlap as drawn (0.1) is as much as 48 degrees of the thread.
+  const double lead = 0.75, pitch = lead / (2.0 * kPi);
+  const auto plain = [](const assemblies::Shell& shell) { return SurfaceMesh{shell.vertices, shell.triangles}; };
+  SurfaceMesh bolt = plain(assemblies::thread(1.0, 0.3, pitch, -3, 4, 32, 0.0, false));
+  shapes::append(plain(assemblies::lathe({{0, 3}, {2, 3}, {2, 4.5}, {0, 4.5}}, 32)), bolt);
+  const SurfaceMesh nut = plain(assemblies::thread(1.0, 0.3, pitch, -1, 1, 32, 0.5, true, 1.9));
+  const MotionPath path{.kind = Kind::kScrew, .axis = Vec3::UnitZ(), .pitch = pitch};
+  const FreeMotion m = turn(nut, bolt, path, 0.1, {.largest_overlap = 0.1, .samples = 100});
+  EXPECT_NEAR(m.tolerance, 0.1, 2e-3);
+  EXPECT_NEAR(m.reachable.high, (3.0 - 1.0) / pitch, 10 * kEnd);
+  EXPECT_EQ(m.reachable.low, -std::numeric_limits<double>::infinity());
+}
+
+TEST(FreeMotion, BlockGoesThroughARowOfFramesToTheWall) {
+  // All boxes are in the way, all frames are open: the eleventh body is the first that stops.
+  std::vector<SurfaceMesh> row;
+  for (int i = 1; i <= 10; ++i) row.push_back(parts::tube({5.0 * i, 0, 0}, Vec3::UnitX(), 2.0, 3.0, 1.0, 16));
+  row.push_back(shapes::box({60, -3, -3}, {61, 3, 3}));
+  const SurfaceMesh block = shapes::box({0, -1, -1}, {2, 1, 1});
+  const MotionBody moving{&block};
+  std::vector<MotionBody> fixed;
+  for (const SurfaceMesh& body : row) fixed.push_back({&body});
+  const FreeMotion m = free_motion({&moving, 1}, fixed, kAlongX);
+  EXPECT_NEAR(m.reachable.high, 60.0 - 2.0, kEnd);
+  EXPECT_EQ(m.high.body, 10);
+  EXPECT_EQ(m.reachable.low, -std::numeric_limits<double>::infinity());
+}
+
+TEST(FreeMotion, ArmTurnsThroughARingOfFramesToTheWallFromBothSides) {
+  const SurfaceMesh arm = shapes::box({4, -0.5, -1}, {6, 0.5, 1});
+  const auto turned = [](double angle) { return parts::placed(Vec3::Zero(), {0, 0, angle}, 1.0); };
+  std::vector<SurfaceMesh> ring{turned(-30 * kDegree)(arm)};  // the wall is like the arm
+  for (int i = 0; i < 11; ++i)
+    ring.push_back(turned(30 * i * kDegree)(parts::tube({5, 0, 0}, Vec3::UnitY(), 1.8, 2.5, 0.4, 16)));
+  const MotionBody moving{&arm};
+  std::vector<MotionBody> fixed;
+  for (const SurfaceMesh& body : ring) fixed.push_back({&body});
+  const FreeMotion m = free_motion({&moving, 1}, fixed, kAboutZ);
+  const double half = std::atan(0.5 / 4.0);  // the inner edges meet halfway
+  EXPECT_NEAR(m.reachable.low, 2.0 * half - 30 * kDegree, kEnd);
+  EXPECT_NEAR(m.reachable.high, 330 * kDegree - 2.0 * half, kEnd);
+  EXPECT_EQ(m.low.body, 0);
+  EXPECT_EQ(m.high.body, 0);
+}
+
+TEST(FreeMotion, WhatLiesFarBehindTheNearestBodiesIsNotToldAndChangesNothing) {
+  const SurfaceMesh block = shapes::box({0, -1, -1}, {2, 1, 1});
+  const MotionBody moving{&block};
+  std::vector<SurfaceMesh> row;
+  for (int i = 1; i <= 20; ++i) row.push_back(shapes::box({5.0 * i, -3, -3}, {5.0 * i + 1.0, 3, 3}));
+  std::vector<MotionBody> fixed;
+  for (const SurfaceMesh& body : row) fixed.push_back({&body});
+  const FreeMotion all = free_motion({&moving, 1}, fixed, kAlongX);
+  const FreeMotion few = free_motion({&moving, 1}, std::span(fixed).first(4), kAlongX);
+  EXPECT_NEAR(all.reachable.high, 3.0, kEnd);
+  EXPECT_EQ(all.reachable, few.reachable);
+  ASSERT_EQ(all.others.size(), 3u);  // between the first four; behind the fourth others follow that nobody looked at
+  EXPECT_EQ(few.others.size(), 4u);
+  EXPECT_NEAR(all.others[2].low, 16.0, kEnd);
+  EXPECT_NEAR(all.others[2].high, 18.0, kEnd);
 }
 
 TEST(FreeMotion, ThinWiresThatCrossAreNotMissed) {

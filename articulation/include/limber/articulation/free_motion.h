@@ -17,6 +17,9 @@
 /// facets, up to `largest_overlap`. Along the motion nothing is lost: the stop is where the surface within δ of such a
 /// point first meets the other body.
 ///
+/// Of many bodies in the way only the nearest in either sense are looked at, by the boxes around them, and more only if
+/// the motion does not end among those.
+///
 /// Closed surfaces bound solids; open ones are sheets that block where they are crossed, and hide what lies behind.
 /// Source: [X09] 3.3 bisects by collision tests, which sees one interval only; orbits are not in the paper.
 #pragma once
@@ -61,11 +64,13 @@ struct MotionStop {
 };
 
 struct FreeMotion {
-  Interval reachable;            ///< the free interval around 0; open where nothing stops. Both ends ∞: a full turn
-  std::vector<Interval> others;  ///< free intervals behind an obstacle, ascending; rotations: within (−π, π]
-  MotionStop low, high;          ///< what stops at the ends of `reachable`
-  double tolerance = 0.0;        ///< δ as used, length
-  bool overlapping = false;      ///< the bodies overlap by more than largest_overlap as read; such places are left out
+  Interval reachable;  ///< the free interval around 0; open where nothing stops. Both ends ∞: a full turn
+  /// Free intervals behind an obstacle, ascending, as far as the bodies that were looked at are all that matters; with
+  /// up to four in the way in either sense these are all. Rotations: within (−π, π]
+  std::vector<Interval> others;
+  MotionStop low, high;      ///< what stops at the ends of `reachable`
+  double tolerance = 0.0;    ///< δ as used, length
+  bool overlapping = false;  ///< the bodies overlap by more than largest_overlap as read; such places are left out
 };
 
 /// @param moving, fixed in one frame
