@@ -43,11 +43,12 @@ int main(int argc, char** argv) {
   const int count = argc > 1 ? std::atoi(argv[1]) : 100, seconds = argc > 2 ? std::atoi(argv[2]) : 8,
             modes = argc > 3 ? std::atoi(argv[3]) : 6;
   const bool rolls = argc < 5 || std::string_view(argv[4]) != "boxes";
-  if (count < 1 || seconds < 1 || modes < -1) {
-    std::fprintf(stderr, "contact_pile [bodies] [seconds] [modes, -1: all rigid] [boxes]\n");
+  const double rolling_friction = rolls && argc >= 5 ? std::atof(argv[4]) : 0.0;
+  if (!(rolling_friction >= 0.0) || count < 1 || seconds < 1 || modes < -1) {
+    std::fprintf(stderr, "contact_pile [bodies] [seconds] [modes, -1: all rigid] [boxes | rolling friction]\n");
     return 2;
   }
-  limber::testing::Pile pile(count, modes, rolls);
+  limber::testing::Pile pile(count, modes, rolls, {.rolling_friction = rolling_friction});
   std::printf(
       "| second | ms a step, mean | worst | contacts | steps not settled of 60 | deepest / size | farthest moved, m "
       "| largest rise of energy, J |\n");

@@ -108,6 +108,7 @@ Json contact(const ContactOptions& c) {
           {"friction_model", to_string(c.rule.friction)},
           {"guard", to_string(c.rule.guard)},
           {"friction", c.friction},
+          {"rolling_friction", c.rolling_friction},
           {"impact", to_string(c.impact)},
           {"impact_speed", c.impact_speed},
           {"recovery_speed", c.recovery_speed},

@@ -141,8 +141,8 @@ FeatureContact flipped(const FeatureContact& c) { return {c.b, c.a, -c.normal, c
 
 std::uint64_t id_of(const FeatureContact& c) { return std::uint64_t{c.a.key} << 32 | c.b.key; }
 
-ContactSide contact_side(const CollisionBody& body, const FeatureSide& side, const Vec3& point_B) {
-  if (body.surface == nullptr) return {body.index, -1, {0.0, 0.0, 0.0}, point_B};
+ContactSide contact_side(const CollisionBody& body, double radius, const FeatureSide& side, const Vec3& point_B) {
+  if (body.surface == nullptr) return {body.index, -1, {0.0, 0.0, 0.0}, point_B, radius};
   return {body.index, side.triangle, side.weight, point_B};
 }
 
@@ -269,9 +269,12 @@ void NarrowPhase::Impl::deliver(const CollisionBody& a, const RigidTransform& X_
   found.erase(std::unique(found.begin(), found.end(),
                           [](const FeatureContact& c, const FeatureContact& d) { return id_of(c) == id_of(d); }),
               found.end());
+  const ConvexCore *core_a = convex(a), *core_b = convex(b);
+  const double radius_a = core_a != nullptr ? core_a->radius : 0.0, radius_b = core_b != nullptr ? core_b->radius : 0.0;
   for (const FeatureContact& c : found)
-    contacts.push_back({contact_side(a, c.a, X_AF * c.a.point), contact_side(b, c.b, X_BF * c.b.point),
-                        X_OF.q * c.normal, X_OF * (0.5 * (c.a.point + c.b.point)), c.gap, id_of(c)});
+    contacts.push_back({contact_side(a, radius_a, c.a, X_AF * c.a.point),
+                        contact_side(b, radius_b, c.b, X_BF * c.b.point), X_OF.q * c.normal,
+                        X_OF * (0.5 * (c.a.point + c.b.point)), c.gap, id_of(c)});
 }
 
 NarrowPhase::NarrowPhase(const NarrowPhaseOptions& options) : impl_(std::make_unique<Impl>()) {

@@ -7,8 +7,10 @@
 #include <string>
 
 #include "contact_dents.h"
+#include "contact_geometry.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/surface_point.h"
+#include "rolling_resistance.h"
 
 namespace limber {
 namespace {
@@ -24,17 +26,24 @@ constexpr double kGive = 1e-4;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
+const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
+const auto by_pair = [](const auto& x, const auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; };
+
 /// One side of a contact, prepared.
 struct Side {
   Index body = -1;
   const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
   SurfacePoint at{};
-  Vec3 rigid_point = Vec3::Zero();  // without a model: body frame
+  Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
+  Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
+  /// Where the body touches.
   Vec3 position(const BodyStates& states, StepTime when) const {
     const Vec3 p = model != nullptr ? deformed_point(*model, at, states.amplitudes(body, when)) : rigid_point;
-    return states.pose(body, when) * p;
+    return states.pose(body, when) * p + rim;
   }
+  /// How far what is there has come beyond that by rolling, by the end of the step.
+  Vec3 rolled(const BodyStates& states) const { return turn_of_step(states, body).cross(rim); }
   Vec3 velocity(const BodyStates& states, StepTime when) const {
     const RigidTransform& X = states.pose(body, when);
     Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
@@ -57,28 +66,24 @@ struct Contact {
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 };
 
-Side make_side(const BodyStates& states, const ContactSide& side) {
+/// @param inwards the normal, into the body
+Side make_side(const BodyStates& states, const ContactSide& side, const Vec3& inwards) {
   Side made{.body = side.body, .rigid_point = side.point_B};
+  if (side.radius > 0.0 && !states.is_static(side.body)) {
+    made.rim = -side.radius * inwards;
+    made.rigid_point -= states.pose(side.body, StepTime::kStart).q.conjugate() * made.rim;
+  }
   if (side.triangle < 0 || states.is_static(side.body)) return made;
   made.model = &states.body(side.body).group->model();
   made.at = {.surface = SurfacePoint::Surface::kCollision, .triangle = side.triangle, .weight = side.weight};
   return made;
 }
 
-/// A right-handed frame whose first axis is n; the same for the same n.
-Mat3 frame_along(const Vec3& n) {
-  Index least = 0;
-  n.cwiseAbs().minCoeff(&least);
-  Mat3 axes;
-  axes.col(0) = n;
-  axes.col(1) = n.cross(Vec3::Unit(least)).normalized();
-  axes.col(2) = n.cross(axes.col(1));
-  return axes;
-}
-
 bool flexes(const Side& side) {
   return side.model != nullptr && (side.model->modes() > 0 || side.model->data().residual_compliance.has_value());
 }
+
+bool is_round(const Side& side) { return !side.rim.isZero(0.0); }
 
 bool yields(const Side& side) { return side.model != nullptr && side.model->data().residual_compliance.has_value(); }
 
@@ -109,11 +114,21 @@ struct Passage {
     }
     motion->evaluate(time, state);
     const Vec3 p = side.model != nullptr ? deformed_point(*side.model, side.at, state.amplitudes) : side.rigid_point;
-    place = state.pose * p;
+    place = state.pose * p + side.rim;
     velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
     if (side.model != nullptr) velocity += state.pose.q * displacement(*side.model, side.at, state.rates);
   }
 };
+
+/// From where they touch to the nearer of the origins of those that move.
+double shorter_arm(const BodyStates& states, const Contact& contact) {
+  double arm = std::numeric_limits<double>::infinity();
+  for (const Side* side : {&contact.a, &contact.b})
+    if (!states.is_static(side->body))
+      arm = std::min(arm,
+                     (side->position(states, StepTime::kStart) - states.pose(side->body, StepTime::kStart).p).norm());
+  return arm;
+}
 
 /// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
 double longest_rebound(const Side& a, const Side& b) {
@@ -158,9 +173,9 @@ class PairContacts final : public Constraint {
       const Vec3 offset = contact.a.position(states, when) - contact.b.position(states, when);
       gaps[row++] = contact.axes.col(0).dot(offset) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
       if (contact.friction == 0.0) continue;
+      const Vec3 slip = offset - contact.offset + rolled(states, when, contact);
       for (int t = 1; t < 3; ++t)
-        gaps[row++] =
-            contact.axes.col(t).dot(offset - contact.offset) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
+        gaps[row++] = contact.axes.col(t).dot(slip) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
     }
   }
 
@@ -217,6 +232,17 @@ class PairContacts final : public Constraint {
       contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
       deepest_dent_ = std::max(deepest_dent_, contact.dent[0]);
     }
+  }
+
+  /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
+  static Vec3 point_of_action(const Contact& contact, const Vec3& a, const Vec3& b) {
+    if (is_round(contact.a) != is_round(contact.b)) return is_round(contact.a) ? a : b;
+    return 0.5 * (a + b);
+  }
+
+  static Vec3 rolled(const BodyStates& states, StepTime when, const Contact& contact) {
+    if (when == StepTime::kStart) return Vec3::Zero();
+    return contact.a.rolled(states) - contact.b.rolled(states);
   }
 
   /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
@@ -294,8 +320,10 @@ class PairContacts final : public Constraint {
 
   void add_contact(const BodyStates& states, StepTime when, const Contact& contact, ConstraintRows& rows) {
     const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
-    const Vec3 end = 0.5 * (a + b);
-    const double length = (a - states.pose(contact.a.body, when).p).norm() + a.norm();
+    const Vec3 end = point_of_action(contact, a, b);
+    double length = a.norm();
+    if (!states.is_static(contact.a.body)) length += (a - states.pose(contact.a.body, when).p).norm();
+    if (!states.is_static(contact.b.body)) length += (b - states.pose(contact.b.body, when).p).norm();
     const double tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min();
     for (Index axis = 0; axis < row_count(contact); ++axis) {
       const Vec3 n = contact.axes.col(axis);
@@ -365,6 +393,7 @@ void ContactOptions::validate() const {
                             ", expected a finite number of at least 0");
   };
   number(friction, "friction");
+  number(rolling_friction, "rolling_friction");
   number(recovery_speed, "recovery_speed");
   number(impact_speed, "impact_speed");
   number(penalty_frequency, "penalty_frequency");
@@ -377,7 +406,10 @@ struct ContactSet::Impl {
   std::vector<Contact> contacts;
   std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
+  std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
   std::vector<std::unique_ptr<PairContacts>> pairs;
+  std::vector<std::unique_ptr<RollingResistance>> rolling;
+  std::size_t pairs_used = 0, rolling_used = 0;
   std::vector<Constraint*> constraints;
   std::vector<ContactEvent> events, last_events;
   std::vector<ContactEvent> resting, last_resting;  // the last of bodies that sleep
@@ -385,8 +417,10 @@ struct ContactSet::Impl {
   std::vector<double> give_energy;  // by body
 
   void remember(std::span<const char> asleep);
+  void remember_rolling(std::span<const char> asleep);
   const ContactMemory* find(std::uint64_t id) const;
   double lasted(Index a, Index b) const;
+  void resist_rolling(const BodyStates& states, std::span<const Contact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
 };
 
@@ -408,7 +442,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
     return static_cast<std::size_t>(body) < friction.size() ? friction[static_cast<std::size_t>(body)]
                                                             : options.friction;
   };
-  Contact contact{.id = point.id, .a = make_side(states, point.a), .b = make_side(states, point.b)};
+  Contact contact{
+      .id = point.id, .a = make_side(states, point.a, point.normal), .b = make_side(states, point.b, -point.normal)};
   contact.axes = frame_along(point.normal);
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
@@ -438,23 +473,44 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.dents.reserve(bodies);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
-  std::size_t begin = 0, pair = 0;
+  s.pairs_used = s.rolling_used = 0;
+  std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
     const Contact& first = s.contacts[begin];
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
-    if (pair == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
-    s.pairs[pair]->set(std::span(s.contacts).subspan(begin, i - begin), s.options, s.dents,
-                       s.lasted(first.a.body, first.b.body));
-    s.constraints.push_back(s.pairs[pair++].get());
+    if (s.pairs_used == s.pairs.size()) s.pairs.push_back(std::make_unique<PairContacts>());
+    PairContacts& pair = *s.pairs[s.pairs_used++];
+    const std::span<Contact> of_pair = std::span(s.contacts).subspan(begin, i - begin);
+    pair.set(of_pair, s.options, s.dents, s.lasted(first.a.body, first.b.body));
+    s.constraints.push_back(&pair);
+    s.resist_rolling(states, of_pair);
     begin = i;
   }
+}
+
+/// With the forces of the last step, where there were any.
+void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const Contact> pair) {
+  if (options.rolling_friction == 0.0 || options.rule.method != ContactMethod::kComplementary ||
+      options.rule.friction != FrictionModel::kCone)
+    return;
+  double largest = 0.0;
+  for (const Contact& contact : pair)
+    if (is_round(contact.a) || is_round(contact.b))
+      largest += options.rolling_friction * shorter_arm(states, contact) *
+                 std::max(0.0, contact.axes.col(0).dot(contact.last_force));
+  if (largest == 0.0) return;
+  const Index a = pair.front().a.body, b = pair.front().b.body;
+  const auto known = std::ranges::lower_bound(rolling_memory, RollingMemory{a, b, Vec3::Zero()}, by_pair);
+  const bool knows = known != rolling_memory.end() && known->a == a && known->b == b;
+  if (rolling_used == rolling.size()) rolling.push_back(std::make_unique<RollingResistance>());
+  RollingResistance& resistance = *rolling[rolling_used++];
+  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()));
+  constraints.push_back(&resistance);
 }
 
 std::span<Constraint* const> ContactSet::constraints() const { return impl_->constraints; }
 
 namespace {
-
-const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
 
 bool rests(std::span<const char> asleep, Index a, Index b) {
   const auto sleeps = [&](Index body) {
@@ -498,7 +554,7 @@ void ContactSet::finish(std::span<const char> asleep) {
   s.remember(asleep);
   s.dents.finish(asleep);
   s.strikes.clear();
-  for (std::size_t i = 0; i < s.constraints.size(); ++i)
+  for (std::size_t i = 0; i < s.pairs_used; ++i)
     if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
       const auto [a, b] = s.pairs[i]->bodies();
       s.strikes.push_back({a, b, lasted});
@@ -522,9 +578,19 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
   for (const ContactMemory& last : last_memory)
     if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
+  remember_rolling(asleep);
   std::ranges::fill(give_energy, 0.0);
   for (const ContactMemory& m : memory)
     if (m.give > 0.0) give_energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
+}
+
+void ContactSet::Impl::remember_rolling(std::span<const char> asleep) {
+  std::erase_if(rolling_memory, [&](const RollingMemory& m) { return !rests(asleep, m.a, m.b); });
+  for (std::size_t i = 0; i < rolling_used; ++i) {
+    const auto [a, b] = rolling[i]->bodies();
+    rolling_memory.push_back({a, b, rolling[i]->moment()});
+  }
+  std::ranges::sort(rolling_memory, by_pair);
 }
 
 const ContactOptions& ContactSet::options() const { return impl_->options; }
@@ -532,12 +598,14 @@ const ContactOptions& ContactSet::options() const { return impl_->options; }
 std::span<const ContactEvent> ContactSet::events() const { return impl_->events; }
 std::span<const ContactMemory> ContactSet::memory() const { return impl_->memory; }
 std::span<const StrikeMemory> ContactSet::strikes() const { return impl_->strikes; }
+std::span<const RollingMemory> ContactSet::rolling() const { return impl_->rolling_memory; }
 
 void ContactSet::clear() {
   impl_->contacts.clear();
   impl_->constraints.clear();
   impl_->memory.clear();
   impl_->strikes.clear();
+  impl_->rolling_memory.clear();
   impl_->events.clear();
   impl_->resting.clear();
   impl_->dents.clear();

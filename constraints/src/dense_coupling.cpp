@@ -56,7 +56,11 @@ void DenseCoupling::scale(std::span<const double> s) {
     std::fill(A_.row(i) + n_, A_.row(i) + A_.stride, 0.0);
   }
   std::fill_n(zero_memory_.need(n_), padded(n_), 0.0);
-  active_.reserve(n_), columns_.reserve(n_);
+  // All that a step of any kind may take, so that a problem of this size allocates nothing whichever way it goes.
+  newton_memory_.need(n_, n_);
+  for (AlignedBuffer* memory : {&coefficients_memory_, &row_memory_, &product_memory_, &answer_memory_})
+    memory->need(n_);
+  active_.reserve(n_), columns_.reserve(n_), lu_.reserve(n_);
 }
 
 /// dy = −d + ρ S (1 + ρ SᵀA S)⁻¹ SᵀA d

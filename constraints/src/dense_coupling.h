@@ -13,6 +13,7 @@ class DenseLu {
  public:
   bool factor(MatrixView M, std::size_t n);
   void solve(double* x) const;
+  void reserve(std::size_t n) { pivots_.reserve(n); }
 
  private:
   MatrixView M_{};

@@ -73,12 +73,12 @@ bool IslandSolver::Impl::slow_start(double left) {
   return true;
 }
 
-/// Large islands of contacts, whose gaps may be off by more than others': in a pile at rest that is energy, with no
-/// motion to take it from. Forces that are smaller by a part that no gap shows let the pile down by as much.
+/// Islands of nothing but contacts: what their gaps may be off is energy where they are at rest, with no motion to take
+/// it from, and most of all in large ones. Forces that are smaller by a part that no gap shows let the pile down by as much.
 /// @return whether they do
 bool IslandSolver::Impl::yield(const BodyStates& states, std::span<Constraint* const> constraints,
                                const IslandOptions& options, IslandReport& report) {
-  if (!splits) return false;
+  if (!std::ranges::all_of(laws, &RowLaw::contact)) return false;
   next_f = f, change = reaction;
   const auto scale = [&](double part) {
     for (std::size_t i = 0; i < f.size(); ++i) f[i] = part * next_f[i], reaction[i] = part * change[i];

@@ -106,11 +106,13 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0) || yield(BodyStates(part.table), part.constraints, options, done)) return done;
+    if (!(left > 0.0) || (splits && yield(BodyStates(part.table), part.constraints, options, done))) return done;
     const bool settled = done.status == SolveStatus::kSolved && !holds_contact_forces() && std::isfinite(left);
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
+  if (!splits && done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
+    return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
 }

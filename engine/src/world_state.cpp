@@ -159,6 +159,7 @@ std::uint64_t World::state_hash() const {
     hash.add(contact.force);
     hash.add(contact.held);
   }
+  for (const RollingMemory& rolling : impl_->contacts.rolling()) hash.add(rolling.moment);
   for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
   for (std::size_t body = 0; body < impl_->entries.size(); ++body)
     for (const DentLoad& load : impl_->contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);

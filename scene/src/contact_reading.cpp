@@ -52,6 +52,7 @@ ContactOptions read_contact_options(const JsonObject& o) {
   ContactOptions c;
   c.rule = read_rule(o);
   c.friction = non_negative(o, "friction", c.friction);
+  c.rolling_friction = non_negative(o, "rolling_friction", c.rolling_friction);
   c.recovery_speed = non_negative(o, "recovery_speed", c.recovery_speed);
   c.residual_compliance = o.boolean("residual_compliance", c.residual_compliance);
   c.penalty_frequency = positive(o, "penalty_frequency", c.penalty_frequency);

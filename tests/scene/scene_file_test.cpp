@@ -68,7 +68,7 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
       R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},
           "layers": [0, 2], "meets": [1], "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
       R"("contact": {"method": "gap_program", "friction": 0.7, "friction_model": "heuristic_no_slip", "guard": "none",
-                     "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2,
+                     "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2, "rolling_friction": 0.04,
                      "residual_compliance": true, "penalty_frequency": 30, "penalty_damping": 0.5},
          "statics": [{"name": "ground", "shape": {"half_space": {"normal": [0, 3, 4], "offset": 2}}, "friction": 0,
                       "position": [1, 2, 3]},
@@ -80,6 +80,7 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
   EXPECT_EQ(s.contact->rule.guard, ProgramGuard::kNone);
   EXPECT_EQ(s.contact->impact, ImpactModel::kHeldFromTouch);
   EXPECT_EQ(s.contact->friction, 0.7);
+  EXPECT_EQ(s.contact->rolling_friction, 0.04);
   EXPECT_EQ(s.contact->impact_speed, 0.5);
   EXPECT_EQ(s.contact->recovery_speed, 0.2);
   EXPECT_TRUE(s.contact->residual_compliance);

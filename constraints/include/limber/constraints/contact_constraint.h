@@ -58,7 +58,13 @@ enum class ImpactModel {
 };
 
 struct ContactOptions {
-  double friction = 0.5;         ///< μ of bodies that do not say; ≥ 0
+  double friction = 0.5;  ///< μ of bodies that do not say; ≥ 0
+  /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
+  /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
+  /// C g/(1 + ⅖), and stays on slopes of less than atan C. A tyre on asphalt has 0.01, a ball on grass 0.1. Spinning is
+  /// braked likewise; what has corners is not. 0: what is round rolls on for ever. Of
+  /// ContactMethod::kComplementary with FrictionModel::kCone.
+  double rolling_friction = 0.0;
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
   /// Used where the models have it.
   bool residual_compliance = true;
@@ -105,6 +111,12 @@ struct StrikeMemory {
   double since = 0.0;    ///< how long they have been at it, s
 };
 
+/// And of a pair that resists rolling.
+struct RollingMemory {
+  Index a = -1, b = -1;        ///< bodies
+  Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
+};
+
 /// A force that was pressed on a body in the last step, and is what has dented it.
 struct DentLoad {
   SurfacePoint at{};
@@ -139,6 +151,8 @@ class ContactSet {
   std::span<const ContactMemory> memory() const;
   /// Impacts under way, ordered by (a, b).
   std::span<const StrikeMemory> strikes() const;
+  /// Pairs that resisted rolling in the last step, ordered by (a, b).
+  std::span<const RollingMemory> rolling() const;
   /// The forces that dent a body beyond its modes (residual compliance), as the last step left them.
   std::span<const DentLoad> dent_loads(Index body) const;
   /// What contacts store in a body, ½ FᵀG F and ½ give F², J: beside the energy of its modes.

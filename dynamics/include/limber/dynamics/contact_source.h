@@ -59,6 +59,10 @@ struct ContactSide {
   Index triangle = -1;
   std::array<double, 3> weight{0.0, 0.0, 0.0};  ///< barycentric, sums to 1; zeros for a rigid shape
   Vec3 point_B = Vec3::Zero();                  ///< the point, deformed, in the body frame, m
+  /// m, > 0: the surface about the point is that of a ball of this radius (of rigid shapes: spheres, capsules). As the
+  /// body turns, what it touches with is another point of it, always this far from the ball's centre against the
+  /// normal.
+  double radius = 0.0;
 };
 
 /// Two points that are, or may come, together:  gap = normal · (p_a − p_b), negative where the bodies overlap.

@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "counted_new.h"
+#include "grounded_world.h"
+#include "limber/core/error.h"
+#include "pile.h"
+
+namespace limber::testing {
+namespace {
+
+constexpr double kRadius = 0.2;                 // m
+constexpr double kResistance = 0.05;            // C
+constexpr double kGap = 1e-9;                   // m and rad: what gaps and turns are met to at a metre from the origin
+constexpr double kRolling = 1.0 / (1.0 + 0.4);  // of what a block that slides without friction does
+
+/// A solid ball, ⅖ m R² about every axis, on a slope; x points down it.
+struct RollingBall : GroundedWorld {
+  explicit RollingBall(double slope, double speed = 0.0, double spin = 0.0, double resistance = kResistance)
+      : GroundedWorld({.friction = 0.8, .rolling_friction = resistance},
+                      {.gravity = kGravity * Vec3(std::sin(slope), 0.0, -std::cos(slope))}) {
+    ModalModelData data = sample_model_data({.modes = 0});
+    data.inertia = 0.4 * data.mass * kRadius * kRadius * Mat3::Identity();
+    ball = world.add_body(std::make_shared<const ModalModel>(std::move(data)),
+                          {.pose = {{}, {0.0, 0.0, kRadius}},
+                           .velocity = {speed, 0.0, 0.0},
+                           .angular_velocity = {0.0, speed / kRadius, spin},
+                           .shape = std::make_shared<const Shape>(Sphere{kRadius})});
+  }
+  double speed() const { return world.body(ball).velocity.x(); }
+  BodyId ball;
+};
+
+TEST(Rolling, OnAPlaneSlowsByTheCoefficientOfItsWeight) {
+  RollingBall scene(0.0, 2.0);
+  scene.step(6);  // resistance begins where forces are known: a step late
+  const double before = scene.speed();
+  scene.step(60);
+  const double slowing = kResistance * kGravity * kRolling;
+  EXPECT_NEAR(before - scene.speed(), slowing, 1e-6 * slowing);
+  EXPECT_NEAR(scene.world.body(scene.ball).angular_velocity.y(), scene.speed() / kRadius, 1e-6);
+}
+
+TEST(Rolling, ComesToRestAndStaysWhereItIs) {
+  RollingBall scene(0.0, 1.0);
+  scene.step(240);  // it has rolled for 2.86 s
+  const Vec3 there = scene.world.body(scene.ball).pose.p;
+  scene.step(60);
+  EXPECT_LT((scene.world.body(scene.ball).pose.p - there).norm(), 10.0 * kGap);
+  EXPECT_NEAR(there.x(), 0.5 / (kResistance * kGravity * kRolling), 0.02) << "v²/2a and a frame's way";
+}
+
+TEST(Rolling, StaysOnSlopesBelowItsAngleAndGoesDownSteeperOnes) {
+  RollingBall flat(0.9 * std::atan(kResistance));
+  flat.step(120);
+  EXPECT_LT(std::abs(flat.world.body(flat.ball).pose.p.x()), 1e-3 * kRadius);
+  const double x = flat.world.body(flat.ball).pose.p.x();
+  flat.step(60);
+  EXPECT_NEAR(flat.world.body(flat.ball).pose.p.x(), x, 10.0 * kGap);
+
+  const double slope = 0.3;
+  RollingBall steep(slope);
+  steep.step(6);
+  const double before = steep.speed();
+  steep.step(60);
+  const double expected = kGravity * (std::sin(slope) - kResistance * std::cos(slope)) * kRolling;
+  EXPECT_NEAR(steep.speed() - before, expected, 1e-6 * expected);
+}
+
+TEST(Rolling, WithoutResistanceGoesOn) {
+  RollingBall scene(0.0, 1.0, 0.0, 0.0);
+  scene.step(300);
+  EXPECT_NEAR(scene.speed(), 1.0, 1e-9);
+}
+
+TEST(Rolling, SpinningEndsToo) {
+  RollingBall scene(0.0, 0.0, 5.0);
+  scene.step(6);
+  const double before = scene.world.body(scene.ball).angular_velocity.z();
+  scene.step(6);
+  const double slowing = kResistance * kGravity * kRadius / (0.4 * kRadius * kRadius);
+  EXPECT_NEAR(before - scene.world.body(scene.ball).angular_velocity.z(), 6.0 * kFrame * slowing, 1e-6);
+  scene.step(120);
+  EXPECT_LT(std::abs(scene.world.body(scene.ball).angular_velocity.z()), 2.0 * kGap / kFrame);
+}
+
+TEST(Rolling, TakesEnergyAwayAndAllocatesNothing) {
+  RollingBall scene(0.0, 1.0);
+  scene.step(30);
+  const std::vector<BodyId> ball{scene.ball};
+  const double weight = scene.world.model(scene.ball).data().mass * kGravity;
+  const long before = allocations();
+  const double rise = largest_rise(scene.world, ball, 200);
+  EXPECT_EQ(allocations() - before, 0);
+  EXPECT_LT(rise, 10.0 * kGap * weight);
+}
+
+TEST(Rolling, APileOfMixedBodiesComesToRest) {
+#if defined(__SANITIZE_ADDRESS__)
+  constexpr int kBodies = 9, kSteps = 120;
+#else
+  constexpr int kBodies = 18, kSteps = 180;
+#endif
+  constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
+  Pile pile(kBodies, -1, true, {.rolling_friction = 0.1});
+  for (int i = 0; i < kSteps; ++i) pile.step_once();
+  std::vector<Vec3> before;
+  for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
+  for (int i = 0; i < 30; ++i) pile.step_once();
+  EXPECT_GT(pile.deepest, -kPenetration);
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT((pile.world.body(pile.bodies[i]).pose.p - before[i]).norm(), kShift) << i;
+}
+
+TEST(Rolling, CoefficientsAreChecked) {
+  EXPECT_THROW(ContactOptions({.rolling_friction = -0.1}).validate(), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace limber::testing
