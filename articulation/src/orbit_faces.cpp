@@ -227,11 +227,9 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
   boxes.push_back(box);
 }
 
-/// Cosine of 20 degrees: a smaller bend continues a surface.
-constexpr double kFlat = 0.94;
-
 /// @param faces of one side, whose vertices are numbered together
 void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
+  constexpr double kContinues = 0.643;  // cosine of 50 degrees: facets of an octagon, and noise, bend by less
   std::vector<int> sides;
   for (OrbitFace& face : faces) {
     sides.push_back(side_of_motion(frame, face.normal, face.corners));
@@ -245,12 +243,13 @@ void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
       const auto others = around.of(vertex);
       faces[f].one_sided = std::none_of(others.begin(), others.end(), [&](Index other) {
         const auto o = static_cast<std::size_t>(other);
-        return sides[o] != sides[f] && faces[o].normal.dot(faces[f].normal) > kFlat;
+        return sides[o] != sides[f] && faces[o].normal.dot(faces[f].normal) > kContinues;
       });
     }
 }
 
 std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
+  constexpr double kFlat = 0.94;
   std::vector<SharpEdge> all;
   all.reserve(3 * surface.triangles.size());
   std::vector<Vec3> normals;

@@ -176,5 +176,43 @@ TEST(Slippage, APistonAtItsDeadCentreMaySlide) {
   EXPECT_GT(piston.hypotheses[1].confidence, 0.2);
 }
 
+/// A flat face whose outline has the radius r(angle), with a hole in its middle.
+Patch flange(const Vec3& centre, const std::function<double(double)>& radius) {
+  return {[=](double u, double v) {
+            const double a = 2 * kPi * u, r = radius(a) * std::sqrt(0.1 + 0.9 * v);
+            return Vec3(centre + Vec3(r * std::cos(a), 0.0, -r * std::sin(a)));
+          },
+          [](double, double) { return Vec3(Vec3::UnitY()); }};
+}
+
+/// Of a polygon about its middle.
+std::function<double(double)> polygon(int corners) {
+  const double side = 2 * kPi / corners;
+  return [=](double a) { return std::cos(side / 2) / std::cos(a - side * std::floor(a / side) - side / 2); };
+}
+
+// Two round flanges that meet slide as far as they show; that a bearing holds them in their middle is the second
+// reading.
+TEST(Slippage, ARoundFlangeMayTurnAboutItsMiddle) {
+  const Vec3 centre(0.3, -1.2, 4.0);
+  for (const auto& radius : {std::function<double(double)>([](double) { return 1.0; }), polygon(8)}) {
+    const Slippage round = analyse_slippage({exact_contact({flange(centre, radius)}, 60)});
+    ASSERT_EQ(round.hypotheses[0].joint.type, JointType::kPlanar);
+    const JointHypothesis& turns = round.hypotheses[1];
+    ASSERT_EQ(turns.joint.type, JointType::kRevolute);
+    EXPECT_LT((turns.joint.frame.origin - centre).norm(), 1e-3);
+    EXPECT_NEAR(std::abs(turns.joint.frame.axes(1, 0)), 1.0, 1e-9);
+    EXPECT_NEAR(turns.joint.frame.axes.determinant(), 1.0, 1e-9);
+    EXPECT_NEAR(turns.confidence, 0.2, 0.02);
+    EXPECT_THAT(turns.reason, ::testing::HasSubstr("flange"));
+  }
+  const auto oval = [](double a) { return 1.0 / std::hypot(std::cos(a), 1.1 * std::sin(a)); };
+  for (const auto& radius : {polygon(4), polygon(6), std::function<double(double)>(oval)}) {
+    const Slippage other = analyse_slippage({exact_contact({flange(centre, radius)}, 60)});
+    ASSERT_EQ(other.hypotheses[0].joint.type, JointType::kPlanar);
+    EXPECT_LT(other.hypotheses[1].confidence, 0.05);
+  }
+}
+
 }  // namespace
 }  // namespace limber

@@ -8,6 +8,8 @@
 ///
 /// so μ in [0, 1] is the mean squared normal velocity per mean squared velocity: 0 for a motion that slips. Unlike the
 /// eigenvalues of C alone, which [X09] compares with a fixed ratio g, μ depends on no centre and no unit of length.
+/// Some readings look alike: a drawer at its stop and a peg in a blind hole, a flange whose bearing is not drawn and a
+/// puck on a table. The less constrained of the first two and the more constrained of the others is a second reading.
 /// Sources: Gelfand and Guibas, "Shape segmentation using local slippage analysis", 2004; [X09] 3.2.
 #pragma once
 
