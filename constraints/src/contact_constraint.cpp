@@ -232,6 +232,20 @@ class PairContacts final : public Constraint {
       contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
       deepest_dent_ = std::max(deepest_dent_, contact.dent[0]);
     }
+    caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
+  }
+
+  /// Whether a part of one body is caught between two of the other: contacts that overlap and push either way. To come
+  /// apart they would press against each other without bound.
+  bool is_caught() const {
+    constexpr double kOpposed = -0.5;
+    const auto overlaps = [](const Contact& c) { return c.axes.col(0).dot(c.offset) < 0.0; };
+    for (const Contact& contact : contacts_)
+      if (overlaps(contact) && std::ranges::any_of(contacts_, [&](const Contact& other) {
+            return overlaps(other) && contact.axes.col(0).dot(other.axes.col(0)) < kOpposed;
+          }))
+        return true;
+    return false;
   }
 
   /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
@@ -295,7 +309,7 @@ class PairContacts final : public Constraint {
   /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
   void add_give(Index first, ConstraintRows& rows) const {
     if (give_ == 0.0) return;
-    for (Index row = first; row < rows.size(); ++row) rows.add_flexibility(row, row, give_);
+    for (Index row = first; row < rows.size(); ++row) rows.add_give(row, give_);
     double stored = 0.0;
     for (const Contact& contact : contacts_) stored += 0.5 * contact.give * contact.last_force.squaredNorm();
     rows.add_stored_energy(stored);
@@ -331,7 +345,7 @@ class PairContacts final : public Constraint {
       if (axis == 0) {
         const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
         const double recovery =
-            std::min(kRecovery * std::max(0.0, -gap - deepest_dent_), step_ * options_->recovery_speed);
+            caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap - deepest_dent_), step_ * options_->recovery_speed);
         law.offset = std::min(0.0, gap) + recovery;
         law.agent_displacement = recovery;
         law.lower = 0.0;
@@ -376,7 +390,7 @@ class PairContacts final : public Constraint {
   ContactDents* dents_ = nullptr;
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
-  bool strikes_ = false;
+  bool strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
   double give_ = 0.0;          // of each contact of bodies that flex, m/N
   double deepest_dent_ = 0.0;  // of the bodies' contacts, m: what the kept modes do not show of their shapes

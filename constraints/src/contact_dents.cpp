@@ -53,7 +53,7 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
     const bool itself = &other == &b.rows.back();
     for (Index p = 0; p < side.count; ++p)
       for (Index q = 0; q < (itself ? p + 1 : other.count); ++q)
-        rows.add_flexibility(side.first + p, other.first + q, G(p, q));
+        rows.add_flexibility(body, side.first + p, other.first + q, G(p, q));
   }
 }
 

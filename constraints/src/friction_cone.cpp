@@ -465,7 +465,6 @@ void FrictionSolver::Impl::place(const BlockFrictionProblem& problem) {
     sparse.add_unit(3);
     for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
       if (is_new(k)) sparse.add_side(node_of(problem.blocks[k]));
-    if (!problem.D.empty()) sparse.add_side(sparse.add_node(3));
   }
   sparse.end_structure();
   std::size_t sides = 0;
@@ -479,9 +478,7 @@ void FrictionSolver::Impl::place(const BlockFrictionProblem& problem) {
       for (std::size_t r = 0; r < 3; ++r)
         for (std::size_t c = 0; c < columns; ++c) rows.row(r)[c] += block.values[r * columns + c];
     }
-    if (problem.D.empty()) continue;
-    const MatrixView rows = sparse.values(sides++);
-    for (std::size_t r = 0; r < 3; ++r) rows.row(r)[r] = std::sqrt(problem.D[3 * i + r]);
+    for (std::size_t r = 0; r < 3 && !problem.D.empty(); ++r) sparse.compliance(3 * i + r) = problem.D[3 * i + r];
   }
 }
 

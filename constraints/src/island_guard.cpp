@@ -61,6 +61,22 @@ double IslandSolver::Impl::close_energy(const IslandOptions& options, IslandRepo
   return done.left;
 }
 
+/// Whether overlapping bodies are being pushed apart.
+bool IslandSolver::Impl::has_recovery() const {
+  return std::ranges::any_of(laws, [](const RowLaw& law) { return law.contact && law.agent_displacement > 0.0; });
+}
+
+/// Overlap stays as it is. Where a part of one body is caught between two of another, contacts that push it either way
+/// would press without bound to come apart; that nothing comes closer they can all have, by standing still.
+void IslandSolver::Impl::stop_recovery() {
+  for (Index i = 0; i < rows.size(); ++i) {
+    RowLaw& law = rows.row(i).law;
+    if (!law.contact) continue;
+    law.offset -= law.agent_displacement;
+    law.agent_displacement = 0.0;
+  }
+}
+
 /// Rows that came together, and yet the bodies end higher than they may: a swing that turns round within the step. It
 /// is to begin more slowly, at rest in the end. @return whether there is motion to take
 bool IslandSolver::Impl::slow_start(double left) {

@@ -17,32 +17,47 @@ constexpr double kToleranceOfLargeIslands = 100.0;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
-
 }  // namespace
 
 SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Constraint* const> constraints,
                                         const IslandOptions& options, IslandReport& report) {
   step = options.step;
   bodies.write_position_metric(step, theta, metric);
+  choose_rows();
   sort_rows();
   constexpr int kIterationsUnsettled = 6, kIterationsUnsettledOfLarge = 3, kIterationsOfStart = 30;
+  constexpr int kNewtonStepsOfLarge = 500;  // in blocks, in all
   // Cones are solved as exactly as the last change of the gaps is worth.
-  constexpr double kFirstSlack = 1e4, kSlackOfChange = 1e-3;
+  constexpr double kFirstSlack = 1e6, kSlackOfChange = 1e-3;
   factor();
+  if (splits || waiting > 0) begin_with_last_forces();
+  report.iterations = 1;
   if (splits) return iterate_contacts(states, constraints, options, report);
   secant.begin(f.size());
   slack = sparse ? kFirstSlack : 1.0;
+  bounded_rows.begin(kNewtonStepsOfLarge);
+  int wakings = 0;
   for (report.iterations = 1;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
+    if (waiting > 0 && wake_rows(options)) {
+      ++wakings;
+      sort_rows();
+      factor();
+      secant.begin(f.size());
+    }
     const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
     if (report.change <= 1.0 && slack == 1.0) return status;
+    const bool settled = status != SolveStatus::kIterationLimit;
+    if (!settled && can_split && bounded_rows.tired()) {
+      std::copy(next_f.begin(), next_f.end(), f.begin());
+      return iterate_contacts(states, constraints, options, report);
+    }
     // Cones that do not come together give other impulses every time.
     const int unsettled = sparse ? kIterationsUnsettledOfLarge : kIterationsUnsettled;
     const int most =
-        status == SolveStatus::kIterationLimit ? std::min(unsettled, options.max_iterations) : options.max_iterations;
+        wakings + (settled || can_split ? options.max_iterations : std::min(unsettled, options.max_iterations));
     if (slack > 1.0 && report.iterations <= most) {  // steps of other exactness do not compare
       slack = std::max(1.0, std::min(kSlackOfChange * report.change, 0.1 * slack));
       std::copy(next_f.begin(), next_f.end(), f.begin());
@@ -59,23 +74,43 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   }
 }
 
-/// Large islands of nothing but contacts: forces from those of the last step on, a few iterations at a time, until they
-/// fit the gaps that bodies come to under them.
+/// What the bodies come through under the forces of the last step tells which contacts need not wait.
+void IslandSolver::Impl::begin_with_last_forces() {
+  for (std::size_t i = 0; i < (splits ? bounded.size() : 3 * cones); ++i) {
+    const auto at = static_cast<std::size_t>(bounded[i]);
+    f[at] = step * laws[at].last_force - step * reaction[at];
+  }
+}
+
+/// Large islands of nothing but contacts: forces from those at hand on, a few iterations at a time, until they fit the
+/// gaps that bodies come to under them.
 SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
                                                  const IslandOptions& options, IslandReport& report) {
   constexpr int kIterationsAtATime = 15, kMostTimes = 8;
-  const std::size_t n = bounded.size();
-  begin_splitting();
-  for (report.iterations = 1;; ++report.iterations) {
+  const int most = report.iterations - 1 + std::min(kMostTimes, options.max_iterations);
+  begin_splitting(splits);
+  for (;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
+    if (waiting > 0 && wake_rows(options)) {
+      sort_rows();
+      factor();
+      begin_splitting(false);
+    }
+    const std::size_t n = bounded.size();
     for (std::size_t i = 0; i < n; ++i) {
       const auto at = static_cast<std::size_t>(bounded[i]);
       ordered_b[i] = gap[at] - laws[at].offset + laws[at].compliance * f_bounded[i];
     }
+    for (const ConstraintRows::Flexibility& g : flexibility) {
+      const Index i = place[static_cast<std::size_t>(g.i)], j = place[static_cast<std::size_t>(g.j)];
+      if (i < 0 || j < 0) continue;
+      ordered_b[static_cast<std::size_t>(i)] += g.value / step * f_bounded[static_cast<std::size_t>(j)];
+      if (i != j) ordered_b[static_cast<std::size_t>(j)] += g.value / step * f_bounded[static_cast<std::size_t>(i)];
+    }
     report.change = splitting.residual(f_bounded, ordered_b, tolerance);
     if (report.change <= 1.0) return SolveStatus::kSolved;
-    if (report.iterations > std::min(kMostTimes, options.max_iterations)) return SolveStatus::kIterationLimit;
+    if (report.iterations > most) return SolveStatus::kIterationLimit;
     coupling.scale({});
     coupling.multiply(product.data(), f_bounded.data());
     for (std::size_t i = 0; i < n; ++i) b_reduced[i] = ordered_b[i] - product[i];
@@ -84,16 +119,15 @@ SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::
   }
 }
 
-/// The last step's forces, bounds and tolerances, in the order of `bounded`.
-void IslandSolver::Impl::begin_splitting() {
+/// Forces, bounds and tolerances, in the order of `bounded`.
+void IslandSolver::Impl::begin_splitting(bool from_last_forces) {
   const std::size_t n = bounded.size();
   tolerance.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = static_cast<std::size_t>(bounded[i]);
     held_impulse[i] = step * reaction[at];
     lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
-    f_bounded[i] = step * laws[at].last_force;
-    f[at] = f_bounded[i] - held_impulse[i];
+    f_bounded[i] = from_last_forces ? step * laws[at].last_force : f[at] + held_impulse[i];
     tolerance[i] = kToleranceOfLargeIslands * laws[at].tolerance;
   }
   splitting.begin(
@@ -101,31 +135,15 @@ void IslandSolver::Impl::begin_splitting() {
       coupling);
 }
 
-/// Which rows have bounds, cones first, and what is left of the bounds, which are on the whole impulse.
-void IslandSolver::Impl::sort_rows() {
-  bounded.clear();
-  for (Index i = 0; i < rows.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const RowLaw& law = rows.row(i).law;
-    const double held = step * reaction[at];
-    lower[at] = law.lower - held, upper[at] = law.upper - held;
-    compliance[at] = law.compliance;
-    if (in_cone(law)) bounded.push_back(i);
-  }
-  cones = bounded.size() / 3;
-  for (Index i = 0; i < rows.size(); ++i)
-    if ((sparse || !is_equality(rows.row(i).law)) && !in_cone(rows.row(i).law)) bounded.push_back(i);
-}
-
 /// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
 void IslandSolver::Impl::factor() {
+  order_rows();
   if (bounded.empty()) {
     factor_equalities();
     return;
   }
-  order_rows();
   const std::size_t c = bounded.size();
-  b_reduced.resize(c), product.resize(c), ordered_b.resize(f.size());
+  b_reduced.resize(c), product.resize(c), ordered_b.resize(order.size());
   if (sparse) {
     place_coupling(coupling, false);
     fill_coupling(coupling, false);
@@ -139,10 +157,10 @@ void IslandSolver::Impl::factor() {
 }
 
 void IslandSolver::Impl::factor_equalities() {
-  const std::size_t m = f.size(), n = metric.size();
+  const std::size_t m = order.size(), n = metric.size();
   std::size_t soft = 0;
-  for (const double c : compliance) soft += c > 0.0 ? 1 : 0;
-  if (soft == 0) {
+  for (const Index row : order) soft += compliance[static_cast<std::size_t>(row)] > 0.0 ? 1 : 0;
+  if (soft == 0 && waiting == 0) {
     least_squares.factor(J, metric, static_cast<int>(m));
     return;
   }
@@ -150,63 +168,62 @@ void IslandSolver::Impl::factor_equalities() {
   const std::size_t width = n + soft;
   wide_J.assign(m * width, 0.0), wide_metric = metric;
   for (std::size_t i = 0; i < m; ++i) {
-    std::copy_n(J.begin() + static_cast<std::ptrdiff_t>(i * n), n,
+    const auto at = static_cast<std::size_t>(order[i]);
+    std::copy_n(J.begin() + static_cast<std::ptrdiff_t>(at * n), n,
                 wide_J.begin() + static_cast<std::ptrdiff_t>(i * width));
-    if (compliance[i] == 0.0) continue;
+    if (compliance[at] == 0.0) continue;
     wide_J[i * width + wide_metric.size()] = 1.0;
-    wide_metric.push_back(compliance[i]);
+    wide_metric.push_back(compliance[at]);
   }
   least_squares.factor(wide_J, wide_metric, static_cast<int>(m));
 }
 
-/// Equality rows first, then those with bounds.
-void IslandSolver::Impl::order_rows() {
-  order.clear();
-  for (Index i = 0; i < rows.size(); ++i)
-    if (!sparse && is_equality(rows.row(i).law)) order.push_back(i);
-  order.insert(order.end(), bounded.begin(), bounded.end());
-  place.resize(f.size());
-  for (std::size_t i = 0; i < f.size(); ++i) place[static_cast<std::size_t>(order[i])] = static_cast<Index>(i);
-}
-
 /// A = J D Jᵀ with compliances and flexibilities, in that order.
 void IslandSolver::Impl::assemble_ordered() {
-  const std::size_t m = f.size(), n = metric.size();
+  const std::size_t m = order.size(), n = metric.size();
   weigh();
-  ordered_G.resize(m * n);
-  for (std::size_t i = 0; i < m; ++i)
-    std::copy_n(G.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(order[i]) * n), n,
-                ordered_G.begin() + static_cast<std::ptrdiff_t>(i * n));
   A.resize(m * m);
   const Eigen::Map<const RowMajor> B(ordered_G.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
   Eigen::Map<RowMajor>(A.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(m)).noalias() =
       B * B.transpose();
   for (std::size_t i = 0; i < m; ++i) A[i * m + i] += compliance[static_cast<std::size_t>(order[i])];
   for (const ConstraintRows::Flexibility& g : flexibility) {
-    const auto i = static_cast<std::size_t>(place[static_cast<std::size_t>(g.i)]),
-               j = static_cast<std::size_t>(place[static_cast<std::size_t>(g.j)]);
+    const Index at_i = place[static_cast<std::size_t>(g.i)], at_j = place[static_cast<std::size_t>(g.j)];
+    if (at_i < 0 || at_j < 0) continue;
+    const auto i = static_cast<std::size_t>(at_i), j = static_cast<std::size_t>(at_j);
     A[i * m + j] += g.value / step;
     if (i != j) A[j * m + i] += g.value / step;
   }
 }
 
-/// G = J D^½.
+/// J D^½ of the rows in their order.
 void IslandSolver::Impl::weigh() {
   const std::size_t n = metric.size();
   for (std::size_t i = 0; i < n; ++i) weighted[i] = std::sqrt(metric[i]);
-  for (std::size_t row = 0; row < f.size(); ++row)
-    for (std::size_t i = 0; i < n; ++i) G[row * n + i] = J[row * n + i] * weighted[i];
+  ordered_G.resize(order.size() * n);
+  double* to = ordered_G.data();
+  for (const Index row : order) {
+    const double* from = J.data() + static_cast<std::size_t>(row) * n;
+    for (std::size_t i = 0; i < n; ++i) *to++ = from[i] * weighted[i];
+  }
 }
 
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
 void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
   if (sparse) {
+    std::fill(gaps.begin(), gaps.end(), 0.0);
     for (std::size_t i = 0; i < order.size(); ++i) ordered_b[i] = values[static_cast<std::size_t>(order[i])];
     coupling.scale({});
     coupling.multiply(product.data(), ordered_b.data());
     for (std::size_t i = 0; i < order.size(); ++i) {
       const auto at = static_cast<std::size_t>(order[i]);
       gaps[at] = product[i] - compliance[at] * values[at];
+    }
+    for (const ConstraintRows::Flexibility& g : flexibility) {
+      const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+      if (place[i] < 0 || place[j] < 0) continue;
+      gaps[i] -= g.value / step * values[j];
+      if (i != j) gaps[j] -= g.value / step * values[i];
     }
     return;
   }
@@ -228,13 +245,16 @@ SolveStatus IslandSolver::Impl::improve(bool first) {
 
 /// Rows without bounds: A Δf = −(gap − offset + compliance f), in the least-squares sense.
 SolveStatus IslandSolver::Impl::improve_equalities() {
-  for (Index i = 0; i < rows.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const RowLaw& law = rows.row(i).law;
-    next_f[at] = law.offset - gap[at] - law.compliance * (f[at] + step * reaction[at]);
+  next_f = f;
+  f_equal.resize(order.size());
+  if (order.empty()) return SolveStatus::kSolved;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const auto at = static_cast<std::size_t>(order[i]);
+    const RowLaw& law = laws[at];
+    f_equal[i] = law.offset - gap[at] - law.compliance * (f[at] + step * reaction[at]);
   }
-  const SolveStatus status = least_squares.solve(next_f, next_f);
-  for (std::size_t i = 0; i < f.size(); ++i) next_f[i] += f[i];
+  const SolveStatus status = least_squares.solve(f_equal, f_equal);
+  for (std::size_t i = 0; i < order.size(); ++i) next_f[static_cast<std::size_t>(order[i])] += f_equal[i];
   return status;
 }
 
@@ -246,7 +266,8 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     change[i] -= g.value * reaction[j];
     if (i != j) change[j] -= g.value * reaction[i];
   }
-  const std::size_t m = f.size(), e = m - bounded.size();
+  const std::size_t m = order.size(), e = m - bounded.size();
+  next_f = f;
   for (std::size_t i = 0; i < m; ++i) {
     const auto at = static_cast<std::size_t>(order[i]);
     const RowLaw& law = laws[at];
@@ -314,7 +335,7 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
                             .lower = lower_bounded,
                             .upper = upper_bounded,
                             .noise = noise_of_gaps()};
-  const SolveStatus status = sparse ? bounded_rows.solve(problem, coupling, f_bounded)
+  const SolveStatus status = sparse ? bounded_rows.solve(problem, coupling, f_bounded, !flexibility.empty())
                              : by_program()
                                  ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
                                  : bounded_rows.solve(problem, f_bounded);
@@ -346,7 +367,7 @@ void IslandSolver::Impl::keep_within_bounds() {
 /// Whether the island is small enough, and its rows have an interval each.
 bool IslandSolver::Impl::can_differentiate() const {
   constexpr std::size_t kMostRows = 96;
-  return !sparse && f.size() <= kMostRows && cones == 0 && flexibility.empty() &&
+  return !sparse && f.size() <= kMostRows && cones == 0 && waiting == 0 && flexibility.empty() &&
          rule.method != ContactMethod::kGapProgram;
 }
 

@@ -101,17 +101,23 @@ IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& 
 /// And the energy with it.
 IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandOptions& options, double whole_step) {
   constexpr int kSlowings = 3;
-  slowed = 0.0;
+  slowed = 0.0, recovers = true;
   IslandReport done = foresee(part, options, whole_step);
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0) || (splits && yield(BodyStates(part.table), part.constraints, options, done))) return done;
+    if (!(left > 0.0) || (can_split && yield(BodyStates(part.table), part.constraints, options, done))) return done;
+    if (recovers && !flexibility.empty() && has_recovery()) {
+      recovers = false, slowing = -1;
+      done = foresee(part, options, whole_step);
+      continue;
+    }
     const bool settled = done.status == SolveStatus::kSolved && !holds_contact_forces() && std::isfinite(left);
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
-  if (!splits && done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
+  if (!can_split && done.status == SolveStatus::kSolved &&
+      yield(BodyStates(part.table), part.constraints, options, done))
     return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
@@ -155,6 +161,7 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
     constraint->add_rows(states, StepTime::kStart, options.step, rows);
   }
   first_row.push_back(rows.size());
+  if (!recovers) stop_recovery();
   laws.clear();
   for (Index i = 0; i < rows.size(); ++i) laws.push_back(rows.row(i).law);
   theta = start_share(laws);
@@ -162,9 +169,10 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   sparse = is_large();
-  splits = sparse && std::ranges::all_of(laws, &RowLaw::contact);
+  can_split = sparse && std::ranges::all_of(laws, &RowLaw::contact);
+  splits = can_split && flexibility.empty();
   metric.resize(n), weighted.resize(n);
-  if (!sparse) J.resize(m * n), G.resize(m * n);
+  if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
   f.assign(m, 0.0), reaction.assign(m, 0.0), end_reaction.assign(m, 0.0);
   if (!sparse) bodies.write_jacobian(rows, J);

@@ -5,26 +5,42 @@
 
 namespace limber {
 
-/// Whether blocks are worth it; linear programs need A in full.
-bool IslandSolver::Impl::is_large() const {
+/// Whether blocks are worth it: an elimination in them by bodies, whose contacts may yield to each other, against one
+/// by rows. Linear programs need A in full, and impacts that hold their forces the answer to gravity by itself.
+bool IslandSolver::Impl::is_large() {
   constexpr Index kMostDenseRows = 150;
-  return rows.size() > kMostDenseRows && flexibility.empty() && !rule.is_program() &&
-         rule.friction == FrictionModel::kCone &&
-         std::ranges::any_of(laws, [](const RowLaw& law) { return !is_equality(law); });
+  const auto m = static_cast<double>(rows.size());
+  return rows.size() > kMostDenseRows && !rule.is_program() && rule.friction == FrictionModel::kCone &&
+         std::ranges::none_of(laws, &RowLaw::strikes) &&
+         std::ranges::any_of(laws, [](const RowLaw& law) { return !is_equality(law); }) &&
+         work_in_blocks() < m * m * m / 3.0;
+}
+
+/// Numbers multiplied where each body, with what its contacts yield to each other by, is eliminated against one other.
+double IslandSolver::Impl::work_in_blocks() {
+  widths.clear();
+  for (Index local = 0; local < bodies.count(); ++local) widths.push_back(bodies.response(local).size());
+  for (const ConstraintRows::Flexibility& g : flexibility)
+    if (g.i == g.j && g.body >= 0) ++widths[static_cast<std::size_t>(bodies.local(g.body))];
+  double work = 0.0;
+  for (const double width : widths) work += 3.0 * width * width * width;
+  return work;
 }
 
 std::size_t IslandSolver::Impl::node_width(Index local, bool frames_alone) const {
   const BodyResponse& r = bodies.response(local);
-  return static_cast<std::size_t>(frames_alone ? r.translations + r.rotations : r.size());
+  if (frames_alone) return static_cast<std::size_t>(r.translations + r.rotations);
+  return static_cast<std::size_t>(r.size()) + residual.rank(local);
 }
 
 /// The rows in the order of `order`, three of a cone as one unit; for the frames alone row by row.
 void IslandSolver::Impl::place_coupling(SparseCoupling& into, bool frames_alone) {
+  if (!frames_alone) residual.set(bodies, flexibility, place, order.size(), step);
   into.begin_structure();
   nodes.clear();
   for (Index local = 0; local < bodies.count(); ++local)
     nodes.push_back(into.add_node(node_width(local, frames_alone)));
-  const std::size_t m = f.size();
+  const std::size_t m = frames_alone ? f.size() : order.size();
   for (std::size_t i = 0, count = 1; i < m; i += count) {
     count = !frames_alone && i < 3 * cones ? 3 : 1;
     into.add_unit(count);
@@ -36,14 +52,13 @@ void IslandSolver::Impl::place_coupling(SparseCoupling& into, bool frames_alone)
       into.add_side(nodes[static_cast<std::size_t>(local)]);
       last = local;
     }
-    if (!frames_alone && row.law.compliance > 0.0) into.add_side(into.add_node(1));
   }
   into.end_structure();
 }
 
-/// J D^½, and a column for each compliance.
+/// J D^½, then the columns of what bodies yield beyond their modes; and what rows yield by themselves.
 void IslandSolver::Impl::fill_coupling(SparseCoupling& into, bool frames_alone) {
-  const std::size_t m = f.size();
+  const std::size_t m = frames_alone ? f.size() : order.size();
   into.clear_values();
   std::size_t next = 0;
   for (std::size_t i = 0, count = 1; i < m; i += count) {
@@ -63,14 +78,18 @@ void IslandSolver::Impl::fill_coupling(SparseCoupling& into, bool frames_alone) 
         one_row.assign(static_cast<std::size_t>(bodies.response(local).size()), 0.0);
         bodies.response(local).add_row(side.linear, side.angular, rows.modal(side), one_row.data());
         const double* weight = metric.data() + bodies.first(local);
-        for (std::size_t k = 0; k < width; ++k) to[k] += one_row[k] * std::sqrt(weight[k]);
+        const std::size_t own = frames_alone ? width : one_row.size();
+        for (std::size_t k = 0; k < own; ++k) to[k] += one_row[k] * std::sqrt(weight[k]);
+        if (!frames_alone) std::ranges::copy(residual.row(local, i + r), to + own);
       }
-      if (!frames_alone && row.law.compliance > 0.0)
-        into.values(next + sides++).row(r)[0] = std::sqrt(row.law.compliance);
+      if (!frames_alone) into.compliance(i + r) = row.law.compliance;
       most = std::max(most, sides);
     }
     next += most;
   }
+  for (const ConstraintRows::Flexibility& g : flexibility)
+    if (const Index at = frames_alone || g.body >= 0 ? Index{-1} : place[static_cast<std::size_t>(g.i)]; at >= 0)
+      into.compliance(static_cast<std::size_t>(at)) += g.value / step;
 }
 
 }  // namespace limber

@@ -3,6 +3,7 @@
 //   island_solver.cpp    the step as a whole, its cuts, the rows, and the bodies under the rows' impulses
 //   island_reaction.cpp  what rows that hold answer to gravity and other held forces
 //   island_touch.cpp     [H03]'s velocity program, before the rows
+//   island_working_rows.cpp  which rows take part, and in what order
 //   island_newton.cpp    Newton's method for the impulses
 //   island_sparse.cpp    the rows of islands of many bodies
 //   island_guard.cpp     the energy that may have come in, and what is done about more
@@ -20,6 +21,7 @@
 #include "limber/constraints/contact_qp.h"
 #include "limber/constraints/island_solver.h"
 #include "limber/constraints/least_squares.h"
+#include "residual_factor.h"
 #include "secant_iteration.h"
 #include "sparse_coupling.h"
 
@@ -42,7 +44,7 @@ struct IslandSolver::Impl {
   std::vector<ModalStep> modal_steps;  // of the bodies, where they are not those of their groups
   std::vector<Index> first_row;        // per constraint, and the end
   std::vector<RowLaw> laws;            // of the rows at the step's start
-  std::vector<double> J, metric, G, weighted, gap, start_gap, b, lower, upper, compliance;
+  std::vector<double> J, metric, weighted, gap, start_gap, b, lower, upper, compliance;
   std::vector<double> f, next_f, reaction, end_reaction, change;
   std::vector<FrameAcceleration> accelerations;  // per body, under held forces
   std::vector<double> frame_G, unit_metric;
@@ -51,6 +53,8 @@ struct IslandSolver::Impl {
   // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
   // Among those the contacts with friction come first, three rows each.
   std::vector<Index> bounded, order, place;
+  std::vector<char> waits;  // by row: of a contact that is left out until the bodies would come through it
+  std::size_t waiting = 0;  // rows
   std::size_t cones = 0;
   std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
   std::vector<double> held_impulse, friction;
@@ -60,10 +64,12 @@ struct IslandSolver::Impl {
   // Islands of many rows: J and its frames' part in blocks instead, all rows in one problem; no dense matrix is made.
   bool sparse = false;
   SparseCoupling coupling, frame_coupling;
+  ResidualFactor residual;         // of the rows in `coupling`
   std::vector<std::size_t> nodes;  // of the bodies
-  std::vector<double> one_row, product;
-  double slack = 1.0;   // of the rows' tolerance, which this iteration's cones may be off
-  bool splits = false;  // with nothing but contacts among the rows
+  std::vector<double> one_row, product, widths;
+  double slack = 1.0;      // of the rows' tolerance, which this iteration's cones may be off
+  bool can_split = false;  // with nothing but contacts among the rows
+  bool splits = false;     // from the start: none of which yields by itself
   ConeSplitting splitting;
   ProximalSolver frames;
   LeastSquaresSolver least_squares;
@@ -82,6 +88,7 @@ struct IslandSolver::Impl {
   DifferenceNewton newton;
   std::vector<double> slope, tolerance;
   IslandEnergy energy;
+  bool recovers = true;       // overlapping bodies are pushed apart
   double slowed = 0.0;        // the part of the frames' relative motion that is taken at the step's start
   double start_energy = 0.0;  // J, of that motion
   std::vector<FrameMomentum> start_momenta;
@@ -95,7 +102,8 @@ struct IslandSolver::Impl {
   void find_accelerations(StepTime when, const Vec3& gravity);
   void hold_contact(StepTime when, Index normal);
   void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
-  bool is_large() const;
+  bool is_large();
+  double work_in_blocks();
   std::size_t node_width(Index local, bool frames_alone) const;
   void place_coupling(SparseCoupling& into, bool frames_alone);
   void fill_coupling(SparseCoupling& into, bool frames_alone);
@@ -121,7 +129,11 @@ struct IslandSolver::Impl {
                   std::span<Constraint* const> constraints, const Vec3& gravity, double left);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                       IslandReport& report);
+  bool rows_may_wait() const;
+  void choose_rows();
+  bool wake_rows(const IslandOptions& options);
   void sort_rows();
+  void begin_with_last_forces();
   void factor();
   void factor_equalities();
   void order_rows();
@@ -152,7 +164,7 @@ struct IslandSolver::Impl {
                             const IslandOptions& options, IslandReport& report);
   SolveStatus iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
                                const IslandOptions& options, IslandReport& report);
-  void begin_splitting();
+  void begin_splitting(bool from_last_forces);
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);
@@ -162,6 +174,8 @@ struct IslandSolver::Impl {
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
   double close_energy(const IslandOptions& options, IslandReport& report);
+  bool has_recovery() const;
+  void stop_recovery();
   bool slow_start(double left);
   bool yield(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
              IslandReport& report);

@@ -3,6 +3,19 @@
 #include <algorithm>
 
 namespace limber {
+namespace {
+
+/// (1 − P' + P'/ρ)⁻¹ − 1, by the eigenvectors of P', which keeps the digits where ρ is large.
+Mat3 inverse_change(const ProjectionDerivative& P, double rho) {
+  Mat3 change = Mat3::Zero();
+  for (std::size_t c = 0; c < P.columns; ++c) {
+    const double part = P.s[c].squaredNorm();
+    if (part > 0.0) change += (1.0 / (1.0 - part + part / rho) - 1.0) / part * P.s[c] * P.s[c].transpose();
+  }
+  return change;
+}
+
+}  // namespace
 
 void SparseCoupling::begin_structure() {
   rows_ = numbers_ = 0;
@@ -55,6 +68,8 @@ void SparseCoupling::end_structure() {
   for (const std::size_t width : widths_) widest = std::max(widest, padded(width));
   product_.need(3 * widest), motion_.need(factor_.size()), step_.need(factor_.size());
   rows_memory_.need(rows_);
+  compliance_.assign(rows_, 0.0), scaled_compliance_.assign(rows_, 0.0);
+  share_.resize(rows_), swept_.resize(rows_);
   left_.resize(units_.size()), right_.resize(units_.size());
   std::fill_n(given_.need(numbers_), padded(numbers_), 0.0);
   scaled_.need(numbers_);
@@ -68,6 +83,7 @@ MatrixView SparseCoupling::used(std::size_t side) const {
 Mat3 SparseCoupling::own_block(std::size_t first, std::size_t count) const {
   const Unit& unit = units_[unit_of_[first]];
   Mat3 A = Mat3::Zero();
+  for (std::size_t r = 0; r < count; ++r) A(static_cast<int>(r), static_cast<int>(r)) = compliance_[first + r];
   for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
     const std::size_t stride = padded(widths_[sides_[s].node]);
     const double* G = given_.data() + sides_[s].offset;
@@ -81,6 +97,7 @@ Mat3 SparseCoupling::own_block(std::size_t first, std::size_t count) const {
 
 void SparseCoupling::scale(std::span<const double> s) {
   used_ = s.empty() ? given_.data() : scaled_.data();
+  for (std::size_t i = 0; i < rows_; ++i) scaled_compliance_[i] = compliance_[i] / (s.empty() ? 1.0 : s[i] * s[i]);
   if (s.empty()) return;
   for (const Unit& unit : units_)
     for (std::size_t side = unit.first_side; side < unit.first_side + unit.sides; ++side) {
@@ -119,8 +136,15 @@ void SparseCoupling::gather(const double* rows, double* x) const {
 void SparseCoupling::multiply(double* out, const double* x) {
   double* motion = motion_.data();
   gather(x, motion);
-  std::fill_n(out, rows_, 0.0);
+  for (std::size_t i = 0; i < rows_; ++i) out[i] = scaled_compliance_[i] * x[i];
   spread_blocks(out, blocks_.data(), blocks_.size(), used_, motion);
+}
+
+/// D of a unit, as it is scaled.
+Mat3 SparseCoupling::own_compliance(const Unit& unit) const {
+  Vec3 own = Vec3::Zero();
+  std::copy_n(scaled_compliance_.begin() + static_cast<std::ptrdiff_t>(unit.first), unit.rows, own.data());
+  return own.asDiagonal();
 }
 
 /// M += Gᵀ N G of a unit.
@@ -149,84 +173,109 @@ void SparseCoupling::add_product(const Unit& unit, const Mat3& N, bool symmetric
   }
 }
 
-/// dy = −d − N G dx with M dx = −Gᵀd, M factored; N by unit.
-void SparseCoupling::step_of_rows(std::span<const ProjectionDerivative> P, const std::vector<Mat3>& N, const double* d,
-                                  double* dy) {
-  double* dx = step_.data();
-  gather(d, dx);
+/// The matrix of (1), with K⁻¹ in left_ and N in right_, which comes to be K⁻¹N.
+bool SparseCoupling::factor_with(std::span<const ProjectionDerivative> P, bool symmetric) {
+  factor_.set_identity();
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    if (P[u].columns == 0) continue;
+    right_[u] = left_[u] * right_[u];
+    add_product(units_[u], right_[u], symmetric);
+  }
+  return symmetric ? factor_.factor_symmetric() : factor_.factor_general();
+}
+
+/// dy = −K⁻¹d − K⁻¹N G dx with M dx = −GᵀK⁻¹d, M factored.
+void SparseCoupling::step_of_rows(std::span<const ProjectionDerivative> P, const double* d, double* dy) {
+  double *dx = step_.data(), *weighted = rows_memory_.data();  // K⁻¹d
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Vec3 own = Vec3::Zero();
+    std::copy_n(d + units_[u].first, units_[u].rows, own.data());
+    own = left_[u] * own;
+    std::copy_n(own.data(), units_[u].rows, weighted + units_[u].first);
+  }
+  gather(weighted, dx);
   for (std::size_t i = 0; i < factor_.size(); ++i) dx[i] = -dx[i];
   factor_.solve(dx);
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const Unit& unit = units_[u];
     Vec3 change = Vec3::Zero();
-    if (P[u].columns > 0) change = N[u] * seen(unit, dx);
-    for (std::size_t r = 0; r < unit.rows; ++r) dy[unit.first + r] = -d[unit.first + r] - change[static_cast<int>(r)];
+    if (P[u].columns > 0) change = right_[u] * seen(unit, dx);
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      dy[unit.first + r] = -weighted[unit.first + r] - change[static_cast<int>(r)];
   }
 }
 
+/// K = 1 + ρ P'D, N = ρ P'
 bool SparseCoupling::convex_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) {
-  factor_.set_identity();
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    left_[u].setZero();
-    for (std::size_t c = 0; c < P[u].columns; ++c) left_[u] += rho * P[u].s[c] * P[u].s[c].transpose();
-    if (P[u].columns > 0) add_product(units_[u], left_[u], true);
+    left_[u].setIdentity(), right_[u].setZero();
+    for (std::size_t c = 0; c < P[u].columns; ++c) right_[u] += rho * P[u].s[c] * P[u].s[c].transpose();
+    const Mat3 D = own_compliance(units_[u]);
+    if (P[u].columns > 0 && !D.isZero(0.0)) left_[u] = (Mat3::Identity() + right_[u] * D).inverse();
   }
-  if (!factor_.factor_symmetric()) return false;
-  step_of_rows(P, left_, d, dy);
+  if (!factor_with(P, true)) return false;
+  step_of_rows(P, d, dy);
   return true;
 }
 
+/// K = 1 − P' + P'/ρ + P'C D, N = P'C
 bool SparseCoupling::map_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) {
-  factor_.set_identity();
-  double* weighted = rows_memory_.data();  // K⁻¹ d
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const Unit& unit = units_[u];
     left_[u].setIdentity(), right_[u].setZero();
-    for (std::size_t c = 0; c < P[u].columns; ++c) {
-      const double part = P[u].s[c].squaredNorm(), inverse = 1.0 / (1.0 - part + part / rho);
-      if (!(part > 0.0)) continue;
-      const Mat3 square = P[u].s[c] * P[u].s[c].transpose() / part;
-      left_[u] += (inverse - 1.0) * square;
-      right_[u] += inverse * part * square;
-    }
-    right_[u] += right_[u].col(0) * P[u].shift.transpose();
-    if (P[u].columns > 0) add_product(unit, right_[u], false);
-    Vec3 own = Vec3::Zero();
-    std::copy_n(d + unit.first, unit.rows, own.data());
-    own = left_[u] * own;
-    std::copy_n(own.data(), unit.rows, weighted + unit.first);
+    for (std::size_t c = 0; c < P[u].columns; ++c) right_[u] += P[u].s[c] * P[u].s[c].transpose();
+    const Mat3 own = right_[u], D = own_compliance(units_[u]);
+    right_[u] += own.col(0) * P[u].shift.transpose();
+    if (P[u].columns == 0) continue;
+    if (!D.isZero(0.0))
+      left_[u] = (Mat3::Identity() - (1.0 - 1.0 / rho) * own + right_[u] * D).inverse();
+    else
+      left_[u] += inverse_change(P[u], rho);
   }
-  if (!factor_.factor_general()) return false;
-  step_of_rows(P, right_, weighted, dy);
+  if (!factor_with(P, false)) return false;
+  step_of_rows(P, d, dy);
   return true;
 }
 
 bool SparseCoupling::factor_shifted(double shift) {
   shift_ = shift;
   factor_.set_identity();
-  for (const Unit& unit : units_) add_product(unit, Mat3::Identity() / shift, true);
+  for (const Unit& unit : units_) {
+    Mat3 inverse = Mat3::Identity() / shift;
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto at = static_cast<int>(r);
+      share_[unit.first + r] = shift / (shift + scaled_compliance_[unit.first + r]);
+      inverse(at, at) *= share_[unit.first + r];
+    }
+    add_product(unit, inverse, true);
+  }
   return factor_.factor_symmetric();
 }
 
-/// (G Gᵀ + c)⁻¹ = (1 − G (1 + GᵀG/c)⁻¹ Gᵀ/c)/c
+/// With s = c/(D + c): (G Gᵀ + D + c)⁻¹ = s (1 − G (1 + Gᵀ s G/c)⁻¹ Gᵀs/c)/c
 void SparseCoupling::solve_shifted(double* x) {
-  double* motion = motion_.data();
-  gather(x, motion);
+  double *motion = motion_.data(), *own = rows_memory_.data();
+  for (std::size_t i = 0; i < rows_; ++i) own[i] = share_[i] * x[i];
+  gather(own, motion);
   factor_.solve(motion);
-  double* own = rows_memory_.data();
   std::fill_n(own, rows_, 0.0);
   spread_blocks(own, blocks_.data(), blocks_.size(), used_, motion);
   const double inverse = 1.0 / shift_;
-  for (std::size_t i = 0; i < rows_; ++i) x[i] = inverse * (x[i] - inverse * own[i]);
+  for (std::size_t i = 0; i < rows_; ++i) x[i] = share_[i] * inverse * (x[i] - inverse * own[i]);
 }
 
-void SparseCoupling::begin_sweeps(const double* f) { gather(f, motion_.data()); }
-
-Vec3 SparseCoupling::answer(std::size_t first, std::size_t) const {
-  return seen(units_[unit_of_[first]], motion_.data());
+void SparseCoupling::begin_sweeps(const double* f) {
+  std::copy_n(f, rows_, swept_.begin());
+  gather(f, motion_.data());
 }
 
-void SparseCoupling::move(std::size_t first, std::size_t, const Vec3& change) {
+Vec3 SparseCoupling::answer(std::size_t first, std::size_t count) const {
+  Vec3 sum = seen(units_[unit_of_[first]], motion_.data());
+  for (std::size_t r = 0; r < count; ++r) sum[static_cast<int>(r)] += scaled_compliance_[first + r] * swept_[first + r];
+  return sum;
+}
+
+void SparseCoupling::move(std::size_t first, std::size_t count, const Vec3& change) {
+  for (std::size_t r = 0; r < count; ++r) swept_[first + r] += change[static_cast<int>(r)];
   add_to_motion(units_[unit_of_[first]], change.data(), motion_.data());
 }
 

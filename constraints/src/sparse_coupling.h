@@ -1,7 +1,8 @@
-// A = G Gᵀ of an island with many bodies: G in blocks, one for each body that a contact touches, A never formed.
+// A = G Gᵀ + D of an island with many bodies: G in blocks, one for each body that a contact touches, D diagonal, what
+// rows yield by themselves; A never formed.
 //
 // Newton's steps are taken in the smaller and sparser space of the bodies' degrees of freedom x = Gᵀy. With a diagonal
-// of small blocks K and N, (K + N A) dy = −d has
+// of small blocks K and N, (K + N G Gᵀ) dy = −d has
 //
 //   (1 + Gᵀ K⁻¹N G) dx = −Gᵀ K⁻¹ d,    dy = −K⁻¹ (d + N G dx),                                                   (1)
 //
@@ -20,7 +21,7 @@ class SparseCoupling final : public RowCoupling {
  public:
   // Built in this order: nodes, units with their sides, end_structure(), then the values of all sides.
   void begin_structure();
-  /// Degrees of freedom that belong together: those of a body, or of what a few rows yield by. @return its number
+  /// Degrees of freedom that belong together: those of a body. @return its number
   std::size_t add_node(std::size_t width);
   /// The next one or three rows.
   void add_unit(std::size_t rows);
@@ -28,7 +29,12 @@ class SparseCoupling final : public RowCoupling {
   std::size_t add_side(std::size_t node);
   /// Finds the order of elimination; all values are zero. Memory grows to the largest problem seen.
   void end_structure();
-  void clear_values() { std::fill_n(given_.data(), padded(numbers_), 0.0); }
+  void clear_values() {
+    std::fill_n(given_.data(), padded(numbers_), 0.0);
+    std::fill(compliance_.begin(), compliance_.end(), 0.0);
+  }
+  /// Of a row by itself: its number of D, ≥ 0.
+  double& compliance(std::size_t row) { return compliance_[row]; }
   /// Row by row: rows of its unit × the node's width.
   MatrixView values(std::size_t side) {
     return {given_.data() + sides_[side].offset, padded(widths_[sides_[side].node])};
@@ -68,7 +74,9 @@ class SparseCoupling final : public RowCoupling {
   Vec3 seen(const Unit& unit, const double* x) const;
   void gather(const double* rows, double* x) const;
   void add_product(const Unit& unit, const Mat3& N, bool symmetric);
-  void step_of_rows(std::span<const ProjectionDerivative> P, const std::vector<Mat3>& N, const double* d, double* dy);
+  Mat3 own_compliance(const Unit& unit) const;
+  bool factor_with(std::span<const ProjectionDerivative> P, bool symmetric);
+  void step_of_rows(std::span<const ProjectionDerivative> P, const double* d, double* dy);
 
   std::size_t rows_ = 0, numbers_ = 0;
   std::vector<std::size_t> widths_, unit_of_;
@@ -76,7 +84,8 @@ class SparseCoupling final : public RowCoupling {
   std::vector<Side> sides_;
   std::vector<RowBlock> blocks_;  // of the sides, with their places in vectors of motion
   std::vector<Place> places_;
-  std::vector<Mat3> left_, right_;  // of map_step(): K⁻¹ and K⁻¹N
+  std::vector<Mat3> left_, right_;  // by unit, K⁻¹ and K⁻¹N of (1)
+  std::vector<double> compliance_, scaled_compliance_, share_, swept_;
   BlockFactor factor_;
   double shift_ = 1.0;
   const double* used_ = nullptr;  // given_ or scaled_

@@ -14,6 +14,12 @@
 namespace limber::testing {
 namespace {
 
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kToRest = false;  // the sanitizers take twenty times as long
+#else
+constexpr bool kToRest = true;
+#endif
+
 RigidTransform above(double height, const Vec3& turn = Vec3::Zero()) {
   return {quaternion_from_rotation_vector(turn), {0.0, 0.0, height}};
 }
@@ -103,6 +109,86 @@ TEST(Contact, FreeBodiesThatCollideKeepLinearAndAngularMomentum) {
       EXPECT_LT((island.linear_momentum() - linear).norm(), kRelative * scale) << modes << ' ' << friction;
       EXPECT_LT((island.angular_momentum() - angular).norm(), kRelative * scale) << modes << ' ' << friction;
     }
+}
+
+/// Most of the rows of an island of many are left out until they are needed: the answer is that of small islands, which
+/// are solved with all of theirs.
+TEST(Contact, BodiesThatDoNotMeetMoveInOneIslandAsEachInItsOwn) {
+  constexpr double kApart = 1e-4;  // m, after half a second: energy is watched in the sum over an island
+  constexpr int kBodies = 7, kSteps = 30;
+  const SampleOptions sample{.modes = 16, .dropped = 4, .lowest_hz = 30.0, .decay = 6.0};  // too many for blocks
+  GroundedIsland together(sample, kFrame);
+  std::vector<Vec3> alone;
+  for (int i = 0; i < kBodies; ++i) {
+    const RigidTransform pose{quaternion_from_rotation_vector({0.2 * i, 0.1, 0.05 * i}), {2.0 * i, 0.0, 0.35}};
+    const Vec3 velocity(0.5, 0.1 * i, -1.0);
+    together.add_body(pose, velocity);
+    GroundedIsland island(sample, kFrame);
+    island.add_body(pose, velocity);
+    for (int n = 0; n < kSteps; ++n) ASSERT_EQ(island.step().status, SolveStatus::kSolved);
+    alone.push_back(island.group.frame(0).pose().p);
+  }
+  for (int n = 0; n < kSteps; ++n) {
+    const IslandReport report = together.step();
+    ASSERT_EQ(report.status, SolveStatus::kSolved) << n;
+    ASSERT_EQ(report.rows, 24 * kBodies);
+  }
+  for (Index i = 0; i < kBodies; ++i)
+    EXPECT_LT((together.group.frame(i).pose().p - alone[static_cast<std::size_t>(i)]).norm(), kApart) << i;
+}
+
+/// More than 150 rows: blocks by body, where forces go on from step to step.
+TEST(Contact, BodiesThatBendComeToRestInOneLargeIslandAndGainNoEnergy) {
+  constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4, kRise = 1e-6;
+  constexpr int kBodies = 7, kSteps = kToRest ? 240 : 30;
+  GroundedIsland island({.modes = 8, .dropped = 4, .lowest_hz = 30.0, .decay = 6.0}, kFrame);
+  for (int i = 0; i < kBodies; ++i)
+    island.add_body({quaternion_from_rotation_vector({0.05 * i, 0.1, 0.05 * i}), {2.0 * i, 0.0, 0.35}});
+  const double scale = island.energy_scale();
+  double before = island.energy(), worst = 0.0;
+  for (int n = 0; n < kSteps; ++n) {
+    const IslandReport report = island.step();
+    EXPECT_EQ(report.status, SolveStatus::kSolved) << n;
+    EXPECT_GT(report.rows, 150);
+    const double after = island.energy();
+    worst = std::max(worst, (after - before) / scale);
+    before = after;
+  }
+  EXPECT_LT(worst, kRise);
+  if (!kToRest) return;
+  EXPECT_GT(island.lowest_gap(), -kPenetration);
+  double weight = 0.0;
+  for (const Index body : island.members) {
+    EXPECT_LT(island.group.frame(body).velocity().norm(), kShift) << body;
+    weight += kGravity * island.model->data().mass;
+  }
+  EXPECT_NEAR(island.contact_impulse().z(), weight * kFrame, 1e-6 * weight * kFrame);
+}
+
+TEST(Contact, BodiesCaughtInEachOtherStayAsTheyAre) {
+  Island island({.modes = 12, .lowest_hz = 20.0}, kFrame, Vec3::Zero());
+  island.add_body({{}, Vec3::Zero()});
+  island.add_body({quaternion_from_rotation_vector({0.0, 0.0, 0.02}), Vec3::Zero()});
+  ContactSet contacts;
+  for (int i = 0; i < 10; ++i) {
+    std::vector<ContactPoint> found;
+    double opposed = 0.0;
+    for (Index corner = 0; corner < 8; ++corner) {
+      const SurfacePoint at = corner_point(*island.model, corner);
+      const double across = (island.group.position(0, at) - island.group.position(1, at)).x();
+      found.push_back(contact_between(island, 0, at, 1, at, Vec3(across > 0.0 ? -1.0 : 1.0, 0.0, 0.0),
+                                      static_cast<std::uint64_t>(corner + 1)));
+      EXPECT_LT(found.back().gap, -1e-3);
+      opposed += found.back().normal.x();
+    }
+    EXPECT_EQ(opposed, 0.0);
+    contacts.update(island.states(), found);
+    island.constraints.assign(contacts.constraints().begin(), contacts.constraints().end());
+    EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+    contacts.finish();
+    EXPECT_TRUE(contacts.events().empty());
+  }
+  EXPECT_LT(island.group.frame(1).velocity().norm() + island.energy(), 1e-12);
 }
 
 Vec3 slope(double angle) { return {-std::sin(angle), 0.0, std::cos(angle)}; }

@@ -229,14 +229,20 @@ TEST(FrictionCone, BlocksGiveTheFixedPointOfTheFullMatrix) {
   std::mt19937 random(4);
   FrictionSolver solver;
   for (int n = 0; n < 20; ++n) {
-    const FrictionSample s = make_friction(1 + n % 5, 18, 0.4, random);
+    FrictionSample s = make_friction(1 + n % 5, 18, 0.4, random);
+    // In every other problem rows yield by themselves besides, those of a contact by different amounts.
+    std::vector<double> yields(s.b.size());
+    for (std::size_t i = 0; i < yields.size() && n % 2 == 1; ++i) {
+      yields[i] = 0.1 * static_cast<double>(1 + i % 4) * s.A[i * yields.size() + i];
+      s.A[i * yields.size() + i] += yields[i];
+    }
     const FrictionOptions options{
         .method = FrictionMethod::kBlockGaussSeidel, .tolerance = 1e-12, .max_sweeps = 20'000};
     const SolvedCones full = solve(s, solver, options);
     std::vector<double> values, f(s.b.size());
     const auto blocks = blocks_of(s, s.columns, values);
     const BlockFrictionProblem problem{
-        .contacts = s.contacts, .columns = s.columns, .blocks = blocks, .b = s.b, .mu = s.mu};
+        .contacts = s.contacts, .columns = s.columns, .blocks = blocks, .D = yields, .b = s.b, .mu = s.mu};
     const SolvedCones exact = solve(s, solver, {.tolerance = 1e-12, .max_sweeps = 20'000});
     for (const FrictionMethod method :
          {FrictionMethod::kBlockGaussSeidel, FrictionMethod::kProximal, FrictionMethod::kSplitting}) {

@@ -84,15 +84,18 @@ class ConstraintRows {
   /// Two rows that yield to each other's forces, beyond what the modes show: gap_i += G f_j/Δt, gap_j += G f_i/Δt.
   struct Flexibility {
     Index i = 0, j = 0;
-    double value = 0.0;  // G, m/N
+    double value = 0.0;  ///< G, m/N
+    Index body = -1;     ///< that yields, in the table; −1: the row does by itself, i = j
   };
 
   void clear();
   /// @return the row's index. Copies the modal parts.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
-  /// together are a positive semidefinite matrix.
-  void add_flexibility(Index i, Index j, double value) { flexibility_.push_back({i, j, value}); }
+  /// of a body together are a positive semidefinite matrix, of rows that act on it.
+  void add_flexibility(Index body, Index i, Index j, double value) { flexibility_.push_back({i, j, value, body}); }
+  /// What a row yields to its own force alone, whatever it acts on: value ≥ 0.
+  void add_give(Index row, double value) { flexibility_.push_back({row, row, value, -1}); }
   /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
   void add_stored_energy(double energy) { stored_energy_ += energy; }
 

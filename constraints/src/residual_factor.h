@@ -1,0 +1,47 @@
+// What the rows of an island yield beyond the bodies' kept modes, as factors by body: G_b/Δt = L_b L_bᵀ, so that a body
+// has the columns of L_b as further degrees of freedom, of unit weight (sparse_coupling.h).
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "limber/constraints/constraint_rows.h"
+#include "pivoted_cholesky.h"
+
+namespace limber {
+
+class ResidualFactor {
+ public:
+  /// Memory grows to the largest island seen.
+  /// @param flexibility of all rows, those of a body alone are read
+  /// @param place of a row among those that take part; −1: it does not. @param rows how many do
+  void set(const IslandBodies& bodies, std::span<const ConstraintRows::Flexibility> flexibility,
+           std::span<const Index> place, std::size_t rows, double step);
+  /// Columns of a body's factor.
+  std::size_t rank(Index local) const { return bodies_[static_cast<std::size_t>(local)].rank; }
+  /// A row's numbers in them; none where the body does not yield to the row.
+  std::span<const double> row(Index local, std::size_t at) const;
+
+ private:
+  struct Body {
+    std::vector<std::size_t> rows;  // their places
+    std::vector<double> values;     // row by row, `rank` each
+    std::size_t rank = 0;
+  };
+  /// A row's number among those of a body.
+  struct Own {
+    Index local = -1;
+    std::size_t number = 0;
+  };
+  std::size_t number_in(Index local, std::size_t at);
+  void factor(Body& body, std::span<const ConstraintRows::Flexibility> pairs);
+
+  std::vector<Body> bodies_;
+  std::vector<std::array<Own, 2>> own_;                          // by place: a row has two sides
+  std::vector<std::vector<ConstraintRows::Flexibility>> pairs_;  // by body, rows by number
+  MatrixBuffer matrix_;
+  PivotedCholesky cholesky_;
+};
+
+}  // namespace limber
