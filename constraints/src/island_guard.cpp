@@ -90,7 +90,8 @@ bool IslandSolver::Impl::slow_start(double left) {
 }
 
 /// Islands of nothing but contacts: what their gaps may be off is energy where they are at rest, with no motion to take
-/// it from, and most of all in large ones. Forces that are smaller by a part that no gap shows let the pile down by as much.
+/// it from, and most of all in large ones. Forces that are smaller by a part that no gap shows let the pile down by as
+/// much.
 /// @return whether they do
 bool IslandSolver::Impl::yield(const BodyStates& states, std::span<Constraint* const> constraints,
                                const IslandOptions& options, IslandReport& report) {
