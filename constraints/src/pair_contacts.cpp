@@ -1,0 +1,256 @@
+#include "pair_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace limber {
+namespace {
+
+// Gaps are met to this part of the distances at hand.
+constexpr double kRelativeTolerance = 1e-9;
+// Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
+constexpr double kRecovery = 0.2;
+// Of what a force moves the reduced mass of two bodies within a step: so far each contact of bodies that flex yields by
+// itself. Loads that many contacts could share in many ways then have one answer that changes little where gaps change
+// by a picometre; what rests sinks by less than kGive g Δt², 3e-7 m at 60 steps a second.
+constexpr double kGive = 1e-4;
+// Steps that an impact may last in any case.
+constexpr double kShortestStrike = 2.0;
+
+/// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
+double longest_rebound(const PreparedSide& a, const PreparedSide& b) {
+  double longest = 0.0;
+  for (const PreparedSide* side : {&a, &b}) {
+    if (side->model == nullptr) continue;
+    for (const double lambda : side->model->data().eigenvalues)
+      if (lambda > 0.0) {
+        longest = std::max(longest, 2.0 * std::numbers::pi / std::sqrt(lambda));
+        break;
+      }
+  }
+  return longest;
+}
+
+}  // namespace
+
+void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents,
+                       double lasted) {
+  contacts_ = contacts;
+  options_ = &options;
+  dents_ = &dents;
+  lasted_ = lasted;
+  const PreparedContact& first = contacts.front();
+  yields_ = {options.residual_compliance && yields(first.a), options.residual_compliance && yields(first.b)};
+}
+
+void PairContacts::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
+  step_ = step;
+  if (when == StepTime::kStart) begin(states);
+  const Index first = rows.size();
+  for (const PreparedContact& contact : contacts_) add_contact(states, when, contact, rows);
+  if (when == StepTime::kStart) add_flexibility(states, first, rows);
+}
+
+void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
+  std::size_t row = 0;
+  for (const PreparedContact& contact : contacts_) {
+    const Vec3 offset = contact.a.position(states, when) - contact.b.position(states, when);
+    gaps[row++] = contact.axes.col(0).dot(offset) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
+    if (contact.friction == 0.0) continue;
+    const Vec3 slip = offset - contact.offset + rolled(states, when, contact);
+    for (int t = 1; t < 3; ++t)
+      gaps[row++] = contact.axes.col(t).dot(slip) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
+  }
+}
+
+double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motions, double within) {
+  const PreparedContact& first = contacts_.front();
+  const bool struck = options_->impact == ImpactModel::kHeldFromTouch && (flexes(first.a) || flexes(first.b));
+  if (!struck && options_->rule.method != ContactMethod::kVelocityProgram) return within;
+  for (const PreparedContact& contact : contacts_) within = touch(states, motions, contact, within);
+  return within;
+}
+
+void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
+  std::size_t row = 0;
+  bool pressed = false;
+  for (PreparedContact& contact : contacts_) {
+    Vec3 impulse = impulses[row++] * contact.axes.col(0);
+    for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
+    const Vec3 before = contact.last_force;
+    contact.last_force = impulse / step_;
+    contact.held_force = lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force;
+    contact.give = give_;
+    contact.impulse += impulse;
+    pressed = pressed || !impulse.isZero(0.0);
+    for (std::size_t side = 0; side < 2; ++side)
+      if (yields_[side])
+        dents_->press(body(contact, side),
+                      {at(contact, side), turn_[side].conjugate() * (sign(side) * contact.last_force)});
+  }
+  lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
+}
+
+void PairContacts::begin(const BodyStates& states) {
+  for (PreparedContact& contact : contacts_)
+    contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
+  strikes_ = strikes(states);
+  for (std::size_t side = 0; side < 2; ++side)
+    if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
+  deepest_dent_ = 0.0;
+  const PreparedContact& first = contacts_.front();
+  give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty
+              ? kGive * step_ * step_ / reduced_mass(states, first)
+              : 0.0;
+  for (PreparedContact& contact : contacts_) {
+    Vec3 dent = Vec3::Zero();
+    for (std::size_t side = 0; side < 2; ++side)
+      if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
+    contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
+    deepest_dent_ = std::max(deepest_dent_, contact.dent[0]);
+  }
+  caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
+}
+
+bool PairContacts::is_caught() const {
+  constexpr double kOpposed = -0.5;
+  const auto overlaps = [](const PreparedContact& c) { return c.axes.col(0).dot(c.offset) < 0.0; };
+  for (const PreparedContact& contact : contacts_)
+    if (overlaps(contact) && std::ranges::any_of(contacts_, [&](const PreparedContact& other) {
+          return overlaps(other) && contact.axes.col(0).dot(other.axes.col(0)) < kOpposed;
+        }))
+      return true;
+  return false;
+}
+
+Vec3 PairContacts::point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
+  if (is_round(contact.a) != is_round(contact.b)) return is_round(contact.a) ? a : b;
+  return 0.5 * (a + b);
+}
+
+Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) {
+  if (when == StepTime::kStart) return Vec3::Zero();
+  return contact.a.rolled(states) - contact.b.rolled(states);
+}
+
+const SurfacePoint& PairContacts::at(const PreparedContact& contact, std::size_t side) {
+  return (side == 0 ? contact.a : contact.b).at;
+}
+
+double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
+                           double within) {
+  constexpr int kMostHalvings = 60;
+  constexpr double kClosed = 1e-12;  // of the way through the step
+  const Vec3 n = contact.axes.col(0);
+  Vec3 a, b, velocity_a, velocity_b;
+  const auto gap = [&](double time) {
+    passage_a_.find(states, motions, contact.a, time, a, velocity_a);
+    passage_b_.find(states, motions, contact.b, time, b, velocity_b);
+    return n.dot(a - b);
+  };
+  double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
+  const double least = kRelativeTolerance * a.norm();
+  if (!(gap_open > least && gap_closed < 0.0)) return within;
+  for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
+    // Secants from both ends close in from one side alone: every third step halves.
+    const double part = i % 3 == 2 ? 0.5 : std::clamp(gap_open / (gap_open - gap_closed), 1e-3, 1.0 - 1e-3);
+    const double between = open + part * (closed - open), seen = gap(between);
+    (seen > 0.0 ? open : closed) = between;
+    (seen > 0.0 ? gap_open : gap_closed) = seen;
+    if (seen > 0.0 && seen <= least) break;
+  }
+  gap(open);
+  return n.dot(velocity_b - velocity_a) > options_->impact_speed ? open : within;
+}
+
+bool PairContacts::strikes(const BodyStates& states) const {
+  const PreparedContact& first = contacts_.front();
+  if (options_->impact == ImpactModel::kAbsorbed || !(flexes(first.a) || flexes(first.b))) return false;
+  if (lasted_ > 0.0) return lasted_ < std::max(longest_rebound(first.a, first.b), kShortestStrike * step_);
+  return std::ranges::any_of(contacts_, [&](const PreparedContact& contact) {
+    if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
+    const Vec3 n = contact.axes.col(0);
+    const double speed =
+        n.dot(contact.a.velocity(states, StepTime::kStart) - contact.b.velocity(states, StepTime::kStart));
+    return -speed > options_->impact_speed && n.dot(contact.offset) + step_ * speed < 0.0;
+  });
+}
+
+void PairContacts::add_give(Index first, ConstraintRows& rows) const {
+  if (give_ == 0.0) return;
+  for (Index row = first; row < rows.size(); ++row) rows.add_give(row, give_);
+  double stored = 0.0;
+  for (const PreparedContact& contact : contacts_) stored += 0.5 * contact.give * contact.last_force.squaredNorm();
+  rows.add_stored_energy(stored);
+}
+
+void PairContacts::add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows) {
+  add_give(first, rows);
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!yields_[side]) continue;
+    const Mat3 R = to_matrix(turn_[side]);
+    Index row = first;
+    for (const PreparedContact& contact : contacts_) {
+      const Mat3 axes = sign(side) * (R.transpose() * contact.axes);
+      dents_->add_rows(states, body(contact, side), {at(contact, side), axes, row, row_count(contact)}, rows);
+      row += row_count(contact);
+    }
+  }
+}
+
+void PairContacts::add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact,
+                               ConstraintRows& rows) {
+  const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
+  const Vec3 end = point_of_action(contact, a, b);
+  double length = a.norm();
+  if (!states.is_static(contact.a.body)) length += (a - states.pose(contact.a.body, when).p).norm();
+  if (!states.is_static(contact.b.body)) length += (b - states.pose(contact.b.body, when).p).norm();
+  const double tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min();
+  for (Index axis = 0; axis < row_count(contact); ++axis) {
+    const Vec3 n = contact.axes.col(axis);
+    RowLaw law{.tolerance = tolerance, .contact = true};
+    if (axis == 0) {
+      const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
+      const double recovery =
+          caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap - deepest_dent_), step_ * options_->recovery_speed);
+      law.offset = std::min(0.0, gap) + recovery;
+      law.agent_displacement = recovery;
+      law.lower = 0.0;
+      law.holds = true;
+      law.strikes = strikes_;
+      if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
+      law.friction = contact.friction;
+    } else {
+      law.offset = contact.dent[axis];
+      law.slides = true;
+      law.goes_on = true;
+    }
+    law.last_force = n.dot(contact.last_force);
+    law.held_force = n.dot(contact.held_force);
+    const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
+    const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
+    rows.add(on_a, on_b, law);
+  }
+}
+
+void PairContacts::make_spring(const BodyStates& states, const PreparedContact& contact, double gap,
+                               RowLaw& law) const {
+  const double mass = reduced_mass(states, contact), omega = 2.0 * std::numbers::pi * options_->penalty_frequency;
+  const double k = mass * omega * omega, d = 2.0 * options_->penalty_damping * mass * omega;
+  law.compliance = 1.0 / (step_ * k + d);
+  law.offset = d * law.compliance * std::min(0.0, gap);
+  law.stiffness = k;
+  law.holds = law.strikes = false;
+  law.goes_on = true;
+  law.agent_displacement = 0.0;
+}
+
+double PairContacts::reduced_mass(const BodyStates& states, const PreparedContact& contact) {
+  double inverse = 0.0;
+  for (const PreparedSide* side : {&contact.a, &contact.b})
+    if (!states.is_static(side->body)) inverse += 1.0 / states.body(side->body).group->frame_constants().mass;
+  return 1.0 / inverse;
+}
+
+}  // namespace limber

@@ -1,0 +1,85 @@
+/// @file pair_contacts.h
+/// The contacts of one pair of bodies as rows of an island (contact_constraint.h has the equations). Private to the
+/// constraints module.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "contact_dents.h"
+#include "limber/constraints/contact_constraint.h"
+#include "prepared_contact.h"
+
+namespace limber {
+
+class PairContacts final : public Constraint {
+ public:
+  /// @param lasted since when the bodies have struck each other, s
+  void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents, double lasted);
+
+  std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
+  void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
+  void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
+  bool is_contact() const override { return true; }
+  double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
+  void accept(const BodyStates&, std::span<const double> impulses) override;
+
+  /// Since when the bodies have struck each other, after the step, s; 0: they have not.
+  double lasted() const { return lasted_; }
+
+ private:
+  /// A step, or part of one, starts from here.
+  void begin(const BodyStates& states);
+
+  /// Whether a part of one body is caught between two of the other: contacts that overlap and push either way. To come
+  /// apart they would press against each other without bound.
+  bool is_caught() const;
+
+  /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
+  static Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b);
+
+  static Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact);
+
+  /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
+  static const SurfacePoint& at(const PreparedContact& contact, std::size_t side);
+  static Index body(const PreparedContact& contact, std::size_t side) {
+    return (side == 0 ? contact.a : contact.b).body;
+  }
+  static double sign(std::size_t side) { return side == 0 ? 1.0 : -1.0; }
+
+  /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.
+  double touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact, double within);
+
+  /// Whether the bodies are in an impact in the coming step.
+  bool strikes(const BodyStates& states) const;
+
+  /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
+  void add_give(Index first, ConstraintRows& rows) const;
+
+  /// @param first row of the first contact
+  void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows);
+
+  static Index row_count(const PreparedContact& contact) { return contact.friction == 0.0 ? 1 : 3; }
+
+  void add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact, ConstraintRows& rows);
+
+  /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
+  void make_spring(const BodyStates& states, const PreparedContact& contact, double gap, RowLaw& law) const;
+
+  static double reduced_mass(const BodyStates& states, const PreparedContact& contact);
+
+  std::span<PreparedContact> contacts_;
+  const ContactOptions* options_ = nullptr;
+  ContactDents* dents_ = nullptr;
+  std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
+  std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
+  bool strikes_ = false, caught_ = false;
+  double step_ = 0.0, lasted_ = 0.0;
+  double give_ = 0.0;          // of each contact of bodies that flex, m/N
+  double deepest_dent_ = 0.0;  // of the bodies' contacts, m: what the kept modes do not show of their shapes
+  std::vector<double> modal_a_, modal_b_;
+  Passage passage_a_, passage_b_;
+};
+
+}  // namespace limber
