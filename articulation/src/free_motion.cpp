@@ -332,6 +332,7 @@ std::vector<Search::PointOf> Search::longest_first() const {
     }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<PointOf> out;
+  out.reserve(all.size());
   for (const auto& [longest, point] : all) out.push_back(point);
   return out;
 }
@@ -519,12 +520,6 @@ void FreeMotionOptions::validate() const {
 
 namespace {
 
-std::vector<OrbitBody> some_of(std::span<const OrbitBody> bodies, const std::vector<Index>& which) {
-  std::vector<OrbitBody> out;
-  for (const Index b : which) out.push_back(bodies[static_cast<std::size_t>(b)]);
-  return out;
-}
-
 FreeMotion motion_among(const PathFrame& frame, std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed,
                         const Tolerances& t, const FreeMotionOptions& options) {
   auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
@@ -549,7 +544,8 @@ FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBod
   const internal::Encounters encounters(frame, moving, fixed, t.largest_overlap + t.nudge);
   for (std::size_t pairs = kNearest;; pairs *= kGrowth) {
     const auto near = encounters.nearest(pairs);
-    FreeMotion m = motion_among(frame, some_of(moving, near.moving), some_of(fixed, near.fixed), t, options);
+    FreeMotion m =
+        motion_among(frame, internal::some_of(moving, near.moving), internal::some_of(fixed, near.fixed), t, options);
     if (m.reachable.low < near.low || m.reachable.high > near.high) continue;
     for (MotionStop* stop : {&m.low, &m.high})
       if (stop->body >= 0) stop->body = near.fixed[static_cast<std::size_t>(stop->body)];

@@ -20,6 +20,7 @@ using internal::degrees_text;
 using internal::kInfinity;
 using internal::number_text;
 using internal::OrbitBody;
+using internal::some_of;
 using Kind = MotionPath::Kind;
 
 // Sides ---------------------------------------------------------------------------------------------------------------
@@ -176,11 +177,6 @@ class Trial {
   static const Component& component(const Assembly& assembly, Index i) {
     return assembly.components[static_cast<std::size_t>(i)];
   }
-  static std::vector<OrbitBody> some_of(std::span<const OrbitBody> bodies, const std::vector<Index>& components) {
-    std::vector<OrbitBody> out;
-    for (const Index c : components) out.push_back(bodies[static_cast<std::size_t>(c)]);
-    return out;
-  }
   static double sagitta_near(const DetectedJoint& joint, const Component& part) {
     constexpr double kMargin = 0.02;  // of the contact's box: the other part's surface lies beside the points
     Vec3 low = Vec3::Constant(kInfinity), high = -low;
@@ -223,7 +219,8 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
   for (int i = 0; i < options.cone_directions; ++i)
     if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
   if (least == kInfinity) return least;
-  for (double d = 0.5 * step, i = 0; i < kConeRefinements; ++i, d *= 0.5)
+  double d = 0.5 * step;
+  for (int i = 0; i < kConeRefinements; ++i, d *= 0.5)
     for (const double psi : {at - d, at + d})
       if (const double angle = swing(psi); angle < least) least = angle, at = psi;
   return std::min(least, std::numbers::pi);
