@@ -419,8 +419,7 @@ Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap
 
 double Search::slope_at(const SurfacePoint& at, bool moving) const {
   const OrbitFace& face = surface(moving).faces()[static_cast<std::size_t>(at.face)];
-  const double along = std::abs(face.normal.dot(frame_.direction(at.p)));
-  const double slope = std::sqrt(std::max(1.0 - along * along, 0.0)) / along;
+  const double slope = internal::slope_of(face.normal.dot(frame_.direction(at.p)));
   return stands(slope, face.one_sided) ? slope : kInfinity;
 }
 

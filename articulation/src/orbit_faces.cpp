@@ -227,6 +227,18 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
   boxes.push_back(box);
 }
 
+/// +1, −1: the motion leaves the outside of a triangle, or its inside, at all corners; 0: neither, or it lies along the
+/// motion to within a degree, which may be noise. @param normal unit. All in path coordinates
+int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners) {
+  constexpr double kLeast = 0.0175;  // sine of 1 degree
+  double low = kUnknown, high = kUnknown;
+  for (const Vec3& corner : corners) {
+    const double along = normal.dot(frame.direction(corner));
+    low = std::fmin(low, along), high = std::fmax(high, along);
+  }
+  return low >= kLeast ? 1 : high <= -kLeast ? -1 : 0;
+}
+
 /// @param faces of one side, whose vertices are numbered together
 void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
   constexpr double kContinues = 0.643;  // cosine of 50 degrees: facets of an octagon, and noise, bend by less
@@ -282,16 +294,6 @@ std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
 }
 
 }  // namespace
-
-int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners) {
-  constexpr double kLeast = 0.0175;  // sine of 1 degree
-  double low = kUnknown, high = kUnknown;
-  for (const Vec3& corner : corners) {
-    const double along = normal.dot(frame.direction(corner));
-    low = std::fmin(low, along), high = std::fmax(high, along);
-  }
-  return low >= kLeast ? 1 : high <= -kLeast ? -1 : 0;
-}
 
 FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
   Index vertices = 0;

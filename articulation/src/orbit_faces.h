@@ -55,10 +55,6 @@ struct OrbitFace {
   OrbitBox box{};                               ///< of the orbits that meet it
 };
 
-/// +1, −1: the motion leaves the outside of a triangle, or its inside, at all corners; 0: neither, or it lies along the
-/// motion to within a degree, which may be noise. @param normal unit. All in path coordinates
-int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners);
-
 /// The faces around each vertex of a side.
 class FacesAround {
  public:

@@ -12,9 +12,6 @@ namespace {
 
 using Kind = MotionPath::Kind;
 
-/// Tangent of the angle whose cosine is given.
-double slope_of(double cosine) { return std::sqrt(std::max(1.0 - cosine * cosine, 0.0)) / std::abs(cosine); }
-
 /// The zero of a function that changes its sign between two places once: regula falsi after Illinois.
 template <class F>
 double zero_between(const F& f, double a, double fa, double b, double fb) {

@@ -5,6 +5,8 @@
 /// boxes answers each orbit by a point query.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -12,6 +14,9 @@
 #include "spans.h"
 
 namespace limber::internal {
+
+/// Tangent of the angle whose cosine is given; ∞ for a right angle.
+inline double slope_of(double cosine) { return std::sqrt(std::max(1.0 - cosine * cosine, 0.0)) / std::abs(cosine); }
 
 /// A part of an orbit inside a body, or a crossing of a sheet (low == high).
 struct OrbitPiece {

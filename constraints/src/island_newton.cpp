@@ -37,7 +37,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   slack = sparse ? kFirstSlack : 1.0;
   bounded_rows.begin(kNewtonStepsOfLarge);
   int wakings = 0;
-  for (report.iterations = 1;; ++report.iterations) {
+  for (;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
     if (waiting > 0 && wake_rows(options)) {
@@ -102,12 +102,9 @@ SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::
       const auto at = static_cast<std::size_t>(bounded[i]);
       ordered_b[i] = gap[at] - laws[at].offset + laws[at].compliance * f_bounded[i];
     }
-    for (const ConstraintRows::Flexibility& g : flexibility) {
-      const Index i = place[static_cast<std::size_t>(g.i)], j = place[static_cast<std::size_t>(g.j)];
-      if (i < 0 || j < 0) continue;
-      ordered_b[static_cast<std::size_t>(i)] += g.value / step * f_bounded[static_cast<std::size_t>(j)];
-      if (i != j) ordered_b[static_cast<std::size_t>(j)] += g.value / step * f_bounded[static_cast<std::size_t>(i)];
-    }
+    for_flexibilities([&](std::size_t i, std::size_t j, double G) {
+      ordered_b[static_cast<std::size_t>(place[i])] += G / step * f_bounded[static_cast<std::size_t>(place[j])];
+    });
     report.change = splitting.residual(f_bounded, ordered_b, tolerance);
     if (report.change <= 1.0) return SolveStatus::kSolved;
     if (report.iterations > most) return SolveStatus::kIterationLimit;
@@ -119,7 +116,8 @@ SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::
   }
 }
 
-/// Forces, bounds and tolerances, in the order of `bounded`.
+/// Forces, bounds and tolerances, in the order of `bounded`. The last step's forces are taken as they are, since less
+/// and plus what is held they would be rounded, and a fall is another one then.
 void IslandSolver::Impl::begin_splitting(bool from_last_forces) {
   const std::size_t n = bounded.size();
   tolerance.resize(n);
@@ -187,13 +185,9 @@ void IslandSolver::Impl::assemble_ordered() {
   Eigen::Map<RowMajor>(A.data(), static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(m)).noalias() =
       B * B.transpose();
   for (std::size_t i = 0; i < m; ++i) A[i * m + i] += compliance[static_cast<std::size_t>(order[i])];
-  for (const ConstraintRows::Flexibility& g : flexibility) {
-    const Index at_i = place[static_cast<std::size_t>(g.i)], at_j = place[static_cast<std::size_t>(g.j)];
-    if (at_i < 0 || at_j < 0) continue;
-    const auto i = static_cast<std::size_t>(at_i), j = static_cast<std::size_t>(at_j);
-    A[i * m + j] += g.value / step;
-    if (i != j) A[j * m + i] += g.value / step;
-  }
+  for_flexibilities([&](std::size_t i, std::size_t j, double G) {
+    A[static_cast<std::size_t>(place[i]) * m + static_cast<std::size_t>(place[j])] += G / step;
+  });
 }
 
 /// J D^½ of the rows in their order.
@@ -219,12 +213,7 @@ void IslandSolver::Impl::respond(std::span<const double> values, std::vector<dou
       const auto at = static_cast<std::size_t>(order[i]);
       gaps[at] = product[i] - compliance[at] * values[at];
     }
-    for (const ConstraintRows::Flexibility& g : flexibility) {
-      const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
-      if (place[i] < 0 || place[j] < 0) continue;
-      gaps[i] -= g.value / step * values[j];
-      if (i != j) gaps[j] -= g.value / step * values[i];
-    }
+    for_flexibilities([&](std::size_t i, std::size_t j, double G) { gaps[i] -= G / step * values[j]; });
     return;
   }
   const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
@@ -261,11 +250,7 @@ SolveStatus IslandSolver::Impl::improve_equalities() {
 /// Rows with bounds beside the others, which are eliminated first: A f' + b, b = gap − offset − A₀ f.
 SolveStatus IslandSolver::Impl::improve_all(bool first) {
   respond(f, change);
-  for (const ConstraintRows::Flexibility& g : flexibility) {
-    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
-    change[i] -= g.value * reaction[j];
-    if (i != j) change[j] -= g.value * reaction[i];
-  }
+  for_flexibilities([&](std::size_t i, std::size_t j, double G) { change[i] -= G * reaction[j]; });
   const std::size_t m = order.size(), e = m - bounded.size();
   next_f = f;
   for (std::size_t i = 0; i < m; ++i) {

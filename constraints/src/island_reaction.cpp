@@ -79,7 +79,7 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
     const RowLaw& law = rows.row(i).law;
     if (sparse && law.contact && law.holds) {
       hold_contact(when, i);
-      i += law.friction > 0.0 ? 2 : 0;
+      i += contact_rows(law) - 1;
       continue;
     }
     const HeldMotion held = held_motion(when, i, options);
@@ -114,7 +114,7 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
 /// step n it gets at the start of the next as well.
 void IslandSolver::Impl::hold_contact(StepTime when, Index normal) {
   const auto first = static_cast<std::size_t>(normal);
-  const std::size_t count = laws[first].friction > 0.0 ? 3 : 1;
+  const auto count = static_cast<std::size_t>(contact_rows(laws[first]));
   double before = 0.0, now = 0.0;
   for (std::size_t i = first; i < first + count; ++i) {
     lower[i] = when == StepTime::kStart ? laws[i].held_force : f[i] / step + reaction[i];

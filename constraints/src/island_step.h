@@ -36,6 +36,8 @@ struct FrameAcceleration {
 inline bool is_equality(const RowLaw& law) {
   return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded;
 }
+/// Rows of the contact whose normal row this is.
+inline Index contact_rows(const RowLaw& normal) { return normal.friction > 0.0 ? 3 : 1; }
 
 struct IslandSolver::Impl {
   IslandBodies bodies;
@@ -129,6 +131,8 @@ struct IslandSolver::Impl {
                   std::span<Constraint* const> constraints, const Vec3& gravity, double left);
   SolveStatus iterate(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                       IslandReport& report);
+  template <class Action>
+  void for_flexibilities(Action&& act) const;
   bool rows_may_wait() const;
   void choose_rows();
   bool wake_rows(const IslandOptions& options);
@@ -182,5 +186,16 @@ struct IslandSolver::Impl {
   void refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                        IslandReport& report);
 };
+
+/// act(i, j, G_ij) for all pairs of rows that take part and yield to each other, both ways round.
+template <class Action>
+void IslandSolver::Impl::for_flexibilities(Action&& act) const {
+  for (const ConstraintRows::Flexibility& g : flexibility) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    if (place[i] < 0 || place[j] < 0) continue;
+    act(i, j, g.value);
+    if (i != j) act(j, i, g.value);
+  }
+}
 
 }  // namespace limber

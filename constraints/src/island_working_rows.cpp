@@ -7,9 +7,6 @@ namespace {
 
 bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
 
-/// Rows of the contact whose normal row this is.
-std::size_t contact_rows(const RowLaw& normal) { return normal.friction > 0.0 ? 3 : 1; }
-
 }  // namespace
 
 /// Whether contacts that do nothing may be left out. Rules other than the complementary one count all of them, and few
@@ -27,7 +24,7 @@ void IslandSolver::Impl::choose_rows() {
   waiting = 0;
   if (!rows_may_wait()) return;
   for (std::size_t i = 0, count = 1; i < laws.size(); i += count) {
-    count = contact_rows(laws[i]);
+    count = static_cast<std::size_t>(contact_rows(laws[i]));
     if (!laws[i].contact) continue;
     bool acts = false;
     for (std::size_t r = i; r < i + count; ++r) acts = acts || laws[r].last_force != 0.0 || reaction[r] != 0.0;
@@ -43,7 +40,7 @@ bool IslandSolver::Impl::wake_rows(const IslandOptions& options) {
   const double near = 0.5 * options.gravity.norm() * step * step;
   const std::size_t before = waiting;
   for (std::size_t i = 0, count = 1; waiting > 0 && i < laws.size(); i += count) {
-    count = contact_rows(laws[i]);
+    count = static_cast<std::size_t>(contact_rows(laws[i]));
     if (waits[i] == 0 || gap[i] - laws[i].offset >= near) continue;
     std::fill_n(waits.begin() + static_cast<std::ptrdiff_t>(i), count, char{0});
     waiting -= count;
