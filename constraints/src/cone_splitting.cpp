@@ -18,7 +18,7 @@ void put(const Vec3& v, double* to) { std::copy_n(v.data(), 3, to); }
 
 }  // namespace
 
-void ConeSplitting::begin(const BoundedRows& rows, SparseCoupling& coupling) {
+void ConeSplitting::begin(const BoundedRows& rows, RowCoupling& coupling) {
   rows_ = rows, coupling_ = &coupling;
   cones_ = static_cast<std::size_t>(rows.cones), n_ = coupling.rows();
   factored_ = false;

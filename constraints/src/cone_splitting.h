@@ -17,7 +17,7 @@
 
 #include "aligned_buffer.h"
 #include "proximal_solver.h"
-#include "sparse_coupling.h"
+#include "row_coupling.h"
 
 namespace limber {
 
@@ -25,7 +25,7 @@ class ConeSplitting {
  public:
   /// Begins a problem. Memory grows to the largest seen.
   /// @param rows its cones, friction, lower and upper, which stay where they are; A and b are not read
-  void begin(const BoundedRows& rows, SparseCoupling& coupling);
+  void begin(const BoundedRows& rows, RowCoupling& coupling);
   /// Units for residual(): the largest |b| of all, each by √A_ii of its row.
   void units_of(std::span<const double> b, std::vector<double>& unit) const;
   /// How far forces are from the solution: the largest |a f − P_C(a f − û)| of a cone or row, a the mean of its A_ii,
@@ -44,7 +44,7 @@ class ConeSplitting {
   void iterate();
 
   BoundedRows rows_{};
-  SparseCoupling* coupling_ = nullptr;
+  RowCoupling* coupling_ = nullptr;
   std::size_t cones_ = 0, n_ = 0;
   bool factored_ = false;
   // Scaled to A_ii = 1 as in proximal_solver.cpp: forces by `scale_`, velocities by its inverse.

@@ -61,6 +61,7 @@ void DenseCoupling::scale(std::span<const double> s) {
   for (AlignedBuffer* memory : {&coefficients_memory_, &row_memory_, &product_memory_, &answer_memory_})
     memory->need(n_);
   active_.reserve(n_), columns_.reserve(n_), lu_.reserve(n_);
+  shifted_.reset(n_);
 }
 
 /// dy = −d + ρ S (1 + ρ SᵀA S)⁻¹ SᵀA d
@@ -135,6 +136,18 @@ bool DenseCoupling::map_step(std::span<const ProjectionDerivative> P, double rho
   for (std::size_t i = 0; i < a; ++i) dy[active_[i]] = x[i];
   return true;
 }
+
+bool DenseCoupling::factor_shifted(double shift) {
+  shifted_.reset(n_);
+  double* column = row_memory_.need(n_);
+  for (std::size_t i = 0; i < n_; ++i) {
+    std::copy_n(A_.row(i), i, column);
+    if (!shifted_.append(column, A_.row(i)[i] + shift)) return false;
+  }
+  return true;
+}
+
+void DenseCoupling::solve_shifted(double* x) { shifted_.solve(x); }
 
 void DenseCoupling::begin_sweeps(const double* f) { multiply(answer_memory_.need(n_), f); }
 

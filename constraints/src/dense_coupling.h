@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "aligned_buffer.h"
+#include "free_set_factor.h"
 #include "row_coupling.h"
 
 namespace limber {
@@ -32,6 +33,8 @@ class DenseCoupling final : public RowCoupling {
   void multiply(double* out, const double* x) override { multiply_rows(out, A_, nullptr, x, n_, n_); }
   bool convex_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
   bool map_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
+  bool factor_shifted(double shift) override;
+  void solve_shifted(double* x) override;
   void begin_sweeps(const double* f) override;
   Vec3 answer(std::size_t first, std::size_t count) const override;
   void move(std::size_t first, std::size_t count, const Vec3& change) override;
@@ -51,6 +54,7 @@ class DenseCoupling final : public RowCoupling {
   std::vector<Column> columns_;
   std::vector<std::size_t> active_;
   DenseLu lu_;
+  FreeSetFactor shifted_;
 };
 
 }  // namespace limber

@@ -26,16 +26,16 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   choose_rows();
   sort_rows();
   constexpr int kIterationsUnsettled = 6, kIterationsUnsettledOfLarge = 3, kIterationsOfStart = 30;
-  constexpr int kNewtonStepsOfLarge = 500;  // in blocks, in all
+  constexpr int kNewtonSteps = 300, kNewtonStepsOfLarge = 500;  // for all problems of the step
   // Cones are solved as exactly as the last change of the gaps is worth.
   constexpr double kFirstSlack = 1e6, kSlackOfChange = 1e-3;
+  bounded_rows.begin(sparse ? kNewtonStepsOfLarge : kNewtonSteps);
   factor();
   if (splits || waiting > 0) begin_with_last_forces();
   report.iterations = 1;
   if (splits) return iterate_contacts(states, constraints, options, report);
   secant.begin(f.size());
   slack = sparse ? kFirstSlack : 1.0;
-  bounded_rows.begin(kNewtonStepsOfLarge);
   int wakings = 0;
   for (;; ++report.iterations) {
     predict(options);
@@ -142,7 +142,8 @@ void IslandSolver::Impl::factor() {
   }
   const std::size_t c = bounded.size();
   b_reduced.resize(c), product.resize(c), ordered_b.resize(order.size());
-  if (sparse) {
+  in_blocks = sparse || blocks_pay();
+  if (in_blocks) {
     place_coupling(coupling, false);
     fill_coupling(coupling, false);
   } else {
@@ -258,7 +259,7 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     const RowLaw& law = laws[at];
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
-  if (sparse)
+  if (in_blocks)
     b_reduced = ordered_b;
   else
     elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
@@ -267,7 +268,7 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     gap_before.push_back(start_gap[static_cast<std::size_t>(row)] - laws[static_cast<std::size_t>(row)].offset);
   const SolveStatus status = solve_bounded(first);
   f_equal.resize(e);
-  if (!sparse) elimination.recover(f_bounded, f_equal);
+  if (!in_blocks) elimination.recover(f_bounded, f_equal);
   for (std::size_t i = 0; i < m; ++i)
     next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
   return status;
@@ -281,7 +282,7 @@ bool IslandSolver::Impl::by_program() const {
 /// b − A Δt reaction, of the rows with bounds.
 void IslandSolver::Impl::take_held_impulses() {
   const auto size = static_cast<Eigen::Index>(bounded.size());
-  if (sparse) {
+  if (in_blocks) {
     coupling.scale({});
     coupling.multiply(product.data(), held_impulse.data());
     for (std::size_t i = 0; i < bounded.size(); ++i) b_reduced[i] -= product[i];
@@ -296,7 +297,7 @@ double IslandSolver::Impl::noise_of_gaps() const {
   const double kPart = 0.5 * slack;
   double noise = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < bounded.size(); ++i) {
-    const double own = sparse ? coupling.own_block(i, 1)(0, 0) : A_reduced[i * bounded.size() + i];
+    const double own = in_blocks ? coupling.own_block(i, 1)(0, 0) : A_reduced[i * bounded.size() + i];
     if (own > 0.0)
       noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
   }
@@ -320,7 +321,10 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
                             .lower = lower_bounded,
                             .upper = upper_bounded,
                             .noise = noise_of_gaps()};
-  const SolveStatus status = sparse ? bounded_rows.solve(problem, coupling, f_bounded, !flexibility.empty())
+  const ConeMethod method = !sparse               ? ConeMethod::kSplitBetween
+                            : flexibility.empty() ? ConeMethod::kOnce
+                                                  : ConeMethod::kShortSteps;
+  const SolveStatus status = in_blocks ? bounded_rows.solve(problem, coupling, f_bounded, method)
                              : by_program()
                                  ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
                                  : bounded_rows.solve(problem, f_bounded);

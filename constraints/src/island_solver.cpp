@@ -77,6 +77,7 @@ void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& option
   if (done.status != SolveStatus::kSolved) report.status = done.status;
   report.rows = rows.size();
   report.iterations = std::max(report.iterations, done.iterations);
+  report.newton_steps = std::max(report.newton_steps, done.newton_steps);
   report.change = std::max(report.change, done.change);
   report.energy_removed += done.energy_removed;
   report.energy_surplus = done.energy_surplus;
@@ -94,6 +95,7 @@ IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& 
   if (holds_contact_forces()) solve_touch(options, done.programs);
   find_reaction(StepTime::kStart, options, reaction);
   done.status = iterate(states, part.constraints, options, done);
+  done.newton_steps = bounded_rows.newton_steps();
   answer_at_end(states, part.constraints, options);
   return done;
 }

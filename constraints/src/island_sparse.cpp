@@ -16,6 +16,14 @@ bool IslandSolver::Impl::is_large() {
          work_in_blocks() < m * m * m / 3.0;
 }
 
+/// Whether the contacts of an island of few rows are solved for in blocks, as short loops over these are slower by the
+/// number multiplied.
+bool IslandSolver::Impl::blocks_pay() {
+  constexpr double kWorthIt = 0.05;
+  const auto m = static_cast<double>(order.size());
+  return cones > 0 && bounded.size() == order.size() && !by_program() && work_in_blocks() < kWorthIt * m * m * m / 3.0;
+}
+
 /// Numbers multiplied where each body, with what its contacts yield to each other by, is eliminated against one other.
 double IslandSolver::Impl::work_in_blocks() {
   widths.clear();

@@ -65,6 +65,7 @@ struct IslandSolver::Impl {
   std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
   // Islands of many rows: J and its frames' part in blocks instead, all rows in one problem; no dense matrix is made.
   bool sparse = false;
+  bool in_blocks = false;  // the rows with bounds: so, or of an island of few rows, by the methods for those
   SparseCoupling coupling, frame_coupling;
   ResidualFactor residual;         // of the rows in `coupling`
   std::vector<std::size_t> nodes;  // of the bodies
@@ -105,6 +106,7 @@ struct IslandSolver::Impl {
   void hold_contact(StepTime when, Index normal);
   void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
   bool is_large();
+  bool blocks_pay();
   double work_in_blocks();
   std::size_t node_width(Index local, bool frames_alone) const;
   void place_coupling(SparseCoupling& into, bool frames_alone);

@@ -35,6 +35,11 @@ class RowCoupling {
   /// dy with (1 − P' + P'/ρ + P' C A) dy = −d. @return false: not found
   virtual bool map_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) = 0;
 
+  /// Makes solve_shifted() ready, for A as it is scaled. @return false: not found
+  virtual bool factor_shifted(double shift) = 0;
+  /// x ← (A + shift)⁻¹ x. Padded.
+  virtual void solve_shifted(double* x) = 0;
+
   // Sweeps: A f is kept up to date.
   virtual void begin_sweeps(const double* f) = 0;
   /// A f of rows [first, first + count)

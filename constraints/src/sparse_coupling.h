@@ -48,10 +48,8 @@ class SparseCoupling final : public RowCoupling {
   void multiply(double* out, const double* x) override;
   bool convex_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
   bool map_step(std::span<const ProjectionDerivative> P, double rho, const double* d, double* dy) override;
-  /// Makes solve_shifted() ready, for A as it is scaled. @return false: not found
-  bool factor_shifted(double shift);
-  /// x ← (A + shift)⁻¹ x. Padded.
-  void solve_shifted(double* x);
+  bool factor_shifted(double shift) override;
+  void solve_shifted(double* x) override;
   void begin_sweeps(const double* f) override;
   Vec3 answer(std::size_t first, std::size_t count) const override;
   void move(std::size_t first, std::size_t count, const Vec3& change) override;

@@ -223,6 +223,7 @@ IslandReport ConstraintStage::report() const {
     sum.cuts += r.cuts;
     sum.programs.add(r.programs);
     sum.iterations = std::max(sum.iterations, r.iterations);
+    sum.newton_steps = std::max(sum.newton_steps, r.newton_steps);
     sum.change = std::max(sum.change, r.change);
     sum.energy_removed += r.energy_removed;
     sum.energy_surplus += r.energy_surplus;

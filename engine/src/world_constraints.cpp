@@ -92,6 +92,7 @@ ConstraintReport World::constraint_report() const {
           .bodies = r.bodies,
           .rows = r.rows,
           .iterations = impl_->iterations,
+          .newton_steps = impl_->newton_steps,
           .programs = impl_->programs,
           .cuts = impl_->cuts,
           .solved = impl_->solved,

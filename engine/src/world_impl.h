@@ -70,7 +70,7 @@ struct World::Impl {
   std::vector<double> still;      // zeros: how far a rigid shape's points move with the modes
   double energy_removed = 0.0;    // of the step's parts before the last
   bool solved = true;
-  int iterations = 0, cuts = 0;
+  int iterations = 0, newton_steps = 0, cuts = 0;
   ProgramReport programs;
   std::vector<ExactMotion> motions;
   std::size_t alive = 0;

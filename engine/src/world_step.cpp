@@ -7,7 +7,7 @@ namespace limber {
 
 void World::step() {
   Impl& m = *impl_;
-  m.energy_removed = 0.0, m.solved = true, m.iterations = m.cuts = 0;
+  m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = m.cuts = 0;
   m.programs = {};
   for (int part = 0; part < m.parts->count(); ++part) {
     m.advance_part(part);
@@ -15,6 +15,7 @@ void World::step() {
     m.energy_removed += report.energy_removed;
     m.solved = m.solved && report.status == SolveStatus::kSolved;
     m.iterations = std::max(m.iterations, report.iterations);
+    m.newton_steps = std::max(m.newton_steps, report.newton_steps);
     m.cuts += report.cuts;
     m.programs.add(report.programs);
   }

@@ -16,17 +16,20 @@
 /// through them, or nearly so, in 3: most of the contacts of bumpy bodies are found ahead and exert nothing. Rows are
 /// only added, so that the answer is that of all rows. (By the default rule, above 150 rows.)
 ///
+/// Contacts with friction get 300 steps of Newton's method in all repetitions of 4 together, and 20 a time when these
+/// are used up; where it gets stuck operator splitting goes on for a while, and it begins again from there. It is done
+/// in blocks by body where that is a twentieth of the work and there are no rows without bounds.
+///
 /// Islands of more than 150 rows are solved in blocks by body where that is less work: where bodies have few degrees of
 /// freedom, counting the rows that residual compliance couples, and no impact is held. There 2 leaves contacts out: a
 /// contact's force goes on instead, half at the end of a step and half at the start of the next, as far as it is no
 /// more than in the step before; where bodies are by the ends of steps does not depend on it. If nothing but contacts
 /// of rigid bodies acts, 4 is a few iterations of an operator splitting at a time, from the last step's forces on,
 /// until true gaps and forces fit to 1e-7 of the distances at hand (else: 1e-9). Where contacts yield by themselves
-/// (add_flexibility, add_give: those of bodies that flex) it is the same method as for small islands, with 500 steps of
-/// Newton's method in all, from where the splitting goes on; beside joints and limits of rigid bodies it is that
-/// method, less patiently. A step that does not settle soon is left with the impulses found, and the report says so.
-/// What the tolerance of gaps leaves 6 without motion to take it from is paid by forces that are smaller by a part of
-/// at most 1e-4.
+/// (add_flexibility, add_give: those of bodies that flex) it is Newton's method with 500 steps in all, from where the
+/// splitting goes on; beside joints and limits of rigid bodies it is that method, less patiently. A step that does not
+/// settle soon is left with the impulses found, and the report says so. What the tolerance of gaps leaves 6 without
+/// motion to take it from is paid by forces that are smaller by a part of at most 1e-4.
 ///
 /// Where 6 fails and overlapping bodies were being pushed apart, the step is done again without that.
 ///
@@ -70,6 +73,7 @@ struct IslandReport {
   int cuts = 0;                 ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch)
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
+  int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most
   double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance; large islands
                                 ///< of contacts alone: what forces and gaps are off, in units of 100 tolerances
   double energy_removed = 0.0;  ///< J, by step 6; negative: given back

@@ -132,6 +132,7 @@ struct JointView {
 struct ConstraintReport {
   int islands = 0, bodies = 0, rows = 0;
   int iterations = 0;           ///< the most that an island needed
+  int newton_steps = 0;         ///< the same, of the contacts with friction: bounded (island_solver.h)
   ProgramReport programs{};     ///< linear programs of the contact rule
   int cuts = 0;                 ///< of islands' steps, where bodies struck (ImpactModel::kHeldFromTouch)
   bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
