@@ -235,10 +235,18 @@ Judged judge(const MotionSpace& space, const Family& family, double threshold) {
   return out;
 }
 
-/// Plain rotations are common and screws are not; a screw must beat the rotation by far.
-bool is_screw(const Judged& screw, double rotation_mu) {
+// A centre far off is a plane, and an axis far off a translation, in disguise.
+constexpr double kFarCentre = 4.0, kFarAxis = 15.0;  // of the contact's RMS radius
+
+/// The screw that slips, if plain motions do not. Those are common and screws are not; one must beat them by far.
+/// @param plain μ of the best rotation or translation
+std::optional<Judged> judged_screw(const MotionSpace& space, double plain, double threshold) {
   constexpr double kClearly = 0.15, kLeast = 3e-4;
-  return screw.slippage < kClearly * rotation_mu && rotation_mu > kLeast;
+  if (plain <= kLeast) return std::nullopt;
+  const auto screw = fit_screw(space);
+  if (!screw || screw->origin.norm() > kFarAxis || std::abs(screw->pitch) > kFarAxis) return std::nullopt;
+  const Judged out = judge(space, *screw, threshold);
+  return out.slippage < kClearly * plain ? std::optional(out) : std::nullopt;
 }
 
 std::vector<Judged> judged_families(const MotionSpace& space, double threshold) {
@@ -248,17 +256,11 @@ std::vector<Judged> judged_families(const MotionSpace& space, double threshold) 
        {fit_ball(space), fit_planar(space), fit_cylindrical(space), revolute, fit_prismatic(space), Family{}})
     all.push_back(judge(space, family, threshold));
   const double rotation_mu = all[3].slippage, translation_mu = all[4].slippage;
-  // A centre far off is a plane, and an axis far off a translation, in disguise.
-  constexpr double kFarCentre = 4.0, kFarAxis = 15.0;  // of the contact's RMS radius
   if (all[0].family.origin.norm() > kFarCentre) all[0].log_evidence -= 10.0;
   if (revolute.origin.norm() > kFarAxis) all[3].log_evidence -= 10.0;
-  if (const auto screw = fit_screw(space)) {
-    const Judged judged = judge(space, *screw, threshold);
-    const bool flat = screw->origin.norm() > kFarAxis || std::abs(screw->pitch) > kFarAxis;
-    if (!flat && is_screw(judged, std::min(rotation_mu, translation_mu))) {
-      all[3].log_evidence -= 5.0;
-      all.push_back(judged);
-    }
+  if (const auto screw = judged_screw(space, std::min(rotation_mu, translation_mu), threshold)) {
+    all[3].log_evidence -= 5.0;
+    all.push_back(*screw);
   }
   return all;
 }
