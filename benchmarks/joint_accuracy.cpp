@@ -150,7 +150,7 @@ int run_change(const DetectionOptions& options, const std::string& only) {
       {"scaled by 1e3", [](Variant& v) { v.scale = 1e3; }},
       {"parts swapped", [](Variant& v) { v.swapped = true; }},
       {"faces shuffled", [](Variant& v) { v.shuffled = true; }}};
-  std::printf("%-22s %6s %8s %14s  %s\n", "change", "joints", "types", "axis turns deg", "where");
+  std::printf("%-22s %6s %8s %10s %14s  %s\n", "change", "joints", "types", "> 0.05 deg", "axis turns deg", "where");
   for (const Kind& kind : kinds) {
     Change all;
     for (const auto* names : {&tuning_names(), &held_out_names()})
@@ -163,10 +163,12 @@ int run_change(const DetectionOptions& options, const std::string& only) {
             const Change here = change_of_joints(make(name, still), make(name, moved), moved.rotation, options, jobs);
             all.joints += here.joints;
             all.types += here.types;
+            all.turned += here.turned;
             if (here.axis > all.axis) all.axis = here.axis, all.worst = name + ": " + here.worst;
           }
       }
-    std::printf("%-22s %6d %8d %14.5f  %s\n", kind.name, all.joints, all.types, all.axis, all.worst.c_str());
+    std::printf("%-22s %6d %8d %10d %14.5f  %s\n", kind.name, all.joints, all.types, all.turned, all.axis,
+                all.worst.c_str());
     std::fflush(stdout);
   }
   return 0;

@@ -87,6 +87,13 @@ struct BothSides {
   std::vector<NearSample> a, b;
 };
 
+double area_of(const BothSides& sides) {
+  double out = 0.0;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) out += s.contact.area;
+  return out;
+}
+
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -94,33 +101,41 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The largest gap that still belongs to the contact: a cluster grown from the smallest gaps, so that a small hinge is
-/// not swamped by large faces that run side by side further apart.
-double gap_limit(const BothSides& sides, double diagonal, double reach) {
-  struct Gap {
-    double distance, chord;
-  };
-  std::vector<Gap> gaps;
-  for (const auto* side : {&sides.a, &sides.b})
-    for (const NearSample& s : *side) gaps.push_back({s.distance, s.chord_error});
-  if (gaps.empty()) return 0.0;
-  std::sort(gaps.begin(), gaps.end(), [](const Gap& x, const Gap& y) { return x.distance < y.distance; });
-  std::size_t count = std::max<std::size_t>(1, gaps.size() / 50);
-  double limit = 0.0;
-  while (true) {
-    std::vector<double> chords;
-    for (std::size_t i = 0; i < count; ++i) chords.push_back(gaps[i].chord);
-    limit = std::min(reach, 2.5 * gaps[count / 2].distance + 3.0 * median(chords) + 1e-4 * diagonal);
-    const auto grown = static_cast<std::size_t>(
-        std::upper_bound(gaps.begin(), gaps.end(), limit, [](double l, const Gap& g) { return l < g.distance; }) -
-        gaps.begin());
-    if (grown <= count) return limit;
-    count = grown;
-  }
-}
-
 /// Squared sine of the angle by which two surfaces do not look straight at each other.
 double askew(const NearSample& s) { return s.contact.normal.cross(s.contact.facing_normal).squaredNorm(); }
+
+constexpr double kRough = 3e-3;  // squared sine; smooth surfaces agree better, however coarse their facets
+
+/// What gaps belong to a contact.
+struct GapLimit {
+  double between = 0.0;  ///< the surfaces that the facets stand for
+  double facets = 0.0;   ///< what facets add to it in most of the contact
+  /// Where a round surface goes on from a flat one, which is most of the contact, its facets add what they do there.
+  double at(double chord_error) const { return between + std::max(facets, chord_error); }
+  bool holds(const NearSample& s) const { return s.distance <= at(own_chord_error(s)); }
+  /// Noise is no chord: it tilts the normals of one side only.
+  static double own_chord_error(const NearSample& s) { return askew(s) < kRough ? s.chord_error : 0.0; }
+};
+
+/// A cluster grown from the smallest gaps, so that a small hinge is not swamped by large faces that run side by side
+/// further apart.
+GapLimit gap_limit(const BothSides& sides, double diagonal) {
+  std::vector<const NearSample*> samples;
+  for (const auto* side : {&sides.a, &sides.b})
+    for (const NearSample& s : *side) samples.push_back(&s);
+  if (samples.empty()) return {};
+  auto grown = samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, samples.size() / 50));
+  std::nth_element(samples.begin(), grown - 1, samples.end(),
+                   [](const NearSample* s, const NearSample* t) { return s->distance < t->distance; });
+  while (true) {
+    std::vector<double> gaps, chords;
+    for (auto s = samples.begin(); s != grown; ++s) gaps.push_back((*s)->distance), chords.push_back((*s)->chord_error);
+    const GapLimit limit = {2.5 * median(gaps) + 1e-4 * diagonal, 3.0 * median(chords)};
+    const auto before = grown;
+    grown = std::partition(before, samples.end(), [&](const NearSample* s) { return limit.holds(*s); });
+    if (grown == before) return limit;
+  }
+}
 
 double normal_spread(const BothSides& sides) {
   double spread = 0.0, area = 0.0;
@@ -149,15 +164,15 @@ void drop_askew(BothSides& sides) {
 /// Whether surfaces look at each other, or only edges of theirs do: past an edge the nearest point is a slanting way
 /// off.
 bool look_straight(const BothSides& sides, double diagonal) {
-  constexpr double kStraight = 0.9, kShare = 0.25;  // cosine; of the samples
+  constexpr double kStraight = 0.9, kShare = 0.25;  // cosine; of the area
   constexpr double kNothing = 1e-6;                 // of the diagonal: a way so short has no direction
   double straight = 0.0, all = 0.0;
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) {
       const Vec3 way = s.contact.point - s.contact.facing_point;
       const double across = std::max(std::abs(way.dot(s.contact.normal)), std::abs(way.dot(s.facing_facet)));
-      all += 1.0;
-      if (s.distance <= kNothing * diagonal || across >= kStraight * s.distance) straight += 1.0;
+      all += s.contact.area;
+      if (s.distance <= kNothing * diagonal || across >= kStraight * s.distance) straight += s.contact.area;
     }
   return straight > kShare * all;
 }
@@ -188,12 +203,12 @@ std::optional<Vec3> plane_of(const BothSides& sides) {
   constexpr double kFlat = 0.02;  // thickness per width, RMS
   Vec3 centre = Vec3::Zero();
   Mat3 second = Mat3::Zero();
-  double count = 0.0;
   for (const auto* side : {&sides.a, &sides.b})
-    for (const NearSample& s : *side) centre += s.contact.point, count += 1.0;
-  centre /= count;
+    for (const NearSample& s : *side) centre += s.contact.area * s.contact.point;
+  centre /= area_of(sides);
   for (const auto* side : {&sides.a, &sides.b})
-    for (const NearSample& s : *side) second += (s.contact.point - centre) * (s.contact.point - centre).transpose();
+    for (const NearSample& s : *side)
+      second += s.contact.area * (s.contact.point - centre) * (s.contact.point - centre).transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(second);
   if (solver.eigenvalues()[0] > kFlat * kFlat * solver.eigenvalues()[1]) return std::nullopt;
   return solver.eigenvectors().col(0);
@@ -208,7 +223,7 @@ void flatten(std::vector<NearSample>& samples, const Vec3& normal) {
 
 /// Takes the noise out of rough surfaces, where that makes the two sides agree better.
 void quieten(BothSides& sides) {
-  constexpr double kRough = 3e-3, kBetter = 0.5;
+  constexpr double kBetter = 0.5;
   const double before = normal_spread(sides);
   if (before < kRough) return;
   if (const auto normal = plane_of(sides)) {
@@ -222,13 +237,6 @@ void quieten(BothSides& sides) {
   if (normal_spread(quiet) < kBetter * before) sides = std::move(quiet);
 }
 
-double area_of(const BothSides& sides) {
-  double out = 0.0;
-  for (const auto* side : {&sides.a, &sides.b})
-    for (const NearSample& s : *side) out += s.contact.area;
-  return out;
-}
-
 /// Σ A n nᵀ / Σ A, eigenvalues ascending: (0, 0, 1) for a flat contact, (0, ½, ½) for a cylinder.
 Vec3 spread_of_directions(const BothSides& sides) {
   Mat3 sum = Mat3::Zero();
@@ -237,41 +245,53 @@ Vec3 spread_of_directions(const BothSides& sides) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(sum / sum.trace(), Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-/// Gaps that belong together: low < gap ≤ high.
-struct GapRange {
-  double low = -1.0, high = 0.0;
-};
-
-BothSides part_of(BothSides sides, const GapRange& gaps) {
+/// Those that the limit holds, or the others.
+BothSides part_of(BothSides sides, const GapLimit& limit, bool held = true) {
   for (auto* side : {&sides.a, &sides.b})
-    std::erase_if(*side, [&](const NearSample& s) { return s.distance <= gaps.low || s.distance > gaps.high; });
+    std::erase_if(*side, [&](const NearSample& s) { return limit.holds(s) != held; });
   return sides;
 }
 
-/// The gap of a second, wider contact that the nearest one hides: a bar that passes a flange more closely than the
-/// flange's bearing fits. The nearest contact gives way only if it is flat, so that it guides no motion, and the wider
-/// one guides (its normals span more than a line), agrees, and has several times the area. Plates that lie beside a
-/// small hinge guide nothing: the hinge stays.
-/// @param nearest the limit of the nearest contact. Nothing if that one stands
-std::optional<double> wider_contact(const BothSides& sides, double nearest, double diagonal, double reach) {
-  constexpr double kFlat = 0.95, kGuides = 0.1, kLarger = 5.0, kMostSpread = 0.03;
-  constexpr double kAny = std::numeric_limits<double>::infinity();
-  const BothSides touch = part_of(sides, {.high = nearest});
-  BothSides rest = part_of(sides, {nearest, kAny});
-  if (touch.a.empty() || touch.b.empty() || rest.a.size() < kFewest || rest.b.size() < kFewest) return std::nullopt;
-  const double limit = gap_limit(rest, diagonal, reach);
-  rest = part_of(std::move(rest), {nearest, limit});
-  if (rest.a.size() < kFewest || rest.b.size() < kFewest || area_of(rest) < kLarger * area_of(touch))
-    return std::nullopt;
-  if (spread_of_directions(touch)[2] < kFlat || spread_of_directions(rest)[1] < kGuides) return std::nullopt;
-  if (normal_spread(rest) > kMostSpread) return std::nullopt;
-  return limit;
+/// Samples whose gaps belong together.
+struct Cluster {
+  GapLimit limit;
+  BothSides samples;
+
+  /// The largest gap that it could hold.
+  double reach() const {
+    double chord_error = 0.0;
+    for (const auto* side : {&samples.a, &samples.b})
+      for (const NearSample& s : *side) chord_error = std::max(chord_error, GapLimit::own_chord_error(s));
+    return limit.at(chord_error);
+  }
+};
+
+Cluster nearest_cluster(const BothSides& sides, double diagonal) {
+  const GapLimit limit = gap_limit(sides, diagonal);
+  return {limit, part_of(sides, limit)};
 }
 
-GapRange contact_gaps(const BothSides& sides, double diagonal, double reach) {
-  const double nearest = gap_limit(sides, diagonal, reach);
-  if (const auto wider = wider_contact(sides, nearest, diagonal, reach)) return {nearest, *wider};
-  return {.high = nearest};
+/// A second, wider contact that the nearest one hides: a bar that passes a flange more closely than the flange's
+/// bearing fits. The nearest contact gives way only if it is flat, so that it guides no motion, and the wider one
+/// guides (its normals span more than a line), agrees, and has several times the area. Plates that lie beside a small
+/// hinge guide nothing: the hinge stays.
+/// @param rest without what touches. Nothing if that one stands
+std::optional<Cluster> wider_cluster(const BothSides& touch, const BothSides& rest, double diagonal) {
+  constexpr double kFlat = 0.95, kGuides = 0.1, kLarger = 5.0, kMostSpread = 0.03;
+  if (touch.a.empty() || touch.b.empty() || rest.a.size() < kFewest || rest.b.size() < kFewest) return std::nullopt;
+  Cluster wider = nearest_cluster(rest, diagonal);
+  const BothSides& found = wider.samples;
+  if (found.a.size() < kFewest || found.b.size() < kFewest || area_of(found) < kLarger * area_of(touch))
+    return std::nullopt;
+  if (spread_of_directions(touch)[2] < kFlat || spread_of_directions(found)[1] < kGuides) return std::nullopt;
+  if (normal_spread(found) > kMostSpread) return std::nullopt;
+  return wider;
+}
+
+Cluster contact_cluster(const BothSides& sides, double diagonal) {
+  Cluster nearest = nearest_cluster(sides, diagonal);
+  if (auto wider = wider_cluster(nearest.samples, part_of(sides, nearest.limit, false), diagonal)) return *wider;
+  return nearest;
 }
 
 BothSides sample(const Prepared& a, const Prepared& b, double reach, double facing_cosine, int wanted) {
@@ -301,10 +321,7 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   const Eigen::AlignedBox3d both = a.smooth.tree().box().intersection(b.smooth.tree().box());
   if (!a.closed || !b.closed || both.isEmpty() || both.volume() == 0.0) return {};
   BothSides sides = {inside_samples(a.smooth, b.smooth, samples), inside_samples(b.smooth, a.smooth, samples)};
-  const auto area = [](const std::vector<NearSample>& side) {
-    return side.empty() ? 0.0 : side.front().contact.area * static_cast<double>(side.size());
-  };
-  (area(sides.a) >= area(sides.b) ? sides.b : sides.a).clear();
+  (area_of({sides.a, {}}) >= area_of({{}, sides.b}) ? sides.b : sides.a).clear();
   const auto& kept = sides.a.empty() ? sides.b : sides.a;
   if (kept.size() < kFewest) return {};
   Vec3 mean = Vec3::Zero();
@@ -337,9 +354,8 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   const int coarse = std::max(100, options.samples / 4);
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
   if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
-  const double fine_reach = std::min(reach, 1.5 * contact_gaps(sides, diagonal, reach).high);
-  sides = sample(a, b, fine_reach, options.facing_cosine, options.samples);
-  sides = part_of(std::move(sides), contact_gaps(sides, diagonal, reach));
+  const double fine_reach = std::min(reach, 1.5 * contact_cluster(sides, diagonal).reach());
+  sides = contact_cluster(sample(a, b, fine_reach, options.facing_cosine, options.samples), diagonal).samples;
   drop_askew(sides);
   drop_hidden(pair, parts, sides);
 

@@ -26,6 +26,27 @@ struct Piece {
   }
 };
 
+/// Lengths that differ by less are the same but for round-off: which of them comes first must not depend on the pose.
+constexpr double kSame = 1e-6;
+
+/// The two halves across the longest edge; of edges of one length across the first.
+std::array<Piece, 2> halves(const SmoothSurface& surface, const Piece& piece) {
+  std::size_t longest = 0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double length =
+        (surface.point(piece.triangle, piece.corner[k]) - surface.point(piece.triangle, piece.corner[(k + 1) % 3]))
+            .squaredNorm();
+    if (length > (1.0 + kSame) * most) most = length, longest = k;
+  }
+  const std::size_t next = (longest + 1) % 3;
+  const Vec3 middle = 0.5 * (piece.corner[longest] + piece.corner[next]);
+  std::array<Piece, 2> out = {piece, piece};
+  out[0].corner[longest] = middle;
+  out[1].corner[next] = middle;
+  return out;
+}
+
 /// Cuts a surface down to what may matter: halves triangles, the largest first, and drops pieces on the way.
 class NearPart {
  public:
@@ -52,10 +73,7 @@ class NearPart {
         if (mostly_matters()) break;
         next_look = 2 * heap_.size();
       }
-      std::pop_heap(heap_.begin(), heap_.end());
-      const std::size_t largest = heap_.back().second;
-      heap_.pop_back();
-      halve(Piece(pieces_[largest]));
+      if (!halve_largest(most)) break;
     }
     std::vector<Piece> out;
     out.reserve(heap_.size());
@@ -104,22 +122,26 @@ class NearPart {
     return matters >= kMost * all;
   }
 
-  void halve(const Piece& piece) {
-    std::size_t longest = 0;
-    double most = -1.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double length =
-          (surface_.point(piece.triangle, piece.corner[k]) - surface_.point(piece.triangle, piece.corner[(k + 1) % 3]))
-              .squaredNorm();
-      if (length > most) most = length, longest = k;
+  /// Halves all that are as large as the largest, so that it does not matter which of them comes first.
+  /// @return whether it did: not if there were many more than `most` then
+  bool halve_largest(std::size_t most) {
+    const double least = (1.0 - kSame) * heap_.front().first;
+    std::vector<std::size_t> largest;
+    auto left = heap_.end();
+    for (; left != heap_.begin() && heap_.front().first >= least; --left) {
+      largest.push_back(heap_.front().second);
+      std::pop_heap(heap_.begin(), left);
     }
-    const std::size_t next = (longest + 1) % 3;
-    const Vec3 middle = 0.5 * (piece.corner[longest] + piece.corner[next]);
-    for (const std::size_t replaced : {longest, next}) {
-      Piece half = piece;
-      half.corner[replaced] = middle;
-      half.distance +=
-          (surface_.point(piece.triangle, half.centre()) - surface_.point(piece.triangle, piece.centre())).norm();
+    if (heap_.size() + largest.size() > most + most / 8) return false;
+    heap_.erase(left, heap_.end());
+    for (const std::size_t number : largest) halve(Piece(pieces_[number]));
+    return true;
+  }
+
+  void halve(const Piece& piece) {
+    const Vec3 centre = surface_.point(piece.triangle, piece.centre());
+    for (Piece half : halves(surface_, piece)) {
+      half.distance += (surface_.point(half.triangle, half.centre()) - centre).norm();
       push(half);
     }
   }
@@ -154,63 +176,138 @@ bool leads_across(const Vec3& way, double nothing, const Vec3& normal, const Vec
          std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >= kAcross * distance;
 }
 
-/// Calls use(piece, barycentric, area) for `wanted` points spread evenly over the pieces' area.
+/// Calls use(triangle, barycentric, area) for the centres of 2^levels equal parts of a piece.
+template <class Use>
+void use_parts(const SmoothSurface& surface, const Piece& piece, int levels, double area, Use&& use) {
+  if (levels == 0) return use(piece.triangle, piece.centre(), area);
+  for (const Piece& half : halves(surface, piece)) use_parts(surface, half, levels - 1, 0.5 * area, use);
+}
+
+/// Points at equal distances along a row of areas.
+struct Row {
+  double step;
+  double covered = 0.0;
+  std::size_t points = 0;
+
+  /// How many points fall on the next area. On the end of one they count with the next, whatever the round-off.
+  std::size_t next(double area) {
+    const std::size_t before = points;
+    for (covered += area; (static_cast<double>(points) + 0.5 + kSame) * step < covered;) ++points;
+    return points - before;
+  }
+};
+
+/// Calls use(triangle, barycentric, area) for about `wanted` points spread evenly over the pieces' area. Triangles of
+/// one shape get the same points whatever their pose and order, so that what is symmetric is sampled symmetrically and
+/// the errors of interpolated normals cancel as they do over the whole surface: the points of a piece are the centres
+/// of equal parts of it, and pieces of less area than a point's share points with those of their triangle. Only
+/// triangles that are smaller still share with each other.
+/// @param pieces by triangle
 template <class Use>
 void spread_evenly(const SmoothSurface& surface, const std::vector<Piece>& pieces, int wanted, Use&& use) {
   double total = 0.0;
   std::vector<double> area;
   for (const Piece& p : pieces) area.push_back(p.share() * surface.area(p.triangle)), total += area.back();
   const double step = total / wanted;
-  double covered = 0.0;
-  std::size_t i = 0;
-  for (std::size_t p = 0; p < pieces.size(); ++p) {
-    covered += area[p];
-    for (; (static_cast<double>(i) + 0.5) * step < covered && i < static_cast<std::size_t>(wanted); ++i)
-      use(pieces[p], even_barycentric(pieces[p], i), step);
+  Row of_all{step};
+  for (std::size_t begin = 0, end = 0; begin < pieces.size(); begin = end) {
+    const Index triangle = pieces[begin].triangle;
+    double whole = 0.0, small = 0.0;
+    std::vector<std::size_t> sharing;
+    for (; end < pieces.size() && pieces[end].triangle == triangle; ++end) {
+      whole += area[end];
+      if (const double levels = std::round(std::log2(area[end] / step)); levels >= 0.0)
+        use_parts(surface, pieces[end], static_cast<int>(levels), area[end], use);
+      else
+        sharing.push_back(end), small += area[end];
+    }
+    constexpr double kOwn = 0.7;  // of a point's area: about where a piece has its own, too
+    const double points = std::max(std::round(small / step - kSame), whole < kOwn * step ? 0.0 : 1.0);
+    Row of_triangle{small / points};
+    for (const std::size_t p : sharing)
+      if (points > 0.0) {
+        if (of_triangle.next(area[p]) > 0) use(triangle, pieces[p].centre(), of_triangle.step);
+      } else {
+        for (std::size_t n = of_all.next(area[p]); n > 0; --n)
+          use(triangle, even_barycentric(pieces[p], of_all.points - n), step);
+      }
   }
 }
 
-/// The nearest of every stride-th sample.
-std::vector<std::size_t> neighbours(const std::vector<NearSample>& samples, const Vec3& p, std::size_t stride,
-                                    std::size_t wanted) {
-  std::vector<std::pair<double, std::size_t>> all;
-  for (std::size_t j = 0; j < samples.size(); j += stride)
-    all.emplace_back((samples[j].contact.point - p).squaredNorm(), j);
-  wanted = std::min(wanted, all.size());
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted - 1), all.end());
-  std::vector<std::size_t> out;
-  for (std::size_t k = 0; k < wanted; ++k) out.push_back(all[k].second);
+/// Neighbouring samples of one facet as one.
+struct Cell {
+  Vec3 facet_normal;
+  // Sums by area.
+  Vec3 facing_normal = Vec3::Zero(), point = Vec3::Zero(), facing_point = Vec3::Zero();
+  double area = 0.0;
+
+  void add(const NearSample& s) {
+    facing_normal += s.contact.area * s.facing_facet;
+    point += s.contact.area * s.contact.point;
+    facing_point += s.contact.area * s.contact.facing_point;
+    area += s.contact.area;
+  }
+};
+
+/// Each facet is cut alike, wherever it stands in the order of the samples. Of a fine mesh some cells stand for all.
+/// @param wanted cells, about; up to twice as many come back
+std::vector<Cell> cells_of(const std::vector<NearSample>& samples, std::size_t wanted) {
+  const std::size_t largest = 1 + samples.size() / wanted;  // samples
+  std::vector<Cell> all, out;
+  std::size_t count = 0;
+  for (const NearSample& s : samples) {
+    if (all.empty() || count == largest || all.back().facet_normal != s.contact.facet_normal)
+      all.push_back({s.contact.facet_normal}), count = 0;
+    all.back().add(s);
+    ++count;
+  }
+  const std::size_t stride = 1 + all.size() / (2 * wanted);
+  for (std::size_t i = 0; i < all.size(); i += stride) out.push_back(all[i]);
   return out;
+}
+
+/// Puts in place of a sample the mean of the cells around it, with weights that fall to 0 at the rim: there it does not
+/// matter which of several that are equally far count.
+/// @param squared distances of the cells. @param rim squared radius
+void average(NearSample& sample, const std::vector<Cell>& cells, const std::vector<double>& squared, double rim) {
+  constexpr double kSameSide = 0.5;  // cosine; what bends more is another face
+  Cell mean{Vec3::Zero()};
+  for (std::size_t j = 0; j < cells.size(); ++j) {
+    const Cell& cell = cells[j];
+    if (squared[j] >= rim || cell.facet_normal.dot(sample.contact.normal) < kSameSide) continue;
+    const double weight = 1.0 - squared[j] / rim;
+    mean.facet_normal += weight * cell.area * cell.facet_normal;
+    mean.facing_normal += weight * cell.facing_normal;
+    mean.point += weight * cell.point;
+    mean.facing_point += weight * cell.facing_point;
+    mean.area += weight * cell.area;
+  }
+  if (!(mean.area > 0.0)) return;
+  sample.contact.normal = mean.facet_normal.normalized();
+  sample.contact.facing_normal = mean.facing_normal.normalized();
+  sample.contact.point = mean.point / mean.area;
+  sample.contact.facing_point = mean.facing_point / mean.area;
 }
 
 }  // namespace
 
 void average_patches(std::vector<NearSample>& samples) {
-  constexpr std::size_t kCandidates = 800, kPatches = 20;  // a patch is a twentieth of the contact
-  const std::size_t stride = 1 + samples.size() / kCandidates;
-  const std::size_t wanted = std::max<std::size_t>(6, samples.size() / stride / kPatches);
-  constexpr double kSameSide = 0.5;  // cosine; what bends more is another face
-  std::vector<NearSample> out;
-  for (const NearSample& s : samples) {
-    NearSample mean = s;
-    Vec3 own = s.contact.facet_normal, facing = s.facing_facet;
-    double count = 1.0;
-    for (const std::size_t j : neighbours(samples, s.contact.point, stride, wanted)) {
-      const NearSample& other = samples[j];
-      if (other.contact.facet_normal.dot(s.contact.normal) < kSameSide) continue;
-      own += other.contact.facet_normal;
-      facing += other.facing_facet;
-      mean.contact.point += other.contact.point;
-      mean.contact.facing_point += other.contact.facing_point;
-      count += 1.0;
-    }
-    mean.contact.normal = own.normalized();
-    mean.contact.facing_normal = facing.normalized();
-    mean.contact.point /= count;
-    mean.contact.facing_point /= count;
-    out.push_back(mean);
+  constexpr std::size_t kCells = 800;
+  constexpr std::size_t kPatches = 15;  // a patch is a fifteenth of the contact; with its weights it quietens as a
+                                        // twentieth that weighs the same throughout
+  constexpr std::size_t kFewest = 6;
+  if (samples.empty()) return;
+  const std::vector<Cell> cells = cells_of(samples, kCells);
+  const std::size_t wanted = std::min(std::max(kFewest, cells.size() / kPatches), cells.size() - 1);
+  std::vector<Vec3> centres;
+  for (const Cell& cell : cells) centres.push_back(cell.point / cell.area);
+  std::vector<double> squared(cells.size()), sorted;
+  for (NearSample& s : samples) {
+    for (std::size_t j = 0; j < cells.size(); ++j) squared[j] = (centres[j] - s.contact.point).squaredNorm();
+    sorted = squared;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(wanted), sorted.end());
+    average(s, cells, squared, sorted[wanted]);
   }
-  samples = std::move(out);
 }
 
 std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
@@ -226,8 +323,8 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
       NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted), 0.25 * reach);
 
   std::vector<NearSample> out;
-  spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
-    const Vec3 point = surface.point(piece.triangle, barycentric), normal = surface.normal(piece.triangle, barycentric);
+  spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
+    const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
     constexpr double kFacetFacing = -0.6;  // facets may bend from the smooth normals by half a segment on each side
     const auto facing = other.tree().nearest(point, reach, normal, kFacetFacing);
     if (!facing.found()) return;
@@ -236,10 +333,10 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
     const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
     if (normal.dot(facing_normal) > facing_cosine) return;
     out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal), point,
-                    surface.tree().normal(piece.triangle)},
+                    surface.tree().normal(triangle)},
                    other.tree().normal(facing.triangle),
                    facing.distance,
-                   std::max(surface.chord_error(piece.triangle), other.chord_error(facing.triangle))});
+                   std::max(surface.chord_error(triangle), other.chord_error(facing.triangle))});
   });
   return out;
 }
@@ -252,12 +349,12 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
   };
   const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted), 0.0);
   std::vector<NearSample> out;
-  spread_evenly(surface, pieces, wanted, [&](const Piece& piece, const Vec3& barycentric, double area) {
-    const Vec3 point = surface.point(piece.triangle, barycentric), normal = surface.normal(piece.triangle, barycentric);
-    const Vec3& facet = surface.tree().normal(piece.triangle);
+  spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
+    const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
+    const Vec3& facet = surface.tree().normal(triangle);
     if (solid.tree().winding(point) > 0)
       out.push_back(
-          {{point, normal, point, -normal, area, 0.0, point, facet}, -facet, 0.0, surface.chord_error(piece.triangle)});
+          {{point, normal, point, -normal, area, 0.0, point, facet}, -facet, 0.0, surface.chord_error(triangle)});
   });
   return out;
 }

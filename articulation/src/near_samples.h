@@ -16,18 +16,19 @@ struct NearSample {
 };
 
 /// Points spread evenly over the part of `surface` that may lie within `reach` of `other` and face it: those that do.
-/// Triangles are halved, the largest first, and what is too far is dropped on the way.
-/// @param wanted points over that part; fewer come back where it faces nothing
+/// Triangles are halved, the largest first, and what is too far is dropped on the way. Where the points lie depends on
+/// the shapes alone, not on pose, scale or the order of the triangles, but for triangles smaller than a point's share.
+/// @param wanted points over that part, about; fewer come back where it faces nothing
 std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
                                      double facing_cosine, int wanted);
 
 /// Points spread evenly over the part of `surface` that lies inside a closed surface. Each faces itself.
 std::vector<NearSample> inside_samples(const SmoothSurface& surface, const SmoothSurface& solid, int wanted);
 
-/// Replaces each sample by the mean of a patch around it: points, and facets' normals, whose sum is the patch's vector
-/// area, in which noise of vertices inside cancels. Means of points and normals belong together: where normals are
-/// linear in the point (planes, spheres, cylinders) they stay so. For rough surfaces; a smooth one's own normals are
-/// better.
+/// Replaces each sample by the mean of a patch around it: points, and facets' normals, whose sum by area is the patch's
+/// vector area, in which noise of vertices inside cancels. Means of points and normals belong together: where normals
+/// are linear in the point (planes, spheres, cylinders) they stay so. For rough surfaces; a smooth one's own normals
+/// are better.
 void average_patches(std::vector<NearSample>& samples);
 
 }  // namespace limber

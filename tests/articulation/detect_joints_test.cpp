@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "assemblies.h"
+#include "grouped_parts.h"
 #include "joint_scores.h"
 #include "limber/core/error.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
@@ -121,24 +122,56 @@ TEST(DetectJoints, BeadsThatTouchAtAPointMakeNoJoint) {
   for (const int segments : {8, 16, 32, 64}) EXPECT_TRUE(joints_of(make("snake", {.segments = segments})).empty());
 }
 
-// Against the same parts as they stood before, not against the truth: what a method adds of its own.
+// Against the same parts as they stood before, not against the truth: what a method adds of its own. The wheel of the
+// dovetail turns on a short shaft with a cone at its end, which tells its axis from few and coarse facets.
 TEST(DetectJoints, PoseScaleAndOrderChangeNoTypeAndNoAxis) {
   TbbJobs jobs;
-  const Variant still{.clearance = 0.005};
-  Variant moved = still;
-  moved.rotation = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
-  moved.shuffled = moved.swapped = true;
-  for (const double scale : {1e-3, 1e3}) {
-    moved.scale = scale;
-    moved.translation = scale * Vec3(5, -3, 2);
-    for (const std::string name : {"brush arm", "stack", "piston"}) {
-      const assemblies::Change change =
-          assemblies::change_of_joints(make(name, still), make(name, moved), moved.rotation, quick(), jobs);
-      EXPECT_GT(change.joints, 0) << name;
-      EXPECT_EQ(change.types, 0) << name;
-      EXPECT_LT(change.axis, 0.05) << name << ", " << change.worst;
+  for (const std::string name : {"brush arm", "stack", "piston", "dovetail"})
+    for (const int segments : {16, 32})
+      for (const double scale : {1e-3, 1e3}) {
+        const Variant still{.segments = segments, .clearance = 0.005};
+        Variant moved = still;
+        moved.rotation = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+        moved.shuffled = moved.swapped = true;
+        moved.scale = scale;
+        moved.translation = scale * Vec3(5, -3, 2);
+        const assemblies::Change change =
+            assemblies::change_of_joints(make(name, still), make(name, moved), moved.rotation, quick(), jobs);
+        EXPECT_GT(change.joints, 0) << name;
+        EXPECT_EQ(change.types, 0) << name;
+        EXPECT_LT(change.axis, 0.05) << name << segments << ", " << change.worst;
+      }
+}
+
+// What is symmetric is sampled symmetrically: a shaft in its sleeve has its samples' middle on its axis to round-off,
+// though no facet is sampled finely.
+TEST(ContactRegions, SamplesOfARoundContactBalanceAboutItsAxis) {
+  for (const double angle : {0.0, 1.1}) {
+    const Mat3 R = Eigen::AngleAxisd(angle, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+    GroupedSurface input;
+    append_group(assemblies::lathe({{1.01, -1}, {2, -1}, {2, 1}, {1.4, 1}}, 12).placed(R, Vec3::Zero()), "sleeve",
+                 input);
+    append_group(assemblies::lathe({{0, -2}, {1, -1}, {1.39, 1}, {0, 1}}, 12).placed(R, Vec3::Zero()), "shaft", input);
+    const auto regions = find_contact_regions(find_components(input), {.samples = 500});
+    ASSERT_EQ(regions.size(), 1u);
+    for (const auto* side : {&regions[0].on_a, &regions[0].on_b}) {
+      ASSERT_GT(side->size(), 100u);
+      Vec3 sum = Vec3::Zero();
+      double area = 0.0;
+      for (const ContactSample& s : *side) sum += s.area * (R.transpose() * s.point), area += s.area;
+      EXPECT_LT((sum / area).head<2>().norm(), 1e-9) << angle;
     }
   }
+}
+
+// Interpolated normals of a coarse cone lean by degrees, to both sides alike: over a whole turn nothing is left of it.
+TEST(DetectJoints, ACoarseWheelOnAConeTurnsAboutItsTrueAxis) {
+  for (const int segments : {8, 16, 32})
+    for (const double clearance : {0.0, 0.005, 0.02}) {
+      const Share share = share_right({"dovetail"}, {.segments = segments, .clearance = clearance});
+      EXPECT_EQ(share.right, share.all) << share.wrong;
+      EXPECT_LT(share.axis, 0.02) << segments << ", " << clearance;
+    }
 }
 
 /// Adds a part that is one or more shells.

@@ -130,6 +130,7 @@ Change change_of_joints(const MadeAssembly& still, const MadeAssembly& moved, co
     const int column = j.joint.type == JointType::kPlanar ? 2 : 0;
     const Vec3 axis = rotation * j.joint.frame.axes.col(column), other = same->joint.frame.axes.col(column);
     const double turned = std::atan2(axis.cross(other).norm(), std::abs(axis.dot(other))) * 180.0 / std::numbers::pi;
+    if (turned > Change::kMostTurn) ++out.turned;
     if (turned <= out.axis) continue;
     out.axis = turned;
     out.worst = name_of(before, j.a) + " - " + name_of(before, j.b);

@@ -36,8 +36,10 @@ Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jo
 struct Change {
   int joints = 0;     ///< of the unmoved assembly
   int types = 0;      ///< of these come out as another type, or not at all
+  int turned = 0;     ///< axes that turn by more than `kMostTurn`
   double axis = 0.0;  ///< degrees, the most by which an axis (planar: the normal) turns beyond the motion itself
   std::string worst;  ///< the joint of that axis
+  static constexpr double kMostTurn = 0.05;  ///< degrees
 };
 /// @param moved the same parts as `still` but for pose, scale and order
 Change change_of_joints(const MadeAssembly& still, const MadeAssembly& moved, const Mat3& rotation,
