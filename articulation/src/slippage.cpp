@@ -11,6 +11,7 @@
 #include "limber/core/error.h"
 #include "motion_space.h"
 #include "number_text.h"
+#include "second_reading.h"
 
 namespace limber {
 namespace {
@@ -399,26 +400,6 @@ bool slides_along(const JointSpec& joint, const Vec3& direction) {
          std::abs(joint.frame.axes.col(0).dot(direction)) > kAlong;
 }
 
-/// Takes a share of the first reading's confidence, for another one that does not overtake it.
-double share_of_first(double share, Slippage& out) {
-  double& first = out.hypotheses.front().confidence;
-  const double second = out.hypotheses.size() > 1 ? out.hypotheses[1].confidence : 0.0;
-  const double taken = std::min(share * first, first - second);
-  first -= taken;
-  return taken;
-}
-
-/// Puts a reading in the place of those of its type, behind the first.
-void replace_reading(JointHypothesis reading, Slippage& out) {
-  const auto others = out.hypotheses.begin() + 1;
-  out.hypotheses.erase(std::remove_if(others, out.hypotheses.end(),
-                                      [&](const JointHypothesis& h) { return h.joint.type == reading.joint.type; }),
-                       out.hypotheses.end());
-  out.hypotheses.push_back(std::move(reading));
-  std::stable_sort(out.hypotheses.begin() + 1, out.hypotheses.end(),
-                   [](const JointHypothesis& x, const JointHypothesis& y) { return x.confidence > y.confidence; });
-}
-
 /// A drawer at its stop touches what a peg in a blind hole touches, a piston at its dead centre what a pin with a head
 /// does. What would slide but for one face that holds one way only stays among the readings, with a share of the first
 /// one's confidence. It does not overtake: nothing in the geometry tells the two apart.
@@ -438,59 +419,6 @@ void add_reading_with_stop(const std::vector<ContactRegion>& regions, const Slip
   free.confidence = share_of_first(kShare * free.confidence, out);
   free.reason = "the face that holds it one way only may be a stop; without it " + free.reason;
   replace_reading(std::move(free), out);
-}
-
-// Flanges.
-
-/// The middle of a flat contact whose outline is a circle, as far as facets and samples tell.
-std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regions, const JointFrame& plane) {
-  constexpr double kEven = 0.05;  // of the second moments; an ellipse of 1.10 has 0.095
-  constexpr double kRound = 0.9;  // of radii: an octagon has 0.92, a hexagon 0.87, the ellipse 0.91
-  constexpr std::size_t kSectors = 48;
-  using Plane = Eigen::Vector2d;
-  std::vector<std::pair<Plane, double>> points;  // with area
-  for (const ContactRegion& r : regions)
-    for (const auto* side : {&r.on_a, &r.on_b})
-      for (const ContactSample& s : *side)
-        points.emplace_back((plane.axes.transpose() * (s.point - plane.origin)).head<2>(), s.area);
-  Plane middle = Plane::Zero();
-  double area = 0.0;
-  for (const auto& [p, weight] : points) middle += weight * p, area += weight;
-  if (!(area > 0.0)) return std::nullopt;
-  middle /= area;
-  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
-  std::array<double, kSectors> outline{};
-  for (const auto& [p, weight] : points) {
-    const Plane d = p - middle;
-    moments += weight * d * d.transpose();
-    const double turn = 0.5 + 0.5 * std::atan2(d.y(), d.x()) / std::numbers::pi;
-    double& radius = outline[std::min(static_cast<std::size_t>(turn * kSectors), kSectors - 1)];
-    radius = std::max(radius, d.norm());
-  }
-  const Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues();
-  const auto [least, most] = std::minmax_element(outline.begin(), outline.end());
-  if (along[1] - along[0] > kEven * (along[1] + along[0]) || *least < kRound * *most) return std::nullopt;
-  return plane.origin + plane.axes.leftCols<2>() * middle;
-}
-
-/// Flanges that meet face to face slide as far as geometry knows, but where the face is round a bearing that is not
-/// drawn may turn about its middle: four of KUKA's robots are drawn that way. A puck on a table looks the same, so the
-/// turn stays a second reading.
-void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
-  constexpr double kShare = 0.2;
-  JointHypothesis& first = out.hypotheses.front();
-  if (first.joint.type != JointType::kPlanar) return;
-  const auto middle = middle_of_round_face(regions, first.joint.frame);
-  if (!middle) return;
-  JointHypothesis turns = first;
-  turns.joint.type = JointType::kRevolute;
-  const Mat3& plane = first.joint.frame.axes;
-  turns.joint.frame.origin = *middle;
-  turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
-  turns.confidence = share_of_first(kShare, out);
-  turns.reason =
-      "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
-  replace_reading(std::move(turns), out);
 }
 
 }  // namespace
