@@ -19,14 +19,26 @@ double start_share(std::span<const RowLaw> laws) {
 constexpr int kMostCuts = 4;
 constexpr double kShortestPart = 1e-3;
 
-/// Whether a step may be cut: free bodies that nothing but contacts, gravity and held forces acts on.
+/// Bodies that the rows, gravity and held forces move, and nothing else.
+bool are_free(std::span<const ConstrainedBody> table, std::span<const Index> members) {
+  return std::ranges::all_of(members, [&](Index member) {
+    const auto& [group, slot, pose] = table[static_cast<std::size_t>(member)];
+    return group->frame_constants().motion == FrameMotion::kFree && !group->has_delayed_impulse(slot);
+  });
+}
+
+/// Whether a step may be cut where bodies strike: free ones that nothing but contacts acts on.
 bool allows_cuts(std::span<const ConstrainedBody> table, std::span<const Index> members,
                  std::span<Constraint* const> constraints) {
   return std::ranges::all_of(constraints, [](const Constraint* c) { return c->is_contact(); }) &&
-         std::ranges::all_of(members, [&](Index member) {
-           const auto& [group, slot, pose] = table[static_cast<std::size_t>(member)];
-           return group->frame_constants().motion == FrameMotion::kFree && !group->has_delayed_impulse(slot);
-         });
+         are_free(table, members);
+}
+
+/// Whether a step may be taken in parts where it does not settle: free bodies that joints alone act on.
+bool may_divide(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                std::span<Constraint* const> constraints) {
+  return std::ranges::all_of(constraints, [](const Constraint* c) { return c->may_be_divided(); }) &&
+         are_free(table, members);
 }
 
 }  // namespace
@@ -55,15 +67,51 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
     ++report.cuts;
   }
   part.step = left;
-  s.take_part({table, members, constraints, begins, true}, part, options.step, report);
+  const Impl::Part rest{table, members, constraints, begins, true};
+  if (may_divide(table, members, constraints))
+    s.take_divided(rest, part, report);
+  else
+    s.take_part(rest, part, options.step, report);
   return report;
+}
+
+/// A step, in halves, quarters and so on of it from where the rows do not come together: impulses at a step's start
+/// bring joints together at its end only where bodies turn by less than a radian or so in between. Where the shortest
+/// part does not settle either, what is left is taken as it comes.
+void IslandSolver::Impl::take_divided(Part part, IslandOptions options, IslandReport& report) {
+  constexpr double kShortest = 1.0 / 64.0;  // of the step
+  const double whole = options.step;
+  double left = whole, length = whole;
+  bool gives_up = false;
+  for (;;) {
+    if (gives_up || left < 1.5 * length) length = left;  // the last one, whatever has been rounded
+    options.step = length;
+    part.ends = length == left;
+    const IslandReport done = foresee_guarded(part, options, whole);
+    if (done.status == SolveStatus::kIterationLimit && !gives_up) {
+      gives_up = length < 1.5 * kShortest * whole;
+      length *= 0.5;
+      continue;
+    }
+    commit(part, options, done, report);
+    if (part.ends) return;
+    options.energy_surplus = report.energy_surplus;
+    left -= length;
+    part.begins = false;
+    ++report.cuts;
+  }
 }
 
 /// One step, or a part of one that is cut.
 void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& options, double whole_step,
                                    IslandReport& report) {
+  commit(part, options, foresee_guarded(part, options, whole_step), report);
+}
+
+/// What has been foreseen happens.
+void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, IslandReport done,
+                                IslandReport& report) {
   const BodyStates states(part.table);
-  IslandReport done = foresee_guarded(part, options, whole_step);
   for (Index local = 0; local < bodies.count(); ++local)
     bodies.body(local).group->commit(bodies.body(local).slot, part.begins, part.ends);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += options.step * reaction[i];

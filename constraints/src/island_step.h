@@ -126,6 +126,8 @@ struct IslandSolver::Impl {
     std::span<Constraint* const> constraints;
     bool begins, ends;  // the whole step
   };
+  void take_divided(Part part, IslandOptions options, IslandReport& report);
+  void commit(const Part& part, const IslandOptions& options, IslandReport done, IslandReport& report);
   void take_part(const Part& part, const IslandOptions& options, double whole_step, IslandReport& report);
   IslandReport foresee(const Part& part, const IslandOptions& options, double whole_step);
   IslandReport foresee_guarded(const Part& part, const IslandOptions& options, double whole_step);

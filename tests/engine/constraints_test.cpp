@@ -104,6 +104,32 @@ TEST(Constraints, MostStepsSettleWhereLinksTurnByMoreThanARadianInEach) {
   EXPECT_LT(unsettled, kUnsettled);
 }
 
+// What cannot come together by impulses at a step's start can by those at the starts of its parts.
+TEST(Constraints, ChainsThatWhipHangTogether) {
+  for (const auto& [links, step] : {std::pair(3, 0.1), std::pair(8, 1.0 / 60.0)}) {
+    World world({.step = step});
+    std::vector<JointId> joints;
+    BodyId last{};
+    for (int i = 0; i < links; ++i) {
+      const Vec3 start(i * kSampleSize, 0.0, 2.0);
+      JointSpec ball{.type = JointType::kBall};
+      ball.frame.origin = start;
+      const BodyId link =
+          world.add_body(sample_model({.modes = 0}), {.pose = {.p = start + 0.5 * kSampleSize * Vec3::UnitX()}});
+      joints.push_back(world.add_joint(last, link, ball));
+      last = link;
+    }
+    int cuts = 0;
+    for (double time = 0.0; time < 30.0; time += step) {
+      world.step();
+      EXPECT_TRUE(world.constraint_report().solved) << links << " links at " << time << " s";
+      cuts += world.constraint_report().cuts;
+      for (const JointId joint : joints) EXPECT_LT(world.joint(joint).distance_error, kExact);
+    }
+    EXPECT_GT(cuts, 0) << links;
+  }
+}
+
 TEST(Constraints, IslandsAreWhatConstraintsTieTogether) {
   World world;
   const auto model = sample_model({.modes = 0});

@@ -52,6 +52,9 @@ class Constraint {
   /// Whether it is contact: an island of nothing else may have its step cut where bodies strike. Each part is then a
   /// step for the functions here.
   virtual bool is_contact() const { return false; }
+  /// Whether islands of nothing but such constraints may have a step that does not settle taken in shorter parts, each
+  /// a step for the functions here.
+  virtual bool may_be_divided() const { return false; }
   /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
   virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
   /// @param impulses of the rows over the step that ends now, N·s, held part included

@@ -40,6 +40,9 @@
 /// Where bodies strike and that is asked for (Constraint::next_cut), the step is cut there, four times at most, and 1
 /// to 7 are done for each part.
 ///
+/// Where free bodies hang on joints alone and the step does not settle, it is taken in halves, quarters … 64ths,
+/// as far as they settle, each by 1 to 7, from that on what is left of it at once.
+///
 /// Momentum of free islands is kept by 4 (opposite impulses at one world point) and by 6 (the motion of the whole is
 /// not touched). What is guaranteed, and why, is in docs/derivations/constraints.md.
 #pragma once
@@ -70,7 +73,7 @@ struct IslandOptions {
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
-  int cuts = 0;                 ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch)
+  int cuts = 0;  ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch) or joints did not come together
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most

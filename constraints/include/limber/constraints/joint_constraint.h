@@ -59,6 +59,7 @@ class JointConstraint final : public Constraint {
   Error error(const BodyStates& states) const;
 
   std::array<Index, 2> bodies() const override { return {a_.body(), b_.body()}; }
+  bool may_be_divided() const override { return true; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
