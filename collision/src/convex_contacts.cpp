@@ -42,8 +42,9 @@ void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidT
   const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
   const double radii = a.radius + b.radius;
   if (!(nearest.distance - radii <= margin)) return;
-  const Direction d = nearest.cores_intersect ? least_penetration()
-                                              : Direction{nearest.normal, -nearest.distance, nearest.a, nearest.b};
+  // Cores that are apart by little more than round-off may have any normal by their nearest points.
+  const bool apart = !nearest.cores_intersect && depth_along(nearest.normal) < 0.0;
+  const Direction d = apart ? Direction{nearest.normal, -nearest.distance, nearest.a, nearest.b} : least_penetration();
   if (a.faces.empty() && b.faces.empty())
     touch_along(d.normal, margin);
   else if (a.points.size() > 1 && b.points.size() > 1)
@@ -84,9 +85,15 @@ ConvexContacts::Direction ConvexContacts::least_penetration() const {
   return best;
 }
 
+// How far the cores would have to move apart along the normal; below 0: how far apart they are along it.
+double ConvexContacts::depth_along(const Vec3& normal) const {
+  return -lowest(side_[1].points, -normal) - lowest(side_[0].points, normal);
+}
+
 void ConvexContacts::take_shallower(Direction& best, const Vec3& normal, double preference) const {
-  const double depth = -lowest(side_[1].points, -normal) - lowest(side_[0].points, normal);
-  if (depth < preference * best.depth) best.normal = normal, best.depth = depth;
+  const double depth = depth_along(normal);
+  if (depth < (best.depth > 0.0 ? preference * best.depth : best.depth / preference))
+    best.normal = normal, best.depth = depth;
 }
 
 // For balls and capsules about one point: any direction across the axes there are.

@@ -44,6 +44,7 @@ class ConvexContacts {
   double least_gap() const;
 
   Direction least_penetration() const;
+  double depth_along(const Vec3& normal) const;
   void take_shallower(Direction& best, const Vec3& normal, double preference) const;
   Vec3 across_edges() const;
   void locate_deepest(Direction& d) const;

@@ -28,6 +28,11 @@ void ConeSplitting::begin(const BoundedRows& rows, RowCoupling& coupling) {
   std::fill_n(next, std::size(vectors) * stride, 0.0);
   for (double** vector : vectors) *vector = next, next += stride;
   scale_rows();
+  sets_.clear();
+  for (std::size_t i = 0; i < cones_; ++i) {
+    sets_.push_back(force_set(rows.friction, rows.radius, i));
+    sets_[i].radius *= scale_[3 * i];
+  }
 }
 
 void ConeSplitting::scale_rows() {
@@ -45,7 +50,7 @@ double ConeSplitting::clamped(std::size_t row, double force) const {
 }
 
 void ConeSplitting::project(const double* from, double* to) const {
-  for (std::size_t i = 0; i < cones_; ++i) put(project_on_cone(triple(from + 3 * i), rows_.friction[i]), to + 3 * i);
+  for (std::size_t i = 0; i < cones_; ++i) put(sets_[i].project(triple(from + 3 * i)), to + 3 * i);
   for (std::size_t i = 3 * cones_; i < n_; ++i) to[i] = clamped(i, from[i]);
 }
 
@@ -56,8 +61,7 @@ double ConeSplitting::residual(std::span<const double> f, std::span<const double
   for (std::size_t i = 0; i < cones_; ++i) {
     const double s = scale_[3 * i];
     const Vec3 force = s * triple(&f[3 * i]), velocity = triple(&w[3 * i]) / s;
-    const double mu = rows_.friction[i];
-    const double off = (force - project_on_cone(force - corrected_velocity(velocity, mu), mu)).norm();
+    const double off = (force - sets_[i].project(force - corrected_velocity(velocity, sets_[i].mu))).norm();
     worst = std::max(worst, s * off / unit[3 * i]);
   }
   for (std::size_t i = 3 * cones_; i < n_; ++i) {
@@ -97,15 +101,15 @@ void ConeSplitting::start(std::span<const double> f) {
   project(x_, z_);
   coupling_->multiply(f_, z_);
   for (std::size_t i = 0; i < n_; ++i) f_[i] += b_[i];
-  for (std::size_t i = 0; i < cones_; ++i) put(corrected_velocity(triple(f_ + 3 * i), rows_.friction[i]), f_ + 3 * i);
+  for (std::size_t i = 0; i < cones_; ++i) put(corrected_velocity(triple(f_ + 3 * i), sets_[i].mu), f_ + 3 * i);
   for (std::size_t i = 0; i < n_; ++i) x_[i] = z_[i] - f_[i] / kRho;
 }
 
 void ConeSplitting::iterate() {
   for (std::size_t i = 0; i < cones_; ++i) {
-    const Vec3 x = triple(x_ + 3 * i), z = project_on_cone(x, rows_.friction[i]), y = kRho * (x - z);
+    const Vec3 x = triple(x_ + 3 * i), z = sets_[i].project(x), y = kRho * (x - z);
     put(z, z_ + 3 * i);
-    put(kRho * z - triple(b_ + 3 * i) - corrected_velocity(y, rows_.friction[i]), f_ + 3 * i);
+    put(kRho * z - triple(b_ + 3 * i) - corrected_velocity(y, sets_[i].mu), f_ + 3 * i);
   }
   for (std::size_t i = 3 * cones_; i < n_; ++i) {
     z_[i] = clamped(i, x_[i]);

@@ -24,7 +24,7 @@ namespace limber {
 class ConeSplitting {
  public:
   /// Begins a problem. Memory grows to the largest seen.
-  /// @param rows its cones, friction, lower and upper, which stay where they are; A and b are not read
+  /// @param rows its cones, friction, radius, lower and upper, which stay where they are; A and b are not read
   void begin(const BoundedRows& rows, RowCoupling& coupling);
   /// Units for residual(): the largest |b| of all, each by √A_ii of its row.
   void units_of(std::span<const double> b, std::vector<double>& unit) const;
@@ -49,6 +49,7 @@ class ConeSplitting {
   bool factored_ = false;
   // Scaled to A_ii = 1 as in proximal_solver.cpp: forces by `scale_`, velocities by its inverse.
   std::vector<double> scale_;
+  std::vector<ForceSet> sets_;
   AlignedBuffer memory_;
   double *b_ = nullptr, *x_ = nullptr, *z_ = nullptr, *f_ = nullptr;
 };

@@ -74,21 +74,6 @@ class Sliding {
 
 }  // namespace
 
-Mat3 cone_projection_derivative(const Vec3& x, double mu) {
-  const double s = x.tail<2>().norm();
-  if (mu > 0.0 && s <= mu * x[0]) return Mat3::Identity();
-  if (mu * s <= -x[0]) return Mat3::Zero();
-  if (mu == 0.0) return Vec3(1.0, 0.0, 0.0).asDiagonal();
-  const Vec2 t = x.tail<2>() / s;
-  const double n = (x[0] + mu * s) / (1.0 + mu * mu);
-  const Vec3 normal_row = Vec3(1.0, mu * t[0], mu * t[1]) / (1.0 + mu * mu);
-  Mat3 P;
-  P.row(0) = normal_row;
-  P.bottomRows<2>() = mu * t * normal_row.transpose();
-  P.bottomRightCorner<2, 2>() += mu * n / s * (Mat2::Identity() - t * t.transpose());
-  return P;
-}
-
 Vec3 solve_coulomb_contact(const Mat3& A, const Vec3& b, double mu) {
   if (b[0] >= 0.0) return Vec3::Zero();
   const double n_alone = -b[0] / A(0, 0);

@@ -18,9 +18,6 @@ inline Vec3 project_on_cone(const Vec3& x, double mu) {
   return {n, mu * n * x[1] / s, mu * n * x[2] / s};
 }
 
-/// A derivative of project_on_cone() (at the kinks one of them).
-Mat3 cone_projection_derivative(const Vec3& x, double mu);
-
 /// û = u + μ|u_t| e_n
 inline Vec3 corrected_velocity(const Vec3& u, double mu) { return {u[0] + mu * u.tail<2>().norm(), u[1], u[2]}; }
 

@@ -86,8 +86,8 @@ void IslandSolver::Impl::begin_with_last_forces() {
 /// gaps that bodies come to under them.
 SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
                                                  const IslandOptions& options, IslandReport& report) {
-  constexpr int kIterationsAtATime = 15, kMostTimes = 8;
-  const int most = report.iterations - 1 + std::min(kMostTimes, options.max_iterations);
+  constexpr int kIterationsAtATime = 15;
+  const int most = report.iterations - 1 + options.max_iterations;
   begin_splitting(splits);
   for (;; ++report.iterations) {
     predict(options);
@@ -128,9 +128,12 @@ void IslandSolver::Impl::begin_splitting(bool from_last_forces) {
     f_bounded[i] = from_last_forces ? step * laws[at].last_force : f[at] + held_impulse[i];
     tolerance[i] = kToleranceOfLargeIslands * laws[at].tolerance;
   }
-  splitting.begin(
-      {.cones = static_cast<int>(cones), .friction = friction, .lower = lower_bounded, .upper = upper_bounded},
-      coupling);
+  splitting.begin({.cones = static_cast<int>(cones),
+                   .friction = friction,
+                   .radius = radius,
+                   .lower = lower_bounded,
+                   .upper = upper_bounded},
+                  coupling);
 }
 
 /// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
@@ -151,8 +154,11 @@ void IslandSolver::Impl::factor() {
     A_reduced.resize(c * c);
   }
   for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
-  friction.resize(cones);
-  for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
+  friction.resize(cones), radius.resize(cones);
+  for (std::size_t i = 0; i < cones; ++i) {
+    const RowLaw& law = laws[static_cast<std::size_t>(bounded[3 * i])];
+    friction[i] = law.friction, radius[i] = law.radius;
+  }
 }
 
 void IslandSolver::Impl::factor_equalities() {
@@ -318,6 +324,7 @@ SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
                             .A = A_reduced,
                             .b = b_reduced,
                             .friction = friction,
+                            .radius = radius,
                             .lower = lower_bounded,
                             .upper = upper_bounded,
                             .noise = noise_of_gaps()};
@@ -344,6 +351,12 @@ void IslandSolver::Impl::keep_within_bounds() {
   if (rule.friction == FrictionModel::kHeuristicNoSlip) return;
   for (std::size_t i = 0; i < cones; ++i) {
     const auto n = static_cast<std::size_t>(bounded[3 * i]), t = n + 1, u = n + 2;
+    if (radius[i] > 0.0) {
+      const Vec3 whole = triple(&f[n]) + step * triple(&reaction[n]);
+      const Vec3 excess = whole - ForceSet{.radius = radius[i]}.project(whole);
+      for (std::size_t r = 0; r < 3; ++r) f[n + r] -= excess[static_cast<int>(r)];
+      continue;
+    }
     const double largest = friction[i] * (f[n] + step * reaction[n]);
     const double along = f[t] + step * reaction[t], across = f[u] + step * reaction[u];
     const double size = std::hypot(along, across);

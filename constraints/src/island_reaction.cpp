@@ -73,12 +73,24 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
   bodies.write_frame_metric(metric);
   const std::size_t n = sparse ? 0 : weigh_frames();
   bool equalities = true, any = sparse, solves = !sparse;
+  const auto take = [&](std::size_t at) {
+    if (!sparse && lower[at] == 0.0 && upper[at] == 0.0)
+      std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
+    any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
+    solves = solves || lower[at] < upper[at];
+  };
   bool rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
     if (sparse && law.contact && law.holds) {
       hold_contact(when, i);
+      i += contact_rows(law) - 1;
+      continue;
+    }
+    if (law.radius > 0.0) {
+      hold_vector(when, i);
+      for (std::size_t row = at; row < at + 3; ++row) equalities = equalities && lower[row] == 0.0, take(row);
       i += contact_rows(law) - 1;
       continue;
     }
@@ -97,10 +109,7 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
     } else {
       equalities = equalities && is_equality(law);
     }
-    if (!sparse && lower[at] == 0.0 && upper[at] == 0.0)
-      std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
-    any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
-    solves = solves || lower[at] < upper[at];
+    take(at);
   }
   if (any && solves)
     answer_rows(when, equalities, answer);
@@ -122,6 +131,16 @@ void IslandSolver::Impl::hold_contact(StepTime when, Index normal) {
   }
   const double part = when == StepTime::kStart ? 1.0 : lasting_part(std::sqrt(before), std::sqrt(now));
   for (std::size_t i = first; i < first + count; ++i) lower[i] *= part, upper[i] = lower[i], b[i] = 0.0;
+}
+
+/// A vector in a ball: all of its force goes on, even where the ball has shrunk since, so that what bodies get at the
+/// end of a step and at the start of the next is the same.
+void IslandSolver::Impl::hold_vector(StepTime when, Index first) {
+  const auto begin = static_cast<std::size_t>(first);
+  for (std::size_t at = begin; at < begin + 3; ++at) {
+    lower[at] = upper[at] = when == StepTime::kStart ? laws[at].last_force : f[at] / step + reaction[at];
+    b[at] = 0.0;
+  }
 }
 
 /// The answer to accelerations b within the bounds.

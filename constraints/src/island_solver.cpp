@@ -220,7 +220,9 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   sparse = is_large();
   can_split = sparse && std::ranges::all_of(laws, &RowLaw::contact);
-  splits = can_split && flexibility.empty();
+  const auto by_itself = [](const ConstraintRows::Flexibility& g) { return g.body < 0; };
+  splits = can_split &&
+           (flexibility.empty() || (rows.size() > kMostRowsOfNewton && std::ranges::all_of(flexibility, by_itself)));
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);

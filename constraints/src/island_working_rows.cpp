@@ -5,7 +5,7 @@
 namespace limber {
 namespace {
 
-bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
+bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0 || law.radius > 0.0; }
 
 }  // namespace
 
@@ -13,7 +13,8 @@ bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
 /// rows are solved for sooner than gaps are measured once more.
 bool IslandSolver::Impl::rows_may_wait() const {
   constexpr std::size_t kFewRows = 150;
-  return laws.size() > kFewRows && !splits && rule.method == ContactMethod::kComplementary && !by_program();
+  return laws.size() > kFewRows && !(splits && flexibility.empty()) && rule.method == ContactMethod::kComplementary &&
+         !by_program();
 }
 
 /// Most contacts of bumpy bodies are found ahead and exert nothing in the step. Those that pressed in the last step, or
@@ -25,7 +26,7 @@ void IslandSolver::Impl::choose_rows() {
   if (!rows_may_wait()) return;
   for (std::size_t i = 0, count = 1; i < laws.size(); i += count) {
     count = static_cast<std::size_t>(contact_rows(laws[i]));
-    if (!laws[i].contact) continue;
+    if (!laws[i].contact || laws[i].radius > 0.0) continue;
     bool acts = false;
     for (std::size_t r = i; r < i + count; ++r) acts = acts || laws[r].last_force != 0.0 || reaction[r] != 0.0;
     if (acts) continue;

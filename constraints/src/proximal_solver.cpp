@@ -39,10 +39,11 @@ struct ProximalSolver::Impl {
   double *b = nullptr, *lower = nullptr, *upper = nullptr, *f = nullptr, *best = nullptr, *y = nullptr, *v = nullptr,
          *z = nullptr, *p = nullptr, *d = nullptr, *Ad = nullptr, *dy = nullptr, *dv = nullptr, *trial_y = nullptr,
          *trial_v = nullptr;
-  std::vector<double> scale, own, mu, shift, shift_step;  // own: A_ii of single rows
-  SecantIteration secant;                                 // of the shift
-  std::vector<Mat3> diagonal;                             // of the cones
-  std::vector<ProjectionDerivative> derivatives;          // of cones, then rows
+  std::vector<double> scale, own, shift, shift_step;  // own: A_ii of single rows
+  std::vector<ForceSet> sets;                         // of the first triples of rows
+  SecantIteration secant;                             // of the shift
+  std::vector<Mat3> diagonal;                         // of the cones
+  std::vector<ProjectionDerivative> derivatives;      // of cones, then rows
   Result result;
   int max_newton_steps = 0;
   double best_residual = 0.0;
@@ -59,12 +60,11 @@ struct ProximalSolver::Impl {
   double residual();
   double convex_residual() const;
   void keep();
-  double shift_of(std::size_t cone) const { return mu[cone] * std::hypot(v[3 * cone + 1], v[3 * cone + 2]); }
+  double shift_of(std::size_t cone) const { return sets[cone].mu * std::hypot(v[3 * cone + 1], v[3 * cone + 2]); }
   void find_shift();
   void solve_convex(double tolerance);
   void argument(const double* velocity, double* to) const;
   void find_derivatives();
-  ProjectionDerivative cone_derivative(std::size_t cone) const;
   bool direction();
   double slope(double t);
   double line_search();
@@ -86,9 +86,13 @@ void ProximalSolver::Impl::place(const BoundedRows& rows, std::span<const double
   double* next = memory.need(std::size(vectors) * stride);
   std::fill_n(next, std::size(vectors) * stride, 0.0);
   for (double** vector : vectors) *vector = next, next += stride;
-  mu.assign(rows.friction.begin(), rows.friction.end());
   shift.assign(cones, 0.0), shift_step.assign(cones, 0.0);
   scale_rows();
+  sets.clear();
+  for (std::size_t i = 0; i < cones; ++i) {
+    sets.push_back(force_set(rows.friction, rows.radius, i));
+    sets[i].radius *= scale[3 * i];
+  }
   for (std::size_t i = 0; i < n; ++i) {
     b[i] = rows.b[i] / scale[i];
     if (i >= 3 * cones) lower[i] = rows.lower[i] * scale[i], upper[i] = rows.upper[i] * scale[i];
@@ -124,7 +128,7 @@ void ProximalSolver::Impl::scale_rows() {
 
 void ProximalSolver::Impl::project(const double* from, double* to) const {
   for (std::size_t i = 0; i < cones; ++i) {
-    const Vec3 x = project_on_cone(triple(from + 3 * i), mu[i]);
+    const Vec3 x = sets[i].project(triple(from + 3 * i));
     std::copy_n(x.data(), 3, to + 3 * i);
   }
   for (std::size_t i = 3 * cones; i < n; ++i) to[i] = std::clamp(from[i], lower[i], upper[i]);
@@ -142,7 +146,7 @@ double ProximalSolver::Impl::residual() {
   double worst = 0.0;
   for (std::size_t i = 0; i < cones; ++i) {
     const Vec3 x = triple(f + 3 * i);
-    worst = std::max(worst, (x - project_on_cone(x - corrected_velocity(triple(v + 3 * i), mu[i]), mu[i])).norm());
+    worst = std::max(worst, (x - sets[i].project(x - corrected_velocity(triple(v + 3 * i), sets[i].mu))).norm());
   }
   for (std::size_t i = 3 * cones; i < n; ++i)
     worst = std::max(worst, std::abs(f[i] - std::clamp(f[i] - v[i], lower[i], upper[i])));
@@ -154,7 +158,7 @@ double ProximalSolver::Impl::convex_residual() const {
   double worst = 0.0;
   for (std::size_t i = 0; i < cones; ++i) {
     const Vec3 x = triple(f + 3 * i);
-    worst = std::max(worst, (x - project_on_cone(x - triple(v + 3 * i) - shift[i] * Vec3::UnitX(), mu[i])).norm());
+    worst = std::max(worst, (x - sets[i].project(x - triple(v + 3 * i) - shift[i] * Vec3::UnitX())).norm());
   }
   for (std::size_t i = 3 * cones; i < n; ++i)
     worst = std::max(worst, std::abs(f[i] - std::clamp(f[i] - v[i], lower[i], upper[i])));
@@ -180,29 +184,9 @@ void ProximalSolver::Impl::argument(const double* velocity, double* to) const {
   for (std::size_t i = 0; i < cones; ++i) to[3 * i] -= rho * shift[i];
 }
 
-ProjectionDerivative ProximalSolver::Impl::cone_derivative(std::size_t cone) const {
-  ProjectionDerivative P{.first = 3 * cone, .rows = 3};
-  const Vec3 at = triple(z + 3 * cone);
-  const double m = mu[cone], across = std::hypot(at[1], at[2]);
-  if (m * across <= -at[0]) return P;
-  if (m > 0.0 && across <= m * at[0]) {  // sticks
-    P.columns = 3;
-    for (int c = 0; c < 3; ++c) P.s[c] = Vec3::Unit(c);
-    return P;
-  }
-  P.columns = 1, P.s[0] = Vec3::UnitX();
-  if (m == 0.0) return P;
-  const double t0 = at[1] / across, t1 = at[2] / across;
-  const double pressed = (at[0] + m * across) / (1.0 + m * m);
-  P.columns = 2;
-  P.s[0] = Vec3(1.0, m * t0, m * t1) / std::sqrt(1.0 + m * m);
-  P.s[1] = Vec3(0.0, -t1, t0) * std::sqrt(m * pressed / across);
-  return P;
-}
-
 /// Of the projection at z.
 void ProximalSolver::Impl::find_derivatives() {
-  for (std::size_t i = 0; i < cones; ++i) derivatives[i] = cone_derivative(i);
+  for (std::size_t i = 0; i < cones; ++i) derivatives[i] = sets[i].derivative(triple(z + 3 * i), 3 * i);
   for (std::size_t i = 3 * cones; i < n; ++i) {
     ProjectionDerivative& P = derivatives[i - 2 * cones];
     P = {.first = i, .rows = 1, .s = {Vec3::UnitX(), Vec3::Zero(), Vec3::Zero()}};
@@ -284,7 +268,7 @@ double ProximalSolver::Impl::map_at(const double* at, const double* velocity) {
   double sum = 0.0;
   for (std::size_t i = 0; i < n; ++i) z[i] = at[i] - (velocity[i] + b[i] + (at[i] - f[i]) / rho);
   for (std::size_t i = 0; i < cones; ++i)
-    z[3 * i] -= mu[i] * std::hypot(velocity[3 * i + 1] + b[3 * i + 1], velocity[3 * i + 2] + b[3 * i + 2]);
+    z[3 * i] -= sets[i].mu * std::hypot(velocity[3 * i + 1] + b[3 * i + 1], velocity[3 * i + 2] + b[3 * i + 2]);
   project(z, p);
   for (std::size_t i = 0; i < n; ++i) d[i] = at[i] - p[i], sum += d[i] * d[i];
   return std::sqrt(sum);
@@ -294,7 +278,7 @@ double ProximalSolver::Impl::map_at(const double* at, const double* velocity) {
 Vec3 ProximalSolver::Impl::shift_derivative(std::size_t cone) const {
   const std::size_t i = 3 * cone;
   const double u0 = v[i + 1] + b[i + 1], u1 = v[i + 2] + b[i + 2], speed = std::hypot(u0, u1);
-  return speed > 0.0 ? Vec3(mu[cone] / speed * Vec3(0.0, u0, u1)) : Vec3::Zero();
+  return speed > 0.0 ? Vec3(sets[cone].mu / speed * Vec3(0.0, u0, u1)) : Vec3::Zero();
 }
 
 /// Newton's step on that map: (1 − P' + P'/ρ + P'C A) dy = −d.
@@ -385,7 +369,7 @@ void ProximalSolver::Impl::sweep() {
   for (std::size_t i = 0; i < cones; ++i) {
     if (!(diagonal[i](0, 0) > 0.0)) continue;
     const Vec3 old = triple(f + 3 * i), velocity = coupling->answer(3 * i, 3) + triple(b + 3 * i);
-    const Vec3 change = solve_coulomb_contact(diagonal[i], velocity - diagonal[i] * old, mu[i]) - old;
+    const Vec3 change = sets[i].improve(diagonal[i], old, velocity) - old;
     if (change.isZero(0.0)) continue;
     coupling->move(3 * i, 3, change);
     for (std::size_t c = 0; c < 3; ++c) f[3 * i + c] = old[static_cast<int>(c)] + change[static_cast<int>(c)];

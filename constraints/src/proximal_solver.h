@@ -20,17 +20,19 @@
 #include <memory>
 #include <span>
 
+#include "force_set.h"
 #include "limber/constraints/solve_status.h"
 #include "row_coupling.h"
 
 namespace limber {
 
-/// Rows of cones come first.
+/// Rows of cones and balls come first.
 struct BoundedRows {
-  int cones = 0;                          ///< the first 3 × cones rows: normal and two tangents each
-  std::span<const double> A = {};         ///< n × n, symmetric positive semidefinite
-  std::span<const double> b = {};         ///< n
-  std::span<const double> friction = {};  ///< μ ≥ 0 of each cone
+  int cones = 0;                   ///< the first 3 × cones rows: normal and two tangents each, or a vector in a ball
+  std::span<const double> A = {};  ///< n × n, symmetric positive semidefinite
+  std::span<const double> b = {};  ///< n
+  std::span<const double> friction = {};  ///< μ ≥ 0 of each cone, 0 of each ball
+  std::span<const double> radius = {};    ///< of each ball, 0 of each cone. Empty: there are no balls
   std::span<const double> lower = {};     ///< n; those of cones are not read. Empty: there are cones alone
   std::span<const double> upper = {};     ///< n
   double noise = 0.0;  ///< ≥ 0: velocities below this, times √A_ii of their rows, are as good as zero

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "block_model.h"
@@ -210,40 +211,51 @@ void expect_all_contacts(Body& a, Body& b, double margin, Tally& tally) {
 
 // -- Against the reference --------------------------------------------------------------------------------------------
 
-TEST(NarrowPhase, TwoLumpySpheresHaveTheContactsOfAllFeaturePairs) {
-  Random random(21);
+/// Pairs that `place_pair(random, a, b)` puts somewhere near each other have all contacts of the reference.
+template <class PlacePair>
+Tally expect_all_contacts_of_pairs(Body& a, Body& b, double margin, unsigned seed, int count,
+                                   const PlacePair& place_pair) {
+  Random random(seed);
   Tally tally;
+  for (int trial = 0; trial < count && !::testing::Test::HasFatalFailure(); ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    place_pair(random, a, b);
+    expect_all_contacts(a, b, margin, tally);
+  }
+  return tally;
+}
+
+/// Each kind of contact has been seen in more than so many pairs, or so many times.
+void expect_more_than(const Tally& least, const Tally& seen) {
+  EXPECT_GT(seen.apart, least.apart);
+  EXPECT_GT(seen.overlapping, least.overlapping);
+  EXPECT_GT(seen.edge, least.edge);
+  EXPECT_GT(seen.inside, least.inside);
+}
+
+const Vec3 kHalfBox(0.5, 0.3, 0.4);
+
+TEST(NarrowPhase, TwoLumpySpheresHaveTheContactsOfAllFeaturePairs) {
   Body a(lumpy_sphere(1, 5)), b(lumpy_sphere(2, 3));
-  for (int trial = 0; trial < trials(300); ++trial) {
+  const auto place_pair = [](Random& random, Body& first, Body& second) {
     const RigidTransform X_WA = random.pose(1.0);
     const Vec3 away = random.vector(1.0).normalized();
-    a.place(X_WA, random.amplitudes(5, 0.05));
-    b.place({random.pose(1.0).q, X_WA.p + random.uniform(0.7, 1.2) * away}, random.amplitudes(3, 0.05));
-    expect_all_contacts(a, b, 0.08, tally);
-    if (HasFatalFailure()) FAIL() << "trial " << trial;
-  }
-  EXPECT_GT(tally.apart, 50);
-  EXPECT_GT(tally.overlapping, 50);
-  EXPECT_GT(tally.edge, 40);
-  EXPECT_GT(tally.inside, 100);
+    first.place(X_WA, random.amplitudes(5, 0.05));
+    second.place({random.pose(1.0).q, X_WA.p + random.uniform(0.7, 1.2) * away}, random.amplitudes(3, 0.05));
+  };
+  expect_more_than({.apart = 50, .overlapping = 50, .edge = 40, .inside = 100},
+                   expect_all_contacts_of_pairs(a, b, 0.08, 21, trials(300), place_pair));
 }
 
 TEST(NarrowPhase, LumpySphereAndBoxHaveTheContactsOfAllFeaturePairs) {
-  Random random(22);
-  Tally tally;
-  const Vec3 half(0.5, 0.3, 0.4);
-  Body a(lumpy_sphere(2, 5)), b(Shape{Box{half}});
-  for (int trial = 0; trial < trials(300); ++trial) {
-    a.place(random.pose(1.0), random.amplitudes(5, 0.05));
+  Body a(lumpy_sphere(2, 5)), b(Shape{Box{kHalfBox}});
+  const auto place_pair = [](Random& random, Body& lumpy, Body& box) {
+    lumpy.place(random.pose(1.0), random.amplitudes(5, 0.05));
     const Vec3 away = random.vector(1.0).normalized();
-    b.place_box({random.pose(1.0).q, a.pose.p + random.uniform(0.6, 1.2) * away}, half);
-    expect_all_contacts(a, b, 0.08, tally);
-    if (HasFatalFailure()) FAIL() << "trial " << trial;
-  }
-  EXPECT_GT(tally.apart, 50);
-  EXPECT_GT(tally.overlapping, 50);
-  EXPECT_GT(tally.edge, 50);
-  EXPECT_GT(tally.inside, 100);
+    box.place_box({random.pose(1.0).q, lumpy.pose.p + random.uniform(0.6, 1.2) * away}, kHalfBox);
+  };
+  expect_more_than({.apart = 50, .overlapping = 50, .edge = 50, .inside = 100},
+                   expect_all_contacts_of_pairs(a, b, 0.08, 22, trials(300), place_pair));
 }
 
 /// The bunny on 240 triangles, or null where the file is not there.
@@ -255,41 +267,28 @@ std::shared_ptr<const ModalModel> bunny_model(Index modes) {
 TEST(Bunny, TwoBunniesHaveTheContactsOfAllFeaturePairs) {
   const auto model = bunny_model(5);
   if (model == nullptr) GTEST_SKIP() << "Debian package glmark2-data is not installed";
-  Random random(61);
-  Tally tally;
   Body a(model), b(model);
   ASSERT_TRUE(a.surface().closed());
-  for (int trial = 0; trial < trials(30); ++trial) {
-    a.place(random.pose(1.0), random.amplitudes(5, 0.02));
+  const auto place_pair = [](Random& random, Body& first, Body& second) {
+    first.place(random.pose(1.0), random.amplitudes(5, 0.02));
     const Vec3 away = random.vector(1.0).normalized();
-    b.place({random.pose(1.0).q, a.pose.p + random.uniform(0.5, 1.0) * away}, random.amplitudes(5, 0.02));
-    expect_all_contacts(a, b, 0.04, tally);
-    if (HasFatalFailure()) FAIL() << "trial " << trial;
-  }
-  EXPECT_GT(tally.apart, 5);
-  EXPECT_GT(tally.overlapping, 5);
-  EXPECT_GT(tally.edge, 0);
-  EXPECT_GT(tally.inside, 20);
+    second.place({random.pose(1.0).q, first.pose.p + random.uniform(0.5, 1.0) * away}, random.amplitudes(5, 0.02));
+  };
+  expect_more_than({.apart = 5, .overlapping = 5, .edge = 0, .inside = 20},
+                   expect_all_contacts_of_pairs(a, b, 0.04, 61, trials(30), place_pair));
 }
 
 TEST(Bunny, BunnyAndBoxHaveTheContactsOfAllFeaturePairs) {
   const auto model = bunny_model(5);
   if (model == nullptr) GTEST_SKIP() << "Debian package glmark2-data is not installed";
-  Random random(62);
-  Tally tally;
-  const Vec3 half(0.5, 0.3, 0.4);
-  Body a(model), b(Shape{Box{half}});
-  for (int trial = 0; trial < trials(30); ++trial) {
-    a.place(random.pose(1.0), random.amplitudes(5, 0.02));
+  Body a(model), b(Shape{Box{kHalfBox}});
+  const auto place_pair = [](Random& random, Body& bunny, Body& box) {
+    bunny.place(random.pose(1.0), random.amplitudes(5, 0.02));
     const Vec3 away = random.vector(1.0).normalized();
-    b.place_box({random.pose(1.0).q, a.pose.p + random.uniform(0.5, 1.1) * away}, half);
-    expect_all_contacts(a, b, 0.04, tally);
-    if (HasFatalFailure()) FAIL() << "trial " << trial;
-  }
-  EXPECT_GT(tally.apart, 5);
-  EXPECT_GT(tally.overlapping, 5);
-  EXPECT_GT(tally.edge, 0);
-  EXPECT_GT(tally.inside, 20);
+    box.place_box({random.pose(1.0).q, bunny.pose.p + random.uniform(0.5, 1.1) * away}, kHalfBox);
+  };
+  expect_more_than({.apart = 5, .overlapping = 5, .edge = 0, .inside = 20},
+                   expect_all_contacts_of_pairs(a, b, 0.04, 62, trials(30), place_pair));
 }
 
 TEST(NarrowPhase, BarOnAPlaneHasEveryVertexWithinTheMargin) {
@@ -396,8 +395,6 @@ TEST(NarrowPhase, CapsuleAgreesWithTheHullOfItsAxis) {
   }
   EXPECT_GT(apart, 50);
 }
-
-// -- Overlap ----------------------------------------------------------------------------------------------------------
 
 }  // namespace
 }  // namespace limber

@@ -45,6 +45,25 @@ TEST(RigidPairs, BoxesRestOnFourPointsAndTurnedOnesOnEight) {
   }
 }
 
+TEST(RigidPairs, BricksThatLieOnEachOtherByRoundOffPressStraightThrough) {
+  constexpr double kWithin = 2e-6;  // of what is tilted and lifted below
+  const Vec3 half(0.15, 0.12, 0.09);
+  Random random(37);
+  for (int trial = 0; trial < 20000; ++trial) {
+    const RigidTransform X = random.pose(1.0);
+    const double lift = std::pow(10.0, random.uniform(-16.0, -6.0));
+    const Vec3 tilt = std::pow(10.0, random.uniform(-16.0, -6.0)) * random.vector(1.0);
+    const RigidTransform above{quaternion_from_rotation_vector(Vec3(0.0, 0.0, random.uniform(-3.0, 3.0)) + tilt),
+                               {random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 2.0 * half.z() + lift}};
+    Body lower = rigid(Box{half}, X), upper = rigid(Box{half}, X * above);
+    for (const ContactPoint& c : contacts_of(upper, lower, 0.01)) {
+      if (c.gap > kWithin) continue;  // beside it
+      ASSERT_GT(c.gap, -kWithin) << trial;
+      ASSERT_GT(c.normal.dot(X.q * Vec3::UnitZ()), 1.0 - 1e-3) << trial;
+    }
+  }
+}
+
 std::vector<Vec3> corners_of(const Body& box, const Vec3& half) {
   std::vector<Vec3> p;
   for (const Vec3& v : shapes::box(-half, half).vertices) p.push_back(box.pose * v);

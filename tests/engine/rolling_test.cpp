@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include "counted_new.h"
 #include "grounded_world.h"
@@ -16,31 +17,54 @@ constexpr double kResistance = 0.05;            // C
 constexpr double kGap = 1e-9;                   // m and rad: what gaps and turns are met to at a metre from the origin
 constexpr double kRolling = 1.0 / (1.0 + 0.4);  // of what a block that slides without friction does
 
-/// A solid ball, ⅖ m R² about every axis, on a slope; x points down it.
+/// A solid ball, ⅖ m R² about every axis, on a slope; x points down it, and it sets out at an angle `heading` to that.
 struct RollingBall : GroundedWorld {
-  explicit RollingBall(double slope, double speed = 0.0, double spin = 0.0, double resistance = kResistance)
+  explicit RollingBall(double slope, double speed = 0.0, double spin = 0.0, double resistance = kResistance,
+                       double heading = 0.0)
       : GroundedWorld({.friction = 0.8, .rolling_friction = resistance},
                       {.gravity = kGravity * Vec3(std::sin(slope), 0.0, -std::cos(slope))}) {
     ModalModelData data = sample_model_data({.modes = 0});
     data.inertia = 0.4 * data.mass * kRadius * kRadius * Mat3::Identity();
-    ball = world.add_body(std::make_shared<const ModalModel>(std::move(data)),
-                          {.pose = {{}, {0.0, 0.0, kRadius}},
-                           .velocity = {speed, 0.0, 0.0},
-                           .angular_velocity = {0.0, speed / kRadius, spin},
-                           .shape = std::make_shared<const Shape>(Sphere{kRadius})});
+    ball = world.add_body(
+        std::make_shared<const ModalModel>(std::move(data)),
+        {.pose = {{}, {0.0, 0.0, kRadius}},
+         .velocity = speed * Vec3(std::cos(heading), std::sin(heading), 0.0),
+         .angular_velocity = speed / kRadius * Vec3(-std::sin(heading), std::cos(heading), 0.0) + spin * Vec3::UnitZ(),
+         .shape = std::make_shared<const Shape>(Sphere{kRadius})});
   }
   double speed() const { return world.body(ball).velocity.x(); }
+  double mass() const { return world.model(ball).data().mass; }
   BodyId ball;
 };
 
-TEST(Rolling, OnAPlaneSlowsByTheCoefficientOfItsWeight) {
-  RollingBall scene(0.0, 2.0);
-  scene.step(6);  // resistance begins where forces are known: a step late
-  const double before = scene.speed();
-  scene.step(60);
-  const double slowing = kResistance * kGravity * kRolling;
-  EXPECT_NEAR(before - scene.speed(), slowing, 1e-6 * slowing);
-  EXPECT_NEAR(scene.world.body(scene.ball).angular_velocity.y(), scene.speed() / kRadius, 1e-6);
+TEST(Rolling, OnAPlaneSlowsByTheCoefficientOfItsWeightWhereverItGoes) {
+  for (const double heading : {0.0, 0.3, 0.25 * std::numbers::pi, 2.0}) {
+    RollingBall scene(0.0, 2.0, 0.0, kResistance, heading);
+    scene.step(6);  // resistance begins where forces are known: a step late
+    const Vec3 before = scene.world.body(scene.ball).velocity;
+    scene.step(60);
+    const Vec3 after = scene.world.body(scene.ball).velocity, ahead = before.normalized();
+    const double slowing = kResistance * kGravity * kRolling;
+    EXPECT_NEAR(before.norm() - after.norm(), slowing, 1e-6 * slowing) << heading;
+    EXPECT_LT(ahead.cross(after).norm(), 1e-6) << "it goes straight on";
+    EXPECT_LT((scene.world.body(scene.ball).angular_velocity - Vec3::UnitZ().cross(after) / kRadius).norm(), 1e-6);
+  }
+}
+
+TEST(Rolling, TheMomentIsNoLargerWhereABallSpinsAsItRolls) {
+  const double speed = 2.0;
+  RollingBall scene(0.0, speed, speed / kRadius, kResistance, 0.4);
+  scene.step(6);
+  const BodyView before = scene.world.body(scene.ball);
+  scene.step(1);
+  const BodyView after = scene.world.body(scene.ball);
+  // Against rolling m R² ⅖ + m R² have to be turned back, against spinning m R² ⅖ alone.
+  const double inertia = 0.4 * scene.mass() * kRadius * kRadius;
+  const double roll = inertia / 0.4 * 1.4 * (before.velocity - after.velocity).norm() / kRadius / kFrame;
+  const double spin = inertia * (before.angular_velocity.z() - after.angular_velocity.z()) / kFrame;
+  const double largest = kResistance * scene.mass() * kGravity * kRadius;
+  EXPECT_NEAR(std::hypot(roll, spin), largest, 1e-5 * largest) << "the velocities are those of a moment that turns";
+  EXPECT_NEAR(spin / roll, after.angular_velocity.z() * kRadius / after.velocity.norm(), 1e-2) << "straight against";
 }
 
 TEST(Rolling, ComesToRestAndStaysWhereItIs) {
@@ -90,7 +114,7 @@ TEST(Rolling, TakesEnergyAwayAndAllocatesNothing) {
   RollingBall scene(0.0, 1.0);
   scene.step(30);
   const std::vector<BodyId> ball{scene.ball};
-  const double weight = scene.world.model(scene.ball).data().mass * kGravity;
+  const double weight = scene.mass() * kGravity;
   const long before = allocations();
   const double rise = largest_rise(scene.world, ball, 200);
   EXPECT_EQ(allocations() - before, 0);

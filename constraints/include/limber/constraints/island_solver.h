@@ -59,7 +59,7 @@ namespace limber {
 struct IslandOptions {
   double step = 1.0 / 60.0;     ///< s; that of all groups
   Vec3 gravity = Vec3::Zero();  ///< m/s², world
-  int max_iterations = 30;      ///< of Newton's method; ≥ 1
+  int max_iterations = 30;      ///< of Newton's method, or of 15 steps of splitting each; ≥ 1
   bool guard_energy = true;     ///< step 6; off where the rule asks for programs as they are
   ContactRule contact{};        ///< how contacts are solved for
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
