@@ -3,9 +3,10 @@
 ///
 ///   0 ≤ f_n ⊥ gap(end of step) + (G F)_n − offset ≥ 0         |f_t| ≤ μ f_n, against the slip of the whole step
 ///
-/// Both points of a contact are carried along by their bodies, deformation included; the normal stays as it was found.
-/// The gap is that at the end of the step, so that stiff bodies do not sink, and the slip is the way of the one point
-/// along the other within the step, so that what sticks does not creep.
+/// Both points of a contact are carried along by their bodies, deformation included; of what is round
+/// (ContactSide::radius) the centre is, and it touches below that. The normal stays as it was found. The gap is that at
+/// the end of the step, so that stiff bodies do not sink, and the slip is the way of the one point along the other
+/// within the step, what has rolled by included, so that what sticks does not creep.
 ///
 /// G F is the residual compliance (residual_compliance.h) under the contact forces F = f/Δt: the part of a dent that
 /// the kept modes cannot show. All contacts of a body yield to each other's forces, whichever bodies they are with.
