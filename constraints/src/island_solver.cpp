@@ -221,8 +221,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   sparse = is_large();
   can_split = sparse && std::ranges::all_of(laws, &RowLaw::contact);
   const auto by_itself = [](const ConstraintRows::Flexibility& g) { return g.body < 0; };
-  splits = can_split &&
-           (flexibility.empty() || (rows.size() > kMostRowsOfNewton && std::ranges::all_of(flexibility, by_itself)));
+  const bool is_pile = rows.size() > kMostRowsOfNewton && rows.size() < kMostRowsOfABody * bodies.count();
+  splits = can_split && (flexibility.empty() || (is_pile && std::ranges::all_of(flexibility, by_itself)));
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);

@@ -40,8 +40,10 @@ inline bool is_equality(const RowLaw& law) {
 inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
 
 // More rows of contacts that yield each by itself are not solved by Newton's method: where hundreds slide and stick it
-// takes all the steps that it is allowed, and splitting is as near in a tenth of the time.
-inline constexpr Index kMostRowsOfNewton = 250;
+// takes all the steps that it is allowed, and splitting is as near in a tenth of the time. But only where there are few
+// to a body, as in piles of boxes: bumpy bodies have hundreds that push against each other, and fell through the ground
+// by splitting; stacks settle by Newton's method in every step.
+inline constexpr Index kMostRowsOfNewton = 250, kMostRowsOfABody = 30;
 
 struct IslandSolver::Impl {
   IslandBodies bodies;
