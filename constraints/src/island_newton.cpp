@@ -26,10 +26,11 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   choose_rows();
   sort_rows();
   constexpr int kIterationsUnsettled = 6, kIterationsUnsettledOfLarge = 3, kIterationsOfStart = 30;
-  constexpr int kNewtonSteps = 300, kNewtonStepsOfLarge = 500;  // for all problems of the step
+  constexpr int kNewtonSteps = 1500, kNewtonStepsOfLarge = 500;  // for all problems of the step
+  constexpr std::size_t kFewRows = 200;
   // Cones are solved as exactly as the last change of the gaps is worth.
   constexpr double kFirstSlack = 1e6, kSlackOfChange = 1e-3;
-  bounded_rows.begin(sparse ? kNewtonStepsOfLarge : kNewtonSteps);
+  bounded_rows.begin(sparse || f.size() > kFewRows ? kNewtonStepsOfLarge : kNewtonSteps);
   factor();
   if (splits || waiting > 0) begin_with_last_forces();
   report.iterations = 1;

@@ -16,7 +16,7 @@
 /// through them, or nearly so, in 3: most of the contacts of bumpy bodies are found ahead and exert nothing. Rows are
 /// only added, so that the answer is that of all rows. (By the default rule, above 150 rows.)
 ///
-/// Contacts with friction get 300 steps of Newton's method in all repetitions of 4 together, and 20 a time when these
+/// Contacts with friction get 1,500 steps of Newton's method in all repetitions of 4 together, and 20 a time when these
 /// are used up; where it gets stuck operator splitting goes on for a while, and it begins again from there. It is done
 /// in blocks by body where that is a twentieth of the work and there are no rows without bounds.
 ///
