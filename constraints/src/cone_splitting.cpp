@@ -28,11 +28,7 @@ void ConeSplitting::begin(const BoundedRows& rows, RowCoupling& coupling) {
   std::fill_n(next, std::size(vectors) * stride, 0.0);
   for (double** vector : vectors) *vector = next, next += stride;
   scale_rows();
-  sets_.clear();
-  for (std::size_t i = 0; i < cones_; ++i) {
-    sets_.push_back(force_set(rows.friction, rows.radius, i));
-    sets_[i].radius *= scale_[3 * i];
-  }
+  make_force_sets(rows.friction, rows.radius, scale_, sets_);
 }
 
 void ConeSplitting::scale_rows() {

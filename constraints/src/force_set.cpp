@@ -5,15 +5,15 @@
 namespace limber {
 namespace {
 
+ProjectionDerivative derivative_inside(std::size_t first) {
+  return {.first = first, .rows = 3, .columns = 3, .s = {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}};
+}
+
 ProjectionDerivative derivative_on_cone(const Vec3& x, double mu, std::size_t first) {
   ProjectionDerivative P{.first = first, .rows = 3};
   const double across = std::hypot(x[1], x[2]);
   if (mu * across <= -x[0]) return P;
-  if (mu > 0.0 && across <= mu * x[0]) {  // sticks
-    P.columns = 3;
-    for (int c = 0; c < 3; ++c) P.s[c] = Vec3::Unit(c);
-    return P;
-  }
+  if (mu > 0.0 && across <= mu * x[0]) return derivative_inside(first);  // sticks
   P.columns = 1, P.s[0] = Vec3::UnitX();
   if (mu == 0.0) return P;
   const double t0 = x[1] / across, t1 = x[2] / across;
@@ -25,16 +25,10 @@ ProjectionDerivative derivative_on_cone(const Vec3& x, double mu, std::size_t fi
 }
 
 ProjectionDerivative derivative_on_ball(const Vec3& x, double radius, std::size_t first) {
-  ProjectionDerivative P{.first = first, .rows = 3};
   const double size = x.norm();
-  if (size <= radius) {
-    P.columns = 3;
-    for (int c = 0; c < 3; ++c) P.s[c] = Vec3::Unit(c);
-    return P;
-  }
-  P.columns = 2;
-  const double root = std::sqrt(radius / size);
-  P.s[0] = root * x.unitOrthogonal();
+  if (size <= radius) return derivative_inside(first);
+  ProjectionDerivative P{.first = first, .rows = 3, .columns = 2};
+  P.s[0] = std::sqrt(radius / size) * x.unitOrthogonal();
   P.s[1] = x.cross(P.s[0]) / size;
   return P;
 }
@@ -53,6 +47,13 @@ ProjectionDerivative ForceSet::derivative(const Vec3& x, std::size_t first) cons
 
 Vec3 ForceSet::improve(const Mat3& A, const Vec3& force, const Vec3& velocity) const {
   return radius > 0.0 ? project(force - velocity / A.trace()) : solve_coulomb_contact(A, velocity - A * force, mu);
+}
+
+void make_force_sets(std::span<const double> friction, std::span<const double> radius, std::span<const double> scale,
+                     std::vector<ForceSet>& sets) {
+  sets.clear();
+  for (std::size_t i = 0; i < friction.size(); ++i)
+    sets.push_back({.mu = friction[i], .radius = radius.empty() ? 0.0 : radius[i] * scale[3 * i]});
 }
 
 }  // namespace limber

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "coulomb_contact.h"
 #include "row_coupling.h"
@@ -21,9 +22,10 @@ struct ForceSet {
   Vec3 improve(const Mat3& A, const Vec3& force, const Vec3& velocity) const;
 };
 
-/// The set of unit i. @param radius empty: none is a ball
-inline ForceSet force_set(std::span<const double> friction, std::span<const double> radius, std::size_t i) {
-  return {friction[i], radius.empty() ? 0.0 : radius[i]};
-}
+/// Those of the first triples of rows, for forces that are multiplied by `scale`, a number by row, the same in a
+/// triple.
+/// @param radius empty: none is a ball
+void make_force_sets(std::span<const double> friction, std::span<const double> radius, std::span<const double> scale,
+                     std::vector<ForceSet>& sets);
 
 }  // namespace limber

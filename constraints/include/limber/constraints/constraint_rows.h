@@ -57,8 +57,7 @@ struct RowLaw {
   /// cone
   /// |(f₁, f₂)| ≤ μ f. 0: no tangents.
   double friction = 0.0;
-  /// > 0: of three rows in a row, whose impulses are a vector that stays within this size. `lower` and `upper` are ∓
-  /// it.
+  /// > 0: of three rows in a row, whose impulses are a vector no longer than this; `lower` and `upper` are ∓ radius.
   double radius = 0.0;
   bool contact = false;  ///< of a contact, its normal row or a tangent
   /// The contact is an impact: where only contacts act, all the island's forces are then held over the step (θ = ½).
