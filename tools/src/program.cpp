@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdio>
 #include <new>
+#include <sstream>
 #include <utility>
 
 #include "limber/core/error.h"
@@ -143,6 +144,12 @@ CLI::Validator number_above_one() {
 
 CLI::Validator proper_fraction() {
   return number_check("a number > 0 and < 1", [](double x) { return x > 0.0 && x < 1.0; });
+}
+
+CLI::Validator number_between(double low, double high) {
+  std::ostringstream expected;
+  expected << "a number from " << low << " to " << high;
+  return number_check(expected.str(), [=](double x) { return x >= low && x <= high; });
 }
 
 }  // namespace limber::tools

@@ -80,10 +80,12 @@ class Program {
   std::vector<std::filesystem::path> input_paths_, output_paths_;
 };
 
-/// Validators for options: a finite number > 0, ≥ 0, > 1, or between 0 and 1. (CLI11 reads "nan" and "inf" as numbers.)
+/// Validators for options: a finite number > 0, ≥ 0, > 1, between 0 and 1, or from low to high. (CLI11 reads "nan" and
+/// "inf" as numbers.)
 CLI::Validator positive_number();
 CLI::Validator non_negative_number();
 CLI::Validator number_above_one();
 CLI::Validator proper_fraction();
+CLI::Validator number_between(double low, double high);
 
 }  // namespace limber::tools

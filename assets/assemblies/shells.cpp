@@ -5,12 +5,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "constants.h"
-
 namespace limber::assemblies {
 namespace {
 
-using testing::kPi;
 using Point = Eigen::Vector2d;
 
 double turn(const Point& a, const Point& b, const Point& c) {

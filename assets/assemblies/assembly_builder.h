@@ -10,13 +10,10 @@
 #include <vector>
 
 #include "assemblies.h"
-#include "constants.h"
 #include "shells.h"
 
 namespace limber::assemblies {
 
-using testing::kDegree;
-using testing::kPi;
 inline constexpr double kOpen = std::numeric_limits<double>::infinity();
 
 /// Where a joint's own drawing is put: z along its axis.
@@ -123,12 +120,13 @@ class Builder {
     add(b, place(ball_with_neck(r, 0.4 * r, 2.5 * r)));
     truth(a, b, JointType::kBall, place);
     turns();
-    swings(neck_meets_rim(r, half_arc));
+    if (v.phase == 0.0 || v.phase == 0.5) swings(neck_meets_rim(r, half_arc));
   }
 
   /// How far a neck of 0.4 r leans until its side meets the edge of the ring. Both are polygons; the least is where a
-  /// flat of the ring's or a corner of both is in line. Where the ring overlaps the ball, its edge lies inside the
-  /// ball, and it is the corners at which the neck leaves the ball that first come down to the ring's face.
+  /// flat of the ring's or a corner of both is in line. @pre a phase of 0 or 0.5. Where the ring overlaps the ball, its
+  /// edge lies inside the ball, and it is the corners at which the neck leaves the ball that first come down to the
+  /// ring's face.
   double neck_meets_rim(double r, double half_arc) const {
     const double inner = r + gap(2 * r), high = inner * std::sin(half_arc), rim = inner * std::cos(half_arc);
     if (inner < r) return std::acos(high / r) - std::asin(0.4);

@@ -1,5 +1,5 @@
 /// @file assemblies.h
-/// Assemblies with known joints, drawn by formulae: what joint detection is judged by.
+/// Assemblies with known joints, drawn by formulae: what joint detection is judged by (README.md beside this file).
 ///
 /// Every assembly exists in variants: more or fewer segments, clearance, overlap, noise, soup, open shells, any pose
 /// and scale. A clearance is the gap on each side of a bearing as a fraction of the joint's diameter (of a plate's

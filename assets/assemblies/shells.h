@@ -3,11 +3,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <numbers>
 #include <vector>
 
 #include "limber/core/types.h"
 
 namespace limber::assemblies {
+
+inline constexpr double kPi = std::numbers::pi;
+inline constexpr double kDegree = kPi / 180.0;  ///< rad
 
 using Loop = std::vector<Eigen::Vector2d>;  ///< counter-clockwise
 
