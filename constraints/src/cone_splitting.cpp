@@ -28,7 +28,7 @@ void ConeSplitting::begin(const BoundedRows& rows, RowCoupling& coupling) {
   std::fill_n(next, std::size(vectors) * stride, 0.0);
   for (double** vector : vectors) *vector = next, next += stride;
   scale_rows();
-  make_force_sets(rows.friction, rows.radius, scale_, sets_);
+  make_force_sets(rows.friction.first(cones_), rows.radius, scale_, sets_);
 }
 
 void ConeSplitting::scale_rows() {

@@ -22,8 +22,8 @@ struct ForceSet {
   Vec3 improve(const Mat3& A, const Vec3& force, const Vec3& velocity) const;
 };
 
-/// Those of the first triples of rows, for forces that are multiplied by `scale`, a number by row, the same in a
-/// triple.
+/// Those of the first triples of rows, as many as `friction` has numbers, for forces that are multiplied by `scale`, a
+/// number by row, the same in a triple.
 /// @param radius empty: none is a ball
 void make_force_sets(std::span<const double> friction, std::span<const double> radius, std::span<const double> scale,
                      std::vector<ForceSet>& sets);

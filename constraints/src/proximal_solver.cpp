@@ -88,7 +88,7 @@ void ProximalSolver::Impl::place(const BoundedRows& rows, std::span<const double
   for (double** vector : vectors) *vector = next, next += stride;
   shift.assign(cones, 0.0), shift_step.assign(cones, 0.0);
   scale_rows();
-  make_force_sets(rows.friction, rows.radius, scale, sets);
+  make_force_sets(rows.friction.first(cones), rows.radius, scale, sets);
   for (std::size_t i = 0; i < n; ++i) {
     b[i] = rows.b[i] / scale[i];
     if (i >= 3 * cones) lower[i] = rows.lower[i] * scale[i], upper[i] = rows.upper[i] * scale[i];
