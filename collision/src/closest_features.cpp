@@ -14,42 +14,6 @@ using Kind = Feature::Kind;
 constexpr double kParallelSine = 1e-13;
 constexpr double kDistanceRoundOff = 32 * std::numeric_limits<double>::epsilon();
 
-// Where the foot of p falls on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
-double line_parameter(const Vec3& p, const Vec3& s0, const Vec3& s1) {
-  const Vec3 d = s1 - s0;
-  const double length2 = d.squaredNorm();
-  if (length2 == 0.0) return 0.0;
-  return (p - s0).dot(d) / length2;
-}
-
-// Measured from the nearer end, so that a point close to an end keeps its digits.
-Vec3 between(const Vec3& a, const Vec3& b, double t) {
-  if (t <= 0.5) return a + t * (b - a);
-  return b + (1.0 - t) * (a - b);
-}
-
-SurfaceFoot foot_at(const SegmentPoints& s, double t) {
-  if (!(t > 0.0)) return {s[0], {1.0, 0.0, 0.0}, {Kind::kVertex, 0}};
-  if (t >= 1.0) return {s[1], {0.0, 1.0, 0.0}, {Kind::kVertex, 1}};
-  return {between(s[0], s[1], t), {1.0 - t, t, 0.0}, {Kind::kEdge, 0}};
-}
-
-SegmentPoints edge_of(const TrianglePoints& t, int edge) {
-  return {t[static_cast<std::size_t>(edge)], t[static_cast<std::size_t>((edge + 1) % 3)]};
-}
-
-// A foot on edge `edge` of a triangle, renamed from the segment's names to the triangle's.
-SurfaceFoot on_edge(const SurfaceFoot& foot, int edge) {
-  const auto first = static_cast<std::size_t>(edge), second = static_cast<std::size_t>((edge + 1) % 3);
-  SurfaceFoot r{foot.point, {0.0, 0.0, 0.0}, {}};
-  r.weight[first] = foot.weight[0], r.weight[second] = foot.weight[1];
-  if (foot.feature.kind == Kind::kEdge)
-    r.feature = {Kind::kEdge, static_cast<std::uint8_t>(first)};
-  else
-    r.feature = {Kind::kVertex, static_cast<std::uint8_t>(foot.feature.index == 0 ? first : second)};
-  return r;
-}
-
 SurfaceFoot at_vertex(const SegmentPoints& s, int i) { return foot_at(s, i); }
 
 SurfaceFoot at_vertex(const TrianglePoints& t, int i) {
@@ -66,29 +30,6 @@ void keep_nearer(ClosestPoints& best, const SurfaceFoot& a, const SurfaceFoot& b
 
 ClosestPoints none_yet() { return {{}, {}, std::numeric_limits<double>::infinity()}; }
 
-// The longest edge of a triangle, from a to b, and the height of the third vertex c over it.
-struct Altitude {
-  explicit Altitude(const TrianglePoints& t) {
-    double longest = -1.0;
-    for (std::size_t i = 0; i < 3; ++i)
-      if (const double length = (t[(i + 1) % 3] - t[i]).squaredNorm(); length > longest) longest = length, a = i;
-    b = (a + 1) % 3, c = (a + 2) % 3;
-    edge = t[b] - t[a], edge2 = edge.squaredNorm();
-    if (edge2 == 0.0) return;
-    foot = (t[c] - t[a]).dot(edge) / edge2;
-    height = t[c] - t[a] - foot * edge;
-    height -= height.dot(edge) / edge2 * edge;
-    height2 = height.squaredNorm();
-    flat = !(height2 > kParallelSine * kParallelSine * edge2);
-  }
-
-  std::size_t a = 0, b = 1, c = 2;
-  Vec3 edge = Vec3::Zero(), height = Vec3::Zero();
-  double edge2 = 0.0, height2 = 0.0;
-  double foot = 0.0;  // where the height stands on the edge: 0 at a, 1 at b
-  bool flat = true;
-};
-
 // The common point of a segment and a triangle that it pierces, or crosses at its rim; none if it lies in the plane.
 struct Piercing {
   bool pierces = false;
@@ -101,7 +42,7 @@ Piercing pierce(const SegmentPoints& s, const TrianglePoints& t) {
   const double h0 = n.dot(s[0] - t[0]), h1 = n.dot(s[1] - t[0]);
   if (h0 == h1 || (h0 > 0.0 && h1 > 0.0) || (h0 < 0.0 && h1 < 0.0)) return {};
   const double parameter = h0 / (h0 - h1);
-  const Vec3 p = between(s[0], s[1], parameter);
+  const Vec3 p = between(s, parameter);
   for (std::size_t i = 0; i < 3; ++i)
     if (n.dot((t[(i + 1) % 3] - t[i]).cross(p - t[i])) < 0.0) return {};
   // The plane of a sliver is round-off in one direction: what it says is taken only where the triangle is indeed met.
@@ -112,40 +53,6 @@ Piercing pierce(const SegmentPoints& s, const TrianglePoints& t) {
 
 }  // namespace
 
-Vec3 unit_normal(const TrianglePoints& t) {
-  const Altitude base(t);
-  if (base.flat) return Vec3::Zero();
-  return (base.edge / std::sqrt(base.edge2)).cross(base.height / std::sqrt(base.height2)).normalized();
-}
-
-SurfaceFoot closest_on_segment(const Vec3& p, const SegmentPoints& s) {
-  return foot_at(s, line_parameter(p, s[0], s[1]));
-}
-
-SurfaceFoot closest_on_triangle(const Vec3& p, const TrianglePoints& t) {
-  const Altitude base(t);
-  if (!base.flat) {
-    // Along the longest edge first, then across: the two errors do not mix, however thin the triangle.
-    const Vec3 r = p - t[base.a];
-    const double along = r.dot(base.edge) / base.edge2;
-    const double c = (r - along * base.edge).dot(base.height) / base.height2;
-    const double b = along - c * base.foot, a = 1.0 - b - c;
-    if (a > 0.0 && b > 0.0 && c > 0.0) {
-      SurfaceFoot inside{t[base.a] + along * base.edge + c * base.height, {}, {Kind::kFace, 0}};
-      inside.weight[base.a] = a, inside.weight[base.b] = b, inside.weight[base.c] = c;
-      return inside;
-    }
-  }
-  SurfaceFoot best{};
-  double best2 = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    const SurfaceFoot foot = on_edge(closest_on_segment(p, edge_of(t, i)), i);
-    const double d2 = (p - foot.point).squaredNorm();
-    if (d2 < best2) best = foot, best2 = d2;
-  }
-  return best;
-}
-
 ClosestPoints closest_points(const SegmentPoints& a, const SegmentPoints& b) {
   const Vec3 u = a[1] - a[0], v = b[1] - b[0], r = b[0] - a[0];
   const Vec3 n = u.cross(v);
@@ -153,7 +60,7 @@ ClosestPoints closest_points(const SegmentPoints& a, const SegmentPoints& b) {
   if (n2 > kParallelSine * kParallelSine * u.squaredNorm() * v.squaredNorm()) {
     const double s = r.cross(v).dot(n) / n2, t = r.cross(u).dot(n) / n2;
     if (s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0) {
-      const SurfaceFoot foot_b = closest_on_segment(between(a[0], a[1], s), b);
+      const SurfaceFoot foot_b = closest_on_segment(between(a, s), b);
       const SurfaceFoot foot_a = closest_on_segment(foot_b.point, a);
       return {foot_a, foot_b, (foot_a.point - foot_b.point).norm()};
     }

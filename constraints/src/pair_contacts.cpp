@@ -11,6 +11,8 @@ namespace {
 constexpr double kRelativeTolerance = 1e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
+// Of the radius of a body that contacts dent: overlap of this much stays, up to the deepest dent.
+constexpr double kOverlapThatStays = 4e-4;
 // Of what a force moves the reduced mass of two bodies within a step: so far each contact of bodies that flex yields by
 // itself. Loads that many contacts could share in many ways then have one answer that changes little where gaps change
 // by a picometre; what rests sinks by less than kGive g Δt², 3e-7 m at 60 steps a second.
@@ -98,7 +100,7 @@ void PairContacts::begin(const BodyStates& states) {
   strikes_ = strikes(states);
   for (std::size_t side = 0; side < 2; ++side)
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
-  deepest_dent_ = 0.0;
+  overlap_that_stays_ = 0.0;
   const PreparedContact& first = contacts_.front();
   give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty
               ? kGive * step_ * step_ / reduced_mass(states, first)
@@ -108,8 +110,13 @@ void PairContacts::begin(const BodyStates& states) {
     for (std::size_t side = 0; side < 2; ++side)
       if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
     contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
-    deepest_dent_ = std::max(deepest_dent_, contact.dent[0]);
+    overlap_that_stays_ = std::max(overlap_that_stays_, contact.dent[0]);
   }
+  for (std::size_t side = 0; side < 2; ++side)
+    if (yields_[side])
+      overlap_that_stays_ =
+          std::min(overlap_that_stays_,
+                   kOverlapThatStays * states.body(body(first, side)).group->model().collision_extent().radius);
   caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
 }
 
@@ -213,7 +220,8 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     if (axis == 0) {
       const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
       const double recovery =
-          caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap - deepest_dent_), step_ * options_->recovery_speed);
+          caught_ ? 0.0
+                  : std::min(kRecovery * std::max(0.0, -gap - overlap_that_stays_), step_ * options_->recovery_speed);
       law.offset = std::min(0.0, gap) + recovery;
       law.agent_displacement = recovery;
       law.lower = 0.0;

@@ -76,8 +76,8 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
-  double give_ = 0.0;          // of each contact of bodies that flex, m/N
-  double deepest_dent_ = 0.0;  // of the bodies' contacts, m: what the kept modes do not show of their shapes
+  double give_ = 0.0;                // of each contact of bodies that flex, m/N
+  double overlap_that_stays_ = 0.0;  // m: the kept modes do not show shapes dented by as much
   std::vector<double> modal_a_, modal_b_;
   Passage passage_a_, passage_b_;
 };

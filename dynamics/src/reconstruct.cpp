@@ -26,6 +26,7 @@ InstanceOutput instance_output(const ReconstructionTarget& target) {
     for (int column = 0; column < 3; ++column) out.rotation[3 * row + column] = static_cast<float>(R(row, column));
     out.translation[row] = static_cast<float>(target.X_OB.p[row]);
   }
+  out.displacement = target.displacement;
   out.positions = target.positions;
   return out;
 }

@@ -33,18 +33,28 @@ struct Points {
   Vector x, y, z;
 };
 
-// kLanes rest positions from `vertex` on; past the surface's last vertex nothing is read.
-HWY_INLINE HWY_ATTR Points LoadRest(const TileRange& range, std::size_t vertex) {
+// kLanes points from `vertex` on, of an array over the surface's vertices; past the last one nothing is read.
+HWY_INLINE HWY_ATTR Points LoadPoints(const TileRange& range, const float* of, std::size_t vertex) {
   const Floats d;
   Points p;
   if (HWY_LIKELY(vertex + kLanes <= range.vertices)) {
-    hn::LoadInterleaved3(d, range.rest + 3 * vertex, p.x, p.y, p.z);
+    hn::LoadInterleaved3(d, of + 3 * vertex, p.x, p.y, p.z);
   } else {
     HWY_ALIGN float buffer[3 * kLanes] = {};
-    std::copy_n(range.rest + 3 * vertex, 3 * (range.vertices - vertex), buffer);
+    std::copy_n(of + 3 * vertex, 3 * (range.vertices - vertex), buffer);
     hn::LoadInterleaved3(d, buffer, p.x, p.y, p.z);
   }
   return p;
+}
+
+// Rest positions, moved by the modes' sum u and what an instance adds to it.
+HWY_INLINE HWY_ATTR Points Displaced(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
+                                     const Points& rest, Points u) {
+  if (HWY_UNLIKELY(out.displacement != nullptr)) {
+    const Points more = LoadPoints(range, out.displacement, vertex);
+    u = {hn::Add(u.x, more.x), hn::Add(u.y, more.y), hn::Add(u.z, more.z)};
+  }
+  return {hn::Add(rest.x, u.x), hn::Add(rest.y, u.y), hn::Add(rest.z, u.z)};
 }
 
 // Stores kLanes points as x y z x y z … in three vectors. Component c of point e belongs to lane (3e + c) mod kLanes of
@@ -126,12 +136,13 @@ HWY_INLINE HWY_ATTR void ManyInstances(const TileRange& range, std::size_t tile,
     }
   }
   const std::size_t vertex = tile * kTileVertices + lane;
-  const Points rest = LoadRest(range, vertex);
+  const Points rest = LoadPoints(range, range.rest, vertex);
   const Interleave interleave;
-  for (std::size_t i = 0; i < N; ++i)
-    StoreTransformed(range, range.outputs[first + i], vertex,
-                     {hn::Add(rest.x, u[3 * i]), hn::Add(rest.y, u[3 * i + 1]), hn::Add(rest.z, u[3 * i + 2])},
+  for (std::size_t i = 0; i < N; ++i) {
+    const InstanceOutput& out = range.outputs[first + i];
+    StoreTransformed(range, out, vertex, Displaced(range, out, vertex, rest, {u[3 * i], u[3 * i + 1], u[3 * i + 2]}),
                      interleave);
+  }
 }
 
 // A whole tile of one instance: bound by the stream of shapes, which is prefetched.
@@ -151,11 +162,11 @@ HWY_INLINE HWY_ATTR void OneInstance(const TileRange& range, std::size_t tile, s
   for (std::size_t part = 0; part < kParts; ++part) {
     const std::size_t vertex = tile * kTileVertices + part * kLanes;
     if (vertex >= range.vertices) break;
-    const Points rest = LoadRest(range, vertex);
-    StoreTransformed(
-        range, range.outputs[instance], vertex,
-        {hn::Add(rest.x, u[part]), hn::Add(rest.y, u[kParts + part]), hn::Add(rest.z, u[2 * kParts + part])},
-        interleave);
+    const InstanceOutput& out = range.outputs[instance];
+    StoreTransformed(range, out, vertex,
+                     Displaced(range, out, vertex, LoadPoints(range, range.rest, vertex),
+                               {u[part], u[kParts + part], u[2 * kParts + part]}),
+                     interleave);
   }
 }
 

@@ -13,7 +13,9 @@ inline constexpr std::size_t kBlockInstances = 8;  ///< with AVX-512 their 24 ac
 struct InstanceOutput {
   float rotation[9];     ///< row-major
   float translation[3];  ///< m
-  float* positions;      ///< xyz per vertex, of vertex 0
+  /// xyz per vertex, of vertex 0: added to the rest positions, in the body's frame; null: nothing
+  const float* displacement;
+  float* positions;  ///< xyz per vertex, of vertex 0
 };
 
 /// Vertices [16·first_tile, min(16·last_tile, vertices)) of up to kBlockInstances instances of one surface.

@@ -138,6 +138,9 @@ Index World::Impl::group_of(std::shared_ptr<const ModalModel> model) {
     found = std::find(groups.begin(), groups.end(), nullptr);
     if (found == groups.end()) found = groups.insert(groups.end(), nullptr);
     *found = std::move(made);
+    dented.resize(groups.size());
+    if ((*found)->model().data().residual_compliance)
+      dented[static_cast<std::size_t>(found - groups.begin())] = std::make_unique<DentedSurface>((*found)->model());
   }
   return static_cast<Index>(found - groups.begin());
 }
@@ -189,10 +192,12 @@ void World::remove_body(BodyId id) {
   if (impl_->source != nullptr) impl_->source->remove_body(index);
   impl_->constraints.remove_body(index);
   impl_->contacts.forget(index);
+  if (id.index < impl_->loads_before.size()) impl_->loads_before[id.index].clear();
   if (known.group >= 0) {
     BodyGroup& group = impl_->group(known);
     group.remove(known.slot);
     if (group.count() == 0) {  // lets go of the model
+      impl_->dented[static_cast<std::size_t>(known.group)].reset();
       impl_->groups[static_cast<std::size_t>(known.group)].reset();
       impl_->make_ranges();
     }

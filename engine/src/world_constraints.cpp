@@ -103,6 +103,7 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   ContactSet contacts(options);
   impl_->constraints.set_contacts({});
   impl_->contacts = std::move(contacts);
+  impl_->loads_before.clear();
   impl_->contact_options = options;
   impl_->source = source;
   impl_->sleep.wake_all();

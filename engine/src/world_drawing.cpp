@@ -24,16 +24,40 @@ void World::Impl::interpolate(BodyId id, double s, Real* amplitudes) const {
     amplitudes[i] = static_cast<Real>(s == 1.0 ? newest[i] : previous[i] + s * (newest[i] - previous[i]));
 }
 
-/// Checks what is to be drawn and orders it by model.
-void World::Impl::prepare_drawing(std::span<const DrawTarget> targets) {
+/// For drawing between this state and the next.
+void World::Impl::keep_dents() {
+  if (std::ranges::none_of(dented, [](const auto& surface) { return surface != nullptr; })) return;
+  loads_before.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const std::span<const DentLoad> loads = contacts.dent_loads(static_cast<Index>(i));
+    loads_before[i].assign(loads.begin(), loads.end());
+  }
+}
+
+std::span<const DentLoad> World::Impl::dents_before(BodyId id) const {
+  if (id.index >= loads_before.size()) return {};
+  return loads_before[id.index];
+}
+
+bool World::Impl::is_dented(BodyId id, double s) const {
+  return !contacts.dent_loads(static_cast<Index>(id.index)).empty() || (s < 1.0 && !dents_before(id).empty());
+}
+
+/// Checks what is to be drawn, orders it by model, and makes room.
+void World::Impl::prepare_drawing(std::span<const DrawTarget> targets, double s) {
   drawn.clear();
+  std::size_t amplitudes = 0, dents = 0;
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const Entry& e = entry(targets[i].id, "reconstruct");
     const std::size_t numbers = 3 * static_cast<std::size_t>(group(e).model().render().vertices());
     require_count(targets[i].positions.size(), numbers, "reconstruct", "positions");
     if (!targets[i].normals.empty()) require_count(targets[i].normals.size(), numbers, "reconstruct", "normals");
     drawn.push_back({e.group, i});
+    amplitudes += static_cast<std::size_t>(group(e).model().modes());
+    if (is_dented(targets[i].id, s)) dents += numbers;
   }
+  if (drawn_amplitudes.size() < amplitudes) drawn_amplitudes.resize(amplitudes);
+  if (drawn_dents.size() < dents) drawn_dents.resize(dents);
   std::sort(drawn.begin(), drawn.end(), [](const Drawn& a, const Drawn& b) {
     return a.group != b.group ? a.group < b.group : a.target < b.target;
   });
@@ -42,22 +66,27 @@ void World::Impl::prepare_drawing(std::span<const DrawTarget> targets) {
 void World::reconstruct(std::span<const DrawTarget> targets, double interpolation, const Vec3& origin) const {
   require_fraction(interpolation, "reconstruct");
   require_finite(origin, "reconstruct", "origin");
-  impl_->prepare_drawing(targets);
-  std::size_t numbers = 0;
-  for (const Impl::Drawn& d : impl_->drawn)
-    numbers += static_cast<std::size_t>(impl_->groups[static_cast<std::size_t>(d.group)]->model().modes());
-  if (impl_->drawn_amplitudes.size() < numbers) impl_->drawn_amplitudes.resize(numbers);
-
-  impl_->reconstruction.clear();
-  double* amplitudes = impl_->drawn_amplitudes.data();
-  for (const Impl::Drawn& d : impl_->drawn) {
+  Impl& m = *impl_;
+  m.prepare_drawing(targets, interpolation);
+  m.reconstruction.clear();
+  double* amplitudes = m.drawn_amplitudes.data();
+  float* dents = m.drawn_dents.data();
+  for (const Impl::Drawn& d : m.drawn) {
     const DrawTarget& target = targets[d.target];
     RigidTransform X_OB = interpolated_pose(target.id, interpolation);
     X_OB.p -= origin;
-    impl_->interpolate(target.id, interpolation, amplitudes);
-    impl_->reconstruction.push_back(
-        {X_OB, amplitudes, target.positions.data(), target.normals.empty() ? nullptr : target.normals.data()});
+    m.interpolate(target.id, interpolation, amplitudes);
+    m.reconstruction.push_back({.X_OB = X_OB,
+                                .amplitudes = amplitudes,
+                                .positions = target.positions.data(),
+                                .normals = target.normals.empty() ? nullptr : target.normals.data()});
     amplitudes += model(target.id).modes();
+    if (!m.is_dented(target.id, interpolation)) continue;
+    m.dented[static_cast<std::size_t>(d.group)]->displacements(
+        m.dents_before(target.id), m.contacts.dent_loads(static_cast<Index>(target.id.index)), interpolation,
+        {dents, target.positions.size()});
+    m.reconstruction.back().displacement = dents;
+    dents += target.positions.size();
   }
   const auto& drawn = impl_->drawn;
   for (std::size_t begin = 0, end = 0; begin < drawn.size(); begin = end) {

@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "constraint_stage.h"
+#include "dented_surface.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/exact_motion.h"
@@ -54,9 +55,10 @@ struct World::Impl {
   Jobs* jobs;
   std::vector<Entry> entries;
   std::vector<std::uint32_t> vacant_entries;
-  std::vector<std::unique_ptr<BodyGroup>> groups;  // null where the last body of a model was removed
-  std::vector<Range> ranges;                       // covers all slots of all groups
-  ConstraintStage constraints;                     // bodies by their entries' indices
+  std::vector<std::unique_ptr<BodyGroup>> groups;      // null where the last body of a model was removed
+  std::vector<std::unique_ptr<DentedSurface>> dented;  // by group; null where nothing dents its bodies
+  std::vector<Range> ranges;                           // covers all slots of all groups
+  ConstraintStage constraints;                         // bodies by their entries' indices
   SleepStage sleep{constraints};
   std::optional<StepParts> parts{};
   std::vector<Apart> apart;
@@ -65,10 +67,11 @@ struct World::Impl {
   std::vector<ContactPoint> touching;
   std::function<bool(const ContactPoint&)> contact_acts;
   ContactOptions contact_options;
-  std::vector<BodyState> states;  // by entries' indices, for the source
-  std::vector<double> friction;   // the same
-  std::vector<double> still;      // zeros: how far a rigid shape's points move with the modes
-  double energy_removed = 0.0;    // of the step's parts before the last
+  std::vector<BodyState> states;                    // by entries' indices, for the source
+  std::vector<double> friction;                     // the same
+  std::vector<double> still;                        // zeros: how far a rigid shape's points move with the modes
+  std::vector<std::vector<DentLoad>> loads_before;  // what dented each entry before the last step
+  double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
   int iterations = 0, newton_steps = 0, cuts = 0;
   ProgramReport programs;
@@ -83,6 +86,7 @@ struct World::Impl {
   };
   std::vector<Drawn> drawn;
   std::vector<double> drawn_amplitudes;
+  std::vector<float> drawn_dents;
   std::vector<ReconstructionTarget> reconstruction;
 
   const Entry& entry(BodyId id, const char* function) const {
@@ -130,9 +134,12 @@ struct World::Impl {
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
   void advance_part(int part);
+  void keep_dents();
+  std::span<const DentLoad> dents_before(BodyId id) const;
+  bool is_dented(BodyId id, double s) const;
   template <class Real>
   void interpolate(BodyId id, double s, Real* amplitudes) const;
-  void prepare_drawing(std::span<const DrawTarget> targets);
+  void prepare_drawing(std::span<const DrawTarget> targets, double s);
 };
 
 }  // namespace limber

@@ -130,6 +130,16 @@ Vec3 World::velocity(BodyId id, const SurfacePoint& at) const {
   return impl_->group(e).velocity(e.slot, at);
 }
 
+Vec3 World::dent(BodyId id, const SurfacePoint& at) const {
+  const Impl::Entry& e = impl_->entry(id, "dent");
+  const BodyGroup& group = impl_->group(e);
+  validate(group.model(), at);
+  const DentedSurface* dented = impl_->dented[static_cast<std::size_t>(e.group)].get();
+  if (dented == nullptr) return Vec3::Zero();
+  return group.frame(e.slot).pose().q *
+         dented->displacement(impl_->contacts.dent_loads(static_cast<Index>(id.index)), at);
+}
+
 std::uint64_t World::state_hash() const {
   Hash hash;
   hash.add(impl_->steps);

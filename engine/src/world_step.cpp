@@ -9,6 +9,7 @@ void World::step() {
   Impl& m = *impl_;
   m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = m.cuts = 0;
   m.programs = {};
+  m.keep_dents();
   for (int part = 0; part < m.parts->count(); ++part) {
     m.advance_part(part);
     const IslandReport report = m.constraints.report();

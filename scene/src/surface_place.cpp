@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limber/core/error.h"
+#include "limber/mesh/closest_point.h"
 
 namespace limber {
 namespace {
@@ -22,7 +23,7 @@ struct PlacedSurface {
     const float* p = positions.data() + 3 * static_cast<std::size_t>(v);
     return {p[0], p[1], p[2]};
   }
-  std::array<Vec3, 3> corners(const Triangle& t) const { return {vertex(t[0]), vertex(t[1]), vertex(t[2])}; }
+  TrianglePoints corners(const Triangle& t) const { return {vertex(t[0]), vertex(t[1]), vertex(t[2])}; }
 };
 
 PlacedSurface place_surface(const World& world, BodyId body, PlaceFrame frame) {
@@ -42,34 +43,6 @@ PlacedSurface place_surface(const World& world, BodyId body, PlaceFrame frame) {
   return s;
 }
 
-/// Barycentric weights of the point of a triangle nearest to p: of the plane's foot if it lies inside, else of the
-/// nearest point of the nearest edge.
-Weights nearest_on_triangle(const std::array<Vec3, 3>& x, const Vec3& p) {
-  const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], d = p - x[0];
-  const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), r = d.dot(e1), s = d.dot(e2);
-  if (const double det = a * c - b * b; det > 0.0) {
-    const double v = (c * r - b * s) / det, w = (a * s - b * r) / det;
-    if (v >= 0.0 && w >= 0.0 && v + w <= 1.0) return {1.0 - v - w, v, w};
-  }
-  Weights best{1.0, 0.0, 0.0};
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3;
-    const Vec3 edge = x[j] - x[i];
-    const double length2 = edge.squaredNorm();
-    const double t = length2 > 0.0 ? std::clamp((p - x[i]).dot(edge) / length2, 0.0, 1.0) : 0.0;
-    const double distance2 = (x[i] + t * edge - p).squaredNorm();
-    if (distance2 >= nearest) continue;
-    nearest = distance2;
-    best = {0.0, 0.0, 0.0};
-    best[static_cast<std::size_t>(i)] = 1.0 - t;
-    best[static_cast<std::size_t>(j)] = t;
-  }
-  return best;
-}
-
-Vec3 at(const std::array<Vec3, 3>& x, const Weights& w) { return w[0] * x[0] + w[1] * x[1] + w[2] * x[2]; }
-
 SurfacePoint render_point(std::size_t triangle, const Weights& w) {
   return {.surface = SurfacePoint::Surface::kRender, .triangle = static_cast<Index>(triangle), .weight = w};
 }
@@ -80,12 +53,11 @@ SurfacePoint find(const NearestTo& place, const World& world, BodyId body, const
   SurfacePoint best;
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t t = 0; t < s.triangles->size(); ++t) {
-    const auto x = s.corners((*s.triangles)[t]);
-    const Weights w = nearest_on_triangle(x, p);
-    const double distance2 = (at(x, w) - p).squaredNorm();
+    const SurfaceFoot foot = closest_on_triangle(p, s.corners((*s.triangles)[t]));
+    const double distance2 = (foot.point - p).squaredNorm();
     if (distance2 >= nearest) continue;
     nearest = distance2;
-    best = render_point(t, w);
+    best = render_point(t, foot.weight);
   }
   return best;
 }
@@ -96,7 +68,7 @@ struct Hit {
   Weights weights{};
 };
 
-Hit meet(const std::array<Vec3, 3>& x, const Vec3& from, const Vec3& direction) {
+Hit meet(const TrianglePoints& x, const Vec3& from, const Vec3& direction) {
   // Cramer's rule for  from + t d = x0 + v e1 + w e2.
   const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], n = direction.cross(e2);
   const double det = e1.dot(n);

@@ -63,12 +63,14 @@ double rounding_bound(const ModalSurface& surface, Index v, const Reconstruction
   double displacement = 0.0;
   for (Index m = 0; m < surface.basis.modes(); ++m)
     displacement += std::abs(target.amplitudes[m]) * surface.basis.shape(v, m).cast<double>().norm();
+  if (target.displacement) displacement += Eigen::Map<const Vec3f>(target.displacement + 3 * v).cast<double>().norm();
   const double size = surface.rest[v].cast<double>().norm() + displacement;
   return u * ((surface.basis.modes() + 4) * displacement + 8.0 * size + 2.0 * target.X_OB.p.norm());
 }
 
 Vec3 exact_position(const ModalSurface& surface, Index v, const ReconstructionTarget& target) {
   Vec3 p = surface.rest[v].cast<double>();
+  if (target.displacement) p += Eigen::Map<const Vec3f>(target.displacement + 3 * v).cast<double>();
   for (Index m = 0; m < surface.basis.modes(); ++m)
     p += target.amplitudes[m] * surface.basis.shape(v, m).cast<double>();
   return target.X_OB * p;
@@ -90,7 +92,11 @@ TEST(Reconstruct, EqualsTheDoubleSumWithinFloatRoundingOnEveryInstructionSet) {
           SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ": " << vertices << " vertices, " << modes
                                             << " modes, " << count << " instances");
           const ModalSurface surface = random_surface(vertices, modes);
-          const Instances instances(surface, count);
+          Instances instances(surface, count);
+          // Every third one is displaced beside its modes, as others of its block are not.
+          const std::vector<float> moved(3 * surface.rest.size(), 0.3f);
+          for (std::size_t i = 1; i < instances.targets.size(); i += 3)
+            instances.targets[i].displacement = moved.data();
           reconstruct(surface, instances.targets);
           for (const auto& t : instances.targets) expect_exact_within_rounding(surface, t);
         }

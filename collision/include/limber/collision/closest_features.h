@@ -9,39 +9,13 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <span>
 
 #include "limber/core/types.h"
+#include "limber/mesh/closest_point.h"
 #include "limber/model/shape.h"
 
 namespace limber {
-
-using SegmentPoints = std::array<Vec3, 2>;
-using TrianglePoints = std::array<Vec3, 3>;
-
-/// A vertex, edge or face of a segment or triangle. Edge i of a triangle runs from vertex i to vertex (i + 1) mod 3; a
-/// segment's own line is its edge 0.
-struct Feature {
-  enum class Kind : std::uint8_t { kVertex, kEdge, kFace } kind = Kind::kVertex;
-  std::uint8_t index = 0;  ///< 0 for a face
-
-  friend bool operator==(const Feature&, const Feature&) = default;
-};
-
-/// The point of a segment (two weights) or triangle (three) nearest to something: Σ weight·vertex.
-struct SurfaceFoot {
-  Vec3 point = Vec3::Zero();
-  std::array<double, 3> weight{1.0, 0.0, 0.0};  ///< barycentric: ≥ 0, sum 1
-  Feature feature{};
-};
-
-/// Unit normal of a triangle, counter-clockwise seen from its tip; zero where its height over the longest edge is less
-/// than 1e-13 of that edge. Orthogonal to the longest edge to round-off, also for slivers.
-Vec3 unit_normal(const TrianglePoints& t);
-
-SurfaceFoot closest_on_segment(const Vec3& p, const SegmentPoints& s);
-SurfaceFoot closest_on_triangle(const Vec3& p, const TrianglePoints& t);
 
 /// The two nearest points of a pair, one on each.
 struct ClosestPoints {

@@ -26,8 +26,8 @@
 /// = 1.
 ///
 /// From a penetrated start the gap is asked to shrink no further, and is pushed open slowly; what that takes counts as
-/// work done on the island. Overlap up to the deepest dent of the pair stays: so far the kept modes do not show the
-/// shape, and which few of many contacts are there changes from step to step.
+/// work done on the island. Overlap up to the deepest dent of the pair stays, at most 4e-4 of the radius of either: the
+/// kept modes do not show the shape, and which few of many contacts are there changes from step to step.
 #pragma once
 
 #include <cstdint>

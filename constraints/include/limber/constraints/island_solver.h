@@ -24,13 +24,13 @@
 /// freedom, counting the rows that residual compliance couples, and no impact is held. There 2 leaves contacts out: a
 /// contact's force goes on instead, half at the end of a step and half at the start of the next, as far as it is no
 /// more than in the step before; where bodies are by the ends of steps does not depend on it. If nothing but contacts
-/// of rigid bodies acts, or those of a pile in which some flex (more than 250 rows, fewer than 30 to a body, no residual
-/// compliance), 4 is a few iterations of an operator splitting at a time, from the last step's forces on, until true
-/// gaps and forces fit to 1e-7 of the distances at hand (else: 1e-9). Where contacts yield by themselves otherwise
-/// (add_flexibility, add_give: those of bodies that flex) it is Newton's method with 500 steps in all, from where the
-/// splitting goes on; beside joints and limits of rigid bodies it is that method, less patiently. A step that does not
-/// settle soon is left with the impulses found, and the report says so. What the tolerance of gaps leaves 6 without
-/// motion to take it from is paid by forces that are smaller by a part of at most 1e-4.
+/// of rigid bodies acts, or those of a pile in which some flex (more than 250 rows, fewer than 30 to a body, no
+/// residual compliance), 4 is a few iterations of an operator splitting at a time, from the last step's forces on,
+/// until true gaps and forces fit to 1e-7 of the distances at hand (else: 1e-9). Where contacts yield by themselves
+/// otherwise (add_flexibility, add_give: those of bodies that flex) it is Newton's method with 500 steps in all, from
+/// where the splitting goes on; beside joints and limits of rigid bodies it is that method, less patiently. A step that
+/// does not settle soon is left with the impulses found, and the report says so. What the tolerance of gaps leaves 6
+/// without motion to take it from is paid by forces that are smaller by a part of at most 1e-4.
 ///
 /// Where 6 fails and overlapping bodies were being pushed apart, the step is done again without that.
 ///

@@ -1,7 +1,7 @@
 /// @file limber/dynamics/reconstruct.h
 /// Deformed vertices from amplitudes, on demand, into the caller's arrays.
 ///
-///   p_i = R (rest_i + Σ_m z_m shape_i,m) + t                        i: vertex
+///   p_i = R (rest_i + Σ_m z_m shape_i,m + d_i) + t                  i: vertex; d: what the modes do not show, if any
 ///
 /// The product is one stream over the basis for a block of up to eight instances; the rigid transform is fused into the
 /// store. Single precision throughout; pass poses relative to an origin near the viewer (a float near 10⁶ m has 6 cm
@@ -22,13 +22,15 @@ struct ReconstructionTarget {
   const double* amplitudes = nullptr;  ///< k, z, kg^½·m; may be null where k = 0
   float* positions = nullptr;          ///< out: 3V, xyz per vertex; m
   float* normals = nullptr;  ///< out, optional: 3V unit normals of the deformed surface, area-weighted; null: none
+  const float* displacement = nullptr;  ///< d, 3V, xyz per vertex, body frame, m; null: none
 };
 
 /// Writes the vertices (and normals) of every target; arrays of different targets must not overlap. Does not allocate
 /// but in what `jobs` does. The result has the same bits however targets are grouped and whatever `jobs` does.
 ///
 /// Error against real arithmetic, with u = 2⁻²⁴: (k + 4) u Σ|z_m||shape_m| of the sum, and 8u (|rest| +
-/// Σ|z_m||shape_m|) + 2u|t| of the rigid motion. The displacement is summed by itself and the rest position added last.
+/// Σ|z_m||shape_m| + |d|) + 2u|t| of the rigid motion. The displacement is summed by itself and the rest position added
+/// last.
 /// @throws InvalidArgument if a required pointer is null, basis and rest shape differ in their vertices, the basis has
 /// more than 8192 modes, or normals are asked for and a triangle names a vertex that is not there.
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets,

@@ -259,15 +259,20 @@ class World {
   Vec3 angular_momentum(BodyId id) const;  ///< world, about the body origin, kg·m²/s (rigid part)
   Vec3 linear_momentum(BodyId id) const;   ///< world, kg·m/s
 
-  /// World position of a surface point, deformed.
+  /// World position of a surface point, deformed by the modes: what handles hold.
   Vec3 position(BodyId id, const SurfacePoint& at) const;
   /// World velocity of a surface point, deformation included.
   Vec3 velocity(BodyId id, const SurfacePoint& at) const;
+  /// What contacts press a surface point in beyond the modes, world, m: G F of the last step's forces
+  /// (residual_compliance.h). Drawn surfaces show it, position() and velocity() do not. Zero where the model has no
+  /// residual compliance or ContactOptions::residual_compliance is off. A point of the render surface goes with the
+  /// point of the collision surface that was nearest at rest.
+  Vec3 dent(BodyId id, const SurfacePoint& at) const;
 
   // Drawing ----------------------------------------------------------------------------------------------------------
-  /// Deformed render surfaces, less `origin` (pass a point near the camera far from the world's origin). Instances of
-  /// one model are made together: their basis is read once, so one call for all that is drawn is faster than one for
-  /// each.
+  /// Deformed render surfaces, dents of contacts included, less `origin` (pass a point near the camera far from the
+  /// world's origin). Instances of one model are made together: their basis is read once, so one call for all that is
+  /// drawn is faster than one for each.
   /// @param interpolation s in [0, 1] between the last two states; 1: the newest.
   void reconstruct(std::span<const DrawTarget> targets, double interpolation = 1.0,
                    const Vec3& origin = Vec3::Zero()) const;
