@@ -178,9 +178,10 @@ void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double d
       if (s.high < p.low - by || s.low > p.high + by) continue;
       Span core{s.low + by, s.high - by};
       if (core.low > core.high) {
-        // The slopes of stops may explain it; what slides at both ends passes beside them.
-        if (slope_of_end(p, true) == kInfinity && slope_of_end(p, false) == kInfinity) continue;
+        // The slope of a stop may explain it, near that stop; what slides there passes beside it.
         core.low = core.high = 0.5 * (core.low + core.high);
+        if (!explains(slope_of_end(p, true), core.low - p.low) && !explains(slope_of_end(p, false), p.high - core.high))
+          continue;
       }
       if (core.low < p.low || explains(slope_of_end(p, true), core.low - p.low)) core.low = p.low;
       if (core.high > p.high || explains(slope_of_end(p, false), p.high - core.high)) core.high = p.high;
@@ -390,7 +391,7 @@ Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap
 double Search::slope_at(const SurfacePoint& at, bool moving) const {
   const OrbitFace& face = surface(moving).faces()[static_cast<std::size_t>(at.face)];
   const double slope = slope_of(face.normal.dot(frame_.direction(at.p)));
-  return stands(slope, face.one_sided) ? slope : kInfinity;
+  return !face.narrow && stands(slope, face.one_sided) ? slope : kInfinity;
 }
 
 void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_seeds, Witness& end) {
@@ -467,6 +468,9 @@ FreeMotion Search::result() const {
 FreeMotion search_motion(const PathFrame& frame, std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed,
                          const Tolerances& t, const FreeMotionOptions& options) {
   auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
+  const double width = std::min(t.across + t.facets, t.largest_overlap);
+  mark_narrow(frame, kSlope, width, moving_faces);
+  mark_narrow(frame, kSlope, width, fixed_faces);
   const Side moving_side(frame, moving, std::move(moving_faces), options.samples);
   const Side fixed_side(frame, fixed, std::move(fixed_faces), options.samples);
   return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "constants.h"
+#include "limber/core/disjoint_sets.h"
 
 namespace limber::internal {
 namespace {
@@ -239,9 +240,10 @@ int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<
   return low >= kLeast ? 1 : high <= -kLeast ? -1 : 0;
 }
 
+constexpr double kContinues = 0.643;  // cosine of 50 degrees: facets of an octagon, and noise, bend by less
+
 /// @param faces of one side, whose vertices are numbered together
 void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
-  constexpr double kContinues = 0.643;  // cosine of 50 degrees: facets of an octagon, and noise, bend by less
   std::vector<int> sides;
   for (OrbitFace& face : faces) {
     sides.push_back(side_of_motion(frame, face.normal, face.corners));
@@ -259,6 +261,36 @@ void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
       });
     }
 }
+
+/// Cosine between the normal and the motion, at the corner where it is the most.
+double most_along(const PathFrame& frame, const OrbitFace& face) {
+  double most = 0.0;
+  for (const Vec3& corner : face.corners)
+    if (const double along = face.normal.dot(frame.direction(corner)); std::abs(along) > std::abs(most)) most = along;
+  return most;
+}
+
+/// Faces that continue one another and face the motion the same way. @param along per face; 0: it counts for nothing
+DisjointSets patches_of(const std::vector<OrbitFace>& faces, const std::vector<double>& along) {
+  const FacesAround around(faces);
+  DisjointSets patches(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (const Index vertex : faces[f].vertices)
+      for (const Index other : around.of(vertex)) {
+        const auto o = static_cast<std::size_t>(other);
+        if (o < f && along[o] * along[f] > 0.0 && faces[o].normal.dot(faces[f].normal) > kContinues)
+          patches.join(other, static_cast<Index>(f));
+      }
+  return patches;
+}
+
+/// How much of the orbits a patch covers.
+struct PatchExtent {
+  Eigen::AlignedBox3d box{};
+  double across = 0.0;  ///< area as the motion sees it
+  bool aslant = false;  ///< some of it lies along the motion, such as a screw's collar: it covers more than it shows
+  bool narrower_than(double width) const { return !aslant && across < width * box.diagonal().norm(); }
+};
 
 std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
   constexpr double kFlat = 0.94;
@@ -294,6 +326,30 @@ std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
 }
 
 }  // namespace
+
+void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces) {
+  const double stands = 1.0 / std::hypot(1.0, slope);
+  std::vector<double> along;
+  for (const OrbitFace& face : faces) {
+    along.push_back(most_along(frame, face));
+    if (!face.one_sided && std::abs(along.back()) < stands) along.back() = 0.0;
+  }
+  if (std::all_of(along.begin(), along.end(), [](double a) { return a == 0.0; })) return;
+  DisjointSets patches = patches_of(faces, along);
+  std::vector<PatchExtent> extents(faces.size());
+  const auto extent_of = [&](std::size_t face) -> PatchExtent& {
+    return extents[static_cast<std::size_t>(patches.root(static_cast<Index>(face)))];
+  };
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (along[f] == 0.0) continue;
+    PatchExtent& extent = extent_of(f);
+    const auto& c = faces[f].corners;
+    for (const Vec3& corner : c) extent.box.extend(corner);
+    extent.across += 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm() * std::abs(along[f]);
+    extent.aslant = extent.aslant || std::abs(along[f]) < stands;
+  }
+  for (std::size_t f = 0; f < faces.size(); ++f) faces[f].narrow = along[f] != 0.0 && extent_of(f).narrower_than(width);
+}
 
 FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
   Index vertices = 0;

@@ -50,6 +50,9 @@ struct OrbitFace {
   /// the motion carries along itself the normal velocity changes its sign; so a face that lies along the motion is told
   /// from one that slides.
   bool one_sided = false;
+  /// It stands against the motion, but with all that continues it is narrower than what counts as an obstacle: a sliver
+  /// between faces that slide, and no stop.
+  bool narrow = false;
   double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
   double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
   OrbitBox box{};                               ///< of the orbits that meet it
@@ -70,6 +73,9 @@ class FacesAround {
  private:
   std::vector<Index> first_{0}, faces_;
 };
+
+/// Sets OrbitFace::narrow. @param slope at which a face stands, see OrbitPiece. @param width across the motion, length
+void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces);
 
 /// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
 /// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.

@@ -53,7 +53,8 @@ OrbitIndex::Face::Face(const OrbitFace& face, Kind kind)
       bearing(face.bearing),
       sector(face.sector),
       body(face.body),
-      one_sided(face.one_sided) {
+      one_sided(face.one_sided && !face.narrow),
+      narrow(face.narrow) {
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& a = face.corners[i];
     Vec3 inward = face.normal.cross(face.corners[(i + 1) % 3] - a);
@@ -120,7 +121,7 @@ void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<
     if (!face.holds({x, to_plane * (n.y() * cosine - n.z() * s), to_plane * (n.z() * cosine + n.y() * s)})) continue;
     // d/dθ cos(θ − β) = −sin: + half goes inward
     out.push_back({wrapped(face.heading + side * std::acos(cosine) - orbit.phase), face.body, side,
-                   slope_of(face.across * sine), face.one_sided});
+                   face.slope(face.across * sine), face.one_sided});
   }
 }
 
@@ -131,7 +132,7 @@ void OrbitIndex::cross_line(const Face& face, const Orbit& orbit, std::vector<Cr
   const auto [y, z] = orbit.plane;
   if (!face.holds({0.0, y, z})) return;
   const double x = (face.plane.offset - n.y() * y - n.z() * z) / n.x();
-  out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, slope_of(n.x()), face.one_sided});
+  out.push_back({x - orbit.phase, face.body, n.x() < 0.0 ? 1 : -1, face.slope(n.x()), face.one_sided});
 }
 
 // The same plane along x = x₀ + pitch t:  f(t) = r h cos(θ₀ + t − β) + n_x pitch t + n_x x₀ − c. Between the zeros of
@@ -175,7 +176,7 @@ void OrbitIndex::cross_helix_part(const Face& face, const Orbit& orbit, const Sp
     const double t = zero_between(f, cuts[i], at_low, cuts[i + 1], at_high);
     if (!face.holds(point(t))) continue;
     const double rate = n.x() * pitch - r * h * std::sin(orbit.phase + t - beta);
-    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, slope_of(rate / std::hypot(r, pitch)), face.one_sided});
+    out.push_back({t, face.body, at_low < 0.0 ? -1 : 1, face.slope(rate / std::hypot(r, pitch)), face.one_sided});
   }
 }
 

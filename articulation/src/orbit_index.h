@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -61,7 +62,9 @@ class OrbitIndex {
     std::array<Plane, 3> sides;  ///< across the face, inward; for translations across the orbit plane
     double bearing, sector, low_x, high_x;
     Index body;
-    bool one_sided;
+    bool one_sided, narrow;
+    /// As slope_of(); what is too narrow to be a stop slides.
+    double slope(double cosine) const { return narrow ? std::numeric_limits<double>::infinity() : slope_of(cosine); }
   };
   struct Crossing {
     double t = 0.0;
