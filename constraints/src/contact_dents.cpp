@@ -41,7 +41,8 @@ Vec3 ContactDents::displacement(const BodyStates& states, Index body, const Surf
 
 void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
   Body& b = at(body);
-  if (!b.gathers) {
+  // A step may be done again before any force is taken: then rows are counted from the first one again.
+  if (!b.gathers || side.first <= b.rows.back().first) {
     b.gathers = true;
     b.rows.clear();
     rows.add_stored_energy(energy(states, body));

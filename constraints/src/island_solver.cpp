@@ -15,9 +15,7 @@ double start_share(std::span<const RowLaw> laws) {
   return contacts_alone && std::ranges::any_of(laws, &RowLaw::strikes) ? 0.5 : 1.0;
 }
 
-// A step is cut so often at most, and never into parts shorter than this share of it.
-constexpr int kMostCuts = 4;
-constexpr double kShortestPart = 1e-3;
+constexpr int kMostCuts = 4;  // of a step
 
 /// Bodies that the rows, gravity and held forces move, and nothing else.
 bool are_free(std::span<const ConstrainedBody> table, std::span<const Index> members) {
@@ -52,27 +50,24 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
                                 std::span<Constraint* const> constraints, const IslandOptions& options) {
   Impl& s = *impl_;
   IslandReport report{.bodies = static_cast<int>(members.size())};
-  IslandOptions part = options;
-  double left = options.step;
-  bool begins = true;
-  const bool may_cut = allows_cuts(table, members, constraints);
-  for (int cut = 0; may_cut && cut < kMostCuts; ++cut) {
-    const double time = s.next_cut(table, members, constraints, options.gravity, left);
-    if (!(time > kShortestPart * options.step && left - time > kShortestPart * options.step)) break;
-    part.step = time;
-    s.take_part({table, members, constraints, begins, false}, part, options.step, report);
-    part.energy_surplus = report.energy_surplus;
-    left -= time;
-    begins = false;
-    ++report.cuts;
+  Impl::Part part{table, members, constraints, true, true};
+  if (may_divide(table, members, constraints)) {
+    s.take_divided(part, options, report);
+    return report;
   }
-  part.step = left;
-  const Impl::Part rest{table, members, constraints, begins, true};
-  if (may_divide(table, members, constraints))
-    s.take_divided(rest, part, report);
-  else
-    s.take_part(rest, part, options.step, report);
-  return report;
+  const bool may_cut = allows_cuts(table, members, constraints);
+  IslandOptions own = options;
+  for (double left = options.step;; left -= own.step, part.begins = false, ++report.cuts) {
+    const bool cuts = may_cut && report.cuts < kMostCuts;
+    const double time = cuts ? s.next_cut(table, members, constraints, options.gravity, left) : left;
+    own.step = is_part(time, left, options.step) ? time : left;
+    part.ends = own.step == left;
+    IslandReport done = s.foresee_guarded(part, own, options.step);
+    if (cuts) s.end_at_release(part, own, options.step, done);
+    s.commit(part, own, done, report);
+    if (part.ends) return report;
+    own.energy_surplus = report.energy_surplus;
+  }
 }
 
 /// A step, in halves, quarters and so on of it from where the rows do not come together: impulses at a step's start
@@ -100,12 +95,6 @@ void IslandSolver::Impl::take_divided(Part part, IslandOptions options, IslandRe
     part.begins = false;
     ++report.cuts;
   }
-}
-
-/// One step, or a part of one that is cut.
-void IslandSolver::Impl::take_part(const Part& part, const IslandOptions& options, double whole_step,
-                                   IslandReport& report) {
-  commit(part, options, foresee_guarded(part, options, whole_step), report);
 }
 
 /// What has been foreseen happens.

@@ -6,6 +6,7 @@
 //   island_working_rows.cpp  which rows take part, and in what order
 //   island_newton.cpp    Newton's method for the impulses
 //   island_sparse.cpp    the rows of islands of many bodies
+//   island_release.cpp   where within a step an impact lets go
 //   island_guard.cpp     the energy that may have come in, and what is done about more
 #pragma once
 
@@ -44,6 +45,12 @@ inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || 
 // to a body, as in piles of boxes: bumpy bodies have hundreds that push against each other, and fell through the ground
 // by splitting; stacks settle by Newton's method in every step.
 inline constexpr Index kMostRowsOfNewton = 250, kMostRowsOfABody = 30;
+
+/// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
+inline bool is_part(double time, double left, double whole_step) {
+  constexpr double kShortest = 1e-3;
+  return time > kShortest * whole_step && left - time > kShortest * whole_step;
+}
 
 struct IslandSolver::Impl {
   IslandBodies bodies;
@@ -135,7 +142,11 @@ struct IslandSolver::Impl {
   };
   void take_divided(Part part, IslandOptions options, IslandReport& report);
   void commit(const Part& part, const IslandOptions& options, IslandReport done, IslandReport& report);
-  void take_part(const Part& part, const IslandOptions& options, double whole_step, IslandReport& report);
+  double longest_impact() const;
+  bool may_let_go(double length) const;
+  double impact_impulse(double length) const;
+  void end_at_release(Part& part, IslandOptions& options, double whole_step, IslandReport& done);
+  double find_release(const Part& part, IslandOptions options, double whole_step);
   IslandReport foresee(const Part& part, const IslandOptions& options, double whole_step);
   IslandReport foresee_guarded(const Part& part, const IslandOptions& options, double whole_step);
   double next_cut(std::span<const ConstrainedBody> table, std::span<const Index> members,

@@ -184,6 +184,12 @@ bool PairContacts::strikes(const BodyStates& states) const {
   });
 }
 
+double PairContacts::time_to_rebound() const {
+  constexpr double kMargin = 0.25;  // of the longest time: its end is to be seen
+  const double longest = longest_rebound(contacts_.front().a, contacts_.front().b);
+  return kMargin * longest + std::max(0.0, longest - lasted_);
+}
+
 void PairContacts::add_give(Index first, ConstraintRows& rows) const {
   if (give_ == 0.0) return;
   for (Index row = first; row < rows.size(); ++row) rows.add_give(row, give_);
@@ -227,6 +233,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.lower = 0.0;
       law.holds = true;
       law.strikes = strikes_;
+      if (strikes_ && options_->impact == ImpactModel::kHeldFromTouch) law.lets_go_within = time_to_rebound();
       if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
       law.friction = contact.friction;
     } else {
@@ -250,6 +257,7 @@ void PairContacts::make_spring(const BodyStates& states, const PreparedContact& 
   law.offset = d * law.compliance * std::min(0.0, gap);
   law.stiffness = k;
   law.holds = law.strikes = false;
+  law.lets_go_within = 0.0;
   law.goes_on = true;
   law.agent_displacement = 0.0;
 }

@@ -54,6 +54,9 @@ class PairContacts final : public Constraint {
   /// Whether the bodies are in an impact in the coming step.
   bool strikes(const BodyStates& states) const;
 
+  /// How long the impact that the bodies are in may go on, s, and a little longer.
+  double time_to_rebound() const;
+
   /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
   void add_give(Index first, ConstraintRows& rows) const;
 

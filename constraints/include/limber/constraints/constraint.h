@@ -49,8 +49,8 @@ class Constraint {
   /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
   /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
-  /// Whether it is contact: an island of nothing else may have its step cut where bodies strike. Each part is then a
-  /// step for the functions here.
+  /// Whether it is contact: an island of nothing else may have its step cut where bodies strike and let go. Each part
+  /// is then a step for the functions here.
   virtual bool is_contact() const { return false; }
   /// Whether islands of nothing but such constraints may have a step that does not settle taken in shorter parts, each
   /// a step for the functions here.

@@ -62,6 +62,8 @@ struct RowLaw {
   bool contact = false;  ///< of a contact, its normal row or a tangent
   /// The contact is an impact: where only contacts act, all the island's forces are then held over the step (θ = ½).
   bool strikes = false;
+  /// > 0: and the step is to be cut where it lets go, this far into it at the latest, s.
+  double lets_go_within = 0.0;
   /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
   bool slides = false;
 };

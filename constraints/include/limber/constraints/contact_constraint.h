@@ -50,11 +50,12 @@ enum class ImpactModel {
   /// Held over the step, θ = ½, while an impact lasts; else θ = 1. Loses nothing but what the gap at the first step's
   /// start costs, so that the rebound is that of the elastic bodies.
   kHeld,
-  /// The same, and the steps of islands of free bodies with nothing but contacts are cut where an impact begins: at the
-  /// exact time at which the first of their contacts closes (exact_motion.h) faster than `impact_speed`. The forces of
-  /// the impact then start at the touch, and the gap costs nothing. At most four cuts a step: what strikes more often
-  /// in
-  /// it is kHeld. Contacts are those found at the step's start.
+  /// The same from the touch until they let go: the steps of islands of free bodies with nothing but contacts are cut
+  /// where an impact begins and where it ends, so that the rebound is that of the elastic bodies at any step. It begins
+  /// at the exact time at which the first of their contacts closes (exact_motion.h) faster than `impact_speed`. It ends
+  /// where the impulse that keeps its gaps closed is largest: from there on contacts would have to pull. That is found
+  /// by doing the part some ten times, for all impacts of an island together, where it settles soon. At most four cuts
+  /// a step: what strikes and lets go more often in it is kHeld. Contacts are those found at the step's start.
   kHeldFromTouch,
 };
 

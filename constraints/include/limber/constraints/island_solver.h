@@ -38,8 +38,9 @@
 /// and forces before 1; its contacts' rows then have these forces as both bounds, held over the step (θ = ½) if nothing
 /// else acts in the island.
 ///
-/// Where bodies strike and that is asked for (Constraint::next_cut), the step is cut there, four times at most, and 1
-/// to 7 are done for each part.
+/// Where bodies strike and that is asked for (Constraint::next_cut), the step is cut there, and where they let go of
+/// each other (RowLaw::lets_go_within): where the impulses of their rows, by 1 to 5 over parts of different lengths,
+/// are largest. Four times at most; 1 to 7 are done for each part.
 ///
 /// Where free bodies hang on joints alone and the step does not settle, it is taken in halves, quarters … 64ths,
 /// as far as they settle, each by 1 to 7, from that on what is left of it at once.
@@ -74,7 +75,8 @@ struct IslandOptions {
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
-  int cuts = 0;  ///< of the step, where bodies struck (ImpactModel::kHeldFromTouch) or joints did not come together
+  /// Of the step, where bodies struck or let go (ImpactModel::kHeldFromTouch), or joints did not come together.
+  int cuts = 0;
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most

@@ -134,7 +134,7 @@ struct ConstraintReport {
   int iterations = 0;           ///< the most that an island needed
   int newton_steps = 0;         ///< the same, of the contacts with friction: bounded (island_solver.h)
   ProgramReport programs{};     ///< linear programs of the contact rule
-  int cuts = 0;                 ///< of islands' steps, where bodies struck or joints did not meet
+  int cuts = 0;                 ///< of islands' steps, where bodies struck or let go, or joints did not meet
   bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
   double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)
 };

@@ -1,0 +1,96 @@
+#include <algorithm>
+#include <numbers>
+
+#include "island_step.h"
+
+namespace limber {
+namespace {
+
+/// A part that settles, and soon: it may be done ten times more.
+bool is_quick(const IslandReport& done) {
+  constexpr int kQuick = 100;  // of Newton's steps
+  return done.status == SolveStatus::kSolved && done.newton_steps <= kQuick;
+}
+
+}  // namespace
+
+/// Cuts a part of a step that has been foreseen where an impact lets go within it.
+///
+/// A force that is held cannot end within a step. But the impulse I(s) that keeps the gaps of an impact closed until s
+/// grows as long as they press, dI/ds being the force then; from where it shrinks on they would have to pull. That is
+/// where they let go. The exact wave in a bar has I = F s up to the release at T, F (2T − s) after it in steps that
+/// began before, and F s²/(3s − 2T) in one that begins with the impact. It grows again later, after 4T/3 there: parts
+/// are no longer than impacts may be.
+void IslandSolver::Impl::end_at_release(Part& part, IslandOptions& options, double whole_step, IslandReport& done) {
+  const double latest = longest_impact();
+  if (latest == 0.0 || theta == 1.0 || holds_contact_forces()) return;
+  if (is_part(latest, options.step, whole_step)) {
+    options.step = latest;
+    part.ends = false;
+    done = foresee_guarded(part, options, whole_step);
+  }
+  if (!is_quick(done) || !may_let_go(options.step)) return;
+  const double length = options.step, release = find_release(part, options, whole_step);
+  if (is_part(release, length, whole_step)) {
+    options.step = release;
+    part.ends = false;
+  }
+  done = foresee_guarded(part, options, whole_step);
+}
+
+/// By when those have let go that are to be cut there, s; 0: there are none.
+double IslandSolver::Impl::longest_impact() const {
+  double longest = 0.0;
+  for (const RowLaw& law : laws) longest = std::max(longest, law.lets_go_within);
+  return longest;
+}
+
+/// What presses harder than before does not let go.
+bool IslandSolver::Impl::may_let_go(double length) const {
+  double before = 0.0;
+  for (const RowLaw& law : laws)
+    if (law.lets_go_within > 0.0) before += law.last_force;
+  return before == 0.0 || impact_impulse(length) < length * before;
+}
+
+/// Of all impacts of the island, along their normals.
+double IslandSolver::Impl::impact_impulse(double length) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < laws.size(); ++i)
+    if (laws[i].lets_go_within > 0.0) sum += f[i] + length * reaction[i];
+  return sum;
+}
+
+/// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there.
+double IslandSolver::Impl::find_release(const Part& part, IslandOptions options, double whole_step) {
+  constexpr int kTrials = 8;  // places the release to a thirtieth of the part; what is left of it may be cut again
+  constexpr double kAlmost = 0.98;      // of the part
+  constexpr double kNoticeable = 1e-6;  // of the impulse
+  const double length = options.step, golden = 1.0 / std::numbers::phi, whole = impact_impulse(length);
+  bool quick = true;
+  const auto impulse_until = [&](double end) {
+    if (!quick) return 0.0;
+    options.step = end;
+    slowed = 0.0, recovers = true;
+    quick = is_quick(foresee(part, options, whole_step));
+    return impact_impulse(end);
+  };
+  if (whole > 0.0 && impulse_until(kAlmost * length) < (1.0 + kNoticeable) * whole) return length;
+  double begin = 0.0, end = length, first = (1.0 - golden) * length, second = golden * length;
+  double at_first = impulse_until(first), at_second = impulse_until(second);
+  for (int trial = 2; trial < kTrials && quick; ++trial) {
+    if (at_first < at_second) {
+      begin = first, first = second, at_first = at_second;
+      second = begin + golden * (end - begin);
+      at_second = impulse_until(second);
+    } else {
+      end = second, second = first, at_second = at_first;
+      first = end - golden * (end - begin);
+      at_first = impulse_until(first);
+    }
+  }
+  if (!quick) return length;
+  return std::max(at_first, at_second) > whole ? (at_first < at_second ? second : first) : length;
+}
+
+}  // namespace limber
