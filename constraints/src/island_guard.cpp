@@ -111,17 +111,19 @@ bool IslandSolver::Impl::yield(const BodyStates& states, std::span<Constraint* c
   return false;
 }
 
-/// Where neither is enough, since the rows did not come together and have left bodies bent: less of the impulses, in
-/// the end none. The free step has the energy it began with.
+/// Where neither is enough, since the rows did not come together and have left bodies bent, or loads have moved to
+/// contacts that have to be filled first: less of the impulses, as little less as will do, in the end none. The free
+/// step has the energy it began with.
 void IslandSolver::Impl::refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints,
                                          const IslandOptions& options, IslandReport& report) {
-  constexpr int kHalvings = 12;
+  constexpr double kLeast = 1e-3;
   report.status = SolveStatus::kIterationLimit;
-  for (int halving = 1; halving <= kHalvings; ++halving) {
-    const bool last = halving == kHalvings;
+  for (double refused = 0.01, accepted = 1.0; accepted > 0.0; refused = std::min(2.0 * refused, 0.5)) {
+    accepted *= 1.0 - refused;
+    if (accepted < kLeast) accepted = 0.0;
     for (std::size_t i = 0; i < f.size(); ++i) {
-      f[i] = last ? 0.0 : 0.5 * f[i];  // not times 0: they need not be finite
-      reaction[i] = last ? 0.0 : 0.5 * reaction[i];
+      f[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * f[i];  // not times 0: they need not be finite
+      reaction[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * reaction[i];
     }
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);

@@ -49,7 +49,10 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     }
     const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
-    if (report.change <= 1.0 && slack == 1.0) return status;
+    if (report.change <= 1.0 && slack == 1.0) {
+      share_anew(states, constraints, options);
+      return status;
+    }
     const bool settled = status != SolveStatus::kIterationLimit;
     if (!settled && can_split && bounded_rows.tired()) {
       std::copy(next_f.begin(), next_f.end(), f.begin());
@@ -73,6 +76,19 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     secant.advance(f, next_f, change);
     keep_within_bounds();
   }
+}
+
+/// Loads that are shared in another way than at the last measuring change no gap but by what each row yields: then the
+/// last answer is the one.
+void IslandSolver::Impl::share_anew(const BodyStates& states, std::span<Constraint* const> constraints,
+                                    const IslandOptions& options) {
+  if (flexibility.empty()) return;
+  std::ranges::fill(change, 0.0);
+  for_flexibilities([&](std::size_t i, std::size_t j, double G) { change[i] += G / step * (next_f[j] - f[j]); });
+  if (largest_change() <= 1.0) return;
+  std::copy(next_f.begin(), next_f.end(), f.begin());
+  predict(options);
+  measure(states, StepTime::kEnd, constraints, gap);
 }
 
 /// What the bodies come through under the forces of the last step tells which contacts need not wait.

@@ -165,6 +165,7 @@ struct IslandSolver::Impl {
   void order_rows();
   void assemble_ordered();
   void respond(std::span<const double> values, std::vector<double>& gaps);
+  void share_anew(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
   SolveStatus improve(bool first);
   SolveStatus improve_equalities();
   SolveStatus improve_all(bool first);

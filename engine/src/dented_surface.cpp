@@ -54,7 +54,7 @@ void DentedSurface::add_forces(std::span<const DentLoad> loads, double part) {
     }
   }
   std::ranges::sort(pressed_);  // a force may have been taken away and come again
-  pressed_.erase(std::ranges::unique(pressed_).begin(), pressed_.end());
+  pressed_.erase(std::unique(pressed_.begin(), pressed_.end()), pressed_.end());
 }
 
 /// Under the forces gathered, which are then forgotten.

@@ -14,10 +14,11 @@
 /// in its own frame, and a contact finds the dent that is there, whether it is an old one or has just come in another's
 /// place. Their energy ½ FᵀG F is booked. What nothing presses any more lets go of it; it is lost.
 ///
-/// Contacts of bodies that flex yield a little besides, each by itself: 1e-4 of what a force moves the reduced mass of
-/// the two within a step. Where many contacts could share a load in many ways, it is shared in one way then, which
-/// changes little where gaps change by a picometre; without it such steps do not settle. What rests sinks by less than
-/// 1e-4 g Δt² for it (3e-7 m at 60 steps a second).
+/// Contacts of bodies that flex yield a little by themselves: by 3e-3 of what a force moves the reduced mass of the two
+/// within a step, in place of what the modes do not show, or 1e-4 beside a residual compliance. Where many contacts
+/// could share a load in many ways, it is shared in one way then, which changes little where gaps change by a
+/// picometre; without it such steps do not settle. What rests sinks by less than 3e-3 g Δt² for it (8e-6 m at 60 steps
+/// a second) for each body that lies on it.
 ///
 /// An impact, for ImpactModel, is a pair of bodies that begin to press on each other at more than `impact_speed`, of
 /// which one at least can flex (modes or residual compliance). It lasts until none of their contacts presses any more,
