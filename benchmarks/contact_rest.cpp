@@ -213,6 +213,7 @@ int main(int argc, char** argv) {
     add("3 fine laid", fine, 3, close, false);
     add("3 fine dropped", fine, 3, far, false);
     add("10 coarse laid", coarse, 10, close, false);
+    add("10 coarse dropped", coarse, 10, far, false);
     add("10 fine laid", fine, 10, close, false);
     if (argc > 3) {
       const auto asset = [&] { return read_asset(argv[3]).bodies.at(0); };
