@@ -1,0 +1,87 @@
+/// @file orbit_faces.h
+/// Triangles as the orbits of a motion see them. Private to the articulation module.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "parts/triangle_clusters.h"
+#include "ranges/path_frame.h"
+
+namespace limber::internal {
+
+/// An edge whose two triangles bend by more than 20 degrees, or that has not two of them.
+struct SharpEdge {
+  Index a = 0, b = 0;  ///< vertices of the surface
+  Index triangle = 0;  ///< one that has it
+};
+
+/// A surface made ready for any path.
+struct OrbitBody {
+  const SurfaceMesh* surface = nullptr;
+  bool closed = true;
+  bool inside_out = false;  ///< closed, and its triangles are clockwise seen from outside
+  Eigen::AlignedBox3d box{};
+  std::span<const Triangle> caps{};                       ///< over small holes
+  std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
+  std::shared_ptr<const TriangleClusters> clusters{};     ///< of all triangles, with caps; copies share them
+
+  std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
+  const Triangle& triangle(std::size_t i) const {
+    const std::size_t own = surface->triangles.size();
+    return i < own ? surface->triangles[i] : caps[i - own];
+  }
+};
+OrbitBody orbit_body(const MotionBody& body);
+
+struct OrbitFace {
+  std::array<Vec3, 3> corners;         ///< path coordinates, counter-clockwise seen from outside
+  Vec3 normal;                         ///< outward, unit; 0 without an area
+  double offset = 0.0;                 ///< normal · corner
+  double across = 0.0, heading = 0.0;  ///< length and angle of the normal's part across the axis
+  Triangle vertices{};                 ///< of the corners, numbered over all faces of a side
+  Index body = 0, triangle = 0;
+  bool cap = false;      ///< over a hole: solid behind it, and no surface
+  bool flipped = false;  ///< the second and third corner have changed places
+  /// The motion runs against it, or away from it, all over it and over what continues it. On a facet of a surface that
+  /// the motion carries along itself the normal velocity changes its sign; so a face that lies along the motion is told
+  /// from one that slides.
+  bool one_sided = false;
+  /// It stands against the motion, but with all that continues it is narrower than what counts as an obstacle: a sliver
+  /// between faces that slide, and no stop.
+  bool narrow = false;
+  double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
+  double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
+  OrbitBox box{};                               ///< of the orbits that meet it
+};
+
+/// The faces around each vertex of a side.
+class FacesAround {
+ public:
+  FacesAround() = default;
+  explicit FacesAround(const std::vector<OrbitFace>& faces);
+  /// @param vertex as OrbitFace numbers them
+  std::span<const Index> of(Index vertex) const {
+    const auto first = static_cast<std::size_t>(first_[static_cast<std::size_t>(vertex)]),
+               end = static_cast<std::size_t>(first_[static_cast<std::size_t>(vertex) + 1]);
+    return std::span(faces_).subspan(first, end - first);
+  }
+
+ private:
+  std::vector<Index> first_{0}, faces_;
+};
+
+/// Sets OrbitFace::narrow. @param slope at which a face stands, see OrbitPiece. @param width across the motion, length
+void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces);
+
+/// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
+/// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.
+std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
+                                                                          std::span<const OrbitBody> moving,
+                                                                          std::span<const OrbitBody> fixed,
+                                                                          double margin);
+
+}  // namespace limber::internal

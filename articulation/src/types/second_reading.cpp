@@ -1,0 +1,82 @@
+#include "types/second_reading.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+namespace limber {
+namespace {
+
+/// The middle of a flat contact whose outline is a circle, as far as facets and samples tell.
+std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regions, const JointFrame& plane) {
+  constexpr double kEven = 0.05;  // of the second moments; an ellipse of 1.10 has 0.095
+  constexpr double kRound = 0.9;  // of radii: an octagon has 0.92, a hexagon 0.87, the ellipse 0.91
+  constexpr std::size_t kSectors = 48;
+  using Plane = Eigen::Vector2d;
+  std::vector<std::pair<Plane, double>> points;  // with area
+  for (const ContactRegion& r : regions)
+    for (const auto* side : {&r.on_a, &r.on_b})
+      for (const ContactSample& s : *side)
+        points.emplace_back((plane.axes.transpose() * (s.point - plane.origin)).head<2>(), s.area);
+  Plane middle = Plane::Zero();
+  double area = 0.0;
+  for (const auto& [p, weight] : points) middle += weight * p, area += weight;
+  if (!(area > 0.0)) return std::nullopt;
+  middle /= area;
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  std::array<double, kSectors> outline{};
+  for (const auto& [p, weight] : points) {
+    const Plane d = p - middle;
+    moments += weight * d * d.transpose();
+    const double turn = 0.5 + 0.5 * std::atan2(d.y(), d.x()) / std::numbers::pi;
+    double& radius = outline[std::min(static_cast<std::size_t>(turn * kSectors), kSectors - 1)];
+    radius = std::max(radius, d.norm());
+  }
+  const Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues();
+  const auto [least, most] = std::minmax_element(outline.begin(), outline.end());
+  if (along[1] - along[0] > kEven * (along[1] + along[0]) || *least < kRound * *most) return std::nullopt;
+  return plane.origin + plane.axes.leftCols<2>() * middle;
+}
+
+}  // namespace
+
+double share_of_first(double share, Slippage& out) {
+  double& first = out.hypotheses.front().confidence;
+  const double second = out.hypotheses.size() > 1 ? out.hypotheses[1].confidence : 0.0;
+  const double taken = std::min(share * first, first - second);
+  first -= taken;
+  return taken;
+}
+
+void replace_reading(JointHypothesis reading, Slippage& out) {
+  const auto others = out.hypotheses.begin() + 1;
+  out.hypotheses.erase(std::remove_if(others, out.hypotheses.end(),
+                                      [&](const JointHypothesis& h) { return h.joint.type == reading.joint.type; }),
+                       out.hypotheses.end());
+  out.hypotheses.push_back(std::move(reading));
+  std::stable_sort(out.hypotheses.begin() + 1, out.hypotheses.end(),
+                   [](const JointHypothesis& x, const JointHypothesis& y) { return x.confidence > y.confidence; });
+}
+
+void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
+  constexpr double kShare = 0.2;
+  JointHypothesis& first = out.hypotheses.front();
+  if (first.joint.type != JointType::kPlanar) return;
+  const auto middle = middle_of_round_face(regions, first.joint.frame);
+  if (!middle) return;
+  JointHypothesis turns = first;
+  turns.joint.type = JointType::kRevolute;
+  const Mat3& plane = first.joint.frame.axes;
+  turns.joint.frame.origin = *middle;
+  turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
+  turns.confidence = share_of_first(kShare, out);
+  turns.reason =
+      "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
+  replace_reading(std::move(turns), out);
+}
+
+}  // namespace limber

@@ -1,0 +1,226 @@
+#include "limber/collision/contact_clusters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "convex/convex_polygon.h"
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+void require(bool holds, const char* field, double value, const char* expected) {
+  if (!holds)
+    throw InvalidArgument(std::string("ContactClusterOptions: ") + field + " is " + std::to_string(value) +
+                          ", expected " + expected);
+}
+
+/// How much of a patch some of its contacts span.
+struct Span {
+  double area = 0.0, diameter = 0.0;
+  bool at_least(double share, const Span& other) const {
+    return area >= share * other.area && diameter >= share * other.diameter;
+  }
+};
+
+}  // namespace
+
+void ContactClusterOptions::validate() const {
+  require(max_points >= 0, "max_points", max_points, "0 or more");
+  require(max_normal_angle > 0.0 && max_normal_angle <= 0.5 * std::numbers::pi, "max_normal_angle", max_normal_angle,
+          "above 0 and at most π/2");
+  require(depth_tolerance >= 0.0 && std::isfinite(depth_tolerance), "depth_tolerance", depth_tolerance,
+          "a finite number of at least 0");
+  require(hysteresis >= 0.0 && hysteresis <= 1.0, "hysteresis", hysteresis, "0 to 1");
+}
+
+struct ContactClusters::Impl {
+  explicit Impl(const ContactClusterOptions& o) : options(o), min_cosine(std::cos(o.max_normal_angle)) {
+    options.validate();
+  }
+
+  ContactClusterOptions options;
+  double min_cosine;
+
+  // Of the pair under way.
+  std::span<ContactPoint> contacts;
+  std::span<const std::uint64_t> previous;
+  std::vector<Index> leaders;   ///< by patch: its first contact
+  std::vector<Index> patch_of;  ///< by contact
+  std::vector<Index> members;   ///< of one patch, ascending
+  std::vector<std::uint8_t> keep;
+
+  // Of the patch under way: its contacts in the plane across the mean normal.
+  double deep_gap = 0.0;  ///< contacts with gaps up to here are deep
+  std::vector<PlanePoint> place, points, hull, all_corners, kept, old, trial, trial_hull;
+
+  double spacing = 0.0;
+
+  void find_patches();
+  void reduce_patch();
+  void project();
+  void choose();
+  void add_corners();
+  void cover();
+  bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const;
+  bool previous_will_do(std::size_t corners);
+  Span span_of(const std::vector<PlanePoint>& some, bool deep_only);
+  bool deep(const PlanePoint& p) const { return contacts[static_cast<std::size_t>(p.item)].gap <= deep_gap; }
+};
+
+/// In ascending id, each joins the first patch whose first contact is like it, or begins one: as long as the same ids
+/// are there, the same ones lead.
+void ContactClusters::Impl::find_patches() {
+  leaders.clear();
+  patch_of.clear();
+  for (const ContactPoint& c : contacts) {
+    Index patch = 0;
+    for (; static_cast<std::size_t>(patch) < leaders.size(); ++patch) {
+      const ContactPoint& leader = contacts[static_cast<std::size_t>(leaders[static_cast<std::size_t>(patch)])];
+      if (c.normal.dot(leader.normal) >= min_cosine) break;
+    }
+    if (static_cast<std::size_t>(patch) == leaders.size()) leaders.push_back(static_cast<Index>(&c - contacts.data()));
+    patch_of.push_back(patch);
+  }
+}
+
+void ContactClusters::Impl::project() {
+  const ContactPoint& leader = contacts[static_cast<std::size_t>(members.front())];
+  Vec3 normal = Vec3::Zero();
+  for (const Index m : members) normal += contacts[static_cast<std::size_t>(m)].normal;
+  if (normal.norm() > 0.0) normal.normalize();
+  const Vec3 x = normal.unitOrthogonal(), y = normal.cross(x);
+  place.clear();
+  for (const Index m : members) {
+    const Vec3 p = contacts[static_cast<std::size_t>(m)].position - leader.position;
+    place.push_back({x.dot(p), y.dot(p), m});
+  }
+}
+
+Span ContactClusters::Impl::span_of(const std::vector<PlanePoint>& some, bool deep_only) {
+  trial.clear();
+  for (const PlanePoint& p : some)
+    if (!deep_only || deep(p)) trial.push_back(p);
+  convex_hull(trial, trial_hull);
+  return {area(trial_hull), diameter(trial_hull)};
+}
+
+/// Adds corners of the whole patch until there are max_points, as long as what they span grows.
+void ContactClusters::Impl::add_corners() {
+  while (kept.size() < static_cast<std::size_t>(options.max_points)) {
+    Span best = span_of(kept, false);
+    const PlanePoint* chosen = nullptr;
+    for (const PlanePoint& corner : all_corners) {
+      kept.push_back(corner);
+      const Span span = span_of(kept, false);
+      kept.pop_back();
+      if (span.area > best.area || (span.area == best.area && span.diameter > best.diameter))
+        best = span, chosen = &corner;
+    }
+    if (chosen == nullptr) return;
+    kept.push_back(*chosen);
+  }
+}
+
+bool ContactClusters::Impl::near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const {
+  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) {
+    const double x = p.x - q.x, y = p.y - q.y;
+    return x * x + y * y <= distance * distance;
+  });
+}
+
+/// Adds what is farther than the spacing from all that are kept, the deepest first.
+void ContactClusters::Impl::cover() {
+  if (std::isinf(spacing)) return;
+  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
+  for (;;) {
+    const PlanePoint* chosen = nullptr;
+    for (const PlanePoint& p : place)
+      if ((chosen == nullptr || gap(p) < gap(*chosen)) && !near_any(p, kept, spacing)) chosen = &p;
+    if (chosen == nullptr) return;
+    kept.push_back(*chosen);
+  }
+}
+
+/// @param corners how many of the best choice are corners; the others cover what lies between
+bool ContactClusters::Impl::previous_will_do(std::size_t corners) {
+  constexpr double kFarther = 1.1;  // may they lie than the spacing
+  old.clear();
+  for (const PlanePoint& p : place)
+    if (std::binary_search(previous.begin(), previous.end(), contacts[static_cast<std::size_t>(p.item)].id))
+      old.push_back(p);
+  const std::size_t covering = kept.size() - corners;
+  return old.size() >= corners && old.size() <= kept.size() + covering / 2 &&
+         std::any_of(old.begin(), old.end(), [&](const auto& p) { return deep(p); }) &&
+         span_of(old, true).at_least(options.hysteresis, span_of(kept, true)) &&
+         span_of(old, false).at_least(options.hysteresis, span_of(kept, false)) &&
+         (std::isinf(spacing) || std::all_of(place.begin(), place.end(), [&](const PlanePoint& p) {
+            return near_any(p, old, kFarther * spacing);
+          }));
+}
+
+/// Fills `kept` from `place`; see the header.
+void ContactClusters::Impl::choose() {
+  points.assign(place.begin(), place.end());
+  convex_hull(points, all_corners);
+  largest_polygon(all_corners, static_cast<int>(kMostCorners), hull);  // thins the corners
+
+  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
+  const auto deepest =
+      std::min_element(place.begin(), place.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
+  deep_gap = gap(*deepest) + options.depth_tolerance * diameter(all_corners);
+  if (options.max_points == 1) {
+    kept.assign(1, *deepest);
+  } else {
+    points.clear();
+    std::copy_if(place.begin(), place.end(), std::back_inserter(points), [&](const auto& p) { return deep(p); });
+    convex_hull(points, hull);
+    largest_polygon(hull, options.max_points, kept);
+    add_corners();
+  }
+  const std::size_t corners = kept.size();
+  cover();
+  if (previous_will_do(corners)) kept.swap(old);
+}
+
+void ContactClusters::Impl::reduce_patch() {
+  if (members.size() <= static_cast<std::size_t>(options.max_points)) {
+    for (const Index m : members) keep[static_cast<std::size_t>(m)] = 1;
+    return;
+  }
+  project();
+  choose();
+  for (const PlanePoint& p : kept) keep[static_cast<std::size_t>(p.item)] = 1;
+}
+
+ContactClusters::ContactClusters(const ContactClusterOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ContactClusters::~ContactClusters() = default;
+ContactClusters::ContactClusters(ContactClusters&&) noexcept = default;
+ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = default;
+
+void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
+                             std::span<const std::uint64_t> previous) {
+  Impl& m = *impl_;
+  m.contacts = std::span(contacts).subspan(first);
+  m.previous = previous;
+  std::sort(m.contacts.begin(), m.contacts.end(),
+            [](const ContactPoint& a, const ContactPoint& b) { return a.id < b.id; });
+  if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
+  m.spacing = spacing;
+  m.find_patches();
+  m.keep.assign(m.contacts.size(), 0);
+  for (std::size_t patch = 0; patch < m.leaders.size(); ++patch) {
+    m.members.clear();
+    for (std::size_t c = 0; c < m.patch_of.size(); ++c)
+      if (m.patch_of[c] == static_cast<Index>(patch)) m.members.push_back(static_cast<Index>(c));
+    m.reduce_patch();
+  }
+  std::size_t end = first;
+  for (std::size_t c = 0; c < m.keep.size(); ++c)
+    if (m.keep[c] != 0) contacts[end++] = contacts[first + c];
+  contacts.resize(end);
+}
+
+}  // namespace limber

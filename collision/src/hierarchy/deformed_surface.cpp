@@ -1,0 +1,174 @@
+#include "limber/collision/deformed_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "hierarchy/deformed_scratch.h"
+#include "limber/core/error.h"
+#include "limber/dynamics/reconstruct.h"
+
+namespace limber {
+namespace {
+
+constexpr double kFarthest = 1e30;     ///< m
+constexpr double kLargestNorm = 1e37;  ///< a float holds it
+constexpr double kUnitRoundOff = 0x1p-24;
+
+/// Nodes whose boxes are made at once: a node and its sibling, which lie side by side. The root stands alone.
+Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) % 2; }
+
+/// How many boxes from amplitudes cost as much as one refit, in floats read from the near cache. A refit streams: three
+/// floats per mode and vertex, and about 32 floats' time per triangle. Boxes lie scattered, and the wider ones among
+/// them lead the walk to more tests and vertices, which is most of their price: measured, see docs/collision.md.
+long boxes_per_refit(const CollisionSurface& surface) {
+  const double k = surface.modes();
+  const double box = 48.0 * k + 1000.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
+  return static_cast<long>((vertex * surface.vertices() + triangle * surface.triangles()) / box);
+}
+
+/// Boxes that a query would have asked for without a refit, whose tighter ones end the walk earlier: up to half as
+/// many.
+long wanted_boxes(const DeformedSurface::Counters& last) { return last.refits > 0 ? 2 * last.boxes : last.boxes; }
+
+void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
+  for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
+  box.stamp = stamp;
+}
+
+}  // namespace
+
+DeformedSurface::DeformedSurface() : scratch_(std::make_unique<Scratch>()) {}
+DeformedSurface::~DeformedSurface() = default;
+DeformedSurface::DeformedSurface(DeformedSurface&&) noexcept = default;
+DeformedSurface& DeformedSurface::operator=(DeformedSurface&&) noexcept = default;
+
+std::span<const double> DeformedSurface::amplitudes() const {
+  return std::span(scratch_->z.data(), static_cast<std::size_t>(surface_->modes()));
+}
+
+void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+                           BoundsChoice choice, const Counters* last) {
+  if (!surface) throw InvalidArgument("DeformedSurface::bind: the surface is null, expected one");
+  if (z.size() != static_cast<std::size_t>(surface->modes()))
+    throw InvalidArgument("DeformedSurface::bind: " + std::to_string(z.size()) + " amplitudes, expected " +
+                          std::to_string(surface->modes()));
+  reserve(*surface);
+  Scratch& s = *scratch_;
+  const StateSums sums =
+      prepare_state(z.data(), z.size(), surface->stride_, surface->largest_shape_.data(), surface->weights_.data(),
+                    surface->scale_.data(), s.amplitudes.data(), s.magnitudes.data());
+  const double norm = std::sqrt(sums.squared_norm);
+  if (!(sums.farthest <= kFarthest && norm <= kLargestNorm)) {
+    surface_ = nullptr;
+    throw InvalidArgument("DeformedSurface::bind: the amplitudes move a vertex by up to " +
+                          std::to_string(sums.farthest) + " m, expected finite ones that move none beyond 1e30 m");
+  }
+  s.norm = static_cast<float>(norm * (1.0 + 4.0 * kUnitRoundOff));
+  s.farthest = sums.farthest;
+  std::fill(std::copy(z.begin(), z.end(), s.z.data()), s.z.data() + surface->stride_, 0.0);
+  if (surface_ != surface) surface_ = surface;
+  counters_ = {};
+  begin_state();
+
+  const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
+  s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
+  const bool expected = choice == BoundsChoice::kAutomatic && last != nullptr && wanted_boxes(*last) > worth;
+  if (choice == BoundsChoice::kRefit || expected) refit();
+}
+
+void DeformedSurface::reserve(const CollisionSurface& surface) {
+  Scratch& s = *scratch_;
+  const std::size_t nodes = surface.nodes().size(), vertices = static_cast<std::size_t>(surface.vertices());
+  if (s.boxes.size() < nodes) s.boxes = AlignedArray<NodeBox>(nodes);
+  const auto triangles = static_cast<std::size_t>(surface.triangles());
+  if (s.triangle_boxes.size() < triangles) s.triangle_boxes = AlignedArray<NodeBox>(triangles);
+  if (s.vertices.size() < vertices) s.vertices.resize(vertices);
+  if (surface.modes() > 0 && s.positions.size() < 3 * vertices + 1) s.positions.resize(3 * vertices + 1);
+  if (s.amplitudes.size() < surface.stride_) {
+    s.amplitudes = AlignedArray<float>(surface.stride_);
+    s.magnitudes = AlignedArray<float>(surface.stride_);
+    s.z = AlignedArray<double>(surface.stride_);
+  }
+}
+
+/// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
+void DeformedSurface::begin_state() {
+  Scratch& s = *scratch_;
+  if (++s.stamp < Scratch::kRefitted) return;
+  for (std::size_t i = 0; i < s.boxes.size(); ++i) s.boxes[i].stamp = 0;
+  for (std::size_t i = 0; i < s.triangle_boxes.size(); ++i) s.triangle_boxes[i].stamp = 0;
+  for (Scratch::Vertex& vertex : s.vertices) vertex.stamp = 0;
+  s.stamp = 1;
+}
+
+Aabb DeformedSurface::bounds(Index node) {
+  const NodeBox& box = BoxReader(*this)(node);
+  return {Vec3(box.low[0], box.low[1], box.low[2]), Vec3(box.high[0], box.high[1], box.high[2])};
+}
+
+void DeformedSurface::make_box(Index node) {
+  Scratch& s = *scratch_;
+  if (counters_.boxes >= s.boxes_before_refit && counters_.refits == 0) refit();
+  const auto first = static_cast<std::size_t>(first_of_siblings(node));
+  const std::size_t count = node == 0 ? 1 : 2;
+  NodeBox* boxes = s.boxes.data() + first;
+  if (boxes->stamp == (s.stamp | Scratch::kRefitted))
+    for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
+  else
+    make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->stride_},
+               surface_->constants_.data() + first * kNodeConstants,
+               surface_->coefficients_.data() + first * 6 * surface_->stride_, count, s.stamp, boxes);
+  counters_.boxes += static_cast<long>(count);
+}
+
+/// Of the triangles of a leaf, from their vertices; their union takes the place of the leaf's own box, which is wider.
+void DeformedSurface::make_triangle_boxes(Index leaf) {
+  const auto first = static_cast<std::size_t>(surface_->node(leaf).first);
+  NodeBox* box = scratch_->triangle_boxes.data() + first;
+  Aabb all;
+  for (const Index t : surface_->node_triangles(leaf)) {
+    const std::array<Vec3, 3> x = triangle(t);
+    const Vec3 low = x[0].cwiseMin(x[1]).cwiseMin(x[2]), high = x[0].cwiseMax(x[1]).cwiseMax(x[2]);
+    store(low, high, scratch_->stamp, *box++);
+    all.include(Aabb{low, high});
+  }
+  const Vec3 rounding = 2.0 * kUnitRoundOff * all.low.cwiseAbs().cwiseMax(all.high.cwiseAbs());
+  store(all.low - rounding, all.high + rounding, scratch_->stamp, scratch_->boxes[static_cast<std::size_t>(leaf)]);
+}
+
+const Vec3& DeformedSurface::vertex(Index v) {
+  Scratch& s = *scratch_;
+  Scratch::Vertex& vertex = s.vertices[static_cast<std::size_t>(v)];
+  if (vertex.stamp == s.stamp) return vertex.p;
+  vertex.stamp = s.stamp;
+  ++counters_.vertices;
+  vertex.p = surface_->rest(v);
+  if (surface_->modes() == 0) return vertex.p;
+  const VertexRows& rows = surface_->model()->collision_rows();
+  double u[3];
+  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->stride_, u);
+  vertex.p += Vec3(u[0], u[1], u[2]);
+  return vertex.p;
+}
+
+std::array<Vec3, 3> DeformedSurface::triangle(Index t) {
+  const auto& [a, b, c] = surface_->triangle(t);
+  return {vertex(a), vertex(b), vertex(c)};
+}
+
+void DeformedSurface::refit() {
+  if (surface_->modes() == 0 || counters_.refits > 0) return;
+  ++counters_.refits;
+  Scratch& s = *scratch_;
+  const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data()};
+  reconstruct(surface_->model()->collision(), std::span(&target, 1));
+  // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
+  const double terms = surface_->modes() + 24.0;
+  const double pad = kUnitRoundOff * (terms * s.farthest + 24.0 * surface_->rest_radius_) + 1e-36;
+  refit_boxes(surface_->vertex_tree_.data(), surface_->vertex_tree_.size(), surface_->leaf_vertices_.data(),
+              s.positions.data(), static_cast<float>(pad), s.stamp | Scratch::kRefitted, s.boxes.data());
+}
+
+}  // namespace limber

@@ -1,0 +1,226 @@
+#include "narrow/convex_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace limber {
+namespace {
+
+// Faces meet, rather than an edge or corner and something, where the normal is within 14° of one's.
+constexpr double kAligned = 0.97;
+// A face is the reference in place of the other body's only where it fits the normal by this much better: faces that
+// lie flush are told apart by round-off, and with the reference the names of all their contacts change.
+constexpr double kReferencePreference = 1e-4;
+// Edges must be this much less deep than faces to decide the direction: faces give steadier contacts.
+constexpr double kEdgePreference = 0.95;
+// Capsules side by side, within 10°, touch along their length.
+constexpr double kSideBySide = 0.17;
+// The two nearest points stand for no feature of theirs alone: bits of kind that no feature has.
+constexpr FeatureKey kNearestPoints = 3u << 30;
+
+double lowest(const std::vector<Vec3>& points, const Vec3& n) {
+  double r = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : points) r = std::min(r, n.dot(p));
+  return r;
+}
+
+ConvexSolid solid(const std::vector<Vec3>& points) { return {points, 0.0}; }
+
+}  // namespace
+
+void ConvexContacts::load(Side& side, const ConvexCore& core, const RigidTransform& pose) {
+  side.core = &core, side.pose = pose;
+  side.points.clear();
+  for (const Vec3& p : core.points) side.points.push_back(pose * p);
+}
+
+void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
+                          std::vector<FeatureContact>& contacts) {
+  load(side_[0], a, {}), load(side_[1], b, X_AB);
+  contacts_ = &contacts, first_ = contacts.size();
+  const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
+  const double radii = a.radius + b.radius;
+  if (!(nearest.distance - radii <= margin)) return;
+  // Cores that are apart by little more than round-off may have any normal by their nearest points.
+  const bool apart = !nearest.cores_intersect && depth_along(nearest.normal) < 0.0;
+  const Direction d = apart ? Direction{nearest.normal, -nearest.distance, nearest.a, nearest.b} : least_penetration();
+  if (a.faces.empty() && b.faces.empty())
+    touch_along(d.normal, margin);
+  else if (a.points.size() > 1 && b.points.size() > 1)
+    clip_faces(d.normal, margin);
+  if (least_gap() > -d.depth - radii + kRoundOff * (radii + d.a.norm() + d.b.norm()))
+    add({kNearestPoints, -1, {}, d.a - a.radius * d.normal}, {kNearestPoints, -1, {}, d.b + b.radius * d.normal},
+        d.normal);
+}
+
+void ConvexContacts::add(const FeatureSide& a, const FeatureSide& b, const Vec3& normal) {
+  contacts_->push_back({a, b, normal, normal.dot(a.point - b.point)});
+}
+
+double ConvexContacts::least_gap() const {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = first_; i < contacts_->size(); ++i) least = std::min(least, (*contacts_)[i].gap);
+  return least;
+}
+
+// -- Direction of two cores that intersect ----------------------------------------------------------------------------
+
+// The separating axis test over all faces and pairs of edges: the nearest face of the difference of the two polytopes.
+ConvexContacts::Direction ConvexContacts::least_penetration() const {
+  Direction best{Vec3::Zero(), std::numeric_limits<double>::infinity(), {}, {}};
+  for (int of = 0; of < 2; ++of)
+    for (const ConvexFace& f : side_[of].core->faces)
+      take_shallower(best, of == 1 ? side_[1].normal(f) : Vec3(-side_[0].normal(f)), 1.0);
+  for (const Vec3& u : side_[0].core->edge_directions)
+    for (const Vec3& w : side_[1].core->edge_directions) {
+      const Vec3 axis = (side_[0].pose.q * u).cross(side_[1].pose.q * w);
+      const double length = axis.norm();
+      if (length < 1e-8) continue;
+      take_shallower(best, axis / length, kEdgePreference);
+      take_shallower(best, -axis / length, kEdgePreference);
+    }
+  if (best.normal.isZero()) take_shallower(best, across_edges(), 1.0);
+  locate_deepest(best);
+  return best;
+}
+
+// How far the cores would have to move apart along the normal; below 0: how far apart they are along it.
+double ConvexContacts::depth_along(const Vec3& normal) const {
+  return -lowest(side_[1].points, -normal) - lowest(side_[0].points, normal);
+}
+
+void ConvexContacts::take_shallower(Direction& best, const Vec3& normal, double preference) const {
+  const double depth = depth_along(normal);
+  if (depth < (best.depth > 0.0 ? preference * best.depth : best.depth / preference))
+    best.normal = normal, best.depth = depth;
+}
+
+// For balls and capsules about one point: any direction across the axes there are.
+Vec3 ConvexContacts::across_edges() const {
+  for (const Side& side : side_)
+    if (!side.core->edge_directions.empty()) return (side.pose.q * side.core->edge_directions[0]).unitOrthogonal();
+  return Vec3::UnitZ();
+}
+
+// Moved apart along the normal, the deepest points are the nearest.
+void ConvexContacts::locate_deepest(Direction& d) const {
+  const double size = (side_[0].points[0] - side_[1].points[0]).norm() + side_[0].core->radius + side_[1].core->radius;
+  const Vec3 shift = (d.depth + size) * d.normal;
+  std::vector<Vec3>& moved = moved_;
+  moved.clear();
+  for (const Vec3& p : side_[0].points) moved.push_back(p + shift);
+  const ConvexDistance apart = distance(solid(moved), solid(side_[1].points));
+  d.a = apart.a - shift, d.b = apart.b;
+}
+
+// -- Manifolds --------------------------------------------------------------------------------------------------------
+
+// Two capsules side by side: where each one's ends are over the other.
+void ConvexContacts::touch_along(const Vec3& normal, double margin) {
+  const auto &p = side_[0].points, &q = side_[1].points;
+  if (p.size() < 2 || q.size() < 2) return;
+  const Vec3 u = p[1] - p[0], w = q[1] - q[0];
+  if (u.cross(w).norm() > kSideBySide * u.norm() * w.norm()) return;
+  const double ra = side_[0].core->radius, rb = side_[1].core->radius;
+  const auto touch = [&](const Vec3& on_a, FeatureKey key_a, const Vec3& on_b, FeatureKey key_b) {
+    const Vec3 n = unit_or(on_a - on_b, normal);
+    if ((on_a - on_b).norm() - ra - rb <= margin)
+      add({key_a, -1, {}, on_a - ra * n}, {key_b, -1, {}, on_b + rb * n}, n);
+  };
+  const FeatureKey edge = feature_key(Feature::Kind::kEdge, 0);
+  for (int i = 0; i < 2; ++i) {
+    const auto end = static_cast<std::size_t>(i);
+    const FeatureKey vertex = feature_key(Feature::Kind::kVertex, i);
+    if (const SurfaceFoot f = closest_on_segment(p[end], {q[0], q[1]}); f.feature.kind == Feature::Kind::kEdge)
+      touch(p[end], vertex, f.point, edge);
+    if (const SurfaceFoot f = closest_on_segment(q[end], {p[0], p[1]}); f.feature.kind == Feature::Kind::kEdge)
+      touch(f.point, edge, q[end], vertex);
+  }
+}
+
+const ConvexFace* ConvexContacts::facing(const Side& side, const Vec3& out) {
+  const auto& faces = side.core->faces;
+  if (faces.empty()) return nullptr;
+  return &*std::max_element(faces.begin(), faces.end(), [&](const ConvexFace& f, const ConvexFace& g) {
+    return side.normal(f).dot(out) < side.normal(g).dot(out);
+  });
+}
+
+// The face that the normal fits better is the reference; the other's face, or its segment, is clipped to what lies over
+// it (Ericson 2005, 5.5).
+void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
+  const ConvexFace *on_a = facing(side_[0], -normal), *on_b = facing(side_[1], normal);
+  const double fit_a = on_a == nullptr ? -1.0 : -side_[0].normal(*on_a).dot(normal);
+  const double fit_b = on_b == nullptr ? -1.0 : side_[1].normal(*on_b).dot(normal);
+  const int reference = fit_a > fit_b + kReferencePreference ? 0 : 1;
+  if (std::max(fit_a, fit_b) < kAligned) return;
+  const Side &side = side_[reference], &other = side_[1 - reference];
+  const ConvexFace& face = reference == 0 ? *on_a : *on_b;
+  const Vec3 out = side.normal(face);
+  load_incident(other, -out);
+  for (Index edge = 0; edge < face.count; ++edge) clip_by_edge(side, face, edge);
+  for (const Corner& c : corners_) {
+    const Vec3 point = c.point - other.core->radius * out;
+    const double height = out.dot(point) - side.offset(face);
+    if (!(height <= margin)) continue;
+    const FeatureSide incident{c.incident, -1, {}, point}, below{c.reference, -1, {}, point - height * out};
+    reference == 1 ? add(incident, below, out) : add(below, incident, -out);
+  }
+}
+
+// The face of a polytope that looks along `out`, or a segment there and back.
+void ConvexContacts::load_incident(const Side& side, const Vec3& out) {
+  corners_.clear();
+  const FeatureKey on_face = feature_key(Feature::Kind::kFace, 0);
+  const auto corner = [&](Index v, Index line) {
+    corners_.push_back(
+        {side.points[static_cast<std::size_t>(v)], feature_key(Feature::Kind::kVertex, v), on_face, line});
+  };
+  if (const ConvexFace* face = facing(side, out)) {
+    for (Index i = 0; i < face->count; ++i)
+      corner(side.core->loop(*face)[static_cast<std::size_t>(i)], face->first + i);
+  } else {
+    corner(0, 0), corner(1, 0);
+  }
+}
+
+// Sutherland and Hodgman, against the plane through one edge of the reference face.
+void ConvexContacts::clip_by_edge(const Side& reference, const ConvexFace& face, Index edge) {
+  const auto loop = reference.core->loop(face);
+  const Vec3& x0 = reference.points[static_cast<std::size_t>(loop[static_cast<std::size_t>(edge)])];
+  const Vec3& x1 = reference.points[static_cast<std::size_t>(loop[static_cast<std::size_t>((edge + 1) % face.count)])];
+  const Vec3 outward = (x1 - x0).cross(reference.normal(face)).normalized();
+  const double tolerance = kRoundOff * (x0.norm() + x1.norm());
+  const auto beyond = [&](const Corner& c) { return outward.dot(c.point - x0); };
+  clipped_.clear();
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const Corner &from = corners_[i], &to = corners_[(i + 1) % corners_.size()];
+    const double h0 = beyond(from), h1 = beyond(to);
+    const bool in0 = h0 <= tolerance, in1 = h1 <= tolerance;
+    if (in0) clipped_.push_back(from);
+    if (in0 == in1) continue;
+    Corner cut{from.point + h0 / (h0 - h1) * (to.point - from.point), from.incident, from.reference, from.line};
+    name_cut(cut, from.line, face, edge);
+    // Where the outline leaves the kept side it goes on along the cut.
+    if (in0) cut.line = -1 - edge;
+    clipped_.push_back(cut);
+  }
+  corners_.swap(clipped_);
+}
+
+// An edge of the incident face over an edge of the reference face; or, where both lines are the reference's, its
+// corner.
+void ConvexContacts::name_cut(Corner& cut, Index line, const ConvexFace& face, Index edge) {
+  if (line >= 0) {
+    cut.incident = feature_key(Feature::Kind::kEdge, line);
+    cut.reference = feature_key(Feature::Kind::kEdge, face.first + edge);
+    return;
+  }
+  cut.incident = feature_key(Feature::Kind::kFace, 0);
+  const Index other = -1 - line;  // consecutive edges meet in the corner that the later one starts from
+  const bool wraps = (edge + 1) % face.count == other;
+  cut.reference = feature_key(Feature::Kind::kVertex, face.first + (wraps ? other : edge));
+}
+
+}  // namespace limber

@@ -1,0 +1,316 @@
+#include "limber/collision/narrow_phase.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "limber/collision/collision_surface.h"
+#include "limber/collision/deformed_surface.h"
+#include "limber/core/error.h"
+#include "narrow/convex_contacts.h"
+#include "narrow/pair_surface.h"
+#include "narrow/primitive_contacts.h"
+#include "narrow/rest_depth.h"
+#include "narrow/surface_contacts.h"
+#include "narrow/tet_overlap.h"
+
+namespace limber {
+
+// -- Rigid shapes -----------------------------------------------------------------------------------------------------
+
+struct RigidGeometry::Impl {
+  Shape shape;
+  std::shared_ptr<const CollisionSurface> surface{};
+  ConvexCore core{};  // of the convex ones
+  Aabb bounds{};
+};
+
+namespace {
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
+
+Aabb bounds_of(const HalfSpace& shape) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Aabb all{Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (shape.normal[axis] == 1.0) all.high[axis] = shape.offset;
+    if (shape.normal[axis] == -1.0) all.low[axis] = -shape.offset;
+  }
+  return all;
+}
+
+Aabb bounds_of(const ConvexCore& core) {
+  Aabb box;
+  for (const Vec3& p : core.points) box.include(p);
+  return box.grown(core.radius);
+}
+
+}  // namespace
+
+RigidGeometry::RigidGeometry(const Shape& shape) {
+  validate(shape);
+  auto impl = std::make_unique<Impl>(Impl{shape});
+  const auto convex = [&](ConvexCore core) {
+    impl->core = std::move(core);
+    impl->bounds = bounds_of(impl->core);
+    if (!impl->core.faces.empty()) impl->surface = std::make_shared<const CollisionSurface>(triangulated(impl->core));
+  };
+  const auto mesh = [&](const auto& triangles) {
+    impl->surface = std::make_shared<const CollisionSurface>(triangles);
+    impl->bounds = impl->surface->rest_bounds();
+  };
+  std::visit(
+      Overloaded{[&](const HalfSpace& s) { impl->bounds = bounds_of(s); },
+                 [&](const Sphere& s) { convex(convex_core(s)); }, [&](const Capsule& s) { convex(convex_core(s)); },
+                 [&](const Box& s) { convex(convex_core(s)); }, [&](const ConvexHull& s) { convex(convex_core(s)); },
+                 [&](const TriangleMesh& s) { mesh(s); }, [&](const HeightField& s) { mesh(s); }},
+      shape);
+  impl_ = std::move(impl);
+}
+RigidGeometry::~RigidGeometry() = default;
+RigidGeometry::RigidGeometry(RigidGeometry&&) noexcept = default;
+RigidGeometry& RigidGeometry::operator=(RigidGeometry&&) noexcept = default;
+
+const Shape& RigidGeometry::shape() const { return impl_->shape; }
+Aabb RigidGeometry::bounds() const { return impl_->bounds; }
+const std::shared_ptr<const CollisionSurface>& RigidGeometry::surface() const { return impl_->surface; }
+
+// -- Pairs ------------------------------------------------------------------------------------------------------------
+
+struct RestVolume::Impl : RestDepth {
+  explicit Impl(std::shared_ptr<const ModalModel> model)
+      : RestDepth(std::move(model)), boundary(boundary_faces(volume())) {}
+  std::vector<Triangle> boundary;
+};
+
+RestVolume::RestVolume(std::shared_ptr<const ModalModel> model)
+    : impl_(std::make_unique<const Impl>(std::move(model))) {}
+RestVolume::~RestVolume() = default;
+RestVolume::RestVolume(RestVolume&&) noexcept = default;
+RestVolume& RestVolume::operator=(RestVolume&&) noexcept = default;
+
+struct NarrowPhase::Impl {
+  NarrowPhaseOptions options;
+  DeformedSurface rigid[2];  // of rigid shapes made of triangles
+  PairSurface surface[2];
+  SurfaceContacts surface_contacts;
+  CoreContacts core_contacts;
+  ConvexContacts convex_contacts;
+  RestDepthRule rest_depth[2];
+  TetOverlap tet_overlap;
+  TetOverlapRule tet_rule[2];
+  std::vector<Index> triangles;
+  std::vector<FeatureContact> found;
+
+  static const HalfSpace* half_space(const CollisionBody& body) {
+    return body.geometry == nullptr ? nullptr : std::get_if<HalfSpace>(&body.geometry->shape());
+  }
+  static const ConvexCore* convex(const CollisionBody& body) {
+    return body.geometry == nullptr || body.geometry->impl_->core.points.empty() ? nullptr
+                                                                                 : &body.geometry->impl_->core;
+  }
+  static bool has_triangles(const CollisionBody& body) {
+    return body.surface != nullptr || body.geometry->surface() != nullptr;
+  }
+
+  DeformedSurface& deformed(const CollisionBody& body, int side);
+  std::array<OverlapRule*, 2> rules(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB);
+  void bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side);
+  static double size(const CollisionBody& body);
+
+  void find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin);
+  void on_half_space(const CollisionBody& body, const RigidTransform& X_BH, const HalfSpace& shape, double margin);
+  void against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core, double margin);
+  void flip();
+  void deliver(const CollisionBody& a, const RigidTransform& X_AF, const CollisionBody& b, const RigidTransform& X_BF,
+               const RigidTransform& X_OF, std::vector<ContactPoint>& contacts);
+};
+
+namespace {
+
+// What was found with the sides exchanged.
+FeatureContact flipped(const FeatureContact& c) { return {c.b, c.a, -c.normal, c.gap}; }
+
+std::uint64_t id_of(const FeatureContact& c) { return std::uint64_t{c.a.key} << 32 | c.b.key; }
+
+ContactSide contact_side(const CollisionBody& body, double radius, const FeatureSide& side, const Vec3& point_B) {
+  if (body.surface == nullptr) return {body.index, -1, {0.0, 0.0, 0.0}, point_B, radius};
+  return {body.index, side.triangle, side.weight, point_B};
+}
+
+void check(const CollisionBody& body) {
+  if ((body.surface == nullptr) == (body.geometry == nullptr))
+    throw InvalidArgument("NarrowPhase: body " + std::to_string(body.index) +
+                          " has a surface and a rigid geometry, or neither; expected one of the two");
+}
+
+double largest_coordinate(const Aabb& box) {
+  return std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff());
+}
+
+RoundedCore rounded(const ConvexCore& core, const RigidTransform& X_PC) {
+  return {{X_PC * core.points.front(), X_PC * core.points.back()}, core.points.size() == 2, core.radius};
+}
+
+}  // namespace
+
+DeformedSurface& NarrowPhase::Impl::deformed(const CollisionBody& body, int side) {
+  if (body.surface != nullptr) return *body.surface;
+  DeformedSurface& mine = rigid[side];
+  mine.bind(body.geometry->surface(), {});
+  return mine;
+}
+
+double NarrowPhase::Impl::size(const CollisionBody& body) {
+  if (body.surface != nullptr) return largest_coordinate(body.surface->bounds(0));
+  if (half_space(body) != nullptr) return 0.0;
+  return largest_coordinate(body.geometry->bounds());
+}
+
+void NarrowPhase::Impl::bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side) {
+  surface[side].bind(deformed(body, side), X_PB, tolerance);
+}
+
+// For vertices inside each, in the frame of a, both surfaces of which are bound; null: the nearest point.
+std::array<OverlapRule*, 2> NarrowPhase::Impl::rules(const CollisionBody& a, const CollisionBody& b,
+                                                     const RigidTransform& X_AB) {
+  std::array<OverlapRule*, 2> chosen{nullptr, nullptr};
+  const CollisionBody* body[2] = {&a, &b};
+  const RigidTransform X_PB[2] = {{}, X_AB};
+  if (options.overlap == OverlapMethod::kRestDepth) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (body[i]->volume == nullptr) continue;
+      rest_depth[i].bind(*body[i]->volume->impl_, *body[i]->surface, X_PB[i]);
+      chosen[i] = &rest_depth[i];
+    }
+  } else if (options.overlap == OverlapMethod::kTetOverlap && a.volume != nullptr && b.volume != nullptr) {
+    const auto overlapping = [&](std::size_t i) {
+      const RestVolume::Impl& volume = *body[i]->volume->impl_;
+      return TetOverlap::Body{&volume.volume(), volume.boundary, body[i]->surface->amplitudes(), X_PB[i]};
+    };
+    tet_overlap.bind(overlapping(0), overlapping(1), surface[0].tolerance());
+    for (std::size_t i = 0; i < 2; ++i) {
+      tet_rule[i].bind(tet_overlap, static_cast<int>(i));
+      chosen[i] = &tet_rule[i];
+    }
+  }
+  return chosen;
+}
+
+void NarrowPhase::Impl::flip() {
+  for (FeatureContact& c : found) c = flipped(c);
+}
+
+// In the frame of the body, for what lies far from the half-space's own origin.
+void NarrowPhase::Impl::on_half_space(const CollisionBody& body, const RigidTransform& X_BH, const HalfSpace& shape,
+                                      double margin) {
+  const Vec3 normal = X_BH.q * shape.normal;
+  const double offset = shape.offset + normal.dot(X_BH.p);
+  if (has_triangles(body)) {
+    bind(body, {}, kRoundOff * size(body), 0);
+    half_space_contacts(surface[0], normal, offset, margin, triangles, found);
+    return;
+  }
+  const ConvexCore& core = *convex(body);
+  for (std::size_t i = 0; i < core.points.size(); ++i) {
+    const Vec3 p = core.points[i] - core.radius * normal;
+    const double height = normal.dot(p) - offset;
+    if (height <= margin)
+      found.push_back({{feature_key(Feature::Kind::kVertex, static_cast<Index>(i)), -1, {}, p},
+                       {feature_key(Feature::Kind::kFace, 0), -1, {}, p - height * normal},
+                       normal,
+                       height});
+  }
+}
+
+void NarrowPhase::Impl::against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core,
+                                     double margin) {
+  bind(body, {}, kRoundOff * (size(body) + X_BC.p.norm()), 0);
+  core_contacts.find(surface[0], rounded(core, X_BC), margin, found);
+}
+
+// In the frame of a. @pre a is not a half-space; if only one has triangles and the other is no half-space, it is a
+void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB,
+                             double margin) {
+  const ConvexCore *core_a = convex(a), *core_b = convex(b);
+  if (core_a != nullptr && core_b != nullptr) {
+    convex_contacts.find(*core_a, *core_b, X_AB, margin, found);
+  } else if (const HalfSpace* plane = half_space(b)) {
+    on_half_space(a, X_AB, *plane, margin);
+  } else if (!has_triangles(b)) {
+    against_core(a, X_AB, *core_b, margin);
+  } else {
+    const double round_off = kRoundOff * (size(a) + size(b) + X_AB.p.norm());
+    bind(a, {}, round_off, 0);
+    bind(b, X_AB, round_off, 1);
+    const Quaternion to_a = a.X_WB.q.conjugate();
+    surface[0].expect_motion(to_a * a.displacement, to_a * a.rotation);
+    surface[1].expect_motion(to_a * b.displacement, to_a * b.rotation);
+    const auto [rule_a, rule_b] = rules(a, b, X_AB);
+    surface_contacts.find(surface[0], surface[1], X_AB, margin, rule_a, rule_b, found);
+  }
+}
+
+// From the frame F in which they were found to the caller's; each feature pair once, by ascending id.
+void NarrowPhase::Impl::deliver(const CollisionBody& a, const RigidTransform& X_AF, const CollisionBody& b,
+                                const RigidTransform& X_BF, const RigidTransform& X_OF,
+                                std::vector<ContactPoint>& contacts) {
+  std::sort(found.begin(), found.end(), [](const FeatureContact& c, const FeatureContact& d) {
+    return std::pair(id_of(c), c.gap) < std::pair(id_of(d), d.gap);
+  });
+  found.erase(std::unique(found.begin(), found.end(),
+                          [](const FeatureContact& c, const FeatureContact& d) { return id_of(c) == id_of(d); }),
+              found.end());
+  const ConvexCore *core_a = convex(a), *core_b = convex(b);
+  const double radius_a = core_a != nullptr ? core_a->radius : 0.0, radius_b = core_b != nullptr ? core_b->radius : 0.0;
+  for (const FeatureContact& c : found)
+    contacts.push_back({contact_side(a, radius_a, c.a, X_AF * c.a.point),
+                        contact_side(b, radius_b, c.b, X_BF * c.b.point), X_OF.q * c.normal,
+                        X_OF * (0.5 * (c.a.point + c.b.point)), c.gap, id_of(c)});
+}
+
+NarrowPhase::NarrowPhase(const NarrowPhaseOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+}
+NarrowPhase::~NarrowPhase() = default;
+NarrowPhase::NarrowPhase(NarrowPhase&&) noexcept = default;
+NarrowPhase& NarrowPhase::operator=(NarrowPhase&&) noexcept = default;
+
+void NarrowPhase::find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
+                                std::vector<ContactPoint>& contacts) {
+  check(a), check(b);
+  Impl& impl = *impl_;
+  impl.found.clear();
+  if (Impl::half_space(a) != nullptr && Impl::half_space(b) != nullptr) return;
+  // The body with more to say comes first: triangles before none, a half-space last.
+  const bool exchange = Impl::half_space(a) != nullptr ||
+                        (!Impl::has_triangles(a) && Impl::has_triangles(b) && Impl::half_space(b) == nullptr);
+  const CollisionBody &first = exchange ? b : a, &second = exchange ? a : b;
+  const Quaternion to_first = first.X_WB.q.conjugate();
+  const RigidTransform X_FS{to_first * second.X_WB.q, to_first * (second.X_WB.p - first.X_WB.p)};
+  impl.find(first, second, X_FS, margin);
+  const RigidTransform X_SF = X_FS.inverse(), X_OF{first.X_WB.q, first.X_WB.p - origin};
+  if (exchange) impl.flip();
+  impl.deliver(a, exchange ? X_SF : RigidTransform{}, b, exchange ? RigidTransform{} : X_SF, X_OF, contacts);
+}
+
+void NarrowPhase::find_self_contacts(const CollisionBody& body, double margin, const Vec3& origin,
+                                     std::vector<ContactPoint>& contacts) {
+  check(body);
+  if (body.surface == nullptr) return;
+  Impl& impl = *impl_;
+  impl.found.clear();
+  impl.bind(body, {}, kRoundOff * impl.size(body), 0);
+  impl.surface_contacts.find_self(impl.surface[0], margin, impl.found);
+  impl.deliver(body, {}, body, {}, {body.X_WB.q, body.X_WB.p - origin}, contacts);
+}
+
+}  // namespace limber

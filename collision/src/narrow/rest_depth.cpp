@@ -1,0 +1,91 @@
+#include "narrow/rest_depth.h"
+
+#include <cmath>
+#include <limits>
+
+#include "limber/core/error.h"
+#include "limber/mesh/tet_mesh.h"
+
+namespace limber {
+namespace {
+
+// Each step moves to the tetrahedron that the last one points to; bodies bent so far that this does not end are left to
+// the nearest point.
+constexpr int kMaxSteps = 16;
+
+TetMesh rest_mesh(const ModalModel& model) {
+  if (!model.data().volume_block)
+    throw InvalidArgument("RestVolume: model \"" + model.name() + "\" has no volume block, bake it with one");
+  return {model.data().volume_block->rest, model.data().volume_block->tets};
+}
+
+Mat3 edges(const std::array<Vec3, 4>& x) {
+  Mat3 m;
+  for (int i = 0; i < 3; ++i) m.col(i) = x[static_cast<std::size_t>(i) + 1] - x[0];
+  return m;
+}
+
+}  // namespace
+
+RestDepth::RestDepth(std::shared_ptr<const ModalModel> model)
+    : model_(std::move(model)), locator_(rest_mesh(*model_)) {}
+
+void RestDepthRule::bind(const RestDepth& rest, DeformedSurface& deformed, const RigidTransform& X_PB) {
+  rest_ = &rest, deformed_ = &deformed, X_PB_ = X_PB;
+  rest_is_bound_ = false;
+}
+
+Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node) {
+  Vec3 p = volume.rest[static_cast<std::size_t>(node)];
+  for (std::size_t i = 0; i < z.size(); ++i) p += z[i] * volume.basis.shape(node, static_cast<Index>(i)).cast<double>();
+  return p;
+}
+
+// Newton's method on rest + U(rest) z = p, which is linear within each tetrahedron.
+bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& place) const {
+  const ModalVolume& volume = rest_->volume();
+  place.rest = first_guess;
+  Index last = -1;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const Index tet = rest_->locator().locate(place.rest).tet;
+    if (tet == last) return true;
+    std::array<Vec3, 4> at_rest, now;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Index node = volume.tets[static_cast<std::size_t>(tet)][i];
+      at_rest[i] = volume.rest[static_cast<std::size_t>(node)],
+      now[i] = deformed_node(volume, deformed_->amplitudes(), node);
+    }
+    const Mat3 inverse = edges(at_rest).inverse();
+    place.F = edges(now) * inverse;
+    if (!(place.F.determinant() > 1e-6)) return false;  // flat or inside out: nothing can be carried back
+    place.rest = at_rest[0] + place.F.inverse() * (p_B - now[0]);
+    last = tet;
+  }
+  return false;
+}
+
+bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) {
+  const CollisionSurface& mesh = surface.surface();
+  if (!rest_is_bound_) {
+    zeros_.assign(static_cast<std::size_t>(mesh.modes()), 0.0);
+    // Not owned: the deformed surface that is bound to it outlives the query.
+    at_rest_.bind(std::shared_ptr<const CollisionSurface>(std::shared_ptr<void>(), &mesh), zeros_);
+    rest_surface_.bind(at_rest_, {}, surface.tolerance());
+    rest_is_bound_ = true;
+  }
+  Vec3 guess = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c) guess += nearest.foot.weight[c] * mesh.rest(mesh.triangle(nearest.triangle)[c]);
+  Place place;
+  if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
+
+  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  if (!rest.inside || rest.distance <= kDirectionless * surface.tolerance()) return false;
+  SurfaceFoot foot = rest.foot;
+  foot.point.setZero();
+  for (std::size_t c = 0; c < 3; ++c) foot.point += foot.weight[c] * surface.face(rest.triangle).x[c];
+  exit.at = surface.at_foot(rest.triangle, foot);
+  exit.normal = X_PB_.q * (place.F.inverse().transpose() * (rest.foot.point - place.rest)).normalized();
+  return exit.normal.dot(p - exit.at.point) < 0.0;
+}
+
+}  // namespace limber

@@ -1,0 +1,218 @@
+// Where surfaces have gone through each other: what is inside, and the way out of it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "narrow/surface_contacts.h"
+
+namespace limber {
+namespace {
+
+// Up to this part of the edges at hand, overlap of bodies with flush sides is pushed out along the other faces.
+constexpr double kAlignedDepth = 0.5;
+
+// Crossings of edges whose normal has at least this cosine with a way out of the loop they are on, 26°, go along it.
+constexpr double kSameWay = 0.9;
+
+}  // namespace
+
+void SurfaceContacts::find_piercings(int of, Index s, Index t) {
+  for (int c = 0; c < 3; ++c)
+    if (side_[of]->owns_edge(s, c)) find_piercing(of, side_[of]->surface().edge_of(s, c), t);
+}
+
+void SurfaceContacts::find_piercing(int of, Index e, Index t) {
+  PairSurface& mine = *side_[of];
+  const PairSurface::Face& f = side_[1 - of]->face(t);
+  const std::array<Index, 2> ends = mine.surface().edge(e).vertices;
+  const Vec3 &x0 = mine.vertex(ends[0]), &x1 = mine.vertex(ends[1]);
+  const double h0 = f.normal.dot(x0 - f.x[0]), h1 = f.normal.dot(x1 - f.x[0]);
+  const std::size_t behind = h0 < h1 ? 0 : 1;
+  const double back = std::min(h0, h1), front = std::max(h0, h1);
+  if (!(back < -tolerance_ && front >= -tolerance_)) return;
+  const Vec3 p = x0 + std::clamp(h0 / (h0 - h1), 0.0, 1.0) * (x1 - x0);
+  double within = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
+  if (within < -tolerance_) return;
+  if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], (p - mine.vertex(ends[behind])).norm()});
+  // An edge that only begins or ends on the face, or meets its rim, touches it.
+  if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});
+}
+
+// From the ends of piercing edges over the mesh to every vertex that is inside the other surface.
+void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
+  std::vector<Seed>& seeds = seeds_[of];
+  while (!seeds.empty()) {
+    const Seed seed = seeds.back();
+    seeds.pop_back();
+    std::uint32_t& visited = visited_[of][static_cast<std::size_t>(seed.vertex)];
+    if (visited >= generation_) continue;
+    visited = generation_;
+    const Vec3& p = side_[of]->vertex(seed.vertex);
+    const PairSurface::Nearest nearest =
+        side_[1 - of]->nearest(p, seed.reach * (1.0 + 1e-9) + kDirectionless * tolerance_);
+    if (!nearest.inside) continue;
+    visited = generation_ + 1;
+    add_inside(of, seed.vertex, nearest, rule);
+    for (const Index w : side_[of]->surface().vertex_neighbours(seed.vertex))
+      seeds.push_back({w, nearest.distance + (side_[of]->vertex(w) - p).norm()});
+  }
+}
+
+void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule) {
+  PairSurface& other = *side_[1 - of];
+  const Vec3& p = side_[of]->vertex(v);
+  OverlapRule::Exit exit;
+  if (rule == nullptr || !rule->exit(other, p, nearest, exit)) {
+    exit.at = other.at_foot(nearest.triangle, nearest.foot);
+    exit.normal = nearest.distance > kDirectionless * tolerance_ ? Vec3((exit.at.point - p) / nearest.distance)
+                                                                 : unit_or(nearest.outward, Vec3::UnitZ());
+  }
+  if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, kSteep))
+    find_supporting_face(of, v, nearest.triangle, flush(of, v, exit.at), exit);
+  overlap_ = true;
+  exit_normal_[of][static_cast<std::size_t>(v)] = exit.normal;
+  add(of, side_[of]->at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
+}
+
+// Next to a rim, the nearest point may be on a face that the vertex's own surface does not follow: the top box of a
+// stack would be pushed off sideways. The nearest face of those around whose normal it does follow is found, if it lies
+// within reach.
+bool SurfaceContacts::find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  const Vec3& p = mine.vertex(v);
+  // Sides in one plane say nothing about how deep the overlap is.
+  const double reach = (aligned ? kAlignedDepth / kTouching : 1.0) * nearness(of, v, near);
+  double least = reach;
+  for (const Index corner : other.surface().triangle(near))
+    for (const Index t : other.surface().vertex_triangles(corner)) {
+      const PairSurface::Face& f = other.face(t);
+      const double height = std::abs(f.normal.dot(p - f.x[0]));
+      if (!(height < least) || !mine.in_front(v, f.normal, kLeaning)) continue;
+      const SurfaceFoot foot = closest_on_triangle(p, f.x);
+      if ((p - foot.point).norm() > reach) continue;
+      exit = {other.at_foot(t, foot), f.normal};
+      least = height;
+    }
+  return least < reach;
+}
+
+// Parts of one surface that are inside the other without meeting it.
+void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
+  if (!side_[1 - of]->surface().closed()) return;
+  for (const Index v : side_[of]->surface().component_vertices()) {
+    if (visited_[of][static_cast<std::size_t>(v)] >= generation_) continue;
+    if (!side_[1 - of]->may_hold(side_[of]->vertex(v))) continue;
+    seeds_[of].push_back({v, std::numeric_limits<double>::infinity()});
+    spread_inside(of, rule);
+  }
+}
+
+// Edges of two solids that have passed through each other. Surfaces intersect along closed loops, and what is to be
+// freed is the part that a loop encloses: all crossings along the ways out of it count, so that bars laid across each
+// other rest on every crossing of their outlines however deep each is.
+void SurfaceContacts::cross_edges() {
+  if (!side_[0]->sided() || !side_[1]->sided()) return;
+  find_loops();
+  for (std::size_t first = 0, next = 0; first < piercings_.size(); first = next) {
+    while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
+    cross_edges_of_loop(first, next);
+  }
+}
+
+// Where two triangles intersect, an edge of one goes through the other at each end: piercings with a triangle pair in
+// common belong to one loop. Sorts them by loop.
+void SurfaceContacts::find_loops() {
+  const auto sort_piercings = [this] {
+    std::sort(piercings_.begin(), piercings_.end(), [](const Piercing& a, const Piercing& b) {
+      return std::tie(a.loop, a.of, a.edge, a.face) < std::tie(b.loop, b.of, b.edge, b.face);
+    });
+  };
+  sort_piercings();
+  crossed_.clear();
+  for (std::size_t i = 0; i < piercings_.size(); ++i) {
+    const Piercing& p = piercings_[i];
+    for (const Index t : side_[p.of]->surface().edge(p.edge).triangles)
+      if (t >= 0)
+        crossed_.push_back({p.of == 0 ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+  }
+  std::sort(crossed_.begin(), crossed_.end(), [](const Crossed& a, const Crossed& b) {
+    return std::tie(a.triangles, a.piercing) < std::tie(b.triangles, b.piercing);
+  });
+  loops_.reset(piercings_.size());
+  for (std::size_t i = 1; i < crossed_.size(); ++i)
+    if (crossed_[i].triangles == crossed_[i - 1].triangles) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
+  for (std::size_t i = 0; i < piercings_.size(); ++i) piercings_[i].loop = loops_.root(static_cast<Index>(i));
+  sort_piercings();
+}
+
+void SurfaceContacts::cross_edges_of_loop(std::size_t first, std::size_t end) {
+  crossings_.clear();
+  for (std::size_t i = first; i < end; ++i) find_crossings(piercings_[i]);
+  find_ways_out(first, end);
+  for (const EdgePair& crossing : crossings_) {
+    const Vec3 n = -crossing.direction;
+    if (std::none_of(ways_out_.begin(), ways_out_.end(), [&](const Vec3& way) { return n.dot(way) > kSameWay; }))
+      continue;
+    overlap_ = true;
+    add_edges(crossing, n);
+  }
+}
+
+// Of a piercing edge with the edges of the face.
+void SurfaceContacts::find_crossings(const Piercing& piercing) {
+  for (int c = 0; c < 3; ++c) {
+    const Index f = side_[1 - piercing.of]->surface().edge_of(piercing.face, c);
+    const EdgePair pair = piercing.of == 0 ? nearest_of_edges(piercing.edge, f) : nearest_of_edges(f, piercing.edge);
+    if (pair.distance < std::numeric_limits<double>::infinity() && side_[1]->in_normal_cone(pair.f, -pair.direction) &&
+        side_[0]->in_normal_cone(pair.e, pair.direction))
+      crossings_.push_back(pair);
+  }
+}
+
+// The directions in which vertices leave that are inside next to the loop. Without any, the direction of the crossing
+// along which the loop, and with it the region that both bodies share, is least wide.
+void SurfaceContacts::find_ways_out(std::size_t first, std::size_t end) {
+  ways_out_.clear();
+  for (std::size_t i = first; i < end; ++i) {
+    const int of = piercings_[i].of;
+    for (const Index v : side_[of]->surface().edge(piercings_[i].edge).vertices)
+      if (visited_[of][static_cast<std::size_t>(v)] == generation_ + 1)
+        ways_out_.push_back((of == 0 ? 1.0 : -1.0) * exit_normal_[of][static_cast<std::size_t>(v)]);
+  }
+  if (!ways_out_.empty() || crossings_.empty()) return;
+  const EdgePair* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const EdgePair& crossing : crossings_) {
+    const double width = std::max(width_of_loop(first, end, crossing.direction), crossing.distance);
+    if (width < least) least = width, best = &crossing;
+  }
+  ways_out_.push_back(-best->direction);
+}
+
+double SurfaceContacts::width_of_loop(std::size_t first, std::size_t end, const Vec3& n) const {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t i = first; i < end; ++i) {
+    const double height = n.dot(piercings_[i].point);
+    low = std::min(low, height), high = std::max(high, height);
+  }
+  return high - low;
+}
+
+// Surfaces that intersect where nothing tells inside from outside, such as a sheet: back out of the pierced face, the
+// shorter way.
+void SurfaceContacts::push_out_of_faces() {
+  for (const Piercing& piercing : piercings_) {
+    PairSurface& other = *side_[1 - piercing.of];
+    const PairSurface::Face& f = other.face(piercing.face);
+    const std::size_t end = std::abs(piercing.heights[0]) <= std::abs(piercing.heights[1]) ? 0 : 1;
+    const double height = piercing.heights[end];
+    const Index v = side_[piercing.of]->surface().edge(piercing.edge).vertices[end];
+    const Vec3 n = height < 0.0 ? f.normal : Vec3(-f.normal);
+    const Vec3 q = side_[piercing.of]->vertex(v) - height * f.normal;
+    add(piercing.of, side_[piercing.of]->at_vertex(v), other.on_face(piercing.face, q), n, -std::abs(height));
+  }
+}
+
+}  // namespace limber

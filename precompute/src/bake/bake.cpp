@@ -1,0 +1,463 @@
+#include "limber/precompute/bake.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "bake/residual.h"
+#include "bake/simplify_surface.h"
+#include "fem/mass_properties.h"
+#include "limber/core/error.h"
+#include "limber/model/embedding.h"
+
+namespace limber {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// Materials ---------------------------------------------------------------------------------------------------------
+
+const Material* find_material(const MaterialTable& table, const Region& region) {
+  for (const std::string& key : {region.name, std::to_string(region.tag), std::string("*")})
+    if (const auto found = table.find(key); found != table.end()) return &found->second;
+  return nullptr;
+}
+
+/// The material of each region; one that no tet uses may have none.
+std::vector<Material> materials_by_region(const TetMesh& mesh, const MaterialTable& table) {
+  for (const auto& [name, material] : table) material.validate("material of \"" + name + "\"");
+  std::vector<char> used(mesh.regions.size(), 0);
+  for (const Index r : mesh.tet_region) used[r] = 1;
+  std::vector<Material> materials(mesh.regions.size());
+  for (std::size_t r = 0; r < mesh.regions.size(); ++r) {
+    const Material* found = find_material(table, mesh.regions[r]);
+    if (!found && used[r])
+      throw InputError("materials: region \"" + mesh.regions[r].name + "\" (tag " +
+                       std::to_string(mesh.regions[r].tag) +
+                       ") of the mesh has no material; name it, or give \"*\" for the rest");
+    if (found) materials[r] = *found;
+  }
+  return materials;
+}
+
+void warn_of_unknown_regions(const TetMesh& mesh, const MaterialTable& table, Warnings& warnings) {
+  for (const auto& [name, unused] : table) {
+    const auto is_named = [&name = name](const Region& r) { return r.name == name || std::to_string(r.tag) == name; };
+    if (name != "*" && std::none_of(mesh.regions.begin(), mesh.regions.end(), is_named))
+      warnings.push_back("materials: the mesh has no region \"" + name + "\"");
+  }
+}
+
+// Surfaces ----------------------------------------------------------------------------------------------------------
+
+/// Deals the triangles of a surface of the whole input out to the bodies: each goes to the one that holds most of its
+/// vertices.
+std::vector<SurfaceMesh> deal(const SurfaceMesh& surface, const TetMesh& mesh, std::span<const Index> component,
+                              Index bodies) {
+  if (bodies == 1) return {surface};
+  const Embedding whole = embed(surface.vertices, mesh);
+  const auto body_of = [&](Index vertex) { return component[whole.vertices[vertex].tet]; };
+  std::vector<SurfaceMesh> parts(bodies);
+  std::vector<std::vector<Index>> new_index(bodies, std::vector<Index>(surface.vertices.size(), -1));
+  for (const Triangle& t : surface.triangles) {
+    const Index body = body_of(t[1]) == body_of(t[2]) ? body_of(t[1]) : body_of(t[0]);
+    SurfaceMesh& part = parts[body];
+    Triangle mapped{};
+    for (int a = 0; a < 3; ++a) {
+      Index& index = new_index[body][t[a]];
+      if (index < 0) {
+        index = static_cast<Index>(part.vertices.size());
+        part.vertices.push_back(surface.vertices[t[a]]);
+      }
+      mapped[a] = index;
+    }
+    part.triangles.push_back(mapped);
+  }
+  return parts;
+}
+
+std::vector<std::optional<SurfaceMesh>> deal_if_any(const std::optional<SurfaceMesh>& surface, const TetMesh& mesh,
+                                                    std::span<const Index> component, Index bodies, const char* which) {
+  std::vector<std::optional<SurfaceMesh>> out(bodies);
+  if (!surface) return out;
+  auto parts = deal(*surface, mesh, component, bodies);
+  for (Index b = 0; b < bodies; ++b) {
+    if (parts[b].triangles.empty())
+      throw InputError(std::string(which) + " surface: no triangle of it lies at body " + std::to_string(b + 1) +
+                       " of " + std::to_string(bodies) + ", expected it to cover every connected part of the mesh");
+    out[b] = std::move(parts[b]);
+  }
+  return out;
+}
+
+/// A surface with where its vertices sit in the mesh of one body.
+struct PlacedSurface {
+  SurfaceMesh surface;
+  Embedding embedding;
+  EmbeddingReport report() const {
+    return {static_cast<Index>(surface.vertices.size()), embedding.outside, embedding.max_distance};
+  }
+};
+
+PlacedSurface place(const SurfaceMesh& surface, const TetMesh& mesh) {
+  return {surface, embed(surface.vertices, mesh)};
+}
+
+PlacedSurface place_boundary(const TetMesh& mesh) {
+  BoundarySurface boundary = boundary_surface(mesh);
+  Embedding embedding = embed_nodes(boundary.node_of, mesh);
+  return {std::move(boundary.surface), std::move(embedding)};
+}
+
+/// A coarser surface on some of the vertices of a finer one.
+PlacedSurface simplified(const PlacedSurface& fine, std::size_t triangles, double& error) {
+  SimplifiedSurface coarse = simplify_surface(fine.surface, triangles);
+  error = coarse.error;
+  PlacedSurface placed{std::move(coarse.surface), fine.embedding};
+  placed.embedding.vertices.clear();
+  for (const Index v : coarse.vertex_of) placed.embedding.vertices.push_back(fine.embedding.vertices[v]);
+  return placed;
+}
+
+// Modes at nodes and surfaces ---------------------------------------------------------------------------------------
+
+/// Column `mode` of W or M W at a node.
+Vec3 at_node(std::span<const double> shapes, Index nodes, Index mode, Index node) {
+  return Eigen::Map<const Vec3>(shapes.data() + 3 * (static_cast<std::size_t>(mode) * nodes + node));
+}
+
+Vec3 at_vertex(const ModalAnalysis& a, const TetMesh& mesh, Index mode, const EmbeddedVertex& v) {
+  Vec3 u = Vec3::Zero();
+  for (int c = 0; c < 4; ++c) u += v.weight[c] * at_node(a.shapes, a.nodes, mode, mesh.tets[v.tet][c]);
+  return u;
+}
+
+double largest_displacement(const ModalAnalysis& a, const TetMesh& mesh, Index mode, const Embedding& e) {
+  double largest = 0.0;
+  for (const EmbeddedVertex& v : e.vertices) largest = std::max(largest, at_vertex(a, mesh, mode, v).norm());
+  return largest;
+}
+
+ModalSurface modal_surface(const PlacedSurface& placed, const ModalAnalysis& a, const TetMesh& mesh,
+                           std::span<const Index> kept, const Vec3& origin) {
+  ModalSurface s;
+  s.triangles = placed.surface.triangles;
+  for (const Vec3& x : placed.surface.vertices) s.rest.push_back((x - origin).cast<float>());
+  s.basis = ModalBasis(s.vertices(), static_cast<Index>(kept.size()));
+  for (Index v = 0; v < s.vertices(); ++v)
+    for (std::size_t m = 0; m < kept.size(); ++m)
+      s.basis.set(v, static_cast<Index>(m), at_vertex(a, mesh, kept[m], placed.embedding.vertices[v]).cast<float>());
+  return s;
+}
+
+ModalBasis basis_at_nodes(std::span<const double> shapes, Index nodes, std::span<const Index> kept) {
+  ModalBasis basis(nodes, static_cast<Index>(kept.size()));
+  for (Index n = 0; n < nodes; ++n)
+    for (std::size_t m = 0; m < kept.size(); ++m)
+      basis.set(n, static_cast<Index>(m), at_node(shapes, nodes, kept[m], n).cast<float>());
+  return basis;
+}
+
+ModalVolume modal_volume(const ModalAnalysis& a, const TetMesh& mesh, std::span<const Index> kept, const Vec3& origin) {
+  ModalVolume volume;
+  for (const Vec3& x : mesh.nodes) volume.rest.push_back(x - origin);
+  volume.tets = mesh.tets;
+  volume.basis = basis_at_nodes(a.shapes, a.nodes, kept);
+  volume.mass_times_basis = basis_at_nodes(a.mass_times_shapes, a.nodes, kept);
+  return volume;
+}
+
+// One body ----------------------------------------------------------------------------------------------------------
+
+struct BodyInput {
+  std::string name;
+  SubMesh part;
+  std::vector<Index> fixed;           // of part.mesh
+  std::vector<Index> residual_nodes;  // of part.mesh
+  std::optional<SurfaceMesh> render, collision;
+};
+
+struct BodySurfaces {
+  PlacedSurface render;
+  std::optional<PlacedSurface> collision;  // none: the render surface
+  const PlacedSurface& touching() const { return collision ? *collision : render; }
+};
+
+/// A given render surface is often far finer than the tets, so what touches is then their boundary.
+BodySurfaces place_surfaces(const BodyInput& in, const BakeOptions& options, BodyReport& report) {
+  const TetMesh& mesh = in.part.mesh;
+  BodySurfaces s;
+  s.render = in.render ? place(*in.render, mesh) : place_boundary(mesh);
+  if (in.collision) s.collision = place(*in.collision, mesh);
+  if (!in.collision && in.render) s.collision = place_boundary(mesh);
+  if (const auto most = static_cast<std::size_t>(options.collision_triangles);
+      most > 0 && s.touching().surface.triangles.size() > most)
+    s.collision = simplified(s.touching(), most, report.collision_error);
+  report.collision_triangles = static_cast<Index>(s.touching().surface.triangles.size());
+  return s;
+}
+
+/// A surface that lies elsewhere follows extrapolated modes: likely another unit or another origin than the mesh's.
+void warn_of_far_surface(const PlacedSurface& placed, const TetMesh& mesh, const std::string& which,
+                         Warnings& warnings) {
+  constexpr double kFar = 0.1;  // of the diagonal of the mesh
+  Eigen::AlignedBox3d box;
+  for (const Vec3& x : mesh.nodes) box.extend(x);
+  const double part = placed.embedding.max_distance / box.diagonal().norm();
+  if (part <= kFar) return;
+  warnings.push_back(which + " surface: " + std::to_string(placed.embedding.outside) + " of " +
+                     std::to_string(placed.surface.vertices.size()) + " vertices lie outside the tetrahedra, up to " +
+                     std::to_string(std::lround(100.0 * part)) +
+                     " % of the mesh's diagonal away; are its unit and origin those of the mesh?");
+}
+
+double decay_of(const RayleighDamping& d, double lambda) {
+  return 0.5 * (d.stiffness_proportional * lambda + d.mass_proportional);
+}
+
+/// Modes to keep, as columns of the analysis: mechanisms always, and of the elastic ones those that the limits leave.
+std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, const BodySurfaces& surfaces,
+                                const BakeOptions& options, BodyReport& report) {
+  std::vector<ModeStrength> strengths;
+  for (Index mode = a.mechanisms; mode < static_cast<Index>(a.eigenvalues.size()); ++mode) {
+    const double lambda = a.eigenvalues[mode];
+    strengths.push_back({.eigenvalue = lambda,
+                         .decay = decay_of(options.damping, lambda),
+                         .max_observable = largest_displacement(a, mesh, mode, surfaces.render.embedding),
+                         .max_loadable = largest_displacement(a, mesh, mode, surfaces.touching().embedding)});
+    report.frequencies_hz.push_back(std::sqrt(lambda) / (2.0 * std::numbers::pi));
+  }
+  report.selection = select_modes(strengths, options.limits);
+  std::vector<Index> columns;
+  columns.reserve(static_cast<std::size_t>(a.mechanisms) + report.selection.kept.size());
+  for (Index m = 0; m < a.mechanisms; ++m) columns.push_back(m);
+  for (const Index m : report.selection.kept) columns.push_back(a.mechanisms + m);
+  return columns;
+}
+
+/// Modes at the chosen nodes join the analysis and those kept, which stay in order of frequency.
+void add_residual_modes(ModalAnalysis& a, std::span<const Index> nodes, std::vector<Index>& kept,
+                        ResidualReport& report) {
+  if (nodes.empty() || !a.compliance) return;
+  const auto first = static_cast<Index>(a.eigenvalues.size());
+  report.modes = append_residual_modes(a, kept, nodes);
+  for (Index m = 0; m < report.modes; ++m) kept.push_back(first + m);
+  std::stable_sort(kept.begin(), kept.end(), [&](Index i, Index j) { return a.eigenvalues[i] < a.eigenvalues[j]; });
+}
+
+std::optional<ResidualCompliance> surface_compliance(const ModalAnalysis& a, std::span<const Index> kept,
+                                                     const TetMesh& mesh, const PlacedSurface& surface,
+                                                     const ResidualOptions& options, ResidualReport& report) {
+  if (!options.surface || !a.compliance) return std::nullopt;
+  using Form = ResidualCompliance::Form;
+  report.vertices = static_cast<Index>(surface.surface.vertices.size());
+  const auto bytes = [&](Form form) { return sizeof(float) * ResidualCompliance::value_count(form, report.vertices); };
+  const bool fits = static_cast<double>(bytes(Form::kFull)) <= options.max_full_bytes;
+  report.form = fits ? Form::kFull : Form::kLocal;
+  report.bytes = bytes(*report.form);
+  return residual_compliance(a, kept, mesh, surface.embedding, *report.form);
+}
+
+void add_inertial_integrals(ModalModelData& data, const ModalAnalysis& a, const TetMesh& mesh,
+                            std::span<const Index> kept) {
+  for (const Index mode : kept) {
+    Vec3 momentum = Vec3::Zero();
+    Mat3 moment = Mat3::Zero();
+    for (Index n = 0; n < a.nodes; ++n) {
+      const Vec3 mw = at_node(a.mass_times_shapes, a.nodes, mode, n);
+      momentum += mw;
+      moment += (mesh.nodes[n] - data.origin_in_input) * mw.transpose();
+    }
+    // Free modes are M-orthogonal to translations: what the sum leaves is round-off.
+    data.participation.push_back(data.motion == FrameMotion::kFree ? Vec3(Vec3::Zero()) : momentum);
+    data.moments.push_back(moment);
+  }
+}
+
+void add_frame(ModalModelData& data, const ModalAnalysis& a, const MassProperties& p) {
+  const bool about_pivot = a.motion == FrameMotion::kPoint || a.motion == FrameMotion::kLine;
+  data.motion = a.motion;
+  data.line_axis = a.line_axis;
+  data.mass = p.mass;
+  data.volume = p.volume;
+  data.origin_in_input = about_pivot ? a.pivot : p.center;
+  data.center_of_mass = about_pivot ? Vec3(p.center - a.pivot) : Vec3(Vec3::Zero());
+  data.inertia = p.inertia_about(data.center_of_mass);
+}
+
+void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, const MassProperties& p) {
+  const auto free_dofs = 3 * (static_cast<std::size_t>(a.nodes) - in.fixed.size());
+  r.name = in.name;
+  r.motion = a.motion;
+  r.nodes = a.nodes;
+  r.tets = static_cast<Index>(in.part.mesh.tets.size());
+  r.mass = p.mass;
+  r.volume = p.volume;
+  r.center_of_mass = p.center;
+  r.inertia = p.inertia;
+  r.mechanisms = a.mechanisms;
+  r.zero_modes = a.rigid_modes + a.mechanisms;
+  r.all_modes = static_cast<std::size_t>(a.rigid_modes) + a.eigenvalues.size() >= free_dofs;
+  r.residual_max = a.residual_max;
+  r.residual_bound = a.residual_bound;
+  r.backward_error_max = a.backward_error_max;
+  r.orthogonality_max = a.orthogonality_max;
+  r.certified = a.certified;
+  r.solves = a.solves;
+  r.seconds = a.seconds;
+}
+
+std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const Material> materials,
+                                            const BakeOptions& options, BodyReport& report, Warnings& warnings,
+                                            Jobs& jobs) {
+  const TetMesh& mesh = in.part.mesh;
+  const MassProperties mass = mass_properties(mesh, materials);
+  ModalAnalysisOptions wanted = options.analysis;
+  wanted.keep_compliance = options.residual.surface || !in.residual_nodes.empty();
+  ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
+  fill_report(report, in, a, mass);
+
+  const auto start = Clock::now();
+  const BodySurfaces surfaces = place_surfaces(in, options, report);
+  warn_of_far_surface(surfaces.render, mesh, "render", warnings);
+  if (in.collision) warn_of_far_surface(*surfaces.collision, mesh, "collision", warnings);
+  std::vector<Index> kept = choose_modes(a, mesh, surfaces, options, report);
+  report.seconds_embed = seconds_since(start);
+
+  const auto residual_start = Clock::now();
+  add_residual_modes(a, in.residual_nodes, kept, report.residual);
+  auto residual = surface_compliance(a, kept, mesh, surfaces.touching(), options.residual, report.residual);
+  report.residual.seconds = seconds_since(residual_start);
+
+  const auto store_start = Clock::now();
+  ModalModelData data;
+  data.name = in.name;
+  add_frame(data, a, mass);
+  for (const Index m : kept) {
+    data.eigenvalues.push_back(a.eigenvalues[m]);
+    data.decays.push_back(decay_of(options.damping, a.eigenvalues[m]));
+  }
+  add_inertial_integrals(data, a, mesh, kept);
+  data.render = modal_surface(surfaces.render, a, mesh, kept, data.origin_in_input);
+  if (surfaces.collision) data.collision = modal_surface(*surfaces.collision, a, mesh, kept, data.origin_in_input);
+  if (options.volume_block) data.volume_block = modal_volume(a, mesh, kept, data.origin_in_input);
+  data.residual_compliance = std::move(residual);
+  auto model = std::make_shared<const ModalModel>(std::move(data));
+  report.render = surfaces.render.report();
+  report.collision = surfaces.touching().report();
+  report.seconds_embed += seconds_since(store_start);
+  return model;
+}
+
+// The whole ---------------------------------------------------------------------------------------------------------
+
+std::vector<char> selected_flags(const TetMesh& mesh, std::span<const NodeSelector> selectors) {
+  std::vector<char> selected(mesh.nodes.size(), 0);
+  for (const NodeSelector& s : selectors)
+    for (const Index n : select_nodes(mesh, s)) selected[n] = 1;
+  return selected;
+}
+
+/// A node that does not move answers no load.
+void warn_of_fixed_loads(std::span<const char> loaded, std::span<const char> fixed, Warnings& warnings) {
+  std::size_t chosen = 0, idle = 0;
+  for (std::size_t n = 0; n < loaded.size(); ++n) {
+    chosen += loaded[n] ? 1 : 0;
+    idle += loaded[n] && fixed[n] ? 1 : 0;
+  }
+  if (idle > 0)
+    warnings.push_back("residual: " + std::to_string(idle) + " of the " + std::to_string(chosen) +
+                       " chosen nodes are fixed and get no residual modes");
+}
+
+void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warnings& warnings) {
+  std::vector<char> used(mesh.nodes.size(), 0);
+  for (const Tet& t : mesh.tets)
+    for (const Index n : t) used[n] = 1;
+  std::size_t unused = 0, to_be_fixed = 0;
+  for (std::size_t n = 0; n < used.size(); ++n) {
+    if (used[n]) continue;
+    ++unused;
+    if (fixed[n]) ++to_be_fixed;
+  }
+  if (unused == 0) return;
+  std::string message = "mesh: " + std::to_string(unused) + " of " + std::to_string(mesh.nodes.size()) +
+                        " nodes belong to no tetrahedron and have been dropped";
+  if (to_be_fixed > 0) message += ", " + std::to_string(to_be_fixed) + " of them were to be fixed";
+  warnings.push_back(message);
+}
+
+}  // namespace
+
+RayleighDamping RayleighDamping::from_ratio(double ratio, double first_hz, double second_hz) {
+  if (!(ratio >= 0.0) || !(first_hz > 0.0) || !(second_hz > 0.0) || !std::isfinite(ratio + first_hz + second_hz))
+    throw InvalidArgument("damping ratio " + std::to_string(ratio) + " at " + std::to_string(first_hz) + " and " +
+                          std::to_string(second_hz) + " Hz: expected a ratio of 0 or more and frequencies above 0");
+  const double w1 = 2.0 * std::numbers::pi * first_hz, w2 = 2.0 * std::numbers::pi * second_hz;
+  return {.stiffness_proportional = 2.0 * ratio / (w1 + w2), .mass_proportional = 2.0 * ratio * w1 * w2 / (w1 + w2)};
+}
+
+void RayleighDamping::validate() const {
+  const auto check = [](double value, const char* field) {
+    if (!(value >= 0.0) || !std::isfinite(value))
+      throw InvalidArgument(std::string("Rayleigh damping: ") + field + " is " + std::to_string(value) +
+                            ", expected 0 or more");
+  };
+  check(stiffness_proportional, "a1 (stiffness-proportional, s)");
+  check(mass_proportional, "a2 (mass-proportional, 1/s)");
+}
+
+void ResidualOptions::validate() const {
+  if (!(max_full_bytes >= 0.0))
+    throw InvalidArgument("ResidualOptions::max_full_bytes is " + std::to_string(max_full_bytes) +
+                          ", expected 0 or more");
+}
+
+void BakeOptions::validate() const {
+  if (materials.empty()) throw InvalidArgument("bake: no material is given");
+  damping.validate();
+  analysis.validate();
+  limits.validate();
+  residual.validate();
+  if (collision_triangles < 0)
+    throw InvalidArgument("BakeOptions::collision_triangles is " + std::to_string(collision_triangles) +
+                          ", expected 0 or more");
+}
+
+BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
+  options.validate();
+  if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
+  const auto materials = materials_by_region(input.mesh, options.materials);
+  warn_of_unknown_regions(input.mesh, options.materials, warnings);
+  const auto fixed = selected_flags(input.mesh, options.fixed);
+  const auto loaded = selected_flags(input.mesh, options.residual.nodes);
+  warn_of_unused_nodes(input.mesh, fixed, warnings);
+  warn_of_fixed_loads(loaded, fixed, warnings);
+
+  const auto component = connected_components(input.mesh);
+  const Index bodies = 1 + *std::max_element(component.begin(), component.end());
+  auto render = deal_if_any(input.render, input.mesh, component, bodies, "render");
+  auto collision = deal_if_any(input.collision, input.mesh, component, bodies, "collision");
+
+  BakeResult result;
+  result.asset.provenance = input.provenance;
+  for (Index b = 0; b < bodies; ++b) {
+    BodyInput body;
+    body.name = bodies == 1 ? input.name : input.name + "_" + std::to_string(b + 1);
+    body.part = extract_component(input.mesh, component, b);
+    for (std::size_t n = 0; n < body.part.node_of.size(); ++n) {
+      if (fixed[body.part.node_of[n]])
+        body.fixed.push_back(static_cast<Index>(n));
+      else if (loaded[body.part.node_of[n]])
+        body.residual_nodes.push_back(static_cast<Index>(n));
+    }
+    body.render = std::move(render[b]);
+    body.collision = std::move(collision[b]);
+    result.asset.bodies.push_back(bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));
+  }
+  return result;
+}
+
+}  // namespace limber

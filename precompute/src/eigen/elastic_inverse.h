@@ -1,0 +1,65 @@
+/// @file elastic_inverse.h
+/// K⁺: the displacement that a load gives a body free to float, without any shift of the spectrum.
+///
+/// With N an M-orthonormal basis of the null space of K and P = I − N (M N)ᵀ,
+///
+///   K⁺ = P K_pin⁻¹ Pᵀ
+///
+/// where K_pin holds d = dim N degrees of freedom, chosen so that N restricted to them is far from singular. Pᵀ f is a
+/// load in equilibrium, so the pins carry nothing, and P takes the null motions out of the answer. K_pin is positive
+/// definite, so CHOLMOD's LLᵀ serves; K⁺M has the eigenvalues 1/λ on the elastic modes and 0 on N.
+///
+/// A body so near to a mechanism that K_pin is not definite in floating point gets (K + sM)⁻¹ between P and Pᵀ instead,
+/// with eigenvalues 1/(λ + s).
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "eigen/cholesky_solver.h"
+#include "limber/precompute/sparse_matrix.h"
+
+namespace limber {
+
+/// K w = λ M w on the free nodes of a body, in units where entries of K and M are about one.
+struct ScaledProblem {
+  SparseMatrix K;          ///< 3n × 3n
+  SparseMatrix node_mass;  ///< n × n, acts alike on the three axes
+  Eigen::MatrixXd N;       ///< null space of K, NᵀMN = I; may have no columns
+  Eigen::MatrixXd MN;
+  /// K X for a few columns, tet by tet: without the round-off of K's entries (see elastic_forces).
+  std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)> stiffness_times;
+
+  Index size() const { return K.size; }
+  Eigen::MatrixXd mass_times(const Eigen::Ref<const Eigen::MatrixXd>& X) const;
+};
+
+class ElasticInverse {
+ public:
+  /// @param node_order from order_nodes(problem.K). Keeps a reference to the problem.
+  /// @throws ComputationError if no factor can be had
+  ElasticInverse(const ScaledProblem& problem, const std::vector<Index>& node_order);
+
+  /// K⁺ F, or P (K + sM)⁻¹ Pᵀ F.
+  Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& F);
+
+  /// The same, improved by residuals that stiffness_times() gives, as long as that changes it: for loads that are all
+  /// of size F_i ~ M w_i, and bodies so slender or of such different stiffnesses that round-off of K shows.
+  Eigen::MatrixXd apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F);
+
+  double shift() const { return shift_; }  ///< s; 0 unless K_pin would not factor
+  int solves() const { return solves_; }   ///< right-hand sides so far
+  const std::vector<Index>& pinned() const { return pinned_; }
+
+ private:
+  const ScaledProblem& problem_;
+  std::vector<Index> pinned_, kept_;  // degrees of freedom, ascending
+  double shift_ = 0.0;
+  int solves_ = 0;
+  CholeskySolver solver_;
+
+  CholeskySolver factor(const std::vector<Index>& node_order);
+};
+
+}  // namespace limber

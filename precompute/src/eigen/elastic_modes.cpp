@@ -1,0 +1,155 @@
+#include "eigen/elastic_modes.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "eigen/canonical_modes.h"
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+// Eigenvalues this close, relative to each other, are one cluster, kept or dropped whole (as in mode selection).
+constexpr double kClusterGap = 1e-6;
+// Eigenvalues this close cannot be told apart: their shapes are free to turn among each other. A turn costs a residual
+// of that size, which must stay below 1e-8.
+constexpr double kUnresolvedGap = 1e-9;
+// Up to so many unknowns the dense solver is as quick as Lanczos, and it cannot miss a mode.
+constexpr Eigen::Index kDenseSize = 300;
+constexpr int kSearches = 3;  // for missing modes
+
+/// Lanczos vectors for a number of eigenpairs: 1.6 each needed the fewest solves in all (docs/modal-analysis.md).
+Eigen::Index subspace_for(Eigen::Index count) { return 8 + count * 8 / 5; }
+
+double gap_after(const Eigen::VectorXd& lambda, Eigen::Index i) { return (lambda[i] - lambda[i - 1]) / lambda[i - 1]; }
+
+/// The first place at or after `wanted` where a gap ends the list, or −1 if there is none among the pairs.
+Eigen::Index end_of_cluster(const Eigen::VectorXd& lambda, Eigen::Index wanted, Eigen::Index available) {
+  if (wanted == 0) return 0;
+  for (Eigen::Index i = wanted; i < lambda.size(); ++i)
+    if (gap_after(lambda, i) > kClusterGap) return i;
+  return lambda.size() == available ? available : -1;
+}
+
+Eigen::Index available(const ScaledProblem& problem) { return problem.size() - problem.N.cols(); }
+
+/// All eigenpairs of K⁺M, highest 1/λ first, by a dense solver; without N.
+Eigen::MatrixXd all_modes(const ScaledProblem& problem, ElasticInverse& inverse) {
+  const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(problem.size(), problem.size());
+  const Eigen::MatrixXd M = problem.mass_times(I);
+  const Eigen::MatrixXd L = Eigen::LLT<Eigen::MatrixXd>(M).matrixL();
+  const Eigen::MatrixXd operator_matrix = L.transpose() * inverse.apply(L);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver((operator_matrix + operator_matrix.transpose()) / 2.0);
+  const Eigen::MatrixXd Y = solver.eigenvectors().rightCols(available(problem)).rowwise().reverse();
+  return L.transpose().triangularView<Eigen::Upper>().solve(Y);
+}
+
+Eigen::MatrixXd first_guess(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index count,
+                            LanczosOptions options) {
+  options.count = static_cast<int>(count);
+  options.subspace = static_cast<int>(subspace_for(count));
+  if (problem.size() <= kDenseSize || options.subspace > available(problem) / 2)
+    return all_modes(problem, inverse).leftCols(count);
+  const Eigen::MatrixXd none(problem.size(), 0);
+  return lanczos(problem, inverse, none, none, options);
+}
+
+/// Modes orthogonal to the pairs, lowest first.
+Eigen::MatrixXd others(const ScaledProblem& problem, ElasticInverse& inverse, const EigenPairs& pairs, int count,
+                       std::uint64_t seed) {
+  count = static_cast<int>(std::min<Eigen::Index>(count, available(problem) - pairs.count()));
+  const Eigen::Index subspace = std::min<Eigen::Index>(4 * count + 20, available(problem) - pairs.count());
+  if (count < 1 || subspace <= count) return Eigen::MatrixXd(problem.size(), 0);
+  return lanczos(problem, inverse, pairs.W, pairs.MW,
+                 {.count = count, .subspace = static_cast<int>(subspace), .tolerance = 1e-12, .seed = seed});
+}
+
+/// How many of the pairs lie below the widest gap from `first` on.
+Eigen::Index widest_gap(const Eigen::VectorXd& lambda, Eigen::Index first) {
+  Eigen::Index best = std::max<Eigen::Index>(first, 1);
+  for (Eigen::Index i = best; i < lambda.size(); ++i)
+    if (gap_after(lambda, i) > gap_after(lambda, best)) best = i;
+  return best;
+}
+
+}  // namespace
+
+void EigenPairs::keep_first(Eigen::Index count) {
+  lambda.conservativeResize(count);
+  W.conservativeResize(Eigen::NoChange, count);
+  MW.conservativeResize(Eigen::NoChange, count);
+}
+
+EigenPairs refined(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& X) {
+  const Eigen::MatrixXd MX = problem.mass_times(X);
+  Eigen::MatrixXd Y = inverse.apply_accurately(MX), MY = problem.mass_times(Y);
+  // Columns of length one, so that the Gram matrix below is near I however far the eigenvalues are apart.
+  const Eigen::VectorXd shrink = Y.cwiseProduct(MY).colwise().sum().cwiseSqrt().cwiseInverse().transpose();
+  Y *= shrink.asDiagonal();
+  MY *= shrink.asDiagonal();
+  const Eigen::MatrixXd B = Y.transpose() * MY;
+  const Eigen::MatrixXd A = Y.transpose() * (MX * shrink.asDiagonal()) - inverse.shift() * B;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz((A + A.transpose()) / 2.0,
+                                                                       (B + B.transpose()) / 2.0);
+  const Eigen::MatrixXd& S = ritz.eigenvectors();
+  EigenPairs pairs{.lambda = Eigen::VectorXd(S.cols()), .W = Y * S, .MW = MY * S};
+  // The dense solver's λ are good to round-off of the largest; quotients are good to round-off of their own.
+  for (Eigen::Index i = 0; i < S.cols(); ++i) pairs.lambda[i] = S.col(i).dot(A * S.col(i)) / S.col(i).dot(B * S.col(i));
+  return pairs;
+}
+
+EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index wanted,
+                        LanczosOptions options, Eigen::Index& pairs_to_keep) {
+  const Eigen::Index most = available(problem);
+  wanted = std::min(wanted, most);
+  for (Eigen::Index extra = 6 + wanted / 16;; extra *= 2) {
+    EigenPairs pairs =
+        refined(problem, inverse, first_guess(problem, inverse, std::min(wanted + extra, most), options));
+    pairs_to_keep = end_of_cluster(pairs.lambda, wanted, most);
+    if (pairs_to_keep >= 0) return pairs;
+    if (pairs.count() == most) throw ComputationError("the eigenvalues found are not in order");
+  }
+}
+
+void complete(const ScaledProblem& problem, ElasticInverse& inverse, EigenvalueCounter& counter, EigenPairs& pairs,
+              Eigen::Index wanted, Eigen::Index& pairs_to_keep) {
+  wanted = std::min(wanted, available(problem));
+  const Eigen::Index zeros = problem.N.cols();
+  for (int search = 0;; ++search) {
+    const Eigen::Index below = widest_gap(pairs.lambda, pairs_to_keep);
+    const double last = pairs.lambda[below - 1];
+    const double sigma = below < pairs.count() ? (last + pairs.lambda[below]) / 2.0 : 2.0 * last;
+    const Eigen::Index missing = counter.below(sigma) - zeros - below;
+    if (missing == 0) return;
+    if (missing < 0 || search == kSearches)
+      throw ComputationError("the certificate of completeness fails: " + std::to_string(zeros + below) +
+                             " eigenvalues were found below a bound that has " +
+                             std::to_string(zeros + below + missing) + " of them");
+    const Eigen::MatrixXd more =
+        others(problem, inverse, pairs, static_cast<int>(missing) + 4, ~static_cast<std::uint64_t>(search));
+    Eigen::MatrixXd all(problem.size(), pairs.count() + more.cols());
+    all << pairs.W, more;
+    pairs = refined(problem, inverse, all);
+    pairs_to_keep = std::max<Eigen::Index>(end_of_cluster(pairs.lambda, wanted, available(problem)), 0);
+  }
+}
+
+void make_clusters_canonical(EigenPairs& pairs) {
+  for (Eigen::Index begin = 0, end = 0; begin < pairs.count(); begin = end) {
+    for (end = begin + 1; end < pairs.count() && gap_after(pairs.lambda, end) < kUnresolvedGap;) ++end;
+    const Eigen::Index size = end - begin;
+    auto W = pairs.W.middleCols(begin, size);
+    auto MW = pairs.MW.middleCols(begin, size);
+    const Eigen::MatrixXd before = MW;
+    Eigen::MatrixXd turned = W;
+    make_canonical(turned);
+    MW = before * (before.transpose() * turned);
+    W = turned;
+    pairs.lambda.segment(begin, size).setConstant(pairs.lambda.segment(begin, size).mean());
+  }
+}
+
+}  // namespace limber

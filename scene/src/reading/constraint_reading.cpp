@@ -1,0 +1,86 @@
+#include "reading/constraint_reading.h"
+
+#include "limber/core/error.h"
+#include "limber/internal/joint_spec_json.h"
+#include "reading/scene_reading.h"
+
+namespace limber {
+namespace {
+
+using internal::JsonObject;
+using internal::refuse;
+using Json = nlohmann::json;
+
+HandleOptions read_handle_options(const JsonObject& o) {
+  HandleOptions options;
+  if (o.has("directions")) {
+    o.for_each("directions",
+               [&](const Json& v, const std::string& where) { options.directions.push_back(direction_of(v, where)); });
+    if (options.directions.empty()) refuse(o.where("directions"), "[]", "1 to 3 directions at right angles");
+  }
+  options.max_force = positive(o, "max_force", options.max_force);
+  options.stiffness = non_negative(o, "stiffness", options.stiffness);
+  options.damping = non_negative(o, "damping", options.damping);
+  check_input(o.where(), [&] { options.validate(); });
+  return options;
+}
+
+JointActuation read_coordinate(const Json& value, const std::string& where) {
+  const JsonObject o(value, where);
+  JointActuation a;
+  if (o.has("motor")) {
+    const JsonObject motor(o.at("motor"), o.where("motor"));
+    a.motor_velocity = motor.number("velocity");
+    a.motor_max_force = positive(motor, "max_force");
+    motor.finish();
+  }
+  if (o.has("drive")) {
+    const JsonObject drive(o.at("drive"), o.where("drive"));
+    a.drive_target = drive.number("target", 0.0);
+    a.drive_stiffness = non_negative(drive, "stiffness", 0.0);
+    a.drive_damping = non_negative(drive, "damping", 0.0);
+    drive.finish();
+  }
+  a.friction = non_negative(o, "friction", 0.0);
+  o.finish();
+  check_input(where, [&] { a.validate(); });
+  return a;
+}
+
+}  // namespace
+
+SceneHandle read_handle(const Json& value, const std::string& where, const Scene& scene) {
+  const JsonObject o(value, where);
+  SceneHandle h{.body = o.text("body"),
+                .start = o.has("start") ? time_inside(o, "start", scene) : 0.0,
+                .duration = held_duration(o, scene),
+                .at = read_place(o),
+                .options = read_handle_options(o),
+                .movement = read_movement(o, false),
+                .where = where};
+  o.finish();
+  return h;
+}
+
+SceneJoint read_joint(const Json& value, const std::string& where) {
+  const JsonObject o(value, where);
+  SceneJoint j{.a = o.text("a", ""), .b = o.text("b"), .where = where};
+  if (o.has("a") && j.a.empty()) refuse(o.where("a"), "\"\"", "a body; without \"a\" it is the world");
+  j.spec = internal::read_joint_kind(o);
+  if (o.has("limits")) j.spec.limits = internal::read_joint_limits(o, j.spec.type);
+  check_input(where, [&] { j.spec.validate(); });
+  j.patch_radius = non_negative(o, "patch_radius", 0.0);
+  j.collide = o.boolean("collide", false);
+  if (o.has("coordinates"))
+    o.for_each("coordinates",
+               [&](const Json& v, const std::string& w) { j.coordinates.push_back(read_coordinate(v, w)); });
+  const JointFreedoms free = freedoms(j.spec.type);
+  const auto most = static_cast<std::size_t>(free.rotations + free.translations);
+  if (j.coordinates.size() > most)
+    refuse(o.where("coordinates"), "an array of " + std::to_string(j.coordinates.size()) + " items",
+           "at most " + std::to_string(most) + ", which a " + std::string(to_string(j.spec.type)) + " joint has");
+  o.finish();
+  return j;
+}
+
+}  // namespace limber

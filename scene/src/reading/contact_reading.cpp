@@ -1,0 +1,117 @@
+#include "reading/contact_reading.h"
+
+#include <array>
+
+#include "limber/core/error.h"
+#include "reading/scene_reading.h"
+#include "reading/shape_reading.h"
+
+namespace limber {
+namespace {
+
+using internal::JsonObject;
+using internal::refuse;
+using Json = nlohmann::json;
+
+std::optional<double> read_friction(const JsonObject& o) {
+  if (!o.has("friction")) return {};
+  return non_negative(o, "friction", 0.0);
+}
+
+/// Numbers of layers as bits.
+std::uint32_t read_layers(const JsonObject& o, const std::string& key, std::uint32_t otherwise) {
+  constexpr int kLayers = 32;
+  if (!o.has(key)) return otherwise;
+  std::uint32_t bits = 0;
+  o.for_each(key, [&](const Json& value, const std::string& where) {
+    if (!value.is_number_integer() || value < 0 || value >= kLayers)
+      refuse(where, JsonObject::shown(value), "a layer, an integer from 0 to " + std::to_string(kLayers - 1));
+    bits |= std::uint32_t{1} << value.get<int>();
+  });
+  return bits;
+}
+
+CollisionFilter read_filter(const JsonObject& o) {
+  const CollisionFilter all;
+  return {.layers = read_layers(o, "layers", all.layers), .mask = read_layers(o, "meets", all.mask)};
+}
+
+ContactRule read_rule(const JsonObject& o) {
+  using enum ContactMethod;
+  using enum FrictionModel;
+  const ContactRule rule;
+  return {.method = choice_of(o, "method", {kPenalty, kVelocityProgram, kGapProgram, ContactMethod::kComplementary},
+                              rule.method),
+          .friction = choice_of(o, "friction_model", {kCone, kHeuristic, kHeuristicNoSlip}, rule.friction),
+          .guard = choice_of(o, "guard", {ProgramGuard::kNone, ProgramGuard::kClamp, ProgramGuard::kComplementary},
+                             rule.guard)};
+}
+
+ContactOptions read_contact_options(const JsonObject& o) {
+  using enum ImpactModel;
+  ContactOptions c;
+  c.rule = read_rule(o);
+  c.friction = non_negative(o, "friction", c.friction);
+  c.rolling_friction = non_negative(o, "rolling_friction", c.rolling_friction);
+  c.recovery_speed = non_negative(o, "recovery_speed", c.recovery_speed);
+  c.residual_compliance = o.boolean("residual_compliance", c.residual_compliance);
+  c.penalty_frequency = positive(o, "penalty_frequency", c.penalty_frequency);
+  c.penalty_damping = non_negative(o, "penalty_damping", c.penalty_damping);
+  c.impact = choice_of(o, "impact", {kAbsorbed, kHeld, kHeldFromTouch}, c.impact);
+  c.impact_speed = non_negative(o, "impact_speed", c.impact_speed);
+  o.finish();
+  check_input(o.where(), [&] { c.validate(); });
+  return c;
+}
+
+}  // namespace
+
+std::string_view to_string(ContactMethod method) {
+  constexpr std::array kWords{"penalty", "velocity_program", "gap_program", "complementary"};
+  return kWords[static_cast<std::size_t>(method)];
+}
+
+std::string_view to_string(FrictionModel model) {
+  constexpr std::array kWords{"cone", "heuristic", "heuristic_no_slip"};
+  return kWords[static_cast<std::size_t>(model)];
+}
+
+std::string_view to_string(ProgramGuard guard) {
+  constexpr std::array kWords{"none", "clamp", "complementary"};
+  return kWords[static_cast<std::size_t>(guard)];
+}
+
+std::string_view to_string(ImpactModel model) {
+  constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
+  return kWords[static_cast<std::size_t>(model)];
+}
+
+std::optional<ContactOptions> read_contact(const JsonObject& scene) {
+  if (scene.has("contact")) return read_contact_options(JsonObject(scene.at("contact"), scene.where("contact")));
+  if (scene.has("statics")) return ContactOptions{};
+  return {};
+}
+
+SceneStatic read_static(const Json& value, const std::string& where, const std::filesystem::path& folder) {
+  const JsonObject o(value, where);
+  SceneStatic s{.name = o.text("name"),
+                .shape = read_shape(o, folder, false),
+                .pose = read_pose(o),
+                .filter = read_filter(o),
+                .friction = read_friction(o),
+                .where = where};
+  o.finish();
+  return s;
+}
+
+void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
+  for (const char* key : {"friction", "shape", "layers", "meets"})
+    if (o.has(key) && !scene.contact)
+      throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
+                       "\"statics\" beside \"bodies\"");
+  body.placement.friction = read_friction(o);
+  body.placement.filter = read_filter(o);
+  if (o.has("shape")) body.shape = read_shape(o, folder, true);
+}
+
+}  // namespace limber

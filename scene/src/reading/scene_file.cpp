@@ -1,0 +1,269 @@
+#include "limber/scene/scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "limber/core/error.h"
+#include "reading/constraint_reading.h"
+#include "reading/contact_reading.h"
+#include "reading/scene_reading.h"
+
+namespace limber {
+namespace {
+
+using internal::JsonObject;
+using internal::refuse;
+using Json = nlohmann::json;
+
+constexpr std::int64_t kMaxSteps = 1'000'000'000;
+constexpr std::int64_t kMaxCopies = 100'000;
+constexpr std::int64_t kMaxSubsteps = 1'000'000;
+
+Axes read_axes(const JsonObject& o) {
+  return choice(o, "axes", {"world", "body"}, "world") == 0 ? Axes::kWorld : Axes::kBody;
+}
+
+Strike read_strike(const Json& value, const std::string& where, const Scene& scene) {
+  const JsonObject o(value, where);
+  Strike s{.body = o.text("body"),
+           .time = time_inside(o, "time", scene),
+           .at = read_place(o),
+           .impulse = o.vec3("impulse"),
+           .axes = read_axes(o),
+           .where = where};
+  o.finish();
+  return s;
+}
+
+HeldForce read_force(const Json& value, const std::string& where, const Scene& scene) {
+  const JsonObject o(value, where);
+  HeldForce f{.body = o.text("body"),
+              .start = o.has("start") ? time_inside(o, "start", scene) : 0.0,
+              .duration = held_duration(o, scene, " (or use a strike)"),
+              .at = read_place(o),
+              .force = o.vec3("force"),
+              .axes = read_axes(o),
+              .where = where};
+  o.finish();
+  return f;
+}
+
+/// A grid of copies: count along x, y, z and the distances between them. One body where it is not given.
+struct Grid {
+  std::array<Index, 3> count{1, 1, 1};
+  Vec3 spacing = Vec3::Zero();
+};
+
+Grid read_grid(const JsonObject& body) {
+  Grid grid;
+  if (!body.has("copies")) return grid;
+  const JsonObject o(body.at("copies"), body.where("copies"));
+  const auto count = o.numbers("count", 3);
+  for (int a = 0; a < 3; ++a) {
+    if (count[a] != std::floor(count[a]) || count[a] < 1 || count[a] > kMaxCopies)
+      refuse(o.where("count"), JsonObject::shown(Json(count)), "three whole numbers >= 1");
+    grid.count[a] = static_cast<Index>(count[a]);
+  }
+  if (count[0] * count[1] * count[2] > kMaxCopies)
+    refuse(o.where("count"), JsonObject::shown(Json(count)), "at most " + std::to_string(kMaxCopies) + " copies");
+  grid.spacing = o.vec3("spacing");
+  o.finish();
+  return grid;
+}
+
+std::variant<Index, std::string> read_part(const JsonObject& o) {
+  if (!o.has("part")) return Index{0};
+  if (o.at("part").is_string()) return o.text("part");
+  return static_cast<Index>(o.integer("part", 0, kMaxIndex));
+}
+
+std::string known_asset(const JsonObject& o, const Scene& scene) {
+  std::string name = o.text("asset");
+  if (scene.assets.contains(name)) return name;
+  std::vector<std::string> known;
+  for (const auto& [key, unused] : scene.assets) known.push_back(key);
+  throw InputError(o.where("asset") + ": \"" + name + "\" is not among the scene's assets; did you mean \"" +
+                   internal::nearest_word(name, known) + "\"?");
+}
+
+void add_copies(const SceneBody& original, const Grid& grid, Scene& scene) {
+  const bool alone = grid.count[0] == 1 && grid.count[1] == 1 && grid.count[2] == 1;
+  int i = 0;
+  for (Index z = 0; z < grid.count[2]; ++z)
+    for (Index y = 0; y < grid.count[1]; ++y)
+      for (Index x = 0; x < grid.count[0]; ++x) {
+        SceneBody copy = original;
+        if (!alone) copy.name += "[" + std::to_string(i++) + "]";
+        const Vec3 shift = Vec3(x, y, z).cwiseProduct(grid.spacing);
+        copy.placement.pose.p += shift;
+        if (auto* keys = std::get_if<std::vector<PoseKey>>(&copy.movement))
+          for (PoseKey& key : *keys) key.pose.p += shift;
+        scene.bodies.push_back(std::move(copy));
+      }
+}
+
+void read_body(const Json& value, const std::string& where, const std::filesystem::path& folder, Scene& scene) {
+  const JsonObject o(value, where);
+  SceneBody body;
+  body.name = body.group = o.text("name");
+  body.asset = known_asset(o, scene);
+  body.part = read_part(o);
+  body.placement = {.pose = read_pose(o),
+                    .velocity = o.vec3("velocity", Vec3::Zero()),
+                    .angular_velocity = o.vec3("angular_velocity", Vec3::Zero())};
+  read_touch(o, scene, folder, body);
+  body.movement = read_movement(o, true);
+  if (body.movement.index() != 0 && (o.has("velocity") || o.has("angular_velocity")))
+    throw InputError(where + ": has both a velocity and a \"motion\", expected one of them");
+  body.where = where;
+  const Grid grid = read_grid(o);
+  o.finish();
+  add_copies(body, grid, scene);
+}
+
+void require_unique_names(const Scene& scene) {
+  std::set<std::string> seen;
+  const auto require_new = [&](const std::string& name, const std::string& where) {
+    if (!seen.insert(name).second)
+      throw InputError(where + ".name: \"" + name + "\" is the name of another body or static, expected one name each");
+  };
+  for (const SceneBody& body : scene.bodies) require_new(body.name, body.where);
+  for (const SceneStatic& s : scene.statics) require_new(s.name, s.where);
+}
+
+/// @return how many bodies have the name
+std::size_t require_known_body(const Scene& scene, const std::string& name, const std::string& where) {
+  const auto named = [&](const SceneBody& body) { return body.name == name || body.group == name; };
+  const auto count = std::count_if(scene.bodies.begin(), scene.bodies.end(), named);
+  if (count > 0) return static_cast<std::size_t>(count);
+  std::vector<std::string> known;
+  for (const SceneBody& body : scene.bodies) known.push_back(body.name);
+  throw InputError(where + ": \"" + name + "\" is not among the scene's bodies; did you mean \"" +
+                   internal::nearest_word(name, known) + "\"?");
+}
+
+void require_one_body(const Scene& scene, const std::string& name, const std::string& where) {
+  const std::size_t count = require_known_body(scene, name, where);
+  if (count > 1)
+    throw InputError(where + ": \"" + name + "\" is the name of " + std::to_string(count) +
+                     " copies, expected one of them, such as \"" + name + "[0]\"");
+}
+
+void require_joined_bodies(const Scene& scene, const SceneJoint& joint) {
+  if (!joint.a.empty()) require_one_body(scene, joint.a, joint.where + ".a");
+  require_one_body(scene, joint.b, joint.where + ".b");
+  if (joint.a == joint.b) refuse(joint.where + ".b", internal::in_quotes(joint.b), "another body than \"a\"");
+}
+
+/// Whatever names a body is read when all are known.
+void read_actions(const JsonObject& o, Scene& scene) {
+  const auto each = [&](const char* key, auto&& read) {
+    if (o.has(key)) o.for_each(key, read);
+  };
+  each("strikes", [&](const Json& v, const std::string& w) { scene.strikes.push_back(read_strike(v, w, scene)); });
+  each("forces", [&](const Json& v, const std::string& w) { scene.forces.push_back(read_force(v, w, scene)); });
+  each("handles", [&](const Json& v, const std::string& w) { scene.handles.push_back(read_handle(v, w, scene)); });
+  each("joints", [&](const Json& v, const std::string& w) { scene.joints.push_back(read_joint(v, w)); });
+  for (const Strike& s : scene.strikes) require_known_body(scene, s.body, s.where + ".body");
+  for (const HeldForce& f : scene.forces) require_known_body(scene, f.body, f.where + ".body");
+  for (const SceneHandle& h : scene.handles) require_known_body(scene, h.body, h.where + ".body");
+  for (const SceneJoint& j : scene.joints) require_joined_bodies(scene, j);
+}
+
+void read_time(const JsonObject& o, Scene& scene) {
+  scene.step = positive(o, "step");
+  if (o.has("steps") == o.has("duration"))
+    throw InputError(o.where() + ": has " + (o.has("steps") ? "both \"steps\" and" : "neither \"steps\" nor") +
+                     " \"duration\", expected one of them");
+  if (o.has("steps")) {
+    scene.steps = o.integer("steps", 1, kMaxSteps);
+    return;
+  }
+  // A duration that is a multiple of the step but for round-off is that many steps; else the last step is begun.
+  const double exact = positive(o, "duration") / scene.step;
+  if (!(exact <= static_cast<double>(kMaxSteps)))
+    refuse(o.where("duration"), shown(o.number("duration")), "at most " + std::to_string(kMaxSteps) + " steps");
+  const double nearest = std::round(exact);
+  scene.steps = static_cast<std::int64_t>(std::abs(exact - nearest) <= 1e-9 * exact ? nearest : std::ceil(exact));
+}
+
+void read_assets(const JsonObject& o, const std::filesystem::path& folder, Scene& scene) {
+  const Json& assets = o.at("assets");
+  if (!assets.is_object() || assets.empty())
+    refuse(o.where("assets"), JsonObject::shown(assets), "an object {name: file, ...} with at least one");
+  const JsonObject entries(assets, o.where("assets"));
+  for (const auto& [name, unused] : assets.items()) {
+    const std::string file = entries.text(name);
+    if (file.empty()) refuse(entries.where(name), "\"\"", "a file name");
+    scene.assets[name] = folder / file;
+  }
+}
+
+SleepOptions read_sleep(const JsonObject& o) {
+  SleepOptions sleep{.enabled = true};
+  sleep.time = non_negative(o, "time", sleep.time);
+  sleep.speed = non_negative(o, "speed", sleep.speed);
+  o.finish();
+  return sleep;
+}
+
+SceneLimits read_limits(const JsonObject& o) {
+  constexpr LoadKind kKinds[] = {LoadKind::kStatic, LoadKind::kSudden, LoadKind::kResonant};
+  SceneLimits limits;
+  limits.max_modes =
+      static_cast<int>(o.integer("max_modes", 1, std::numeric_limits<int>::max(), std::numeric_limits<int>::max()));
+  limits.max_force = non_negative(o, "max_force", 0.0);
+  limits.min_displacement = non_negative(o, "min_displacement", 0.0);
+  limits.frame_rate = non_negative(o, "frame_rate", 0.0);
+  limits.load = kKinds[choice(o, "load", {"static", "sudden", "resonant"}, "sudden")];
+  o.finish();
+  if ((limits.max_force > 0.0) != (limits.min_displacement > 0.0))
+    throw InputError(o.where() + ": has only one of \"max_force\" and \"min_displacement\", expected both or none");
+  return limits;
+}
+
+}  // namespace
+
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+  const Json document = internal::parse_json(text, name);
+  const JsonObject o(document, name);
+  Scene scene;
+  read_time(o, scene);
+  scene.substeps = static_cast<int>(o.integer("substeps", 1, kMaxSubsteps, scene.substeps));
+  if (o.has("sleep")) scene.sleep = read_sleep(JsonObject(o.at("sleep"), o.where("sleep")));
+  scene.gravity = o.vec3("gravity", scene.gravity);
+  read_assets(o, folder, scene);
+  if (o.has("limits")) scene.limits = read_limits(JsonObject(o.at("limits"), o.where("limits")));
+  scene.contact = read_contact(o);
+  if (o.has("statics"))
+    o.for_each("statics",
+               [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, folder)); });
+  o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
+  if (scene.bodies.empty()) refuse(o.where("bodies"), "[]", "at least one body");
+  require_unique_names(scene);
+  read_actions(o, scene);
+  o.finish();
+  return scene;
+}
+
+std::vector<std::filesystem::path> files_of(const Scene& scene) {
+  std::set<std::filesystem::path> files;
+  const auto add = [&](const SceneShape& shape) {
+    if (const auto* file = std::get_if<ShapeFile>(&shape)) files.insert(file->path);
+  };
+  for (const auto& [name, file] : scene.assets) files.insert(file);
+  for (const SceneBody& body : scene.bodies) add(body.shape);
+  for (const SceneStatic& s : scene.statics) add(s.shape);
+  return {files.begin(), files.end()};
+}
+
+Scene read_scene(const std::filesystem::path& path) {
+  constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
+  Scene scene = parse_scene(read_file(path, kMaxBytes), "\"" + path.string() + "\"", path.parent_path());
+  scene.name = path.stem().string();
+  return scene;
+}
+
+}  // namespace limber
