@@ -5,10 +5,10 @@
 #include <numeric>
 
 #include "dense_fem.h"
-#include "elastic_modes.h"
+#include "eigen/elastic_modes.h"
 #include "limber/core/error.h"
 #include "limber/precompute/fem.h"
-#include "sparse_operations.h"
+#include "eigen/sparse_operations.h"
 #include "tet_box.h"
 
 namespace limber {

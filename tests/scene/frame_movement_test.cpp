@@ -1,5 +1,5 @@
 // Moved frames: velocities are the derivatives of poses, and every key is reached at rest.
-#include "frame_movement.h"
+#include "running/frame_movement.h"
 
 #include <gtest/gtest.h>
 
