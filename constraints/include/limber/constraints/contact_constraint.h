@@ -3,24 +3,27 @@
 ///
 ///   0 ≤ f_n ⊥ gap(end of step) + (G F)_n − offset ≥ 0         |f_t| ≤ μ f_n, against the slip of the whole step
 ///
-/// Gaps in m, impulses f in N·s, F = f/Δt. Both points of a contact are carried along by their bodies, deformation
-/// included; of what is round (ContactSide::radius) the centre is, and slip counts what has rolled by. The normal stays
-/// as it was found. Gap and slip are those at the end of the step: stiff bodies do not sink, what sticks does not
-/// creep.
+/// Gaps in m, impulses f in N·s, F = f/Δt. Gap and slip are those at the end of the step: stiff bodies do not sink,
+/// what sticks does not creep. Both points of a contact are carried along by their bodies, deformation included; of
+/// round surfaces (ContactSide::radius) the centre is, and slip counts rolling. The normal stays as it was found.
 ///
 /// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. All contacts of a body
 /// yield to each other's forces. The residual displacement is a state of the body: the forces of its last step at the
-/// material points that they pressed on, in its own frame (DentLoad). Its energy ½ FᵀG F is booked. Where nothing
-/// presses any more it is dropped, and its energy with it. *Contact compliance* (`give`): contacts of bodies that flex
-/// yield by 3e-3 of what a force moves the reduced mass of the two within a step, or by 1e-4 beside a residual
-/// compliance, which makes the shares of a load among redundant contacts unique. A body sinks by at most 3e-3 g Δt² for
-/// each body that it carries. *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press
-/// at more than `impact_speed`. An impact lasts until none of their contacts presses, at most a period of the lowest
-/// mode of either. Forces are held over the step (θ = ½) only in islands of nothing but contacts. *Overlap* at the
-/// start shrinks by a fifth a step, at most at `recovery_speed`; that is work done on the island. Overlap up to the
-/// largest residual displacement of the pair stays, at most 4e-4 of the radius of either body.
+/// material points that they pressed on, in its own frame (DentLoad), with the energy ½ FᵀG F.
 ///
-/// Errors: InvalidArgument from options alone; a step never throws. What to expect: docs/contact.md.
+/// *Contact compliance* (`give`): contacts of bodies that flex yield by 3e-3 of what a force moves the reduced mass of
+/// the two within a step, 1e-4 beside a residual compliance. It makes the shares of a load among redundant contacts
+/// unique; a body sinks by at most 3e-3 g Δt² for each body that it carries.
+///
+/// *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press at more than
+/// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
+/// held over the step (θ = ½) only in islands of nothing but contacts.
+///
+/// *Overlap* at the start shrinks by a fifth a step, at most at `recovery_speed`; that is work done on the island,
+/// bounded by what lifts it at that speed. It stays up to the largest residual displacement of the pair, at most 4e-4
+/// of the radius of either body.
+///
+/// Only options throw, InvalidArgument. What to expect: docs/contact.md.
 #pragma once
 
 #include <cstdint>
@@ -53,12 +56,12 @@ enum class ImpactModel {
 };
 
 struct ContactOptions {
-  double friction = 0.5;  ///< μ of bodies that do not say; ≥ 0
+  double friction = 0.5;  ///< μ of bodies without their own; ≥ 0
   /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
   /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
   /// C g/(1 + ⅖), and stays on slopes of less than atan C. A tyre on asphalt has 0.01, a ball on grass 0.1. Spinning is
-  /// braked likewise; what has corners is not. 0: what is round rolls on for ever. Of
-  /// ContactMethod::kComplementary with FrictionModel::kCone.
+  /// braked likewise; bodies with corners are not. 0: round bodies roll on for ever. Works with
+  /// ContactMethod::kComplementary and FrictionModel::kCone.
   double rolling_friction = 0.0;
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
   /// Used where the models have it.
@@ -67,8 +70,8 @@ struct ContactOptions {
   /// kPenalty: frequency and share of critical damping of each contact's spring under the bodies' reduced mass, Hz, >
   /// 0, and ≥ 0. k = m (2πν)², c = 2ζ m 2πν.
   double penalty_frequency = 15.0, penalty_damping = 1.0;
-  ImpactModel impact = ImpactModel::kAbsorbed;  ///< of kGapProgram and kComplementary
-  /// m/s, ≥ 0: what comes together more slowly is no impact, so that bouncing ends and what rests stays (θ = 1).
+  ImpactModel impact = ImpactModel::kAbsorbed;  ///< by kGapProgram and kComplementary
+  /// m/s, ≥ 0: bodies that come together more slowly do not rebound, so that bouncing ends (θ = 1).
   double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
