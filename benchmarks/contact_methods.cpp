@@ -1,6 +1,6 @@
 // The four contact methods in the same scenes, from World: what each lets overlap, how still it comes to rest, how much
 // energy it adds, what it costs, and how its linear programs compare with the complementary answer. Prints Markdown.
-// Figures: docs/contact.md, docs/contact-solvers.md.
+// Figures: docs/reports/contact-methods.md.
 #include <algorithm>
 #include <cstdio>
 #include <memory>

@@ -41,15 +41,15 @@ struct RowLaw {
   double lower = -kUnbounded;  ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
   double upper = kUnbounded;  ///< largest impulse
   double tolerance = 1e-12;   ///< of the gap, in its unit; > 0
-  /// The row holds still what lies on it: a joint, a stop, the ground. Its answer to gravity and other held forces is
-  /// found by itself, so that what rests has no velocity. For rows without compliance.
+  /// A static constraint: a joint, a stop, the ground. Its force under gravity and other held forces is found by
+  /// itself, so that what rests has no velocity. For rows without compliance.
   bool holds = false;
-  /// The row's force goes on from step to step: springs, motors, friction. `last_force` is that of the last step.
+  /// The row's force persists from step to step: springs, motors, friction. `last_force` is that of the last step.
   bool goes_on = false;
   double last_force = 0.0;
-  double held_force = 0.0;  ///< of contacts: what of it went on beyond the last step's end
-  /// How far the agent behind the row (a hand, a motor) moves what it holds within the step, in the gap's unit: the
-  /// work f/Δt times this may enter the system.
+  double held_force = 0.0;  ///< of contacts: the part of it that persists beyond the last step's end
+  /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
+  /// times this may enter the system.
   double agent_displacement = 0.0;
   /// Of the spring in the row, force per unit gap from 0: its energy ½ stiffness gap² counts with that of the bodies.
   double stiffness = 0.0;
@@ -68,8 +68,8 @@ struct RowLaw {
   bool slides = false;
 };
 
-/// What part of a contact's force goes on beyond the step's end in large islands: no more than it was in the step
-/// before, so that what a blow adds does not. @param before, now its sizes in the last step and in this one, N
+/// The part of a contact's force that persists beyond the step's end in large islands: no more than the force of the
+/// step before, so that a blow does not. @param before, now its sizes in the last step and in this one, N
 inline double lasting_part(double before, double now) { return now > before ? before / now : 1.0; }
 
 /// The rows of one island, made anew every step in memory that is kept.
@@ -85,7 +85,7 @@ class ConstraintRows {
     RowLaw law;
   };
 
-  /// Two rows that yield to each other's forces, beyond what the modes show: gap_i += G f_j/Δt, gap_j += G f_i/Δt.
+  /// Coupled compliance of two rows, beyond what the modes show: gap_i += G f_j/Δt, gap_j += G f_i/Δt.
   struct Flexibility {
     Index i = 0, j = 0;
     double value = 0.0;  ///< G, m/N
@@ -98,7 +98,7 @@ class ConstraintRows {
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
   void add_flexibility(Index body, Index i, Index j, double value) { flexibility_.push_back({i, j, value, body}); }
-  /// What a row yields to its own force alone, whatever it acts on: value ≥ 0.
+  /// Contact compliance: what a row yields to its own force alone, whatever it acts on, m/N; value ≥ 0.
   void add_give(Index row, double value) { flexibility_.push_back({row, row, value, -1}); }
   /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
   void add_stored_energy(double energy) { stored_energy_ += energy; }

@@ -3,32 +3,27 @@
 ///
 ///   0 ≤ f_n ⊥ gap(end of step) + (G F)_n − offset ≥ 0         |f_t| ≤ μ f_n, against the slip of the whole step
 ///
-/// Both points of a contact are carried along by their bodies, deformation included; of what is round
-/// (ContactSide::radius) the centre is, and it touches below that. The normal stays as it was found. The gap is that at
-/// the end of the step, so that stiff bodies do not sink, and the slip is the way of the one point along the other
-/// within the step, what has rolled by included, so that what sticks does not creep.
+/// Gaps in m, impulses f in N·s, F = f/Δt. Gap and slip are those at the end of the step: stiff bodies do not sink,
+/// what sticks does not creep. Both points of a contact are carried along by their bodies, deformation included; of
+/// round surfaces (ContactSide::radius) the centre is, and slip counts rolling. The normal stays as it was found.
 ///
-/// G F is the residual compliance (residual_compliance.h) under the contact forces F = f/Δt: the part of a dent that
-/// the kept modes cannot show. All contacts of a body yield to each other's forces, whichever bodies they are with.
-/// Dents are a state of the body: it remembers the forces of its last step at the material points that they pressed on,
-/// in its own frame, and a contact finds the dent that is there, whether it is an old one or has just come in another's
-/// place. Their energy ½ FᵀG F is booked. What nothing presses any more lets go of it; it is lost.
+/// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. All contacts of a body
+/// yield to each other's forces. The residual displacement is a state of the body: the forces of its last step at the
+/// material points that they pressed on, in its own frame (DentLoad), with the energy ½ FᵀG F.
 ///
-/// Contacts of bodies that flex yield a little by themselves: by 3e-3 of what a force moves the reduced mass of the two
-/// within a step, in place of what the modes do not show, or 1e-4 beside a residual compliance. Where many contacts
-/// could share a load in many ways, it is shared in one way then, which changes little where gaps change by a
-/// picometre; without it such steps do not settle. What rests sinks by less than 3e-3 g Δt² for it (8e-6 m at 60 steps
-/// a second) for each body that lies on it.
+/// *Contact compliance* (`give`): contacts of bodies that flex yield by 3e-3 of what a force moves the reduced mass of
+/// the two within a step, 1e-4 beside a residual compliance. It makes the shares of a load among redundant contacts
+/// unique; a body sinks by at most 3e-3 g Δt² for each body that it carries.
 ///
-/// An impact, for ImpactModel, is a pair of bodies that begin to press on each other at more than `impact_speed`, of
-/// which one at least can flex (modes or residual compliance). It lasts until none of their contacts presses any more,
-/// at most a period of the lowest mode of either: longer is no rebound. θ is one for an island, since A would not be
-/// symmetric otherwise, and ½ only where nothing but contacts acts in it: the velocities of joints and hands want θ
-/// = 1.
+/// *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press at more than
+/// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
+/// held over the step (θ = ½) only in islands of nothing but contacts.
 ///
-/// From a penetrated start the gap is asked to shrink no further, and is pushed open slowly; what that takes counts as
-/// work done on the island. Overlap up to the deepest dent of the pair stays, at most 4e-4 of the radius of either: the
-/// kept modes do not show the shape, and which few of many contacts are there changes from step to step.
+/// *Overlap* at the start shrinks by a fifth a step, at most at `recovery_speed`; that is work done on the island,
+/// bounded by what lifts it at that speed. It stays up to the largest residual displacement of the pair, at most 4e-4
+/// of the radius of either body.
+///
+/// Only options throw, InvalidArgument. What to expect: docs/contact.md.
 #pragma once
 
 #include <cstdint>
@@ -45,8 +40,8 @@ namespace limber {
 
 /// How long a contact force lasts, seen from the frames of the bodies; their modes always feel it held over the step.
 enum class ImpactModel {
-  /// All at the step's start, θ = 1. What the frames bring into a contact is lost to the method in the measure of the
-  /// step: a rigid body does not rebound, an elastic one in contact for N steps loses about 4/N of its energy.
+  /// All at the step's start, θ = 1: a rigid body does not rebound, an elastic one in contact for N steps loses about
+  /// 4/N of its energy.
   kAbsorbed,
   /// Held over the step, θ = ½, while an impact lasts; else θ = 1. Loses nothing but what the gap at the first step's
   /// start costs, so that the rebound is that of the elastic bodies.
@@ -54,19 +49,19 @@ enum class ImpactModel {
   /// The same from the touch until they let go: the steps of islands of free bodies with nothing but contacts are cut
   /// where an impact begins and where it ends, so that the rebound is that of the elastic bodies at any step. It begins
   /// at the exact time at which the first of their contacts closes (exact_motion.h) faster than `impact_speed`. It ends
-  /// where the impulse that keeps its gaps closed is largest: from there on contacts would have to pull. That is found
-  /// by doing the part some ten times, for all impacts of an island together, where it settles soon. At most four cuts
-  /// a step: what strikes and lets go more often in it is kHeld. Contacts are those found at the step's start.
+  /// where the impulse that keeps its gaps closed is largest: from there on contacts would have to pull. That takes the
+  /// part some ten times, for all impacts of an island together. At most four cuts a step: what strikes and lets go
+  /// more often in it is kHeld. Contacts are those found at the step's start.
   kHeldFromTouch,
 };
 
 struct ContactOptions {
-  double friction = 0.5;  ///< μ of bodies that do not say; ≥ 0
+  double friction = 0.5;  ///< μ of bodies without their own; ≥ 0
   /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
   /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
   /// C g/(1 + ⅖), and stays on slopes of less than atan C. A tyre on asphalt has 0.01, a ball on grass 0.1. Spinning is
-  /// braked likewise; what has corners is not. 0: what is round rolls on for ever. Of
-  /// ContactMethod::kComplementary with FrictionModel::kCone.
+  /// braked likewise; bodies with corners are not. 0: round bodies roll on for ever. Works with
+  /// ContactMethod::kComplementary and FrictionModel::kCone.
   double rolling_friction = 0.0;
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
   /// Used where the models have it.
@@ -75,8 +70,8 @@ struct ContactOptions {
   /// kPenalty: frequency and share of critical damping of each contact's spring under the bodies' reduced mass, Hz, >
   /// 0, and ≥ 0. k = m (2πν)², c = 2ζ m 2πν.
   double penalty_frequency = 15.0, penalty_damping = 1.0;
-  ImpactModel impact = ImpactModel::kAbsorbed;  ///< of kGapProgram and kComplementary
-  /// m/s, ≥ 0: what comes together more slowly is no impact, so that bouncing ends and what rests stays (θ = 1).
+  ImpactModel impact = ImpactModel::kAbsorbed;  ///< by kGapProgram and kComplementary
+  /// m/s, ≥ 0: bodies that come together more slowly do not rebound, so that bouncing ends (θ = 1).
   double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
@@ -104,7 +99,7 @@ struct ContactMemory {
   Index a = -1, b = -1;       ///< bodies
   Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
   Vec3 held = Vec3::Zero();   ///< what of it goes on into the next step
-  double give = 0.0;          ///< what the contact yielded to it by itself, m/N; ½ give F² is stored there
+  double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
   Index yielding = -1;        ///< the body that this energy is counted with
 };
 
@@ -120,7 +115,7 @@ struct RollingMemory {
   Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
 };
 
-/// A force that was pressed on a body in the last step, and is what has dented it.
+/// A force that pressed on a body in the last step: the source of its residual displacement.
 struct DentLoad {
   SurfacePoint at{};
   Vec3 force = Vec3::Zero();  ///< body frame, N
@@ -156,12 +151,12 @@ class ContactSet {
   std::span<const StrikeMemory> strikes() const;
   /// Pairs that resisted rolling in the last step, ordered by (a, b).
   std::span<const RollingMemory> rolling() const;
-  /// The forces that dent a body beyond its modes (residual compliance), as the last step left them.
+  /// The forces behind a body's residual displacement, as the last step left them.
   std::span<const DentLoad> dent_loads(Index body) const;
-  /// What contacts store in a body, ½ FᵀG F and ½ give F², J: beside the energy of its modes.
+  /// The energy in a body's residual and contact compliance, ½ FᵀG F and ½ give F², J: beside that of its modes.
   double dent_energy(const BodyStates& states, Index body) const;
   const ContactOptions& options() const;
-  /// A body that is removed: its dents go with it.
+  /// A body that is removed: its residual displacement goes with it.
   void forget(Index body);
   /// Forgets what it knows of earlier steps.
   void clear();

@@ -8,12 +8,13 @@
 ///   kGapProgram        min Σf, g ≥ 0, f ≥ 0                              the same at the end of the step, force held
 ///   kComplementary     0 ≤ f ⊥ g ≥ 0                                     the default
 ///
-/// [H03] takes the spring of kPenalty at the step's start, which is stable only for Δt² k A below about 4; here it is
-/// taken at the end, as a compliance 1/(Δt k + c) of the row: stable for every k, c and step, and soft all the same:
-/// n contacts under a weight m g sink in by m g/(n k). kVelocityProgram is exact at the touch (the step is cut there,
-/// four times at most) and does not look at the gap otherwise: what it lets sink stays so. Its forces hold the
-/// accelerations of the step's start, so stiff modes make it rough. Programs that are degenerate or have no solution
-/// never fail a step: slack is bought at a price (linear_program.h) and counted as relaxed.
+/// kPenalty takes its spring at the step's end, as a compliance 1/(Δt k + c) of the row ([H03]: at its start): stable
+/// for every k, c and step. n contacts under a weight m g sink in by m g/(n k). With kCone its steps do not settle in
+/// piles. kVelocityProgram cuts the step at the touch, four times at most, in islands of free bodies with nothing but
+/// contacts. It does not look at the gap otherwise, so what sinks in stays so; it leaves J̇v out of J a. Its forces hold
+/// the accelerations of the step's start, which is rough for stiff modes. Programs that are degenerate or have no
+/// solution never fail a step: slack is bought at a price (linear_program.h) and counted as relaxed. Side by side:
+/// docs/reports/contact-methods.md.
 #pragma once
 
 #include "limber/constraints/energy_guard.h"
@@ -34,9 +35,10 @@ enum class FrictionModel {
   kHeuristicNoSlip,
 };
 
-/// What happens to a linear program's answer that would add energy (energy_guard.h).
+/// What happens to a linear program's answer that would add energy (energy_guard.h). It judges the normals' work; what
+/// heuristic friction adds is left to the island's energy guard.
 enum class ProgramGuard {
-  kNone,           ///< it stays as [H03] has it; the island's own guard (island_solver.h) is off as well
+  kNone,           ///< it stays, as in [H03]; the island's energy guard (island_solver.h) is off as well
   kClamp,          ///< the largest part of it that adds none, blended with the complementary answer
   kComplementary,  ///< the complementary answer takes its place
 };
@@ -49,7 +51,7 @@ struct ContactRule {
   bool is_program() const { return method == ContactMethod::kVelocityProgram || method == ContactMethod::kGapProgram; }
 };
 
-/// What the linear programs of a step came to; at gap level those of the last iteration.
+/// The results of a step's linear programs; at gap level those of the last iteration.
 struct ProgramReport {
   EnergyGuardReport guard{};  ///< of solves with at least one force, whatever ProgramGuard does with the answer
   long different = 0;         ///< of guard.solves: another energy than the complementary answer, by 1e-6 of it

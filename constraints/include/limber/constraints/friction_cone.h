@@ -11,7 +11,8 @@
 /// μ = 0 is a contact without friction.
 ///
 /// (1) is not convex: contacts strongly coupled by large friction may not converge by any method here (figures:
-/// docs/contact-solvers.md). The status then is kIterationLimit, and the forces are in their cones all the same.
+/// docs/reports/contact-solvers.md). The status then is kIterationLimit, and the forces are in their cones all the
+/// same. For programs of your own: islands (island_solver.h) use private solvers with the same fixed point.
 ///
 /// Methods, all with (1) as fixed point where they converge:
 /// - kBlockGaussSeidel: one contact after the other, each solved exactly; memory and time linear in contacts × bodies.

@@ -13,9 +13,10 @@
 /// order in the step (limber/dynamics/rigid_frame.h). Deterministic: same calls, same bits, for any Jobs. Once warm, a
 /// step allocates nothing. A World is used by one thread at a time; it spreads the work over its Jobs itself.
 ///
-/// Handles and joints tie bodies together. All of an island of bodies is one problem per step, solved at the step's
-/// end: held points and joints are where they should be to round-off, and the island's energy does not rise but by the
-/// work of what drives it (limber/constraints/island_solver.h). Bodies without constraints cost what they cost without.
+/// Handles, joints and contacts tie bodies together into islands, each one problem per step, solved at the step's end:
+/// held points and joints are where they should be to round-off, and the island's energy does not rise but by the work
+/// of what drives it (limber/constraints/island_solver.h). Where an island does not settle, ConstraintReport::solved is
+/// false. Bodies without constraints cost what they cost without. Contact: docs/contact.md.
 ///
 /// All functions throw InvalidArgument, and then change nothing, for an id that names no body, for numbers that are not
 /// finite, and for arrays of the wrong length.
@@ -263,14 +264,14 @@ class World {
   Vec3 position(BodyId id, const SurfacePoint& at) const;
   /// World velocity of a surface point, deformation included.
   Vec3 velocity(BodyId id, const SurfacePoint& at) const;
-  /// What contacts press a surface point in beyond the modes, world, m: G F of the last step's forces
-  /// (residual_compliance.h). Drawn surfaces show it, position() and velocity() do not. Zero where the model has no
-  /// residual compliance or ContactOptions::residual_compliance is off. A point of the render surface goes with the
-  /// point of the collision surface that was nearest at rest.
+  /// The residual displacement of a surface point, world, m: G F of the last step's contact forces
+  /// (residual_compliance.h), beyond the modes. Drawn surfaces show it, position() and velocity() do not. Zero where
+  /// the model has no residual compliance or ContactOptions::residual_compliance is off. A point of the render surface
+  /// goes with the point of the collision surface that was nearest at rest.
   Vec3 dent(BodyId id, const SurfacePoint& at) const;
 
   // Drawing ----------------------------------------------------------------------------------------------------------
-  /// Deformed render surfaces, dents of contacts included, less `origin` (pass a point near the camera far from the
+  /// Deformed render surfaces, residual displacement included, less `origin` (pass a point near the camera far from the
   /// world's origin). Instances of one model are made together: their basis is read once, so one call for all that is
   /// drawn is faster than one for each.
   /// @param interpolation s in [0, 1] between the last two states; 1: the newest.
