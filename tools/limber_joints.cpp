@@ -202,7 +202,7 @@ DetectionOptions detection_options(const Arguments& a, Program& program) {
   DetectionOptions options = a.detection;
   options.min_confidence = a.min_confidence;
   if (a.method == "paper") options.slippage.method = SlippageMethod::kFixedRatio;
-  if (a.contacts == "hulls") options.contact.method = ContactMethod::kHulls;
+  if (a.contacts == "hulls") options.contact.method = ContactSearch::kHulls;
   if (a.hull_growth) options.contact.hull_growth = *a.hull_growth;
   if (options.contact.hull_growth > options.contact.search) {
     if (a.hull_growth)
