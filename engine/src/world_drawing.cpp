@@ -119,4 +119,14 @@ void World::interpolated_amplitudes(BodyId id, double interpolation, std::span<f
   impl_->interpolate(id, interpolation, amplitudes.data());
 }
 
+void World::interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const {
+  const Impl::Entry& e = impl_->entry(id, "interpolated_weights");
+  require_fraction(interpolation, "interpolated_weights");
+  const std::span<const double> per_amplitude = impl_->group(e).model().weight_per_amplitude();
+  require_count(weights.size(), per_amplitude.size(), "interpolated_weights", "weights");
+  impl_->interpolate(id, interpolation, weights.data());
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    weights[i] = static_cast<float>(static_cast<double>(weights[i]) * per_amplitude[i]);
+}
+
 }  // namespace limber

@@ -149,6 +149,7 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   lean.eigenvalues = pick(all.eigenvalues, kept);
   lean.decays = pick(all.decays, kept);
   lean.participation = pick(all.participation, kept);
+  lean.mode_scales = pick(all.mode_scales, kept);
   lean.moments = pick(all.moments, kept);
   lean.render = pick(all.render, kept);
   if (all.collision) lean.collision = pick(*all.collision, kept);
