@@ -7,6 +7,9 @@
 namespace limber {
 namespace {
 
+using internal::require_count;
+using internal::require_finite;
+
 void require_fraction(double s, const char* function) {
   if (!(s >= 0.0 && s <= 1.0))
     throw InvalidArgument(std::string("World::") + function + ": interpolation is " + std::to_string(s) +

@@ -11,7 +11,7 @@
 #include "limber/model/asset.h"
 #include "limber/model/sha256.h"
 
-namespace limber::asset_format {
+namespace limber::internal::asset_format {
 
 static_assert(std::endian::native == std::endian::little,
               "the file is little-endian and is copied from memory as it is");
@@ -88,4 +88,4 @@ class ContentHash {
   Sha256 hash_;
 };
 
-}  // namespace limber::asset_format
+}  // namespace limber::internal::asset_format

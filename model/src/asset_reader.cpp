@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "accessor_type.h"
@@ -14,6 +15,7 @@
 namespace limber {
 namespace {
 
+namespace asset_format = internal::asset_format;
 using asset_format::ContentHash;
 using internal::JsonObject;
 using nlohmann::json;

@@ -11,6 +11,7 @@
 namespace limber {
 namespace {
 
+namespace asset_format = internal::asset_format;
 using asset_format::ContentHash;
 using nlohmann::json;
 

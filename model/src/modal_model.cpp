@@ -12,6 +12,8 @@
 namespace limber {
 namespace {
 
+using internal::shown;
+
 constexpr std::size_t kMaxNameLength = 200;
 /// Slack on identities that hold exactly but for the round-off of whoever integrated over the mesh.
 constexpr double kRoundOff = 1e-9;

@@ -12,6 +12,9 @@
 namespace limber {
 namespace {
 
+using internal::largest_shape;
+using internal::ShapeLoader;
+
 std::size_t bytes_of(const ModalBasis& basis) {
   constexpr std::size_t kBlock = 3 * ModalBasis::kTile * sizeof(float);
   return static_cast<std::size_t>(basis.tiles()) * static_cast<std::size_t>(basis.modes()) * kBlock;
