@@ -1,11 +1,13 @@
 // limber-joints: the components and joints of an assembly, from its geometry alone.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <set>
