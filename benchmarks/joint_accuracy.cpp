@@ -232,7 +232,7 @@ int main(int argc, char** argv) {
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
     else if (arg == "--contacts" && i + 1 < argc && std::string_view(argv[i + 1]) == "hulls")
-      options.contact.method = limber::ContactMethod::kHulls, ++i;
+      options.contact.method = limber::ContactSearch::kHulls, ++i;
     else if (arg == "--only" && i + 1 < argc)
       only = argv[++i];
     else if (arg == "--class" && i + 1 < argc)

@@ -1,7 +1,7 @@
 // 09_picture_of_a_scene: how is a scene file played, and what did its bodies look like at some instants?
 //   run:   09_picture_of_a_scene falling_bunnies.json fall.pov 0.2 0.5 4 && povray fall.pov +W1800 +H600 +A
 //   see:   the scene at each time in seconds, side by side: what stands in grey, each model in a colour of its own
-//   next:  the header to read, scene/include/limber/scene/run.h
+//   next:  10_joints_from_a_mesh; the header to read, scene/include/limber/scene/run.h
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

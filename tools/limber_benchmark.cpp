@@ -1,12 +1,14 @@
 // limber-benchmark: how long limber takes, beside what it computes. Tables as CSV and JSON, plots as SVG.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "limber/core/error.h"

@@ -1,10 +1,12 @@
 // limber-inspect: what is inside an asset.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "limber/mesh/surface_mesh.h"

@@ -1,11 +1,13 @@
 // limber-joints: the components and joints of an assembly, from its geometry alone.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -202,7 +204,7 @@ DetectionOptions detection_options(const Arguments& a, Program& program) {
   DetectionOptions options = a.detection;
   options.min_confidence = a.min_confidence;
   if (a.method == "paper") options.slippage.method = SlippageMethod::kFixedRatio;
-  if (a.contacts == "hulls") options.contact.method = ContactMethod::kHulls;
+  if (a.contacts == "hulls") options.contact.method = ContactSearch::kHulls;
   if (a.hull_growth) options.contact.hull_growth = *a.hull_growth;
   if (options.contact.hull_growth > options.contact.search) {
     if (a.hull_growth)

@@ -1,10 +1,12 @@
 // limber-precompute: a mesh in, an asset out.
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <chrono>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "limber/core/error.h"

@@ -1,9 +1,11 @@
 // limber-simulate: plays a scene at a fixed step; records it, samples its energies, reports.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "limber/scene/recording.h"
 #include "limber/scene/run.h"

@@ -1,6 +1,7 @@
 // make_assembly: writes drawn assemblies as OBJ, a group for each part, with their true joints beside them.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <filesystem>

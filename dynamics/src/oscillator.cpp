@@ -10,6 +10,15 @@
 namespace limber {
 namespace {
 
+using internal::advance_blocks;
+using internal::advance_blocks_free;
+using internal::kBlockModes;
+using internal::kVv;
+using internal::kVz;
+using internal::kZg;
+using internal::kZv;
+using internal::kZz;
+
 static_assert(PropagatorTable::kPad == Index{kBlockModes});
 
 /// No intermediate result below overflows or becomes NaN for arguments up to here.

@@ -7,7 +7,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace limber::HWY_NAMESPACE {
+namespace limber::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t kStride = kBlockModes * kBlockCoefficients;
@@ -43,11 +43,11 @@ HWY_ATTR void AdvanceBlocksFree(const double* HWY_RESTRICT c, std::size_t blocks
   }
 }
 
-}  // namespace limber::HWY_NAMESPACE
+}  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace limber {
+namespace limber::internal {
 
 HWY_EXPORT(AdvanceBlocks);
 HWY_EXPORT(AdvanceBlocksFree);
@@ -60,5 +60,5 @@ void advance_blocks_free(const double* coefficients, std::size_t blocks, double*
   HWY_DYNAMIC_DISPATCH(AdvanceBlocksFree)(coefficients, blocks, z, v);
 }
 
-}  // namespace limber
+}  // namespace limber::internal
 #endif  // HWY_ONCE

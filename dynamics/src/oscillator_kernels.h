@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace limber {
+namespace limber::internal {
 
 /// One block advances this many modes by coefficients in this order, each an array of kBlockModes.
 inline constexpr std::size_t kBlockModes = 8;
@@ -14,4 +14,4 @@ enum BlockCoefficient : std::size_t { kZz, kZv, kVz, kVv, kZg, kBlockCoefficient
 void advance_blocks(const double* coefficients, std::size_t blocks, double* z, double* v, const double* g);
 void advance_blocks_free(const double* coefficients, std::size_t blocks, double* z, double* v);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -11,6 +11,12 @@
 namespace limber {
 namespace {
 
+using internal::InstanceOutput;
+using internal::kBlockInstances;
+using internal::kTileVertices;
+using internal::normalize_vectors;
+using internal::reconstruct_tiles;
+
 static_assert(ModalBasis::kTile == int{kTileVertices});
 static_assert(sizeof(Vec3f) == 3 * sizeof(float), "rest positions are read as plain floats");
 

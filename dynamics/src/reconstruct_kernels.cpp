@@ -15,7 +15,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace limber::HWY_NAMESPACE {
+namespace limber::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, kTileVertices>;
@@ -210,11 +210,11 @@ HWY_ATTR void NormalizeVectors(float* vectors, std::size_t count) {
   std::copy_n(buffer, 3 * (count - i), vectors + 3 * i);
 }
 
-}  // namespace limber::HWY_NAMESPACE
+}  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace limber {
+namespace limber::internal {
 
 HWY_EXPORT(ReconstructTiles);
 HWY_EXPORT(NormalizeVectors);
@@ -223,5 +223,5 @@ void reconstruct_tiles(const TileRange& range) { HWY_DYNAMIC_DISPATCH(Reconstruc
 
 void normalize_vectors(float* vectors, std::size_t count) { HWY_DYNAMIC_DISPATCH(NormalizeVectors)(vectors, count); }
 
-}  // namespace limber
+}  // namespace limber::internal
 #endif  // HWY_ONCE

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace limber {
+namespace limber::internal {
 
 inline constexpr std::size_t kTileVertices = 16;
 inline constexpr std::size_t kBlockInstances = 8;  ///< with AVX-512 their 24 accumulators leave room for the operands
@@ -34,4 +34,4 @@ void reconstruct_tiles(const TileRange& range);
 /// n ← n/|n| for xyz vectors in a row; (0, 0, 1) where |n|² vanishes in single precision.
 void normalize_vectors(float* vectors, std::size_t count);
 
-}  // namespace limber
+}  // namespace limber::internal

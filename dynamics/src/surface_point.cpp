@@ -8,6 +8,10 @@
 namespace limber {
 namespace {
 
+using internal::add_rows;
+using internal::rows_times;
+using internal::SurfaceRows;
+
 const ModalSurface& surface_of(const ModalModel& model, const SurfacePoint& at) {
   return at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
 }

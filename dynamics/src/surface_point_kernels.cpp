@@ -7,7 +7,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace limber::HWY_NAMESPACE {
+namespace limber::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Eight modes at a time, in as many vectors as it takes: the sums do not depend on the instruction set.
@@ -69,11 +69,11 @@ HWY_ATTR void RowsTimes(const SurfaceRows& rows, std::size_t modes, const double
   }
 }
 
-}  // namespace limber::HWY_NAMESPACE
+}  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace limber {
+namespace limber::internal {
 
 HWY_EXPORT(AddRows);
 HWY_EXPORT(RowsTimes);
@@ -84,5 +84,5 @@ void rows_times(const SurfaceRows& rows, std::size_t modes, const double* z, dou
   HWY_DYNAMIC_DISPATCH(RowsTimes)(rows, modes, z, u);
 }
 
-}  // namespace limber
+}  // namespace limber::internal
 #endif  // HWY_ONCE

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace limber {
+namespace limber::internal {
 
 /// Up to nine rows of U, one per corner and axis, in the order corner 0 x, y, z, corner 1 x, …
 struct SurfaceRows {
@@ -19,4 +19,4 @@ void add_rows(const SurfaceRows& rows, std::size_t modes, double* g);
 /// u_axis = Σ_i z_i Σ_corner weight row[i]
 void rows_times(const SurfaceRows& rows, std::size_t modes, const double* z, double* u);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace limber {
+namespace limber::internal {
 
 void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
   const auto i = static_cast<std::size_t>(body);
@@ -231,4 +231,4 @@ IslandReport ConstraintStage::report() const {
   return sum;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -10,7 +10,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/jobs.h"
 
-namespace limber {
+namespace limber::internal {
 
 class ConstraintStage {
  public:
@@ -94,4 +94,4 @@ class ConstraintStage {
   IslandOptions options_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

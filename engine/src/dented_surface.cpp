@@ -4,7 +4,7 @@
 
 #include "limber/mesh/surface_locator.h"
 
-namespace limber {
+namespace limber::internal {
 
 DentedSurface::DentedSurface(const ModalModel& model) : model_(&model) {
   const auto vertices = static_cast<std::size_t>(model.collision().vertices());
@@ -108,4 +108,4 @@ Vec3 DentedSurface::displacement(std::span<const DentLoad> loads, const SurfaceP
   return u;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

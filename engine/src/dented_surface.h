@@ -10,7 +10,7 @@
 #include "limber/constraints/contact_constraint.h"
 #include "limber/model/modal_model.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Of one model. Not for two threads at a time.
 class DentedSurface {
@@ -43,4 +43,4 @@ class DentedSurface {
   std::vector<Vec3f> moved_;    // by vertex of the collision surface
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -5,7 +5,7 @@
 
 #include "limber/dynamics/body_group.h"
 
-namespace limber {
+namespace limber::internal {
 
 void SleepStage::add(Index body) {
   const auto i = static_cast<std::size_t>(body);
@@ -101,4 +101,4 @@ void SleepStage::put_to_sleep(std::span<const Index> members) {
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,7 +9,7 @@
 #include "limber/constraints/contact_constraint.h"
 #include "limber/engine/world.h"
 
-namespace limber {
+namespace limber::internal {
 
 class SleepStage {
  public:
@@ -52,4 +52,4 @@ class SleepStage {
   std::vector<Support> supports_;  // static shapes that sleepers rest on
 };
 
-}  // namespace limber
+}  // namespace limber::internal

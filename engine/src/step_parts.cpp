@@ -5,7 +5,7 @@
 
 #include "limber/dynamics/body_group.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 struct ById {
@@ -169,4 +169,4 @@ void StepParts::tell_events() {
   std::sort(events_.begin(), events_.end(), by_id);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -10,7 +10,7 @@
 #include "limber/dynamics/surface_point.h"
 #include "limber/engine/world.h"
 
-namespace limber {
+namespace limber::internal {
 
 class StepParts {
  public:
@@ -76,4 +76,4 @@ class StepParts {
   std::vector<ContactEvent> released_;  // told as pressing, but let go before the step's end
 };
 
-}  // namespace limber
+}  // namespace limber::internal

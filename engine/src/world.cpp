@@ -5,39 +5,10 @@
 
 #include "world_impl.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
-// Bodies advanced as one job: about 10 µs of work, so that handing it out costs little.
-constexpr Index kBodiesPerJob = 64;
-
 bool finite(const Quaternion& q) { return std::isfinite(q.w + q.x + q.y + q.z); }
-
-double checked(std::optional<double> friction, const char* function) {
-  constexpr double kNotGiven = -1.0;
-  if (friction && !(*friction >= 0.0 && std::isfinite(*friction)))
-    throw InvalidArgument(std::string("World::") + function + ": friction is " + std::to_string(*friction) +
-                          ", expected a finite number of at least 0");
-  return friction.value_or(kNotGiven);
-}
-
-/// Of a ball about the body origin that holds all of a shape, m.
-double radius_of(const Shape& shape) {
-  const auto farthest = [](const std::vector<Vec3>& points) {
-    double r = 0.0;
-    for (const Vec3& p : points) r = std::max(r, p.norm());
-    return r;
-  };
-  if (const auto* ball = std::get_if<Sphere>(&shape)) return ball->radius;
-  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius + capsule->half_length;
-  if (const auto* box = std::get_if<Box>(&shape)) return box->half_extents.norm();
-  if (const auto* hull = std::get_if<ConvexHull>(&shape)) return farthest(hull->points);
-  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return farthest(mesh->vertices);
-  const auto& field = std::get<HeightField>(shape);
-  double height = 0.0;
-  for (const float h : field.heights) height = std::max(height, std::abs(static_cast<double>(h)));
-  return Vec3((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y, height).norm();
-}
 
 }  // namespace
 
@@ -66,6 +37,47 @@ void require_count(std::size_t seen, std::size_t expected, const char* function,
     throw InvalidArgument(std::string("World::") + function + ": " + what + " has " + std::to_string(seen) +
                           " elements, expected " + std::to_string(expected));
 }
+
+}  // namespace limber::internal
+
+namespace limber {
+namespace {
+
+using internal::DentedSurface;
+using internal::require_count;
+using internal::require_finite;
+using internal::require_pose;
+
+// Bodies advanced as one job: about 10 µs of work, so that handing it out costs little.
+constexpr Index kBodiesPerJob = 64;
+
+double checked(std::optional<double> friction, const char* function) {
+  constexpr double kNotGiven = -1.0;
+  if (friction && !(*friction >= 0.0 && std::isfinite(*friction)))
+    throw InvalidArgument(std::string("World::") + function + ": friction is " + std::to_string(*friction) +
+                          ", expected a finite number of at least 0");
+  return friction.value_or(kNotGiven);
+}
+
+/// Of a ball about the body origin that holds all of a shape, m.
+double radius_of(const Shape& shape) {
+  const auto farthest = [](const std::vector<Vec3>& points) {
+    double r = 0.0;
+    for (const Vec3& p : points) r = std::max(r, p.norm());
+    return r;
+  };
+  if (const auto* ball = std::get_if<Sphere>(&shape)) return ball->radius;
+  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius + capsule->half_length;
+  if (const auto* box = std::get_if<Box>(&shape)) return box->half_extents.norm();
+  if (const auto* hull = std::get_if<ConvexHull>(&shape)) return farthest(hull->points);
+  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return farthest(mesh->vertices);
+  const auto& field = std::get<HeightField>(shape);
+  double height = 0.0;
+  for (const float h : field.heights) height = std::max(height, std::abs(static_cast<double>(h)));
+  return Vec3((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y, height).norm();
+}
+
+}  // namespace
 
 void SleepOptions::validate() const {
   const auto number = [](double value, const char* name) {

@@ -6,6 +6,9 @@
 
 namespace limber {
 
+using internal::ConstraintStage;
+using internal::require_finite;
+
 HandleId World::add_handle(BodyId id, const SurfacePoint& at, const HandleOptions& options) {
   const Impl::Entry& e = impl_->entry(id, "add_handle");
   const ModalModel& model = impl_->group(e).model();

@@ -7,6 +7,9 @@
 namespace limber {
 namespace {
 
+using internal::require_count;
+using internal::require_finite;
+
 void require_fraction(double s, const char* function) {
   if (!(s >= 0.0 && s <= 1.0))
     throw InvalidArgument(std::string("World::") + function + ": interpolation is " + std::to_string(s) +
@@ -117,6 +120,16 @@ void World::interpolated_amplitudes(BodyId id, double interpolation, std::span<f
   require_count(amplitudes.size(), static_cast<std::size_t>(impl_->group(e).model().modes()), "interpolated_amplitudes",
                 "amplitudes");
   impl_->interpolate(id, interpolation, amplitudes.data());
+}
+
+void World::interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const {
+  const Impl::Entry& e = impl_->entry(id, "interpolated_weights");
+  require_fraction(interpolation, "interpolated_weights");
+  const std::span<const double> per_amplitude = impl_->group(e).model().weight_per_amplitude();
+  require_count(weights.size(), per_amplitude.size(), "interpolated_weights", "weights");
+  impl_->interpolate(id, interpolation, weights.data());
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    weights[i] = static_cast<float>(static_cast<double>(weights[i]) * per_amplitude[i]);
 }
 
 }  // namespace limber

@@ -20,13 +20,17 @@
 #include "sleep_stage.h"
 #include "step_parts.h"
 
-namespace limber {
+namespace limber::internal {
 
 // What arguments are to be, of the function named.
 void require_finite(const Vec3& v, const char* function, const char* what);
 void require_finite(std::span<const double> values, const char* function, const char* what);
 void require_pose(const RigidTransform& X, const char* function);
 void require_count(std::size_t seen, std::size_t expected, const char* function, const char* what);
+
+}  // namespace limber::internal
+
+namespace limber {
 
 struct World::Impl {
   /// What a BodyId's index names.
@@ -55,12 +59,12 @@ struct World::Impl {
   Jobs* jobs;
   std::vector<Entry> entries;
   std::vector<std::uint32_t> vacant_entries;
-  std::vector<std::unique_ptr<BodyGroup>> groups;      // null where the last body of a model was removed
-  std::vector<std::unique_ptr<DentedSurface>> dented;  // by group; null where nothing dents its bodies
-  std::vector<Range> ranges;                           // covers all slots of all groups
-  ConstraintStage constraints;                         // bodies by their entries' indices
-  SleepStage sleep{constraints};
-  std::optional<StepParts> parts{};
+  std::vector<std::unique_ptr<BodyGroup>> groups;                // null where the last body of a model was removed
+  std::vector<std::unique_ptr<internal::DentedSurface>> dented;  // by group; null where nothing dents its bodies
+  std::vector<Range> ranges;                                     // covers all slots of all groups
+  internal::ConstraintStage constraints;                         // bodies by their entries' indices
+  internal::SleepStage sleep{constraints};
+  std::optional<internal::StepParts> parts{};
   std::vector<Apart> apart;
   ContactSource* source = nullptr;
   ContactSet contacts;
@@ -106,15 +110,15 @@ struct World::Impl {
 
   /// The constraint that an id names, if it is of the kind asked for.
   template <class Id>
-  const ConstraintStage::Entry* find(Id id) const {
+  const internal::ConstraintStage::Entry* find(Id id) const {
     if (id.index >= constraints.entries().size()) return nullptr;
-    const ConstraintStage::Entry& e = constraints.entries()[id.index];
+    const internal::ConstraintStage::Entry& e = constraints.entries()[id.index];
     const bool kind = std::is_same_v<Id, HandleId> ? e.handle != nullptr : e.joint != nullptr;
     return kind && e.generation == id.generation ? &e : nullptr;
   }
   template <class Id>
-  const ConstraintStage::Entry& constraint(Id id, const char* function) const {
-    if (const ConstraintStage::Entry* found = find(id)) return *found;
+  const internal::ConstraintStage::Entry& constraint(Id id, const char* function) const {
+    if (const internal::ConstraintStage::Entry* found = find(id)) return *found;
     throw InvalidArgument(std::string("World::") + function + ": " +
                           (std::is_same_v<Id, HandleId> ? "handle " : "joint ") + std::to_string(id.index) +
                           " (generation " + std::to_string(id.generation) +

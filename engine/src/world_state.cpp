@@ -5,6 +5,12 @@
 namespace limber {
 namespace {
 
+using internal::ConstraintStage;
+using internal::DentedSurface;
+using internal::require_count;
+using internal::require_finite;
+using internal::require_pose;
+
 /// FNV-1a over the bits of doubles.
 class Hash {
  public:

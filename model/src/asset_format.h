@@ -4,7 +4,6 @@
 
 #include <bit>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +11,7 @@
 #include "limber/model/asset.h"
 #include "limber/model/sha256.h"
 
-namespace limber::asset_format {
+namespace limber::internal::asset_format {
 
 static_assert(std::endian::native == std::endian::little,
               "the file is little-endian and is copied from memory as it is");
@@ -32,8 +31,7 @@ class ContentHash {
     add(std::uint64_t{bodies});
   }
 
-  /// @param scales one per mode
-  void add_body(const ModalModelData& body, std::span<const double> scales) {
+  void add_body(const ModalModelData& body) {
     add(body.name);
     add(to_string(body.motion));
     if (body.motion == FrameMotion::kLine) add(body.line_axis);
@@ -47,7 +45,7 @@ class ContentHash {
     for (const double x : body.decays) add(x);
     for (const Vec3& x : body.participation) add(x);
     for (const Mat3& x : body.moments) add(x);
-    for (const double x : scales) add(x);
+    for (const double x : body.mode_scales) add(x);
     add_counts(body.render);
     add(std::uint64_t{body.collision.has_value()});
     if (body.collision) add_counts(*body.collision);
@@ -90,4 +88,4 @@ class ContentHash {
   Sha256 hash_;
 };
 
-}  // namespace limber::asset_format
+}  // namespace limber::internal::asset_format

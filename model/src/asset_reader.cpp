@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "accessor_type.h"
@@ -14,6 +15,7 @@
 namespace limber {
 namespace {
 
+namespace asset_format = internal::asset_format;
 using asset_format::ContentHash;
 using internal::JsonObject;
 using nlohmann::json;
@@ -173,8 +175,6 @@ class BodyReader {
     return std::move(data_);
   }
 
-  const std::vector<double>& scales() const { return scales_; }
-
  private:
   static JsonObject extension_of(const JsonObject& mesh) {
     const JsonObject extensions(mesh.at("extensions"), mesh.where("extensions"));
@@ -209,10 +209,10 @@ class BodyReader {
       data_.participation.push_back(vector_from(std::span(participation).subspan(3 * i, 3)));
       data_.moments.push_back(matrix_from(std::span(moments).subspan(9 * i, 9)));
     }
-    scales_ = block_.numbers("mode_scales", modes_);
+    data_.mode_scales = block_.numbers("mode_scales", modes_);
     for (std::size_t i = 0; i < modes_; ++i) {
       int exponent = 0;
-      if (!(scales_[i] > 0.0 && std::frexp(scales_[i], &exponent) == 0.5))
+      if (!(data_.mode_scales[i] > 0.0 && std::frexp(data_.mode_scales[i], &exponent) == 0.5))
         throw InputError(block_.where("mode_scales") + "[" + std::to_string(i) + "]: expected a power of two");
     }
   }
@@ -247,7 +247,7 @@ class BodyReader {
       throw InputError(primitive.where("targets") + ": there are " + std::to_string(targets.size()) +
                        " morph targets, expected one per mode, " + std::to_string(modes_) + kNotAnAsset);
     data_.render.basis = ModalBasis(static_cast<Index>(vertices), static_cast<Index>(modes_));
-    for (std::size_t i = 0; i < modes_; ++i) fill(data_.render.basis, i, targets[i], scales_[i]);
+    for (std::size_t i = 0; i < modes_; ++i) fill(data_.render.basis, i, targets[i], data_.mode_scales[i]);
   }
 
   void read_collision_surface() {
@@ -314,7 +314,6 @@ class BodyReader {
   JsonObject mesh_, block_;
   BinaryPieces& pieces_;
   ModalModelData data_;
-  std::vector<double> scales_;
   std::size_t modes_ = 0;
 };
 
@@ -366,13 +365,10 @@ Asset read_document(const json& document, std::string_view binary, const std::st
 
   Asset asset{.bodies = {}, .provenance = block.provenance};
   std::vector<ModalModelData> bodies;
-  std::vector<std::vector<double>> scales;
   std::set<std::string> names;
   BinaryPieces pieces(root, binary);
   root.for_each("meshes", [&](const json& value, const std::string& where) {
-    BodyReader reader(value, where, pieces);
-    bodies.push_back(reader.read());
-    scales.push_back(reader.scales());
+    bodies.push_back(BodyReader(value, where, pieces).read());
     if (!names.insert(bodies.back().name).second) throw InputError(where + ".name: is that of another body too");
   });
   root.finish();
@@ -380,7 +376,7 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   if (bodies.empty()) throw InputError(name + ": holds no body");
 
   ContentHash hash(block.provenance, bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) hash.add_body(bodies[i], scales[i]);
+  for (const ModalModelData& body : bodies) hash.add_body(body);
   if (hash.finish(binary) != block.content_hash)
     throw InputError(name + ": its content does not match its content_hash" + kNotAnAsset);
   for (ModalModelData& body : bodies) asset.bodies.push_back(checked_model(std::move(body), name));

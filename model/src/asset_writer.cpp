@@ -11,6 +11,7 @@
 namespace limber {
 namespace {
 
+namespace asset_format = internal::asset_format;
 using asset_format::ContentHash;
 using nlohmann::json;
 
@@ -86,7 +87,7 @@ json residual_block(GlbBuilder& glb, const ResidualCompliance& residual) {
 }
 
 /// The LIMBER_modal block of a mesh, but for the parts that lie in the binary chunk.
-json body_block(const ModalModelData& body, const std::vector<double>& scales) {
+json body_block(const ModalModelData& body) {
   json block = {{"motion", to_string(body.motion)},
                 {"mass", body.mass},
                 {"volume", body.volume},
@@ -100,7 +101,7 @@ json body_block(const ModalModelData& body, const std::vector<double>& scales) {
                 {"decays", body.decays},
                 {"participation", list_of(body.participation)},
                 {"moments", list_of(body.moments)},
-                {"mode_scales", scales}};
+                {"mode_scales", body.mode_scales}};
   append(block["inertia"], body.inertia);
   if (body.motion == FrameMotion::kLine) block["line_axis"] = numbers(body.line_axis);
   return block;
@@ -114,7 +115,7 @@ std::string extras_for_people(const ModalModel& model) {
 }
 
 /// The render surface with its modes as morph targets. @return the mesh, but for extras and extensions
-GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& scales, int material) {
+GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material) {
   const ModalSurface& surface = model.render();
   const std::vector<float> rest = rest_positions(surface);
   GlbMesh mesh{.name = model.name(), .material = material};
@@ -122,7 +123,8 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, const std::vector
   mesh.normal = glb.add_vertex_vectors(unit_normals(rest, surface.triangles));
   mesh.triangles = glb.add_triangles(surface.triangles);
   for (Index i = 0; i < model.modes(); ++i) {
-    const std::vector<float> moved = mode_displacements(surface, i, scales[static_cast<std::size_t>(i)]);
+    const std::vector<float> moved =
+        mode_displacements(surface, i, model.data().mode_scales[static_cast<std::size_t>(i)]);
     GlbMorphTarget target{.name = mode_target_name(i, model.modes(), model.frequency_hz(i))};
     target.position = glb.add_vertex_vectors(moved);
     if (model.modes() <= kMaxTargetsWithNormals)
@@ -134,12 +136,8 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, const std::vector
 
 void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHash& hash) {
   const ModalModelData& body = model.data();
-  std::vector<double> scales;
-  scales.reserve(static_cast<std::size_t>(model.modes()));
-  for (Index i = 0; i < model.modes(); ++i) scales.push_back(visible_mode_scale(model.render(), i));
-
-  GlbMesh mesh = surface_mesh(glb, model, scales, material);
-  json block = body_block(body, scales);
+  GlbMesh mesh = surface_mesh(glb, model, material);
+  json block = body_block(body);
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
   if (body.residual_compliance) block["residual_compliance"] = residual_block(glb, *body.residual_compliance);
@@ -147,7 +145,7 @@ void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHas
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
   // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.
   glb.add_node({.name = body.name, .mesh = glb.add_mesh(mesh), .translation = body.origin_in_input});
-  hash.add_body(body, scales);
+  hash.add_body(body);
 }
 
 void check(const Asset& asset) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "limber/core/error.h"
@@ -11,6 +12,8 @@
 
 namespace limber {
 namespace {
+
+using internal::shown;
 
 constexpr std::string_view kCallister =
     "Callister and Rethwisch, Materials Science and Engineering, appendix B (density, modulus, Poisson's ratio tables)";

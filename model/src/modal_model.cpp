@@ -6,10 +6,13 @@
 #include <span>
 
 #include "limber/core/error.h"
+#include "limber/model/morph_targets.h"
 #include "text.h"
 
 namespace limber {
 namespace {
+
+using internal::shown;
 
 constexpr std::size_t kMaxNameLength = 200;
 /// Slack on identities that hold exactly but for the round-off of whoever integrated over the mesh.
@@ -105,6 +108,18 @@ class Checker {
     for (std::size_t i = 0; i < modes_; ++i)
       if (!(std::isfinite(d_.decays[i]) && d_.decays[i] >= 0.0))
         refuse(at("decays", i), "is " + shown(d_.decays[i]) + " 1/s", "0 or more and finite");
+    check_scales();
+  }
+
+  void check_scales() const {
+    if (d_.mode_scales.empty()) return;
+    count(d_.mode_scales.size(), modes_, "mode_scales", "mode");
+    for (std::size_t i = 0; i < modes_; ++i) {
+      const double scale = d_.mode_scales[i];
+      int exponent = 0;
+      if (!(scale > 0.0 && std::isfinite(1.0 / scale) && std::frexp(scale, &exponent) == 0.5))
+        refuse(at("mode_scales", i), "is " + shown(scale) + " kg^(1/2) m", "a power of two with a finite reciprocal");
+    }
   }
 
   /// Both integrals have bounds by the Cauchy-Schwarz inequality, as ∫ρ|w_i|² = 1: a wrong unit or normalisation shows
@@ -204,6 +219,12 @@ class Checker {
   std::size_t modes_;
 };
 
+std::vector<double> visible_scales(const ModalSurface& surface) {
+  std::vector<double> scales;
+  for (Index i = 0; i < surface.basis.modes(); ++i) scales.push_back(visible_mode_scale(surface, i));
+  return scales;
+}
+
 SurfaceExtent extent(const ModalSurface& surface) {
   SurfaceExtent e;
   for (const Vec3f& r : surface.rest) e.radius = std::max(e.radius, r.cast<double>().norm());
@@ -235,6 +256,8 @@ std::string_view to_string(FrameMotion motion) {
 ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   (void)to_string(data_.motion);
   Checker(data_).check();
+  if (data_.mode_scales.empty()) data_.mode_scales = visible_scales(data_.render);
+  for (const double scale : data_.mode_scales) weight_per_amplitude_.push_back(1.0 / scale);
   collision_rows_ = VertexRows(collision().basis);
   collision_extent_ = extent(collision());
 }

@@ -13,6 +13,8 @@
 namespace limber {
 namespace {
 
+using internal::shown;
+
 constexpr double kClusterDistance = 1e-6;  // relative, between neighbours
 
 void check_limit(double value, const char* field, const char* unit) {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-namespace limber {
+namespace limber::internal {
 
 inline std::string shown(double value) {
   char text[32];
@@ -12,4 +12,4 @@ inline std::string shown(double value) {
   return text;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -15,7 +15,7 @@ namespace {
 
 DetectionOptions by_hulls() {
   DetectionOptions options;
-  options.contact.method = ContactMethod::kHulls;
+  options.contact.method = ContactSearch::kHulls;
   options.contact.samples = 1500;
   return options;
 }

@@ -151,6 +151,17 @@ TEST(Asset, RigidBodyHasNoMorphTargets) {
   EXPECT_EQ(asset_from_bytes(bytes, "test").bodies[0]->modes(), 0);
 }
 
+TEST(Asset, ScalesOfTheMorphTargetsAreKept) {
+  ModalModelData data = example::box("bar", 3);
+  const std::vector<double> scales{4.0, 0x1p-20, 1.0};
+  data.mode_scales = scales;
+  const std::string bytes = asset_bytes({.bodies = {example::model(std::move(data))}, .provenance = {}});
+  const Asset read = asset_from_bytes(bytes, "test");
+  EXPECT_EQ(read.bodies[0]->data().mode_scales, scales);
+  EXPECT_THAT(read.bodies[0]->weight_per_amplitude(), ::testing::ElementsAre(0.25, 0x1p20, 1.0));
+  expect_same_bytes(asset_bytes(read), bytes);
+}
+
 TEST(Asset, WeightOneIsAVisibleShapeOfKnownScale) {
   const Asset asset = example::asset();
   const std::string bytes = asset_bytes(asset);

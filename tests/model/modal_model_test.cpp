@@ -93,6 +93,17 @@ TEST(ModalModel, ModesAreAscendingAndStable) {
   EXPECT_THAT(said_of([](D& d) { d.decays.pop_back(); }), HasSubstr("decays has 2 entries, expected 3"));
 }
 
+TEST(ModalModel, ScalesOfTheMorphTargetsArePowersOfTwo) {
+  EXPECT_EQ(said_of([](D& d) { d.mode_scales = {0.5, 4.0, 1.0}; }), "accepted");
+  EXPECT_THAT(said_of([](D& d) {
+                d.mode_scales = {0.5, 3.0, 1.0};
+              }),
+              AllOf(HasSubstr("mode_scales[1] is 3"), HasSubstr("power of two")));
+  EXPECT_THAT(said_of([](D& d) { d.mode_scales = {0.5, 1.0, -2.0}; }), HasSubstr("mode_scales[2] is -2"));
+  EXPECT_THAT(said_of([](D& d) { d.mode_scales = {0x1p-1074, 1.0, 1.0}; }), HasSubstr("finite reciprocal"));
+  EXPECT_THAT(said_of([](D& d) { d.mode_scales = {1.0}; }), HasSubstr("mode_scales has 1 entries, expected 3"));
+}
+
 TEST(ModalModel, IntegralsObeyTheBoundsOfNormalisedModes) {
   EXPECT_THAT(said_of([](D& d) { d.participation[1].x() = 1.5; }), HasSubstr("root of the mass, 1.414"));
   EXPECT_THAT(said_of([](D& d) { d.participation[1].x() = kNan; }), HasSubstr("participation[1]"));

@@ -6,14 +6,23 @@
 
 #include "dense_fem.h"
 #include "eigen/elastic_modes.h"
+#include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 #include "limber/precompute/fem.h"
-#include "eigen/sparse_operations.h"
 #include "tet_box.h"
 
 namespace limber {
 namespace {
 
+using internal::complete;
+using internal::EigenPairs;
+using internal::ElasticInverse;
+using internal::lowest_modes;
+using internal::multiply;
+using internal::order_nodes;
+using internal::principal_submatrix;
+using internal::ScaledProblem;
+using internal::scattered;
 using testing::nodes_where;
 using testing::tet_box;
 

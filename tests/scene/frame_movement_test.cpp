@@ -9,6 +9,10 @@
 namespace limber {
 namespace {
 
+using internal::frame_at;
+using internal::frame_over_step;
+using internal::FrameState;
+
 const RigidTransform kStart{normalized(Quaternion{1.0, 0.2, -0.1, 0.4}), {1.0, 2.0, 3.0}};
 const RigidTransform kMiddle{normalized(Quaternion{-0.3, 1.0, 0.5, 0.0}), {0.0, 0.0, 1.0}};
 const RigidTransform kEnd{normalized(Quaternion{0.1, 0.0, 1.0, -0.7}), {-2.0, 1.0, 0.0}};

@@ -2,7 +2,7 @@
 /// The report of limber-precompute: figures of the whole input, and the same per body (docs/formats/reports.md).
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

@@ -1,10 +1,12 @@
 #include "program.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
@@ -48,15 +50,20 @@ CLI::Validator number_check(const std::string& expected, Holds holds) {
 }  // namespace
 
 Program::Program(std::string name, const std::string& purpose)
-    : name_(std::move(name)), options_(purpose, name_), progress_(name_) {
-  options_.set_version_flag("--version", name_and_version(), "print the version and stop");
-  options_.set_help_flag("-h,--help", "print this help and stop");
-  options_.add_option("--report", report_path_, "write a machine-readable report here")->type_name("FILE.json");
-  options_.get_formatter()->column_width(34);
-  options_.footer("Exit codes: 0 good, 1 failed work, 2 wrong usage. Output files appear whole or not at all.");
-  report_["program"] = name_;
-  report_["version"] = LIMBER_VERSION_STRING;
+    : name_(std::move(name)),
+      options_(std::make_unique<CLI::App>(purpose, name_)),
+      report_(std::make_unique<nlohmann::ordered_json>()),
+      progress_(name_) {
+  options_->set_version_flag("--version", name_and_version(), "print the version and stop");
+  options_->set_help_flag("-h,--help", "print this help and stop");
+  options_->add_option("--report", report_path_, "write a machine-readable report here")->type_name("FILE.json");
+  options_->get_formatter()->column_width(34);
+  options_->footer("Exit codes: 0 good, 1 failed work, 2 wrong usage. Output files appear whole or not at all.");
+  (*report_)["program"] = name_;
+  (*report_)["version"] = LIMBER_VERSION_STRING;
 }
+
+Program::~Program() = default;
 
 std::string Program::name_and_version() const { return name_ + " " LIMBER_VERSION_STRING; }
 
@@ -64,7 +71,7 @@ int Program::run(int argc, const char* const* argv, const std::function<void()>&
   // A file size limit then shows as a failed write, with its reason, instead of ending the program half way.
   std::signal(SIGXFSZ, SIG_IGN);
   try {
-    options_.parse(argc, argv);
+    options_->parse(argc, argv);
     work();
     finish();
     return kGood;
@@ -99,9 +106,9 @@ void Program::write_file(const std::filesystem::path& path, std::string_view byt
 
 void Program::finish() {
   if (!report_path_.empty()) {
-    report_["warnings"] = warnings_;
+    (*report_)["warnings"] = warnings_;
     // File names need not be UTF-8; JSON must be.
-    write_file(report_path_, report_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    write_file(report_path_, report_->dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
   progress_.clear();
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw InputError("write to standard output: failed");
@@ -118,14 +125,14 @@ int Program::fail(int code, std::string message) {
 
 int Program::refuse_usage(const CLI::ParseError& error) {
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))  // --help or --version
-    return options_.exit(error);
+    return options_->exit(error);
   std::string message = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
-    const std::string stranger = options_.remaining(true).empty() ? "" : options_.remaining(true).front();
+    const std::string stranger = options_->remaining(true).empty() ? "" : options_->remaining(true).front();
     message = "\"" + stranger + "\" was not expected";
     if (stranger.starts_with("--"))
       message = "the option \"" + stranger + "\" is unknown; did you mean \"" +
-                internal::nearest_word(stranger.substr(0, stranger.find('=')), long_names(options_)) + "\"?";
+                internal::nearest_word(stranger.substr(0, stranger.find('=')), long_names(*options_)) + "\"?";
   }
   return fail(kWrongUsage, message + " (see " + name_ + " --help)");
 }

@@ -10,13 +10,13 @@
 ///
 /// Exit codes: 0 good; 1 failed work (InputError, ComputationError, out of memory, a full disk); 2 wrong usage
 /// (options, InvalidArgument). An error is one line on stderr. Results go to stdout.
+/// A program that declares options includes <CLI/CLI.hpp>, one that fills a report <nlohmann/json.hpp>.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +25,12 @@
 #include "limber/core/types.h"
 #include "progress.h"
 
+namespace CLI {
+class App;
+class ParseError;
+class Validator;
+}  // namespace CLI
+
 namespace limber::tools {
 
 class Program {
@@ -32,11 +38,12 @@ class Program {
   /// Declares --help, --version and --report FILE.json.
   /// @param name of the executable. @param purpose one or two sentences for --help
   Program(std::string name, const std::string& purpose);
+  ~Program();
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
   /// Where the program declares its own options; give each value's unit as its type_name().
-  CLI::App& options() { return options_; }
+  CLI::App& options() { return *options_; }
 
   /// Parses, works, then writes the report and lets every output file appear. @return the exit code
   int run(int argc, const char* const* argv, const std::function<void()>& work);
@@ -58,7 +65,7 @@ class Program {
 
   /// The machine-readable report, keys in the order they are set; starts with "program" and "version". What differs
   /// between equal runs (times) belongs under the key "seconds". "warnings" is added at the end.
-  nlohmann::ordered_json& report() { return report_; }
+  nlohmann::ordered_json& report() { return *report_; }
 
   /// Remarks: each becomes a line "NAME: warning: …" on stderr when the work is done, and stands in the report.
   Warnings& warnings() { return warnings_; }
@@ -71,9 +78,9 @@ class Program {
   void finish();
 
   std::string name_;
-  CLI::App options_;
+  std::unique_ptr<CLI::App> options_;
   std::string report_path_;
-  nlohmann::ordered_json report_;
+  std::unique_ptr<nlohmann::ordered_json> report_;
   Warnings warnings_;
   Progress progress_;
   OutputFiles outputs_;

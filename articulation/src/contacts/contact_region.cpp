@@ -383,7 +383,7 @@ std::vector<ContactRegion> find_contact_regions(const Assembly& assembly, const 
                                                 Jobs& jobs, const std::function<void(double)>& progress) {
   options.validate();
   Parts parts(assembly.components.size());
-  const bool hulls = options.method == ContactMethod::kHulls;
+  const bool hulls = options.method == ContactSearch::kHulls;
   jobs.parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       parts[i] = std::make_unique<Prepared>(assembly.components[i], options.crease_angle);

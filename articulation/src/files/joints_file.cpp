@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "limber/core/error.h"
+#include "limber/core/file.h"
 #include "limber/internal/joint_spec_json.h"
 
 namespace limber {

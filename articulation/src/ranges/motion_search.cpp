@@ -37,7 +37,7 @@ struct Side {
 /// A blocked piece and the point that told of it.
 struct Witness {
   OrbitPiece piece{};
-  SurfacePoint point{};
+  SurfaceSample point{};
   bool moving = true;  ///< whose point
 };
 
@@ -79,7 +79,7 @@ class Search {
   void collect();
   bool adds(const OrbitPiece& piece) const;
   void add(const Witness& witness);
-  bool touches_start(const OrbitPiece& piece, const SurfacePoint& at) const {
+  bool touches_start(const OrbitPiece& piece, const SurfaceSample& at) const {
     return piece.sheet != 0 && std::abs(piece.low) * speed(at) <= tolerances_.across;
   }
   void refine();
@@ -91,8 +91,8 @@ class Search {
   void raw_pieces(const Orbit& orbit, bool moving, const std::vector<Index>& near, std::vector<OrbitPiece>& out) const;
   void raw_pieces(const Orbit& orbit, bool moving, std::vector<OrbitPiece>& out) const;
   /// @param pieces as raw_pieces() gave them for this point's orbit; what is wide of them stays
-  void keep_wide(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const;
-  void keep_blocked(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const;
+  void keep_wide(const SurfaceSample& at, bool moving, std::vector<OrbitPiece>& pieces) const;
+  void keep_blocked(const SurfaceSample& at, bool moving, std::vector<OrbitPiece>& pieces) const;
   void clip_at_start(std::vector<OrbitPiece>& pieces, double speed) const;
   bool holds_start(const OrbitPiece& piece, double speed) const;
   template <class PiecesOf>
@@ -100,10 +100,10 @@ class Search {
   Witness first_blocked(const Witness& seed, bool low, const Span& gap) const;
   Witness first_touching(const Witness& blocked, bool low, const Span& gap) const;
   /// Of the surface at a point, as in OrbitPiece; ∞ where it slides.
-  double slope_at(const SurfacePoint& at, bool moving) const;
+  double slope_at(const SurfaceSample& at, bool moving) const;
   void refine_end(Span& span, bool low, const Span& gap, std::size_t seeds, Witness& end);
   MotionStop stop_of(const Witness& witness) const;
-  double speed(const SurfacePoint& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
+  double speed(const SurfaceSample& at) const { return frame_.speed(frame_.orbit_of(at.p)); }
   const SampledSurface& surface(bool moving) const { return (moving ? moving_ : fixed_).surface; }
   const RawPieces& raw(bool moving) const { return moving ? raw_moving_ : raw_fixed_; }
 
@@ -147,7 +147,7 @@ void Search::find_raw() {
   for (const bool moving : {true, false}) {
     RawPieces& raw = moving ? raw_moving_ : raw_fixed_;
     raw.first = {0};
-    for (const SurfacePoint& at : surface(moving).points()) {
+    for (const SurfaceSample& at : surface(moving).points()) {
       raw_pieces(frame_.orbit_of(at.p), moving, pieces);
       raw.pieces.insert(raw.pieces.end(), pieces.begin(), pieces.end());
       raw.first.push_back(raw.pieces.size());
@@ -193,7 +193,7 @@ void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double d
 }
 
 // Overlap wider than δ: orbits moved by δ in eight directions across meet the other side as well.
-void Search::keep_wide(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const {
+void Search::keep_wide(const SurfaceSample& at, bool moving, std::vector<OrbitPiece>& pieces) const {
   constexpr double kDiagonal = std::numbers::sqrt2 / 2.0;
   constexpr std::array<std::array<double, 2>, 8> kAcross{{{1, 0},
                                                           {-1, 0},
@@ -243,7 +243,7 @@ void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
   }
 }
 
-void Search::keep_blocked(const SurfacePoint& at, bool moving, std::vector<OrbitPiece>& pieces) const {
+void Search::keep_blocked(const SurfaceSample& at, bool moving, std::vector<OrbitPiece>& pieces) const {
   const double v = speed(at);
   keep_wide(at, moving, pieces);
   // Sheets that slide on each other cross at grazing angles.
@@ -259,7 +259,7 @@ void Search::settle_tolerance() {
   if (tolerances_.across >= tolerances_.largest_overlap) return;
   constexpr double kGrowth = 1.25;
   std::vector<OrbitPiece> pieces;
-  const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfacePoint& at) {
+  const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfaceSample& at) {
     const double v = speed(at);
     return std::any_of(among.begin(), among.end(), [&](const OrbitPiece& p) { return holds_start(p, v); });
   };
@@ -311,7 +311,7 @@ std::vector<Search::PointOf> Search::longest_first() const {
 void Search::collect() {
   std::vector<OrbitPiece> pieces;
   for (const auto& [i, moving] : longest_first()) {
-    const SurfacePoint& at = surface(moving).points()[i];
+    const SurfaceSample& at = surface(moving).points()[i];
     const auto own = raw(moving).of(i);
     // Blocked pieces are parts of the raw ones: what is known to be blocked needs no closer look.
     if (std::none_of(own.begin(), own.end(), [&](const OrbitPiece& p) { return adds(p) || touches_start(p, at); }))
@@ -340,7 +340,7 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
     bool better = false;
     for (int k = 0; k < kDirections && !better; ++k, ++steps) {
       const double angle = kTurn * level + 2.0 * kPi * k / kDirections;
-      const SurfacePoint next =
+      const SurfaceSample next =
           over.walk(best.point, best.point.p + step * (std::cos(angle) * e + std::sin(angle) * f));
       const auto improves = [&](const OrbitPiece& p) {
         return low ? p.low < best.piece.low && p.high > gap.low : p.high > best.piece.high && p.low < gap.high;
@@ -359,11 +359,12 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
 
 Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) const {
   const double finest = 0.1 * tolerances_.across;
-  return downhill(seed, low, gap, finest, [&](const SurfacePoint& next, auto&& improves, std::vector<OrbitPiece>& out) {
-    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
-    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
-    keep_blocked(next, seed.moving, out);
-  });
+  return downhill(seed, low, gap, finest,
+                  [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
+                    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
+                    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
+                    keep_blocked(next, seed.moving, out);
+                  });
 }
 
 // A blocked point has the other body all around it, to a distance δ. What belongs to the same overlap may meet it
@@ -376,7 +377,7 @@ Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap
   const auto explained = [](double slope) { return slope < kInfinity ? std::max(slope, kSlope) : kSlope; };
   const double earlier = (explained(own) + explained(met)) * delta / frame_.speed(centre);
   const double from = blocked.piece.low - earlier, to = blocked.piece.high + earlier;
-  return downhill(blocked, low, gap, finest, [&](const SurfacePoint& next, auto&&, std::vector<OrbitPiece>& out) {
+  return downhill(blocked, low, gap, finest, [&](const SurfaceSample& next, auto&&, std::vector<OrbitPiece>& out) {
     const Orbit orbit = frame_.orbit_of(next.p);
     out.clear();
     if (std::hypot(orbit.plane[0] - centre.plane[0], orbit.plane[1] - centre.plane[1]) > delta) return;
@@ -388,7 +389,7 @@ Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap
   });
 }
 
-double Search::slope_at(const SurfacePoint& at, bool moving) const {
+double Search::slope_at(const SurfaceSample& at, bool moving) const {
   const OrbitFace& face = surface(moving).faces()[static_cast<std::size_t>(at.face)];
   const double slope = slope_of(face.normal.dot(frame_.direction(at.p)));
   return !face.narrow && stands(slope, face.one_sided) ? slope : kInfinity;

@@ -127,11 +127,11 @@ void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most)
     points_.push_back({corner(corners[k].second, corners[k].first), corners[k].second});
 }
 
-SurfacePoint SampledSurface::walk(const SurfacePoint& start, const Vec3& target) const {
+SurfaceSample SampledSurface::walk(const SurfaceSample& start, const Vec3& target) const {
   constexpr int kMostFaces = 16;
-  SurfacePoint here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
+  SurfaceSample here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
   for (int step = 0; step < kMostFaces; ++step) {
-    SurfacePoint best = here;
+    SurfaceSample best = here;
     for (const Index v : faces_[static_cast<std::size_t>(here.face)].vertices)
       for (const Index f : around_.of(v)) {
         const Vec3 p = nearest_point(faces_[static_cast<std::size_t>(f)], target);

@@ -11,7 +11,7 @@
 namespace limber::internal {
 
 /// A point of a surface, in path coordinates.
-struct SurfacePoint {
+struct SurfaceSample {
   Vec3 p = Vec3::Zero();
   Index face = 0;  ///< of SampledSurface::faces()
 };
@@ -24,11 +24,11 @@ class SampledSurface {
   SampledSurface(std::span<const OrbitBody> bodies, std::vector<OrbitFace> faces, int count);
 
   const std::vector<OrbitFace>& faces() const { return faces_; }
-  const std::vector<SurfacePoint>& points() const { return points_; }
+  const std::vector<SurfaceSample>& points() const { return points_; }
   double spacing() const { return spacing_; }  ///< typical distance between points on faces
 
   /// A point of the surface near `target`, reached from `start` over neighbouring faces.
-  SurfacePoint walk(const SurfacePoint& start, const Vec3& target) const;
+  SurfaceSample walk(const SurfaceSample& start, const Vec3& target) const;
 
  private:
   struct Edge {
@@ -44,7 +44,7 @@ class SampledSurface {
 
   std::vector<OrbitFace> faces_;
   FacesAround around_;
-  std::vector<SurfacePoint> points_;
+  std::vector<SurfaceSample> points_;
   double spacing_ = 0.0;
 };
 

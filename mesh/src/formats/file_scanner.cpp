@@ -6,7 +6,7 @@
 
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v'; }
@@ -235,4 +235,4 @@ Index FileScanner::checked_count(std::int64_t count, std::size_t least_bytes, co
   return static_cast<Index>(count);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -14,7 +14,7 @@
 
 #include "limber/core/types.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// How the numbers of a section are written.
 enum class Encoding { kText, kLittleEndian, kBigEndian };
@@ -121,4 +121,4 @@ class FileScanner {
   bool raw_ = false;  // what begins at word_begin_ is bytes, not text
 };
 
-}  // namespace limber
+}  // namespace limber::internal

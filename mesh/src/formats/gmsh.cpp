@@ -7,7 +7,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 struct ElementType {
@@ -469,4 +469,4 @@ class GmshReader {
 
 MeshFile read_gmsh(const FileBytes& file, Warnings& warnings) { return GmshReader(file, warnings).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

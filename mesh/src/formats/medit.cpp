@@ -5,7 +5,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 class MeditReader {
@@ -148,4 +148,4 @@ class MeditReader {
 
 MeshFile read_medit(const FileBytes& file, Warnings& warnings) { return MeditReader(file, warnings).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

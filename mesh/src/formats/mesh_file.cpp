@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Sorts each list and drops repeats, in time linear in its length but for the sort of what stays.
@@ -102,4 +102,4 @@ Index NodeNumbers::find(std::int64_t number) const {
   return found == sparse_.end() ? -1 : found->second;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

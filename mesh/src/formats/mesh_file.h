@@ -16,7 +16,7 @@
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Polygons from `first` on carry these names, until the next group begins.
 struct PolygonGroup {
@@ -106,4 +106,4 @@ class NodeNumbers {
   std::unordered_map<std::int64_t, Index> sparse_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

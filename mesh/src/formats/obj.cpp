@@ -5,7 +5,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Statements that carry no vertex and no face.
@@ -106,4 +106,4 @@ class ObjReader {
 
 MeshFile read_obj(const FileBytes& file) { return ObjReader(file).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

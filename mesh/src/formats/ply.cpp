@@ -4,7 +4,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
@@ -232,4 +232,4 @@ class PlyReader {
 
 MeshFile read_ply(const FileBytes& file) { return PlyReader(file).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 struct Point {
@@ -94,4 +94,4 @@ std::vector<Triangle> triangulated(const Polygons& polygons, std::span<const Vec
   return out;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

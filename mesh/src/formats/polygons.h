@@ -6,7 +6,7 @@
 
 #include "limber/core/types.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Polygons over some vertices, one behind the other.
 struct Polygons {
@@ -30,4 +30,4 @@ struct Polygons {
 /// ear in the plane that fits them best. Polygons of fewer than three corners give none. @pre all corners are in range
 std::vector<Triangle> triangulated(const Polygons& polygons, std::span<const Vec3> vertices);
 
-}  // namespace limber
+}  // namespace limber::internal

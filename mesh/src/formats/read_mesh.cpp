@@ -13,6 +13,12 @@
 namespace limber {
 namespace {
 
+using internal::FileBytes;
+using internal::MeshFile;
+using internal::PolygonGroup;
+using internal::Polygons;
+using internal::shown_path;
+
 enum class Format { kGmsh, kMedit, kVtk, kTetgen, kPly, kObj, kStl };
 
 constexpr const char* kKnownFormats =
@@ -50,19 +56,19 @@ std::optional<Format> format_of(const std::filesystem::path& path, std::string_v
 MeshFile read_as(Format format, const std::filesystem::path& path, const FileBytes& file, Warnings& warnings) {
   switch (format) {
     case Format::kGmsh:
-      return read_gmsh(file, warnings);
+      return internal::read_gmsh(file, warnings);
     case Format::kMedit:
-      return read_medit(file, warnings);
+      return internal::read_medit(file, warnings);
     case Format::kVtk:
-      return read_vtk(file, warnings);
+      return internal::read_vtk(file, warnings);
     case Format::kTetgen:
-      return read_tetgen(path);
+      return internal::read_tetgen(path);
     case Format::kPly:
-      return read_ply(file);
+      return internal::read_ply(file);
     case Format::kObj:
-      return read_obj(file);
+      return internal::read_obj(file);
     case Format::kStl:
-      return read_stl(file);
+      return internal::read_stl(file);
   }
   throw InputError(file.name + ": unknown format");
 }
@@ -83,7 +89,7 @@ bool has_tets(const ReadFile& file) { return file.format == Format::kTetgen || !
 
 SurfaceMesh surface_of(ReadFile file, const std::string& name, Warnings& warnings) {
   SurfaceMesh surface;
-  surface.triangles = triangulated(file.content.polygons, file.content.tets.nodes);
+  surface.triangles = internal::triangulated(file.content.polygons, file.content.tets.nodes);
   surface.vertices = std::move(file.content.tets.nodes);
   if (file.format == Format::kStl) weld(surface);
   validate(surface, name, warnings);
@@ -163,7 +169,7 @@ GroupedSurface read_grouped_surface(const std::filesystem::path& path, Warnings&
   auto file = read_any(path, warnings);
   if (has_tets(file)) throw InputError(shown_path(path) + ": holds tetrahedra, expected a surface");
   GroupedSurface out;
-  out.surface.triangles = triangulated(file.content.polygons, file.content.tets.nodes);
+  out.surface.triangles = internal::triangulated(file.content.polygons, file.content.tets.nodes);
   out.surface.vertices = std::move(file.content.tets.nodes);
   out.face_of = polygon_of_triangles(file.content.polygons);
   out.groups = groups_of_triangles(file.content.groups, out.face_of);

@@ -5,7 +5,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr std::size_t kHead = 84, kFacet = 50;  // bytes of a binary file
@@ -100,4 +100,4 @@ class StlText {
 
 MeshFile read_stl(const FileBytes& file) { return is_binary(file) ? read_binary(file) : StlText(file).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -5,7 +5,7 @@
 #include "formats/mesh_file.h"
 #include "limber/core/file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 std::filesystem::path with_extension(std::filesystem::path path, const char* extension) {
@@ -108,4 +108,4 @@ class TetgenReader {
 
 MeshFile read_tetgen(const std::filesystem::path& path) { return TetgenReader(path).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

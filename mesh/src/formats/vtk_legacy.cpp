@@ -8,7 +8,7 @@
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Cell types of VTK that limber knows by name.
@@ -450,4 +450,4 @@ class VtkReader {
 
 MeshFile read_vtk(const FileBytes& file, Warnings& warnings) { return VtkReader(file, warnings).read(); }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -11,7 +11,7 @@
 
 #include "limber/core/types.h"
 
-namespace limber {
+namespace limber::internal {
 
 template <std::size_t N>
 class CornerTree {
@@ -110,4 +110,4 @@ class CornerTree {
   std::vector<Index> element_;    // which each is of those given
 };
 
-}  // namespace limber
+}  // namespace limber::internal

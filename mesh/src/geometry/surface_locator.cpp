@@ -12,7 +12,7 @@
 
 namespace limber {
 
-struct SurfaceLocator::Tree : CornerTree<3> {};
+struct SurfaceLocator::Tree : internal::CornerTree<3> {};
 
 SurfaceLocator::SurfaceLocator(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
   if (triangles.empty()) throw InvalidArgument("SurfaceLocator: the surface has no triangles");

@@ -56,7 +56,7 @@ double largest(const Weights& w) { return std::max({std::abs(w[0]), std::abs(w[1
 
 }  // namespace
 
-struct TetLocator::Tree : CornerTree<4> {};
+struct TetLocator::Tree : internal::CornerTree<4> {};
 
 TetLocator::TetLocator(const TetMesh& mesh) {
   if (mesh.tets.empty()) throw InvalidArgument("TetLocator: the mesh has no tetrahedra");

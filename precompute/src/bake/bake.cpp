@@ -14,6 +14,13 @@
 namespace limber {
 namespace {
 
+using internal::append_residual_modes;
+using internal::mass_properties;
+using internal::MassProperties;
+using internal::residual_compliance;
+using internal::SimplifiedSurface;
+using internal::simplify_surface;
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 

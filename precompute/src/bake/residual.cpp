@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 // Loads solved together: enough to make the triangular solves matrix products, few enough to stay in cache.
@@ -146,4 +146,4 @@ ResidualCompliance residual_compliance(const ModalAnalysis& analysis, std::span<
   return residual;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

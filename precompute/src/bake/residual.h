@@ -10,7 +10,7 @@
 #include "limber/model/residual_compliance.h"
 #include "limber/precompute/modal_analysis.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Appends to the analysis the modes in the span of G_res e_j, e_j the unit forces at some nodes, so that kept and new
 /// modes together answer static loads there exactly. Rayleigh–Ritz in that span: they are M-orthonormal to each other
@@ -24,4 +24,4 @@ Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept
 ResidualCompliance residual_compliance(const ModalAnalysis& analysis, std::span<const Index> kept, const TetMesh& mesh,
                                        const Embedding& surface, ResidualCompliance::Form form);
 
-}  // namespace limber
+}  // namespace limber::internal

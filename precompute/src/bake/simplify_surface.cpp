@@ -2,7 +2,7 @@
 
 #include <meshoptimizer.h>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// meshoptimizer's floats would cost a surface far from the origin its digits.
@@ -52,4 +52,4 @@ SimplifiedSurface simplify_surface(const SurfaceMesh& surface, std::size_t trian
   return out;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

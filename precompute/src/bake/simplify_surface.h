@@ -6,7 +6,7 @@
 
 #include "limber/mesh/surface_mesh.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct SimplifiedSurface {
   SurfaceMesh surface;
@@ -18,4 +18,4 @@ struct SimplifiedSurface {
 /// asked for.
 SimplifiedSurface simplify_surface(const SurfaceMesh& surface, std::size_t triangles);
 
-}  // namespace limber
+}  // namespace limber::internal

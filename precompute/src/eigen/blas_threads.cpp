@@ -2,7 +2,7 @@
 
 #include <cblas.h>
 
-namespace limber {
+namespace limber::internal {
 
 BlasThreads::BlasThreads(int threads) : before_(openblas_get_num_threads()) {
   openblas_set_num_threads(threads > 0 ? threads : openblas_get_num_procs());
@@ -10,4 +10,4 @@ BlasThreads::BlasThreads(int threads) : before_(openblas_get_num_threads()) {
 
 BlasThreads::~BlasThreads() { openblas_set_num_threads(before_); }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -2,7 +2,7 @@
 /// How many threads the BLAS uses, for the length of a scope.
 #pragma once
 
-namespace limber {
+namespace limber::internal {
 
 /// Sets OpenBLAS's thread count and gives the former one back. Left to itself OpenBLAS takes every core even for small
 /// blocks, and on a busy machine that is slower by orders of magnitude than one thread.
@@ -18,4 +18,4 @@ class BlasThreads {
   int before_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

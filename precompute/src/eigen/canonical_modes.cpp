@@ -2,7 +2,7 @@
 
 #include <Eigen/Householder>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr double kTie = 1e-6;
@@ -31,4 +31,4 @@ void make_canonical(Eigen::Ref<Eigen::MatrixXd> W) {
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace limber {
+namespace limber::internal {
 
 /// Turns the columns of W within their span, which stays the same, and so does WᵀW and, for an M-orthonormal W, WᵀMW.
 /// The row of largest norm becomes (r, 0, 0, …) with r > 0; then the same for the other columns. Rows within 1e-6 of
@@ -12,4 +12,4 @@ namespace limber {
 /// largest entry becomes positive.
 void make_canonical(Eigen::Ref<Eigen::MatrixXd> W);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -11,7 +11,7 @@
 
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr Eigen::Index kBlock = 32;  // right-hand sides at once: wider gains little and needs more memory
@@ -127,4 +127,4 @@ Eigen::MatrixXd CholeskySolver::solve(const Eigen::Ref<const Eigen::MatrixXd>& B
   return result;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

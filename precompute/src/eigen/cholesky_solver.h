@@ -9,7 +9,7 @@
 
 #include "limber/precompute/sparse_matrix.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Nested dissection (METIS) of the graph of nodes behind a 3n × 3n matrix made of 3 × 3 blocks.
 /// Ordering nodes instead of degrees of freedom takes a ninth of the edges and gives no more fill.
@@ -38,4 +38,4 @@ class CholeskySolver {
   std::unique_ptr<Factor> factor_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

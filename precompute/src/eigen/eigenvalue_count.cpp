@@ -12,6 +12,8 @@
 namespace limber {
 namespace {
 
+using internal::add_mass;
+
 constexpr int kUseWorld = -987654;  // MUMPS's name for MPI_COMM_WORLD, which the sequential library has alone
 constexpr int kOutOfWorkspace1 = -8, kOutOfWorkspace2 = -9;
 constexpr int kSingular = -10;

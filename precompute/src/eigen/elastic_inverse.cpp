@@ -7,7 +7,7 @@
 #include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr int kMaxRefinements = 8;
@@ -101,4 +101,4 @@ Eigen::MatrixXd ElasticInverse::apply_accurately(const Eigen::Ref<const Eigen::M
   return U;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -20,7 +20,7 @@
 #include "eigen/cholesky_solver.h"
 #include "limber/precompute/sparse_matrix.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// K w = λ M w on the free nodes of a body, in units where entries of K and M are about one.
 struct ScaledProblem {
@@ -62,4 +62,4 @@ class ElasticInverse {
   CholeskySolver factor(const std::vector<Index>& node_order);
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,7 +9,7 @@
 #include "eigen/canonical_modes.h"
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 // Eigenvalues this close, relative to each other, are one cluster, kept or dropped whole (as in mode selection).
@@ -152,4 +152,4 @@ void make_clusters_canonical(EigenPairs& pairs) {
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -8,7 +8,7 @@
 #include "eigen/lanczos.h"
 #include "limber/precompute/eigenvalue_count.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct EigenPairs {
   Eigen::VectorXd lambda;  ///< ascending
@@ -37,4 +37,4 @@ void complete(const ScaledProblem& problem, ElasticInverse& inverse, EigenvalueC
 /// Turns every cluster of eigenvalues that cannot be told apart into its canonical form, with equal λ.
 void make_clusters_canonical(EigenPairs& pairs);
 
-}  // namespace limber
+}  // namespace limber::internal

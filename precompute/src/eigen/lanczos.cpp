@@ -12,7 +12,7 @@
 #include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr int kMaxRestarts = 1000;
@@ -138,4 +138,4 @@ Eigen::MatrixXd lanczos(const ScaledProblem& problem, ElasticInverse& inverse, c
   return arpack.parameters[4] > 0 ? arpack.vectors(options.tolerance) : Eigen::MatrixXd(problem.size(), 0);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -7,7 +7,7 @@
 
 #include "eigen/elastic_inverse.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct LanczosOptions {
   int count = 1;            ///< eigenpairs wanted; ≥ 1
@@ -22,4 +22,4 @@ struct LanczosOptions {
 Eigen::MatrixXd lanczos(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& found,
                         const Eigen::MatrixXd& mass_times_found, const LanczosOptions& options);
 
-}  // namespace limber
+}  // namespace limber::internal

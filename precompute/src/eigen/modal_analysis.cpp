@@ -21,6 +21,23 @@
 namespace limber {
 namespace {
 
+using internal::BlasThreads;
+using internal::complete;
+using internal::EigenPairs;
+using internal::ElasticInverse;
+using internal::find_null_space;
+using internal::lanczos;
+using internal::LanczosOptions;
+using internal::lowest_modes;
+using internal::make_canonical;
+using internal::make_clusters_canonical;
+using internal::multiply;
+using internal::norm_estimate;
+using internal::NullSpace;
+using internal::order_nodes;
+using internal::principal_submatrix;
+using internal::ScaledProblem;
+
 constexpr double kNearlyLoose = 1e-6;
 constexpr double kResidual = 1e-8;  // relative to ‖λMw‖, unless round-off of K forbids it
 constexpr double kRoundOffFactor = 100.0;

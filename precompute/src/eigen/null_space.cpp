@@ -8,7 +8,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr double kInLine = 1e-9;     // of the body's size
@@ -264,4 +264,4 @@ NullSpace find_null_space(const TetMesh& mesh, std::span<const Index> fixed_node
   return space;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

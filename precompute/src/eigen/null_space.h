@@ -13,7 +13,7 @@
 #include "limber/mesh/tet_mesh.h"
 #include "limber/model/modal_model.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// What fixed nodes leave of the rigid motions of the whole body.
 struct RigidFreedom {
@@ -37,4 +37,4 @@ struct NullSpace {
 /// Not yet orthonormal. @throws ComputationError if more than 300 parts hang together only by nodes and edges
 NullSpace find_null_space(const TetMesh& mesh, std::span<const Index> fixed_nodes);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -3,7 +3,7 @@
 #include <cassert>
 #include <cmath>
 
-namespace limber {
+namespace limber::internal {
 
 SparseMatrix principal_submatrix(const SparseMatrix& A, std::span<const Index> kept) {
   std::vector<Index> place(A.size, -1);
@@ -91,4 +91,4 @@ double scattered(std::uint64_t seed, std::uint64_t i) {
   return std::ldexp(static_cast<double>(x >> 11), -52) - 1.0;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,7 +9,7 @@
 
 #include "limber/precompute/sparse_matrix.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// The rows and columns listed in `kept` (ascending), renumbered in that order.
 SparseMatrix principal_submatrix(const SparseMatrix& A, std::span<const Index> kept);
@@ -29,4 +29,4 @@ SparseMatrix add_mass(const SparseMatrix& K, double s, const SparseMatrix& node_
 /// Entry i of a fixed sequence of numbers spread evenly over (−1, 1), the same on every machine.
 double scattered(std::uint64_t seed, std::uint64_t i);
 
-}  // namespace limber
+}  // namespace limber::internal

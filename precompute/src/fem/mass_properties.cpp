@@ -1,6 +1,6 @@
 #include "fem/mass_properties.h"
 
-namespace limber {
+namespace limber::internal {
 
 MassProperties mass_properties(const TetMesh& mesh, std::span<const Material> materials) {
   MassProperties p;
@@ -29,4 +29,4 @@ MassProperties mass_properties(const TetMesh& mesh, std::span<const Material> ma
   return p;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

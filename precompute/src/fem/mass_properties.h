@@ -8,7 +8,7 @@
 #include "limber/mesh/tet_mesh.h"
 #include "limber/model/material.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct MassProperties {
   double mass = 0.0;            ///< kg
@@ -25,4 +25,4 @@ struct MassProperties {
 /// @param materials one per region
 MassProperties mass_properties(const TetMesh& mesh, std::span<const Material> materials);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -4,11 +4,9 @@
 #include "limber/internal/joint_spec_json.h"
 #include "reading/scene_reading.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
-using internal::JsonObject;
-using internal::refuse;
 using Json = nlohmann::json;
 
 HandleOptions read_handle_options(const JsonObject& o) {
@@ -66,8 +64,8 @@ SceneJoint read_joint(const Json& value, const std::string& where) {
   const JsonObject o(value, where);
   SceneJoint j{.a = o.text("a", ""), .b = o.text("b"), .where = where};
   if (o.has("a") && j.a.empty()) refuse(o.where("a"), "\"\"", "a body; without \"a\" it is the world");
-  j.spec = internal::read_joint_kind(o);
-  if (o.has("limits")) j.spec.limits = internal::read_joint_limits(o, j.spec.type);
+  j.spec = read_joint_kind(o);
+  if (o.has("limits")) j.spec.limits = read_joint_limits(o, j.spec.type);
   check_input(where, [&] { j.spec.validate(); });
   j.patch_radius = non_negative(o, "patch_radius", 0.0);
   j.collide = o.boolean("collide", false);
@@ -83,4 +81,4 @@ SceneJoint read_joint(const Json& value, const std::string& where) {
   return j;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

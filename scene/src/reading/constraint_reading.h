@@ -7,9 +7,9 @@
 #include "limber/internal/strict_json.h"
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 SceneHandle read_handle(const nlohmann::json& value, const std::string& where, const Scene& scene);
 SceneJoint read_joint(const nlohmann::json& value, const std::string& where);
 
-}  // namespace limber
+}  // namespace limber::internal

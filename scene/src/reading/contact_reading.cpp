@@ -1,16 +1,39 @@
 #include "reading/contact_reading.h"
 
 #include <array>
+#include <nlohmann/json.hpp>
 
 #include "limber/core/error.h"
 #include "reading/scene_reading.h"
 #include "reading/shape_reading.h"
 
 namespace limber {
+
+std::string_view to_string(ContactMethod method) {
+  constexpr std::array kWords{"penalty", "velocity_program", "gap_program", "complementary"};
+  return kWords[static_cast<std::size_t>(method)];
+}
+
+std::string_view to_string(FrictionModel model) {
+  constexpr std::array kWords{"cone", "heuristic", "heuristic_no_slip"};
+  return kWords[static_cast<std::size_t>(model)];
+}
+
+std::string_view to_string(ProgramGuard guard) {
+  constexpr std::array kWords{"none", "clamp", "complementary"};
+  return kWords[static_cast<std::size_t>(guard)];
+}
+
+std::string_view to_string(ImpactModel model) {
+  constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
+  return kWords[static_cast<std::size_t>(model)];
+}
+
+}  // namespace limber
+
+namespace limber::internal {
 namespace {
 
-using internal::JsonObject;
-using internal::refuse;
 using Json = nlohmann::json;
 
 std::optional<double> read_friction(const JsonObject& o) {
@@ -66,26 +89,6 @@ ContactOptions read_contact_options(const JsonObject& o) {
 
 }  // namespace
 
-std::string_view to_string(ContactMethod method) {
-  constexpr std::array kWords{"penalty", "velocity_program", "gap_program", "complementary"};
-  return kWords[static_cast<std::size_t>(method)];
-}
-
-std::string_view to_string(FrictionModel model) {
-  constexpr std::array kWords{"cone", "heuristic", "heuristic_no_slip"};
-  return kWords[static_cast<std::size_t>(model)];
-}
-
-std::string_view to_string(ProgramGuard guard) {
-  constexpr std::array kWords{"none", "clamp", "complementary"};
-  return kWords[static_cast<std::size_t>(guard)];
-}
-
-std::string_view to_string(ImpactModel model) {
-  constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
-  return kWords[static_cast<std::size_t>(model)];
-}
-
 std::optional<ContactOptions> read_contact(const JsonObject& scene) {
   if (scene.has("contact")) return read_contact_options(JsonObject(scene.at("contact"), scene.where("contact")));
   if (scene.has("statics")) return ContactOptions{};
@@ -114,4 +117,4 @@ void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::
   if (o.has("shape")) body.shape = read_shape(o, folder, true);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,15 +9,14 @@
 #include "limber/internal/strict_json.h"
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// The member `contact`; without one, the defaults where there are statics, else none.
-std::optional<ContactOptions> read_contact(const internal::JsonObject& scene);
+std::optional<ContactOptions> read_contact(const JsonObject& scene);
 
 SceneStatic read_static(const nlohmann::json& value, const std::string& where, const std::filesystem::path& folder);
 
 /// `friction`, `shape`, `layers` and `meets` of a body, which only a scene with contact may have.
-void read_touch(const internal::JsonObject& o, const Scene& scene, const std::filesystem::path& folder,
-                SceneBody& body);
+void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body);
 
-}  // namespace limber
+}  // namespace limber::internal

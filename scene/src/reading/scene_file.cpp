@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "limber/core/error.h"
+#include "limber/core/file.h"
 #include "reading/constraint_reading.h"
 #include "reading/contact_reading.h"
 #include "reading/scene_reading.h"
@@ -13,8 +15,22 @@
 namespace limber {
 namespace {
 
+using internal::choice;
+using internal::held_duration;
 using internal::JsonObject;
+using internal::kMaxIndex;
+using internal::non_negative;
+using internal::positive;
+using internal::read_contact;
+using internal::read_handle;
+using internal::read_joint;
+using internal::read_movement;
+using internal::read_place;
+using internal::read_pose;
+using internal::read_static;
+using internal::read_touch;
 using internal::refuse;
+using internal::time_inside;
 using Json = nlohmann::json;
 
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
@@ -184,7 +200,8 @@ void read_time(const JsonObject& o, Scene& scene) {
   // A duration that is a multiple of the step but for round-off is that many steps; else the last step is begun.
   const double exact = positive(o, "duration") / scene.step;
   if (!(exact <= static_cast<double>(kMaxSteps)))
-    refuse(o.where("duration"), shown(o.number("duration")), "at most " + std::to_string(kMaxSteps) + " steps");
+    refuse(o.where("duration"), JsonObject::shown(o.number("duration")),
+           "at most " + std::to_string(kMaxSteps) + " steps");
   const double nearest = std::round(exact);
   scene.steps = static_cast<std::int64_t>(std::abs(exact - nearest) <= 1e-9 * exact ? nearest : std::ceil(exact));
 }

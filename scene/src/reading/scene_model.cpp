@@ -12,6 +12,9 @@
 namespace limber {
 namespace {
 
+using internal::largest_shape;
+using internal::ShapeLoader;
+
 std::size_t bytes_of(const ModalBasis& basis) {
   constexpr std::size_t kBlock = 3 * ModalBasis::kTile * sizeof(float);
   return static_cast<std::size_t>(basis.tiles()) * static_cast<std::size_t>(basis.modes()) * kBlock;
@@ -149,6 +152,7 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   lean.eigenvalues = pick(all.eigenvalues, kept);
   lean.decays = pick(all.decays, kept);
   lean.participation = pick(all.participation, kept);
+  lean.mode_scales = pick(all.mode_scales, kept);
   lean.moments = pick(all.moments, kept);
   lean.render = pick(all.render, kept);
   if (all.collision) lean.collision = pick(*all.collision, kept);

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "limber/core/error.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
-using internal::JsonObject;
-using internal::refuse;
 using Json = nlohmann::json;
 
 PlaceFrame read_place_frame(const JsonObject& o) {
@@ -62,11 +61,9 @@ AlongRay read_ray(const JsonObject& o) {
 
 }  // namespace
 
-std::string shown(double x) { return JsonObject::shown(Json(x)); }
-
 double positive(const JsonObject& o, const std::string& key) {
   const double x = o.number(key);
-  if (!(x > 0.0)) refuse(o.where(key), shown(x), "a number > 0");
+  if (!(x > 0.0)) refuse(o.where(key), JsonObject::shown(x), "a number > 0");
   return x;
 }
 
@@ -76,7 +73,7 @@ double positive(const JsonObject& o, const std::string& key, double otherwise) {
 
 double non_negative(const JsonObject& o, const std::string& key, double otherwise) {
   const double x = o.number(key, otherwise);
-  if (x < 0.0) refuse(o.where(key), shown(x), "a number >= 0");
+  if (x < 0.0) refuse(o.where(key), JsonObject::shown(x), "a number >= 0");
   return x;
 }
 
@@ -99,14 +96,16 @@ Vec3 direction(const JsonObject& o, const std::string& key) { return direction_o
 double time_inside(const JsonObject& o, const std::string& key, const Scene& scene) {
   const double t = o.number(key);
   if (!(t >= 0.0 && t < scene.duration()))
-    refuse(o.where(key), shown(t), "a time within the scene's duration, [0, " + shown(scene.duration()) + ") s");
+    refuse(o.where(key), JsonObject::shown(t),
+           "a time within the scene's duration, [0, " + JsonObject::shown(scene.duration()) + ") s");
   return t;
 }
 
 double held_duration(const JsonObject& o, const Scene& scene, const std::string& otherwise) {
   const double duration = positive(o, "duration", kToTheEnd);
   if (duration < scene.step)
-    refuse(o.where("duration"), shown(duration), "at least one step, " + shown(scene.step) + " s" + otherwise);
+    refuse(o.where("duration"), JsonObject::shown(duration),
+           "at least one step, " + JsonObject::shown(scene.step) + " s" + otherwise);
   return duration;
 }
 
@@ -117,7 +116,7 @@ std::size_t choice(const JsonObject& o, const std::string& key, const std::vecto
   if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
   std::string list;
   for (const auto& w : words) list += (list.empty() ? "\"" : ", \"") + w + "\"";
-  refuse(o.where(key), internal::in_quotes(seen), "one of " + list);
+  refuse(o.where(key), in_quotes(seen), "one of " + list);
 }
 
 void check_input(const std::string& where, const std::function<void()>& check) {
@@ -166,7 +165,7 @@ std::vector<PoseKey> read_keys(const JsonObject& motion, bool turns) {
         {.time = non_negative(o, "time", 0.0), .pose = turns ? read_pose(o) : RigidTransform{{}, o.vec3("position")}});
     o.finish();
     if (keys.size() > 1 && !(keys.back().time > keys[keys.size() - 2].time))
-      refuse(where + ".time", shown(keys.back().time), "a time after the key before it");
+      refuse(where + ".time", JsonObject::shown(keys.back().time), "a time after the key before it");
   });
   if (keys.empty()) refuse(motion.where("keys"), "[]", "at least one key");
   return keys;
@@ -186,4 +185,4 @@ FrameMovement read_movement(const JsonObject& parent, bool turns) {
   return movement;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -1,16 +1,15 @@
 #include "reading/shape_reading.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "limber/core/error.h"
 #include "limber/mesh/read_mesh.h"
 #include "reading/scene_reading.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
-using internal::JsonObject;
-using internal::refuse;
 using Json = nlohmann::json;
 
 constexpr std::size_t kMaxHeights = 100'000'000;
@@ -121,4 +120,4 @@ std::shared_ptr<const Shape> ShapeLoader::load(const SceneShape& shape, const st
   return made;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -10,11 +10,11 @@
 #include "limber/internal/strict_json.h"
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// The member `shape` of a body or static. @param folder that files are relative to @param ends whether a half-space,
 /// which has no end, is refused @throws InputError
-SceneShape read_shape(const internal::JsonObject& parent, const std::filesystem::path& folder, bool ends);
+SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& folder, bool ends);
 
 /// Makes shapes, each file once.
 class ShapeLoader {
@@ -26,4 +26,4 @@ class ShapeLoader {
   std::vector<std::pair<ShapeFile, std::shared_ptr<const Shape>>> read_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 FrameState between(const PoseKey& a, const PoseKey& b, double t) {
@@ -52,4 +52,4 @@ KinematicFrame frame_over_step(const FrameMovement& movement, const RigidTransfo
           .angular_acceleration = (to.angular_velocity - from.angular_velocity) / h};
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -4,7 +4,7 @@
 
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct FrameState {
   RigidTransform pose;
@@ -19,4 +19,4 @@ FrameState frame_at(const FrameMovement& movement, const RigidTransform& start, 
 /// whole change of velocity also where it jumps.
 KinematicFrame frame_over_step(const FrameMovement& movement, const RigidTransform& start, double t, double h);
 
-}  // namespace limber
+}  // namespace limber::internal

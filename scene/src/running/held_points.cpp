@@ -6,7 +6,7 @@
 #include "running/step_times.h"
 #include "running/surface_place.h"
 
-namespace limber {
+namespace limber::internal {
 
 void HeldPoints::plan(const SceneHandle& handle, BodyId body, const std::string& name) {
   planned_.push_back({.handle = &handle, .body = body});
@@ -59,4 +59,4 @@ void HeldPoints::note(const World& world, std::int64_t n) {
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

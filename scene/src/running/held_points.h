@@ -9,7 +9,7 @@
 #include "limber/scene/run.h"
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 class HeldPoints {
  public:
@@ -38,4 +38,4 @@ class HeldPoints {
   std::vector<HandleReport> reports_;  // of the same
 };
 
-}  // namespace limber
+}  // namespace limber::internal

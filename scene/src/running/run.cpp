@@ -14,6 +14,13 @@
 namespace limber {
 namespace {
 
+using internal::find_place;
+using internal::frame_over_step;
+using internal::HeldPoints;
+using internal::step_at_or_after;
+using internal::time_in_steps;
+using internal::TimeInSteps;
+
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }

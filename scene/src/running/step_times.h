@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace limber {
+namespace limber::internal {
 
 constexpr double kStepRoundOff = 1e-9;
 
@@ -30,4 +30,4 @@ inline TimeInSteps time_in_steps(double time, double step) {
   return {whole, std::min(delay, std::nextafter(step, 0.0))};
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -8,7 +8,7 @@
 #include "limber/core/error.h"
 #include "limber/mesh/closest_point.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 using Weights = std::array<double, 3>;
@@ -127,4 +127,4 @@ SurfacePoint find_place(const SurfacePlace& place, const World& world, BodyId bo
   return std::visit([&](const auto& told) { return find(told, world, body, where); }, place);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

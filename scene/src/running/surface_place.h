@@ -7,10 +7,10 @@
 #include "limber/engine/world.h"
 #include "limber/scene/scene_file.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// @param where the place in the scene file, for messages
 /// @throws InputError if the surface has no such triangle or vertex, or the ray misses it
 SurfacePoint find_place(const SurfacePlace& place, const World& world, BodyId body, const std::string& where);
 
-}  // namespace limber
+}  // namespace limber::internal

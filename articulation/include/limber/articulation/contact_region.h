@@ -35,7 +35,7 @@ struct ContactRegion {
   bool overlapping = false;    ///< found as surface inside the other solid, not as surfaces that face each other
 };
 
-enum class ContactMethod {
+enum class ContactSearch {
   kNearest,  ///< facing samples in a cluster grown from the smallest gaps
   /// After [X09] 3.1: parts are cut into nearly convex pieces; what of each surface lies in a slightly grown hull of
   /// the other's pieces and faces it there is the contact, whatever its gap.
@@ -43,7 +43,7 @@ enum class ContactMethod {
 };
 
 struct ContactRegionOptions {
-  ContactMethod method = ContactMethod::kNearest;
+  ContactSearch method = ContactSearch::kNearest;
   int samples = 3000;            ///< wanted on each side; 100 … 100,000
   double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
   double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π

@@ -32,7 +32,6 @@ class MaterialFrame {
   MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body);
 
   Index body() const { return body_; }
-  bool deforms() const { return !displacement_.empty(); }
 
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
   Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal

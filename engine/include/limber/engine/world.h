@@ -281,10 +281,14 @@ class World {
   void reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation = 1.0,
                    const Vec3& origin = Vec3::Zero()) const;
 
-  /// For a caller that deforms on its GPU: pose and amplitudes between the last two states. The rotation between them
-  /// is the shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
+  /// For a caller that deforms on its GPU: pose and modes between the last two states. The rotation between them is the
+  /// shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
   RigidTransform interpolated_pose(BodyId id, double interpolation) const;
+  /// z, kg^½·m, one per mode: vertex v is rest_v + Σ z_i shape_i,v, with the shapes of ModalModel::render().
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
+  /// z_i/s_i, one per mode: weights of the morph targets of the asset (docs/formats/asset.md), as a glTF viewer takes
+  /// them. Base and targets, weighted and moved by the pose, are what reconstruct() draws, but for dents.
+  void interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const;
 
   /// Hash of the whole state, for determinism checks: two worlds with the same calls behind them have the same, for any
   /// Jobs. It covers what the next step depends on: time, poses, momenta, amplitudes and rates, targets of handles,
