@@ -72,12 +72,11 @@ std::vector<std::string> options_of(const Json& reference, const fs::path& folde
 class ReferenceCase : public Precompute, public ::testing::WithParamInterface<const char*> {};
 
 TEST_P(ReferenceCase, AgreesWithThreeIndependentPrograms) {
-  const fs::path shared = fs::path(LIMBER_SHARED_DIR) / "reference-modal";
-  if (!fs::exists(shared)) GTEST_SKIP() << "the reference cases are not here";
-  const Json reference = Json::parse(read_file(shared / (std::string(GetParam()) + ".json")));
+  const fs::path cases = fs::path(LIMBER_SOURCE_DIR) / "tests/data/reference-modal";
+  const Json reference = Json::parse(read_file(cases / (std::string(GetParam()) + ".json")));
   for (const auto& [mass, key] : {std::pair("consistent", "freqs_hz"), std::pair("lumped", "freqs_hz_lumped")}) {
     auto arguments = options_of(reference, folder / "");
-    arguments.insert(arguments.begin(), (shared / reference["mesh"].get<std::string>()).string());
+    arguments.insert(arguments.begin(), (cases / reference["mesh"].get<std::string>()).string());
     arguments.insert(arguments.end(), {"--mass", mass});
     const Json r = report(arguments);
     ASSERT_TRUE(r.is_object());
@@ -95,7 +94,7 @@ TEST_P(ReferenceCase, AgreesWithThreeIndependentPrograms) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shared, ReferenceCase,
+INSTANTIATE_TEST_SUITE_P(Cases, ReferenceCase,
                          ::testing::Values("small_300", "composite_medit", "pinned_node", "two_bodies",
                                            "bar_cantilever"),
                          [](const auto& test) { return std::string(test.param); });
