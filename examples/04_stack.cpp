@@ -4,8 +4,8 @@
 //            --modes 10 -o box.glb
 //   run:   04_stack box.glb
 //   see:   five boxes laid on each other askew, where they settle and when they sleep; then the lowest is struck from the
-//          side, and all wake. They meet as rigid boxes: by their own, flexing surfaces a stack is slow to solve, and
-//          higher ones topple (docs/contact.md, "Where it ends"). A strike rings the modes all the same
+//          side, and all wake. They meet as rigid boxes, which costs less than to meet by their own, flexing surfaces; a
+//          strike rings the modes all the same
 //   next:  05_hinged_lamp
 #include <algorithm>
 #include <cstdio>
