@@ -23,7 +23,7 @@ constexpr int kHashSteps = 20;
 constexpr int kStepsToRest = 300;
 constexpr int kPileBoxes = 18;
 constexpr int kStepsOfLump = 60;
-constexpr int kHashSteps = 70;
+constexpr int kHashSteps = 60;
 #endif
 
 TEST(WorldContact, AFallingBoxComesToRestOnTheGround) {
@@ -516,7 +516,7 @@ TEST(WorldContact, AWarmStepAllocatesNothingByAnyRule) {
   }
 }
 
-/// The states' hashes on the way of fourteen flexible bodies that rub: a heap, three stacks that are dropped and a pair
+/// The states' hashes on the way of twelve flexible bodies that rub: a heap, three stacks that are dropped and a pair
 /// that meets in the air.
 std::vector<std::uint64_t> hashes_of_islands_in_contact(Jobs& jobs) {
   GroundedWorld scene({.friction = 0.6}, {}, jobs);
@@ -525,7 +525,7 @@ std::vector<std::uint64_t> hashes_of_islands_in_contact(Jobs& jobs) {
   const auto add = [&](const Vec3& at, const Vec3& turn, const Vec3& velocity) {
     world.add_body(model, {.pose = {quaternion_from_rotation_vector(turn), at}, .velocity = velocity});
   };
-  for (int i = 0; i < 6; ++i)
+  for (int i = 0; i < 4; ++i)
     add({0.45 * (i % 2), 0.0, 0.25 + 0.3 * (i / 2)}, {0.2 * std::sin(i), 0.1 * std::cos(i), 0.3 * i}, {0.1, 0.0, -1.0});
   for (int stack = 0; stack < 3; ++stack)
     for (int i = 0; i < 3; ++i) add({3.0 + 2.0 * stack, 0.01 * i, 0.13 + 0.22 * i}, {0.0, 0.0, 0.05 * i}, Vec3::Zero());
@@ -540,7 +540,7 @@ std::vector<std::uint64_t> hashes_of_islands_in_contact(Jobs& jobs) {
     if (step % 10 == 0) hashes.push_back(world.state_hash());
   }
   EXPECT_GE(islands, 4);
-  EXPECT_GE(rows, 100);
+  EXPECT_GE(rows, 80);
   return hashes;
 }
 
@@ -550,7 +550,7 @@ TEST(WorldContact, StateHashIsTheSameForAnyThreadCount) {
     ThreadJobs jobs(threads);
     EXPECT_EQ(hashes_of_islands_in_contact(jobs), serial) << threads << " threads";
   }
-  TbbJobs jobs(8);
+  TbbJobs jobs;
   EXPECT_EQ(hashes_of_islands_in_contact(jobs), serial) << "oneTBB";
 }
 
