@@ -16,6 +16,7 @@
 #include "grounded_world.h"
 #include "limber/model/asset.h"
 #include "limber/precompute/bake.h"
+#include "overlap.h"
 #include "tet_box.h"
 
 namespace limber::testing {
@@ -55,45 +56,6 @@ struct Extent {
       high = high.cwiseMax(x.cast<double>());
     }
   }
-};
-
-/// All contacts of the bodies of a world, not thinned.
-class Overlap {
- public:
-  Overlap(const World& world, const std::vector<BodyId>& bodies, BodyId ground) : world_(world), bodies_(bodies) {
-    finder_.add_body(static_cast<Index>(ground.index), {.shape = std::make_shared<Shape>(HalfSpace{})}, {});
-    for (const BodyId id : bodies) {
-      // Not owned: the world outlives this.
-      const std::shared_ptr<const ModalModel> model(std::shared_ptr<void>(), &world.model(id));
-      finder_.add_body(static_cast<Index>(id.index), {.model = model}, {});
-      states_.resize(std::max<std::size_t>(states_.size(), id.index + 1));
-    }
-  }
-  double deepest() {
-    for (const BodyId id : bodies_) {
-      const BodyView view = world_.body(id);
-      states_[id.index] = {.pose = view.pose, .amplitudes = view.amplitudes};
-    }
-    finder_.find_contacts({.states = states_, .margin = 0.0}, contacts_, serial_jobs());
-    double most = 0.0;
-    for (const ContactPoint& contact : contacts_)
-      most = std::max(most, -contact.gap - contact.normal.dot(dent_of(contact.a) - dent_of(contact.b)));
-    return most;
-  }
-
- private:
-  Vec3 dent_of(const ContactSide& side) const {
-    for (const BodyId id : bodies_)
-      if (static_cast<Index>(id.index) == side.body)
-        return world_.dent(id, {.triangle = side.triangle, .weight = side.weight});
-    return Vec3::Zero();  // the ground
-  }
-
-  const World& world_;
-  const std::vector<BodyId>& bodies_;
-  ContactFinder finder_{{.clusters = {.max_points = 0}}};
-  std::vector<BodyState> states_;
-  std::vector<ContactPoint> contacts_;
 };
 
 double farthest_from(const World& world, const std::vector<BodyId>& bodies, const std::vector<Vec3>& places) {
@@ -167,7 +129,7 @@ void run(const Scene& scene, double seconds) {
     rows = std::max(rows, report.rows);
     unsettled += report.solved ? 0 : 1;
     late += !report.solved && i >= steps - 60 ? 1 : 0;
-    if (i >= steps - 60) deepest = std::max(deepest, overlap.deepest());
+    if (i >= steps - 60) deepest = std::max(deepest, overlap.deepest().anywhere());
     const double now = total_energy(world, bodies);
     if (i > 0) rise = std::max(rise, (now - energy) / scale);
     energy = now;

@@ -24,13 +24,17 @@ int main(int argc, char** argv) {
     long steps = 0, unsettled = 0;
   };
   std::map<std::string, Worst> worst;
-  std::puts("scene,E,nu,step,damping,modes,mass_ratio,worst_rise,total_rise,unsettled,finite");
+  std::puts(
+      "scene,E,nu,step,damping,modes,mass_ratio,worst_rise,total_rise,node_worst_rise,"
+      "node_total_rise,spin_bound,spin_excess,strain_difference,removed,unsettled,finite");
   const auto grid = energy_grid();
   for (std::size_t i = 0; i < grid.size(); i += static_cast<std::size_t>(every)) {
     const EnergyCase& at = grid[i];
     const EnergyResult r = run(at, steps);
-    std::printf("%s,%g,%g,%g,%g,%d,%g,%.3g,%.3g,%d,%d\n", name(at.scene), at.youngs_modulus, at.poisson_ratio, at.step,
-                at.damping_ratio, at.modes, at.mass_ratio, r.worst_rise, r.total_rise, r.unsettled, r.finite ? 1 : 0);
+    std::printf("%s,%g,%g,%g,%g,%d,%g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%d,%d\n", name(at.scene),
+                at.youngs_modulus, at.poisson_ratio, at.step, at.damping_ratio, at.modes, at.mass_ratio, r.worst_rise,
+                r.total_rise, r.node_worst_rise, r.node_total_rise, r.spin_bound, r.spin_excess, r.strain_difference,
+                r.removed, r.unsettled, r.finite ? 1 : 0);
     std::fflush(stdout);
     Worst& w = worst[name(at.scene)];
     w.rise = std::max(w.rise, r.worst_rise);

@@ -117,10 +117,8 @@ function(limber_add_tests module)
     RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests" UNITY_BUILD ON)
   target_link_libraries(test_${module} PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
   target_include_directories(test_${module} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
-  # Tests that compare with files outside the repository look for them here, and skip where they are absent.
   target_compile_definitions(test_${module} PRIVATE
-    LIMBER_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared" LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
-    LIMBER_BIN_DIR="${PROJECT_BINARY_DIR}/bin")
+    LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" LIMBER_BIN_DIR="${PROJECT_BINARY_DIR}/bin")
   limber_compile_options(test_${module})
   target_compile_options(test_${module} PRIVATE ${LIMBER_TEST_OPTIONS})
   limber_sanitize(test_${module})

@@ -18,17 +18,31 @@ GroundedIsland dropped_box(const ContactOptions& options, int modes, double step
   return scene;
 }
 
-TEST(ContactMethod, TheWeightIsCarriedInTheEnd) {
+/// The contact impulses of a second, after five seconds, by the weight of a second; and the speed that is left.
+struct Carried {
+  double weights = 0.0, speed = 0.0;
+};
+Carried carried(ContactMethod method) {
+  GroundedIsland scene = dropped_box({.rule = {.method = method}}, 0);
+  for (int i = 0; i < 300; ++i) scene.step();
+  Vec3 impulse = Vec3::Zero();
+  for (int i = 0; i < 60; ++i) scene.step(), impulse += scene.contact_impulse();
+  return {impulse.z() / (scene.model->data().mass * kGravity * 60.0 * kFrame), scene.group.frame(0).velocity().norm()};
+}
+
+/// At rest the impulses are the weight. Those of the gap program are 3 % more, which the guard takes back after the
+/// step: a regression guard.
+TEST(ContactMethod, TheWeightIsCarriedInTheEndByTheGapProgramWithAFewPercentToSpare) {
+  constexpr double kRest = 1e-6, kGapProgramGuard = 0.04, kGapProgramSpeed = 1e-3;
   for (const ContactMethod method :
        {ContactMethod::kPenalty, ContactMethod::kVelocityProgram, ContactMethod::kComplementary}) {
-    GroundedIsland scene = dropped_box({.rule = {.method = method}}, 0);
-    for (int i = 0; i < 300; ++i) scene.step();
-    Vec3 impulse = Vec3::Zero();
-    for (int i = 0; i < 60; ++i) scene.step(), impulse += scene.contact_impulse();
-    const double weight = scene.model->data().mass * kGravity * 60.0 * kFrame;
-    EXPECT_NEAR(impulse.z(), weight, 0.01 * weight) << static_cast<int>(method);
-    EXPECT_LT(scene.group.frame(0).velocity().norm(), 0.02) << static_cast<int>(method);
+    const Carried end = carried(method);
+    EXPECT_NEAR(end.weights, 1.0, kRest) << static_cast<int>(method);
+    EXPECT_LT(end.speed, kRest) << static_cast<int>(method);
   }
+  const Carried end = carried(ContactMethod::kGapProgram);
+  EXPECT_NEAR(end.weights, 1.0, kGapProgramGuard);
+  EXPECT_LT(end.speed, kGapProgramSpeed);
 }
 
 TEST(ContactMethod, PenaltySpringsSinkInByWhatTheWeightIs) {
@@ -104,14 +118,27 @@ Slide slide(const FrictionModel model, double angle) {
   return {scene.group.frame(0).pose().p - before, scene.group.frame(0).velocity()};
 }
 
-/// It brakes as Coulomb says to within a seventh, but what should stick creeps: the cone is there for that.
-TEST(ContactMethod, UnderHeuristicFrictionABlockSlidesAsItShouldButDoesNotStick) {
+/// Under the heuristic what should stick creeps, by less than a twentieth of its size a second, and what slides brakes
+/// too little. How much is no theory's, so the bounds are regression guards above what is measured (2.3 cm a second,
+/// and 11 % of the speed); the cone is there for more.
+TEST(ContactMethod, UnderHeuristicFrictionCreepAndTooLittleBrakingStayWithinGuards) {
+  constexpr double kCreepGuard = 0.05 * kSampleSize, kSpeedGuard = 1.0 / 7.0;
   const double angle = 1.4 * std::atan(kFriction);
   const double expected = 2.0 * kGravity * (std::sin(angle) - kFriction * std::cos(angle));  // after two seconds
   for (const FrictionModel model : {FrictionModel::kHeuristic, FrictionModel::kHeuristicNoSlip}) {
-    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), 0.05 * kSampleSize);
-    EXPECT_NEAR(slide(model, angle).velocity.norm(), expected, expected / 7.0);
+    EXPECT_LT(slide(model, 0.9 * std::atan(kFriction)).way.norm(), kCreepGuard);
+    EXPECT_NEAR(slide(model, angle).velocity.norm(), expected, kSpeedGuard * expected);
   }
+}
+
+/// Under the cone it is Coulomb's law: at rest below the angle; beyond it its acceleration.
+TEST(ContactMethod, UnderTheConeABlockSticksAndSlidesByCoulombsLaw) {
+  const double angle = 1.4 * std::atan(kFriction);
+  const double acceleration = kGravity * (std::sin(angle) - kFriction * std::cos(angle));
+  EXPECT_LT(slide(FrictionModel::kCone, 0.9 * std::atan(kFriction)).way.norm(), 1e-6 * kSampleSize);
+  const Slide slid = slide(FrictionModel::kCone, angle);
+  // Friction begins with the second step (docs/contact.md): a step's worth of it is missing.
+  EXPECT_NEAR(slid.velocity.norm(), 2.0 * acceleration, kFriction * kGravity * kFrame);
 }
 
 }  // namespace

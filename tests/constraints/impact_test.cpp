@@ -44,6 +44,10 @@ Rebound strike_at_any_phase(int modes, double step, const ContactOptions& option
   return worst;
 }
 
+// Theory's rebound is 1 as steps and dropped modes go to nothing; how much is left of it at the steps and modes at hand
+// is no theory's. So these are regression guards, a little below what is measured (0.987 and 0.895).
+constexpr double kReboundGuard = 0.98, kReboundGuardAtAnyPhase = 0.88;
+
 constexpr ContactOptions kHeld{.friction = 0.0, .residual_compliance = true, .impact = ImpactModel::kHeld};
 #if defined(__SANITIZE_ADDRESS__)
 constexpr double kStepsPerContact[] = {100.0, 10.0};  // the sanitizers take twenty times as long
@@ -58,7 +62,7 @@ TEST(Impact, ABarReboundsAsItCameIfStepsStartAtTheTouch) {
     for (const double steps : kStepsPerContact) {
       const double h = kBarContactTime / steps;
       const Rebound r = strike(modes, h, kHeld, 0.0);
-      EXPECT_GE(r.speed, 0.98) << modes << " modes, T/" << steps;
+      EXPECT_GE(r.speed, kReboundGuard) << modes << " modes, T/" << steps;
       EXPECT_LE(r.speed, 1.0 + 1e-12) << modes << " modes, T/" << steps;
       EXPECT_NEAR(r.contact_time, kBarContactTime, 0.02 * kBarContactTime + h) << modes << " modes, T/" << steps;
       EXPECT_LE(r.highest_energy, 1.0 + 1e-12) << modes << " modes, T/" << steps;
@@ -70,7 +74,7 @@ TEST(Impact, ABarReboundsWithMostOfItsSpeedWhereverTheTouchFallsWithinAStep) {
     for (const double steps : {100.0, 20.0, 10.0}) {
       const double h = kBarContactTime / steps;
       const Rebound r = strike_at_any_phase(modes, h, kHeld);
-      EXPECT_GE(r.speed, 0.88) << modes << " modes, T/" << steps;
+      EXPECT_GE(r.speed, kReboundGuardAtAnyPhase) << modes << " modes, T/" << steps;
       EXPECT_NEAR(r.contact_time, kBarContactTime, 0.02 * kBarContactTime + h) << modes << " modes, T/" << steps;
       EXPECT_LE(r.highest_energy, 1.0 + 1e-12) << modes << " modes, T/" << steps;
     }
@@ -86,7 +90,7 @@ TEST(Impact, ABarReboundsAsItCameWhateverTheStepIfThatIsCutWhereItTouchesAndLets
         const double h = kBarContactTime / steps;
         const Rebound r = strike(modes, h, kCut, phase);
         const auto where = ::testing::Message() << modes << " modes, T/" << steps << " phase " << phase;
-        EXPECT_GE(r.speed, 0.98) << where;
+        EXPECT_GE(r.speed, kReboundGuard) << where;
         EXPECT_GE(r.speed, strike(modes, h, kHeld, phase).speed - 1e-3) << where;
         EXPECT_LE(r.speed, 1.0 + 1e-12) << where;
         EXPECT_NEAR(r.contact_time, kBarContactTime, 0.02 * kBarContactTime + h) << where;
@@ -96,7 +100,7 @@ TEST(Impact, ABarReboundsAsItCameWhateverTheStepIfThatIsCutWhereItTouchesAndLets
 
 TEST(Impact, ABarReboundsAsItCameInStepsThatAreShorterThanItsModes) {
   const Rebound r = strike(20, kBarContactTime / kStepsPerContact[0], kCut, 0.5);
-  EXPECT_GE(r.speed, 0.98);
+  EXPECT_GE(r.speed, kReboundGuard);
   EXPECT_LE(r.highest_energy, 1.0 + 1e-12);
 }
 
@@ -105,7 +109,7 @@ TEST(Impact, ABarReboundsAsItCameInStepsThatAreLongerThanTheImpact) {
   for (const double steps : {3.0, 2.0, 1.2, 0.9, 0.5, 0.1})
     for (const double phase : {0.0, 0.05, 0.3, 0.5, 0.7, 0.95}) {
       const Rebound r = strike(20, kBarContactTime / steps, kCut, phase);
-      EXPECT_GE(r.speed, 0.98) << "T/" << steps << " phase " << phase;
+      EXPECT_GE(r.speed, kReboundGuard) << "T/" << steps << " phase " << phase;
       EXPECT_LE(r.highest_energy, 1.0 + 1e-12) << "T/" << steps << " phase " << phase;
     }
 }

@@ -57,9 +57,13 @@ class Island {
   }
 
   IslandReport step() {
-    const IslandReport report = solver.step(
-        table, members, constraints,
-        {.step = step_, .gravity = gravity_, .contact = rule, .undisturbed = steps++ > 0, .energy_surplus = surplus});
+    const IslandReport report = solver.step(table, members, constraints,
+                                            {.step = step_,
+                                             .gravity = gravity_,
+                                             .guard_energy = guard_energy,
+                                             .contact = rule,
+                                             .undisturbed = steps++ > 0,
+                                             .energy_surplus = surplus});
     surplus = report.energy_surplus;
     return report;
   }
@@ -111,6 +115,7 @@ class Island {
   std::vector<JointConstraint*> joints;
   IslandSolver solver;
   ContactRule rule;
+  bool guard_energy = true;
   int steps = 0;
   double surplus = 0.0;
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "constants.h"
+#include "energy_meter.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
 #include "limber/precompute/bake.h"
@@ -17,22 +18,38 @@ namespace {
 const Vec3 kSize{0.3, 0.1, 0.1};  // of a bar, m
 constexpr double kDensity = 1000.0;
 
+TetMesh bar_mesh() { return tet_box(3, 2, 2, kSize); }
+
 /// @param weight times the density, and the stiffness with it, so that the frequencies stay
+Material bar_material(const EnergyCase& at, double weight) {
+  return {
+      .youngs_modulus = weight * at.youngs_modulus, .poisson_ratio = at.poisson_ratio, .density = weight * kDensity};
+}
+
 std::shared_ptr<const ModalModel> baked_bar(const EnergyCase& at, double weight) {
   BakeOptions o;
-  o.materials = {{"*", Material{.youngs_modulus = weight * at.youngs_modulus,
-                                .poisson_ratio = at.poisson_ratio,
-                                .density = weight * kDensity}}};
+  o.materials = {{"*", bar_material(at, weight)}};
   o.analysis.modes = o.limits.max_modes = std::max(1, at.modes);
+  o.analysis.mass = MassKind::kConsistent;  // so that the nodes have the inertia by which the frame turns
+  o.volume_block = true;
   const auto bake_it = [&o] {
     Warnings warnings;
-    return bake({.name = "bar", .mesh = tet_box(3, 2, 2, kSize)}, o, warnings).asset.bodies[0];
+    return bake({.name = "bar", .mesh = bar_mesh()}, o, warnings).asset.bodies[0];
   };
   auto bar = bake_it();
   if (at.modes == 0) return reduce_model(*bar, {});
   if (at.damping_ratio == 0.0) return bar;
   o.damping.stiffness_proportional = 2.0 * at.damping_ratio / std::sqrt(bar->data().eigenvalues.front());
   return bake_it();
+}
+
+struct Bar {
+  std::shared_ptr<const ModalModel> model;
+  std::shared_ptr<const EnergyMeter> meter;
+};
+Bar make_bar(const EnergyCase& at, double weight) {
+  const auto model = baked_bar(at, weight);
+  return {model, std::make_shared<const EnergyMeter>(bar_mesh(), bar_material(at, weight), model)};
 }
 
 /// A point of the surface as near as may be to one of the bar at rest, body frame.
@@ -56,7 +73,7 @@ SurfacePoint corner(const ModalModel& model, const Vec3& near) {
 class Scene {
  public:
   explicit Scene(const EnergyCase& at) : world_({.step = at.step}) {
-    const auto light = baked_bar(at, 1.0), heavy = at.mass_ratio == 1.0 ? light : baked_bar(at, at.mass_ratio);
+    const Bar light = make_bar(at, 1.0), heavy = at.mass_ratio == 1.0 ? light : make_bar(at, at.mass_ratio);
     switch (at.scene) {
       case EnergyScene::kGround:
         stand_on_ground(at.friction);
@@ -70,7 +87,7 @@ class Scene {
         break;
       case EnergyScene::kHandle:
         add(light, {});
-        world_.add_handle(bodies_[0], corner(*light, -0.5 * kSize));
+        world_.add_handle(bodies_[0], corner(*light.model, -0.5 * kSize));
         break;
       case EnergyScene::kChain:
         hang_chain(light, heavy);
@@ -84,16 +101,19 @@ class Scene {
 
   EnergyResult run(int steps) {
     EnergyResult result;
-    const double first = total();
-    double before = first;
+    const double first = total(), node_first = node_total(result);
+    double before = first, node_before = node_first;
     for (; result.steps < steps && result.finite; ++result.steps) {
       world_.step();
-      const double now = total();
-      result.finite = std::isfinite(now);
+      const double now = total(), node_now = node_total(result);
+      result.finite = std::isfinite(now) && std::isfinite(node_now);
       result.worst_rise = std::max(result.worst_rise, (now - before) / scale_);
       result.total_rise = std::max(result.total_rise, (now - first) / scale_);
+      result.node_worst_rise = std::max(result.node_worst_rise, (node_now - node_before) / scale_);
+      result.node_total_rise = std::max(result.node_total_rise, (node_now - node_first) / scale_);
       if (!world_.constraint_report().solved) ++result.unsettled;
-      before = now;
+      result.removed += world_.constraint_report().energy_removed / scale_;
+      before = now, node_before = node_now;
     }
     return result;
   }
@@ -104,15 +124,16 @@ class Scene {
     world_.add_static(std::make_shared<Shape>(HalfSpace{}));
   }
 
-  BodyId add(const std::shared_ptr<const ModalModel>& model, const RigidTransform& pose,
-             const Vec3& velocity = Vec3::Zero(), const Vec3& angular_velocity = Vec3::Zero()) {
+  BodyId add(const Bar& bar, const RigidTransform& pose, const Vec3& velocity = Vec3::Zero(),
+             const Vec3& angular_velocity = Vec3::Zero()) {
     bodies_.push_back(
-        world_.add_body(model, {.pose = pose, .velocity = velocity, .angular_velocity = angular_velocity}));
+        world_.add_body(bar.model, {.pose = pose, .velocity = velocity, .angular_velocity = angular_velocity}));
+    meters_.push_back(bar.meter);
     return bodies_.back();
   }
 
   /// Links along x, joined at the middles of their ends.
-  void hang_chain(const std::shared_ptr<const ModalModel>& light, const std::shared_ptr<const ModalModel>& heavy) {
+  void hang_chain(const Bar& light, const Bar& heavy) {
     constexpr double kLimit = 0.6;  // rad
     for (int i = 0; i < 3; ++i) {
       const BodyId link = add(i < 2 ? light : heavy, {{}, {kSize.x() * i, 0.0, 0.0}});
@@ -139,9 +160,26 @@ class Scene {
     return sum;
   }
 
+  /// By the nodes, and how the parts compare with the world's.
+  double node_total(EnergyResult& result) const {
+    double sum = 0.0, spin = 0.0;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const NodeEnergy nodes = meters_[i]->read(world_.body(bodies_[i]), world_.options().gravity);
+      const BodyEnergy e = world_.energy(bodies_[i]);
+      const double beyond = std::abs(nodes.kinetic - e.kinetic_rigid - e.kinetic_modal) - nodes.spin_bound;
+      result.spin_excess = std::max(result.spin_excess, beyond / scale_);
+      result.strain_difference = std::max(result.strain_difference, std::abs(nodes.strain - e.elastic) / scale_);
+      sum += nodes.total();
+      spin += nodes.spin_bound / scale_;
+    }
+    result.spin_bound = std::max(result.spin_bound, spin);
+    return sum;
+  }
+
   ContactFinder finder_;
   World world_;
   std::vector<BodyId> bodies_;
+  std::vector<std::shared_ptr<const EnergyMeter>> meters_;
   double scale_ = 1.0;
 };
 

@@ -30,6 +30,13 @@ struct EnergyCase {
 struct EnergyResult {
   double worst_rise = 0.0;  ///< of the energy in a step, over its scale: max(kinetic and elastic at first, Σ m g size)
   double total_rise = 0.0;  ///< largest excess over the energy at first, over the scale
+  double removed = 0.0;     ///< what the constraints took out on purpose, over the scale (ConstraintReport)
+
+  // The same by the nodes of the meshes (energy_meter.h), over the scale.
+  double node_worst_rise = 0.0, node_total_rise = 0.0;
+  double spin_bound = 0.0;         ///< largest sum over the bodies of what their change of inertia may account for
+  double spin_excess = 0.0;        ///< largest amount by which the kinetic energies differ beyond that
+  double strain_difference = 0.0;  ///< largest difference of the elastic energies
   bool finite = true;
   int steps = 0, unsettled = 0;  ///< steps; those in which some island did not come to its targets
 };

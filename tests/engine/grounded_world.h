@@ -20,8 +20,9 @@ inline std::shared_ptr<const ModalModel> damped_box(int modes, double hz) {
 
 /// A world with the ground, and its finder.
 struct GroundedWorld {
-  explicit GroundedWorld(const ContactOptions& options = {}, const WorldOptions& world_options = {})
-      : world(world_options) {
+  explicit GroundedWorld(const ContactOptions& options = {}, const WorldOptions& world_options = {},
+                         Jobs& jobs = serial_jobs())
+      : world(world_options, jobs) {
     world.set_contact_source(&finder, options);
     ground = world.add_static(std::make_shared<Shape>(HalfSpace{}));
   }

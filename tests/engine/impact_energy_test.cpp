@@ -23,12 +23,16 @@ double energy_kept(double steps_per_second, int dropped_modes, ImpactModel impac
   return sum / kWays;
 }
 
-TEST(WorldImpact, BoxesKeepTheirEnergyInStepsThatAreCut) {
+// Theory's loss is none without damping and friction; what blows at several corners leave of it in steps of this length
+// is no theory's. Regression guards, a little below what is measured (0.89 with dropped modes).
+constexpr double kKeptGuard = 0.9, kKeptGuardWithDroppedModes = 0.85, kGainGuard = 0.4;
+
+TEST(WorldImpact, BoxesKeepMostOfTheirEnergyInStepsThatAreCut) {
   for (const double steps : {60.0, 240.0}) {
-    EXPECT_GE(energy_kept(steps, 0, ImpactModel::kHeldFromTouch), 0.9) << steps;
+    EXPECT_GE(energy_kept(steps, 0, ImpactModel::kHeldFromTouch), kKeptGuard) << steps;
     const double kept = energy_kept(steps, 30, ImpactModel::kHeldFromTouch);
-    EXPECT_GE(kept, 0.85) << steps;
-    EXPECT_GE(kept, energy_kept(steps, 30, ImpactModel::kHeld) + 0.4) << steps;
+    EXPECT_GE(kept, kKeptGuardWithDroppedModes) << steps;
+    EXPECT_GE(kept, energy_kept(steps, 30, ImpactModel::kHeld) + kGainGuard) << steps;
     EXPECT_LE(kept, 1.0) << steps;
   }
 }

@@ -20,8 +20,7 @@ constexpr double kReferenceRoundOff = 1e-12;
 class ReferenceMesh : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
-  const fs::path folder = fs::path(LIMBER_SHARED_DIR) / "reference-modal";
-  if (!fs::exists(folder)) GTEST_SKIP() << "the reference cases are not in " << folder;
+  const fs::path folder = fs::path(LIMBER_SOURCE_DIR) / "tests/data/reference-modal";
   const auto expected = nlohmann::json::parse(std::ifstream(folder / (std::string(GetParam()) + ".json")));
 
   Warnings warnings;

@@ -205,6 +205,34 @@ TEST(Bake, LimitsLeaveOutWhatTheSceneCannotShow) {
   for (const DroppedMode& m : r.selection.dropped) EXPECT_EQ(m.reason, DropReason::kTooFast);
 }
 
+/// A collision surface where the first mode has its node moves less than the ends, which a strike can reach.
+TEST(Bake, AModeIsKeptIfAStrikeOnTheRenderSurfaceCanShowItThoughContactsCannot) {
+  SurfaceMesh small;  // one triangle on the axis, where a free beam's first bending mode is still; its torsion is too
+  const Vec3 still(0.224 * kBoxSize.x(), 0.5 * kBoxSize.y(), 0.5 * kBoxSize.z());
+  small.vertices = {still, still + Vec3(0.001, 0.0, 0.0), still + Vec3(0.0, 0.001, 0.0)};
+  small.triangles = {{0, 1, 2}};
+  BakeOptions o = rubber(1);
+  const auto bake_with_small = [&](const BakeOptions& options) {
+    Warnings warnings;
+    return bake({.name = "box", .mesh = tet_box(3, 2, 2, kBoxSize), .collision = small}, options, warnings);
+  };
+  const auto body = only_body(bake_with_small(o));
+  const auto largest = [](const ModalSurface& s) {
+    double most = 0.0;
+    for (Index v = 0; v < s.vertices(); ++v) most = std::max(most, static_cast<double>(s.basis.shape(v, 0).norm()));
+    return most;
+  };
+  const double shown = largest(body->render()), touched = largest(body->collision());
+  ASSERT_LT(touched, 0.5 * shown);
+  // What a sudden force makes the mode show: 2 |w|·|w| F/λ. The limit lies between the two surfaces'.
+  o.limits.max_force = 10.0;
+  const double static_answer = 2.0 * o.limits.max_force * shown / body->data().eigenvalues[0];
+  o.limits.min_displacement = static_answer * std::sqrt(shown * touched);
+  EXPECT_EQ(only_body(bake_with_small(o))->modes(), 1);
+  o.limits.min_displacement = 1.01 * static_answer * shown;
+  EXPECT_EQ(only_body(bake_with_small(o))->modes(), 0);
+}
+
 TEST(RayleighDamping, HasTheRatioAskedForAtBothFrequencies) {
   const RayleighDamping d = RayleighDamping::from_ratio(0.03, 20.0, 300.0);
   for (const double hz : {20.0, 300.0}) {

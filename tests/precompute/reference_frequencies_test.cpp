@@ -1,5 +1,4 @@
-/// Five meshes whose frequencies three other programs agree on. They lie outside the repository; where they are absent
-/// the tests say so and skip.
+/// Five meshes whose frequencies three other programs agree on: tests/data/reference-modal.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +13,7 @@
 namespace limber {
 namespace {
 
-const std::filesystem::path kFolder = std::filesystem::path(LIMBER_SHARED_DIR) / "reference-modal";
+const std::filesystem::path kFolder = std::filesystem::path(LIMBER_SOURCE_DIR) / "tests/data/reference-modal";
 constexpr double kAgreement = 1e-6;  // what the programs agree on among themselves, relative
 
 struct Summary {
@@ -62,7 +61,7 @@ class ReferenceFrequencies : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(ReferenceFrequencies, AreThoseOfThreeOtherPrograms) {
   std::ifstream file(kFolder / (std::string(GetParam()) + ".json"));
-  if (!file) GTEST_SKIP() << "no reference data in " << kFolder;
+  ASSERT_TRUE(file) << kFolder;
   const auto reference = nlohmann::json::parse(file);
   Warnings warnings;
   const TetMesh mesh = read_tet_mesh(kFolder / reference["mesh"].get<std::string>(), warnings);

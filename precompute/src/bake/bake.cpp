@@ -225,15 +225,18 @@ double decay_of(const RayleighDamping& d, double lambda) {
 }
 
 /// Modes to keep, as columns of the analysis: mechanisms always, and of the elastic ones those that the limits leave.
+/// Strikes and forces act on the render surface, contacts on the collision surface: a mode counts by the larger.
 std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, const BodySurfaces& surfaces,
                                 const BakeOptions& options, BodyReport& report) {
   std::vector<ModeStrength> strengths;
   for (Index mode = a.mechanisms; mode < static_cast<Index>(a.eigenvalues.size()); ++mode) {
     const double lambda = a.eigenvalues[mode];
+    const double shown = largest_displacement(a, mesh, mode, surfaces.render.embedding);
+    const double touched = largest_displacement(a, mesh, mode, surfaces.touching().embedding);
     strengths.push_back({.eigenvalue = lambda,
                          .decay = decay_of(options.damping, lambda),
-                         .max_observable = largest_displacement(a, mesh, mode, surfaces.render.embedding),
-                         .max_loadable = largest_displacement(a, mesh, mode, surfaces.touching().embedding)});
+                         .max_observable = shown,
+                         .max_loadable = std::max(shown, touched)});
     report.frequencies_hz.push_back(std::sqrt(lambda) / (2.0 * std::numbers::pi));
   }
   report.selection = select_modes(strengths, options.limits);
