@@ -86,9 +86,9 @@ enum Scene { kFar, kNearBalls, kTouchingBalls, kOnePlace, kTenPlaces, kHundredPl
 constexpr const char* kSceneNames[] = {"far",       "near, gap 2 %", "touching, 1 % deep", "1 place",
                                        "10 places", "100 places",    "everywhere"};
 
-/// A second of 60 steps, in which both bodies vibrate and one moves there and back: by 2 % of the balls' diameter, so
+/// A second of 30 steps, in which both bodies vibrate and one moves there and back: by 2 % of the balls' diameter, so
 /// that they come near and touch in turn, of the bumps' height by a tenth.
-constexpr int kSteps = 60;
+constexpr int kSteps = 30;
 
 struct State {
   RigidTransform X_AB;
@@ -237,7 +237,7 @@ struct Wave {
   Wave(const Pair& bodies, BoundsChoice choice, bool remembers) : of_step(kSteps) {
     std::vector<State> states;
     for (int step = 0; step < kSteps; ++step) states.push_back(bodies.at(step));
-    constexpr int kRounds = 7;
+    constexpr int kRounds = 4;
     Query query;
     const auto answer = [&](std::size_t i) { query.run(bodies, states[i], choice, remembers); };
     LeastTime all;

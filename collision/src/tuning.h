@@ -32,8 +32,9 @@ struct BroadTuning {
 
 /// Convex rigid shapes, and the distance of two hulls.
 struct ConvexTuning {
-  /// Part of a hull's size up to which points lie on a face and normals are one; round-off to 1e-6. Not measured.
+  /// Part of a hull's size up to which points lie on a face; round-off to 1e-6.
   double hull_thickness = 1e-10;
+  double hull_same_direction = 1e-7;  ///< length of the difference of two unit normals of one plane; 1e-10 to 1e-4
   /// Sine below which two lines are parallel: what is lost is their length times this; 1e-15 to 1e-12.
   double parallel_lines = 1e-13;
   /// GJK: part of the squared distance that a step must gain; a few round-offs of it.
