@@ -87,7 +87,7 @@ constexpr const char* kSceneNames[] = {"far",       "near, gap 2 %", "touching, 
                                        "10 places", "100 places",    "everywhere"};
 
 /// A second of 30 steps, in which both bodies vibrate and one moves there and back: by 2 % of the balls' diameter, so
-/// that they come near and touch in turn, of the bumps' height by a tenth.
+/// that they come near and touch in turn, by a tenth of the bumps' height, or of flat plates as far as they vibrate.
 constexpr int kSteps = 30;
 
 struct State {
@@ -99,10 +99,10 @@ struct Pair {
   Surface a, b;
   RigidTransform X_AB;
   std::vector<double> z_a, z_b;
-  bool balls;
+  Vec3 way;  // from the middle of the motion to its end
 
   Pair(Scene scene, bool large, Index modes, int leaf_triangles = 4) {
-    balls = scene <= kTouchingBalls;
+    const bool balls = scene <= kTouchingBalls;
     const SurfaceMesh below = balls ? ball(large ? 71 : 26) : plate(large ? 100 : 36, 0, 0.0);
     const int bumps = scene == kOnePlace ? 1 : scene == kTenPlaces ? 10 : scene == kHundredPlaces ? 100 : 0;
     const CollisionSurfaceOptions options{.leaf_triangles = leaf_triangles};
@@ -113,6 +113,7 @@ struct Pair {
     // Balls are bent by some 5 %; plates hardly, so that the places stay what they are.
     z_a = amplitudes(modes, balls ? 0.02 : 1e-4);
     z_b = amplitudes(modes, balls ? -0.02 : 1e-4);
+    way = balls ? Vec3(0.04, 0.0, 0.0) : Vec3(0.0, 0.0, scene == kEverywhere ? 1e-4 : 0.01);
     if (balls) {
       X_AB.q = quaternion_from_rotation_vector({0.0, 0.0, 0.7});
       X_AB.p = Vec3(scene == kFar ? 16.0 : gap_free_distance() + (scene == kNearBalls ? 0.04 : -0.02), 0.0, 0.0);
@@ -129,7 +130,7 @@ struct Pair {
       s.z_a[i] *= std::cos(omega * t), s.z_b[i] *= std::sin(omega * t);
     }
     s.X_AB.q = quaternion_from_rotation_vector({0.0, 0.0, 0.1 * swing}) * X_AB.q;
-    s.X_AB.p += swing * (balls ? Vec3(0.04, 0.0, 0.0) : Vec3(0.0, 0.0, 0.01));
+    s.X_AB.p += swing * way;
     return s;
   }
 

@@ -1,99 +1,116 @@
 /// @file
-/// Numbers of the collision module that choose a path, a tolerance or a preference: all of them, in one place.
-/// docs/reports/tuning-collision.md tells what moves when each is halved and doubled; "any" below means that contacts
-/// are the same throughout.
+/// Numbers of the collision module that choose a path, a tolerance or a preference, all of them and each once. Each has
+/// its meaning, its unit where it has one, a sensible range in brackets and what it rests on.
+/// docs/reports/tuning-collision.md tells what moves when each is halved and doubled; benchmarks/tuning_collision.cpp
+/// measures it. "Steady" below: nothing moves there.
 ///
-/// What stands where it is used: bounds of round-off, which follow from the arithmetic, and sizes of buffers.
+/// Bounds of round-off, which follow from the arithmetic, and sizes of buffers stand where they are used.
 #pragma once
 
 #include <cstddef>
 
 namespace limber::internal {
 
-/// Trees of surfaces: when all vertices are made at once. They decide how fast boxes are found, not what touches.
+/// Trees of surfaces. These decide how fast boxes are found and nothing else.
+///
+/// BoundsChoice::kAutomatic refits a tree once as many boxes have been asked for as cost the same. Costs are in floats
+/// read from the near cache, for k modes, fitted by hand to benchmark_collision_hierarchy; within 8 % at half and
+/// twice.
 struct HierarchyTuning {
-  // BoundsChoice::kAutomatic refits where as many boxes from amplitudes would cost as much. Costs are in floats read
-  // from the near cache, for k modes; fitted to times of benchmark_collision_hierarchy, 0.25 to 4 times these.
-  double box_cost = 1000.0;           ///< of one box, besides ...
-  double box_cost_per_mode = 48.0;    ///< ... k times this: scattered in memory, and wider than a refit's
-  double vertex_cost = 6.0;           ///< of one vertex of a refit, besides ...
-  double vertex_cost_per_mode = 3.0;  ///< ... k times this: three floats, which stream
-  double triangle_cost = 32.0;        ///< of one triangle of a refit
-  /// Boxes asked for without a refit per box asked for with one, which end the walk earlier; 1 to 2, counted.
+  double box_cost = 1000.0;           ///< of a box beside what grows with k: the tests and vertices it leads to [> 0]
+  double box_cost_per_mode = 48.0;    ///< of a box, times k: 6 half floats, scattered in memory [6 to 100]
+  double vertex_cost_per_mode = 3.0;  ///< of a vertex of a refit, times k: three floats, which stream [3]
+  double triangle_cost = 32.0;        ///< of a triangle of a refit, with its share of vertices and nodes [10 to 100]
+  /// Boxes that a walk asks for without a refit, per box with one: tighter boxes end it earlier [1 to 2]. Counted.
   double boxes_without_refit = 2.0;
 };
 
-/// The list of awake bodies. They decide time alone.
+/// Lists of many bodies. These decide time alone. Steady.
 struct BroadTuning {
-  /// Moves per body after which insertion stops and the list is sorted anew; 2 to log2 of the bodies.
+  /// Moves per body after which insertion stops and the list is sorted anew [2 to log2 of the number of bodies].
   std::size_t moves_before_sort = 8;
-  std::size_t rows_per_chunk = 256;  ///< of the sweep, given to a thread at once; 64 to 1,024
+  std::size_t rows_per_chunk = 256;  ///< of the sweep, for a thread at a time [64 to 1,024]
 };
 
 /// Convex rigid shapes, and the distance of two hulls.
 struct ConvexTuning {
-  /// Part of a hull's size up to which points lie on a face; round-off to 1e-6.
+  /// Part of a hull's size up to which a point lies on a face [1e-14 to 1e-6]: far above round-off, far below any
+  /// corner that is meant. Steady.
   double hull_thickness = 1e-10;
-  double hull_same_direction = 1e-7;  ///< length of the difference of two unit normals of one plane; 1e-10 to 1e-4
-  /// Sine below which two lines are parallel: what is lost is their length times this; 1e-15 to 1e-12.
+  /// Length of the difference of two unit normals or directions that are one [1e-12 to 1e-4]; the same argument.
+  /// Steady.
+  double hull_same_direction = 1e-7;
+  /// Sine below which two lines are parallel [1e-15 to 1e-11]: what is lost is their length times this. Steady.
   double parallel_lines = 1e-13;
-  /// GJK: part of the squared distance that a step must gain; a few round-offs of it.
+  /// GJK: part of the squared distance that a step must gain [some round-offs, 2.2e-16 each]. Steady.
   double gjk_progress = 1e-15;
-  /// GJK: polytopes end after as many steps as they have features, round-off may make the last repeat; 64 and more.
+  /// GJK: steps at most [≥ 64]. Polytopes take as many as they have features; round-off may make the last repeat.
+  /// Steady.
   int gjk_iterations = 128;
-  /// Cosine with a face's normal above which faces meet rather than an edge or a corner; 0.9 to 0.99. 0.97: 14°.
+  /// Cosine with a face's normal, 14°, from which faces meet rather than an edge or a corner [7° to 30°]. By judgement:
+  /// an eighth of the contacts of random pairs come or go at half the angle, none is deeper for it.
   double face_alignment = 0.97;
-  /// By so much better, as a cosine, must a face of a fit the normal to be the reference: flush faces are told apart by
-  /// round-off, and with the reference the names of all contacts change (docs/contact-solvers.md, forces that go on).
+  /// Cosine by which a face of a must fit the normal better to be the reference [1e-8 to 1e-3]: flush faces are told
+  /// apart by round-off, and with the reference the ids of all contacts change (NarrowPhase.BricksThatLieFlush...).
   double reference_preference = 1e-4;
-  /// Edges decide the direction of least depth where they are less deep than faces by this factor; 0.9 to 1. Faces give
-  /// steadier contacts.
+  /// Edges decide the direction of least depth where their depth is below this part of the faces' [0.9 to 1]: faces
+  /// give steadier contacts. By judgement.
   double edge_preference = 0.95;
-  double least_cross = 1e-8;   ///< sine of two edges below which their cross product is no axis; 1e-12 to 1e-4
-  double side_by_side = 0.17;  ///< sine of the axes of capsules that touch along their length, 10°; 0.05 to 0.3
+  /// Sine of two edges below which their cross product is no axis [1e-12 to 1e-4]: faces bound that direction. Steady.
+  double least_cross = 1e-8;
+  double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]; by judgement
 };
 
-/// Surfaces made of triangles.
+/// Surfaces made of triangles. "Edges at hand" are the shortest ones around a vertex and of the face it meets.
 struct NarrowTuning {
-  /// Part of the shortest edges at hand below which features touch: the direction between two points tells little, the
-  /// faces that lie on each other do; 1e-3 to 0.05. Set so that stacks of boxes stand (touching_faces_test.cpp).
+  /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
+  /// normal, as the direction between two points is noise. Half of it turns the corners of flush boxes sideways.
   double touching = 0.01;
-  double flat = 0.02;  ///< sine by which faces that touch along an area may be from parallel, 1°; 1e-3 to 0.1
-  /// Sine by which a surface may lean against a contact's normal for the contact to count as its own, 12°; 0.1 to 0.4.
+  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]; at half, tilted boxes suffer
+  /// Sine, 12°, by which a surface may lean against a contact's normal that counts as its own [0.1 to 0.4]. Steady.
   double leaning = 0.2;
-  double steep = 0.5;  ///< sine beyond which it runs through the plane that the contact stands for, 30°; > leaning, < 1
-  /// Part of the shortest edges by which a plane may have been passed and still keep bodies apart: a floor of boxes
-  /// need not be level to the last bit; round-off to 1e-3 (touching_faces_test.cpp).
+  /// Sine, 30°, from which a surface runs through the plane of its contact [above leaning, to 45°]. At 60° flush boxes
+  /// are pushed out sideways.
+  double steep = 0.5;
+  /// Part of the edges at hand by which a plane may have been passed and still keeps bodies apart [1e-6 to 1e-3]:
+  /// floors of boxes need not be level to the last bit. Seams that are farther off than this stop what slides.
   double passed = 1e-4;
   /// How far a direction may lean out of a crease's normal cone, per unit of |inward₁ + inward₂|: 12° at a right angle,
-  /// 17° on a knife's edge, 0 on a plane; 0 to 0.3. Bodies that rock keep the crossings of their outlines.
+  /// 17° on a knife's edge, 0 on a plane [0 to 0.3]. Rocking bodies keep the crossings of their outlines. By judgement:
+  /// with 0 the contacts are the local minima alone.
   double rocking = 0.15;
-  double leads_into = 1e-3;    ///< sine at which a direction leads into a face from its rim; 1e-6 to 1e-2
-  double aligned_depth = 0.5;  ///< part of the edges up to which flush bodies are freed along other faces; 0.1 to 1
-  double same_way = 0.9;       ///< cosine with a way out of the loop of crossings that go along it, 26°; 0.7 to 0.99
-  double directionless = 1e3;  ///< round-offs: directions between points nearer than this are noise; 10 to 1e6
-  double parallel_edges =
-      1e-12;  ///< sine below which edges are parallel and their ends make the contacts; 1e-15 to 1e-6
-  double parallel_touching = 1e-4;  ///< the same for edges that touch, whose common perpendicular is lost sooner
-  double grazing = 1e-9;            ///< cosine with a face's normal below which a ray goes by; round-off to 1e-6
-  int rest_depth_steps = 16;        ///< tetrahedra walked through to carry a point back; bodies bent too far take more
-  double least_stretch = 1e-6;      ///< det F below which a tetrahedron is flat: nothing is carried back through it
-  /// Part of a patch's area below which its area vectors cancel and leave no direction but round-off's; 1e-12 to 1e-2.
+  double leads_into = 1e-3;  ///< sine at which a direction leads from a face's rim into it [1e-6 to 1e-2]. Steady.
+  /// Part of the edges at hand up to which bodies with flush sides are freed along other faces [0.1 to 1]: deeper, the
+  /// nearest side is the way out. By judgement.
+  double aligned_depth = 0.5;
+  /// Cosine, 26°, with a way out of a loop of intersection within which a crossing of edges goes that way [13° to 40°].
+  /// By judgement: bars laid across each other rest on all four crossings.
+  double same_way = 0.9;
+  double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. Steady.
+  /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. Steady.
+  double parallel_touching = 1e-4;
+  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
+  int rest_depth_steps = 16;  ///< tetrahedra walked to carry a point back to the rest shape [≥ 8]. Steady.
+  double least_stretch =
+      1e-6;  ///< det F up to which a tetrahedron is flat and carries nothing [1e-12 to 1e-3]. Steady.
+  /// Part of its area below which a patch's area vector is round-off [1e-12 to 1e-2]. Steady.
   double least_patch = 1e-6;
 };
 
 /// Whole queries: thinning, and the first time of impact.
 struct FinderTuning {
-  double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1, as the header says
-  std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< given to a thread at once; decide time alone
-  /// Last time's contacts are kept while they cover the patch within so many spacings ...
+  double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1: a promise of the header
+  std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
+  /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets
+  /// of the benchmark change their contacts from step to step at 0.55.
   double kept_spacing = 1.1;
-  /// ... and are at most so many, beside the best choice's, per contact that covers its middle; 0 to 1.
+  /// How many more they may be than the best choice, per contact of it that covers the middle [0 to 1]. Steady.
   double kept_surplus = 0.5;
-  double kept_gap = 0.5;  ///< part of the margin that an advancement leaves, as the header says; > 0, < 1
-  /// An advancement below this part of the time looked ahead asks for a nearer look: at what the bounds gave times
-  /// `look_again`, at least `look_nearer` of the time before. Then `look_farther` times the last advancement is looked
-  /// ahead. Times of benchmark_collision_impact; the answer is safe with any.
+  double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
+  /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
+  /// `look_again` [1 to 4] times what the bounds gave, at least `look_nearer` [0.01 to 0.2] of the time before. After
+  /// an advancement, `look_farther` [2 to 10] times it is looked ahead. Advancements change by a sixth at most at half
+  /// and twice; the answer is safe with any.
   double good_advancement = 0.25, look_nearer = 1.0 / 16.0, look_again = 2.0, look_farther = 4.0;
 };
 

@@ -34,8 +34,7 @@ Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) %
 long boxes_per_refit(const CollisionSurface& surface) {
   const double k = surface.modes();
   const internal::HierarchyTuning& cost = internal::collision_tuning().hierarchy;
-  const double box = cost.box_cost_per_mode * k + cost.box_cost,
-               vertex = cost.vertex_cost_per_mode * k + cost.vertex_cost;
+  const double box = cost.box_cost_per_mode * k + cost.box_cost, vertex = cost.vertex_cost_per_mode * k;
   return static_cast<long>((vertex * surface.vertices() + cost.triangle_cost * surface.triangles()) / box);
 }
 

@@ -247,7 +247,8 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
   const Vec3 u = a1 - a0, w = b1 - b0, r = b0 - a0;
   const Vec3 n = u.cross(w);
   const double n2 = n.squaredNorm(), u2 = u.squaredNorm(), w2 = w.squaredNorm();
-  if (!(n2 > tuning_->parallel_edges * tuning_->parallel_edges * u2 * w2)) return pair;
+  const double parallel = collision_tuning().convex.parallel_lines;
+  if (!(n2 > parallel * parallel * u2 * w2)) return pair;
   const double s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
   const double end_s = tolerance_ / std::sqrt(u2), end_t = tolerance_ / std::sqrt(w2);
   if (!(s > end_s && s < 1.0 - end_s && t > end_t && t < 1.0 - end_t)) return pair;
