@@ -47,6 +47,8 @@ double multiplied(double x, double factor) { return x * factor; }
 double angle_of_cosine(double x, double factor) { return std::cos(factor * std::acos(x)); }
 double angle_of_sine(double x, double factor) { return std::sin(factor * std::asin(x)); }
 double rest_to_one(double x, double factor) { return 1.0 - factor * (1.0 - x); }
+/// Half way to 0 or to 1.
+double between_bounds(double x, double factor) { return factor < 1.0 ? 0.5 * x : 0.5 * (1.0 + x); }
 
 #define LIMBER_NUMBER_BY(room, name, change)                                      \
   Number {                                                                        \
@@ -95,7 +97,7 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(finder, bodies_per_chunk),
     LIMBER_NUMBER(finder, kept_spacing),
     LIMBER_NUMBER(finder, kept_surplus),
-    LIMBER_NUMBER_BY(finder, kept_gap, [](double x, double factor) { return factor < 1.0 ? 0.5 * x : 1.5 * x; }),
+    LIMBER_NUMBER_BY(finder, kept_gap, between_bounds),
     LIMBER_NUMBER(finder, good_advancement),
     LIMBER_NUMBER(finder, look_nearer),
     LIMBER_NUMBER(finder, look_again),

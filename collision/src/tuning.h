@@ -48,10 +48,11 @@ struct ConvexTuning {
   /// Steady.
   int gjk_iterations = 128;
   /// Cosine with a face's normal, 14°, from which faces meet rather than an edge or a corner [7° to 30°]. By judgement:
-  /// an eighth of the contacts of random pairs come or go at half the angle, none is deeper for it.
+  /// 76 of 11,696 contacts come or go at half the angle, none gets another depth.
   double face_alignment = 0.97;
   /// Cosine by which a face of a must fit the normal better to be the reference [1e-8 to 1e-3]: flush faces are told
   /// apart by round-off, and with the reference the ids of all contacts change (NarrowPhase.BricksThatLieFlush...).
+  /// Steady.
   double reference_preference = 1e-4;
   /// Edges decide the direction of least depth where their depth is below this part of the faces' [0.9 to 1]: faces
   /// give steadier contacts. By judgement.
@@ -66,11 +67,12 @@ struct NarrowTuning {
   /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
   /// normal, as the direction between two points is noise. Half of it turns the corners of flush boxes sideways.
   double touching = 0.01;
-  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]; at half, tilted boxes suffer
+  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]; at half, boxes tilted by as
+                       ///< much have sideways normals
   /// Sine, 12°, by which a surface may lean against a contact's normal that counts as its own [0.1 to 0.4]. Steady.
   double leaning = 0.2;
-  /// Sine, 30°, from which a surface runs through the plane of its contact [above leaning, to 45°]. At 60° flush boxes
-  /// are pushed out sideways.
+  /// Sine, 30°, from which a surface runs through the plane of its contact [15° to 60°]. Steady; at
+  /// 90°, which is never, flush boxes are pushed out sideways.
   double steep = 0.5;
   /// Part of the edges at hand by which a plane may have been passed and still keeps bodies apart [1e-6 to 1e-3]:
   /// floors of boxes need not be level to the last bit. Seams that are farther off than this stop what slides.

@@ -15,6 +15,7 @@
 #include "narrow_phase_bodies.h"
 #include "narrow_phase_reference.h"
 #include "random_states.h"
+#include "tuning.h"
 #include "wavy_model.h"
 
 namespace limber {
@@ -111,6 +112,29 @@ TEST(NarrowPhase, LumpySphereAndBoxHaveTheContactsOfAllFeaturePairs) {
   };
   expect_at_least({.apart = 50, .overlapping = 50, .inside = 100, .edges = 25, .edge_minima = 15, .crossed = 100},
                   expect_all_contacts_of_pairs(a, b, 0.08, 22, trials(300), place_pair));
+}
+
+/// Other numbers give other contacts, and the reference tells: so a fault of that size would not pass the tests above.
+TEST(NarrowPhase, ContactsByOtherNumbersAreNotThoseOfTheReference) {
+  Random random(29);
+  Body a(lumpy_sphere(1, 5)), b(lumpy_sphere(2, 3));
+  std::size_t missed = 0, extra = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    a.place(random.pose(1.0), random.amplitudes(5, 0.05));
+    b.place({random.pose(1.0).q, a.pose.p + random.uniform(0.7, 1.0) * random.vector(1.0).normalized()},
+            random.amplitudes(3, 0.05));
+    const PairReference reference(a.plain(), b.plain(), 0.08);
+    for (const double factor : {0.5, 2.0}) {
+      internal::CollisionTuning tuning;
+      tuning.narrow.rocking *= factor;
+      const internal::ScopedCollisionTuning in_force(tuning);
+      const auto contacts = contacts_of(a, b, 0.08, {.overlap = OverlapMethod::kNearestPoint});
+      const Comparison compared = compare(contacts, reference, a, b);
+      (factor < 1.0 ? missed : extra) += factor < 1.0 ? compared.missed.size() : compared.extra.size();
+    }
+  }
+  EXPECT_GT(missed, 0u);
+  EXPECT_GT(extra, 0u);
 }
 
 /// The bunny on 240 triangles, or null where the file is not there.
