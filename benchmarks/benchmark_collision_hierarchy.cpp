@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -84,10 +86,20 @@ enum Scene { kFar, kNearBalls, kTouchingBalls, kOnePlace, kTenPlaces, kHundredPl
 constexpr const char* kSceneNames[] = {"far",       "near, gap 2 %", "touching, 1 % deep", "1 place",
                                        "10 places", "100 places",    "everywhere"};
 
+/// A second of 30 steps, in which both bodies vibrate and one moves there and back: by 2 % of the balls' diameter, so
+/// that they come near and touch in turn, by a tenth of the bumps' height, or of flat plates as far as they vibrate.
+constexpr int kSteps = 30;
+
+struct State {
+  RigidTransform X_AB;
+  std::vector<double> z_a, z_b;
+};
+
 struct Pair {
   Surface a, b;
   RigidTransform X_AB;
   std::vector<double> z_a, z_b;
+  Vec3 way;  // from the middle of the motion to its end
 
   Pair(Scene scene, bool large, Index modes, int leaf_triangles = 4) {
     const bool balls = scene <= kTouchingBalls;
@@ -101,12 +113,25 @@ struct Pair {
     // Balls are bent by some 5 %; plates hardly, so that the places stay what they are.
     z_a = amplitudes(modes, balls ? 0.02 : 1e-4);
     z_b = amplitudes(modes, balls ? -0.02 : 1e-4);
+    way = balls ? Vec3(0.04, 0.0, 0.0) : Vec3(0.0, 0.0, scene == kEverywhere ? 1e-4 : 0.01);
     if (balls) {
       X_AB.q = quaternion_from_rotation_vector({0.0, 0.0, 0.7});
       X_AB.p = Vec3(scene == kFar ? 16.0 : gap_free_distance() + (scene == kNearBalls ? 0.04 : -0.02), 0.0, 0.0);
     } else {
       X_AB.p = Vec3(0.0, 0.0, scene == kEverywhere ? 1e-5 : 0.085);
     }
+  }
+
+  State at(int step) const {
+    const double t = step / double{kSteps}, swing = std::sin(2.0 * std::numbers::pi * t);
+    State s{X_AB, z_a, z_b};
+    for (std::size_t i = 0; i < z_a.size(); ++i) {
+      const double omega = std::sqrt(a->model()->data().eigenvalues[i]);
+      s.z_a[i] *= std::cos(omega * t), s.z_b[i] *= std::sin(omega * t);
+    }
+    s.X_AB.q = quaternion_from_rotation_vector({0.0, 0.0, 0.1 * swing}) * X_AB.q;
+    s.X_AB.p += swing * way;
+    return s;
   }
 
   /// Distance of the balls' centres along x at which they touch, by bisection on the triangles' own pairs.
@@ -126,17 +151,18 @@ struct Pair {
   }
 };
 
-/// One way of answering, again and again, as a body meets the same other one in step after step.
+/// One way of answering, as a body meets the same other one in step after step.
 struct Query {
   DeformedSurface a, b;
   std::vector<TrianglePair> pairs;
   DeformedSurface::Counters last_a, last_b;
 
-  void run(const Pair& pair, BoundsChoice choice) {
-    a.bind(pair.a, pair.z_a, choice, &last_a);
-    b.bind(pair.b, pair.z_b, choice, &last_b);
+  /// @param remembers the boxes are chosen by what the step before asked for
+  void run(const Pair& pair, const State& state, BoundsChoice choice, bool remembers = false) {
+    a.bind(pair.a, state.z_a, choice, remembers ? &last_a : nullptr);
+    b.bind(pair.b, state.z_b, choice, remembers ? &last_b : nullptr);
     pairs.clear();
-    find_triangle_pairs(a, b, pair.X_AB, 0.0, pairs);
+    find_triangle_pairs(a, b, state.X_AB, 0.0, pairs);
     last_a = a.counters(), last_b = b.counters();
   }
 };
@@ -204,35 +230,60 @@ class FclPair {
   fcl::Transform3<double> X_ = fcl::Transform3<double>::Identity();
 };
 
-/// range(0) scene, range(1) large, range(2) modes.
+/// Times of a way of answering over the steps, s.
+struct Wave {
+  double mean = 0.0;            // of all
+  std::vector<double> of_step;  // with the clock's own time, half a microsecond
+
+  Wave(const Pair& bodies, BoundsChoice choice, bool remembers) : of_step(kSteps) {
+    std::vector<State> states;
+    for (int step = 0; step < kSteps; ++step) states.push_back(bodies.at(step));
+    constexpr int kRounds = 4;
+    Query query;
+    const auto answer = [&](std::size_t i) { query.run(bodies, states[i], choice, remembers); };
+    LeastTime all;
+    std::vector<LeastTime> each(kSteps);
+    for (int round = 0; round < kRounds; ++round) {
+      all.measure([&] {
+        for (std::size_t i = 0; i < kSteps; ++i) answer(i);
+      });
+      for (std::size_t i = 0; i < kSteps; ++i) each[i].measure([&] { answer(i); });
+    }
+    mean = all.seconds() / kSteps;
+    for (std::size_t i = 0; i < kSteps; ++i) of_step[i] = each[i].seconds();
+  }
+  double sum() const { return std::accumulate(of_step.begin(), of_step.end(), 0.0); }
+};
+
+/// range(0) scene, range(1) large, range(2) modes. `best` takes the cheaper of boxes from amplitudes and refit in each
+/// step; `forgetful` is automatic without what the step before asked for.
 void pair(benchmark::State& state) {
   const auto scene = static_cast<Scene>(state.range(0));
   const Pair bodies(scene, state.range(1) != 0, static_cast<Index>(state.range(2)));
-  Query lazy, refit, automatic;
-  double seconds[3] = {};
   for (auto _ : state) {
-    const int repeats = scene == kFar ? 1000 : 3;
-    seconds[0] = least_seconds(
-        state, [&] { lazy.run(bodies, BoundsChoice::kAmplitudes); }, repeats);
-    seconds[1] = least_seconds(
-        state, [&] { refit.run(bodies, BoundsChoice::kRefit); }, 3);
-    seconds[2] = least_seconds(
-        state, [&] { automatic.run(bodies, BoundsChoice::kAutomatic); }, repeats);
+    const Wave lazy(bodies, BoundsChoice::kAmplitudes, false), refit(bodies, BoundsChoice::kRefit, false),
+        automatic(bodies, BoundsChoice::kAutomatic, true), forgetful(bodies, BoundsChoice::kAutomatic, false);
+    double best = 0.0;
+    int lazy_wins = 0;
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      best += std::min(lazy.of_step[i], refit.of_step[i]);
+      lazy_wins += lazy.of_step[i] < refit.of_step[i] ? 1 : 0;
+    }
+    state.counters["lazy_us"] = 1e6 * lazy.mean;
+    state.counters["refit_us"] = 1e6 * refit.mean;
+    state.counters["automatic_us"] = 1e6 * automatic.mean;
+    state.counters["automatic_over_refit"] = automatic.mean / refit.mean;
+    state.counters["automatic_over_best"] = automatic.sum() / best;
+    state.counters["forgetful_over_best"] = forgetful.sum() / best;
+    state.counters["lazy_is_best_percent"] = 100.0 * lazy_wins / kSteps;
   }
   state.SetLabel(kSceneNames[scene]);
-  state.counters["lazy_us"] = 1e6 * seconds[0];
-  state.counters["refit_us"] = 1e6 * seconds[1];
-  state.counters["automatic_us"] = 1e6 * seconds[2];
-  state.counters["refit_over_lazy"] = seconds[1] / seconds[0];
-  state.counters["automatic_over_refit"] = seconds[2] / seconds[1];
-  state.counters["boxes"] = static_cast<double>(lazy.last_a.boxes + lazy.last_b.boxes);
-  state.counters["vertices"] = static_cast<double>(lazy.last_a.vertices + lazy.last_b.vertices);
-  state.counters["pairs"] = static_cast<double>(lazy.pairs.size());
 }
 
 void fcl_pair(benchmark::State& state) {
   const auto scene = static_cast<Scene>(state.range(0));
   const Pair bodies(scene, state.range(1) != 0, static_cast<Index>(state.range(2)));
+  const State now{bodies.X_AB, bodies.z_a, bodies.z_b};
   FclPair fcl(bodies);
   Query automatic;
   double refit = 0.0, collide = 0.0, own = 0.0;
@@ -242,7 +293,7 @@ void fcl_pair(benchmark::State& state) {
     for (int i = 0; i < 3; ++i) collide_time.measure([&] { fcl.collide(); });
     refit = refit_time.seconds(), collide = collide_time.seconds();
     own = least_seconds(
-        state, [&] { automatic.run(bodies, BoundsChoice::kAutomatic); }, 3);
+        state, [&] { automatic.run(bodies, now, BoundsChoice::kAutomatic, true); }, 3);
   }
   state.SetLabel(kSceneNames[scene]);
   state.counters["fcl_refit_us"] = 1e6 * refit;

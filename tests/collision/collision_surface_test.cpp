@@ -108,15 +108,11 @@ TEST(CollisionSurface, VerticesAtOnePlaceThatMoveApartStayTwo) {
   EXPECT_FALSE(s.adjacent(0, 1));
 }
 
-TEST(CollisionSurface, FlatTrianglesAreKeptAndTold) {
+TEST(CollisionSurface, FlatTrianglesAreKept) {
   const SurfaceMesh mesh{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}, {1, 0, 0}},
                          {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}, {1, 1, 1}}};
   const CollisionSurface s = rigid(mesh);
   EXPECT_EQ(s.triangles(), 4);
-  EXPECT_TRUE(s.degenerate(0));
-  EXPECT_FALSE(s.degenerate(1));
-  EXPECT_TRUE(s.degenerate(2)) << "two corners at one place";
-  EXPECT_TRUE(s.degenerate(3));
   EXPECT_FALSE(s.closed());
 }
 

@@ -41,13 +41,17 @@ class Body {
       plain_.vertices.push_back(R * p + X_WB.p);
     }
   }
-  /// Corners and faces of a box in the world.
+  /// Corners and faces of a box in the world; which way its sides are cut into triangles is the geometry's choice.
   void place_box(const RigidTransform& X_WB, const Vec3& half_extents) {
     pose = X_WB;
-    const SurfaceMesh box = shapes::box(-half_extents, half_extents);
-    plain_.triangles = box.triangles;
+    const CollisionSurface& s = surface();
+    plain_.triangles.clear();
+    for (Index t = 0; t < s.triangles(); ++t) plain_.triangles.push_back(s.triangle(t));
     plain_.vertices.clear();
-    for (const Vec3& p : box.vertices) plain_.vertices.push_back(to_matrix(X_WB.q) * p + X_WB.p);
+    for (const Vec3& p : shapes::box(-half_extents, half_extents).vertices) {
+      ASSERT_EQ(p, s.rest(static_cast<Index>(plain_.vertices.size())));
+      plain_.vertices.push_back(to_matrix(X_WB.q) * p + X_WB.p);
+    }
   }
 
   CollisionBody body(Index index) {

@@ -1,10 +1,12 @@
 #include "limber/collision/narrow_phase.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -17,6 +19,7 @@
 #include "random_states.h"
 #include "sample_models.h"
 #include "shapes.h"
+#include "solid_bodies.h"
 #include "wavy_model.h"
 
 namespace limber {
@@ -25,11 +28,13 @@ namespace {
 using testing::Body;
 using testing::contacts_of;
 using testing::expect_well_formed;
+using testing::index_of;
 using testing::is_kind;
 using testing::key_of;
 using testing::kGap;
 using testing::lumpy_sphere;
 using testing::nearest_distance;
+using testing::point_a;
 using testing::point_b;
 using testing::Random;
 using testing::rigid;
@@ -136,20 +141,107 @@ TEST(NarrowPhase, RestDepthOfAnUndeformedBoxIsItsSignedDistance) {
   EXPECT_GT(inside, 300);
 }
 
-TEST(NarrowPhase, RestDepthFollowsTheDeformation) {
-  // What is pushed out of a bent body leaves where the rest shape says, along the carried normal.
-  Body soft(testing::sample_model()), probe(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.02, 0), 0));
+/// A solid in one state as plain arrays, in its body frame.
+struct PlainSolid {
+  TetMesh rest;
+  std::vector<Vec3> now;  // of the nodes
+  BoundarySurface boundary;
+
+  explicit PlainSolid(const TetMesh& mesh) : rest(mesh), boundary(boundary_surface(mesh)) {}
+  void bend(const ModalModel& model, const std::vector<double>& z) {
+    now = rest.nodes;
+    for (std::size_t v = 0; v < now.size(); ++v)
+      for (std::size_t i = 0; i < z.size(); ++i)
+        now[v] +=
+            z[i] * model.data().volume_block->basis.shape(static_cast<Index>(v), static_cast<Index>(i)).cast<double>();
+  }
+};
+
+Eigen::Matrix4d homogeneous(const std::vector<Vec3>& nodes, const Tet& tet) {
+  Eigen::Matrix4d m;
+  for (int i = 0; i < 4; ++i) m.col(i) << nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])], 1.0;
+  return m;
+}
+
+/// Where a point of a bent solid is at rest, and the affine map of the tetrahedron there; none if no tetrahedron holds
+/// the point.
+struct PulledBack {
+  Vec3 rest;
+  Mat3 F;
+};
+std::optional<PulledBack> pull_back(const PlainSolid& solid, const Vec3& p) {
+  for (const Tet& tet : solid.rest.tets) {
+    const Eigen::Matrix4d now = homogeneous(solid.now, tet), rest = homogeneous(solid.rest.nodes, tet);
+    const Eigen::Vector4d weights = now.inverse() * p.homogeneous();
+    if (weights.minCoeff() < 0.0) continue;
+    return PulledBack{(rest * weights).head<3>(), (now * rest.inverse()).topLeftCorner<3, 3>()};
+  }
+  return std::nullopt;
+}
+
+/// Where a point inside leaves the bent solid by the rest shape: at the material point that is nearest at rest.
+struct WayOut {
+  Vec3 at, normal;
+};
+WayOut way_out_by_rest(const PlainSolid& solid, const PulledBack& from) {
+  testing::HullDistance nearest;
+  WayOut out{};
+  for (const Triangle& t : solid.boundary.surface.triangles) {
+    std::array<Vec3, 3> x, x_now;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto node = static_cast<std::size_t>(solid.boundary.node_of[static_cast<std::size_t>(t[c])]);
+      x[c] = solid.rest.nodes[node], x_now[c] = solid.now[node];
+    }
+    const testing::HullDistance d = testing::hull_distance({&from.rest, 1}, x);
+    if (!(d.distance < nearest.distance)) continue;
+    nearest = d;
+    Mat3 corners;
+    corners << x[0], x[1], x[2];
+    // Shifted, for a triangle whose plane holds the origin.
+    const Vec3 off = (x[1] - x[0]).cross(x[2] - x[0]);
+    const Vec3 weights = (corners.colwise() + off).inverse() * (d.b + off);
+    out.at = weights[0] * x_now[0] + weights[1] * x_now[1] + weights[2] * x_now[2];
+  }
+  out.normal = (from.F.inverse().transpose() * (nearest.b - from.rest)).normalized();
+  return out;
+}
+
+TEST(NarrowPhase, ByDefaultBentBodiesAreLeftWhereTheRestShapeSays) {
+  const TetMesh mesh = testing::solid_box({0.75, 0.25, 0.25}, {6, 2, 2});  // exact in single precision too
+  const auto model = testing::solid(mesh, 4);
+  PlainSolid solid(mesh);
+  Body soft(model), probe(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.02, 0), 0));
   soft.use_volume();
   Random random(27);
-  int inside = 0;
-  for (int trial = 0; trial < 500; ++trial) {
-    soft.place(random.pose(1.0), random.amplitudes(4, 0.02));
-    probe.place({random.pose(1.0).q, soft.pose * random.vector(0.15)});
+  int inside = 0, unlike_nearest = 0;
+  for (int trial = 0; trial < 150; ++trial) {
+    const std::vector<double> z = random.amplitudes(4, 0.08);
+    solid.bend(*model, z);
+    soft.place(random.pose(1.0), z);
+    probe.place({random.pose(1.0).q, soft.pose * random.vector(1.0).cwiseProduct(Vec3(0.75, 0.25, 0.25))});
     const auto contacts = contacts_of(soft, probe, 1e-6);
     expect_well_formed(contacts, soft, probe, 1e-6);
-    for (const ContactPoint& c : contacts) inside += c.gap < -1e-3 ? 1 : 0;
+    for (std::size_t v = 0; v < probe.plain().vertices.size(); ++v) {
+      const Vec3 p_B = soft.pose.inverse() * probe.plain().vertices[v];
+      const auto from = pull_back(solid, p_B);
+      const double nearest = nearest_distance(soft.plain(), probe.plain().vertices[v]);
+      if (!from || nearest < 1e-3) continue;
+      const WayOut out = way_out_by_rest(solid, *from);
+      const double gap = out.normal.dot(p_B - out.at);
+      const auto c = std::find_if(contacts.begin(), contacts.end(), [&](const ContactPoint& x) {
+        return x.gap < 0.0 && is_kind(key_of(x, 1), Feature::Kind::kVertex) &&
+               index_of(key_of(x, 1)) == static_cast<Index>(v);
+      });
+      ASSERT_NE(c, contacts.end()) << "trial " << trial << ", vertex " << v;
+      ASSERT_NEAR(c->gap, gap, kGap) << "trial " << trial << ", vertex " << v;
+      ASSERT_LE((soft.pose.inverse() * point_a(*c, soft) - out.at).norm(), kGap);
+      // Out of the soft body, which is a: the other way round.
+      ASSERT_LE((c->normal + soft.pose.q * out.normal).norm(), kGap / nearest);
+      ++inside, unlike_nearest += (p_B - out.at).norm() > 1.01 * nearest ? 1 : 0;
+    }
   }
-  EXPECT_GT(inside, 300);
+  EXPECT_GT(inside, 700);
+  EXPECT_GT(unlike_nearest, 200);  // else the above does not tell the two methods apart
 }
 
 TEST(NarrowPhase, IdenticalBodiesInOnePlaceHaveFinitelyManyFiniteContacts) {

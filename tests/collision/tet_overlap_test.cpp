@@ -12,15 +12,15 @@
 #include "contact_bodies.h"
 #include "contact_reference.h"
 #include "counted_new.h"
-#include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 #include "random_states.h"
-#include "wavy_model.h"
+#include "solid_bodies.h"
 
 namespace limber {
 namespace {
 
 using testing::Body;
+using testing::body_of;
 using testing::contacts_of;
 using testing::expect_well_formed;
 using testing::index_of;
@@ -29,6 +29,9 @@ using testing::key_of;
 using testing::PlainSurface;
 using testing::point_a;
 using testing::Random;
+using testing::solid;
+using testing::solid_box;
+using testing::tet_ball;
 using testing::winding_number;
 
 // Of lengths about 1 m computed in double from corners that are exact in single precision.
@@ -38,70 +41,6 @@ constexpr double kRoundOffNormal = 1e-10;
 
 constexpr NarrowPhaseOptions kTets{.overlap = OverlapMethod::kTetOverlap};
 constexpr NarrowPhaseOptions kNearest{.overlap = OverlapMethod::kNearestPoint};
-
-/// A box about the origin, `cells` of it along each axis, each cut in six tetrahedra along its diagonal (Kuhn).
-TetMesh tet_box(const Vec3& half_extents, const std::array<Index, 3>& cells) {
-  TetMesh mesh;
-  const auto node = [&](const std::array<Index, 3>& at) {
-    return at[0] + (cells[0] + 1) * (at[1] + (cells[1] + 1) * at[2]);
-  };
-  std::array<Index, 3> at{};
-  for (at[2] = 0; at[2] <= cells[2]; ++at[2])
-    for (at[1] = 0; at[1] <= cells[1]; ++at[1])
-      for (at[0] = 0; at[0] <= cells[0]; ++at[0]) {
-        Vec3 p;
-        for (std::size_t i = 0; i < 3; ++i) p[static_cast<int>(i)] = 2.0 * at[i] / cells[i] - 1.0;
-        mesh.nodes.push_back(p.cwiseProduct(half_extents));
-      }
-  for (at[2] = 0; at[2] < cells[2]; ++at[2])
-    for (at[1] = 0; at[1] < cells[1]; ++at[1])
-      for (at[0] = 0; at[0] < cells[0]; ++at[0]) {
-        std::array<std::size_t, 3> order{0, 1, 2};
-        do {
-          Tet tet{};
-          std::array<Index, 3> corner = at;
-          for (std::size_t i = 0; i < 4; ++i) {
-            tet[i] = node(corner);
-            if (i < 3) ++corner[order[i]];
-          }
-          mesh.tets.push_back(tet);
-          if (signed_volume(mesh, static_cast<Index>(mesh.tets.size()) - 1) < 0.0)
-            std::swap(mesh.tets.back()[2], mesh.tets.back()[3]);
-        } while (std::next_permutation(order.begin(), order.end()));
-      }
-  return mesh;
-}
-
-/// The cube of tet_box() drawn onto the ball.
-TetMesh tet_ball(double radius, Index cells) {
-  TetMesh mesh = tet_box(Vec3::Ones(), {cells, cells, cells});
-  for (Vec3& p : mesh.nodes)
-    if (p.norm() > 0.0) p *= radius * p.cwiseAbs().maxCoeff() / p.norm();
-  return mesh;
-}
-
-/// With waves for modes; the surface is the boundary of the volume.
-std::shared_ptr<const ModalModel> solid(const TetMesh& mesh, Index modes = 0) {
-  const BoundarySurface boundary = boundary_surface(mesh);
-  ModalModelData data = testing::wavy_data(boundary.surface, modes);
-  double size = 0.0;
-  for (const Vec3& p : boundary.surface.vertices) size = std::max(size, p.cwiseAbs().maxCoeff());
-  ModalVolume volume;
-  volume.rest = mesh.nodes, volume.tets = mesh.tets;
-  const auto nodes = static_cast<Index>(mesh.nodes.size());
-  volume.basis = ModalBasis(nodes, modes), volume.mass_times_basis = ModalBasis(nodes, modes);
-  for (Index v = 0; v < nodes; ++v)
-    for (Index i = 0; i < modes; ++i)
-      volume.basis.set(v, i, testing::wavy_shape(mesh.nodes[static_cast<std::size_t>(v)], size, i).cast<float>());
-  data.volume_block = std::move(volume);
-  return std::make_shared<const ModalModel>(std::move(data));
-}
-
-Body body_of(const TetMesh& mesh, Index modes = 0) {
-  Body body(solid(mesh, modes));
-  body.use_volume();
-  return body;
-}
 
 std::vector<ContactPoint> overlaps_of(Body& a, Body& b, const NarrowPhaseOptions& options = kTets) {
   std::vector<ContactPoint> contacts = contacts_of(a, b, 0.0, options);
@@ -117,7 +56,7 @@ bool of_vertex(const ContactPoint& c) {
 
 TEST(TetOverlap, ASlabOfOverlapHasTheFacesNormalAndItsThicknessForDepth) {
   Random random(51);
-  Body upper = body_of(tet_box({0.5, 0.5, 0.5}, {2, 2, 2})), lower = body_of(tet_box({1.0, 1.0, 0.5}, {8, 8, 2}));
+  Body upper = body_of(solid_box({0.5, 0.5, 0.5}, {2, 2, 2})), lower = body_of(solid_box({1.0, 1.0, 0.5}, {8, 8, 2}));
   for (const double depth : {1e-4, 0.01, 0.125, 0.3}) {
     const RigidTransform X = random.pose(1.0);
     lower.place(X), upper.place(X * RigidTransform{.p = {0.13, 0.07, 1.0 - depth}});
@@ -135,7 +74,7 @@ TEST(TetOverlap, ASlabOfOverlapHasTheFacesNormalAndItsThicknessForDepth) {
 TEST(TetOverlap, ACornerInAFaceHasTheFacesNormalAndEachVertexItsDepthBelowTheFace) {
   Random random(52);
   const Vec3 half(0.25, 0.25, 0.25);
-  Body cube = body_of(tet_box(half, {4, 4, 4})), floor = body_of(tet_box({1.0, 1.0, 0.5}, {4, 4, 2}));
+  Body cube = body_of(solid_box(half, {4, 4, 4})), floor = body_of(solid_box({1.0, 1.0, 0.5}, {4, 4, 2}));
   int corners = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const Quaternion q = random.pose(1.0).q;
@@ -163,7 +102,7 @@ TEST(TetOverlap, ACornerInAFaceHasTheFacesNormalAndEachVertexItsDepthBelowTheFac
 }
 
 TEST(TetOverlap, ADeepOverlapKeepsItsNormalWhereTheNearestPointTurnsAway) {
-  Body post = body_of(tet_box({0.25, 0.25, 1.0}, {2, 2, 8})), block = body_of(tet_box({1.0, 1.0, 0.5}, {8, 8, 4}));
+  Body post = body_of(solid_box({0.25, 0.25, 1.0}, {2, 2, 8})), block = body_of(solid_box({1.0, 1.0, 0.5}, {8, 8, 4}));
   block.place({});
   bool turned = false;
   for (double depth = 0.03; depth < 0.98; depth += 0.05) {
@@ -207,7 +146,7 @@ Vec3 area_inside(const PlainSurface& mine, const PlainSurface& other, double& un
 
 TEST(TetOverlap, TheNormalOfBentBodiesIsThatOfTheirBoundariesInsideEachOther) {
   Random random(53);
-  Body a = body_of(tet_box({0.4, 0.3, 0.35}, {3, 3, 3}), 4), b = body_of(tet_ball(0.4, 2), 3);
+  Body a = body_of(solid_box({0.4, 0.3, 0.35}, {3, 3, 3}), 4), b = body_of(tet_ball(0.4, 2), 3);
   int compared = 0;
   for (int trial = 0; trial < 4; ++trial) {
     a.place(random.pose(1.0), random.amplitudes(4, 0.05));
@@ -230,7 +169,7 @@ TEST(TetOverlap, TheNormalOfBentBodiesIsThatOfTheirBoundariesInsideEachOther) {
 
 TEST(TetOverlap, TurningBothBodiesTurnsTheContacts) {
   Random random(54);
-  Body a = body_of(tet_box({0.4, 0.3, 0.35}, {3, 3, 3}), 4), b = body_of(tet_ball(0.4, 4), 3);
+  Body a = body_of(solid_box({0.4, 0.3, 0.35}, {3, 3, 3}), 4), b = body_of(tet_ball(0.4, 4), 3);
   std::size_t compared = 0;
   for (int trial = 0; trial < 50; ++trial) {
     const RigidTransform X_WA = random.pose(1.0), X = random.pose(2.0);
@@ -295,13 +234,13 @@ TEST(TetOverlap, ShallowOverlapOfBallsAgreesWithTheNearestPoint) {
 
 TEST(TetOverlap, APartBetweenTwoOthersHasANormalForEach) {
   // One body of two blocks, 0.4 apart, and a plate between them that goes 0.1 into both.
-  TetMesh jaws = tet_box({0.5, 0.5, 0.5}, {4, 4, 4});
+  TetMesh jaws = solid_box({0.5, 0.5, 0.5}, {4, 4, 4});
   const auto half = static_cast<Index>(jaws.nodes.size());
   const TetMesh block = jaws;
   for (Vec3& p : jaws.nodes) p.z() -= 0.75;
   for (const Vec3& p : block.nodes) jaws.nodes.push_back(p + Vec3(0, 0, 0.75));
   for (const Tet& t : block.tets) jaws.tets.push_back({t[0] + half, t[1] + half, t[2] + half, t[3] + half});
-  Body b = body_of(jaws), plate = body_of(tet_box({0.25, 0.25, 0.375}, {3, 3, 1}));
+  Body b = body_of(jaws), plate = body_of(solid_box({0.25, 0.25, 0.375}, {3, 3, 1}));
   b.place({}), plate.place({.p = {0.03, 0.02, 0.0}});
   int up = 0, down = 0;
   for (const ContactPoint& c : overlaps_of(plate, b)) {
@@ -325,7 +264,7 @@ void expect_same(const std::vector<ContactPoint>& contacts, const std::vector<Co
 }
 
 TEST(TetOverlap, WithoutAVolumeOrADirectionTheNearestPointServes) {
-  const TetMesh box = tet_box({0.5, 0.5, 0.5}, {2, 2, 2});
+  const TetMesh box = solid_box({0.5, 0.5, 0.5}, {2, 2, 2});
   Body with = body_of(box), without(solid(box)), rigid(Shape{Box{Vec3::Constant(0.5)}});
   with.place({}), without.place({.p = {0.1, 0.2, 0.8}}), rigid.place({.p = {0.1, 0.2, 0.8}});
   for (Body* other : {&without, &rigid}) {
@@ -334,7 +273,7 @@ TEST(TetOverlap, WithoutAVolumeOrADirectionTheNearestPointServes) {
     expect_same(contacts, overlaps_of(with, *other, kNearest));
   }
   // A body inside another: all of its boundary is inside, and its area vectors cancel.
-  Body inner = body_of(tet_box({0.125, 0.125, 0.125}, {1, 1, 1}));
+  Body inner = body_of(solid_box({0.125, 0.125, 0.125}, {1, 1, 1}));
   inner.place({.p = {0.2, 0.1, 0.05}});
   const auto contacts = overlaps_of(with, inner);
   EXPECT_EQ(contacts.size(), 8u);
@@ -343,7 +282,7 @@ TEST(TetOverlap, WithoutAVolumeOrADirectionTheNearestPointServes) {
 
 TEST(TetOverlap, FlatAndInsideOutTetrahedraGiveFiniteContacts) {
   Random random(56);
-  Body a = body_of(tet_box({0.4, 0.3, 0.35}, {2, 2, 2}), 4), b = body_of(tet_ball(0.4, 2), 4);
+  Body a = body_of(solid_box({0.4, 0.3, 0.35}, {2, 2, 2}), 4), b = body_of(tet_ball(0.4, 2), 4);
   std::size_t contacts = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const double size = std::pow(10.0, random.uniform(-2.0, 2.0));  // up to hundreds of times the bodies
@@ -357,14 +296,14 @@ TEST(TetOverlap, FlatAndInsideOutTetrahedraGiveFiniteContacts) {
   EXPECT_GT(contacts, 200u);
   // Identical bodies in one place: every boundary lies in the other's.
   a.place({}, {0.0, 0.0, 0.0, 0.0});
-  Body twin = body_of(tet_box({0.4, 0.3, 0.35}, {2, 2, 2}), 4);
+  Body twin = body_of(solid_box({0.4, 0.3, 0.35}, {2, 2, 2}), 4);
   twin.place({}, {0.0, 0.0, 0.0, 0.0});
   for (const ContactPoint& c : contacts_of(a, twin, 0.01, kTets)) ASSERT_TRUE(std::isfinite(c.gap));
 }
 
 TEST(TetOverlap, WarmQueriesAllocateNothingAndRepeatTheSameBits) {
   Random random(57);
-  Body a = body_of(tet_box({0.4, 0.3, 0.35}, {4, 4, 4}), 4), b = body_of(tet_ball(0.4, 4), 4);
+  Body a = body_of(solid_box({0.4, 0.3, 0.35}, {4, 4, 4}), 4), b = body_of(tet_ball(0.4, 4), 4);
   a.place({}, random.amplitudes(4, 0.05)), b.place({.p = {0.5, 0.1, 0.0}}, random.amplitudes(4, 0.05));
   NarrowPhase narrow(kTets);
   std::vector<ContactPoint> first, second;

@@ -1,6 +1,6 @@
 #include "broad/box_tree.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Half the surface: what a random line or box near it meets is proportional to it.
@@ -111,4 +111,4 @@ void BoxTree::remove(Index leaf) {
   free_ = leaf;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

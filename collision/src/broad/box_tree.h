@@ -5,7 +5,7 @@
 
 #include "limber/collision/aabb.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Leaves are put where they grow the tree's surface least, and each ancestor is then turned where that lowers it
 /// further (Kopta et al., *Fast, Effective BVH Updates for Animated Scenes*, 2012), which keeps the tree shallow
@@ -55,4 +55,4 @@ class BoxTree {
   Index root_ = -1, free_ = -1;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,11 +9,20 @@
 #include "broad/box_tree.h"
 #include "broad/sweep_kernels.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
+
+using internal::BoxTree;
+using internal::kSweepHits;
+using internal::kSweepPadding;
+using internal::sweep_rows_on;
+using internal::SweepBoxes;
+using internal::SweepCursor;
+using internal::SweepHit;
+
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 256;
 constexpr double kLargestSide = 1e37;  ///< boxes that reach farther count as endless: single precision ends soon after
 
 enum class Bounds : std::uint8_t { kNone, kBox, kHalfSpace };
@@ -73,7 +82,7 @@ bool near(const HalfSpace& h, const Aabb& box, double margin) {
 
 /// Sorts what is nearly sorted in the time of its disorder, and anything else in n log n.
 void sort_nearly_sorted(std::vector<std::uint64_t>& keys) {
-  std::size_t moves_left = 8 * keys.size();
+  std::size_t moves_left = internal::collision_tuning().broad.moves_before_sort * keys.size();
   for (std::size_t i = 1; i < keys.size(); ++i) {
     const std::uint64_t key = keys[i];
     std::size_t j = i;
@@ -395,12 +404,13 @@ void BroadPhase::find_pairs(double margin, std::vector<BodyPair>& pairs, Jobs& j
   m.sort_awake();
   m.fill_sides();
 
-  const std::size_t chunks = (m.awake.size() + kRowsPerChunk - 1) / kRowsPerChunk;
+  const std::size_t rows = internal::collision_tuning().broad.rows_per_chunk;
+  const std::size_t chunks = (m.awake.size() + rows - 1) / rows;
   if (m.chunks.size() < chunks + 1) m.chunks.resize(chunks + 1);
   for (Chunk& chunk : m.chunks) chunk.pairs.clear();
-  jobs.parallel_for(chunks, 1, [&m](std::size_t begin, std::size_t end) {
+  jobs.parallel_for(chunks, 1, [&m, rows](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c < end; ++c)
-      m.find_in_chunk(m.chunks[c], c * kRowsPerChunk, std::min((c + 1) * kRowsPerChunk, m.awake.size()));
+      m.find_in_chunk(m.chunks[c], c * rows, std::min((c + 1) * rows, m.awake.size()));
   });
   m.endless_meet_the_rest(m.chunks[chunks]);
 

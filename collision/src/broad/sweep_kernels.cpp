@@ -7,7 +7,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace limber::HWY_NAMESPACE {
+namespace limber::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 HWY_ATTR std::size_t SweepRowsOn(const SweepBoxes& boxes, std::size_t last, SweepCursor& cursor,
@@ -44,11 +44,11 @@ HWY_ATTR std::size_t SweepRowsOn(const SweepBoxes& boxes, std::size_t last, Swee
   return found;
 }
 
-}  // namespace limber::HWY_NAMESPACE
+}  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace limber {
+namespace limber::internal {
 
 HWY_EXPORT(SweepRowsOn);
 
@@ -56,5 +56,5 @@ std::size_t sweep_rows_on(const SweepBoxes& boxes, std::size_t last, SweepCursor
   return HWY_DYNAMIC_DISPATCH(SweepRowsOn)(boxes, last, cursor, hits);
 }
 
-}  // namespace limber
+}  // namespace limber::internal
 #endif  // HWY_ONCE

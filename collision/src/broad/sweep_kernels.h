@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace limber {
+namespace limber::internal {
 
 inline constexpr std::size_t kSweepPadding = 16;  ///< entries behind the last, of low[0] = infinity
 inline constexpr std::size_t kSweepHits = 1024;   ///< room for what one call finds
@@ -30,4 +30,4 @@ struct SweepCursor {
 /// or there may be no room for more: call again then. @return how many hits were written
 std::size_t sweep_rows_on(const SweepBoxes& boxes, std::size_t last, SweepCursor& cursor, SweepHit* hits);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "tuning.h"
+
 namespace limber {
 namespace {
 
 using Kind = Feature::Kind;
 
-// Lines whose angle has a sine below this are taken as parallel: the ends decide then, and what is lost is their length
-// times this.
-constexpr double kParallelSine = 1e-13;
 constexpr double kDistanceRoundOff = 32 * std::numeric_limits<double>::epsilon();
 
 SurfaceFoot at_vertex(const SegmentPoints& s, int i) { return foot_at(s, i); }
@@ -57,7 +56,8 @@ ClosestPoints closest_points(const SegmentPoints& a, const SegmentPoints& b) {
   const Vec3 u = a[1] - a[0], v = b[1] - b[0], r = b[0] - a[0];
   const Vec3 n = u.cross(v);
   const double n2 = n.squaredNorm();
-  if (n2 > kParallelSine * kParallelSine * u.squaredNorm() * v.squaredNorm()) {
+  const double parallel = internal::collision_tuning().convex.parallel_lines;
+  if (n2 > parallel * parallel * u.squaredNorm() * v.squaredNorm()) {
     const double s = r.cross(v).dot(n) / n2, t = r.cross(u).dot(n) / n2;
     if (s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0) {
       const SurfaceFoot foot_b = closest_on_segment(between(a, s), b);

@@ -7,12 +7,10 @@
 
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-// Points nearer to a face than this part of the hull's size are on it; so are normals nearer than this one normal.
-constexpr double kNoThickness = 1e-10;
 
 struct HullFace {
   Triangle corners;
@@ -29,7 +27,7 @@ class HullBuilder {
   explicit HullBuilder(std::span<const Vec3> points) : points_(points) {
     Vec3 low = points[0], high = points[0];
     for (const Vec3& p : points) low = low.cwiseMin(p), high = high.cwiseMax(p);
-    size_ = (high - low).norm();
+    thickness_ = collision_tuning().convex.hull_thickness * (high - low).norm();
     middle_ = 0.5 * (low + high);
   }
 
@@ -62,7 +60,7 @@ class HullBuilder {
     const Index c = farthest([&](const Vec3& p) { return axis.cross(p - point(a)).norm(); });
     const Vec3 n = axis.cross(point(c) - point(a));
     const Index d = farthest([&](const Vec3& p) { return std::abs(n.dot(p - point(a))); });
-    if (!(std::abs(n.dot(point(d) - point(a))) > kNoThickness * size_ * n.norm()) || !(n.norm() > kNoThickness * size_))
+    if (!(std::abs(n.dot(point(d) - point(a))) > thickness_ * n.norm()) || !(n.norm() > thickness_))
       throw InvalidArgument("ConvexHull: the points lie in one plane, expected a hull with volume");
     const bool below = n.dot(point(d) - point(a)) < 0.0;
     const Triangle base = below ? Triangle{a, b, c} : Triangle{a, c, b};
@@ -76,7 +74,7 @@ class HullBuilder {
   }
 
   void add(Index p) {
-    const auto visible = [&](const HullFace& f) { return f.normal.dot(point(p)) - f.offset > kNoThickness * size_; };
+    const auto visible = [&](const HullFace& f) { return f.normal.dot(point(p)) - f.offset > thickness_; };
     std::set<HalfEdge> rim;
     for (const HullFace& f : faces_)
       if (visible(f))
@@ -88,7 +86,7 @@ class HullBuilder {
   }
 
   std::span<const Vec3> points_;
-  double size_ = 0.0;
+  double thickness_ = 0.0;
   Vec3 middle_;
   std::vector<HullFace> faces_;
 };
@@ -100,20 +98,22 @@ std::vector<Index> flat_groups(const std::vector<HullFace>& faces) {
     for (std::size_t i = 0; i < 3; ++i)
       owner[{faces[f].corners[i], faces[f].corners[(i + 1) % 3]}] = static_cast<Index>(f);
   DisjointSets groups(faces.size());
+  const double same = collision_tuning().convex.hull_same_direction;
   for (const auto& [edge, f] : owner) {
     const auto twin = owner.find({edge[1], edge[0]});
     if (twin == owner.end()) continue;
     const Vec3 &n = faces[static_cast<std::size_t>(f)].normal,
                &m = faces[static_cast<std::size_t>(twin->second)].normal;
-    if ((n - m).norm() < 1e3 * kNoThickness) groups.join(f, twin->second);
+    if ((n - m).norm() < same) groups.join(f, twin->second);
   }
   return groups.labels();
 }
 
 void add_edge_direction(ConvexCore& core, const Vec3& d) {
   const Vec3 unit = d.normalized();
+  const double same = collision_tuning().convex.hull_same_direction;
   if (std::none_of(core.edge_directions.begin(), core.edge_directions.end(),
-                   [&](const Vec3& e) { return e.cross(unit).norm() < 1e3 * kNoThickness; }))
+                   [&](const Vec3& e) { return e.cross(unit).norm() < same; }))
     core.edge_directions.push_back(unit);
 }
 
@@ -191,4 +191,4 @@ TriangleMesh triangulated(const ConvexCore& core) {
   return mesh;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -7,7 +7,7 @@
 #include "limber/core/types.h"
 #include "limber/model/shape.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct ConvexFace {
   Vec3 normal;  // unit, outward
@@ -37,4 +37,4 @@ ConvexCore convex_core(const ConvexHull& shape);
 // The faces as triangles over the same points. @pre has faces
 TriangleMesh triangulated(const ConvexCore& core);
 
-}  // namespace limber
+}  // namespace limber::internal

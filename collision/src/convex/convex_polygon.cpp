@@ -6,7 +6,7 @@
 #include <numbers>
 #include <tuple>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 double squared_distance(const PlanePoint& a, const PlanePoint& b) {
@@ -152,4 +152,4 @@ void largest_polygon(std::vector<PlanePoint>& hull, int count, std::vector<Plane
     if (taken[i]) polygon.push_back(hull[i]);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

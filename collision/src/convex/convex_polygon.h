@@ -5,7 +5,7 @@
 
 #include "limber/core/types.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct PlanePoint {
   double x = 0.0, y = 0.0;
@@ -32,4 +32,4 @@ double diameter(const std::vector<PlanePoint>& polygon);
 void largest_polygon(std::vector<PlanePoint>& hull, int count, std::vector<PlanePoint>& polygon);
 inline constexpr std::size_t kMostCorners = 64;
 
-}  // namespace limber
+}  // namespace limber::internal

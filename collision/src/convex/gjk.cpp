@@ -3,14 +3,10 @@
 #include <limits>
 
 #include "limber/collision/closest_features.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-// Polytopes end after as many steps as they have features; round-off may make the last of them repeat.
-constexpr int kMaxIterations = 128;
-// A step that brings the point nearer by less than this part of its squared distance brings nothing but round-off.
-constexpr double kNoProgress = 1e-15;
 
 // A vertex of the difference of two hulls, A − B, and where it comes from.
 struct Vertex {
@@ -102,12 +98,13 @@ ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b) {
   Simplex simplex;
   simplex.vertices[simplex.size++] = {a.points[0] - b.points[0], 0, 0};
   Vec3 nearest = simplex.vertices[0].point;
-  for (int i = 0; i < kMaxIterations; ++i) {
+  const internal::ConvexTuning& tuning = internal::collision_tuning().convex;
+  for (int i = 0; i < tuning.gjk_iterations; ++i) {
     const double squared = nearest.squaredNorm();
     if (squared == 0.0) return intersecting(a.points[simplex.vertices[0].a], radii);
     Vertex next{Vec3::Zero(), farthest(a.points, -nearest), farthest(b.points, nearest)};
     next.point = a.points[next.a] - b.points[next.b];
-    if (simplex.has(next) || squared - nearest.dot(next.point) <= kNoProgress * squared) break;
+    if (simplex.has(next) || squared - nearest.dot(next.point) <= tuning.gjk_progress * squared) break;
     Simplex larger = simplex;
     larger.vertices[larger.size++] = next;
     const Vec3 nearer = shrink_to_nearest(larger);

@@ -7,8 +7,17 @@
 
 #include "convex/convex_polygon.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
+
+using internal::area;
+using internal::convex_hull;
+using internal::diameter;
+using internal::kMostCorners;
+using internal::largest_polygon;
+using internal::PlanePoint;
+
 namespace {
 
 void require(bool holds, const char* field, double value, const char* expected) {
@@ -146,18 +155,18 @@ void ContactClusters::Impl::cover() {
 
 /// @param corners how many of the best choice are corners; the others cover what lies between
 bool ContactClusters::Impl::previous_will_do(std::size_t corners) {
-  constexpr double kFarther = 1.1;  // may they lie than the spacing
+  const internal::FinderTuning& tuning = internal::collision_tuning().finder;
   old.clear();
   for (const PlanePoint& p : place)
     if (std::binary_search(previous.begin(), previous.end(), contacts[static_cast<std::size_t>(p.item)].id))
       old.push_back(p);
-  const std::size_t covering = kept.size() - corners;
-  return old.size() >= corners && old.size() <= kept.size() + covering / 2 &&
+  const auto surplus = static_cast<std::size_t>(tuning.kept_surplus * static_cast<double>(kept.size() - corners));
+  return old.size() >= corners && old.size() <= kept.size() + surplus &&
          std::any_of(old.begin(), old.end(), [&](const auto& p) { return deep(p); }) &&
          span_of(old, true).at_least(options.hysteresis, span_of(kept, true)) &&
          span_of(old, false).at_least(options.hysteresis, span_of(kept, false)) &&
          (std::isinf(spacing) || std::all_of(place.begin(), place.end(), [&](const PlanePoint& p) {
-            return near_any(p, old, kFarther * spacing);
+            return near_any(p, old, tuning.kept_spacing * spacing);
           }));
 }
 

@@ -13,12 +13,17 @@
 #include "limber/collision/time_of_impact.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/exact_motion.h"
+#include "tuning.h"
 
 namespace limber {
-namespace {
 
-constexpr std::size_t kPairsPerChunk = 4;
-constexpr std::size_t kBodiesPerChunk = 64;
+using internal::GeometryCache;
+using internal::ModalGeometry;
+using internal::SurfacePool;
+using internal::world_box;
+using internal::world_half_space;
+
+namespace {
 
 struct FoundBody {
   bool present = false;
@@ -107,10 +112,10 @@ std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
 
 /// All but the amplitudes' size, which binding them shows: see bind_state().
 void check_state(Index index, const FoundBody& body, const BodyState& state) {
-  constexpr double kUnit = 1e-6;
+  const double unit = internal::collision_tuning().finder.unit_quaternion;
   const Quaternion& q = state.pose.q;
   if (!state.pose.p.allFinite()) refuse(index, "pose.p is not finite", "finite coordinates");
-  if (!(std::abs(q.norm() - 1.0) <= kUnit)) refuse(index, "pose.q has length " + std::to_string(q.norm()), "1");
+  if (!(std::abs(q.norm() - 1.0) <= unit)) refuse(index, "pose.q has length " + std::to_string(q.norm()), "1");
   if (!state.displacement.allFinite() || !state.rotation.allFinite())
     refuse(index, "displacement or rotation is not finite", "finite numbers");
   if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
@@ -250,10 +255,11 @@ void ContactFinder::Impl::check_motion(Index index) const {
 
 void ContactFinder::Impl::make_boxes(Jobs& jobs) {
   boxes.resize(to_place.size());
-  jobs.parallel_for(to_place.size(), kBodiesPerChunk, [this](std::size_t begin, std::size_t end) {
-    const Workers::Lease worker(workers);
-    for (std::size_t i = begin; i < end; ++i) make_box(i, *worker);
-  });
+  jobs.parallel_for(to_place.size(), internal::collision_tuning().finder.bodies_per_chunk,
+                    [this](std::size_t begin, std::size_t end) {
+                      const Workers::Lease worker(workers);
+                      for (std::size_t i = begin; i < end; ++i) make_box(i, *worker);
+                    });
 }
 
 /// Of a body to be placed, in the world, from its amplitudes alone.
@@ -378,13 +384,14 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
 }
 
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
-  const std::size_t chunks = (pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk;
+  const std::size_t per_chunk = internal::collision_tuning().finder.pairs_per_chunk;
+  const std::size_t chunks = (pairs.size() + per_chunk - 1) / per_chunk;
   if (found.size() < chunks) found.resize(chunks);
   for (auto& contacts : found) contacts.clear();
-  jobs.parallel_for(chunks, 1, [this](std::size_t begin, std::size_t end) {
+  jobs.parallel_for(chunks, 1, [this, per_chunk](std::size_t begin, std::size_t end) {
     const Workers::Lease worker(workers);
-    for (std::size_t p = begin * kPairsPerChunk; p < std::min(end * kPairsPerChunk, pairs.size()); ++p)
-      find_in_pair(pairs[p], *worker, found[p / kPairsPerChunk]);
+    for (std::size_t p = begin * per_chunk; p < std::min(end * per_chunk, pairs.size()); ++p)
+      find_in_pair(pairs[p], *worker, found[p / per_chunk]);
   });
 }
 
@@ -419,10 +426,11 @@ ImpactTime ContactFinder::Impl::find_impact(const BodyPair& pair, Worker& worker
 
 void ContactFinder::Impl::find_impacts_in_pairs(Jobs& jobs) {
   times.resize(pairs.size());
-  jobs.parallel_for(pairs.size(), kPairsPerChunk, [this](std::size_t begin, std::size_t end) {
-    const Workers::Lease worker(workers);
-    for (std::size_t p = begin; p < end; ++p) times[p] = find_impact(pairs[p], *worker);
-  });
+  jobs.parallel_for(pairs.size(), internal::collision_tuning().finder.pairs_per_chunk,
+                    [this](std::size_t begin, std::size_t end) {
+                      const Workers::Lease worker(workers);
+                      for (std::size_t p = begin; p < end; ++p) times[p] = find_impact(pairs[p], *worker);
+                    });
 }
 
 void ContactFinder::Impl::gather(std::vector<Impact>& impacts) const {

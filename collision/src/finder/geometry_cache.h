@@ -8,7 +8,7 @@
 #include "limber/collision/collision_surface.h"
 #include "limber/collision/narrow_phase.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct ModalGeometry {
   explicit ModalGeometry(const std::shared_ptr<const ModalModel>& model)
@@ -54,4 +54,4 @@ class GeometryCache {
   std::unordered_map<const Shape*, std::weak_ptr<const RigidGeometry>> rigid_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

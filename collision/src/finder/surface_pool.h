@@ -6,7 +6,7 @@
 
 #include "limber/collision/deformed_surface.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Bodies are bound when a pair needs them and kept while others do, as one body is in several pairs. Bounded, as a
 /// surface's scratch is as large as the surface: the one not used for longest makes room.
@@ -44,4 +44,4 @@ class SurfacePool {
   std::uint64_t query_ = 0, clock_ = 0;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

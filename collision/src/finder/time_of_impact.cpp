@@ -15,20 +15,17 @@
 #include "limber/collision/deformed_surface.h"
 #include "limber/collision/narrow_phase.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
+
+using internal::box_about;
+
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Round-off of a pose and of what is done with it, in ε of its coordinates.
 constexpr double kMotionRoundOff = 32.0 * std::numeric_limits<double>::epsilon();
-/// The gap that an advancement leaves, of the margin.
-constexpr double kKept = 0.5;
-/// An advancement of less than this part of the time looked ahead asks for a nearer look, if that would be sharper.
-constexpr double kGoodAdvancement = 0.25;
-/// The next look: at what the bounds gave, doubled, or where they gave nothing at a part of the time before.
-constexpr double kNearer = 1.0 / 16.0, kAgain = 2.0, kFarther = 4.0;
-
 /// How fast two things come together along a direction: they close c t + ½ k t² + f at most.
 struct Closing {
   double speed, acceleration, offset;
@@ -441,20 +438,21 @@ ImpactTime TimeOfImpact::find(const MovingBody& first, const MovingBody& second,
   const double round_off = pair.start(first, second, step);
   if (pair.a.plane()) return {Status::kNone, step, 0};  // two half-spaces
   margin = std::max(margin, round_off);
+  const internal::FinderTuning& tuning = internal::collision_tuning().finder;
   double t = 0.0, until = step;
   for (int n = 1; n <= impl_->options.max_advancements; ++n) {
     const double ahead = until - t;
-    const std::optional<double> safe = pair.advancement(t == 0.0 ? margin : kKept * margin, margin, ahead);
+    const std::optional<double> safe = pair.advancement(t == 0.0 ? margin : tuning.kept_gap * margin, margin, ahead);
     if (!safe) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
-    if (*safe < kGoodAdvancement * ahead && pair.has_offset()) {
+    if (*safe < tuning.good_advancement * ahead && pair.has_offset()) {
       const double kick = std::min(pair.a.smooth_until(t), pair.b.smooth_until(t));
-      until = std::min(t + std::max(kNearer * ahead, kAgain * *safe), kick > t ? kick : until);
+      until = std::min(t + std::max(tuning.look_nearer * ahead, tuning.look_again * *safe), kick > t ? kick : until);
       pair.look_ahead(t, until);
       continue;
     }
     t += *safe;
     if (t >= step) return {Status::kNone, step, n};
-    until = std::min(step, t + kFarther * *safe);
+    until = std::min(step, t + tuning.look_farther * *safe);
     pair.go_to(t, until);
   }
   return {Status::kResting, t, impl_->options.max_advancements};

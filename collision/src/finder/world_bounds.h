@@ -10,7 +10,7 @@
 #include "limber/core/quaternion.h"
 #include "limber/core/rigid_transform.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Encloses what lies within half_W of a point, with room for rounding.
 inline Aabb box_about(const Vec3& center_W, const Vec3& half_W) {
@@ -40,4 +40,4 @@ inline HalfSpace world_half_space(const HalfSpace& h, const RigidTransform& X_WB
   return {normal, h.offset + normal.dot(X_WB.p)};
 }
 
-}  // namespace limber
+}  // namespace limber::internal

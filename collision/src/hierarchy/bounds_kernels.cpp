@@ -7,7 +7,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace limber::HWY_NAMESPACE {
+namespace limber::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Many = hn::CappedTag<float, kBoundsLanes>;  // eight lanes, or as many as there are
@@ -298,11 +298,11 @@ HWY_ATTR void RefitBoxes(const TreeNode* nodes, std::size_t count, const std::in
   }
 }
 
-}  // namespace limber::HWY_NAMESPACE
+}  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace limber {
+namespace limber::internal {
 
 HWY_EXPORT(PrepareState);
 HWY_EXPORT(MakeBoxes);
@@ -334,5 +334,5 @@ std::uint64_t boxes_within(const BoxFrames& frames, const NodeBox& one, const No
   return HWY_DYNAMIC_DISPATCH(BoxesWithin)(frames, one, many, count, many_of_b);
 }
 
-}  // namespace limber
+}  // namespace limber::internal
 #endif  // HWY_ONCE

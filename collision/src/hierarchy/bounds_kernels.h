@@ -7,7 +7,12 @@
 
 #include "limber/collision/tree_node.h"
 
-namespace limber {
+namespace limber::internal {
+
+/// Coordinates and displacements are smaller, m: boxes are made in single precision, which ends at 3.4e38.
+inline constexpr double kFarthest = 1e30;
+/// Far below any length, m: what single precision may lose to underflow in the sums that make a box.
+inline constexpr double kBoxUnderflow = 1e-36;
 
 /// Rows of mode shapes and amplitudes are padded with zeros to a multiple of so many modes.
 inline constexpr std::size_t kBoundsLanes = 8;
@@ -66,4 +71,4 @@ struct alignas(64) BoxFrames {
 std::uint64_t boxes_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,
                            bool many_of_b);
 
-}  // namespace limber
+}  // namespace limber::internal

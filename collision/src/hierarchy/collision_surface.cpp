@@ -6,15 +6,12 @@
 #include <tuple>
 #include <utility>
 
+#include "hierarchy/bounds_kernels.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
-
-constexpr double kLargest =
-    1e30;  ///< m; squares of what is made of it stay finite in single precision's exponent range
-constexpr double kNoArea = 1e-12;
 
 std::vector<Triangle> grid_triangles(Index columns, Index rows) {
   std::vector<Triangle> triangles;
@@ -115,7 +112,6 @@ void CollisionSurface::build(std::vector<Triangle> triangles, const CollisionSur
   find_canonical_vertices();
   build_edges();
   build_vertex_adjacency();
-  mark_degenerate();
   build_tree(options.leaf_triangles);
   list_leaf_vertices();
   build_bounds();
@@ -123,7 +119,7 @@ void CollisionSurface::build(std::vector<Triangle> triangles, const CollisionSur
 
 void CollisionSurface::check_range() const {
   for (std::size_t v = 0; v < rest_.size(); ++v)
-    if (!(rest_[v].cwiseAbs().maxCoeff() <= kLargest))
+    if (!(rest_[v].cwiseAbs().maxCoeff() <= internal::kFarthest))
       throw InvalidArgument("CollisionSurface: vertex " + std::to_string(v) + " lies beyond 1e30 m, expected nearer");
 }
 
@@ -203,14 +199,6 @@ void CollisionSurface::build_vertex_adjacency() {
   std::tie(vertex_neighbours_, vertex_neighbours_start_) = lists(std::move(of_vertices), vertices());
   for (Index v = 0; v < vertices(); ++v)
     if (parts.root(v) == v && !vertex_neighbours(v).empty()) component_vertices_.push_back(v);
-}
-
-void CollisionSurface::mark_degenerate() {
-  for (const auto& [a, b, c] : triangles_) {
-    const Vec3 ab = rest(b) - rest(a), ac = rest(c) - rest(a), bc = rest(c) - rest(b);
-    const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), bc.squaredNorm()});
-    degenerate_.push_back(ab.cross(ac).norm() <= kNoArea * longest ? 1 : 0);
-  }
 }
 
 Index CollisionSurface::neighbour(Index t, int corner) const {

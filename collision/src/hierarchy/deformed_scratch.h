@@ -18,8 +18,9 @@ struct DeformedSurface::Scratch {
   std::uint32_t stamp = 0;
   static constexpr std::uint32_t kRefitted = 0x80000000u;
 
-  AlignedArray<NodeBox> boxes;
-  AlignedArray<NodeBox> triangle_boxes;  ///< in the tree's order; rounded to nearest, so to be grown by who uses them
+  AlignedArray<internal::NodeBox> boxes;
+  AlignedArray<internal::NodeBox>
+      triangle_boxes;  ///< in the tree's order; rounded to nearest, so to be grown by who uses them
   std::vector<Vertex> vertices;
   AlignedArray<double> z;  ///< padded with zeros to the rows' stride, as are the next
   AlignedArray<float> amplitudes, magnitudes;
@@ -28,6 +29,8 @@ struct DeformedSurface::Scratch {
   long boxes_before_refit = 0;   ///< kAutomatic: so many, then refit
   std::vector<float> positions;  ///< of a refit: xyz, and one float more
 };
+
+namespace internal {
 
 /// Direct access to the boxes of one state.
 class BoxReader {
@@ -61,4 +64,5 @@ class BoxReader {
   DeformedSurface::Scratch& scratch_;
 };
 
+}  // namespace internal
 }  // namespace limber

@@ -8,29 +8,41 @@
 #include "hierarchy/deformed_scratch.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/reconstruct.h"
+#include "tuning.h"
 
 namespace limber {
+
+using internal::BoxReader;
+using internal::kFarthest;
+using internal::kNodeConstants;
+using internal::make_boxes;
+using internal::make_displacement;
+using internal::NodeBox;
+using internal::prepare_state;
+using internal::refit_boxes;
+using internal::StateSums;
+
 namespace {
 
-constexpr double kFarthest = 1e30;     ///< m
 constexpr double kLargestNorm = 1e37;  ///< a float holds it
 constexpr double kUnitRoundOff = 0x1p-24;
 
 /// Nodes whose boxes are made at once: a node and its sibling, which lie side by side. The root stands alone.
 Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) % 2; }
 
-/// How many boxes from amplitudes cost as much as one refit, in floats read from the near cache. A refit streams: three
-/// floats per mode and vertex, and about 32 floats' time per triangle. Boxes lie scattered, and the wider ones among
-/// them lead the walk to more tests and vertices, which is most of their price: measured, see docs/collision.md.
+/// How many boxes from amplitudes cost as much as one refit.
 long boxes_per_refit(const CollisionSurface& surface) {
   const double k = surface.modes();
-  const double box = 48.0 * k + 1000.0, vertex = 3.0 * k + 6.0, triangle = 32.0;
-  return static_cast<long>((vertex * surface.vertices() + triangle * surface.triangles()) / box);
+  const internal::HierarchyTuning& cost = internal::collision_tuning().hierarchy;
+  const double box = cost.box_cost_per_mode * k + cost.box_cost, vertex = cost.vertex_cost_per_mode * k;
+  return static_cast<long>((vertex * surface.vertices() + cost.triangle_cost * surface.triangles()) / box);
 }
 
-/// Boxes that a query would have asked for without a refit, whose tighter ones end the walk earlier: up to half as
-/// many.
-long wanted_boxes(const DeformedSurface::Counters& last) { return last.refits > 0 ? 2 * last.boxes : last.boxes; }
+/// Boxes that a query would have asked for without a refit, whose tighter ones end the walk earlier.
+double wanted_boxes(const DeformedSurface::Counters& last) {
+  const double boxes = static_cast<double>(last.boxes);
+  return last.refits > 0 ? internal::collision_tuning().hierarchy.boxes_without_refit * boxes : boxes;
+}
 
 void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
   for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
@@ -74,7 +86,8 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
 
   const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
   s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
-  const bool expected = choice == BoundsChoice::kAutomatic && last != nullptr && wanted_boxes(*last) > worth;
+  const bool expected =
+      choice == BoundsChoice::kAutomatic && last != nullptr && wanted_boxes(*last) > static_cast<double>(worth);
   if (choice == BoundsChoice::kRefit || expected) refit();
 }
 
@@ -166,7 +179,7 @@ void DeformedSurface::refit() {
   reconstruct(surface_->model()->collision(), std::span(&target, 1));
   // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
   const double terms = surface_->modes() + 24.0;
-  const double pad = kUnitRoundOff * (terms * s.farthest + 24.0 * surface_->rest_radius_) + 1e-36;
+  const double pad = kUnitRoundOff * (terms * s.farthest + 24.0 * surface_->rest_radius_) + internal::kBoxUnderflow;
   refit_boxes(surface_->vertex_tree_.data(), surface_->vertex_tree_.size(), surface_->leaf_vertices_.data(),
               s.positions.data(), static_cast<float>(pad), s.stamp | Scratch::kRefitted, s.boxes.data());
 }

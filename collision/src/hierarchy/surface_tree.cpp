@@ -11,6 +11,10 @@
 #include "limber/collision/collision_surface.h"
 
 namespace limber {
+
+using internal::kBoundsLanes;
+using internal::kNodeConstants;
+
 namespace {
 
 constexpr double kSingleRoundOff = 0x1p-24;

@@ -9,6 +9,12 @@
 #include "limber/core/error.h"
 
 namespace limber {
+
+using internal::boxes_within;
+using internal::BoxFrames;
+using internal::BoxReader;
+using internal::NodeBox;
+
 namespace {
 
 /// Slack on tests between boxes, relative to the sizes in them: far above the round-off of a double rotation, far below
@@ -49,7 +55,7 @@ BoxFrames box_frames(const RigidTransform& X_AB, double margin, double size) {
     for (int j = 0; j < 3; ++j) frames.columns[j][i] = frames.rows[i][j] = static_cast<float>(R(i, j));
     frames.p[i] = static_cast<float>(X_AB.p[i]);
   }
-  frames.slack = static_cast<float>(margin + kErrors * (size + margin) + 1e-36);
+  frames.slack = static_cast<float>(margin + kErrors * (size + margin) + internal::kBoxUnderflow);
   return frames;
 }
 
@@ -167,12 +173,6 @@ void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::
 void find_triangles_in_box(DeformedSurface& a, const Aabb& box_B, std::vector<Index>& triangles) {
   for_each_triangle(
       a, [&](const Aabb& box) { return box.overlaps(box_B); }, [&](Index t) { triangles.push_back(t); });
-}
-
-void find_triangles_in_sphere(DeformedSurface& a, const Vec3& center_B, double radius, std::vector<Index>& triangles) {
-  for_each_triangle(
-      a, [&](const Aabb& box) { return distance_to_box(center_B, box) <= radius; },
-      [&](Index t) { triangles.push_back(t); });
 }
 
 void find_triangles_in_half_space(DeformedSurface& a, const Vec3& normal_B, double offset,

@@ -1,21 +1,13 @@
 #include "narrow/convex_contacts.h"
+#include "tuning.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
-// Faces meet, rather than an edge or corner and something, where the normal is within 14° of one's.
-constexpr double kAligned = 0.97;
-// A face is the reference in place of the other body's only where it fits the normal by this much better: faces that
-// lie flush are told apart by round-off, and with the reference the names of all their contacts change.
-constexpr double kReferencePreference = 1e-4;
-// Edges must be this much less deep than faces to decide the direction: faces give steadier contacts.
-constexpr double kEdgePreference = 0.95;
-// Capsules side by side, within 10°, touch along their length.
-constexpr double kSideBySide = 0.17;
 // The two nearest points stand for no feature of theirs alone: bits of kind that no feature has.
 constexpr FeatureKey kNearestPoints = 3u << 30;
 
@@ -69,6 +61,7 @@ double ConvexContacts::least_gap() const {
 // The separating axis test over all faces and pairs of edges: the nearest face of the difference of the two polytopes.
 ConvexContacts::Direction ConvexContacts::least_penetration() const {
   Direction best{Vec3::Zero(), std::numeric_limits<double>::infinity(), {}, {}};
+  const ConvexTuning& tuning = collision_tuning().convex;
   for (int of = 0; of < 2; ++of)
     for (const ConvexFace& f : side_[of].core->faces)
       take_shallower(best, of == 1 ? side_[1].normal(f) : Vec3(-side_[0].normal(f)), 1.0);
@@ -76,9 +69,9 @@ ConvexContacts::Direction ConvexContacts::least_penetration() const {
     for (const Vec3& w : side_[1].core->edge_directions) {
       const Vec3 axis = (side_[0].pose.q * u).cross(side_[1].pose.q * w);
       const double length = axis.norm();
-      if (length < 1e-8) continue;
-      take_shallower(best, axis / length, kEdgePreference);
-      take_shallower(best, -axis / length, kEdgePreference);
+      if (length < tuning.least_cross) continue;
+      take_shallower(best, axis / length, tuning.edge_preference);
+      take_shallower(best, -axis / length, tuning.edge_preference);
     }
   if (best.normal.isZero()) take_shallower(best, across_edges(), 1.0);
   locate_deepest(best);
@@ -121,7 +114,7 @@ void ConvexContacts::touch_along(const Vec3& normal, double margin) {
   const auto &p = side_[0].points, &q = side_[1].points;
   if (p.size() < 2 || q.size() < 2) return;
   const Vec3 u = p[1] - p[0], w = q[1] - q[0];
-  if (u.cross(w).norm() > kSideBySide * u.norm() * w.norm()) return;
+  if (u.cross(w).norm() > collision_tuning().convex.side_by_side * u.norm() * w.norm()) return;
   const double ra = side_[0].core->radius, rb = side_[1].core->radius;
   const auto touch = [&](const Vec3& on_a, FeatureKey key_a, const Vec3& on_b, FeatureKey key_b) {
     const Vec3 n = unit_or(on_a - on_b, normal);
@@ -153,8 +146,9 @@ void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
   const ConvexFace *on_a = facing(side_[0], -normal), *on_b = facing(side_[1], normal);
   const double fit_a = on_a == nullptr ? -1.0 : -side_[0].normal(*on_a).dot(normal);
   const double fit_b = on_b == nullptr ? -1.0 : side_[1].normal(*on_b).dot(normal);
-  const int reference = fit_a > fit_b + kReferencePreference ? 0 : 1;
-  if (std::max(fit_a, fit_b) < kAligned) return;
+  const ConvexTuning& tuning = collision_tuning().convex;
+  const int reference = fit_a > fit_b + tuning.reference_preference ? 0 : 1;
+  if (std::max(fit_a, fit_b) < tuning.face_alignment) return;
   const Side &side = side_[reference], &other = side_[1 - reference];
   const ConvexFace& face = reference == 0 ? *on_a : *on_b;
   const Vec3 out = side.normal(face);
@@ -223,4 +217,4 @@ void ConvexContacts::name_cut(Corner& cut, Index line, const ConvexFace& face, I
   cut.reference = feature_key(Feature::Kind::kVertex, face.first + (wraps ? other : edge));
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -8,7 +8,7 @@
 #include "limber/core/rigid_transform.h"
 #include "narrow/pair_surface.h"
 
-namespace limber {
+namespace limber::internal {
 
 class ConvexContacts {
  public:
@@ -63,4 +63,4 @@ class ConvexContacts {
   std::size_t first_ = 0;  // of the contacts of this pair
 };
 
-}  // namespace limber
+}  // namespace limber::internal

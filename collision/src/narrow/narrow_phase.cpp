@@ -19,6 +19,26 @@
 
 namespace limber {
 
+using internal::boundary_faces;
+using internal::convex_core;
+using internal::ConvexContacts;
+using internal::ConvexCore;
+using internal::CoreContacts;
+using internal::feature_key;
+using internal::FeatureContact;
+using internal::FeatureSide;
+using internal::half_space_contacts;
+using internal::kRoundOff;
+using internal::OverlapRule;
+using internal::PairSurface;
+using internal::RestDepth;
+using internal::RestDepthRule;
+using internal::RoundedCore;
+using internal::SurfaceContacts;
+using internal::TetOverlap;
+using internal::TetOverlapRule;
+using internal::triangulated;
+
 // -- Rigid shapes -----------------------------------------------------------------------------------------------------
 
 struct RigidGeometry::Impl {

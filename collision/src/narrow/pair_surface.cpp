@@ -4,16 +4,10 @@
 #include <cmath>
 
 #include "limber/collision/tree_traversal.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-// How far a direction may lean out of a crease's normal cone, per unit of |inward₁ + inward₂|: 12° at a right angle, 0
-// on a plane. A hollow edge would need 0.5.
-constexpr double kRocking = 0.15;
-
-// Rays that meet a face at less than this, the cosine to its normal, go by.
-constexpr double kGrazing = 1e-9;
 
 // How far along a ray a box begins; infinite where the ray misses it.
 double distance_along(const Vec3& p, const Vec3& direction, const Aabb& box) {
@@ -47,7 +41,7 @@ int corner_of_edge(const CollisionSurface& s, Index t, Index e) {
 
 void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, double tolerance) {
   deformed_ = &deformed;
-  tolerance_ = tolerance;
+  tolerance_ = tolerance, directionless_ = collision_tuning().narrow.directionless * tolerance;
   X_PS_ = X_PS, X_SP_ = X_PS.inverse();
   displacement_ = rotation_ = Vec3::Zero();
   sided_ = surface().closed() || surface().model() == nullptr;
@@ -117,7 +111,7 @@ bool PairSurface::finish(const Vec3& p, const Vec3& outward, double reach, Minim
   const Vec3 d = p - minimum.at.point;
   if (sided_ && outward.dot(d) < -tolerance_) return false;
   const double length = d.norm();
-  minimum.direction = length > kDirectionless * tolerance_ ? Vec3(d / length) : unit_or(outward, Vec3::UnitZ());
+  minimum.direction = length > directionless_ ? Vec3(d / length) : unit_or(outward, Vec3::UnitZ());
   minimum.distance = minimum.direction.dot(d);
   return minimum.distance <= reach;
 }
@@ -138,7 +132,7 @@ bool PairSurface::in_normal_cone(Index e, const Vec3& direction) {
     sum += inward;
     worst = std::max(worst, inward.dot(direction));
   }
-  if (worst > kRoundOff + kRocking * sum.norm()) return false;
+  if (worst > kRoundOff + collision_tuning().narrow.rocking * sum.norm()) return false;
   return !sided_ || edge_normal(e).dot(direction) >= -kRoundOff;
 }
 
@@ -262,13 +256,14 @@ PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
 
 PairSurface::WayOut PairSurface::way_out(const Vec3& p, const Vec3& direction) {
   WayOut way;
+  const double grazing = collision_tuning().narrow.grazing;
   const Vec3 p_S = X_SP_ * p, direction_S = X_SP_.q * direction;
   branch_and_bound(
       *deformed_, [&](const Aabb& box) { return distance_along(p_S, direction_S, box.grown(tolerance_)); },
       [&](Index t, double best) {
         const Face& f = face(t);
         const double slope = f.normal.dot(direction), height = f.normal.dot(f.x[0] - p);
-        if (!(slope > kGrazing) || height < -tolerance_) return best;
+        if (!(slope > grazing) || height < -tolerance_) return best;
         const double d = std::max(height / slope, 0.0);
         if (!(d < best)) return best;
         const Vec3 q = p + d * direction;
@@ -280,4 +275,4 @@ PairSurface::WayOut PairSurface::way_out(const Vec3& p, const Vec3& direction) {
   return way;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

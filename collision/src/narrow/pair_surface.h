@@ -12,7 +12,7 @@
 #include "limber/collision/deformed_surface.h"
 #include "limber/core/rigid_transform.h"
 
-namespace limber {
+namespace limber::internal {
 
 // A vertex, edge or face of a surface as one number: two bits of kind, thirty of index.
 using FeatureKey = std::uint32_t;
@@ -26,24 +26,11 @@ inline Feature::Kind kind_of(FeatureKey key) { return static_cast<Feature::Kind>
 // Round-off of a length, in parts of the largest coordinate: points nearer than this to where two features meet belong
 // to the smaller feature.
 inline constexpr double kRoundOff = 64 * std::numeric_limits<double>::epsilon();
-// Directions between points nearer than this many round-offs are noise; the surface's own normal serves.
-inline constexpr double kDirectionless = 1e3;
 
 inline Vec3 unit_or(const Vec3& v, const Vec3& otherwise) {
   const double n = v.norm();
   return n > 0.0 ? Vec3(v / n) : otherwise;
 }
-
-// Closer than this part of the edges at hand, the direction between two points tells little: the faces that touch do.
-inline constexpr double kTouching = 0.01;
-// How far, as a sine, faces may be from parallel to touch each other along an area.
-inline constexpr double kFlat = 0.02;
-// How far a surface may lean against a contact's normal, as a sine, for the contact to count as its own: 12°.
-inline constexpr double kLeaning = 0.2;
-// Beyond this, 30°, it runs through the plane that the contact stands for.
-inline constexpr double kSteep = 0.5;
-// Parts of the edges at hand by which a plane may have been passed and still serve to keep bodies apart.
-inline constexpr double kPassed = 1e-4;
 
 // One side of a contact, in the pair's frame.
 struct FeatureSide {
@@ -77,6 +64,8 @@ class PairSurface {
   const CollisionSurface& surface() const { return deformed_->surface(); }
   const RigidTransform& pose() const { return X_PS_; }  // in the pair's frame
   double tolerance() const { return tolerance_; }
+  // Directions between points nearer than this are noise; the surface's own normal serves.
+  double directionless() const { return directionless_; }
   // Only one of its sides can be touched: it bounds a solid, or is a rigid mesh, which has a front.
   bool sided() const { return sided_; }
 
@@ -185,7 +174,7 @@ class PairSurface {
   DeformedSurface* deformed_ = nullptr;
   RigidTransform X_PS_{}, X_SP_{};
   bool sided_ = false;
-  double tolerance_ = 0.0;
+  double tolerance_ = 0.0, directionless_ = 0.0;
   Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;
@@ -219,4 +208,4 @@ void PairSurface::for_each_minimum(const Vec3& p, Index t, double reach, bool al
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -4,7 +4,7 @@
 
 #include "limber/collision/tree_traversal.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 // Of a core: its ends and the segment between.
@@ -61,7 +61,7 @@ void CoreContacts::vertex_against_core(Index v) {
   const SurfaceFoot foot = core_.segment ? closest_on_segment(p, core_.ends) : SurfaceFoot{core_.ends[0]};
   const double d = (foot.point - p).norm();
   if (!(d <= reach_) || !surface_->sees(v, foot.point)) return;
-  const bool on_core = d <= kDirectionless * surface_->tolerance();
+  const bool on_core = d <= surface_->directionless();
   add(surface_->at_vertex(v), feature_key(foot.feature.kind, foot.feature.index), foot.point,
       on_core ? unit_or(surface_->vertex_normal(v), Vec3::UnitZ()) : Vec3((foot.point - p) / d));
 }
@@ -73,7 +73,7 @@ void CoreContacts::edge_against_core(Index e) {
   if (!(pair.distance <= reach_) || pair.a.feature.kind != Feature::Kind::kEdge ||
       pair.b.feature.kind != Feature::Kind::kEdge)
     return;
-  const bool touching = pair.distance <= kDirectionless * surface_->tolerance();
+  const bool touching = pair.distance <= surface_->directionless();
   const Vec3 n =
       touching ? unit_or(surface_->edge_normal(e), Vec3::UnitZ()) : Vec3((pair.b.point - pair.a.point) / pair.distance);
   if (!surface_->in_normal_cone(e, n)) return;
@@ -85,9 +85,8 @@ void CoreContacts::end_inside(int end) {
   if (!surface_->surface().closed() || !surface_->may_hold(p)) return;
   const PairSurface::Nearest nearest = surface_->nearest(p, std::numeric_limits<double>::infinity());
   if (!nearest.inside) return;
-  const Vec3 n = nearest.distance > kDirectionless * surface_->tolerance()
-                     ? Vec3((nearest.foot.point - p) / nearest.distance)
-                     : unit_or(nearest.outward, Vec3::UnitZ());
+  const Vec3 n = nearest.distance > surface_->directionless() ? Vec3((nearest.foot.point - p) / nearest.distance)
+                                                              : unit_or(nearest.outward, Vec3::UnitZ());
   add(surface_->at_foot(nearest.triangle, nearest.foot), end_key(end), p, n);
 }
 
@@ -97,4 +96,4 @@ void CoreContacts::add(const FeatureSide& of_surface, FeatureKey of_core, const 
   contacts_->push_back({of_surface, core, -normal, normal.dot(core.point - of_surface.point)});
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -5,7 +5,7 @@
 
 #include "narrow/pair_surface.h"
 
-namespace limber {
+namespace limber::internal {
 
 // A point or a segment with a radius, in the pair's frame.
 struct RoundedCore {
@@ -37,4 +37,4 @@ class CoreContacts {
   std::vector<Index> triangles_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -5,13 +5,10 @@
 
 #include "limber/core/error.h"
 #include "limber/mesh/tet_mesh.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-// Each step moves to the tetrahedron that the last one points to; bodies bent so far that this does not end are left to
-// the nearest point.
-constexpr int kMaxSteps = 16;
 
 TetMesh rest_mesh(const ModalModel& model) {
   if (!model.data().volume_block)
@@ -41,12 +38,14 @@ Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index n
   return p;
 }
 
-// Newton's method on rest + U(rest) z = p, which is linear within each tetrahedron.
+// Newton's method on rest + U(rest) z = p, which is linear within each tetrahedron: each step moves to the one that the
+// last one points to. Bodies bent so far that this does not end are left to the nearest point.
 bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& place) const {
   const ModalVolume& volume = rest_->volume();
+  const NarrowTuning& tuning = collision_tuning().narrow;
   place.rest = first_guess;
   Index last = -1;
-  for (int step = 0; step < kMaxSteps; ++step) {
+  for (int step = 0; step < tuning.rest_depth_steps; ++step) {
     const Index tet = rest_->locator().locate(place.rest).tet;
     if (tet == last) return true;
     std::array<Vec3, 4> at_rest, now;
@@ -57,7 +56,8 @@ bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& 
     }
     const Mat3 inverse = edges(at_rest).inverse();
     place.F = edges(now) * inverse;
-    if (!(place.F.determinant() > 1e-6)) return false;  // flat or inside out: nothing can be carried back
+    if (!(place.F.determinant() > tuning.least_stretch))
+      return false;  // flat or inside out: nothing can be carried back
     place.rest = at_rest[0] + place.F.inverse() * (p_B - now[0]);
     last = tet;
   }
@@ -79,7 +79,7 @@ bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface:
   if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
 
   const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
-  if (!rest.inside || rest.distance <= kDirectionless * surface.tolerance()) return false;
+  if (!rest.inside || rest.distance <= surface.directionless()) return false;
   SurfaceFoot foot = rest.foot;
   foot.point.setZero();
   for (std::size_t c = 0; c < 3; ++c) foot.point += foot.weight[c] * surface.face(rest.triangle).x[c];
@@ -88,4 +88,4 @@ bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface:
   return exit.normal.dot(p - exit.at.point) < 0.0;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

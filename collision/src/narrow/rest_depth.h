@@ -9,7 +9,7 @@
 #include "limber/model/modal_model.h"
 #include "narrow/surface_contacts.h"
 
-namespace limber {
+namespace limber::internal {
 
 // A node of the volume in one state: rest + Σ z_i w_i, body frame.
 Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node);
@@ -49,4 +49,4 @@ class RestDepthRule final : public OverlapRule {
   bool rest_is_bound_ = false;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

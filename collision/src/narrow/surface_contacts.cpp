@@ -4,13 +4,8 @@
 #include <cmath>
 #include <limits>
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-// Edges whose angle has a sine below this are parallel: their ends make the contacts.
-constexpr double kParallelEdges = 1e-12;
-// The same for edges that all but touch, whose common perpendicular is lost sooner.
-constexpr double kParallelTouchingSine = 1e-4;
 
 bool apart(const Aabb& a, const Aabb& b, double margin) {
   return ((a.low - b.high).array() > margin).any() || ((b.low - a.high).array() > margin).any();
@@ -20,8 +15,9 @@ bool apart(const Aabb& a, const Aabb& b, double margin) {
 
 void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool self,
                             std::vector<FeatureContact>& contacts) {
+  tuning_ = &collision_tuning().narrow;
   side_[0] = &a, side_[1] = &b;
-  margin_ = margin, tolerance_ = a.tolerance(), self_ = self, overlap_ = false;
+  margin_ = margin, tolerance_ = a.tolerance(), directionless_ = a.directionless(), self_ = self, overlap_ = false;
   contacts_ = &contacts;
   pairs_.clear(), piercings_.clear();
   for (int of = 0; of < 2; ++of) {
@@ -96,7 +92,7 @@ double SurfaceContacts::nearness(int of, Index v, Index t) {
   const std::array<Vec3, 3>& x = side_[1 - of]->face(t).x;
   double shortest = side_[of]->shortest_edge(v);
   for (std::size_t c = 0; c < 3; ++c) shortest = std::min(shortest, (x[(c + 1) % 3] - x[c]).norm());
-  return kTouching * shortest;
+  return tuning_->touching * shortest;
 }
 
 void SurfaceContacts::add_vertex(int of, Index v, PairSurface::Minimum minimum) {
@@ -109,7 +105,7 @@ void SurfaceContacts::add_vertex(int of, Index v, PairSurface::Minimum minimum) 
     back.at = mine.at_vertex(v);
     if (rests_on_faces(1 - of, index_of(minimum.at.key), back)) return;
   }
-  if (near && kind_of(minimum.at.key) != Feature::Kind::kFace && minimum.distance <= kDirectionless * tolerance_)
+  if (near && kind_of(minimum.at.key) != Feature::Kind::kFace && minimum.distance <= directionless_)
     minimum.direction = unit_or(minimum.direction - unit_or(mine.vertex_normal(v), Vec3::Zero()), minimum.direction);
   const Vec3 n = solids ? unhindered(of, v, minimum) : minimum.direction;
   if (n.isZero()) return;
@@ -133,7 +129,7 @@ bool SurfaceContacts::rests_on_faces(int of, Index v, const PairSurface::Minimum
     rim = rim || found == Touch::kRim;
     if (found != Touch::kArea || count == touching.size()) return;
     for (std::size_t i = 0; i < count; ++i)
-      if (other.face(touching[i]).normal.dot(other.face(t).normal) > 1.0 - kFlat) return;
+      if (other.face(touching[i]).normal.dot(other.face(t).normal) > 1.0 - tuning_->flat) return;
     touching[count++] = t;
   });
   for (std::size_t i = 0; i < count; ++i) {
@@ -143,7 +139,7 @@ bool SurfaceContacts::rests_on_faces(int of, Index v, const PairSurface::Minimum
   }
   if (count > 0) return true;
   const bool aligned = flush(of, v, at);
-  if (!aligned && (rim || mine.in_front(v, minimum.direction, kLeaning))) return rim;
+  if (!aligned && (rim || mine.in_front(v, minimum.direction, tuning_->leaning))) return rim;
   OverlapRule::Exit exit;
   if (!find_supporting_face(of, v, at.triangle, aligned, exit)) return rim;
   const double gap = exit.normal.dot(p - exit.at.point);
@@ -178,9 +174,9 @@ bool SurfaceContacts::flush(int of, Index v, const FeatureSide& at) {
   bool any = false, within = true;
   other.for_faces_at(at.key, [&](Index t) {
     const Vec3& n = other.face(t).normal;
-    within = within && n.dot(into) < -kFlat;
+    within = within && n.dot(into) < -tuning_->flat;
     for (const Index g : mine.surface().vertex_triangles(v))
-      any = any || mine.face(g).normal.dot(n) > 1.0 - kFlat * kFlat;
+      any = any || mine.face(g).normal.dot(n) > 1.0 - tuning_->flat * tuning_->flat;
   });
   return any && within;
 }
@@ -190,12 +186,12 @@ bool SurfaceContacts::flush(int of, Index v, const FeatureSide& at) {
 SurfaceContacts::Touch SurfaceContacts::touch(int of, Index v, const FeatureSide& at, Index t) {
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
   const PairSurface::Face& f = other.face(t);
-  if (!mine.in_front(v, f.normal, kFlat)) return Touch::kNone;
+  if (!mine.in_front(v, f.normal, tuning_->flat)) return Touch::kNone;
   // Directions that lead from the point into a face are those along all inward normals of its edges there.
-  const auto leads_into = [](const PairSurface::Face& face, const std::array<bool, 3>& edges, const Vec3& d) {
-    constexpr double kInto = 1e-3;
+  const auto leads_into = [into = tuning_->leads_into](const PairSurface::Face& face, const std::array<bool, 3>& edges,
+                                                       const Vec3& d) {
     for (std::size_t c = 0; c < 3; ++c)
-      if (edges[c] && !(d.dot(face.inward[c]) > kInto)) return false;
+      if (edges[c] && !(d.dot(face.inward[c]) > into)) return false;
     return true;
   };
   std::array<bool, 3> rim{};
@@ -205,12 +201,12 @@ SurfaceContacts::Touch SurfaceContacts::touch(int of, Index v, const FeatureSide
   bool flat = false;
   for (const Index w : mine.surface().vertex_neighbours(v)) {
     const Vec3 d = direction(mine.vertex(w) - p);
-    if (std::abs(d.dot(f.normal)) <= kFlat && leads_into(f, rim, d)) return Touch::kArea;
+    if (std::abs(d.dot(f.normal)) <= tuning_->flat && leads_into(f, rim, d)) return Touch::kArea;
   }
   // Or what leads into the face lies within a face of mine.
   for (const Index g : mine.surface().vertex_triangles(v)) {
     const PairSurface::Face& own = mine.face(g);
-    if (own.normal.dot(f.normal) > -1.0 + kFlat * kFlat) continue;
+    if (own.normal.dot(f.normal) > -1.0 + tuning_->flat * tuning_->flat) continue;
     flat = true;
     std::array<bool, 3> at_v{};
     std::array<Vec3, 5> rays;
@@ -251,7 +247,8 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
   const Vec3 u = a1 - a0, w = b1 - b0, r = b0 - a0;
   const Vec3 n = u.cross(w);
   const double n2 = n.squaredNorm(), u2 = u.squaredNorm(), w2 = w.squaredNorm();
-  if (!(n2 > kParallelEdges * kParallelEdges * u2 * w2)) return pair;
+  const double parallel = collision_tuning().convex.parallel_lines;
+  if (!(n2 > parallel * parallel * u2 * w2)) return pair;
   const double s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
   const double end_s = tolerance_ / std::sqrt(u2), end_t = tolerance_ / std::sqrt(w2);
   if (!(s > end_s && s < 1.0 - end_s && t > end_t && t < 1.0 - end_t)) return pair;
@@ -271,10 +268,10 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
 // Out of f towards e, and back: both edges must have nothing nearer to either side.
 void SurfaceContacts::add_separated_edges(EdgePair pair) {
   const Vec3 u = side_[0]->edge_vector(pair.e), w = side_[1]->edge_vector(pair.f);
-  if (pair.distance <= kTouching * shorter_edge(pair) &&
-      u.cross(w).norm() <= kParallelTouchingSine * u.norm() * w.norm())
+  if (pair.distance <= tuning_->touching * shorter_edge(pair) &&
+      u.cross(w).norm() <= tuning_->parallel_touching * u.norm() * w.norm())
     return;
-  if (pair.distance <= kDirectionless * tolerance_ && pair.direction.dot(side_[1]->edge_normal(pair.f)) < 0.0)
+  if (pair.distance <= directionless_ && pair.direction.dot(side_[1]->edge_normal(pair.f)) < 0.0)
     pair.direction = -pair.direction;
   if (!side_[1]->in_normal_cone(pair.f, pair.direction) || !side_[0]->in_normal_cone(pair.e, -pair.direction)) return;
   if (const Vec3 n = unhindered(pair); !n.isZero()) add_edges(pair, n);
@@ -302,11 +299,11 @@ Vec3 SurfaceContacts::unhindered(int of, Index v, const PairSurface::Minimum& mi
   Vec3 best = minimum.direction;
   double end = minimum.distance + best.dot(motion);
   if (!(end < 0.0)) return best;
-  const double passed = kPassed / kTouching * nearness(of, v, minimum.at.triangle);
+  const double passed = tuning_->passed / tuning_->touching * nearness(of, v, minimum.at.triangle);
   const auto try_normal = [&](const FeatureSide& at, const Vec3& n) {
     const double gap = n.dot(p - at.point);
     if (!(gap >= -passed) || !(gap + n.dot(motion) > end)) return;
-    if (!mine.in_front(v, n, kLeaning) || !other.behind(at, n, kLeaning)) return;
+    if (!mine.in_front(v, n, tuning_->leaning) || !other.behind(at, n, tuning_->leaning)) return;
     best = n, end = gap + n.dot(motion);
   };
   const auto try_faces_at = [&](Feature::Kind kind, Index index) {
@@ -334,7 +331,7 @@ Vec3 SurfaceContacts::unhindered(const EdgePair& pair) {
   Vec3 best = pair.direction;
   double end = best.dot(apart + motion);
   if (self_ || !(end < 0.0)) return best;
-  const double passed = kPassed * shorter_edge(pair);
+  const double passed = tuning_->passed * shorter_edge(pair);
   const double room_s = std::min(pair.s, 1.0 - pair.s), room_t = std::min(pair.t, 1.0 - pair.t);
   if (room_s * side_[0]->edge_vector(pair.e).norm() <= passed ||
       room_t * side_[1]->edge_vector(pair.f).norm() <= passed)
@@ -361,4 +358,4 @@ void SurfaceContacts::add(int of, const FeatureSide& mine, const FeatureSide& ot
     contacts_->push_back({other, mine, -out_of_other, gap});
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -6,8 +6,9 @@
 #include "limber/collision/tree_traversal.h"
 #include "limber/core/disjoint_sets.h"
 #include "narrow/pair_surface.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 
 // Answers where a vertex that is inside a surface is to leave it.
 class OverlapRule {
@@ -97,7 +98,8 @@ class SurfaceContacts {
   void add(int of, const FeatureSide& mine, const FeatureSide& other, const Vec3& out_of_other, double gap);
 
   PairSurface* side_[2] = {nullptr, nullptr};
-  double margin_ = 0.0, tolerance_ = 0.0;
+  const NarrowTuning* tuning_ = nullptr;
+  double margin_ = 0.0, tolerance_ = 0.0, directionless_ = 0.0;
   bool self_ = false, overlap_ = false;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
@@ -112,4 +114,4 @@ class SurfaceContacts {
   std::uint32_t generation_ = 0;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -6,17 +6,7 @@
 
 #include "narrow/surface_contacts.h"
 
-namespace limber {
-namespace {
-
-// Up to this part of the edges at hand, overlap of bodies with flush sides is pushed out along the other faces.
-constexpr double kAlignedDepth = 0.5;
-
-// Crossings of edges whose normal has at least this cosine with a way out of the loop they are on, 26°, go along it.
-constexpr double kSameWay = 0.9;
-
-}  // namespace
-
+namespace limber::internal {
 void SurfaceContacts::find_piercings(int of, Index s, Index t) {
   for (int c = 0; c < 3; ++c)
     if (side_[of]->owns_edge(s, c)) find_piercing(of, side_[of]->surface().edge_of(s, c), t);
@@ -50,8 +40,7 @@ void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
     if (visited >= generation_) continue;
     visited = generation_;
     const Vec3& p = side_[of]->vertex(seed.vertex);
-    const PairSurface::Nearest nearest =
-        side_[1 - of]->nearest(p, seed.reach * (1.0 + 1e-9) + kDirectionless * tolerance_);
+    const PairSurface::Nearest nearest = side_[1 - of]->nearest(p, seed.reach + directionless_);
     if (!nearest.inside) continue;
     visited = generation_ + 1;
     add_inside(of, seed.vertex, nearest, rule);
@@ -66,10 +55,10 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
   OverlapRule::Exit exit;
   if (rule == nullptr || !rule->exit(other, p, nearest, exit)) {
     exit.at = other.at_foot(nearest.triangle, nearest.foot);
-    exit.normal = nearest.distance > kDirectionless * tolerance_ ? Vec3((exit.at.point - p) / nearest.distance)
-                                                                 : unit_or(nearest.outward, Vec3::UnitZ());
+    exit.normal = nearest.distance > directionless_ ? Vec3((exit.at.point - p) / nearest.distance)
+                                                    : unit_or(nearest.outward, Vec3::UnitZ());
   }
-  if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, kSteep))
+  if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, tuning_->steep))
     find_supporting_face(of, v, nearest.triangle, flush(of, v, exit.at), exit);
   overlap_ = true;
   exit_normal_[of][static_cast<std::size_t>(v)] = exit.normal;
@@ -83,13 +72,13 @@ bool SurfaceContacts::find_supporting_face(int of, Index v, Index near, bool ali
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
   const Vec3& p = mine.vertex(v);
   // Sides in one plane say nothing about how deep the overlap is.
-  const double reach = (aligned ? kAlignedDepth / kTouching : 1.0) * nearness(of, v, near);
+  const double reach = (aligned ? tuning_->aligned_depth / tuning_->touching : 1.0) * nearness(of, v, near);
   double least = reach;
   for (const Index corner : other.surface().triangle(near))
     for (const Index t : other.surface().vertex_triangles(corner)) {
       const PairSurface::Face& f = other.face(t);
       const double height = std::abs(f.normal.dot(p - f.x[0]));
-      if (!(height < least) || !mine.in_front(v, f.normal, kLeaning)) continue;
+      if (!(height < least) || !mine.in_front(v, f.normal, tuning_->leaning)) continue;
       const SurfaceFoot foot = closest_on_triangle(p, f.x);
       if ((p - foot.point).norm() > reach) continue;
       exit = {other.at_foot(t, foot), f.normal};
@@ -151,9 +140,10 @@ void SurfaceContacts::cross_edges_of_loop(std::size_t first, std::size_t end) {
   crossings_.clear();
   for (std::size_t i = first; i < end; ++i) find_crossings(piercings_[i]);
   find_ways_out(first, end);
+  const double same_way = tuning_->same_way;
   for (const EdgePair& crossing : crossings_) {
     const Vec3 n = -crossing.direction;
-    if (std::none_of(ways_out_.begin(), ways_out_.end(), [&](const Vec3& way) { return n.dot(way) > kSameWay; }))
+    if (std::none_of(ways_out_.begin(), ways_out_.end(), [&](const Vec3& way) { return n.dot(way) > same_way; }))
       continue;
     overlap_ = true;
     add_edges(crossing, n);
@@ -215,4 +205,4 @@ void SurfaceContacts::push_out_of_faces() {
   }
 }
 
-}  // namespace limber
+}  // namespace limber::internal

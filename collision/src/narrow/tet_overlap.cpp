@@ -8,12 +8,10 @@
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 #include "narrow/rest_depth.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-// Area vectors that cancel to less than this part of the areas have no direction but round-off's.
-constexpr double kLeastDirection = 1e-6;
 
 // A triangle cut by four planes has seven corners at most; round-off in a sliver may cross a plane at every side, which
 // makes 4, 6, 9 and 13 of its 3.
@@ -90,7 +88,7 @@ std::vector<Triangle> boundary_faces(const ModalVolume& volume) {
 
 void TetOverlap::bind(const Body& a, const Body& b, double tolerance) {
   body_[0] = a, body_[1] = b;
-  tolerance_ = tolerance;
+  tolerance_ = tolerance, touching_ = collision_tuning().narrow.directionless * tolerance;
   computed_ = false;
 }
 
@@ -100,7 +98,7 @@ Vec3 TetOverlap::normal(int out_of, const Vec3& p) {
   if (i < 0) return Vec3::Zero();
   const Patch& patch = patch_[static_cast<std::size_t>(i)];
   const double length = patch.out_of_a.norm();
-  if (!(length > kLeastDirection * patch.area)) return Vec3::Zero();
+  if (!(length > collision_tuning().narrow.least_patch * patch.area)) return Vec3::Zero();
   return patch.out_of_a / (out_of == 0 ? length : -length);
 }
 
@@ -176,7 +174,7 @@ void TetOverlap::cut_boundary(int of) {
     if (!(area.norm() > tolerance_ * tolerance_)) return;
     Aabb box;
     for (std::size_t i = 0; i < polygon.size; ++i) box.include(polygon.x[i]);
-    boxes_.push_back({box.grown(kDirectionless * tolerance_), static_cast<Index>(pieces_.size())});
+    boxes_.push_back({box.grown(touching_), static_cast<Index>(pieces_.size())});
     pieces_.push_back({of, corners_.size(), polygon.size, area});
     corners_.insert(corners_.end(), polygon.x.begin(), polygon.x.begin() + static_cast<std::ptrdiff_t>(polygon.size));
   });
@@ -185,7 +183,6 @@ void TetOverlap::cut_boundary(int of) {
 void TetOverlap::join_patches() {
   sets_.reset(pieces_.size());
   sort(boxes_);
-  const double touching = kDirectionless * tolerance_;
   const auto join = [&](const auto& touch) {
     for_each_overlap(boxes_, boxes_, [&](Index s, Index t) {
       if (sets_.root(s) != sets_.root(t) &&
@@ -196,11 +193,11 @@ void TetOverlap::join_patches() {
   // Neighbours have a corner in common, mostly; that is quickly seen and leaves few to be asked for their distance.
   join([&](std::span<const Vec3> a, std::span<const Vec3> b) {
     return std::any_of(a.begin(), a.end(), [&](const Vec3& p) {
-      return std::any_of(b.begin(), b.end(), [&](const Vec3& q) { return (p - q).norm() <= touching; });
+      return std::any_of(b.begin(), b.end(), [&](const Vec3& q) { return (p - q).norm() <= touching_; });
     });
   });
   join([&](std::span<const Vec3> a, std::span<const Vec3> b) {
-    return distance(ConvexSolid{a}, ConvexSolid{b}).distance <= touching;
+    return distance(ConvexSolid{a}, ConvexSolid{b}).distance <= touching_;
   });
   patch_.assign(pieces_.size(), {});
   only_ = -1;
@@ -239,4 +236,4 @@ bool TetOverlapRule::exit(PairSurface& surface, const Vec3& p, const PairSurface
   return true;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -10,7 +10,7 @@
 #include "limber/model/modal_model.h"
 #include "narrow/surface_contacts.h"
 
-namespace limber {
+namespace limber::internal {
 
 // Faces of a volume block that belong to one tetrahedron, seen from outside, by node.
 std::vector<Triangle> boundary_faces(const ModalVolume& volume);
@@ -63,6 +63,7 @@ class TetOverlap {
 
   Body body_[2];
   double tolerance_ = 0.0;
+  double touching_ = 0.0;  // pieces nearer than this belong to one patch, m
   bool computed_ = false;
   Index only_ = -1;  // the one patch, if there is one only
   std::vector<Vec3> nodes_[2];
@@ -85,4 +86,4 @@ class TetOverlapRule final : public OverlapRule {
   int of_ = 0;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

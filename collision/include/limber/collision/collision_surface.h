@@ -18,6 +18,10 @@
 
 namespace limber {
 
+namespace internal {
+class BoxReader;
+}
+
 /// An undirected edge between two (canonical) vertices.
 struct SurfaceEdge {
   std::array<Index, 2> vertices{-1, -1};   ///< ascending; equal where a triangle has two corners at one place
@@ -83,20 +87,16 @@ class CollisionSurface {
   }
   /// The lowest vertex of each part that hangs together by edges, ascending.
   std::span<const Index> component_vertices() const { return component_vertices_; }
-  /// At rest, no area to speak of: twice its area is at most 1e-12 of its longest edge squared. Kept, as it may be bent
-  /// into one that has.
-  bool degenerate(Index t) const { return degenerate_[static_cast<std::size_t>(t)] != 0; }
   /// Bounds a solid: every edge between distinct vertices lies in two triangles that run through it in opposite ways.
   bool closed() const { return closed_; }
   /// Whether two triangles have a (canonical) vertex in common.
   bool adjacent(Index t, Index u) const;
 
   // -- Tree ----------------------------------------------------------------------------------------------------------
-  /// Node 0 is the root; ranges are of triangle_order(). The tree is balanced: no deeper than kMaxDepth.
+  /// Node 0 is the root. The tree is balanced: no deeper than kMaxDepth.
   std::span<const TreeNode> nodes() const { return nodes_; }
   const TreeNode& node(Index n) const { return nodes_[static_cast<std::size_t>(n)]; }
   static constexpr int kMaxDepth = 32;
-  std::span<const Index> triangle_order() const { return triangle_order_; }
   /// Distinct vertices of a leaf's triangles, ascending.
   std::span<const Index> leaf_vertices(Index n) const {
     const TreeNode& leaf = vertex_tree_[static_cast<std::size_t>(n)];
@@ -111,7 +111,7 @@ class CollisionSurface {
 
  private:
   friend class DeformedSurface;
-  friend class BoxReader;
+  friend class internal::BoxReader;
 
   static std::span<const Index> range(const std::vector<Index>& all, const std::vector<Index>& start, Index v) {
     const auto begin = static_cast<std::size_t>(start[static_cast<std::size_t>(v)]);
@@ -123,7 +123,6 @@ class CollisionSurface {
   void find_canonical_vertices();
   void build_edges();
   void build_vertex_adjacency();
-  void mark_degenerate();
   void build_tree(int leaf_triangles);
   void list_leaf_vertices();
   void build_bounds();
@@ -141,11 +140,10 @@ class CollisionSurface {
   std::vector<std::array<Index, 3>> triangle_edges_;
   std::vector<Index> vertex_triangles_, vertex_triangles_start_, vertex_neighbours_, vertex_neighbours_start_;
   std::vector<Index> component_vertices_;
-  std::vector<std::uint8_t> degenerate_;
   bool closed_ = false;
 
   std::vector<TreeNode> nodes_;
-  std::vector<Index> triangle_order_;
+  std::vector<Index> triangle_order_;  ///< nodes' ranges are of it
   std::vector<Index> leaf_vertices_;   ///< distinct vertices of each leaf
   std::vector<TreeNode> vertex_tree_;  ///< the same nodes; a leaf's range is of leaf_vertices_
 

@@ -65,7 +65,7 @@ class DeformedSurface {
   const Counters& counters() const { return counters_; }
 
  private:
-  friend class BoxReader;
+  friend class internal::BoxReader;
   struct Scratch;
   void reserve(const CollisionSurface& surface);
   void begin_state();

@@ -6,8 +6,9 @@
 ///  - vertex–surface: a vertex v of A and a point q of B that is a local minimum of the distance from v, on a face, an
 ///    edge or a vertex of B (v lies in that feature's Voronoi region), and the same with A and B exchanged;
 ///  - edge–edge: the nearest points of two edges, inside both, where the direction between them lies in the normal cone
-///    of each edge; for creases the cone is widened by up to about 12°, so that bodies that rest on each other face to
-///    face keep the crossings of their outlines while they rock.
+///    of each edge; for creases the cone is widened (by 12° at a right angle, 17° on a knife's edge, 0 on a plane), so
+///    that bodies that rest on each other face to face keep the crossings of their outlines while they rock. Pairs that
+///    only the widening lets in are no local minima of the distance.
 ///
 /// Solids that all but touch (nearer than a hundredth of the edges at hand) have the normals of the faces that lie on
 /// each other: flush stacks press straight down. A vertex whose own surface runs through the plane of the contact has

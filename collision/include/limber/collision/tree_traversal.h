@@ -32,8 +32,6 @@ void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::
 
 /// Triangles that may overlap a box of the body frame; appended.
 void find_triangles_in_box(DeformedSurface& a, const Aabb& box_B, std::vector<Index>& triangles);
-/// … that may be within `radius` of a point; appended.
-void find_triangles_in_sphere(DeformedSurface& a, const Vec3& center_B, double radius, std::vector<Index>& triangles);
 /// … that may reach into normal · x ≤ offset (unit normal); appended.
 void find_triangles_in_half_space(DeformedSurface& a, const Vec3& normal_B, double offset,
                                   std::vector<Index>& triangles);

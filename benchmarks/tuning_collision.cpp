@@ -1,0 +1,533 @@
+// What each number of collision/src/tuning.h moves when it is halved and doubled, on fixed scenes; of a cosine or sine
+// that stands for an angle, the angle. See README.md.
+//
+//   build/release/bin/tuning_collision > table.md
+//
+// Prints a Markdown table; docs/reports/tuning-collision.md holds one with its reading.
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "block_model.h"
+#include "contact_bodies.h"
+#include "cpu_time.h"
+#include "finder_scenes.h"
+#include "limber/collision/broad_phase.h"
+#include "limber/collision/time_of_impact.h"
+#include "limber/collision/tree_traversal.h"
+#include "limber/dynamics/body_group.h"
+#include "narrow_phase_reference.h"
+#include "random_states.h"
+#include "sheet_model.h"
+#include "solid_bodies.h"
+#include "tuning.h"
+
+namespace limber {
+namespace {
+
+using internal::CollisionTuning;
+using testing::Body;
+using testing::PairReference;
+using testing::Random;
+
+// -- The numbers ------------------------------------------------------------------------------------------------------
+
+struct Number {
+  std::string room, name;
+  std::function<void(CollisionTuning&, double)> multiply;
+};
+
+double multiplied(double x, double factor) { return x * factor; }
+/// A cosine or sine whose angle is multiplied, and a share whose distance from 1 is.
+double angle_of_cosine(double x, double factor) { return std::cos(factor * std::acos(x)); }
+double angle_of_sine(double x, double factor) { return std::sin(factor * std::asin(x)); }
+double rest_to_one(double x, double factor) { return 1.0 - factor * (1.0 - x); }
+/// Half way to 0 or to 1.
+double between_bounds(double x, double factor) { return factor < 1.0 ? 0.5 * x : 0.5 * (1.0 + x); }
+
+#define LIMBER_NUMBER_BY(room, name, change)                                      \
+  Number {                                                                        \
+#room, #name, [](CollisionTuning& t, double factor) {                           \
+      using T = decltype(t.room.name);                                              \
+      t.room.name = static_cast<T>(change(static_cast<double>(t.room.name), factor)); \
+    } \
+  }
+#define LIMBER_NUMBER(room, name) LIMBER_NUMBER_BY(room, name, multiplied)
+
+const std::vector<Number> kNumbers{
+    LIMBER_NUMBER(hierarchy, box_cost),
+    LIMBER_NUMBER(hierarchy, box_cost_per_mode),
+    LIMBER_NUMBER(hierarchy, vertex_cost_per_mode),
+    LIMBER_NUMBER(hierarchy, triangle_cost),
+    LIMBER_NUMBER(hierarchy, boxes_without_refit),
+    LIMBER_NUMBER(broad, moves_before_sort),
+    LIMBER_NUMBER(broad, rows_per_chunk),
+    LIMBER_NUMBER(convex, hull_thickness),
+    LIMBER_NUMBER(convex, hull_same_direction),
+    LIMBER_NUMBER(convex, parallel_lines),
+    LIMBER_NUMBER(convex, gjk_progress),
+    LIMBER_NUMBER(convex, gjk_iterations),
+    LIMBER_NUMBER_BY(convex, face_alignment, angle_of_cosine),
+    LIMBER_NUMBER(convex, reference_preference),
+    LIMBER_NUMBER_BY(convex, edge_preference, rest_to_one),
+    LIMBER_NUMBER(convex, least_cross),
+    LIMBER_NUMBER(convex, side_by_side),
+    LIMBER_NUMBER(narrow, touching),
+    LIMBER_NUMBER(narrow, flat),
+    LIMBER_NUMBER(narrow, leaning),
+    LIMBER_NUMBER_BY(narrow, steep, angle_of_sine),
+    LIMBER_NUMBER(narrow, passed),
+    LIMBER_NUMBER(narrow, rocking),
+    LIMBER_NUMBER(narrow, leads_into),
+    LIMBER_NUMBER(narrow, aligned_depth),
+    LIMBER_NUMBER_BY(narrow, same_way, angle_of_cosine),
+    LIMBER_NUMBER(narrow, directionless),
+    LIMBER_NUMBER(narrow, parallel_touching),
+    LIMBER_NUMBER(narrow, grazing),
+    LIMBER_NUMBER(narrow, rest_depth_steps),
+    LIMBER_NUMBER(narrow, least_stretch),
+    LIMBER_NUMBER(narrow, least_patch),
+    LIMBER_NUMBER(finder, unit_quaternion),
+    LIMBER_NUMBER(finder, pairs_per_chunk),
+    LIMBER_NUMBER(finder, bodies_per_chunk),
+    LIMBER_NUMBER(finder, kept_spacing),
+    LIMBER_NUMBER(finder, kept_surplus),
+    LIMBER_NUMBER_BY(finder, kept_gap, between_bounds),
+    LIMBER_NUMBER(finder, good_advancement),
+    LIMBER_NUMBER(finder, look_nearer),
+    LIMBER_NUMBER(finder, look_again),
+    LIMBER_NUMBER(finder, look_farther),
+};
+
+// -- Pairs of bodies --------------------------------------------------------------------------------------------------
+
+/// Two bodies in one place, and what is known of their contacts.
+struct Pair {
+  std::unique_ptr<Body> a, b;
+  double margin;
+  OverlapMethod overlap = OverlapMethod::kRestDepth;
+  Vec3 ahead = Vec3::Zero();                   // expected motion of a
+  std::unique_ptr<PairReference> reference{};  // all contacts
+  std::optional<double> upright{};             // all normals are ±z, by as much of it
+  std::optional<double> free_after{};          // nothing is in the way of the motion ahead, by as much
+};
+
+std::unique_ptr<Body> modal(std::shared_ptr<const ModalModel> model) {
+  return std::make_unique<Body>(std::move(model));
+}
+std::unique_ptr<Body> box_of_triangles(const Vec3& half) {
+  return modal(testing::wavy_model(shapes::box(-half, half), 0));
+}
+
+/// Bent bodies at random, judged by brute force.
+void add_random_pairs(std::vector<Pair>& pairs) {
+  Random random(71);
+  const auto coarse = testing::lumpy_sphere(1, 5), fine = testing::lumpy_sphere(2, 3);
+  const Vec3 half(0.5, 0.3, 0.4);
+  for (int i = 0; i < 160; ++i) {
+    Pair pair{modal(coarse), i % 2 == 0 ? modal(fine) : std::make_unique<Body>(Shape{Box{half}}), 0.08,
+              OverlapMethod::kNearestPoint};
+    pair.a->place(random.pose(1.0), random.amplitudes(5, 0.05));
+    const RigidTransform X{random.pose(1.0).q,
+                           pair.a->pose.p + random.uniform(0.6, 1.1) * random.vector(1.0).normalized()};
+    if (i % 2 == 0)
+      pair.b->place(X, random.amplitudes(3, 0.05));
+    else
+      pair.b->place_box(X, half);
+    pair.reference = std::make_unique<PairReference>(pair.a->plain(), pair.b->plain(), pair.margin);
+    pairs.push_back(std::move(pair));
+  }
+}
+
+/// Boxes on a box: flush, a little off, apart, sunk in and tilted.
+void add_resting_boxes(std::vector<Pair>& pairs) {
+  const Vec3 half(0.25, 0.1875, 0.125);
+  for (const double off : {0.0, 1e-12, 1e-6, 1e-3, 0.03})
+    for (const double gap : {0.0, 1e-9, 1e-5, 1e-3, -1e-9, -1e-5, -1e-3, -0.02, -0.05})
+      for (const double tilt : {0.0, 1e-6, 1e-3, 0.005, 0.015, 0.03}) {
+        Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 2e-3};
+        const Quaternion q = quaternion_from_rotation_vector({tilt, 0.7 * tilt, 0.0});
+        pair.a->place({q, {off, -off, 2.0 * half.z() + gap}});
+        pair.b->place({});
+        if (off == 0.0 || -gap < off) pair.upright = tilt;  // else the sides are the nearer way out
+        pairs.push_back(std::move(pair));
+      }
+}
+
+/// Bars laid across each other, tilted, so that their rims have crossed.
+void add_crossed_bars(std::vector<Pair>& pairs) {
+  Random random(72);
+  for (int i = 0; i < 60; ++i) {
+    Pair pair{box_of_triangles({0.1, 1.0, 0.1}), box_of_triangles({1.0, 0.1, 0.1}), 0.0};
+    const Vec3 tilt(random.uniform(-0.1, 0.1), random.uniform(-0.3, 0.3), random.uniform(-0.5, 0.5));
+    pair.a->place({quaternion_from_rotation_vector(tilt), {0.0, 0.0, 0.2 + random.uniform(-0.02, 0.03)}});
+    pair.b->place({});
+    pair.upright = 0.45;  // within the cone of the tilts
+    pairs.push_back(std::move(pair));
+  }
+}
+
+/// A box that is about to slide onto the next one of the same height, level to round-off and to a part of an edge.
+void add_seams(std::vector<Pair>& pairs) {
+  const Vec3 half(0.25, 0.1875, 0.125);
+  for (const double above : {1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-5, -2e-5, -4e-5, -1e-4})
+    for (const double move : {0.15, 0.3}) {
+      Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 0.2};
+      pair.a->place({.p = {-2.0 * half.x() - 0.1, 0.013, 2.0 * half.z() + above}});
+      pair.b->place({});
+      pair.ahead = {move, 0.0, 0.0};
+      pair.free_after = 2.0 * std::abs(above) + 1e-8;
+      pairs.push_back(std::move(pair));
+    }
+}
+
+/// Blocks that flex on blocks that flex, about flat on each other, and boxes at random: nothing is known but what the
+/// numbers give as they are.
+void add_unjudged(std::vector<Pair>& pairs) {
+  Random random(77);
+  const auto block = testing::block_model(4);
+  for (int i = 0; i < 60; ++i) {
+    Pair pair{modal(block), modal(block), 0.01};
+    const double bent = std::pow(10.0, random.uniform(-5.0, -1.5));
+    const Vec3 tilt = std::pow(10.0, random.uniform(-5.0, -1.0)) * random.vector(1.0);
+    pair.a->place(
+        {quaternion_from_rotation_vector(tilt), {random.uniform(-0.3, 0.3), 1.0 + random.uniform(-0.01, 0.01), 0.1}},
+        random.amplitudes(4, bent));
+    pair.b->place({}, random.amplitudes(4, bent));
+    pairs.push_back(std::move(pair));
+  }
+  const Vec3 half(0.25, 0.2, 0.15);
+  for (int i = 0; i < 120; ++i) {
+    Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 0.02};
+    pair.a->place({random.pose(1.0).q, random.uniform(0.3, 0.5) * random.vector(1.0).normalized()});
+    pair.b->place({});
+    pair.ahead = 0.1 * random.vector(1.0);
+    pairs.push_back(std::move(pair));
+  }
+}
+
+/// Solids bent by a tenth and by half, one within the other, by the rest shape and by their tetrahedra.
+void add_solids(std::vector<Pair>& pairs) {
+  Random random(73);
+  const auto bar = testing::solid(testing::solid_box({0.75, 0.25, 0.25}, {6, 2, 2}), 4);
+  const auto ball = testing::solid(testing::tet_ball(0.4, 4), 3);
+  for (int i = 0; i < 40; ++i) {
+    Pair pair{modal(bar), modal(ball), 0.02, i % 2 == 0 ? OverlapMethod::kRestDepth : OverlapMethod::kTetOverlap};
+    pair.a->use_volume(), pair.b->use_volume();
+    pair.a->place(random.pose(1.0), random.amplitudes(4, i % 4 < 2 ? 0.05 : 0.25));
+    pair.b->place({random.pose(1.0).q, pair.a->pose.p + 0.5 * random.vector(1.0).normalized()},
+                  random.amplitudes(3, 0.05));
+    pairs.push_back(std::move(pair));
+  }
+}
+
+ConvexHull hull(Random& random) {
+  ConvexHull shape;
+  for (int i = 0; i < 24; ++i) shape.points.push_back(0.4 * random.vector(1.0));
+  return shape;
+}
+
+/// Rigid convex shapes in all positions, and bricks all but flush.
+void add_convex_pairs(std::vector<Pair>& pairs) {
+  Random random(74);
+  const Vec3 half(0.3, 0.24, 0.18);
+  const auto shape = [&](int kind) {
+    return kind == 0   ? Shape{Box{half}}
+           : kind == 1 ? Shape{Capsule{0.2, 0.3}}
+           : kind == 2 ? Shape{hull(random)}
+                       : Shape{Sphere{0.3}};
+  };
+  for (int i = 0; i < 240; ++i) {
+    Pair pair{std::make_unique<Body>(shape(i % 4)), std::make_unique<Body>(shape(i / 4 % 3)), 0.05};
+    pair.a->place(random.pose(1.0));
+    pair.b->place({random.pose(1.0).q, pair.a->pose.p + random.uniform(0.3, 0.7) * random.vector(1.0).normalized()});
+    pairs.push_back(std::move(pair));
+  }
+  for (int i = 0; i < 120; ++i) {
+    Pair pair{std::make_unique<Body>(Shape{Box{half}}), std::make_unique<Body>(Shape{Box{half}}), 0.01};
+    const double small = std::pow(10.0, random.uniform(-16.0, -2.0));
+    pair.b->place({});
+    pair.a->place(
+        {quaternion_from_rotation_vector(Vec3(0.0, 0.0, random.uniform(-3.0, 3.0)) + small * random.vector(1.0)),
+         {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), 2.0 * half.z() + small * random.uniform(-1.0, 1.0)}});
+    pair.upright = 3.0 * small;
+    pairs.push_back(std::move(pair));
+  }
+}
+
+// -- What comes out ---------------------------------------------------------------------------------------------------
+
+using Contacts = std::vector<ContactPoint>;
+
+/// All answers with one tuning, and what the references say of them.
+struct Outcome {
+  std::vector<Contacts> contacts;  // by query
+  std::vector<double> times;       // of impact, s
+  long advancements = 0;
+  int missed = 0, extra = 0, wrong = 0;
+  double worst_gap = 0.0, worst_normal = 0.0;
+};
+
+class Scenes {
+ public:
+  Scenes() {
+    add_random_pairs(pairs_), add_resting_boxes(pairs_), add_crossed_bars(pairs_), add_seams(pairs_);
+    add_solids(pairs_), add_unjudged(pairs_);
+    convex_from_ = pairs_.size();
+    add_convex_pairs(pairs_);
+    make_shots();
+    make_crossing_boxes();
+  }
+
+  Outcome answer() {
+    Outcome r;
+    for (const Pair& pair : pairs_) {
+      r.contacts.push_back(contacts_of(pair));
+      judge(pair, r.contacts.back(), r);
+    }
+    ask_heap(&r.contacts);
+    for (const Shot& shot : shots_) {
+      const ImpactTime t = shoot(shot);
+      r.times.push_back(t.status == ImpactTime::Status::kImpact ? t.time : kStep);
+      r.advancements += t.advancements;
+    }
+    return r;
+  }
+
+  /// CPU time of a room's scenes, s.
+  double seconds(const std::string& room) {
+    LeastTime time;
+    for (int i = 0; i < 4; ++i) time.measure([&] { run(room); });
+    return time.seconds();
+  }
+
+ private:
+  static constexpr double kStep = 1.0 / 60.0;
+
+  struct Shot {
+    std::shared_ptr<const CollisionSurface> surface;
+    ExactMotion sheet, ball;
+  };
+
+  static void judge(const Pair& pair, const Contacts& contacts, Outcome& r) {
+    if (pair.reference) {
+      const testing::Comparison c = testing::compare(contacts, *pair.reference, *pair.a, *pair.b);
+      r.missed += static_cast<int>(c.missed.size()), r.extra += static_cast<int>(c.extra.size());
+      r.worst_gap = std::max(r.worst_gap, c.worst_gap), r.worst_normal = std::max(r.worst_normal, c.worst_normal);
+    }
+    if (pair.upright) {
+      if (contacts.size() < (pair.margin > 0.0 && *pair.upright <= 1e-3 ? 4u : 0u)) ++r.wrong;
+      for (const ContactPoint& c : contacts)
+        r.wrong += std::hypot(c.normal.x(), c.normal.y()) > 1.5 * *pair.upright + 1e-7 ? 1 : 0;
+    }
+    if (pair.free_after)
+      for (const ContactPoint& c : contacts) r.wrong += c.gap + c.normal.dot(pair.ahead) < -*pair.free_after ? 1 : 0;
+  }
+
+  Contacts contacts_of(const Pair& pair) {
+    Contacts contacts;
+    CollisionBody a = pair.a->body(0);
+    a.displacement = pair.ahead;
+    NarrowPhase& narrow = pair.overlap == OverlapMethod::kNearestPoint ? nearest_
+                          : pair.overlap == OverlapMethod::kTetOverlap ? tets_
+                                                                       : rest_;
+    narrow.find_contacts(a, pair.b->body(1), pair.margin, Vec3::Zero(), contacts);
+    return contacts;
+  }
+
+  void run(const std::string& room) {
+    if (room == "hierarchy") walk_trees();
+    if (room == "broad") sweep();
+    if (room == "convex")
+      for (std::size_t i = convex_from_; i < pairs_.size(); ++i) contacts_of(pairs_[i]);
+    if (room == "narrow")
+      for (std::size_t i = 0; i < convex_from_; ++i) contacts_of(pairs_[i]);
+    if (room == "finder") {
+      ask_heap(nullptr);
+      for (const Shot& shot : shots_) shoot(shot);
+    }
+  }
+
+  /// A heap of mixed bodies and two sheets on each other that move by millimetres from query to query.
+  void ask_heap(std::vector<Contacts>* all) {
+    testing::ContactScene scene = testing::heap(60, 6);
+    const Index below =
+        scene.add(BodyGeometry{.model = sheet_, .shape = {}}, {.p = {0.0, 0.0, -20.0}}, {1e-4, 1e-4, 1e-4, 1e-4});
+    scene.add(BodyGeometry{.model = sheet_, .shape = {}}, {.p = {0.3, 0.2, -20.0 + 1e-3}}, {1e-4, -1e-4, 1e-4, -1e-4});
+    ContactFinder finder;
+    scene.add_all_to(finder);
+    for (int step = 0; step < 10; ++step) {
+      for (std::size_t i = 1; i < scene.poses.size(); ++i)
+        scene.poses[i].p.x() += 0.001 * std::sin(0.3 * step + static_cast<double>(i));
+      for (double& z : scene.amplitudes[static_cast<std::size_t>(below)]) z = 1e-4 * std::cos(step + 1e4 * z);
+      Contacts contacts;
+      finder.find_contacts({.states = scene.states(), .margin = 0.005}, contacts, serial_jobs());
+      if (all != nullptr) all->push_back(std::move(contacts));
+    }
+  }
+
+  /// Balls at 5 to 100 m/s towards and past a vibrating sheet.
+  void make_shots() {
+    Random random(75);
+    const auto model = testing::sheet_model(12, 8);
+    const auto surface = std::make_shared<const CollisionSurface>(model);
+    for (int i = 0; i < 60; ++i) {
+      BodyGroup group(model, kStep);
+      const Index slot = group.add({}, random.vector(0.5), random.vector(3.0));
+      std::vector<double> z, rates;
+      for (const double lambda : model->data().eigenvalues)
+        z.push_back(random.uniform(-1e-3, 1e-3)), rates.push_back(1e-3 * std::sqrt(lambda) * random.uniform(-1.0, 1.0));
+      group.set_amplitudes(slot, z, rates);
+      Shot shot{surface, {}, {}};
+      group.predict_motion(slot, {0.0, 0.0, -9.80665}, shot.sheet);
+      const double speed = std::pow(10.0, random.uniform(0.7, 2.0));
+      const Vec3 aim = random.vector(0.6), from = aim.cwiseProduct(Vec3(1, 1, 0)) + Vec3(0, 0, 0.6 * speed * kStep);
+      shot.ball.set_frame({.pose = {.p = from},
+                           .velocity = speed * (Vec3(random.uniform(-1, 1), random.uniform(-1, 1), -1.0)).normalized(),
+                           .acceleration = {0.0, 0.0, -9.80665}},
+                          kStep);
+      shots_.push_back(std::move(shot));
+    }
+  }
+  ImpactTime shoot(const Shot& shot) {
+    return impact_.find({.geometry = &ball_, .motion = &shot.ball}, {.surface = shot.surface, .motion = &shot.sheet},
+                        kStep, 1e-4);
+  }
+
+  /// Two vibrating balls of 1,280 triangles that come near, touch and part, by the automatic choice of boxes.
+  void walk_trees() {
+    for (const auto& surface : {spheres_[0], spheres_[1]}) {
+      DeformedSurface a, b;
+      DeformedSurface::Counters last_a, last_b;
+      std::vector<TrianglePair> pairs;
+      for (int step = 0; step < 100; ++step) {
+        std::vector<double> z;
+        for (Index i = 0; i < surface->modes(); ++i)
+          z.push_back(0.02 * std::sin(0.2 * step * (1 + i)) / (1.0 + 0.6 * i));
+        a.bind(surface, z, BoundsChoice::kAutomatic, &last_a), b.bind(surface, z, BoundsChoice::kAutomatic, &last_b);
+        pairs.clear();
+        const RigidTransform X{quaternion_from_rotation_vector({0.1, 0.2, 0.01 * step}),
+                               {1.0 + 0.06 * std::sin(0.1 * step), 0.0, 0.0}};
+        find_triangle_pairs(a, b, X, 0.0, pairs);
+        last_a = a.counters(), last_b = b.counters();
+      }
+    }
+  }
+
+  void make_crossing_boxes() {
+    Random random(76);
+    for (int i = 0; i < 2000; ++i) places_.push_back(random.vector(7.0)), speeds_.push_back(random.vector(0.05));
+  }
+  /// 2,000 boxes that move by a twentieth of their size from query to query.
+  void sweep() {
+    BroadPhase broad;
+    std::vector<BodyPair> pairs;
+    for (std::size_t i = 0; i < places_.size(); ++i) broad.add(static_cast<Index>(i));
+    for (int step = 0; step < 20; ++step) {
+      for (std::size_t i = 0; i < places_.size(); ++i) {
+        const Vec3 p = places_[i] + step * speeds_[i];
+        broad.set_box(static_cast<Index>(i), {p - Vec3::Constant(0.5), p + Vec3::Constant(0.5)});
+      }
+      broad.find_pairs(0.0, pairs, serial_jobs());
+    }
+  }
+
+  std::vector<Pair> pairs_;
+  std::size_t convex_from_ = 0;
+  std::vector<Shot> shots_;
+  std::vector<Vec3> places_, speeds_;
+  const std::shared_ptr<const CollisionSurface> spheres_[2] = {
+      std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 8)),
+      std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 32))};
+  NarrowPhase nearest_{{.overlap = OverlapMethod::kNearestPoint}}, tets_{{.overlap = OverlapMethod::kTetOverlap}},
+      rest_{{.overlap = OverlapMethod::kRestDepth}};
+  const RigidGeometry ball_{Sphere{0.01}};
+  const std::shared_ptr<const ModalModel> sheet_ = testing::sheet_model(16, 4);
+  TimeOfImpact impact_;
+};
+
+/// How one outcome differs from another.
+struct Difference {
+  long contacts = 0;               // in one and not in the other
+  double gap = 0.0, normal = 0.0;  // of contacts in both, m and 1
+  double time = 0.0;               // of impacts, s
+};
+
+Difference difference(const Outcome& one, const Outcome& other) {
+  Difference d;
+  for (std::size_t q = 0; q < one.contacts.size(); ++q) {
+    std::map<std::uint64_t, const ContactPoint*> known;
+    for (const ContactPoint& c : one.contacts[q]) known[c.id] = &c;
+    for (const ContactPoint& c : other.contacts[q]) {
+      const auto same = known.find(c.id);
+      if (same == known.end()) {
+        ++d.contacts;
+        continue;
+      }
+      d.gap = std::max(d.gap, std::abs(c.gap - same->second->gap));
+      d.normal = std::max(d.normal, (c.normal - same->second->normal).norm());
+      known.erase(same);
+    }
+    d.contacts += static_cast<long>(known.size());
+  }
+  for (std::size_t i = 0; i < one.times.size(); ++i) d.time = std::max(d.time, std::abs(one.times[i] - other.times[i]));
+  return d;
+}
+
+std::string row(const std::string& name, const Outcome& r, const Difference& d, double time) {
+  char text[256];
+  const auto small = [](double x) {
+    char number[32];
+    std::snprintf(number, sizeof number, x == 0.0 ? "0" : "%.0e", x);
+    return std::string(number);
+  };
+  std::snprintf(text, sizeof text, "| %s | %d | %d | %d | %s | %s | %ld | %s | %s | %+ld | %s | %.2f |", name.c_str(),
+                r.missed, r.extra, r.wrong, small(r.worst_gap).c_str(), small(r.worst_normal).c_str(), d.contacts,
+                small(d.gap).c_str(), small(d.normal).c_str(), r.advancements, small(d.time).c_str(), time);
+  return text;
+}
+
+int print_table() {
+  Scenes scenes;
+  const Outcome usual = scenes.answer();
+  const std::size_t contacts = std::accumulate(usual.contacts.begin(), usual.contacts.end(), std::size_t{0},
+                                               [](std::size_t sum, const Contacts& c) { return sum + c.size(); });
+  std::printf("%zu queries, %zu contacts, %zu shots, %ld advancements\n\n", usual.contacts.size(), contacts,
+              usual.times.size(), usual.advancements);
+  std::puts(
+      "| number | missed | extra | wrong | gap | normal | changed | by gap | by normal | advancements | by time | CPU "
+      "|");
+  std::puts("|---|---|---|---|---|---|---|---|---|---|---|---|");
+  std::puts(row("as they are", usual, {}, 1.0).c_str());
+  for (const Number& number : kNumbers) {
+    double usual_time = scenes.seconds(number.room);
+    for (const double factor : {0.5, 2.0}) {
+      CollisionTuning tuning;
+      number.multiply(tuning, factor);
+      double time = 0.0;
+      Outcome changed;
+      {
+        const internal::ScopedCollisionTuning in_force(tuning);
+        changed = scenes.answer();
+        time = scenes.seconds(number.room);
+      }
+      usual_time = std::min(usual_time, scenes.seconds(number.room));
+      const Difference d = difference(usual, changed);
+      changed.advancements -= usual.advancements;
+      std::puts(
+          row(number.room + "." + number.name + (factor < 1.0 ? " ½" : " 2"), changed, d, time / usual_time).c_str());
+      std::fflush(stdout);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace limber
+
+int main() { return limber::print_table(); }

@@ -1,0 +1,146 @@
+/// @file
+/// Numbers of the collision module that choose a path, a tolerance or a preference, all of them and each once. Each has
+/// its meaning, its unit where it has one, a sensible range in brackets and what it rests on.
+/// docs/reports/tuning-collision.md tells what moves when each is halved and doubled; benchmarks/tuning_collision.cpp
+/// measures it. "Steady" below: nothing moves there.
+///
+/// Bounds of round-off, which follow from the arithmetic, and sizes of buffers stand where they are used.
+#pragma once
+
+#include <cstddef>
+
+namespace limber::internal {
+
+/// Trees of surfaces. These decide how fast boxes are found and nothing else.
+///
+/// BoundsChoice::kAutomatic refits a tree once as many boxes have been asked for as cost the same. Costs are in floats
+/// read from the near cache, for k modes, fitted by hand to benchmark_collision_hierarchy; within 8 % at half and
+/// twice.
+struct HierarchyTuning {
+  double box_cost = 1000.0;           ///< of a box beside what grows with k: the tests and vertices it leads to [> 0]
+  double box_cost_per_mode = 48.0;    ///< of a box, times k: 6 half floats, scattered in memory [6 to 100]
+  double vertex_cost_per_mode = 3.0;  ///< of a vertex of a refit, times k: three floats, which stream [3]
+  double triangle_cost = 32.0;        ///< of a triangle of a refit, with its share of vertices and nodes [10 to 100]
+  /// Boxes that a walk asks for without a refit, per box with one: tighter boxes end it earlier [1 to 2]. Counted.
+  double boxes_without_refit = 2.0;
+};
+
+/// Lists of many bodies. These decide time alone. Steady.
+struct BroadTuning {
+  /// Moves per body after which insertion stops and the list is sorted anew [2 to log2 of the number of bodies].
+  std::size_t moves_before_sort = 8;
+  std::size_t rows_per_chunk = 256;  ///< of the sweep, for a thread at a time [64 to 1,024]
+};
+
+/// Convex rigid shapes, and the distance of two hulls.
+struct ConvexTuning {
+  /// Part of a hull's size up to which a point lies on a face [1e-14 to 1e-6]: far above round-off, far below any
+  /// corner that is meant. Steady.
+  double hull_thickness = 1e-10;
+  /// Length of the difference of two unit normals or directions that are one [1e-12 to 1e-4]; the same argument.
+  /// Steady.
+  double hull_same_direction = 1e-7;
+  /// Sine below which two lines are parallel [1e-15 to 1e-11]: what is lost is their length times this. Steady.
+  double parallel_lines = 1e-13;
+  /// GJK: part of the squared distance that a step must gain [some round-offs, 2.2e-16 each]. Steady.
+  double gjk_progress = 1e-15;
+  /// GJK: steps at most [≥ 64]. Polytopes take as many as they have features; round-off may make the last repeat.
+  /// Steady.
+  int gjk_iterations = 128;
+  /// Cosine with a face's normal, 14°, from which faces meet rather than an edge or a corner [7° to 30°]. By judgement:
+  /// 76 of 11,696 contacts come or go at half the angle, none gets another depth.
+  double face_alignment = 0.97;
+  /// Cosine by which a face of a must fit the normal better to be the reference [1e-8 to 1e-3]: flush faces are told
+  /// apart by round-off, and with the reference the ids of all contacts change (NarrowPhase.BricksThatLieFlush...).
+  /// Steady.
+  double reference_preference = 1e-4;
+  /// Edges decide the direction of least depth where their depth is below this part of the faces' [0.9 to 1]: faces
+  /// give steadier contacts. By judgement.
+  double edge_preference = 0.95;
+  /// Sine of two edges below which their cross product is no axis [1e-12 to 1e-4]: faces bound that direction. Steady.
+  double least_cross = 1e-8;
+  double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]; by judgement
+};
+
+/// Surfaces made of triangles. "Edges at hand" are the shortest ones around a vertex and of the face it meets.
+struct NarrowTuning {
+  /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
+  /// normal, as the direction between two points is noise. Half of it turns the corners of flush boxes sideways.
+  double touching = 0.01;
+  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]; at half, boxes tilted by as
+                       ///< much have sideways normals
+  /// Sine, 12°, by which a surface may lean against a contact's normal that counts as its own [0.1 to 0.4]. Steady.
+  double leaning = 0.2;
+  /// Sine, 30°, from which a surface runs through the plane of its contact [15° to 60°]. Steady; at
+  /// 90°, which is never, flush boxes are pushed out sideways.
+  double steep = 0.5;
+  /// Part of the edges at hand by which a plane may have been passed and still keeps bodies apart [1e-6 to 1e-3]:
+  /// floors of boxes need not be level to the last bit. Seams that are farther off than this stop what slides.
+  double passed = 1e-4;
+  /// How far a direction may lean out of a crease's normal cone, per unit of |inward₁ + inward₂|: 12° at a right angle,
+  /// 17° on a knife's edge, 0 on a plane [0 to 0.3]. Rocking bodies keep the crossings of their outlines. By judgement:
+  /// with 0 the contacts are the local minima alone.
+  double rocking = 0.15;
+  double leads_into = 1e-3;  ///< sine at which a direction leads from a face's rim into it [1e-6 to 1e-2]. Steady.
+  /// Part of the edges at hand up to which bodies with flush sides are freed along other faces [0.1 to 1]: deeper, the
+  /// nearest side is the way out. By judgement.
+  double aligned_depth = 0.5;
+  /// Cosine, 26°, with a way out of a loop of intersection within which a crossing of edges goes that way [13° to 40°].
+  /// By judgement: bars laid across each other rest on all four crossings.
+  double same_way = 0.9;
+  double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. Steady.
+  /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. Steady.
+  double parallel_touching = 1e-4;
+  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
+  int rest_depth_steps = 16;  ///< tetrahedra walked to carry a point back to the rest shape [≥ 8]. Steady.
+  double least_stretch =
+      1e-6;  ///< det F up to which a tetrahedron is flat and carries nothing [1e-12 to 1e-3]. Steady.
+  /// Part of its area below which a patch's area vector is round-off [1e-12 to 1e-2]. Steady.
+  double least_patch = 1e-6;
+};
+
+/// Whole queries: thinning, and the first time of impact.
+struct FinderTuning {
+  double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1: a promise of the header
+  std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
+  /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets
+  /// of the benchmark change their contacts from step to step at 0.55.
+  double kept_spacing = 1.1;
+  /// How many more they may be than the best choice, per contact of it that covers the middle [0 to 1]. Steady.
+  double kept_surplus = 0.5;
+  double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
+  /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
+  /// `look_again` [1 to 4] times what the bounds gave, at least `look_nearer` [0.01 to 0.2] of the time before. After
+  /// an advancement, `look_farther` [2 to 10] times it is looked ahead. Advancements change by a sixth at most at half
+  /// and twice; the answer is safe with any.
+  double good_advancement = 0.25, look_nearer = 1.0 / 16.0, look_again = 2.0, look_farther = 4.0;
+};
+
+struct CollisionTuning {
+  HierarchyTuning hierarchy{};
+  BroadTuning broad{};
+  ConvexTuning convex{};
+  NarrowTuning narrow{};
+  FinderTuning finder{};
+};
+
+inline CollisionTuning collision_tuning_in_force{};
+
+inline const CollisionTuning& collision_tuning() { return collision_tuning_in_force; }
+
+/// Puts other numbers in force for as long as it lives. For measurements and tests: the numbers are the process', and
+/// no call of the module may run while one begins or ends.
+class ScopedCollisionTuning {
+ public:
+  explicit ScopedCollisionTuning(const CollisionTuning& tuning) : before_(collision_tuning_in_force) {
+    collision_tuning_in_force = tuning;
+  }
+  ~ScopedCollisionTuning() { collision_tuning_in_force = before_; }
+  ScopedCollisionTuning(const ScopedCollisionTuning&) = delete;
+  ScopedCollisionTuning& operator=(const ScopedCollisionTuning&) = delete;
+
+ private:
+  CollisionTuning before_;
+};
+
+}  // namespace limber::internal
