@@ -15,18 +15,20 @@ constexpr double kSamplesPerCell = 2.0;     ///< along a side
 constexpr double kFacetDistancePerCell = 0.1;
 /// Refinement that makes this many times the nodes expected is running away.
 constexpr double kRunaway = 3.0;
-constexpr double kWorstShape = 0.01;  ///< flatter tets (see worst_shape) spoil the stiffness
-constexpr double kFiner = 0.8;        ///< cells of the next try
-constexpr int kTries = 4;             ///< with smaller and smaller cells
-constexpr double kStrayPart = 0.01;   ///< of its body's volume: a smaller loose piece is dropped
-constexpr double kWorstVolume = 0.1;  ///< of the body's: a worse error is not good
-constexpr double kLeastSize = 1e-3;   ///< of the cell size: nothing is made smaller for what is thin
+constexpr std::size_t kFewNodes = 2000;  ///< are never too many
+constexpr double kWorstShape = 0.01;     ///< flatter tets (see worst_shape) spoil the stiffness
+constexpr double kFiner = 0.8;           ///< cells of the next try
+constexpr int kTries = 4;                ///< with smaller and smaller cells
+constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
+constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
+constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
 
 /// How good a mesh is, best first.
-enum class Grade { kGood, kInaccurate, kFlat, kNone };
+enum class Grade { kGood, kPinched, kInaccurate, kFlat, kNone };
 
 struct Judged {
   FilledBody filled;
+  double cell_size = 0.0;
   Grade grade = Grade::kNone;
 };
 
@@ -86,22 +88,32 @@ Judged judge(MeshedBody meshed, const Body& body) {
   } else if (error > kWorstVolume) {
     j.grade = Grade::kInaccurate;
     f.fault = "its volume is " + percent(error) + " off";
+  } else if (!surface_quality(boundary_surface(f.mesh).surface).closed_manifold()) {
+    j.grade = Grade::kPinched;
+    f.fault = "its boundary touches itself along edges";
   } else {
     j.grade = Grade::kGood;
   }
   return j;
 }
 
-Judged attempt(const MeasuredBody& body, double cell_size, double smallest_cell, bool keep_sharp_edges) {
-  const SizeField size(body.samples, cell_size, smallest_cell);
-  const double expected = expected_nodes(body.samples, body.body->volume, cell_size, smallest_cell);
+struct Attempt {
+  double cell_size = 0.0;
+  bool keep_sharp_edges = false, manifold = false;
+};
+
+Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
+  const SizeField size(body.samples, how.cell_size, smallest_cell);
+  const double expected = expected_nodes(body.samples, body.body->volume, how.cell_size, smallest_cell);
   Judged j = judge(mesh_body(body.body->boundary, body.body->seeds,
                              {.cell_size = size,
                               .facet_distance = kFacetDistancePerCell,
-                              .keep_sharp_edges = keep_sharp_edges,
-                              .max_nodes = static_cast<std::size_t>(kRunaway * expected) + 2000}),
+                              .keep_sharp_edges = how.keep_sharp_edges,
+                              .manifold = how.manifold,
+                              .max_nodes = static_cast<std::size_t>(kRunaway * expected) + kFewNodes}),
                    *body.body);
-  j.filled.sharp_edges_kept = keep_sharp_edges;
+  j.filled.sharp_edges_kept = how.keep_sharp_edges;
+  j.cell_size = how.cell_size;
   return j;
 }
 
@@ -136,19 +148,22 @@ double smallest_affordable_cell(const std::vector<MeasuredBody>& bodies, double 
 FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_edges) {
   Judged best;
   int tries = 0;
-  const auto better = [&](double size, bool edges) {
-    Judged j = attempt(body, size, smallest_cell, edges);
+  const auto attempt = [&](const Attempt& how) {
+    Judged j = make(body, smallest_cell, how);
     ++tries;
-    const bool failed = j.grade == Grade::kNone;
-    if (tries == 1 || j.grade < best.grade) best = std::move(j);
-    return failed;
+    const Grade grade = j.grade;
+    if (tries == 1 || grade < best.grade) best = std::move(j);
+    return grade;
   };
-  bool edges = keep_sharp_edges;
-  double size = body.cell_size;
-  for (int i = 0; i < kTries && best.grade != Grade::kGood; ++i, size *= kFiner) {
-    if (better(size, edges) && edges) better(size, edges = false);
+  Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
+  for (int i = 0; i < kTries && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
+    if (attempt(how) != Grade::kNone || !how.keep_sharp_edges) continue;
+    how.keep_sharp_edges = false;
+    attempt(how);
   }
-  if (edges && best.grade != Grade::kGood) better(body.cell_size, false);
+  if (best.grade > Grade::kPinched && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
+  if (best.grade == Grade::kPinched)
+    attempt({.cell_size = best.cell_size, .keep_sharp_edges = best.filled.sharp_edges_kept, .manifold = true});
   best.filled.tries = tries;
   return best.filled;
 }

@@ -120,7 +120,7 @@ std::string refine(const Domain& domain, const SurfaceMesh& boundary, std::span<
   if (error == CGAL::CGAL_MESH_3_NO_ERROR)
     CGAL::refine_mesh_3(complex, domain, criteria, parameters::no_perturb(),
                         parameters::exude(parameters::sliver_bound = kSliverDegrees), parameters::no_reset_c3t3(),
-                        limits, parameters::manifold());
+                        limits, options.manifold ? parameters::manifold() : parameters::non_manifold());
   return error == CGAL::CGAL_MESH_3_NO_ERROR ? "" : "more than " + std::to_string(options.max_nodes) + " nodes";
 }
 
