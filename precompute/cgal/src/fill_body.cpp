@@ -14,11 +14,12 @@ constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many c
 constexpr double kSamplesPerCell = 2.0;     ///< along a side
 constexpr double kFacetDistancePerCell = 0.1;
 /// Refinement that makes this many times the nodes expected is running away.
-constexpr double kRunaway = 3.0;
+constexpr double kRunaway = 2.5;
 constexpr std::size_t kFewNodes = 2000;  ///< are never too many
 constexpr double kWorstShape = 0.01;     ///< flatter tets (see worst_shape) spoil the stiffness
 constexpr double kFiner = 0.8;           ///< cells of the next try
 constexpr int kTries = 4;                ///< with smaller and smaller cells
+constexpr int kFailures = 2;             ///< tries without a mesh, after which smaller cells are no hope
 constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
 constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
 constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
@@ -156,10 +157,14 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
     return grade;
   };
   Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
-  for (int i = 0; i < kTries && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
-    if (attempt(how) != Grade::kNone || !how.keep_sharp_edges) continue;
-    how.keep_sharp_edges = false;
-    attempt(how);
+  int failures = 0;
+  for (int i = 0; i < kTries && failures < kFailures && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
+    bool failed = attempt(how) == Grade::kNone;
+    if (failed && how.keep_sharp_edges) {
+      how.keep_sharp_edges = false;
+      failed = attempt(how) == Grade::kNone;
+    }
+    failures += failed ? 1 : 0;
   }
   if (best.grade > Grade::kPinched && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
   if (best.grade == Grade::kPinched)

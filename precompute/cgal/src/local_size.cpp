@@ -24,8 +24,8 @@ constexpr double kGrowth = 0.5;
 constexpr std::size_t kLeafSize = 8;
 constexpr int kMostSubdivisions = 200;  // of one edge
 // Nodes per h² of boundary and per h³ of volume, measured: docs/tetrahedralisation.md.
-constexpr double kNodesPerArea = 1.5;
-constexpr double kNodesPerVolume = 1.0;
+constexpr double kNodesPerArea = 2.5;
+constexpr double kNodesPerVolume = 0.6;
 
 Vec3 unit_normal(const std::array<Vec3, 3>& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
 
