@@ -109,12 +109,18 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
       ->type_name("N")
       ->check(CLI::Range(4, 100'000'000));
   app.add_option("--cell-size", a.tets.cell_size,
-                 "tets from a surface: largest circumradius; default: 1/40 of the diagonal")
+                 "tets from a surface: largest circumradius; default: 1/40 of the diagonal, less where parts are thin")
       ->type_name("M")
       ->check(positive_number());
   app.add_option("--alpha", a.tets.alpha, "wrap of a soup: smallest hole it enters; default: 1/50 of the diagonal")
       ->type_name("M")
       ->check(positive_number());
+  app.add_option(
+         "--max-nodes", a.tets.max_nodes,
+         "tets from a surface: nodes that cells smaller than --cell-size may cost, where parts or gaps are thin")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str();
   app.add_option("--scale", a.scale, "multiplies all input lengths first, for files that are not in metres")
       ->type_name("FACTOR")
       ->check(positive_number())
@@ -237,22 +243,43 @@ SurfaceMesh read_surface(Program& program, const std::string& path, double facto
   return surface;
 }
 
+/// How the tets came from the surface.
+const char* route_of(const Tetrahedralisation& t) {
+  return t.wrapped ? "wrapped" : t.sharp_edges_kept ? "given" : "smooth";
+}
+
+nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahedralisation& t) {
+  return {{"vertices", surface.vertices.size()},
+          {"triangles", surface.triangles.size()},
+          {"wrapped", t.wrapped},
+          {"why_wrapped", t.why_wrapped},
+          {"route", route_of(t)},
+          {"smallest_cell", t.smallest_cell},
+          {"tries", t.tries},
+          {"volume_before", t.volume_before},
+          {"volume_after", t.volume_after}};
+}
+
 /// Fills a surface with tets; it stays what is drawn.
 void fill_with_tets(Program& program, const Arguments& a, BakeInput& input, Stopwatch& stopwatch) {
-  program.progress().stage("tetrahedra");
-  Tetrahedralisation t =
-      stopwatch.time("tetrahedralise", [&] { return tetrahedralise(*input.render, a.tets, program.warnings()); });
+  TetrahedralisationOptions options = a.tets;
+  options.progress = [&](const std::string& stage) { program.progress().stage(stage); };
+  Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
+    try {
+      return tetrahedralise(*input.render, options, program.warnings());
+    } catch (const ComputationError& e) {
+      throw ComputationError("\"" + a.mesh + "\": " + e.what());
+    } catch (const InputError& e) {
+      throw InputError("\"" + a.mesh + "\": " + e.what());
+    }
+  });
   stopwatch.add("wrap", t.seconds_wrap);
+  stopwatch.add("thickness", t.seconds_thickness);
   stopwatch.add("mesh", t.seconds_mesh);
-  const std::size_t triangles = input.render->triangles.size();
-  program.report()["surface"] = {{"vertices", input.render->vertices.size()},
-                                 {"triangles", triangles},
-                                 {"wrapped", t.wrapped},
-                                 {"why_wrapped", t.why_wrapped},
-                                 {"volume_before", t.volume_before},
-                                 {"volume_after", t.volume_after}};
-  program.print(fmt::format("surface: {} triangles{}; it encloses {:.6g} m^3, its tets {:.6g} m^3\n", triangles,
-                            t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "", t.volume_before, t.volume_after));
+  program.report()["surface"] = surface_report(*input.render, t);
+  program.print(fmt::format("surface: {} triangles{}; it encloses {:.6g} m^3, its tets {:.6g} m^3\n",
+                            input.render->triangles.size(), t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "",
+                            t.volume_before, t.volume_after));
   input.mesh = std::move(t.mesh);
 }
 

@@ -139,6 +139,45 @@ TEST(Tetrahedralise, ARodAboutOneCellThickHasNoFlatTets) {
   }
 }
 
+TEST(Tetrahedralise, FiveVerticesAreEnough) {
+  SurfaceMesh pyramid;
+  pyramid.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {0, 0, 1}};
+  pyramid.triangles = {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {0, 2, 1}, {0, 3, 2}};
+  Warnings warnings;
+  const auto r = tetrahedralise(pyramid, {}, warnings);
+  EXPECT_NEAR(r.volume_after, 4.0 / 3.0, kRoundOff);
+  EXPECT_THAT(warnings, IsEmpty());
+}
+
+TEST(Tetrahedralise, APlateThinnerThanACellKeepsItsVolumeAndStaysInOnePiece) {
+  const double thickness = 0.01;  // cells of 0.035 without regard to it
+  Warnings warnings;
+  const auto r = tetrahedralise(shapes::box({0, 0, 0}, {1, 1, thickness}), {}, warnings);
+  EXPECT_NEAR(r.volume_after, thickness, kRoundOff);
+  EXPECT_EQ(bodies(r.mesh), 1);
+  EXPECT_THAT(warnings, IsEmpty());
+}
+
+TEST(Tetrahedralise, AThinShellIsWholeAndManifold) {
+  SurfaceMesh shell = shapes::sphere({0, 0, 0}, 1.0, 4);
+  shapes::append(shapes::turned(shapes::sphere({0, 0, 0}, 0.97, 4)), shell);
+  Warnings warnings;
+  const auto r = tetrahedralise(shell, {}, warnings);  // cells of 0.087 without regard to the thickness of 0.03
+  EXPECT_NEAR(r.volume_after, r.volume_before, 0.1 * r.volume_before);
+  const SurfaceQuality quality = surface_quality(boundary_surface(r.mesh).surface);
+  EXPECT_TRUE(quality.closed_manifold());
+  EXPECT_EQ(quality.components, 2);
+  EXPECT_THAT(warnings, IsEmpty());
+}
+
+TEST(Tetrahedralise, TheBudgetOfNodesBoundsWhatThinPartsCost) {
+  const SurfaceMesh plate = shapes::box({0, 0, 0}, {1, 1, 0.002});
+  Warnings warnings;
+  const auto cheap = tetrahedralise(plate, {.max_nodes = 5'000}, warnings);
+  // Sheets so much thinner than their cells may fail to be good, and are then told of; runaway is 2.5 times too many.
+  EXPECT_LT(cheap.mesh.nodes.size(), 5u * 5'000u / 2u + 2'000u);
+}
+
 TEST(Tetrahedralise, WrongOptionsAndImpossibleSizesAreOneLineEach) {
   Warnings warnings;
   const SurfaceMesh box = shapes::box({0, 0, 0}, {1, 1, 1});
@@ -148,6 +187,7 @@ TEST(Tetrahedralise, WrongOptionsAndImpossibleSizesAreOneLineEach) {
   EXPECT_THAT(message_of<InvalidArgument>(with({.cell_size = -1.0})), HasSubstr("cell_size is -1"));
   EXPECT_THAT(message_of<InvalidArgument>(with({.alpha = std::nan("")})), HasSubstr("alpha is nan"));
   EXPECT_THAT(message_of<ComputationError>(with({.cell_size = 1e-4})), HasSubstr("try cell size"));
+  EXPECT_THAT(message_of<InvalidArgument>(with({.max_nodes = 0})), HasSubstr("max_nodes is 0"));
   SurfaceMesh open = box;
   open.triangles.pop_back();
   EXPECT_THAT(message_of<ComputationError>([&] { tetrahedralise(open, {.alpha = 1e-5}, warnings); }),

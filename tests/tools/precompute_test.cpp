@@ -155,14 +155,47 @@ TEST_F(Precompute, EqualRunsGiveEqualBytes) {
   EXPECT_EQ(read_file(folder / "a.glb"), read_file(folder / "b.glb"));
 }
 
+/// How far the vertices of a surface that lie inside the tets are from moving as the linear field of the tet around
+/// them, relative to the largest shape; found by trying every tet. @param inside counts those vertices
+double worst_embedding(const ModalSurface& surface, const ModalVolume& volume, Index& inside) {
+  std::vector<Mat3> to_weights;
+  for (const Tet& t : volume.tets) {
+    Mat3 edges;
+    for (int a = 0; a < 3; ++a) edges.col(a) = volume.rest[t[a + 1]] - volume.rest[t[0]];
+    to_weights.push_back(edges.inverse());
+  }
+  double worst = 0.0, largest = 0.0;
+  for (Index v = 0; v < surface.vertices(); ++v)
+    for (std::size_t i = 0; i < volume.tets.size(); ++i) {
+      const Tet& t = volume.tets[i];
+      const Vec3 w = to_weights[i] * (surface.rest[v].cast<double>() - volume.rest[t[0]]);
+      if (w.minCoeff() < 0.0 || w.sum() > 1.0) continue;
+      ++inside;
+      for (Index mode = 0; mode < surface.basis.modes(); ++mode) {
+        Vec3 expected = (1.0 - w.sum()) * volume.basis.shape(t[0], mode).cast<double>();
+        for (int a = 0; a < 3; ++a) expected += w[a] * volume.basis.shape(t[a + 1], mode).cast<double>();
+        worst = std::max(worst, (surface.basis.shape(v, mode).cast<double>() - expected).norm());
+        largest = std::max(largest, expected.norm());
+      }
+      break;
+    }
+  return largest > 0.0 ? worst / largest : 1.0;
+}
+
 TEST_F(Precompute, SoupIsWrappedBakedAndMoved) {
   write_obj(folder / "soup.obj", shapes::soup());
-  const Json r = report({"soup.obj", "--material", "rubber", "--modes", "6", "--cell-size", "0.25", "--alpha", "0.1"});
+  const Json r =
+      report({"soup.obj", "--material", "rubber", "--modes", "6", "--cell-size", "0.25", "--alpha", "0.1", "--volume"});
   ASSERT_TRUE(r.is_object());
   EXPECT_TRUE(r["surface"]["wrapped"]);
   // Wrap and tets stay within about the wrap's offset and the cell's sagitta of the union of the two balls.
   EXPECT_NEAR(r["volume"].get<double>(), shapes::soup_volume(), 0.1 * shapes::soup_volume());
   EXPECT_EQ(r["zero_modes"], 6);
+  const auto soup = read_asset(folder / "asset.glb").bodies[0];
+  Index inside = 0;
+  constexpr double kSinglePrecision = 1e-5;  // positions and shapes are floats; a cell is some 100 times their spacing
+  EXPECT_LT(worst_embedding(soup->render(), *soup->data().volume_block, inside), kSinglePrecision);
+  EXPECT_GT(inside, soup->render().vertices() / 4);  // where the balls cross and where tets cut a bulge off
   write_file(folder / "scene.json",
              R"({"step": 0.01, "steps": 50, "gravity": [0, 0, 0], "assets": {"soup": "asset.glb"},
                  "bodies": [{"name": "soup", "asset": "soup", "angular_velocity": [1, 2, 3]}],
@@ -215,6 +248,21 @@ TEST_F(Precompute, EveryBrokenMeshGivesOneLineAndNoOutput) {
     fs::remove(folder / b.name);
     EXPECT_EQ(files(), 0u) << "something was written";
   }
+}
+
+TEST_F(Precompute, SurfacesThatBoundNothingAreRefusedInOneLine) {
+  write_file(folder / "triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write_file(folder / "tilted_quad.obj", "v 0 0 1\nv 3 1 2\nv 4 4 6\nv 1 3 5\nf 1 2 3 4\n");
+  write_file(folder / "both_sides.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n");
+  for (const char* name : {"triangle.obj", "tilted_quad.obj", "both_sides.obj"}) {
+    const ProgramResult r = run({name, "-o", "asset.glb", "--material", "steel"});
+    EXPECT_EQ(r.exit_code, 1) << name;
+    EXPECT_TRUE(is_one_line(r.err)) << r.err;
+    EXPECT_THAT(r.err, HasSubstr(name));
+    EXPECT_THAT(r.err, HasSubstr("flat"));
+    EXPECT_THAT(r.err, HasSubstr("expected a surface around a volume; try"));
+  }
+  EXPECT_EQ(files(), 3u);
 }
 
 TEST_F(Precompute, WhatIsNoMeshGivesOneLine) {

@@ -1,12 +1,14 @@
 // The three steps that need CGAL, one source file each, so that they compile side by side and no CGAL header spreads.
 #pragma once
 
+#include <functional>
 #include <span>
+#include <string>
 
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 
-namespace limber::cgal {
+namespace limber::internal {
 
 /// Pairs of triangles that cross or touch other than at the vertices and edges they share, and vertices at which the
 /// surface is not one fan. @pre every edge has two triangles that run through it in opposite directions
@@ -21,15 +23,21 @@ Crossings find_crossings(const SurfaceMesh& surface);
 SurfaceMesh wrap(const SurfaceMesh& soup, double alpha, double offset);
 
 struct BodyMeshing {
-  double cell_size = 0.0;         ///< bound on the circumradius of tets and of boundary triangles' surface balls
-  double facet_distance = 0.0;    ///< bound on the distance between a boundary triangle and the surface
+  std::function<double(const Vec3&)> cell_size;  ///< bound on the circumradius of tets and of boundary triangles'
+                                                 ///< surface balls there, m; Lipschitz
+  double facet_distance = 0.0;    ///< bound on the distance between a boundary triangle and the surface, in cells
   bool keep_sharp_edges = false;  ///< sharp edges of the surface become edges of the mesh
-  std::size_t max_nodes = 0;      ///< more are not made: an error
+  bool manifold = false;          ///< refines where the boundary touches itself; need not end at a knife edge
+  std::size_t max_nodes = 0;      ///< more are not made
 };
 
-/// Tets inside one body: nodes and tets only. @param boundary clean; its shells bound the body by the even-odd rule
-/// @param seeds points on the boundary, a few of each shell, where the refinement starts
-/// @throws ComputationError
-TetMesh mesh_body(const SurfaceMesh& boundary, std::span<const Vec3> seeds, const BodyMeshing& options);
+struct MeshedBody {
+  TetMesh mesh;         ///< nodes and tets only
+  std::string failure;  ///< what went wrong, empty if nothing did; the mesh is then worth nothing
+};
 
-}  // namespace limber::cgal
+/// Tets inside one body. @param boundary clean; its shells bound the body by the even-odd rule
+/// @param seeds points on the boundary, a few of each shell, where the refinement starts
+MeshedBody mesh_body(const SurfaceMesh& boundary, std::span<const Vec3> seeds, const BodyMeshing& options);
+
+}  // namespace limber::internal

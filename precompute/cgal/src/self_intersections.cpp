@@ -4,7 +4,7 @@
 
 #include "cgal_steps.h"
 
-namespace limber::cgal {
+namespace limber::internal {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -52,4 +52,4 @@ Crossings find_crossings(const SurfaceMesh& surface) {
   return crossings;
 }
 
-}  // namespace limber::cgal
+}  // namespace limber::internal

@@ -7,7 +7,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/mesh/winding_number.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 constexpr std::size_t kSeedsPerShell = 48;
@@ -111,4 +111,4 @@ Bodies split_into_bodies(const SurfaceMesh& surface) {
   return out;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

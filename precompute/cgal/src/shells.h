@@ -5,7 +5,7 @@
 
 #include "limber/mesh/surface_mesh.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// One body: an outer shell and the cavities directly inside it.
 struct Body {
@@ -25,4 +25,4 @@ struct Bodies {
 /// is a cavity, a shell inside a cavity is a body again, whichever way their triangles run.
 Bodies split_into_bodies(const SurfaceMesh& surface);
 
-}  // namespace limber
+}  // namespace limber::internal

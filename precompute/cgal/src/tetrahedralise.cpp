@@ -1,35 +1,32 @@
 #include "limber/precompute/tetrahedralise.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <sstream>
 
 #include "cgal_steps.h"
+#include "fill_body.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
-#include "shells.h"
 
 namespace limber {
 namespace {
+
+using internal::Bodies;
+using internal::Body;
+using internal::FilledBody;
+using internal::MeasuredBody;
 
 // Defaults and bounds; docs/tetrahedralisation.md has the measurements behind them.
 constexpr double kCellsPerDiagonal = 40.0;
 constexpr double kAlphasPerDiagonal = 50.0;
 constexpr double kOffsetPerAlpha = 1.0 / 30.0;
-constexpr double kFacetDistancePerCell = 0.1;
-constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many cells gets smaller ones
-constexpr double kTetsPerCubicCell = 6.0;   ///< tets in a volume of cell_size³
+constexpr double kTetsPerCubicCell = 6.0;  ///< tets in a volume of cell_size³
 constexpr double kMostTets = 20e6;
-/// Refinement that makes this many times the nodes expected is running away.
-constexpr double kNodesPerExpected = 20.0;
-constexpr double kWorstShape = 0.01;  ///< a mesh with a flatter tet (see worst_shape) is made again, finer
-constexpr double kFiner = 0.8;        ///< cells of the next try
-constexpr int kTries = 4;
-constexpr double kStrayPart = 0.01;  ///< of its body's volume: a smaller loose piece is dropped
-constexpr double kWorrisomeVolumeError = 0.1;
+constexpr double kFlatSurface = 1e-9;  ///< of its extent: a surface that is thinner bounds nothing
 
 std::string text(double value) {
   std::ostringstream s;
@@ -91,10 +88,28 @@ std::string what_is_not_clean(const SurfaceMesh& surface) {
   note(quality.misoriented_edges, "edges between triangles of opposite orientation");
   note(count_flat_triangles(surface), "flat triangles");
   if (!reasons.empty()) return reasons;
-  const cgal::Crossings crossings = cgal::find_crossings(surface);
+  const internal::Crossings crossings = internal::find_crossings(surface);
   note(crossings.pinched_vertices, "vertices where parts touch at a point");
   note(crossings.triangle_pairs, "pairs of crossing triangles");
   return reasons;
+}
+
+/// A surface in one plane bounds no volume, whatever its triangles are.
+void refuse_flat(const SurfaceMesh& surface) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& v : surface.vertices) middle += v / static_cast<double>(surface.vertices.size());
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3& v : surface.vertices) spread += (v - middle) * (v - middle).transpose();
+  const Mat3 axes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors();
+  double thickness = 0.0;
+  for (const Vec3& v : surface.vertices) thickness = std::max(thickness, std::abs(axes.col(0).dot(v - middle)));
+  if (surface.triangles.empty() || thickness <= kFlatSurface * bounding_box(surface).diagonal().norm())
+    throw InputError("tetrahedralise: the surface is flat: its " + std::to_string(surface.triangles.size()) +
+                     " triangles lie in one plane, expected a surface around a volume; try giving it a thickness");
+}
+
+void tell(const TetrahedralisationOptions& options, const std::string& stage) {
+  if (options.progress) options.progress(stage);
 }
 
 double area(const SurfaceMesh& surface) {
@@ -145,39 +160,13 @@ void refuse_huge_wrap(const SurfaceMesh& surface, double alpha) {
                            text(alpha * std::sqrt(expected / kMostTets) * 2.0));
 }
 
-double cell_size_of(const Body& body, double cell_size) {
-  return std::min(cell_size, body.diagonal / kLeastCellsPerBody);
-}
-
-void refuse_huge_mesh(const Bodies& bodies, double cell_size) {
+void refuse_huge_mesh(const std::vector<MeasuredBody>& bodies, double cell_size) {
   double expected = 0.0;
-  for (const Body& body : bodies.bodies)
-    expected += kTetsPerCubicCell * body.volume / std::pow(cell_size_of(body, cell_size), 3);
+  for (const MeasuredBody& b : bodies) expected += kTetsPerCubicCell * b.body->volume / std::pow(b.cell_size, 3);
   if (!(expected <= kMostTets))
     throw ComputationError("tetrahedralise: cell size " + text(cell_size) + " m would give about " + text(expected) +
                            " tetrahedra, expected at most " + text(kMostTets) + "; try cell size " +
                            text(cell_size * std::cbrt(expected / kMostTets) * 1.1));
-}
-
-/// Drops pieces that are no more than a splinter of the body: they hang on by a node or an edge, or not at all, and
-/// each would swing or fly as a body of its own.
-Index drop_stray_pieces(TetMesh& mesh, Index& pieces_left) {
-  const std::vector<Index> piece = face_connected_parts(mesh);
-  std::vector<double> volume(1 + *std::max_element(piece.begin(), piece.end()), 0.0);
-  double whole = 0.0;
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    const double v = signed_volume(mesh, static_cast<Index>(i));
-    volume[piece[i]] += v;
-    whole += v;
-  }
-  std::vector<Tet> kept;
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
-    if (volume[piece[i]] >= kStrayPart * whole) kept.push_back(mesh.tets[i]);
-  pieces_left = static_cast<Index>(
-      std::count_if(volume.begin(), volume.end(), [&](double v) { return v >= kStrayPart * whole; }));
-  const auto dropped = static_cast<Index>(mesh.tets.size() - kept.size());
-  mesh.tets = std::move(kept);
-  return dropped;
 }
 
 /// Adds the tets of one body, its nodes renumbered in order of appearance so that none is left over.
@@ -196,64 +185,44 @@ void append(const TetMesh& body, TetMesh& mesh) {
   }
 }
 
-/// More nodes than a body of this volume, boundary and detail can need.
-std::size_t most_nodes(const Body& body, double cell_size) {
-  const double inside = body.volume / std::pow(cell_size, 3),
-               on_boundary = area(body.boundary) / std::pow(cell_size, 2);
-  return static_cast<std::size_t>(kNodesPerExpected * (inside + on_boundary)) + 4 * body.boundary.vertices.size() +
-         1000;
-}
-
-/// Volume of the flattest tet over that of the regular tet with the same mean squared edge: 1 is best, 0 flat.
-double worst_shape(const TetMesh& mesh) {
-  double worst = 1.0;
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    double squared = 0.0;
-    for (int a = 0; a < 4; ++a)
-      for (int b = a + 1; b < 4; ++b)
-        squared += (mesh.nodes[mesh.tets[i][a]] - mesh.nodes[mesh.tets[i][b]]).squaredNorm();
-    const double regular = std::pow(squared / 6.0, 1.5) / (6.0 * std::numbers::sqrt2);
-    worst = std::min(worst, signed_volume(mesh, static_cast<Index>(i)) / regular);
-  }
-  return worst;
-}
-
-/// Tets of a body, none so flat that it spoils the stiffness. Where all nodes lie on sharp edges, as in a rod one cell
-/// thick, flat tets cannot be helped: smaller cells can, and the last resort is to let the edges go.
-TetMesh mesh_well(const Body& body, double cell_size, bool keep_sharp_edges) {
-  const auto attempt = [&](double size, bool edges) {
-    return cgal::mesh_body(body.boundary, body.seeds,
-                           {.cell_size = size,
-                            .facet_distance = kFacetDistancePerCell * size,
-                            .keep_sharp_edges = edges,
-                            .max_nodes = most_nodes(body, size)});
-  };
-  double size = cell_size;
-  for (int i = 0; i < kTries; ++i, size *= kFiner)
-    if (TetMesh mesh = attempt(size, keep_sharp_edges); worst_shape(mesh) >= kWorstShape) return mesh;
-  return attempt(cell_size, false);
-}
-
-/// Meshes one body and adds it to the whole.
-void add_body(const Body& body, double wanted_cell_size, bool keep_sharp_edges, const std::string& which, TetMesh& mesh,
+/// Fills one body and adds its tets to the whole.
+void add_body(const MeasuredBody& body, const std::string& which, bool keep_sharp_edges, Tetrahedralisation& result,
               Warnings& warnings) {
-  const double cell_size = cell_size_of(body, wanted_cell_size);
-  TetMesh tets = mesh_well(body, cell_size, keep_sharp_edges);
-  if (tets.tets.empty())
-    throw ComputationError("tetrahedralise: " + which + " (diagonal " + text(body.diagonal) +
-                           " m) gave no tetrahedron at "
-                           "cell size " +
-                           text(cell_size) + " m: it is too thin; try a smaller cell size");
-  Index pieces = 0;
-  const Index dropped = drop_stray_pieces(tets, pieces);
-  if (dropped > 0)
-    warnings.push_back("tetrahedralise: " + which + ": " + std::to_string(dropped) +
+  const FilledBody filled = internal::fill(body, result.smallest_cell, keep_sharp_edges);
+  result.tries += filled.tries;
+  result.sharp_edges_kept = result.sharp_edges_kept && filled.sharp_edges_kept;
+  const std::string sized = "tetrahedralise: " + which + " (diagonal " + text(body.body->diagonal) + " m, cells of " +
+                            text(body.cell_size) + " m, " + text(result.smallest_cell) + " m where it is thin): ";
+  if (filled.mesh.tets.empty())
+    throw ComputationError(sized + filled.fault + " in " + std::to_string(filled.tries) +
+                           " tries, expected a mesh; try a larger budget of nodes, or another cell size");
+  if (!filled.fault.empty())
+    warnings.push_back(sized + filled.fault + "; try a larger budget of nodes, or a smaller cell size");
+  if (filled.dropped_tets > 0)
+    warnings.push_back("tetrahedralise: " + which + ": " + std::to_string(filled.dropped_tets) +
                        " stray tetrahedra, joined to the rest by less than a face, have been dropped");
-  if (pieces > 1)
-    warnings.push_back("tetrahedralise: " + which + " came apart into " + std::to_string(pieces) +
-                       " pieces: parts of it are thinner than the cell size of " + text(cell_size) +
-                       " m; try a smaller one");
-  append(tets, mesh);
+  append(filled.mesh, result.mesh);
+}
+
+/// Fills all bodies, the cells as small as thin parts ask for and the budget of nodes allows.
+void fill_bodies(const Bodies& bodies, double cell_size, const TetrahedralisationOptions& options,
+                 Tetrahedralisation& result, Warnings& warnings) {
+  auto start = std::chrono::steady_clock::now();
+  tell(options, "measuring thickness");
+  std::vector<MeasuredBody> measured;
+  for (const Body& body : bodies.bodies) measured.push_back(internal::measure(body, cell_size));
+  refuse_huge_mesh(measured, cell_size);
+  result.smallest_cell = internal::smallest_affordable_cell(measured, options.max_nodes);
+  result.seconds_thickness = seconds_since(start);
+
+  start = std::chrono::steady_clock::now();
+  result.sharp_edges_kept = !result.wrapped;
+  for (std::size_t b = 0; b < measured.size(); ++b) {
+    tell(options, "meshing body " + std::to_string(b + 1) + " of " + std::to_string(measured.size()));
+    add_body(measured[b], "body " + std::to_string(b), !result.wrapped, result, warnings);
+    result.volume_before += bodies.bodies[b].volume;
+  }
+  result.seconds_mesh = seconds_since(start);
 }
 
 }  // namespace
@@ -263,6 +232,9 @@ void TetrahedralisationOptions::validate() const {
     if (!(value >= 0.0 && std::isfinite(value)))
       throw InvalidArgument(std::string("TetrahedralisationOptions: ") + name + " is " + text(value) +
                             " m, expected a finite length above 0, or 0 for the default");
+  if (max_nodes < 1)
+    throw InvalidArgument("TetrahedralisationOptions: max_nodes is " + std::to_string(max_nodes) +
+                          ", expected at least 1");
 }
 
 Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const TetrahedralisationOptions& options,
@@ -279,36 +251,28 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
 
   Tetrahedralisation result;
   input = welded(input);
+  refuse_flat(input);
+  tell(options, "checking the surface");
   result.why_wrapped = what_is_not_clean(input);
   result.wrapped = !result.why_wrapped.empty();
   if (result.wrapped) {
+    tell(options, "wrapping");
     refuse_huge_wrap(input, alpha);
     cap_holes(input);
     const auto start = std::chrono::steady_clock::now();
-    input = cgal::wrap(input, alpha, kOffsetPerAlpha * alpha);
+    input = internal::wrap(input, alpha, kOffsetPerAlpha * alpha);
     result.seconds_wrap = seconds_since(start);
   }
 
-  const Bodies bodies = split_into_bodies(input);
+  const Bodies bodies = internal::split_into_bodies(input);
   if (bodies.turned > 0)
     warnings.push_back("tetrahedralise: " + std::to_string(bodies.turned) +
                        " closed shells were inside out for where they lie and have been turned");
-  refuse_huge_mesh(bodies, cell_size);
-
-  const auto start = std::chrono::steady_clock::now();
-  for (std::size_t b = 0; b < bodies.bodies.size(); ++b) {
-    add_body(bodies.bodies[b], cell_size, !result.wrapped, "body " + std::to_string(b), result.mesh, warnings);
-    result.volume_before += bodies.bodies[b].volume;
-  }
-  result.seconds_mesh = seconds_since(start);
+  fill_bodies(bodies, cell_size, options, result, warnings);
 
   result.mesh.regions = {{"*", 0}};
   validate(result.mesh, "tetrahedralise", warnings);
   result.volume_after = volume_properties(result.mesh).volume;
-  if (std::abs(result.volume_after - result.volume_before) > kWorrisomeVolumeError * result.volume_before)
-    warnings.push_back("tetrahedralise: the surface encloses " + text(result.volume_before) + " m^3, the tetrahedra " +
-                       text(result.volume_after) +
-                       " m^3: parts are thinner than the cell size; try a smaller one than " + text(cell_size) + " m");
   return result;
 }
 

@@ -6,7 +6,7 @@
 #include "cgal_steps.h"
 #include "limber/core/error.h"
 
-namespace limber::cgal {
+namespace limber::internal {
 
 SurfaceMesh wrap(const SurfaceMesh& soup, double alpha, double offset) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -39,4 +39,4 @@ SurfaceMesh wrap(const SurfaceMesh& soup, double alpha, double offset) {
   return out;
 }
 
-}  // namespace limber::cgal
+}  // namespace limber::internal

@@ -9,6 +9,9 @@
 /// inside it, cavities too, is filled, and so are holes, whatever their size.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 
@@ -18,17 +21,25 @@ struct TetrahedralisationOptions {
   /// Largest tet circumradius, m, which the last step (exudation of slivers) may exceed by a few per cent; 0: 1/40 of
   /// the bounding box's diagonal. A body less than eight cells across gets smaller ones.
   double cell_size = 0.0;
-  double alpha = 0.0;     ///< narrowest gap that the wrap enters, m; 0: 1/50 of the diagonal. Clean surfaces ignore it.
+  double alpha = 0.0;  ///< narrowest gap that the wrap enters, m; 0: 1/50 of the diagonal. Clean surfaces ignore it.
+  /// Nodes that may be spent on parts and gaps thinner than the cell size, whose cells are made as small as they are
+  /// thin; a mesh of cells of one size is made whatever it takes. ≥ 1
+  int max_nodes = 40'000;
+  /// Told each stage as it begins, in the thread that calls.
+  std::function<void(const std::string&)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
 struct Tetrahedralisation {
-  TetMesh mesh;                ///< one region named "*"; every node used
-  bool wrapped = false;        ///< the surface was not clean, so a wrap of it was meshed
-  std::string why_wrapped;     ///< "12 boundary edges, 3 pairs of crossing triangles", empty if not wrapped
-  double volume_before = 0.0;  ///< enclosed by the surface as given, m³ (for a soup: of its wrap)
-  double volume_after = 0.0;   ///< of the tets, m³
-  double seconds_wrap = 0.0, seconds_mesh = 0.0;
+  TetMesh mesh;                   ///< one region named "*"; every node used
+  bool wrapped = false;           ///< the surface was not clean, so a wrap of it was meshed
+  std::string why_wrapped;        ///< "12 boundary edges, 3 pairs of crossing triangles", empty if not wrapped
+  double volume_before = 0.0;     ///< enclosed by the surface as given, m³ (for a soup: of its wrap)
+  double volume_after = 0.0;      ///< of the tets, m³
+  double smallest_cell = 0.0;     ///< bound on cells where parts are thin or close, m; may exceed the cell size
+  bool sharp_edges_kept = false;  ///< edges sharper than 60° are edges of the mesh
+  int tries = 0;                  ///< meshes made, of all bodies
+  double seconds_wrap = 0.0, seconds_thickness = 0.0, seconds_mesh = 0.0;
 };
 
 /// Deterministic: fixed seeds, one thread, no time limits.

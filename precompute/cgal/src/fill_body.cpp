@@ -1,0 +1,176 @@
+#include "fill_body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "cgal_steps.h"
+
+namespace limber::internal {
+namespace {
+
+// docs/tetrahedralisation.md has the measurements behind these.
+constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many cells gets smaller ones
+constexpr double kSamplesPerCell = 2.0;     ///< along a side
+constexpr double kFacetDistancePerCell = 0.1;
+/// Refinement that makes this many times the nodes expected is running away.
+constexpr double kRunaway = 2.5;
+constexpr std::size_t kFewNodes = 2000;  ///< are never too many
+constexpr double kWorstShape = 0.01;     ///< flatter tets (see worst_shape) spoil the stiffness
+constexpr double kFiner = 0.8;           ///< cells of the next try
+constexpr int kTries = 4;                ///< with smaller and smaller cells
+constexpr int kFailures = 2;             ///< tries without a mesh, after which smaller cells are no hope
+constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
+constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
+constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
+
+/// How good a mesh is, best first.
+enum class Grade { kGood, kPinched, kInaccurate, kFlat, kNone };
+
+struct Judged {
+  FilledBody filled;
+  double cell_size = 0.0;
+  Grade grade = Grade::kNone;
+};
+
+/// Volume of the flattest tet over that of the regular tet with the same mean squared edge: 1 is best, 0 flat.
+double worst_shape(const TetMesh& mesh) {
+  double worst = 1.0;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    double squared = 0.0;
+    for (int a = 0; a < 4; ++a)
+      for (int b = a + 1; b < 4; ++b)
+        squared += (mesh.nodes[mesh.tets[i][a]] - mesh.nodes[mesh.tets[i][b]]).squaredNorm();
+    const double regular = std::pow(squared / 6.0, 1.5) / (6.0 * std::numbers::sqrt2);
+    worst = std::min(worst, signed_volume(mesh, static_cast<Index>(i)) / regular);
+  }
+  return worst;
+}
+
+double volume(const TetMesh& mesh) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) sum += signed_volume(mesh, static_cast<Index>(i));
+  return sum;
+}
+
+/// Drops pieces that are no more than a splinter of the body: they hang on by a node or an edge, or not at all, and
+/// each would swing or fly as a body of its own. @return pieces that are left
+Index drop_stray_pieces(TetMesh& mesh, Index& dropped) {
+  const std::vector<Index> piece = face_connected_parts(mesh);
+  std::vector<double> of_piece(1 + *std::max_element(piece.begin(), piece.end()), 0.0);
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) of_piece[piece[i]] += signed_volume(mesh, static_cast<Index>(i));
+  const double stray = kStrayPart * volume(mesh);
+  std::vector<Tet> kept;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
+    if (of_piece[piece[i]] >= stray) kept.push_back(mesh.tets[i]);
+  dropped = static_cast<Index>(mesh.tets.size() - kept.size());
+  mesh.tets = std::move(kept);
+  return static_cast<Index>(std::count_if(of_piece.begin(), of_piece.end(), [&](double v) { return v >= stray; }));
+}
+
+std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
+
+Judged judge(MeshedBody meshed, const Body& body) {
+  Judged j{.filled = {.mesh = std::move(meshed.mesh), .fault = std::move(meshed.failure)}};
+  FilledBody& f = j.filled;
+  if (!f.fault.empty()) return j;
+  if (f.mesh.tets.empty()) {
+    f.fault = "no tetrahedron";
+    return j;
+  }
+  const Index pieces = drop_stray_pieces(f.mesh, f.dropped_tets);
+  const double error = std::abs(volume(f.mesh) / body.volume - 1.0);
+  if (worst_shape(f.mesh) < kWorstShape) {
+    j.grade = Grade::kFlat;
+    f.fault = "flat tetrahedra";
+  } else if (pieces > 1) {
+    j.grade = Grade::kInaccurate;
+    f.fault = "it came apart into " + std::to_string(pieces) + " pieces";
+  } else if (error > kWorstVolume) {
+    j.grade = Grade::kInaccurate;
+    f.fault = "its volume is " + percent(error) + " off";
+  } else if (!surface_quality(boundary_surface(f.mesh).surface).closed_manifold()) {
+    j.grade = Grade::kPinched;
+    f.fault = "its boundary touches itself along edges";
+  } else {
+    j.grade = Grade::kGood;
+  }
+  return j;
+}
+
+struct Attempt {
+  double cell_size = 0.0;
+  bool keep_sharp_edges = false, manifold = false;
+};
+
+Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
+  const SizeField size(body.samples, how.cell_size, smallest_cell);
+  const double expected = expected_nodes(body.samples, body.body->volume, how.cell_size, smallest_cell);
+  Judged j = judge(mesh_body(body.body->boundary, body.body->seeds,
+                             {.cell_size = size,
+                              .facet_distance = kFacetDistancePerCell,
+                              .keep_sharp_edges = how.keep_sharp_edges,
+                              .manifold = how.manifold,
+                              .max_nodes = static_cast<std::size_t>(kRunaway * expected) + kFewNodes}),
+                   *body.body);
+  j.filled.sharp_edges_kept = how.keep_sharp_edges;
+  j.cell_size = how.cell_size;
+  return j;
+}
+
+}  // namespace
+
+double MeasuredBody::expected_nodes(double smallest) const {
+  return internal::expected_nodes(samples, body->volume, cell_size, smallest);
+}
+
+MeasuredBody measure(const Body& body, double cell_size) {
+  const double size = std::min(cell_size, body.diagonal / kLeastCellsPerBody);
+  return {&body, size, sample_thickness(body.boundary, size / kSamplesPerCell, size)};
+}
+
+double smallest_affordable_cell(const std::vector<MeasuredBody>& bodies, double most_nodes) {
+  const auto fits = [&](double smallest) {
+    double expected = 0.0;
+    for (const MeasuredBody& b : bodies) expected += b.expected_nodes(smallest);
+    return expected <= most_nodes;
+  };
+  double high = 0.0;
+  for (const MeasuredBody& b : bodies) high = std::max(high, b.cell_size);
+  double low = kLeastSize * high;
+  if (fits(low)) return low;
+  while (high > 1.01 * low) {
+    const double middle = std::sqrt(low * high);
+    (fits(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_edges) {
+  Judged best;
+  int tries = 0;
+  const auto attempt = [&](const Attempt& how) {
+    Judged j = make(body, smallest_cell, how);
+    ++tries;
+    const Grade grade = j.grade;
+    if (tries == 1 || grade < best.grade) best = std::move(j);
+    return grade;
+  };
+  Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
+  int failures = 0;
+  for (int i = 0; i < kTries && failures < kFailures && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
+    bool failed = attempt(how) == Grade::kNone;
+    if (failed && how.keep_sharp_edges) {
+      how.keep_sharp_edges = false;
+      failed = attempt(how) == Grade::kNone;
+    }
+    failures += failed ? 1 : 0;
+  }
+  if (best.grade > Grade::kPinched && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
+  if (best.grade == Grade::kPinched)
+    attempt({.cell_size = best.cell_size, .keep_sharp_edges = best.filled.sharp_edges_kept, .manifold = true});
+  best.filled.tries = tries;
+  return best.filled;
+}
+
+}  // namespace limber::internal
