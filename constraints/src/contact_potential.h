@@ -42,7 +42,7 @@ struct ContactPotential {
 
  private:
   Value cone(const Vec3& x) const {
-    const double mu = bound, along = x[0], across = std::hypot(x[1], x[2]);
+    const double mu = bound, along = x[0], across = std::sqrt(x[1] * x[1] + x[2] * x[2]);
     if (across <= mu * along) return inside(x, 3);
     if (mu * across <= -along) return {};
     const double scale = 1.0 / (1.0 + mu * mu), pressed = scale * (along + mu * across);

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "island_step.h"
 
@@ -28,10 +30,15 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
   start_contacts(options);
   internal::ConvexContactReport done = contacts.solve(momentum, kConvexOptions);
   report.newton_steps = done.iterations;
+  int stiffened = 0;
   while (done.status == SolveStatus::kSolved && stiffen_pressed()) {
     done = contacts.solve_on(momentum, kConvexOptions);
     report.newton_steps += done.iterations;
+    ++stiffened;
   }
+  if (std::getenv("DBG"))
+    std::fprintf(stderr, "newton %d status %d residual %.2e stiffened %d\n", report.newton_steps,
+                 static_cast<int>(done.status), done.residual, stiffened);
   report.iterations = 1;
   report.change = done.residual / kConvexOptions.tolerance;
   for (std::size_t u = 0; u < contacts.units(); ++u) {
@@ -46,6 +53,9 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
     // The spring's own part of the slip comes back; the rest is gone.
     if (count == 3 && impulse[0] > 0.0) slip[first] = (contacts.end(u) + c * impulse).tail<2>().norm();
   }
+  std::erase_if(flexibility, [](const ConstraintRows::Flexibility& g) { return g.body < 0; });
+  for (std::size_t i = 0; i < give.size(); ++i)
+    flexibility.push_back({static_cast<Index>(i), static_cast<Index>(i), give[i], -1});
   if (done.status == SolveStatus::kSolved)
     predict(options);
   else

@@ -145,6 +145,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   constexpr int kSlowings = 3;
   slowed = 0.0, recovers = true;
   IslandReport done = foresee(part, options, whole_step);
+  if (convex) return done;  // its energy cannot rise but by recovery
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
@@ -209,8 +210,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
-  sparse = is_large();
-  convex = sparse && std::ranges::all_of(laws, &RowLaw::contact);
+  convex = is_pile();
+  sparse = convex || is_large();
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);

@@ -5,6 +5,12 @@
 
 namespace limber {
 
+/// Whether nothing but contacts acts, by the complementary rule with cones, and no impact is held.
+bool IslandSolver::Impl::is_pile() const {
+  return rule.method == ContactMethod::kComplementary && rule.friction == FrictionModel::kCone && !laws.empty() &&
+         std::ranges::all_of(laws, [](const RowLaw& law) { return law.contact && !law.strikes; });
+}
+
 /// Whether blocks are worth it: an elimination in them by bodies, whose contacts may yield to each other, against one
 /// by rows. Linear programs need A in full, and impacts that hold their forces the answer to gravity by itself.
 bool IslandSolver::Impl::is_large() {

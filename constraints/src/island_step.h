@@ -116,6 +116,7 @@ struct IslandSolver::Impl {
   void hold_contact(StepTime when, Index normal);
   void hold_vector(StepTime when, Index first);
   void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
+  bool is_pile() const;
   bool is_large();
   bool blocks_pay();
   double work_in_blocks();

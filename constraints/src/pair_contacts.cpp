@@ -205,8 +205,7 @@ double PairContacts::time_to_rebound() const {
 }
 
 void PairContacts::add_give(Index first, ConstraintRows& rows) const {
-  if (give_ == 0.0) return;
-  for (Index row = first; row < rows.size(); ++row) rows.add_give(row, give_);
+  for (Index row = first; give_ > 0.0 && row < rows.size(); ++row) rows.add_give(row, give_);
   double stored = 0.0;
   for (const PreparedContact& contact : contacts_) stored += 0.5 * contact.give * contact.last_force.squaredNorm();
   rows.add_stored_energy(stored);

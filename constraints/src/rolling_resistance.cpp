@@ -28,6 +28,7 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
   next_give_ = 0.0;
   const double regularisation = kRegularisation * step * step * (turning(states, a_) + turning(states, b_));
   const double radius = step * largest_;
+  rows.add_stored_energy(0.5 * give_ * moment_.squaredNorm());
   for (int i = 0; i < 3; ++i) {
     const Vec3 axis = Vec3::Unit(i);
     const auto side = [&](Index body, double sign) {
