@@ -79,16 +79,25 @@ function(limber_add_program name)
   endif()
 endfunction()
 
-# GoogleTest and Eigen are parsed once, with the first program, for all test programs.
-function(limber_precompile_for_tests target)
-  get_property(first GLOBAL PROPERTY LIMBER_PRECOMPILED_FOR_TESTS)
-  if(first)
-    target_precompile_headers(${target} REUSE_FROM ${first})
-  else()
-    target_precompile_headers(${target} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <string> <vector> <span>)
-    set_property(GLOBAL PROPERTY LIMBER_PRECOMPILED_FOR_TESTS ${target})
+# limber_add_precompiled(name HEADERS <...> LINK ... [OPTIONS ...]): large headers that many programs include, parsed once. A
+# program takes them by target_precompile_headers(program REUSE_FROM name); its own compile options must be the same.
+function(limber_add_precompiled name)
+  cmake_parse_arguments(arg "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "limber_add_precompiled(${name}): unknown argument(s) ${arg_UNPARSED_ARGUMENTS}")
   endif()
+  # A program of its own, as it has the flags of programs, and no definitions but those of the headers' libraries.
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "int main() { return 0; }\n")
+  add_executable(${name} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  target_link_libraries(${name} PRIVATE ${arg_LINK})
+  limber_compile_options(${name})
+  target_compile_options(${name} PRIVATE ${arg_OPTIONS})
+  limber_sanitize(${name})
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
 endfunction()
+
+# Tests do little themselves: what they call is in the libraries, at -O3. Optimising them takes two fifths of a build.
+set(LIMBER_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # limber_add_tests(module SOURCES ... LINK ... [TIMEOUT seconds]): one GoogleTest program per module, one CTest entry per test;
 # under sanitizers one per program, as an instrumented program takes longer to start than most tests to run.
@@ -113,10 +122,9 @@ function(limber_add_tests module)
     LIMBER_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared" LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     LIMBER_BIN_DIR="${PROJECT_BINARY_DIR}/bin")
   limber_compile_options(test_${module})
-  # Tests do little themselves: what they call is in the libraries, at -O3. Optimising them takes two fifths of a build.
-  target_compile_options(test_${module} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_compile_options(test_${module} PRIVATE ${LIMBER_TEST_OPTIONS})
   limber_sanitize(test_${module})
-  limber_precompile_for_tests(test_${module})
+  target_precompile_headers(test_${module} REUSE_FROM limber_test_headers)
   if(LIMBER_SANITIZE)
     add_test(NAME ${module} COMMAND test_${module})
     set_tests_properties(${module} PROPERTIES TIMEOUT 900 ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
