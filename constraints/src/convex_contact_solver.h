@@ -60,13 +60,6 @@ class ConvexContactSolver {
   const Vec3& impulse(std::size_t unit) const { return units_[unit].impulse; }
   /// u_c + J_c y, after solve().
   const Vec3& end(std::size_t unit) const { return units_[unit].end; }
-  /// J Jᵀ h of impulses h that are held: h(unit) → Vec3. Read by held() until solve().
-  template <class Held>
-  void add_held(Held&& h) {
-    std::fill_n(d_.data(), size_, 0.0);
-    for (std::size_t u = 0; u < units_.size(); ++u) add_transposed(units_[u], h(u), d_.data());
-  }
-  Vec3 held(std::size_t unit) const { return seen(units_[unit], d_.data()); }
   ContactPotential& potential(std::size_t unit) { return units_[unit].potential; }
   std::size_t units() const { return units_.size(); }
 

@@ -23,7 +23,7 @@ internal::ContactPotential potential_of(const RowLaw& law) {
 SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span<Constraint* const> constraints,
                                              const IslandOptions& options, IslandReport& report) {
   bodies.write_position_metric(step, theta, metric);
-  predict(options);  // under what goes on from the last step alone
+  predict(options);  // without contacts
   const double momentum = find_displacement();
   place_contacts();
   fill_contacts();
@@ -47,7 +47,7 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
     const Vec3& impulse = contacts.impulse(u);
     const double c = contacts.potential(u).compliance;
     for (std::size_t r = 0; r < count; ++r) {
-      f[first + r] = impulse[static_cast<int>(r)] - step * reaction[first + r];
+      f[first + r] = impulse[static_cast<int>(r)];
       give[first + r] = c * step;
     }
     // The spring's own part of the slip comes back; the rest is gone.
@@ -135,24 +135,18 @@ void IslandSolver::Impl::fill_contacts() {
   }
 }
 
-/// u⁰: where the free motion takes each contact, less what it asks for and what goes on; compliances; last impulses.
+/// u⁰: where the free motion takes each contact, less what it asks for; compliances; last impulses.
 void IslandSolver::Impl::start_contacts(const IslandOptions&) {
   give.assign(f.size(), 0.0), slip.assign(f.size(), 0.0);
   for (const ConstraintRows::Flexibility& g : flexibility)
     if (g.body < 0) give[static_cast<std::size_t>(g.i)] = g.value;
   std::size_t u = 0;
-  contacts.add_held([&](std::size_t unit) {
-    const std::size_t first = unit_rows[unit];
-    Vec3 held = Vec3::Zero();
-    for (int r = 0; r < contact_rows(laws[first]); ++r) held[r] = step * reaction[first + static_cast<std::size_t>(r)];
-    return held;
-  });
   for (const std::size_t first : unit_rows) {
     const RowLaw& law = laws[first];
     const auto count = static_cast<std::size_t>(contact_rows(law));
     internal::ContactPotential& potential = contacts.potential(u);
     potential.compliance = std::max(give[first], law.regularisation) / step;
-    Vec3 start = -contacts.held(u), impulse = Vec3::Zero();
+    Vec3 start = Vec3::Zero(), impulse = Vec3::Zero();
     for (std::size_t r = 0; r < count; ++r) {
       const auto at = static_cast<int>(r);
       start[at] += laws[first + r].start_gap - laws[first + r].offset + moved(first + r);
@@ -196,11 +190,7 @@ bool IslandSolver::Impl::stiffen_pressed() {
 
 /// The motion found in place of that under the impulses found, which are not yet in balance with it.
 void IslandSolver::Impl::take_motion(const IslandOptions& options) {
-  std::vector<double>& held = held_impulse;
-  held.resize(f.size());
-  for (std::size_t i = 0; i < f.size(); ++i) held[i] = -step * reaction[i];
-  sum_loads(held, theta, 1.0);
-  add_loads(reaction, 0.5 * options.step, options.step);
+  sum_loads(f, 0.0, 0.0);
   for (Index local = 0; local < bodies.count(); ++local) {
     const BodyResponse& r = bodies.response(local);
     const std::span<const double> y = contacts.motion(nodes[static_cast<std::size_t>(local)]);
@@ -213,10 +203,7 @@ void IslandSolver::Impl::take_motion(const IslandOptions& options) {
     for (int i = 0; i < r.modes; ++i, ++k)
       if (weight[k] > 0.0) modal[i] += y[k] / weight[k];
   }
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const ConstrainedBody& body = bodies.body(local);
-    body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)], bodies.modal_step(local));
-  }
+  predict_under_loads(options);
 }
 
 }  // namespace limber

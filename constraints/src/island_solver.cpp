@@ -133,10 +133,10 @@ IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& 
   energy.begin(bodies, options.gravity);
   program_report = {};
   if (holds_contact_forces()) solve_touch(options, done.programs);
-  find_reaction(StepTime::kStart, options, reaction);
+  if (!convex) find_reaction(StepTime::kStart, options, reaction);
   done.status = iterate(states, part.constraints, options, done);
   done.newton_steps = bounded_rows.newton_steps();
-  answer_at_end(states, part.constraints, options);
+  if (!convex) answer_at_end(states, part.constraints, options);
   return done;
 }
 
@@ -238,9 +238,25 @@ void IslandSolver::Impl::predict(const IslandOptions& options) {
     loads[i].impulse -= slowed * start_momenta[i].linear;
     loads[i].moment -= slowed * start_momenta[i].angular;
   }
+  predict_under_loads(options);
+}
+
+/// Where contacts alone act gravity and held forces come to the frames at the step's start, as what presses does: what
+/// rests has no velocity then, and the work of all of them is that over one displacement.
+void IslandSolver::Impl::predict_under_loads(const IslandOptions& options) {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
-    body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)], bodies.modal_step(local));
+    ConstraintLoad& load = loads[static_cast<std::size_t>(local)];
+    Vec3 gravity = options.gravity;
+    if (convex) {
+      const FrameConstants& c = body.group->frame_constants();
+      const Vec3 early = options.step * c.mass * gravity,
+                 arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+      load.impulse += early + options.step * body.group->held_force(body.slot);
+      load.moment += arm.cross(early);
+      gravity = -body.group->held_force(body.slot) / c.mass;
+    }
+    body.group->predict(body.slot, gravity, load, bodies.modal_step(local));
   }
 }
 

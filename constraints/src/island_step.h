@@ -199,6 +199,7 @@ struct IslandSolver::Impl {
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);
+  void predict_under_loads(const IslandOptions& options);
   void sum_loads(std::span<const double> values, double frame_scale, double modal_scale);
   void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
   double largest_recovery_work(double distance, const IslandOptions& options) const;

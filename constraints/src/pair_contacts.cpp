@@ -79,6 +79,7 @@ double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motio
 }
 
 void PairContacts::yielded(std::span<const double> compliance, std::span<const double> slip) {
+  at_once_ = true;
   std::size_t row = 0;
   for (PreparedContact& contact : contacts_) {
     contact.next_give = compliance[row], contact.next_slip = slip[row];
@@ -94,7 +95,8 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
     const Vec3 before = contact.last_force;
     contact.last_force = impulse / step_;
-    contact.held_force = lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force;
+    contact.held_force = at_once_ ? Vec3(Vec3::Zero())
+                                  : Vec3(lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force);
     contact.give = contact.next_give;
     contact.slip = contact.next_slip;
     contact.impulse += impulse;
@@ -110,7 +112,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
 void PairContacts::begin(const BodyStates& states) {
   for (PreparedContact& contact : contacts_)
     contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
-  strikes_ = strikes(states);
+  strikes_ = strikes(states), at_once_ = false;
   for (std::size_t side = 0; side < 2; ++side)
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
   overlap_that_stays_ = 0.0;
