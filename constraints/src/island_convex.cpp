@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "island_step.h"
 
@@ -30,15 +28,10 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
   start_contacts(options);
   internal::ConvexContactReport done = contacts.solve(momentum, kConvexOptions);
   report.newton_steps = done.iterations;
-  int stiffened = 0;
   while (done.status == SolveStatus::kSolved && stiffen_pressed()) {
     done = contacts.solve_on(momentum, kConvexOptions);
     report.newton_steps += done.iterations;
-    ++stiffened;
   }
-  if (std::getenv("DBG"))
-    std::fprintf(stderr, "newton %d status %d residual %.2e stiffened %d\n", report.newton_steps,
-                 static_cast<int>(done.status), done.residual, stiffened);
   report.iterations = 1;
   report.change = done.residual / kConvexOptions.tolerance;
   for (std::size_t u = 0; u < contacts.units(); ++u) {
@@ -85,14 +78,12 @@ double IslandSolver::Impl::find_displacement() {
   return std::sqrt(sum);
 }
 
-/// Each contact a unit of its rows; a body's further degrees of freedom are those of its residual compliance.
+/// Each contact a unit of its rows.
 void IslandSolver::Impl::place_contacts() {
-  place.resize(f.size());
-  for (std::size_t i = 0; i < place.size(); ++i) place[i] = static_cast<Index>(i);
-  residual.set(bodies, flexibility, place, f.size(), step);
   contacts.begin_structure();
   nodes.clear(), unit_rows.clear();
-  for (Index local = 0; local < bodies.count(); ++local) nodes.push_back(contacts.add_node(node_width(local, false)));
+  for (Index local = 0; local < bodies.count(); ++local)
+    nodes.push_back(contacts.add_node(static_cast<std::size_t>(bodies.response(local).size())));
   for (std::size_t i = 0, count = 1; i < f.size(); i += count) {
     count = static_cast<std::size_t>(contact_rows(laws[i]));
     contacts.add_unit(count, potential_of(laws[i]));
@@ -107,7 +98,7 @@ void IslandSolver::Impl::place_contacts() {
   contacts.end_structure();
 }
 
-/// J D^½, then the columns of what bodies yield beyond their modes.
+/// J D^½
 void IslandSolver::Impl::fill_contacts() {
   weighted.resize(metric.size());
   for (std::size_t i = 0; i < metric.size(); ++i) weighted[i] = std::sqrt(metric[i]);
@@ -128,7 +119,6 @@ void IslandSolver::Impl::fill_contacts() {
         bodies.response(local).add_row(side.linear, side.angular, rows.modal(side), one_row.data());
         const double* weight = weighted.data() + bodies.first(local);
         for (std::size_t k = 0; k < one_row.size(); ++k) to[k] += one_row[k] * weight[k];
-        std::ranges::copy(residual.row(local, row), to + one_row.size());
       }
     }
     next_side += sides;

@@ -145,11 +145,10 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   constexpr int kSlowings = 3;
   slowed = 0.0, recovers = true;
   IslandReport done = foresee(part, options, whole_step);
-  if (convex) return done;  // its energy cannot rise but by recovery
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0) || (convex && yield(BodyStates(part.table), part.constraints, options, done))) return done;
+    if (!(left > 0.0) || convex) return done;  // springs and recovery alone are left, and y has gained nothing
     if (recovers && !flexibility.empty() && has_recovery()) {
       recovers = false, slowing = -1;
       done = foresee(part, options, whole_step);
@@ -159,7 +158,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
-  if (!convex && done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
+  if (done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
     return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
@@ -210,8 +209,8 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
-  convex = is_pile();
-  sparse = convex || is_large();
+  sparse = is_large();
+  convex = sparse && is_pile();
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);

@@ -5,10 +5,10 @@
 
 namespace limber {
 
-/// Whether nothing but contacts acts, by the complementary rule with cones, and no impact is held.
+/// Whether nothing but contacts acts, each of which may yield by itself, and no body yields to them all.
 bool IslandSolver::Impl::is_pile() const {
-  return rule.method == ContactMethod::kComplementary && rule.friction == FrictionModel::kCone && !laws.empty() &&
-         std::ranges::all_of(laws, [](const RowLaw& law) { return law.contact && !law.strikes; });
+  return std::ranges::all_of(laws, &RowLaw::contact) &&
+         std::ranges::all_of(flexibility, [](const ConstraintRows::Flexibility& g) { return g.body < 0; });
 }
 
 /// Whether blocks are worth it: an elimination in them by bodies, whose contacts may yield to each other, against one
