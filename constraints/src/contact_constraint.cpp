@@ -78,8 +78,11 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
   contact.start_position = point.position + origin;
+  contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
+  if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = find(point.id))
-    contact.last_force = known->force, contact.held_force = known->held, contact.give = known->give;
+    contact.last_force = known->force, contact.held_force = known->held, contact.give = known->give,
+    contact.slip = known->slip;
   contacts.push_back(contact);
 }
 
@@ -130,11 +133,11 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
                  std::max(0.0, contact.axes.col(0).dot(contact.last_force));
   if (largest == 0.0) return;
   const Index a = pair.front().a.body, b = pair.front().b.body;
-  const auto known = std::ranges::lower_bound(rolling_memory, RollingMemory{a, b, Vec3::Zero()}, by_pair);
+  const auto known = std::ranges::lower_bound(rolling_memory, RollingMemory{.a = a, .b = b}, by_pair);
   const bool knows = known != rolling_memory.end() && known->a == a && known->b == b;
   if (rolling_used == rolling.size()) rolling.push_back(std::make_unique<RollingResistance>());
   RollingResistance& resistance = *rolling[rolling_used++];
-  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()));
+  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()), knows ? known->give : 0.0);
   constraints.push_back(&resistance);
 }
 
@@ -204,7 +207,8 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
                         .force = contact.last_force,
                         .held = contact.held_force,
                         .give = contact.give,
-                        .yielding = flexes(contact.a) ? contact.a.body : contact.b.body});
+                        .slip = contact.slip,
+                        .yielding = contact.yielding});
   for (const ContactMemory& last : last_memory)
     if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
@@ -218,7 +222,7 @@ void ContactSet::Impl::remember_rolling(std::span<const char> asleep) {
   std::erase_if(rolling_memory, [&](const RollingMemory& m) { return !rests(asleep, m.a, m.b); });
   for (std::size_t i = 0; i < rolling_used; ++i) {
     const auto [a, b] = rolling[i]->bodies();
-    rolling_memory.push_back({a, b, rolling[i]->moment()});
+    rolling_memory.push_back({a, b, rolling[i]->moment(), rolling[i]->give()});
   }
   std::ranges::sort(rolling_memory, by_pair);
 }

@@ -11,10 +11,6 @@ Eigen::Map<const Eigen::VectorXd> as_vector(std::span<const double> v) {
   return {v.data(), static_cast<Eigen::Index>(v.size())};
 }
 
-// What forces of large islands of contacts may be off, in units of their rows' tolerance: 1e-7 of the distances at hand
-// in a step. Of a box of 0.3 m that is less than a thousandth of what it falls by in a step.
-constexpr double kToleranceOfLargeIslands = 100.0;
-
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 }  // namespace
@@ -22,6 +18,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Constraint* const> constraints,
                                         const IslandOptions& options, IslandReport& report) {
   step = options.step;
+  if (convex) return solve_convex(states, constraints, options, report);
   bodies.write_position_metric(step, theta, metric);
   choose_rows();
   sort_rows();
@@ -32,9 +29,8 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   constexpr double kFirstSlack = 1e6, kSlackOfChange = 1e-3;
   bounded_rows.begin(sparse || f.size() > kFewRows ? kNewtonStepsOfLarge : kNewtonSteps);
   factor();
-  if (splits || waiting > 0) begin_with_last_forces();
+  if (waiting > 0) begin_with_last_forces();
   report.iterations = 1;
-  if (splits) return iterate_contacts(states, constraints, options, report);
   secant.begin(f.size());
   slack = sparse ? kFirstSlack : 1.0;
   int wakings = 0;
@@ -54,14 +50,9 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
       return status;
     }
     const bool settled = status != SolveStatus::kIterationLimit;
-    if (!settled && can_split && bounded_rows.tired()) {
-      std::copy(next_f.begin(), next_f.end(), f.begin());
-      return iterate_contacts(states, constraints, options, report);
-    }
     // Cones that do not come together give other impulses every time.
     const int unsettled = sparse ? kIterationsUnsettledOfLarge : kIterationsUnsettled;
-    const int most =
-        wakings + (settled || can_split ? options.max_iterations : std::min(unsettled, options.max_iterations));
+    const int most = wakings + (settled ? options.max_iterations : std::min(unsettled, options.max_iterations));
     if (slack > 1.0 && report.iterations <= most) {  // steps of other exactness do not compare
       slack = std::max(1.0, std::min(kSlackOfChange * report.change, 0.1 * slack));
       std::copy(next_f.begin(), next_f.end(), f.begin());
@@ -93,64 +84,10 @@ void IslandSolver::Impl::share_anew(const BodyStates& states, std::span<Constrai
 
 /// What the bodies come through under the forces of the last step tells which contacts need not wait.
 void IslandSolver::Impl::begin_with_last_forces() {
-  for (std::size_t i = 0; i < (splits ? bounded.size() : 3 * cones); ++i) {
+  for (std::size_t i = 0; i < 3 * cones; ++i) {
     const auto at = static_cast<std::size_t>(bounded[i]);
     f[at] = step * laws[at].last_force - step * reaction[at];
   }
-}
-
-/// Large islands of nothing but contacts: forces from those at hand on, a few iterations at a time, until they fit the
-/// gaps that bodies come to under them.
-SolveStatus IslandSolver::Impl::iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
-                                                 const IslandOptions& options, IslandReport& report) {
-  constexpr int kIterationsAtATime = 15;
-  const int most = report.iterations - 1 + options.max_iterations;
-  begin_splitting(splits);
-  for (;; ++report.iterations) {
-    predict(options);
-    measure(states, StepTime::kEnd, constraints, gap);
-    if (waiting > 0 && wake_rows(options)) {
-      sort_rows();
-      factor();
-      begin_splitting(false);
-    }
-    const std::size_t n = bounded.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto at = static_cast<std::size_t>(bounded[i]);
-      ordered_b[i] = gap[at] - laws[at].offset + laws[at].compliance * f_bounded[i];
-    }
-    for_flexibilities([&](std::size_t i, std::size_t j, double G) {
-      ordered_b[static_cast<std::size_t>(place[i])] += G / step * f_bounded[static_cast<std::size_t>(place[j])];
-    });
-    report.change = splitting.residual(f_bounded, ordered_b, tolerance);
-    if (report.change <= 1.0) return SolveStatus::kSolved;
-    if (report.iterations > most) return SolveStatus::kIterationLimit;
-    coupling.scale({});
-    coupling.multiply(product.data(), f_bounded.data());
-    for (std::size_t i = 0; i < n; ++i) b_reduced[i] = ordered_b[i] - product[i];
-    if (!splitting.advance(b_reduced, kIterationsAtATime, f_bounded)) return SolveStatus::kIterationLimit;
-    for (std::size_t i = 0; i < n; ++i) f[static_cast<std::size_t>(bounded[i])] = f_bounded[i] - held_impulse[i];
-  }
-}
-
-/// Forces, bounds and tolerances, in the order of `bounded`. The last step's forces are taken as they are, since less
-/// and plus what is held they would be rounded, and a fall is another one then.
-void IslandSolver::Impl::begin_splitting(bool from_last_forces) {
-  const std::size_t n = bounded.size();
-  tolerance.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto at = static_cast<std::size_t>(bounded[i]);
-    held_impulse[i] = step * reaction[at];
-    lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
-    f_bounded[i] = from_last_forces ? step * laws[at].last_force : f[at] + held_impulse[i];
-    tolerance[i] = kToleranceOfLargeIslands * laws[at].tolerance;
-  }
-  splitting.begin({.cones = static_cast<int>(cones),
-                   .friction = friction,
-                   .radius = radius,
-                   .lower = lower_bounded,
-                   .upper = upper_bounded},
-                  coupling);
 }
 
 /// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.

@@ -109,6 +109,9 @@ void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, 
   report.programs.add(done.programs);
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
+    if (convex)
+      part.constraints[i]->yielded(std::span<const double>(give).subspan(begin, end - begin),
+                                   std::span<const double>(slip).subspan(begin, end - begin));
     part.constraints[i]->accept(states, std::span<const double>(f).subspan(begin, end - begin));
   }
   if (done.status != SolveStatus::kSolved) report.status = done.status;
@@ -130,10 +133,10 @@ IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& 
   energy.begin(bodies, options.gravity);
   program_report = {};
   if (holds_contact_forces()) solve_touch(options, done.programs);
-  find_reaction(StepTime::kStart, options, reaction);
+  if (!convex) find_reaction(StepTime::kStart, options, reaction);
   done.status = iterate(states, part.constraints, options, done);
   done.newton_steps = bounded_rows.newton_steps();
-  answer_at_end(states, part.constraints, options);
+  if (!convex) answer_at_end(states, part.constraints, options);
   return done;
 }
 
@@ -145,7 +148,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0) || (can_split && yield(BodyStates(part.table), part.constraints, options, done))) return done;
+    if (!(left > 0.0) || convex) return done;  // springs and recovery alone are left, and y has gained nothing
     if (recovers && !flexibility.empty() && has_recovery()) {
       recovers = false, slowing = -1;
       done = foresee(part, options, whole_step);
@@ -155,8 +158,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
-  if (!can_split && done.status == SolveStatus::kSolved &&
-      yield(BodyStates(part.table), part.constraints, options, done))
+  if (done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
     return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
@@ -208,10 +210,7 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
   sparse = is_large();
-  can_split = sparse && std::ranges::all_of(laws, &RowLaw::contact);
-  const auto by_itself = [](const ConstraintRows::Flexibility& g) { return g.body < 0; };
-  const bool is_pile = rows.size() > kMostRowsOfNewton && rows.size() < kMostRowsOfABody * bodies.count();
-  splits = can_split && (flexibility.empty() || (is_pile && std::ranges::all_of(flexibility, by_itself)));
+  convex = sparse && is_pile();
   metric.resize(n), weighted.resize(n);
   if (!sparse) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
@@ -238,9 +237,25 @@ void IslandSolver::Impl::predict(const IslandOptions& options) {
     loads[i].impulse -= slowed * start_momenta[i].linear;
     loads[i].moment -= slowed * start_momenta[i].angular;
   }
+  predict_under_loads(options);
+}
+
+/// Where contacts alone act gravity and held forces come to the frames at the step's start, as what presses does: what
+/// rests has no velocity then, and the work of all of them is that over one displacement.
+void IslandSolver::Impl::predict_under_loads(const IslandOptions& options) {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
-    body.group->predict(body.slot, options.gravity, loads[static_cast<std::size_t>(local)], bodies.modal_step(local));
+    ConstraintLoad& load = loads[static_cast<std::size_t>(local)];
+    Vec3 gravity = options.gravity;
+    if (convex) {
+      const FrameConstants& c = body.group->frame_constants();
+      const Vec3 early = options.step * c.mass * gravity,
+                 arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+      load.impulse += early + options.step * body.group->held_force(body.slot);
+      load.moment += arm.cross(early);
+      gravity = -body.group->held_force(body.slot) / c.mass;
+    }
+    body.group->predict(body.slot, gravity, load, bodies.modal_step(local));
   }
 }
 

@@ -5,6 +5,12 @@
 
 namespace limber {
 
+/// Whether nothing but contacts acts, each of which may yield by itself, and no body yields to them all.
+bool IslandSolver::Impl::is_pile() const {
+  return std::ranges::all_of(laws, &RowLaw::contact) &&
+         std::ranges::all_of(flexibility, [](const ConstraintRows::Flexibility& g) { return g.body < 0; });
+}
+
 /// Whether blocks are worth it: an elimination in them by bodies, whose contacts may yield to each other, against one
 /// by rows. Linear programs need A in full, and impacts that hold their forces the answer to gravity by itself.
 bool IslandSolver::Impl::is_large() {

@@ -5,6 +5,7 @@
 //   island_touch.cpp     [H03]'s velocity program, before the rows
 //   island_working_rows.cpp  which rows take part, and in what order
 //   island_newton.cpp    Newton's method for the impulses
+//   island_convex.cpp    contacts of islands with nothing else, as one convex problem
 //   island_sparse.cpp    the rows of islands of many bodies
 //   island_release.cpp   where within a step an impact lets go
 //   island_guard.cpp     the energy that may have come in, and what is done about more
@@ -15,8 +16,8 @@
 #include <vector>
 
 #include "bounded_rows.h"
-#include "cone_splitting.h"
 #include "contact_program.h"
+#include "convex_contact_solver.h"
 #include "difference_newton.h"
 #include "island_energy.h"
 #include "limber/constraints/contact_qp.h"
@@ -39,12 +40,6 @@ inline bool is_equality(const RowLaw& law) {
 }
 /// Rows of the contact whose normal row this is, or of the vector whose first row it is.
 inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
-
-// More rows of contacts that yield each by itself are not solved by Newton's method: where hundreds slide and stick it
-// takes all the steps that it is allowed, and splitting is as near in a tenth of the time. But only where there are few
-// to a body, as in piles of boxes: bumpy bodies have hundreds that push against each other, and fell through the ground
-// by splitting; stacks settle by Newton's method in every step.
-inline constexpr Index kMostRowsOfNewton = 250, kMostRowsOfABody = 30;
 
 /// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
 inline bool is_part(double time, double left, double whole_step) {
@@ -83,10 +78,12 @@ struct IslandSolver::Impl {
   ResidualFactor residual;         // of the rows in `coupling`
   std::vector<std::size_t> nodes;  // of the bodies
   std::vector<double> one_row, product, widths;
-  double slack = 1.0;      // of the rows' tolerance, which this iteration's cones may be off
-  bool can_split = false;  // with nothing but contacts among the rows
-  bool splits = false;     // from the start: none of which yields by itself, or too many for Newton's method
-  ConeSplitting splitting;
+  double slack = 1.0;   // of the rows' tolerance, which this iteration's cones may be off
+  bool convex = false;  // large, with nothing but contacts among the rows
+  internal::ConvexContactSolver contacts;
+  std::vector<double> displacement;    // by degree of freedom, of the free motion
+  std::vector<double> give, slip;      // by row, of contacts in a convex island
+  std::vector<std::size_t> unit_rows;  // the first row of each unit
   ProximalSolver frames;
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
@@ -119,6 +116,7 @@ struct IslandSolver::Impl {
   void hold_contact(StepTime when, Index normal);
   void hold_vector(StepTime when, Index first);
   void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
+  bool is_pile() const;
   bool is_large();
   bool blocks_pay();
   double work_in_blocks();
@@ -189,12 +187,19 @@ struct IslandSolver::Impl {
   bool can_differentiate() const;
   SolveStatus differentiate(const BodyStates& states, std::span<Constraint* const> constraints,
                             const IslandOptions& options, IslandReport& report);
-  SolveStatus iterate_contacts(const BodyStates& states, std::span<Constraint* const> constraints,
-                               const IslandOptions& options, IslandReport& report);
-  void begin_splitting(bool from_last_forces);
+  SolveStatus solve_convex(const BodyStates& states, std::span<Constraint* const> constraints,
+                           const IslandOptions& options, IslandReport& report);
+  void place_contacts();
+  void fill_contacts();
+  double find_displacement();
+  void start_contacts(const IslandOptions& options);
+  double moved(std::size_t row) const;
+  bool stiffen_pressed();
+  void take_motion(const IslandOptions& options);
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
   void predict(const IslandOptions& options);
+  void predict_under_loads(const IslandOptions& options);
   void sum_loads(std::span<const double> values, double frame_scale, double modal_scale);
   void add_loads(std::span<const double> values, double frame_scale, double modal_scale);
   double largest_recovery_work(double distance, const IslandOptions& options) const;

@@ -13,8 +13,7 @@ bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0 || law
 /// rows are solved for sooner than gaps are measured once more.
 bool IslandSolver::Impl::rows_may_wait() const {
   constexpr std::size_t kFewRows = 150;
-  return laws.size() > kFewRows && !(splits && flexibility.empty()) && rule.method == ContactMethod::kComplementary &&
-         !by_program();
+  return laws.size() > kFewRows && rule.method == ContactMethod::kComplementary && !by_program();
 }
 
 /// Most contacts of bumpy bodies are found ahead and exert nothing in the step. Those that pressed in the last step, or

@@ -23,6 +23,7 @@ class PairContacts final : public Constraint {
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   bool is_contact() const override { return true; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
+  void yielded(std::span<const double> compliance, std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
 
   /// Since when the bodies have struck each other, after the step, s; 0: they have not.
@@ -70,6 +71,9 @@ class PairContacts final : public Constraint {
   /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
   void make_spring(const BodyStates& states, const PreparedContact& contact, double gap, RowLaw& law) const;
 
+  /// What a contact may yield by in an island that is solved with yielding contacts.
+  double regularisation(const BodyStates& states, const PreparedContact& contact, const RowSide& a,
+                        const RowSide& b) const;
   static double reduced_mass(const BodyStates& states, const PreparedContact& contact);
 
   std::span<PreparedContact> contacts_;
@@ -78,6 +82,7 @@ class PairContacts final : public Constraint {
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false, caught_ = false;
+  bool at_once_ = false;  // forces came to the frames at the step's start
   double step_ = 0.0, lasted_ = 0.0;
   double give_ = 0.0;                // of each contact of bodies that flex, m/N
   double overlap_that_stays_ = 0.0;  // m: the kept modes do not show shapes dented by as much

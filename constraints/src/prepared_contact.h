@@ -40,6 +40,7 @@ struct PreparedSide {
 struct PreparedContact {
   std::uint64_t id = 0;
   PreparedSide a, b;
+  Index yielding = -1;           // the body that the energy of its spring is counted with
   Mat3 axes = Mat3::Identity();  // columns: normal, two tangents; world
   double friction = 0.0;
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
@@ -47,6 +48,9 @@ struct PreparedContact {
   Vec3 last_force = Vec3::Zero();  // world, on a, N
   Vec3 held_force = Vec3::Zero();  // what of it goes on
   double give = 0.0;               // what the contact yielded to it by itself, m/N
+  double next_give = 0.0;          // in this step
+  double slip = 0.0;               // of the last step, beyond what its spring gave, m
+  double next_slip = 0.0;          // of this one
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 };

@@ -7,29 +7,42 @@ namespace {
 
 // Turns are braked to this, rad.
 constexpr double kTolerance = 1e-9;
+// Of what the moment turns the pair by within a step, what it may yield by.
+constexpr double kRegularisation = 1e-3;
+
+/// How far a unit moment turns a body, a mean over its axes, per second.
+double turning(const BodyStates& states, Index body) {
+  if (states.is_static(body)) return 0.0;
+  return states.body(body).group->frame_constants().principal.moments.cwiseInverse().mean();
+}
 
 }  // namespace
 
-void RollingResistance::set(Index a, Index b, double largest, const Vec3& last) {
-  a_ = a, b_ = b, largest_ = largest, moment_ = last;
+void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, double give) {
+  a_ = a, b_ = b, largest_ = largest, moment_ = last, give_ = give;
 }
 
 /// About the world's axes: a ball looks the same from all sides.
 void RollingResistance::add_rows(const BodyStates& states, StepTime, double step, ConstraintRows& rows) {
   step_ = step;
+  next_give_ = 0.0;
+  const double regularisation = kRegularisation * step * step * (turning(states, a_) + turning(states, b_));
   const double radius = step * largest_;
+  rows.add_stored_energy(0.5 * give_ * moment_.squaredNorm());
   for (int i = 0; i < 3; ++i) {
     const Vec3 axis = Vec3::Unit(i);
     const auto side = [&](Index body, double sign) {
       return states.is_static(body) ? RowSide{} : RowSide{.body = body, .angular = sign * axis};
     };
     rows.add(side(a_, 1.0), side(b_, -1.0),
-             {.lower = -radius,
+             {.offset = give_ * moment_[i],
+              .lower = -radius,
               .upper = radius,
               .tolerance = kTolerance,
               .goes_on = true,
               .last_force = moment_[i],
               .radius = radius,
+              .regularisation = regularisation,
               .contact = true});
   }
 }
@@ -40,8 +53,13 @@ void RollingResistance::gaps(const BodyStates& states, StepTime when, std::span<
   for (int i = 0; i < 3; ++i) gaps[static_cast<std::size_t>(i)] = turned[i];
 }
 
+void RollingResistance::yielded(std::span<const double> compliance, std::span<const double>) {
+  next_give_ = compliance[0];
+}
+
 void RollingResistance::accept(const BodyStates&, std::span<const double> impulses) {
   moment_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
+  give_ = next_give_;
 }
 
 }  // namespace limber

@@ -59,6 +59,13 @@ struct RowLaw {
   double friction = 0.0;
   /// > 0: of three rows in a row, whose impulses are a vector no longer than this; `lower` and `upper` are ∓ radius.
   double radius = 0.0;
+  /// Of contacts: the gap at the step's start, without what compliance gives there.
+  double start_gap = 0.0;
+  /// Of contacts, their normal row: what the island may let them yield by, gap per force, and the most that is to come
+  /// of it, in the gap's unit.
+  double regularisation = 0.0, largest_yield = 0.0;
+  /// Of contacts that slide, their normal row: De Saxcé's shift μ |slip| of the last step.
+  double shift = 0.0;
   bool contact = false;  ///< of a contact, its normal row or a tangent
   /// The contact is an impact: where only contacts act, all the island's forces are then held over the step (θ = ½).
   bool strikes = false;

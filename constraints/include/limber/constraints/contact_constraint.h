@@ -100,6 +100,7 @@ struct ContactMemory {
   Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
   Vec3 held = Vec3::Zero();   ///< what of it goes on into the next step
   double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
+  double slip = 0.0;          ///< how far the point slid in the step beyond its spring, m
   Index yielding = -1;        ///< the body that this energy is counted with
 };
 
@@ -113,6 +114,7 @@ struct StrikeMemory {
 struct RollingMemory {
   Index a = -1, b = -1;        ///< bodies
   Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
+  double give = 0.0;           ///< what the pair turned by under it by itself, rad per N·m
 };
 
 /// A force that pressed on a body in the last step: the source of its residual displacement.

@@ -1,0 +1,79 @@
+// What one contact adds to the convex problem of an island (convex_contact_solver.h): a spring of compliance c whose
+// impulse stays in a set K.
+//
+//   l(u) = max over F ∈ K of  −u·F − ½ c |F|²,      F = P_K(−u/c) = −∇l,      ∂F/∂u = −P_K'/c = −∇²l
+//
+// K is Coulomb's cone |F_t| ≤ μ F_n (rows: normal, two tangents), a ball |F| ≤ r, or an interval. The projection onto
+// the cone is that of SAP (Castro, Permenter and Han, IEEE T-RO 39 (2023) 1301) with one compliance for all axes.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "limber/core/types.h"
+
+namespace limber::internal {
+
+struct ContactPotential {
+  enum class Set { kCone, kBall, kInterval };
+  Set set = Set::kCone;
+  double compliance = 0.0;          ///< c, gap per impulse, > 0
+  double bound = 0.0;               ///< μ of the cone, r of the ball, N·s
+  double lower = 0.0, upper = 0.0;  ///< of the interval
+
+  struct Value {
+    double potential = 0.0;
+    Vec3 impulse = Vec3::Zero();    ///< F
+    Mat3 stiffness = Mat3::Zero();  ///< ∇²l, positive semidefinite
+    bool acts = false;              ///< whether F or ∇²l is not zero
+  };
+  /// An interval reads and writes the first number alone.
+  Value at(const Vec3& u) const {
+    switch (set) {
+      case Set::kCone:
+        return cone(-u / compliance);
+      case Set::kBall:
+        return ball(-u / compliance);
+      case Set::kInterval:
+        break;
+    }
+    return interval(-u[0] / compliance);
+  }
+
+ private:
+  Value cone(const Vec3& x) const {
+    const double mu = bound, along = x[0], across = std::sqrt(x[1] * x[1] + x[2] * x[2]);
+    if (across <= mu * along) return inside(x, 3);
+    if (mu * across <= -along) return {};
+    const double scale = 1.0 / (1.0 + mu * mu), pressed = scale * (along + mu * across);
+    const Vec3 tangent = Vec3(0.0, x[1], x[2]) / across, edge = Vec3::UnitX() + mu * tangent;
+    Value v{.potential = 0.5 * compliance * pressed * pressed / scale, .impulse = pressed * edge, .acts = true};
+    // Along the edge of the cone the spring yields; round it the impulse turns with the slip.
+    Mat3 turning = Mat3::Identity() - tangent * tangent.transpose();
+    turning(0, 0) = 0.0;
+    v.stiffness = (scale * edge * edge.transpose() + mu * pressed / across * turning) / compliance;
+    return v;
+  }
+  Value ball(const Vec3& x) const {
+    const double size = x.norm();
+    if (size <= bound) return inside(x, 3);
+    const Vec3 direction = x / size;
+    return {.potential = compliance * bound * (size - 0.5 * bound),
+            .impulse = bound * direction,
+            .stiffness = bound / size / compliance * (Mat3::Identity() - direction * direction.transpose()),
+            .acts = bound > 0.0};
+  }
+  Value interval(double x) const {
+    const double F = std::clamp(x, lower, upper);
+    Value v{.potential = compliance * (x * F - 0.5 * F * F), .impulse = {F, 0.0, 0.0}, .acts = F != 0.0 || F == x};
+    if (F == x) v.stiffness(0, 0) = 1.0 / compliance;
+    return v;
+  }
+  Value inside(const Vec3& x, int rows) const {
+    Value v{.potential = 0.5 * compliance * x.squaredNorm(), .impulse = x, .acts = true};
+    v.stiffness.diagonal().head(rows).setConstant(1.0 / compliance);
+    return v;
+  }
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,238 @@
+#include "convex_contact_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace limber::internal {
+
+void ConvexContactSolver::begin_structure() {
+  nodes_.clear(), units_.clear(), sides_.clear();
+  numbers_ = size_ = 0;
+}
+
+std::size_t ConvexContactSolver::add_node(std::size_t width) {
+  nodes_.push_back({width, size_});
+  size_ += padded(width);
+  return nodes_.size() - 1;
+}
+
+std::size_t ConvexContactSolver::add_unit(std::size_t rows, const ContactPotential& potential) {
+  units_.push_back({.rows = rows, .first_side = sides_.size(), .potential = potential});
+  return units_.size() - 1;
+}
+
+std::size_t ConvexContactSolver::add_side(std::size_t node) {
+  sides_.push_back({node, numbers_});
+  numbers_ += units_.back().rows * padded(nodes_[node].width);
+  ++units_.back().sides;
+  return sides_.size() - 1;
+}
+
+void ConvexContactSolver::end_structure() {
+  std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
+  std::size_t widest = kPad;
+  for (const Node& node : nodes_) widest = std::max(widest, padded(node.width));
+  product_.need(3 * widest);
+  for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
+}
+
+MatrixView ConvexContactSolver::values(std::size_t side) {
+  return {values_.data() + sides_[side].values, padded(nodes_[sides_[side].node].width)};
+}
+
+std::span<const double> ConvexContactSolver::motion(std::size_t node) const {
+  return {y_.data() + nodes_[node].first, nodes_[node].width};
+}
+
+/// J y
+Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
+  double sum[3] = {}, part[3];
+  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
+    const Node& node = nodes_[sides_[s].node];
+    const MatrixView J{const_cast<double*>(values_.data()) + sides_[s].values, padded(node.width)};
+    multiply_rows(part, J, nullptr, y + node.first, unit.rows, J.stride);
+    for (std::size_t r = 0; r < unit.rows; ++r) sum[r] += part[r];
+  }
+  return {sum[0], sum[1], sum[2]};
+}
+
+/// y += Jᵀ rows
+void ConvexContactSolver::add_transposed(const Unit& unit, const Vec3& rows, double* y) const {
+  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
+    const Node& node = nodes_[sides_[s].node];
+    const MatrixView J{const_cast<double*>(values_.data()) + sides_[s].values, padded(node.width)};
+    combine_rows(y + node.first, y + node.first, J, nullptr, rows.data(), unit.rows, J.stride);
+  }
+}
+
+void ConvexContactSolver::find_ends(const double* y) {
+  for (Unit& unit : units_) unit.end = unit.start + seen(unit, y);
+}
+
+/// (1)
+double ConvexContactSolver::potential_of(const double* y) {
+  find_ends(y);
+  double sum = 0.5 * dot(y, y, size_);
+  for (const Unit& unit : units_) sum += unit.potential.at(unit.end).potential;
+  return sum;
+}
+
+void ConvexContactSolver::begin_with_better_start() {
+  double *free = y_.data(), *guess = d_.data();
+  std::fill_n(free, size_, 0.0);
+  std::fill_n(guess, size_, 0.0);
+  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, guess);
+  const double at_free = potential_of(free), at_guess = potential_of(guess);
+  if (at_guess < at_free) std::copy_n(guess, size_, free);
+}
+
+ConvexContactReport ConvexContactSolver::solve(double momentum, const ConvexContactOptions& options) {
+  begin_with_better_start();
+  return solve_on(momentum, options);
+}
+
+ConvexContactReport ConvexContactSolver::solve_on(double momentum, const ConvexContactOptions& options) {
+  ConvexContactReport report;
+  find_ends(y_.data());
+  for (;; ++report.iterations) {
+    const double pressed = gradient();
+    const double* g = gradient_.data();
+    const double scale = std::max({momentum, pressed, std::numeric_limits<double>::min()});
+    report.residual = std::sqrt(dot(g, g, size_)) / scale;
+    if (report.residual <= options.tolerance) return report;
+    if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
+    if (!structure_holds()) place_pairs();
+    assemble();
+    if (!factor_.factor_symmetric()) break;
+    double *d = d_.data(), *y = y_.data();
+    find_direction(g, d);
+    for (Unit& unit : units_) unit.change = seen(unit, d);
+    const double step = best_step(dot(g, d, size_));
+    add_scaled(y, step, d, size_);
+    for (Unit& unit : units_) unit.end += step * unit.change;
+  }
+  report.status = SolveStatus::kIterationLimit;
+  return report;
+}
+
+/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l. @return |Σ Jᵀ F|
+double ConvexContactSolver::gradient() {
+  double* g = gradient_.data();
+  std::fill_n(g, size_, 0.0);
+  for (Unit& unit : units_) {
+    const ContactPotential::Value v = unit.potential.at(unit.end);
+    unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
+    if (v.acts) add_transposed(unit, v.impulse, g);
+  }
+  const double pressed = std::sqrt(dot(g, g, size_));
+  const double* y = y_.data();
+  for (std::size_t i = 0; i < size_; ++i) g[i] = y[i] - g[i];
+  return pressed;
+}
+
+/// Whether every unit that acts has its pair among those that the factor has blocks for.
+bool ConvexContactSolver::structure_holds() {
+  widths_.clear();
+  for (const Node& node : nodes_) widths_.push_back(node.width);
+  bool holds = widths_ == factor_widths_;
+  pairs_.clear();
+  for (Unit& unit : units_) {
+    unit.placed = false;
+    if (unit.sides < 2) continue;
+    const std::size_t a = sides_[unit.first_side].node, b = sides_[unit.first_side + 1].node;
+    const Pair pair{std::min(a, b), std::max(a, b)};
+    const bool known = std::ranges::binary_search(factor_pairs_, pair);
+    if (unit.acts) pairs_.push_back(pair), holds = holds && known;
+    if (!known || !holds) continue;
+    unit.block = factor_.comes_first(a, b) ? factor_.block(a, b) : factor_.block(b, a);
+    unit.placed = true;
+  }
+  return holds;
+}
+
+/// A structure with the pairs that it had, as far as the bodies are the same ones, and those that press.
+void ConvexContactSolver::place_pairs() {
+  if (widths_ == factor_widths_) pairs_.insert(pairs_.end(), factor_pairs_.begin(), factor_pairs_.end());
+  std::ranges::sort(pairs_);
+  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+  factor_widths_ = widths_;
+  factor_pairs_ = pairs_;
+  factor_.begin_pattern(widths_);
+  for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
+  factor_.end_pattern();
+  structure_holds();
+}
+
+/// 1 + Σ Jᵀ ∇²l J
+void ConvexContactSolver::assemble() {
+  factor_.set_identity();
+  for (const Unit& unit : units_) {
+    if (!unit.acts) continue;
+    for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s)
+      add_product(unit, s, s, factor_.block(sides_[s].node, sides_[s].node));
+    if (unit.sides < 2) continue;
+    std::size_t a = unit.first_side, b = a + 1;
+    if (!factor_.comes_first(sides_[a].node, sides_[b].node)) std::swap(a, b);
+    add_product(unit, a, b, unit.block);
+  }
+}
+
+void ConvexContactSolver::add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block) {
+  const MatrixView left = values(a), right = values(b);
+  const MatrixView product{product_.data(), right.stride};
+  for (std::size_t r = 0; r < unit.rows; ++r) {
+    std::fill_n(product.row(r), right.stride, 0.0);
+    combine_rows(product.row(r), product.row(r), right, nullptr, unit.stiffness.col(static_cast<int>(r)).data(),
+                 unit.rows, right.stride);
+  }
+  double* to = factor_.upper(block);
+  for (std::size_t p = 0; p < nodes_[sides_[a].node].width; ++p, to += block.stride) {
+    double column[3];
+    for (std::size_t r = 0; r < unit.rows; ++r) column[r] = left.row(r)[p];
+    combine_rows(to, to, product, nullptr, column, unit.rows, right.stride);
+  }
+}
+
+ConvexContactSolver::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {
+  Slope slope{yd + step * dd, dd};
+  for (const Unit& unit : units_) {
+    const ContactPotential::Value v = unit.potential.at(unit.end + step * unit.change);
+    if (!v.acts) continue;
+    slope.first -= v.impulse.dot(unit.change);
+    slope.second += unit.change.dot(v.stiffness * unit.change);
+  }
+  return slope;
+}
+
+/// d = −(1 + Σ Jᵀ ∇²l J)⁻¹ g
+void ConvexContactSolver::find_direction(const double* g, double* d) {
+  double* x = ordered_.need(factor_.size());
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    std::copy_n(g + nodes_[i].first, padded(nodes_[i].width), x + factor_.first(i));
+  factor_.solve(x);
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    for (std::size_t k = 0; k < nodes_[i].width; ++k) d[nodes_[i].first + k] = -x[factor_.first(i) + k];
+}
+
+/// Where (1) is least along d: Newton's method on its slope, within the bracket found so far.
+double ConvexContactSolver::best_step(double slope_at_start) const {
+  // Of the slope at the start; the full step is worth less of a search, as most are near enough.
+  constexpr double kEnoughOfFullStep = 1e-2, kEnough = 1e-3;
+  constexpr int kMost = 30;
+  const double yd = dot(y_.data(), d_.data(), size_), dd = dot(d_.data(), d_.data(), size_);
+  double step = 1.0, low = 0.0, high = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kMost; ++i) {
+    const Slope slope = slope_at(step, yd, dd);
+    if (std::abs(slope.first) <= (i == 0 ? kEnoughOfFullStep : kEnough) * std::abs(slope_at_start)) break;
+    (slope.first < 0.0 ? low : high) = step;
+    const double next = step - slope.first / slope.second;
+    if (next > low && next < std::min(high, 4.0 * step))
+      step = next;
+    else
+      step = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * step;
+  }
+  return step;
+}
+
+}  // namespace limber::internal
