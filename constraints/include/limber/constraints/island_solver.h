@@ -13,9 +13,12 @@
 ///      slowed, or impulses are reduced; where joints alone have lost energy to the method it is given back,
 ///   5. commits the prediction and tells the constraints their impulses (Constraint::accept).
 ///
-/// Tolerances are the rows' own; where large islands of contacts are solved by splitting, 100 times that. Iterations
-/// are bounded (IslandOptions::max_iterations; 1,500 Newton steps for contacts with friction, 500 above 200 rows). A
-/// step that does not settle keeps the best impulses found, and its status is kIterationLimit.
+/// Large islands of nothing but contacts are one convex problem instead, linear in the step, in which each contact
+/// yields a little and loads come to the frames at the step's start: 1, 3 and 5, without iterations over true gaps.
+///
+/// Tolerances are the rows' own; of the convex problem 1e-6 of the momenta at hand. Iterations are bounded
+/// (IslandOptions::max_iterations; 1,500 Newton steps for contacts with friction, 500 above 200 rows). A step that does
+/// not settle keeps the best impulses found, and its status is kIterationLimit.
 ///
 /// A step is taken in parts where impacts begin and end, if asked for (Constraint::next_cut, RowLaw::lets_go_within;
 /// four times at most), and in halves down to 64ths where free bodies hang on joints alone and it does not settle.
@@ -36,7 +39,7 @@ namespace limber {
 struct IslandOptions {
   double step = 1.0 / 60.0;     ///< s; that of all groups
   Vec3 gravity = Vec3::Zero();  ///< m/s², world
-  int max_iterations = 30;      ///< of Newton's method, or of 15 steps of splitting each; ≥ 1
+  int max_iterations = 30;      ///< of Newton's method on true gaps; ≥ 1
   bool guard_energy = true;     ///< 4 above; ProgramGuard::kNone switches it off as well
   ContactRule contact{};        ///< how contacts are solved for
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
@@ -56,7 +59,7 @@ struct IslandReport {
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most
   double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance; large islands
-                                ///< of contacts alone: the residual, in units of 100 tolerances
+                                ///< of contacts alone: the residual of the convex problem, by its tolerance
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
 };
