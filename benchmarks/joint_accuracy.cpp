@@ -1,8 +1,8 @@
 // joint_accuracy: how often joints are read right, and how well.
-//   run:  build/release/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
-//         build/release/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
-//         build/release/bin/joint_accuracy --limits [--samples N] [--only ASSEMBLY] [--class TEXT] [--verbose]
-//         build/release/bin/joint_accuracy --change [--only ASSEMBLY]
+//   run:  build/benchmark/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
+//         build/benchmark/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/benchmark/bin/joint_accuracy --limits [--samples N] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/benchmark/bin/joint_accuracy --change [--only ASSEMBLY]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose. With --limits instead: the
 //         ranges of motion of all joints whose type was read right and whose range is known on paper. With --change: by

@@ -1,7 +1,7 @@
 // What each number of collision/src/tuning.h moves when it is halved and doubled, on fixed scenes; of a cosine or sine
 // that stands for an angle, the angle. See README.md.
 //
-//   build/release/bin/tuning_collision > table.md
+//   build/benchmark/bin/tuning_collision > table.md
 //
 // Prints a Markdown table; docs/reports/tuning-collision.md holds one with its reading.
 #include <cmath>
