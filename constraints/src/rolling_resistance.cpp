@@ -6,9 +6,9 @@ namespace limber {
 namespace {
 
 // Turns are braked to this, rad.
-constexpr double kTolerance = 1e-9;
+constexpr double kTurnTolerance = 1e-9;
 // Of what the moment turns the pair by within a step, what it may yield by.
-constexpr double kRegularisation = 1e-3;
+constexpr double kTurnRegularisation = 1e-3;
 
 /// How far a unit moment turns a body, a mean over its axes, per second.
 double turning(const BodyStates& states, Index body) {
@@ -26,7 +26,7 @@ void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, 
 void RollingResistance::add_rows(const BodyStates& states, StepTime, double step, ConstraintRows& rows) {
   step_ = step;
   next_give_ = 0.0;
-  const double regularisation = kRegularisation * step * step * (turning(states, a_) + turning(states, b_));
+  const double regularisation = kTurnRegularisation * step * step * (turning(states, a_) + turning(states, b_));
   const double radius = step * largest_;
   rows.add_stored_energy(0.5 * give_ * moment_.squaredNorm());
   for (int i = 0; i < 3; ++i) {
@@ -38,7 +38,7 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
              {.offset = give_ * moment_[i],
               .lower = -radius,
               .upper = radius,
-              .tolerance = kTolerance,
+              .tolerance = kTurnTolerance,
               .goes_on = true,
               .last_force = moment_[i],
               .radius = radius,
