@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "cgal_steps.h"
+#include "flat_tets.h"
+#include "pinched_edges.h"
 
 namespace limber::internal {
 namespace {
@@ -25,27 +26,12 @@ constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is no
 constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
 
 /// How good a mesh is, best first.
-enum class Grade { kGood, kPinched, kInaccurate, kFlat, kNone };
+enum class Grade { kGood, kInaccurate, kFlat, kNone };
 
 struct Judged {
   FilledBody filled;
-  double cell_size = 0.0;
   Grade grade = Grade::kNone;
 };
-
-/// Volume of the flattest tet over that of the regular tet with the same mean squared edge: 1 is best, 0 flat.
-double worst_shape(const TetMesh& mesh) {
-  double worst = 1.0;
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    double squared = 0.0;
-    for (int a = 0; a < 4; ++a)
-      for (int b = a + 1; b < 4; ++b)
-        squared += (mesh.nodes[mesh.tets[i][a]] - mesh.nodes[mesh.tets[i][b]]).squaredNorm();
-    const double regular = std::pow(squared / 6.0, 1.5) / (6.0 * std::numbers::sqrt2);
-    worst = std::min(worst, signed_volume(mesh, static_cast<Index>(i)) / regular);
-  }
-  return worst;
-}
 
 double volume(const TetMesh& mesh) {
   double sum = 0.0;
@@ -78,7 +64,9 @@ Judged judge(MeshedBody meshed, const Body& body) {
     f.fault = "no tetrahedron";
     return j;
   }
+  peel_flat_tets(f.mesh, kWorstShape);
   const Index pieces = drop_stray_pieces(f.mesh, f.dropped_tets);
+  open_pinched_edges(f.mesh);
   const double error = std::abs(volume(f.mesh) / body.volume - 1.0);
   if (worst_shape(f.mesh) < kWorstShape) {
     j.grade = Grade::kFlat;
@@ -89,9 +77,6 @@ Judged judge(MeshedBody meshed, const Body& body) {
   } else if (error > kWorstVolume) {
     j.grade = Grade::kInaccurate;
     f.fault = "its volume is " + percent(error) + " off";
-  } else if (!surface_quality(boundary_surface(f.mesh).surface).closed_manifold()) {
-    j.grade = Grade::kPinched;
-    f.fault = "its boundary touches itself along edges";
   } else {
     j.grade = Grade::kGood;
   }
@@ -100,7 +85,7 @@ Judged judge(MeshedBody meshed, const Body& body) {
 
 struct Attempt {
   double cell_size = 0.0;
-  bool keep_sharp_edges = false, manifold = false;
+  bool keep_sharp_edges = false;
 };
 
 Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
@@ -110,11 +95,9 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
                              {.cell_size = size,
                               .facet_distance = kFacetDistancePerCell,
                               .keep_sharp_edges = how.keep_sharp_edges,
-                              .manifold = how.manifold,
                               .max_nodes = static_cast<std::size_t>(kRunaway * expected) + kFewNodes}),
                    *body.body);
   j.filled.sharp_edges_kept = how.keep_sharp_edges;
-  j.cell_size = how.cell_size;
   return j;
 }
 
@@ -158,7 +141,7 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
   };
   Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
   int failures = 0;
-  for (int i = 0; i < kTries && failures < kFailures && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
+  for (int i = 0; i < kTries && failures < kFailures && best.grade != Grade::kGood; ++i, how.cell_size *= kFiner) {
     bool failed = attempt(how) == Grade::kNone;
     if (failed && how.keep_sharp_edges) {
       how.keep_sharp_edges = false;
@@ -166,9 +149,7 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
     }
     failures += failed ? 1 : 0;
   }
-  if (best.grade > Grade::kPinched && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
-  if (best.grade == Grade::kPinched)
-    attempt({.cell_size = best.cell_size, .keep_sharp_edges = best.filled.sharp_edges_kept, .manifold = true});
+  if (best.grade != Grade::kGood && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
   best.filled.tries = tries;
   return best.filled;
 }
