@@ -23,6 +23,7 @@ constexpr int kTries = 4;                ///< with smaller and smaller cells
 constexpr int kFailures = 2;             ///< tries without a mesh, after which smaller cells are no hope
 constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
 constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
+constexpr double kUselessVolume = 0.5;   ///< a worse error is no mesh of the body
 constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
 
 /// How good a mesh is, best first.
@@ -68,15 +69,15 @@ Judged judge(MeshedBody meshed, const Body& body) {
   const Index pieces = drop_stray_pieces(f.mesh, f.dropped_tets);
   open_pinched_edges(f.mesh);
   const double error = std::abs(volume(f.mesh) / body.volume - 1.0);
-  if (worst_shape(f.mesh) < kWorstShape) {
+  if (error > kUselessVolume) {
+    f.fault = "its volume is " + percent(error) + " off";
+    f.mesh = {};
+  } else if (worst_shape(f.mesh) < kWorstShape) {
     j.grade = Grade::kFlat;
     f.fault = "flat tetrahedra";
-  } else if (pieces > 1) {
+  } else if (error > kWorstVolume || pieces > 1) {
     j.grade = Grade::kInaccurate;
-    f.fault = "it came apart into " + std::to_string(pieces) + " pieces";
-  } else if (error > kWorstVolume) {
-    j.grade = Grade::kInaccurate;
-    f.fault = "its volume is " + percent(error) + " off";
+    f.fault = "its volume is " + percent(error) + " off, in " + std::to_string(pieces) + " pieces";
   } else {
     j.grade = Grade::kGood;
   }
@@ -102,6 +103,8 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
 }
 
 }  // namespace
+
+double MeasuredBody::nodes_to_resolve() const { return expected_nodes(kLeastSize * cell_size); }
 
 double MeasuredBody::expected_nodes(double smallest) const {
   return internal::expected_nodes(samples, body->volume, cell_size, smallest);
