@@ -24,7 +24,7 @@ struct TetrahedralisationOptions {
   double alpha = 0.0;  ///< narrowest gap that the wrap enters, m; 0: 1/50 of the diagonal. Clean surfaces ignore it.
   /// Nodes that may be spent on parts and gaps thinner than the cell size, whose cells are made as small as they are
   /// thin; a mesh of cells of one size is made whatever it takes. ≥ 1
-  int max_nodes = 40'000;
+  int max_nodes = 60'000;
   /// Told each stage as it begins, in the thread that calls.
   std::function<void(const std::string&)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
