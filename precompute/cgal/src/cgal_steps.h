@@ -27,7 +27,6 @@ struct BodyMeshing {
                                                  ///< surface balls there, m; Lipschitz
   double facet_distance = 0.0;    ///< bound on the distance between a boundary triangle and the surface, in cells
   bool keep_sharp_edges = false;  ///< sharp edges of the surface become edges of the mesh
-  bool manifold = false;          ///< refines where the boundary touches itself; need not end at a knife edge
   std::size_t max_nodes = 0;      ///< more are not made
 };
 

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "cgal_steps.h"
+#include "flat_tets.h"
+#include "pinched_edges.h"
 
 namespace limber::internal {
 namespace {
@@ -22,30 +23,16 @@ constexpr int kTries = 4;                ///< with smaller and smaller cells
 constexpr int kFailures = 2;             ///< tries without a mesh, after which smaller cells are no hope
 constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
 constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
+constexpr double kUselessVolume = 0.5;   ///< a worse error is no mesh of the body
 constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
 
 /// How good a mesh is, best first.
-enum class Grade { kGood, kPinched, kInaccurate, kFlat, kNone };
+enum class Grade { kGood, kInaccurate, kFlat, kNone };
 
 struct Judged {
   FilledBody filled;
-  double cell_size = 0.0;
   Grade grade = Grade::kNone;
 };
-
-/// Volume of the flattest tet over that of the regular tet with the same mean squared edge: 1 is best, 0 flat.
-double worst_shape(const TetMesh& mesh) {
-  double worst = 1.0;
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    double squared = 0.0;
-    for (int a = 0; a < 4; ++a)
-      for (int b = a + 1; b < 4; ++b)
-        squared += (mesh.nodes[mesh.tets[i][a]] - mesh.nodes[mesh.tets[i][b]]).squaredNorm();
-    const double regular = std::pow(squared / 6.0, 1.5) / (6.0 * std::numbers::sqrt2);
-    worst = std::min(worst, signed_volume(mesh, static_cast<Index>(i)) / regular);
-  }
-  return worst;
-}
 
 double volume(const TetMesh& mesh) {
   double sum = 0.0;
@@ -78,20 +65,19 @@ Judged judge(MeshedBody meshed, const Body& body) {
     f.fault = "no tetrahedron";
     return j;
   }
+  peel_flat_tets(f.mesh, kWorstShape);
   const Index pieces = drop_stray_pieces(f.mesh, f.dropped_tets);
+  open_pinched_edges(f.mesh);
   const double error = std::abs(volume(f.mesh) / body.volume - 1.0);
-  if (worst_shape(f.mesh) < kWorstShape) {
+  if (error > kUselessVolume) {
+    f.fault = "its volume is " + percent(error) + " off";
+    f.mesh = {};
+  } else if (worst_shape(f.mesh) < kWorstShape) {
     j.grade = Grade::kFlat;
     f.fault = "flat tetrahedra";
-  } else if (pieces > 1) {
+  } else if (error > kWorstVolume || pieces > 1) {
     j.grade = Grade::kInaccurate;
-    f.fault = "it came apart into " + std::to_string(pieces) + " pieces";
-  } else if (error > kWorstVolume) {
-    j.grade = Grade::kInaccurate;
-    f.fault = "its volume is " + percent(error) + " off";
-  } else if (!surface_quality(boundary_surface(f.mesh).surface).closed_manifold()) {
-    j.grade = Grade::kPinched;
-    f.fault = "its boundary touches itself along edges";
+    f.fault = "its volume is " + percent(error) + " off, in " + std::to_string(pieces) + " pieces";
   } else {
     j.grade = Grade::kGood;
   }
@@ -100,7 +86,7 @@ Judged judge(MeshedBody meshed, const Body& body) {
 
 struct Attempt {
   double cell_size = 0.0;
-  bool keep_sharp_edges = false, manifold = false;
+  bool keep_sharp_edges = false;
 };
 
 Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
@@ -110,15 +96,15 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
                              {.cell_size = size,
                               .facet_distance = kFacetDistancePerCell,
                               .keep_sharp_edges = how.keep_sharp_edges,
-                              .manifold = how.manifold,
                               .max_nodes = static_cast<std::size_t>(kRunaway * expected) + kFewNodes}),
                    *body.body);
   j.filled.sharp_edges_kept = how.keep_sharp_edges;
-  j.cell_size = how.cell_size;
   return j;
 }
 
 }  // namespace
+
+double MeasuredBody::nodes_to_resolve() const { return expected_nodes(kLeastSize * cell_size); }
 
 double MeasuredBody::expected_nodes(double smallest) const {
   return internal::expected_nodes(samples, body->volume, cell_size, smallest);
@@ -158,7 +144,7 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
   };
   Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
   int failures = 0;
-  for (int i = 0; i < kTries && failures < kFailures && best.grade > Grade::kPinched; ++i, how.cell_size *= kFiner) {
+  for (int i = 0; i < kTries && failures < kFailures && best.grade != Grade::kGood; ++i, how.cell_size *= kFiner) {
     bool failed = attempt(how) == Grade::kNone;
     if (failed && how.keep_sharp_edges) {
       how.keep_sharp_edges = false;
@@ -166,9 +152,7 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
     }
     failures += failed ? 1 : 0;
   }
-  if (best.grade > Grade::kPinched && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
-  if (best.grade == Grade::kPinched)
-    attempt({.cell_size = best.cell_size, .keep_sharp_edges = best.filled.sharp_edges_kept, .manifold = true});
+  if (best.grade != Grade::kGood && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
   best.filled.tries = tries;
   return best.filled;
 }

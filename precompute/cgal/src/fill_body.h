@@ -16,6 +16,8 @@ struct MeasuredBody {
   std::vector<ThicknessSample> samples;
   /// Of a mesh whose cells are not made smaller than `smallest` for what is thin.
   double expected_nodes(double smallest) const;
+  /// Of a mesh with a cell across everything that is thin.
+  double nodes_to_resolve() const;
 };
 
 /// @param cell_size wanted; a body of few cells gets smaller ones
@@ -33,9 +35,9 @@ struct FilledBody {
   Index dropped_tets = 0;  ///< of stray pieces
 };
 
-/// The first good mesh, or else the best: without flat tets, in one piece and within a tenth of the body's volume. A
-/// mesh that is not good is made again with smaller cells, a few times, and without the sharp edges where it cannot be
-/// made with them.
+/// The first good mesh, or else the best; if that is less than half of the body's volume, none. Good is: without flat
+/// tets, in one piece and within a tenth of the body's volume. A mesh that is not good is made again with smaller
+/// cells, a few times, and without the sharp edges where it cannot be made with them.
 FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_edges);
 
 }  // namespace limber::internal

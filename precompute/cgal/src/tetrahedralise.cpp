@@ -193,11 +193,12 @@ void add_body(const MeasuredBody& body, const std::string& which, bool keep_shar
   result.sharp_edges_kept = result.sharp_edges_kept && filled.sharp_edges_kept;
   const std::string sized = "tetrahedralise: " + which + " (diagonal " + text(body.body->diagonal) + " m, cells of " +
                             text(body.cell_size) + " m, " + text(result.smallest_cell) + " m where it is thin): ";
+  const std::string way_out = "; its thin parts ask for " + text(body.nodes_to_resolve()) +
+                              " nodes in all: try max_nodes (--max-nodes) above that, or another cell size";
   if (filled.mesh.tets.empty())
-    throw ComputationError(sized + filled.fault + " in " + std::to_string(filled.tries) +
-                           " tries, expected a mesh; try a larger budget of nodes, or another cell size");
-  if (!filled.fault.empty())
-    warnings.push_back(sized + filled.fault + "; try a larger budget of nodes, or a smaller cell size");
+    throw ComputationError(sized + filled.fault + " in the best of " + std::to_string(filled.tries) +
+                           " tries, expected a mesh" + way_out);
+  if (!filled.fault.empty()) warnings.push_back(sized + filled.fault + way_out);
   if (filled.dropped_tets > 0)
     warnings.push_back("tetrahedralise: " + which + ": " + std::to_string(filled.dropped_tets) +
                        " stray tetrahedra, joined to the rest by less than a face, have been dropped");

@@ -19,12 +19,13 @@ namespace limber {
 
 struct TetrahedralisationOptions {
   /// Largest tet circumradius, m, which the last step (exudation of slivers) may exceed by a few per cent; 0: 1/40 of
-  /// the bounding box's diagonal. A body less than eight cells across gets smaller ones.
+  /// the bounding box's diagonal. A body less than eight cells across gets smaller ones, and so do parts and gaps that
+  /// are thinner than a cell (see max_nodes).
   double cell_size = 0.0;
   double alpha = 0.0;  ///< narrowest gap that the wrap enters, m; 0: 1/50 of the diagonal. Clean surfaces ignore it.
   /// Nodes that may be spent on parts and gaps thinner than the cell size, whose cells are made as small as they are
   /// thin; a mesh of cells of one size is made whatever it takes. ≥ 1
-  int max_nodes = 40'000;
+  int max_nodes = 60'000;
   /// Told each stage as it begins, in the thread that calls.
   std::function<void(const std::string&)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
@@ -43,8 +44,9 @@ struct Tetrahedralisation {
 };
 
 /// Deterministic: fixed seeds, one thread, no time limits.
-/// @throws InvalidArgument for wrong options, InputError if the surface is not valid (see validate()), ComputationError
-/// if no tet comes out (too thin for the cell size, say) or more than 20 million would, with what to try
+/// @throws InvalidArgument for wrong options, InputError if the surface is not valid (see validate()) or lies in one
+/// plane, ComputationError if no mesh comes out (too thin for the budget of nodes, say) or one of more than 20 million
+/// tets would, with what to try
 Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const TetrahedralisationOptions& options,
                                   Warnings& warnings);
 
