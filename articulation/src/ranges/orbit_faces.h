@@ -75,13 +75,15 @@ class FacesAround {
 };
 
 /// Sets OrbitFace::narrow. @param slope at which a face stands, see OrbitPiece. @param width across the motion, length
-void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces);
+/// @param crease angle below which a face continues another, rad
+void mark_narrow(const PathFrame& frame, double slope, double width, double crease, std::vector<OrbitFace>& faces);
 
 /// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
 /// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.
+/// @param crease see mark_narrow()
 std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
                                                                           std::span<const OrbitBody> moving,
                                                                           std::span<const OrbitBody> fixed,
-                                                                          double margin);
+                                                                          double margin, double crease);
 
 }  // namespace limber::internal

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "limber/articulation/assembly.h"
+#include "limber/articulation/crease_angle.h"
 #include "limber/core/jobs.h"
 
 namespace limber {
@@ -44,14 +45,15 @@ enum class ContactMethod {
 
 struct ContactRegionOptions {
   ContactMethod method = ContactMethod::kNearest;
-  int samples = 3000;            ///< wanted on each side; 100 … 100,000
-  double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
-  double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
-  double search = 0.025;         ///< largest gap, of the smaller component's diagonal; > 0
-  double largest_gap = 0.025;    ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
-  double hull_growth = 0.01;     ///< kHulls: of the smaller component's diagonal; > 0, at most `search`
-  double concavity = 0.01;       ///< kHulls: of a piece at most, of its component's diagonal; > 0
-  void validate() const;         ///< @throws InvalidArgument naming the field
+  int samples = 3000;           ///< wanted on each side; 100 … 100,000
+  double facing_cosine = -0.8;  ///< normals whose product is below face each other; −1 … 0
+  /// rad (50°), 0 … π: sharper edges stay sharp in the normals. As in FreeMotionOptions.
+  double crease_angle = kDefaultCreaseAngle;
+  double search = 0.025;       ///< largest gap, of the smaller component's diagonal; > 0
+  double largest_gap = 0.025;  ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
+  double hull_growth = 0.01;   ///< kHulls: of the smaller component's diagonal; > 0, at most `search`
+  double concavity = 0.01;     ///< kHulls: of a piece at most, of its component's diagonal; > 0
+  void validate() const;       ///< @throws InvalidArgument naming the field
 };
 
 /// Contacts of all pairs of components, ordered by (a, b). Pairs without a contact are absent.

@@ -27,6 +27,7 @@
 #include <span>
 #include <vector>
 
+#include "limber/articulation/crease_angle.h"
 #include "limber/core/types.h"
 #include "limber/mesh/surface_mesh.h"
 #include "limber/model/joint_spec.h"
@@ -53,8 +54,10 @@ struct FreeMotionOptions {
   double tolerance = 0.0;        ///< δ to start with, length; ≥ 0; 0: 2e-4 of the smaller body's diagonal
   double largest_overlap = 0.0;  ///< δ at most, length; ≥ 0; 0: 2e-2 of the smaller body's diagonal
   int samples = 1000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
-  bool reachable_only = false;   ///< saves the work of following the ends of `others`
-  void validate() const;         ///< @throws InvalidArgument naming the field
+  /// rad (50°), 0 … π: a face that bends by less from the next one continues it. As in ContactRegionOptions.
+  double crease_angle = kDefaultCreaseAngle;
+  bool reachable_only = false;  ///< saves the work of following the ends of `others`
+  void validate() const;        ///< @throws InvalidArgument naming the field
 };
 
 /// Where a motion ends.
@@ -82,6 +85,7 @@ FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const Motio
 
 /// How far the facets of a surface stay from the smooth surface they stand for, within a box: the largest w/2 ·
 /// tan(α/4) over edges that bend by α less than `crease` (rad) between facets of width w.
-double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high, double crease = 0.8727);
+double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high,
+                     double crease = kDefaultCreaseAngle);
 
 }  // namespace limber
