@@ -18,6 +18,15 @@
 namespace limber {
 namespace {
 
+using internal::ContactsTuning;
+using internal::ConvexPieces;
+using internal::inside_samples;
+using internal::near_samples;
+using internal::NearSample;
+using internal::SmoothSurface;
+using internal::TriangleTree;
+using internal::tuning;
+
 void require(bool holds, const std::string& field, double value, const std::string& expected) {
   if (!holds)
     throw InvalidArgument("ContactRegionOptions: " + field + " is " + std::to_string(value) + ", expected " + expected);
@@ -81,9 +90,6 @@ std::vector<Pair> near_pairs(const Parts& parts, double search) {
             [](const Pair& p, const Pair& q) { return std::pair(p.a, p.b) < std::pair(q.a, q.b); });
   return out;
 }
-
-using internal::ContactsTuning;
-using internal::tuning;
 
 struct BothSides {
   std::vector<NearSample> a, b;
@@ -240,8 +246,8 @@ void quieten(BothSides& sides) {
     return;
   }
   BothSides quiet = sides;
-  average_patches(quiet.a);
-  average_patches(quiet.b);
+  internal::average_patches(quiet.a);
+  internal::average_patches(quiet.b);
   if (normal_spread(quiet) < tuning().contacts.quieter * before) sides = std::move(quiet);
 }
 

@@ -10,7 +10,7 @@
 #include "constants.h"
 #include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// A part of a triangle.
@@ -28,9 +28,6 @@ struct Piece {
     return std::abs(m.determinant());
   }
 };
-
-using internal::ContactsTuning;
-using internal::tuning;
 
 /// The two halves across the longest edge; of edges of one length across the first.
 std::array<Piece, 2> halves(const SmoothSurface& surface, const Piece& piece) {
@@ -157,8 +154,7 @@ class NearPart {
 
 /// The i-th of the R2 sequence, which fills the unit square evenly.
 Eigen::Vector2d even_point(std::size_t i) {
-  const double x = 0.5 + internal::kEvenFirst * static_cast<double>(i + 1),
-               y = 0.5 + internal::kEvenSecond * static_cast<double>(i + 1);
+  const double x = 0.5 + kEvenFirst * static_cast<double>(i + 1), y = 0.5 + kEvenSecond * static_cast<double>(i + 1);
   return {x - std::floor(x), y - std::floor(y)};
 }
 
@@ -356,4 +352,4 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
   return out;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -7,7 +7,7 @@
 
 #include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// A loop of vertices in the direction of the surface's triangles.
@@ -82,7 +82,7 @@ std::pair<std::vector<Triangle>, double> least_fan(const SurfaceMesh& surface, c
 
 std::optional<std::vector<Triangle>> small_hole_caps(const SurfaceMesh& surface) {
   constexpr double kNoVolume = 1e-9;  // per area^1.5: the round-off of a sheet drawn from both sides
-  const internal::PartsTuning& t = internal::tuning().parts;
+  const PartsTuning& t = tuning().parts;
   double area = 0.0;
   for (const Triangle& triangle : surface.triangles) area += area_of(surface, triangle);
   SurfaceMesh closed = surface;
@@ -98,4 +98,4 @@ std::optional<std::vector<Triangle>> small_hole_caps(const SurfaceMesh& surface)
                                closed.triangles.end());
 }
 
-}  // namespace limber
+}  // namespace limber::internal

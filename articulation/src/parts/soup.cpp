@@ -10,7 +10,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 struct CellHash {
@@ -90,7 +90,7 @@ void join_at_edge(std::span<const SoupSide> sides, DisjointSets& sets) {
     double angle;
     std::size_t i, j;
   };
-  const double fold = internal::tuning().parts.soup_fold;
+  const double fold = tuning().parts.soup_fold;
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < sides.size(); ++i)
     for (std::size_t j = i + 1; j < sides.size(); ++j) {
@@ -151,4 +151,4 @@ void propose_by_open_edges(Assembly& assembly) {
           {{pair.first, pair.second}, std::to_string(count) + " open edges of the two lie on each other"});
 }
 
-}  // namespace limber
+}  // namespace limber::internal

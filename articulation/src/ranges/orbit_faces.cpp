@@ -67,7 +67,7 @@ class SideOnPath {
     return out;
   }
 
-  /// The same by the boxes of their clusters of triangles.
+  /// The same by the leaves of their trees.
   OrbitBox close_reach(const OrbitBox& reach) const;
 
   /// Finds the triangles that orbits within `reach` can meet.
@@ -89,7 +89,7 @@ class SideOnPath {
   }
 
  private:
-  /// Calls use(body, box around the orbits, triangles) for clusters that may come within `reach`.
+  /// Calls use(body, box around the orbits, triangles) for leaves of the bodies' trees that may come within `reach`.
   template <class Use>
   void visit(const OrbitBox& reach, Use&& use) const;
   void add_candidate(Index body, Index triangle, VertexNumbers& numbers, const OrbitBox& reach,
@@ -110,14 +110,18 @@ class SideOnPath {
 template <class Use>
 void SideOnPath::visit(const OrbitBox& reach, Use&& use) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    if (!around_[b].overlaps(reach)) continue;
+    if (bodies_[b].triangles() == 0 || !around_[b].overlaps(reach)) continue;
     OrbitBox around;
-    bodies_[b].clusters->visit(
-        [&](const Eigen::AlignedBox3d& box) {
-          around = frame_.box_around(box);
+    const CornerTree<3>& tree = *bodies_[b].tree;
+    tree.any_leaf(
+        [&](std::size_t node) {
+          around = frame_.box_around(tree.box(node));
           return around.overlaps(reach);
         },
-        [&](std::span<const Index> triangles) { use(static_cast<Index>(b), around, triangles); });
+        [&](Index first, Index end) {
+          use(static_cast<Index>(b), around, tree.elements(first, end));
+          return false;
+        });
   }
 }
 
@@ -368,6 +372,20 @@ FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
       faces_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
 }
 
+/// Of a surface's own triangles and its caps, numbered one after the other.
+std::shared_ptr<const CornerTree<3>> tree_of(const SurfaceMesh& surface, std::span<const Triangle> caps) {
+  constexpr std::size_t kLeaf = 8;  // triangles: bounds of orbits cost more than boxes
+  std::vector<CornerTree<3>::Corners> all;
+  all.reserve(surface.triangles.size() + caps.size());
+  for (const auto triangles : {std::span(surface.triangles), caps})
+    for (const Triangle& t : triangles)
+      all.push_back({surface.vertices[static_cast<std::size_t>(t[0])], surface.vertices[static_cast<std::size_t>(t[1])],
+                     surface.vertices[static_cast<std::size_t>(t[2])]});
+  auto tree = std::make_shared<CornerTree<3>>();
+  if (!all.empty()) tree->build(all, kLeaf);
+  return tree;
+}
+
 OrbitBody orbit_body(const MotionBody& body) {
   OrbitBody out{body.surface, body.closed};
   out.caps = body.caps;
@@ -379,7 +397,7 @@ OrbitBody orbit_body(const MotionBody& body) {
     out.inside_out = enclosed_volume(with_caps) < 0.0;
   }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
-  out.clusters = std::make_shared<const TriangleClusters>(*body.surface, body.caps);
+  out.tree = tree_of(*body.surface, body.caps);
   out.sharp = std::make_shared<const std::vector<SharpEdge>>(sharp_edges(*body.surface));
   return out;
 }

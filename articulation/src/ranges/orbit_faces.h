@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "parts/triangle_clusters.h"
+#include "limber/mesh/corner_tree.h"
 #include "ranges/path_frame.h"
 
 namespace limber::internal {
@@ -27,7 +27,7 @@ struct OrbitBody {
   Eigen::AlignedBox3d box{};
   std::span<const Triangle> caps{};                       ///< over small holes
   std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
-  std::shared_ptr<const TriangleClusters> clusters{};     ///< of all triangles, with caps; copies share them
+  std::shared_ptr<const CornerTree<3>> tree{};            ///< of all triangles, with caps; copies share it
 
   std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
   const Triangle& triangle(std::size_t i) const {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "constants.h"
+#include "limber/mesh/closest_point.h"
 #include "tuning.h"
 
 namespace limber::internal {
@@ -17,21 +17,7 @@ double area(const OrbitFace& f) {
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
 }
 
-/// The point of a triangle nearest to q: that of its plane if it lies inside, else the nearest of its sides.
-Vec3 nearest_point(const OrbitFace& f, const Vec3& q) {
-  const Vec3& n = f.normal;
-  bool inside = n.squaredNorm() > 0.0;
-  Vec3 best = f.corners[0];
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3 &a = f.corners[i], d = f.corners[(i + 1) % 3] - a;
-    if (d.cross(q - a).dot(n) < 0.0) inside = false;
-    const double length2 = d.squaredNorm();
-    const Vec3 p = a + (length2 > 0.0 ? std::clamp(d.dot(q - a) / length2, 0.0, 1.0) : 0.0) * d;
-    if (const double distance = (q - p).squaredNorm(); distance < least) least = distance, best = p;
-  }
-  return inside ? Vec3(q - n.dot(q - f.corners[0]) * n) : best;
-}
+Vec3 nearest_point(const OrbitFace& f, const Vec3& q) { return closest_on_triangle(q, f.corners).point; }
 
 /// Running sums of a measure, for points at even distances along it.
 template <class Items, class Measure>

@@ -48,7 +48,7 @@ DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const Slippage
   out.reasons = {contact_in_words(regions), slippage.hypotheses.front().reason};
   for (std::size_t i = 1; i < slippage.hypotheses.size(); ++i)
     if (i == 1 || slippage.hypotheses[i].confidence > internal::tuning().types.worth_telling)
-      out.alternatives.push_back(slippage.hypotheses[i]);
+      out.other_hypotheses.push_back(slippage.hypotheses[i]);
   out.contact_points = points_of(regions);
   out.influence = box_around(out.contact_points, out.joint.frame.axes);
   for (const ContactRegion& r : regions) out.gap = std::max(out.gap, r.gap);

@@ -7,13 +7,13 @@
 
 #include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Weights that fall with the square root of how much area has a similar normal: a wide plate does not drown the small
 /// peg under it. The floor keeps normals that are nothing but noise from counting for much.
 std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
-  const internal::TypesTuning& t = internal::tuning().types;
+  const TypesTuning& t = tuning().types;
   const std::size_t stride = 1 + points.size() / t.similar_compared;
   const std::size_t count = (points.size() + stride - 1) / stride;
   // By coordinate, so that several are compared at once.
@@ -119,4 +119,4 @@ Eigen::MatrixXd MotionSpace::complement(const Eigen::MatrixXd& basis) const {
   return svd.matrixV().rightCols(6 - basis.cols());
 }
 
-}  // namespace limber
+}  // namespace limber::internal

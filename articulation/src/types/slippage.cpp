@@ -12,13 +12,19 @@
 #include "tuning.h"
 #include "types/joint_frame.h"
 #include "types/motion_space.h"
-#include "types/second_reading.h"
+#include "types/other_hypotheses.h"
 
 namespace limber {
 namespace {
 
+using internal::cross_matrix;
+using internal::Motion;
+using internal::MotionSpace;
+using internal::rotation_about;
+using internal::translation_along;
 using internal::tuning;
 using internal::TypesTuning;
+using internal::WeightedPoint;
 
 /// One family of motions fitted to a contact, in the contact's own coordinates.
 struct Family {
@@ -291,8 +297,8 @@ JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double 
   JointHypothesis out;
   out.joint.type = judged.family.type;
   out.joint.pitch = judged.family.pitch * space.scale();
-  out.joint.frame =
-      joint_frame(judged.family.type, judged.family.axis, space.to_input(judged.family.origin), space.middles());
+  out.joint.frame = internal::joint_frame(judged.family.type, judged.family.axis, space.to_input(judged.family.origin),
+                                          space.middles());
   out.slippage = judged.slippage;
   out.reason = reason(judged, threshold);
   return out;
@@ -318,8 +324,8 @@ JointType type_by_ratio(const MotionSpace& space, double ratio, std::array<doubl
   return rotations > 0 ? JointType::kRevolute : JointType::kPrismatic;
 }
 
-/// All readings of a contact as it stands.
-Slippage readings(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
+/// All hypotheses of a contact as it stands.
+Slippage hypotheses_of(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
   const MotionSpace space(regions);
   Slippage out;
   out.threshold = options.threshold + space.spread();
@@ -398,9 +404,10 @@ bool slides_along(const JointSpec& joint, const Vec3& direction) {
 }
 
 /// A drawer at its stop touches what a peg in a blind hole touches, a piston at its dead centre what a pin with a head
-/// does. What would slide but for one face that holds one way only stays among the readings, with a share of the first
-/// one's confidence. It does not overtake: nothing in the geometry tells the two apart.
-void add_reading_with_stop(const std::vector<ContactRegion>& regions, const SlippageOptions& options, Slippage& out) {
+/// does. What would slide but for one face that holds one way only stays among the hypotheses, with a share of the
+/// first one's confidence. It does not overtake: nothing in the geometry tells the two apart.
+void add_hypothesis_with_stop(const std::vector<ContactRegion>& regions, const SlippageOptions& options,
+                              Slippage& out) {
   const TypesTuning& t = tuning().types;
   JointHypothesis& first = out.hypotheses.front();
   if (first.joint.type != JointType::kFixed && first.joint.type != JointType::kRevolute) return;
@@ -410,11 +417,11 @@ void add_reading_with_stop(const std::vector<ContactRegion>& regions, const Slip
   std::size_t left = 0;
   for (const ContactRegion& r : rest) left += r.on_a.size() + r.on_b.size();
   if (left < t.stop_fewest) return;
-  JointHypothesis free = readings(rest, options).hypotheses.front();
+  JointHypothesis free = hypotheses_of(rest, options).hypotheses.front();
   if (!slides_along(free.joint, *stop)) return;
-  free.confidence = share_of_first(t.stop_share * free.confidence, out);
+  free.confidence = internal::share_of_first(t.stop_share * free.confidence, out);
   free.reason = "the face that holds it one way only may be a stop; without it " + free.reason;
-  replace_reading(std::move(free), out);
+  internal::replace_hypothesis(std::move(free), out);
 }
 
 }  // namespace
@@ -431,10 +438,10 @@ Slippage analyse_slippage(const std::vector<ContactRegion>& regions, const Slipp
   std::size_t samples = 0;
   for (const ContactRegion& r : regions) samples += r.on_a.size() + r.on_b.size();
   if (samples == 0) throw InvalidArgument("analyse_slippage: the contact has no samples");
-  Slippage out = readings(regions, options);
+  Slippage out = hypotheses_of(regions, options);
   if (options.method == SlippageMethod::kFixedRatio) return out;
-  add_reading_with_stop(regions, options, out);
-  add_reading_of_flange(regions, out);
+  add_hypothesis_with_stop(regions, options, out);
+  internal::add_hypothesis_of_flange(regions, out);
   return out;
 }
 

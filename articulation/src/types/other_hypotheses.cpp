@@ -1,4 +1,4 @@
-#include "types/second_reading.h"
+#include "types/other_hypotheses.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -9,12 +9,12 @@
 
 #include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// The middle of a flat contact whose outline is a circle, as far as facets and samples tell.
 std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regions, const JointFrame& plane) {
-  const internal::TypesTuning& t = internal::tuning().types;
+  const TypesTuning& t = tuning().types;
   using Plane = Eigen::Vector2d;
   std::vector<std::pair<Plane, double>> points;  // with area
   for (const ContactRegion& r : regions)
@@ -53,17 +53,17 @@ double share_of_first(double share, Slippage& out) {
   return taken;
 }
 
-void replace_reading(JointHypothesis reading, Slippage& out) {
+void replace_hypothesis(JointHypothesis hypothesis, Slippage& out) {
   const auto others = out.hypotheses.begin() + 1;
   out.hypotheses.erase(std::remove_if(others, out.hypotheses.end(),
-                                      [&](const JointHypothesis& h) { return h.joint.type == reading.joint.type; }),
+                                      [&](const JointHypothesis& h) { return h.joint.type == hypothesis.joint.type; }),
                        out.hypotheses.end());
-  out.hypotheses.push_back(std::move(reading));
+  out.hypotheses.push_back(std::move(hypothesis));
   std::stable_sort(out.hypotheses.begin() + 1, out.hypotheses.end(),
                    [](const JointHypothesis& x, const JointHypothesis& y) { return x.confidence > y.confidence; });
 }
 
-void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
+void add_hypothesis_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
   JointHypothesis& first = out.hypotheses.front();
   if (first.joint.type != JointType::kPlanar) return;
   const auto middle = middle_of_round_face(regions, first.joint.frame);
@@ -73,10 +73,10 @@ void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& 
   const Mat3& plane = first.joint.frame.axes;
   turns.joint.frame.origin = *middle;
   turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
-  turns.confidence = share_of_first(internal::tuning().types.round_share, out);
+  turns.confidence = share_of_first(tuning().types.round_share, out);
   turns.reason =
       "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
-  replace_reading(std::move(turns), out);
+  replace_hypothesis(std::move(turns), out);
 }
 
-}  // namespace limber
+}  // namespace limber::internal
