@@ -93,7 +93,6 @@ std::vector<Number> sheet_of(Tuning& tuning) {
           {"contacts.first_look", kPlain, kJoints, &c.first_look},
           {"contacts.matters", kShare, kJoints, &c.matters},
           {"contacts.surplus_pieces", kPlain, kJoints, &c.surplus_pieces},
-          {"contacts.finest_piece", kShare, kJoints, &c.finest_piece},
           {"contacts.own_point", kShare, kJoints, &c.own_point},
           {"contacts.loose_facing", kCosine, kJoints, &c.loose_facing},
           {"contacts.facet_facing", kCosine, kJoints, &c.facet_facing},

@@ -42,8 +42,6 @@ struct ContactsTuning {
   /// A part of the wanted pieces, 4 … 20 as a divisor: by how many too many the pieces of one size may exceed it, since
   /// pieces of one size are halved together. Not measured.
   std::size_t surplus_pieces = 8;
-  /// Of the reach, 0.1 … 0.5: pieces of a smaller radius are not halved. Not measured.
-  double finest_piece = 0.25;
   /// Of a point's area, 0.5 … 1: a triangle of more has points of its own. Near 1/√2, halfway between no and one point
   /// by ratio of areas, where larger pieces change from one number of points to the next, too.
   double own_point = 0.7;

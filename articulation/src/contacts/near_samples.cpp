@@ -57,9 +57,9 @@ class NearPart {
   NearPart(const SmoothSurface& surface, double reach, SomePlace some_place)
       : surface_(surface), reach_(reach), some_place_(std::move(some_place)) {}
 
-  /// Pieces in the order of their triangles, until most of their area matters, there are `most`, or the largest has the
-  /// radius `finest`. @param box what matters lies in it
-  std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most, double finest) {
+  /// Pieces in the order of their triangles, until most of their area matters or there are `most`. @param box around
+  /// all that matters
+  std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most) {
     for (std::size_t t = 0; t < surface_.mesh().triangles.size(); ++t) {
       Eigen::AlignedBox3d own;
       for (const Index v : surface_.mesh().triangles[t])
@@ -67,8 +67,7 @@ class NearPart {
       if (!box.intersects(own)) continue;
       push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, kUnknown});
     }
-    for (std::size_t next_look = tuning().contacts.first_look;
-         !heap_.empty() && heap_.size() < most && heap_.front().first > finest;) {
+    for (std::size_t next_look = tuning().contacts.first_look; !heap_.empty() && heap_.size() < most;) {
       if (heap_.size() >= next_look) {
         if (mostly_matters()) break;
         next_look = 2 * heap_.size();
@@ -313,8 +312,7 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
   Eigen::AlignedBox3d box = other.tree().box();
   box.min().array() -= reach;
   box.max().array() += reach;
-  const auto pieces =
-      NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted), t.finest_piece * reach);
+  const auto pieces = NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted));
 
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
@@ -340,7 +338,7 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
     const double distance = box.exteriorDistance(from);
     return distance <= limit ? std::optional(distance) : std::nullopt;
   };
-  const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted), 0.0);
+  const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted));
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
     const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
