@@ -165,13 +165,13 @@ def cross(a, b):
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def off_by(robot, reading, origin, axis):
-    """Degrees between the axes and their distance in diagonals; infinite where the reading has no axis."""
-    if reading["axis"] is None:
+def off_by(robot, hypothesis, origin, axis):
+    """Degrees between the axes and their distance in diagonals; infinite where the hypothesis has no axis."""
+    if hypothesis["axis"] is None:
         return math.inf, math.inf
-    x = reading["axis"]
+    x = hypothesis["axis"]
     angle = math.atan2(math.dist(cross(x, axis), [0, 0, 0]), abs(sum(p * q for p, q in zip(x, axis))))
-    off = [p - q for p, q in zip(reading["origin"], origin)]
+    off = [p - q for p, q in zip(hypothesis["origin"], origin)]
     return math.degrees(angle), math.dist(cross(off, axis), [0, 0, 0]) / robot.diagonal()
 
 
@@ -186,14 +186,14 @@ def compare(robot, joints):
         if not found:
             print("  axis %d: no joint found" % k)
             continue
-        for rank, reading in enumerate([found[0]] + found[0]["alternatives"][:2]):
-            angle, distance = off_by(robot, reading, origin, axis)
+        for rank, hypothesis in enumerate([found[0]] + found[0]["alternatives"][:2]):
+            angle, distance = off_by(robot, hypothesis, origin, axis)
             line = angle <= 0.5 and distance <= 1e-3
-            good = line and reading["type"] == "revolute"
+            good = line and hypothesis["type"] == "revolute"
             lines += line and rank == 0
             right += good and rank == 0
             print("  axis %d%s: %s (%.2f), %.3f degrees off, %.1e diagonals away%s" %
-                  (k, ", or" if rank else "", reading["type"], reading["confidence"], angle, distance,
+                  (k, ", or" if rank else "", hypothesis["type"], hypothesis["confidence"], angle, distance,
                    ", right" if good else ""))
     for j in joints:
         if frozenset((j["a"], j["b"])) not in expected:

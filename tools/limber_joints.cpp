@@ -288,7 +288,7 @@ std::string joint_text(const Work& work, std::size_t number, bool explain, bool 
   text += fmt::format("      {} at {}, axis {}\n", kind_text(j.joint), point_text(j.joint.frame.origin),
                       point_text(j.joint.frame.axes.col(column)));
   for (const std::string& reason : j.reasons) text += "      " + reason + "\n";
-  for (const JointHypothesis& h : j.alternatives)
+  for (const JointHypothesis& h : j.other_hypotheses)
     text += fmt::format("      or {} ({:.2f}): {}\n", kind_text(h.joint), h.confidence, h.reason);
   return text;
 }

@@ -16,6 +16,7 @@ namespace {
 
 using assemblies::MadeAssembly;
 using assemblies::make;
+using assemblies::taken_apart;
 using assemblies::Variant;
 
 std::vector<std::string> all_names() {
@@ -32,10 +33,6 @@ DetectionOptions quick() {
   return out;
 }
 
-Assembly taken_apart(const MadeAssembly& made) {
-  return find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
-}
-
 std::vector<DetectedJoint> joints_of(const MadeAssembly& made) {
   TbbJobs jobs;
   return detect_joints(taken_apart(made), quick(), jobs);
@@ -45,15 +42,28 @@ struct Share {
   int all = 0, right = 0, extra = 0;
   double axis = 0.0, origin = 0.0;  ///< worst of those read right
   std::string wrong;
-
-  double part() const { return static_cast<double>(right) / all; }
 };
 
+/// What docs/joints.md says of a class of variants: every joint is right, none is found where there is none, and the
+/// worst errors are as told there. Those are rounded to the nearest, so half a unit of their last digit is allowed.
+struct Claim {
+  double axis = 0.02, axis_digit = 0.01;      ///< degrees
+  double origin = 4e-5, origin_digit = 1e-5;  ///< of the diagonal
+};
+
+void expect_claimed(const Share& share, const Claim& claim, const std::string& where) {
+  EXPECT_EQ(share.right, share.all) << where << ": " << share.wrong;
+  EXPECT_EQ(share.extra, 0) << where << ": " << share.wrong;
+  EXPECT_LT(share.axis, claim.axis + 0.5 * claim.axis_digit) << where;
+  EXPECT_LT(share.origin, claim.origin + 0.5 * claim.origin_digit) << where;
+}
+
+/// With the options that docs/joints.md is about: the defaults.
 Share share_right(const std::vector<std::string>& names, const Variant& variant, bool with_balls = true) {
   Share out;
   TbbJobs jobs;
   for (const std::string& name : names) {
-    const auto score = assemblies::scored(make(name, variant), quick(), jobs);
+    const auto score = assemblies::scored(make(name, variant), {}, jobs);
     for (const auto& joint : score.joints) {
       if (!with_balls && joint.truth == static_cast<int>(JointType::kBall)) continue;
       ++out.all;
@@ -83,39 +93,43 @@ TEST(Assemblies, EveryShellIsClosedAndLooksOutward) {
 }
 
 TEST(DetectJoints, AllTypesAreRightAt32Segments) {
-  const Share share = share_right(all_names(), {.segments = 32, .clearance = 0.005});
-  EXPECT_GE(share.part(), 0.97) << share.wrong;
-  EXPECT_EQ(share.extra, 0) << share.wrong;
-  EXPECT_LT(share.axis, 0.5);     // degrees
-  EXPECT_LT(share.origin, 1e-3);  // of the diagonal
+  for (const double clearance : {0.0, 0.005})
+    expect_claimed(share_right(all_names(), {.segments = 32, .clearance = clearance}), {},
+                   "gap " + std::to_string(clearance));
 }
 
-TEST(DetectJoints, TouchingAndOverlappingPartsAreReadToo) {
-  const std::vector<std::string> names = {"brush arm", "scissors", "telescope", "hitch", "stack"};
-  for (const double clearance : {0.0, 0.02, -0.005}) {
-    const Share share = share_right(names, {.segments = 32, .clearance = clearance});
-    EXPECT_EQ(share.right, share.all) << clearance << ": " << share.wrong;
-    EXPECT_LT(share.axis, clearance == 0.02 ? 1.0 : 0.5);
-  }
+TEST(DetectJoints, WideBearingsAndOverlappingPartsAreReadToo) {
+  for (const double clearance : {0.02, -0.005, -0.01})
+    expect_claimed(share_right(all_names(), {.segments = 32, .clearance = clearance}), {.origin = 5e-5},
+                   "gap " + std::to_string(clearance));
 }
 
 TEST(DetectJoints, CoarseMeshesAreReadByTheirNormals) {
-  EXPECT_GE(share_right(all_names(), {.segments = 16, .clearance = 0.005}).part(), 0.95);
-  EXPECT_GE(share_right(assemblies::tuning_names(), {.segments = 8}, false).part(), 0.90);
+  for (const double clearance : {0.0, 0.005, 0.02, -0.005})
+    expect_claimed(share_right(all_names(), {.segments = 16, .clearance = clearance}),
+                   {.axis = 0.05, .origin = 2e-4, .origin_digit = 1e-4}, "16, gap " + std::to_string(clearance));
+  for (const double clearance : {0.0, 0.005})
+    expect_claimed(share_right(all_names(), {.segments = 8, .clearance = clearance}, false),
+                   {.axis = 0.07, .origin = 2e-4, .origin_digit = 1e-4}, "8, gap " + std::to_string(clearance));
 }
 
+// All but those that docs/joints.md names: parts whose bearings are a few jitters wide.
 TEST(DetectJoints, NoiseOfAThousandthOfEachPartIsBorne) {
-  const Share share =
-      share_right({"brush arm", "humanoid", "dog", "stack"}, {.segments = 32, .clearance = 0.005, .jitter = 1e-3});
-  EXPECT_GE(share.part(), 0.90) << share.wrong;
-  EXPECT_LT(share.axis, 2.0);
+  auto names = all_names();
+  std::erase_if(names, [](const std::string& name) { return name == "door" || name == "scissors" || name == "chair"; });
+  for (const double clearance : {0.0, 0.005})
+    expect_claimed(share_right(names, {.segments = 32, .clearance = clearance, .jitter = 1e-3}),
+                   {.axis = 0.92, .origin = 5e-4, .origin_digit = 1e-4}, "gap " + std::to_string(clearance));
+}
+
+TEST(DetectJoints, NoiseOfThreeTenThousandthsOfEachPartLosesNoJoint) {
+  expect_claimed(share_right(all_names(), {.segments = 32, .clearance = 0.005, .jitter = 3e-4}),
+                 {.axis = 0.42, .origin = 1e-4, .origin_digit = 1e-4}, "jitter");
 }
 
 TEST(DetectJoints, SoupAndOpenShellsAreReadLikeSolids) {
-  const std::vector<std::string> names = {"chair", "scissors", "telescope", "drawer", "piston"};
-  const Share soup = share_right(names, {.soup = true}), open = share_right(names, {.clearance = 0.005, .open = true});
-  EXPECT_EQ(soup.right, soup.all) << soup.wrong;
-  EXPECT_EQ(open.right, open.all) << open.wrong;
+  expect_claimed(share_right(all_names(), {.soup = true}), {.origin = 5e-5}, "soup");
+  expect_claimed(share_right(all_names(), {.clearance = 0.005, .open = true}), {.origin = 5e-5}, "open");
 }
 
 TEST(DetectJoints, BeadsThatTouchAtAPointMakeNoJoint) {

@@ -192,7 +192,7 @@ std::function<double(double)> polygon(int corners) {
 }
 
 // Two round flanges that meet slide as far as they show; that a bearing holds them in their middle is the second
-// reading.
+// hypothesis.
 TEST(Slippage, ARoundFlangeMayTurnAboutItsMiddle) {
   const Vec3 centre(0.3, -1.2, 4.0);
   for (const auto& radius : {std::function<double(double)>([](double) { return 1.0; }), polygon(8)}) {

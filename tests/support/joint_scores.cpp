@@ -30,10 +30,6 @@ void measure(const TrueJoint& truth, const JointSpec& found, double diagonal, Jo
   score.pitch_right = std::abs(found.pitch - truth.pitch) <= 0.02 * std::abs(truth.pitch);
 }
 
-Assembly taken_apart(const MadeAssembly& made) {
-  return find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
-}
-
 const std::string& name_of(const Assembly& assembly, Index component) {
   return assembly.components[static_cast<std::size_t>(component)].name;
 }
@@ -87,10 +83,19 @@ RangeScore compared(const TrueRange& truth, const std::optional<Interval>& found
 
 }  // namespace
 
+Assembly taken_apart(const MadeAssembly& made) {
+  return find_components(made.surface, {.rule = made.compound ? ComponentRule::kGroups : ComponentRule::kConnectivity});
+}
+
 std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs,
                                       const RangeOptions& range_options) {
   const Assembly assembly = taken_apart(made);
-  const auto joints = detect_joints(assembly, options, jobs);
+  return scored_ranges(made, assembly, detect_joints(assembly, options, jobs), jobs, range_options);
+}
+
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const Assembly& assembly,
+                                      const std::vector<DetectedJoint>& joints, Jobs& jobs,
+                                      const RangeOptions& range_options) {
   const auto ranges = ranges_of_motion(assembly, joints, range_options, jobs);
   std::vector<RangeScore> out;
   for (const TrueJoint& truth : made.joints)

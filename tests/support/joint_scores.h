@@ -30,6 +30,9 @@ struct Score {
   std::vector<std::string> extra;  ///< joints where there are none
 };
 
+/// The components of a drawn assembly: by groups where parts are drawn as several shells.
+Assembly taken_apart(const MadeAssembly& made);
+
 Score scored(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs);
 
 /// What moving, scaling or reordering an assembly changes in the joints that are found.
@@ -59,6 +62,10 @@ struct RangeScore {
 
 /// Ranges of motion against those known on paper, for the joints whose type was read right.
 std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs,
+                                      const RangeOptions& ranges = {});
+/// The same for joints that were found before.
+std::vector<RangeScore> scored_ranges(const MadeAssembly& made, const Assembly& assembly,
+                                      const std::vector<DetectedJoint>& joints, Jobs& jobs,
                                       const RangeOptions& ranges = {});
 
 struct VariantClass {

@@ -13,9 +13,19 @@
 #include "contacts/near_samples.h"
 #include "counted_progress.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
+
+using internal::ContactsTuning;
+using internal::ConvexPieces;
+using internal::inside_samples;
+using internal::near_samples;
+using internal::NearSample;
+using internal::SmoothSurface;
+using internal::TriangleTree;
+using internal::tuning;
 
 void require(bool holds, const std::string& field, double value, const std::string& expected) {
   if (!holds)
@@ -81,11 +91,13 @@ std::vector<Pair> near_pairs(const Parts& parts, double search) {
   return out;
 }
 
-constexpr std::size_t kFewest = 20;  // samples a side; fewer say nothing about a surface
-
 struct BothSides {
   std::vector<NearSample> a, b;
 };
+
+bool tell_enough(const BothSides& sides) {
+  return std::min(sides.a.size(), sides.b.size()) >= tuning().contacts.fewest_samples;
+}
 
 double area_of(const BothSides& sides) {
   double out = 0.0;
@@ -104,8 +116,6 @@ double median(std::vector<double> values) {
 /// Squared sine of the angle by which two surfaces do not look straight at each other.
 double askew(const NearSample& s) { return s.contact.normal.cross(s.contact.facing_normal).squaredNorm(); }
 
-constexpr double kRough = 3e-3;  // squared sine; smooth surfaces agree better, however coarse their facets
-
 /// What gaps belong to a contact.
 struct GapLimit {
   double between = 0.0;  ///< the surfaces that the facets stand for
@@ -114,23 +124,28 @@ struct GapLimit {
   double at(double chord_error) const { return between + std::max(facets, chord_error); }
   bool holds(const NearSample& s) const { return s.distance <= at(own_chord_error(s)); }
   /// Noise is no chord: it tilts the normals of one side only.
-  static double own_chord_error(const NearSample& s) { return askew(s) < kRough ? s.chord_error : 0.0; }
+  static double own_chord_error(const NearSample& s) {
+    return askew(s) < tuning().contacts.rough ? s.chord_error : 0.0;
+  }
 };
 
 /// A cluster grown from the smallest gaps, so that a small hinge is not swamped by large faces that run side by side
 /// further apart.
 GapLimit gap_limit(const BothSides& sides, double diagonal) {
+  const ContactsTuning& t = tuning().contacts;
   std::vector<const NearSample*> samples;
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) samples.push_back(&s);
   if (samples.empty()) return {};
-  auto grown = samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, samples.size() / 50));
+  auto grown =
+      samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, samples.size() / t.cluster_start));
   std::nth_element(samples.begin(), grown - 1, samples.end(),
-                   [](const NearSample* s, const NearSample* t) { return s->distance < t->distance; });
+                   [](const NearSample* x, const NearSample* y) { return x->distance < y->distance; });
   while (true) {
     std::vector<double> gaps, chords;
     for (auto s = samples.begin(); s != grown; ++s) gaps.push_back((*s)->distance), chords.push_back((*s)->chord_error);
-    const GapLimit limit = {2.5 * median(gaps) + 1e-4 * diagonal, 3.0 * median(chords)};
+    const GapLimit limit = {t.cluster_gaps * median(gaps) + t.cluster_least * diagonal,
+                            t.cluster_chords * median(chords)};
     const auto before = grown;
     grown = std::partition(before, samples.end(), [&](const NearSample* s) { return limit.holds(*s); });
     if (grown == before) return limit;
@@ -150,31 +165,31 @@ double normal_spread(const BothSides& sides) {
 /// Leaves out pairs that look past each other while most do not: the face at the end of a nut is near the bolt's flank
 /// and leans by 34 degrees from it. What holds for most is noise, curvature or both, and stays.
 void drop_askew(BothSides& sides) {
-  constexpr double kShare = 0.75, kTimes = 8.0, kAlways = 0.02;  // 8 degrees
+  const ContactsTuning& t = tuning().contacts;
   std::vector<double> all;
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) all.push_back(askew(s));
   if (all.empty()) return;
-  const auto most = all.begin() + static_cast<std::ptrdiff_t>(kShare * static_cast<double>(all.size() - 1));
+  const auto most = all.begin() + static_cast<std::ptrdiff_t>(t.askew_share * static_cast<double>(all.size() - 1));
   std::nth_element(all.begin(), most, all.end());
-  const double limit = kAlways + kTimes * *most;
+  const double limit = t.askew_always + t.askew_times * *most;
   for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
 /// Whether surfaces look at each other, or only edges of theirs do: past an edge the nearest point is a slanting way
 /// off.
 bool look_straight(const BothSides& sides, double diagonal) {
-  constexpr double kStraight = 0.9, kShare = 0.25;  // cosine; of the area
-  constexpr double kNothing = 1e-6;                 // of the diagonal: a way so short has no direction
+  const ContactsTuning& t = tuning().contacts;
   double straight = 0.0, all = 0.0;
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) {
       const Vec3 way = s.contact.point - s.contact.facing_point;
       const double across = std::max(std::abs(way.dot(s.contact.normal)), std::abs(way.dot(s.facing_facet)));
       all += s.contact.area;
-      if (s.distance <= kNothing * diagonal || across >= kStraight * s.distance) straight += s.contact.area;
+      if (s.distance <= t.shortest_way * diagonal || across >= t.straight_cosine * s.distance)
+        straight += s.contact.area;
     }
-  return straight > kShare * all;
+  return straight > t.straight_share * all;
 }
 
 /// What is measured over the samples of both sides.
@@ -200,7 +215,7 @@ ContactRegion summarised(const Pair& pair, const BothSides& sides) {
 /// The normal of the plane that rough samples lie in, if they do: whatever their facets say, it blocks no motion along
 /// it.
 std::optional<Vec3> plane_of(const BothSides& sides) {
-  constexpr double kFlat = 0.02;  // thickness per width, RMS
+  const double flat = tuning().contacts.flat_thickness;
   Vec3 centre = Vec3::Zero();
   Mat3 second = Mat3::Zero();
   for (const auto* side : {&sides.a, &sides.b})
@@ -210,7 +225,7 @@ std::optional<Vec3> plane_of(const BothSides& sides) {
     for (const NearSample& s : *side)
       second += s.contact.area * (s.contact.point - centre) * (s.contact.point - centre).transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(second);
-  if (solver.eigenvalues()[0] > kFlat * kFlat * solver.eigenvalues()[1]) return std::nullopt;
+  if (solver.eigenvalues()[0] > flat * flat * solver.eigenvalues()[1]) return std::nullopt;
   return solver.eigenvectors().col(0);
 }
 
@@ -223,18 +238,17 @@ void flatten(std::vector<NearSample>& samples, const Vec3& normal) {
 
 /// Takes the noise out of rough surfaces, where that makes the two sides agree better.
 void quieten(BothSides& sides) {
-  constexpr double kBetter = 0.5;
   const double before = normal_spread(sides);
-  if (before < kRough) return;
+  if (before < tuning().contacts.rough) return;
   if (const auto normal = plane_of(sides)) {
     flatten(sides.a, *normal);
     flatten(sides.b, *normal);
     return;
   }
   BothSides quiet = sides;
-  average_patches(quiet.a);
-  average_patches(quiet.b);
-  if (normal_spread(quiet) < kBetter * before) sides = std::move(quiet);
+  internal::average_patches(quiet.a);
+  internal::average_patches(quiet.b);
+  if (normal_spread(quiet) < tuning().contacts.quieter * before) sides = std::move(quiet);
 }
 
 /// Σ A n nᵀ / Σ A, eigenvalues ascending: (0, 0, 1) for a flat contact, (0, ½, ½) for a cylinder.
@@ -277,14 +291,14 @@ Cluster nearest_cluster(const BothSides& sides, double diagonal) {
 /// hinge guide nothing: the hinge stays.
 /// @param rest without what touches. Nothing if that one stands
 std::optional<Cluster> wider_cluster(const BothSides& touch, const BothSides& rest, double diagonal) {
-  constexpr double kFlat = 0.95, kGuides = 0.1, kLarger = 5.0, kMostSpread = 0.03;
-  if (touch.a.empty() || touch.b.empty() || rest.a.size() < kFewest || rest.b.size() < kFewest) return std::nullopt;
+  const ContactsTuning& t = tuning().contacts;
+  if (touch.a.empty() || touch.b.empty() || !tell_enough(rest)) return std::nullopt;
   Cluster wider = nearest_cluster(rest, diagonal);
   const BothSides& found = wider.samples;
-  if (found.a.size() < kFewest || found.b.size() < kFewest || area_of(found) < kLarger * area_of(touch))
+  if (!tell_enough(found) || area_of(found) < t.wider_area * area_of(touch)) return std::nullopt;
+  if (spread_of_directions(touch)[2] < t.stray_flat || spread_of_directions(found)[1] < t.wider_guides)
     return std::nullopt;
-  if (spread_of_directions(touch)[2] < kFlat || spread_of_directions(found)[1] < kGuides) return std::nullopt;
-  if (normal_spread(found) > kMostSpread) return std::nullopt;
+  if (normal_spread(found) > t.most_spread) return std::nullopt;
   return wider;
 }
 
@@ -323,11 +337,10 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   BothSides sides = {inside_samples(a.smooth, b.smooth, samples), inside_samples(b.smooth, a.smooth, samples)};
   (area_of({sides.a, {}}) >= area_of({{}, sides.b}) ? sides.b : sides.a).clear();
   const auto& kept = sides.a.empty() ? sides.b : sides.a;
-  if (kept.size() < kFewest) return {};
+  if (kept.size() < tuning().contacts.fewest_samples) return {};
   Vec3 mean = Vec3::Zero();
   for (const NearSample& s : kept) mean += s.contact.normal / static_cast<double>(kept.size());
-  constexpr double kOneWay = 0.6;  // a cap of 78 degrees about its pole
-  if (mean.norm() > kOneWay) return {};
+  if (mean.norm() > tuning().contacts.one_way) return {};
   ContactRegion out = summarised(pair, sides);
   out.overlapping = true;
   return {std::move(out)};
@@ -343,7 +356,7 @@ std::vector<ContactRegion> hull_contact(const Pair& pair, const Parts& parts, co
   };
   std::erase_if(sides.a, outside(b));
   std::erase_if(sides.b, outside(a));
-  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return {};
+  if (!tell_enough(sides)) return {};
   return {summarised(pair, sides)};
 }
 
@@ -351,15 +364,17 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   const Prepared &a = *parts[static_cast<std::size_t>(pair.a)], &b = *parts[static_cast<std::size_t>(pair.b)];
   const double diagonal = std::min(a.diagonal, b.diagonal), reach = options.search * diagonal;
   // A coarse look finds how wide the gap is; a fine one then spends its samples where the contact is.
-  const int coarse = std::max(100, options.samples / 4);
+  const ContactsTuning& t = tuning().contacts;
+  const int coarse =
+      static_cast<int>(std::max(t.coarse_fewest, static_cast<std::size_t>(options.samples) / t.coarse_divisor));
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
   if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
-  const double fine_reach = std::min(reach, 1.5 * contact_cluster(sides, diagonal).reach());
+  const double fine_reach = std::min(reach, t.fine_reach * contact_cluster(sides, diagonal).reach());
   sides = contact_cluster(sample(a, b, fine_reach, options.facing_cosine, options.samples), diagonal).samples;
   drop_askew(sides);
   drop_hidden(pair, parts, sides);
 
-  if (sides.a.size() < kFewest || sides.b.size() < kFewest) return overlap(pair, a, b, coarse);
+  if (!tell_enough(sides)) return overlap(pair, a, b, coarse);
   if (!look_straight(sides, diagonal)) return {};
   quieten(sides);
   ContactRegion out = summarised(pair, sides);

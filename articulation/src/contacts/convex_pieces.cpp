@@ -4,7 +4,9 @@
 #include <numeric>
 #include <span>
 
-namespace limber {
+#include "tuning.h"
+
+namespace limber::internal {
 namespace {
 
 const Vec3& corner(const SurfaceMesh& surface, Index triangle, int k) {
@@ -18,8 +20,7 @@ Vec3 centre(const SurfaceMesh& surface, Index t) {
 /// How far corners stand out from the planes of triangles at most; a convex surface has 0. Of many, every so-manieth is
 /// looked at.
 double concavity_of(const SurfaceMesh& surface, std::span<const Index> piece) {
-  constexpr std::size_t kMost = 300;
-  const std::size_t stride = 1 + piece.size() / kMost;
+  const std::size_t stride = 1 + piece.size() / tuning().contacts.hull_compared;
   double most = 0.0;
   for (std::size_t i = 0; i < piece.size(); i += stride) {
     const Vec3& a = corner(surface, piece[i], 0);
@@ -57,9 +58,8 @@ std::size_t best_cut(const SurfaceMesh& surface, std::span<Index> piece) {
 /// By Gilbert's iteration (1966): the nearest point of the hull known so far moves toward the corner that lies furthest
 /// on the way to p, until either bound of the distance tells.
 bool within_hull(const Vec3& p, const std::vector<Vec3>& corners, double distance) {
-  constexpr int kMostSteps = 100;
   Vec3 nearest = corners.front();
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (std::size_t step = 0; step < tuning().contacts.hull_steps; ++step) {
     const Vec3 v = p - nearest;
     const double length = v.norm();
     if (length <= distance) return true;
@@ -112,4 +112,4 @@ bool ConvexPieces::hold(const Vec3& p, double growth) const {
   });
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -1,4 +1,6 @@
-/// A surface cut into nearly convex pieces, as [X09] 3.1 does before it intersects hulls. Private to the module.
+/// @file convex_pieces.h
+/// A surface cut into nearly convex pieces, as [X09] 3.1 does before it intersects hulls. Private to the articulation
+/// module.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,7 +8,7 @@
 
 #include "limber/mesh/surface_mesh.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Cut in halves across the box of its triangles until no corner of a piece stands out from one of its triangles by
 /// more than a tolerance, after the approximate convex decomposition of Lien and Amato (2006). Triangles stay whole.
@@ -28,4 +30,4 @@ class ConvexPieces {
   std::vector<Piece> pieces_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -7,7 +7,10 @@
 #include <optional>
 #include <utility>
 
-namespace limber {
+#include "constants.h"
+#include "tuning.h"
+
+namespace limber::internal {
 namespace {
 
 /// A part of a triangle.
@@ -26,9 +29,6 @@ struct Piece {
   }
 };
 
-/// Lengths that differ by less are the same but for round-off: which of them comes first must not depend on the pose.
-constexpr double kSame = 1e-6;
-
 /// The two halves across the longest edge; of edges of one length across the first.
 std::array<Piece, 2> halves(const SmoothSurface& surface, const Piece& piece) {
   std::size_t longest = 0;
@@ -37,7 +37,7 @@ std::array<Piece, 2> halves(const SmoothSurface& surface, const Piece& piece) {
     const double length =
         (surface.point(piece.triangle, piece.corner[k]) - surface.point(piece.triangle, piece.corner[(k + 1) % 3]))
             .squaredNorm();
-    if (length > (1.0 + kSame) * most) most = length, longest = k;
+    if (length > (1.0 + tuning().contacts.same_length) * most) most = length, longest = k;
   }
   const std::size_t next = (longest + 1) % 3;
   const Vec3 middle = 0.5 * (piece.corner[longest] + piece.corner[next]);
@@ -57,9 +57,9 @@ class NearPart {
   NearPart(const SmoothSurface& surface, double reach, SomePlace some_place)
       : surface_(surface), reach_(reach), some_place_(std::move(some_place)) {}
 
-  /// Pieces in the order of their triangles, until most of their area matters, there are `most`, or the largest has the
-  /// radius `finest`. @param box what matters lies in it
-  std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most, double finest) {
+  /// Pieces in the order of their triangles, until most of their area matters or there are `most`. @param box around
+  /// all that matters
+  std::vector<Piece> pieces(const Eigen::AlignedBox3d& box, std::size_t most) {
     for (std::size_t t = 0; t < surface_.mesh().triangles.size(); ++t) {
       Eigen::AlignedBox3d own;
       for (const Index v : surface_.mesh().triangles[t])
@@ -67,8 +67,7 @@ class NearPart {
       if (!box.intersects(own)) continue;
       push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, kUnknown});
     }
-    constexpr std::size_t kFirstLook = 512;
-    for (std::size_t next_look = kFirstLook; !heap_.empty() && heap_.size() < most && heap_.front().first > finest;) {
+    for (std::size_t next_look = tuning().contacts.first_look; !heap_.empty() && heap_.size() < most;) {
       if (heap_.size() >= next_look) {
         if (mostly_matters()) break;
         next_look = 2 * heap_.size();
@@ -111,7 +110,6 @@ class NearPart {
 
   /// Whether smaller pieces would leave out little more: the centres of most matter themselves.
   bool mostly_matters() {
-    constexpr double kMost = 0.8;
     double all = 0.0, matters = 0.0;
     for (const auto& [radius, number] : heap_) {
       Piece& p = pieces_[number];
@@ -119,20 +117,20 @@ class NearPart {
       all += area;
       if (lies_within(p, surface_.point(p.triangle, p.centre()), reach_)) matters += area;
     }
-    return matters >= kMost * all;
+    return matters >= tuning().contacts.matters * all;
   }
 
   /// Halves all that are as large as the largest, so that it does not matter which of them comes first.
   /// @return whether it did: not if there were many more than `most` then
   bool halve_largest(std::size_t most) {
-    const double least = (1.0 - kSame) * heap_.front().first;
+    const double least = (1.0 - tuning().contacts.same_length) * heap_.front().first;
     std::vector<std::size_t> largest;
     auto left = heap_.end();
     for (; left != heap_.begin() && heap_.front().first >= least; --left) {
       largest.push_back(heap_.front().second);
       std::pop_heap(heap_.begin(), left);
     }
-    if (heap_.size() + largest.size() > most + most / 8) return false;
+    if (heap_.size() + largest.size() > most + most / tuning().contacts.surplus_pieces) return false;
     heap_.erase(left, heap_.end());
     for (const std::size_t number : largest) halve(Piece(pieces_[number]));
     return true;
@@ -153,10 +151,9 @@ class NearPart {
   std::vector<std::pair<double, std::size_t>> heap_;  ///< radius and number in pieces_, the largest first
 };
 
-/// The i-th of a sequence that fills the unit square evenly (the plastic number's powers; Roberts 2018).
+/// The i-th of the R2 sequence, which fills the unit square evenly.
 Eigen::Vector2d even_point(std::size_t i) {
-  constexpr double kA = 0.7548776662466927, kB = 0.5698402909980532;
-  const double x = 0.5 + kA * static_cast<double>(i + 1), y = 0.5 + kB * static_cast<double>(i + 1);
+  const double x = 0.5 + kEvenFirst * static_cast<double>(i + 1), y = 0.5 + kEvenSecond * static_cast<double>(i + 1);
   return {x - std::floor(x), y - std::floor(y)};
 }
 
@@ -168,12 +165,11 @@ Vec3 even_barycentric(const Piece& piece, std::size_t i) {
 
 /// Whether the way from a point to the nearest one of the other surface leads along a normal rather than along the
 /// surface. Faces side by side in one plane, which meet at an edge, do not face each other.
-/// @param nothing a way so short that it has no direction
-bool leads_across(const Vec3& way, double nothing, const Vec3& normal, const Vec3& facing_facet) {
-  constexpr double kAcross = 0.4;  // cosine: 66 degrees, as far beside the rim as a gap may vary (2.5)
+/// @param shortest a shorter way has no direction
+bool leads_across(const Vec3& way, double shortest, const Vec3& normal, const Vec3& facing_facet) {
   const double distance = way.norm();
-  return distance <= nothing ||
-         std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >= kAcross * distance;
+  return distance <= shortest ||
+         std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >= tuning().contacts.across * distance;
 }
 
 /// Calls use(triangle, barycentric, area) for the centres of 2^levels equal parts of a piece.
@@ -192,7 +188,8 @@ struct Row {
   /// How many points fall on the next area. On the end of one they count with the next, whatever the round-off.
   std::size_t next(double area) {
     const std::size_t before = points;
-    for (covered += area; (static_cast<double>(points) + 0.5 + kSame) * step < covered;) ++points;
+    for (covered += area; (static_cast<double>(points) + 0.5 + tuning().contacts.same_length) * step < covered;)
+      ++points;
     return points - before;
   }
 };
@@ -205,6 +202,7 @@ struct Row {
 /// @param pieces by triangle
 template <class Use>
 void spread_evenly(const SmoothSurface& surface, const std::vector<Piece>& pieces, int wanted, Use&& use) {
+  const ContactsTuning& t = tuning().contacts;
   double total = 0.0;
   std::vector<double> area;
   for (const Piece& p : pieces) area.push_back(p.share() * surface.area(p.triangle)), total += area.back();
@@ -221,8 +219,7 @@ void spread_evenly(const SmoothSurface& surface, const std::vector<Piece>& piece
       else
         sharing.push_back(end), small += area[end];
     }
-    constexpr double kOwn = 0.7;  // of a point's area: about where a piece has its own, too
-    const double points = std::max(std::round(small / step - kSame), whole < kOwn * step ? 0.0 : 1.0);
+    const double points = std::max(std::round(small / step - t.same_length), whole < t.own_point * step ? 0.0 : 1.0);
     Row of_triangle{small / points};
     for (const std::size_t p : sharing)
       if (points > 0.0) {
@@ -270,11 +267,10 @@ std::vector<Cell> cells_of(const std::vector<NearSample>& samples, std::size_t w
 /// matter which of several that are equally far count.
 /// @param squared distances of the cells. @param rim squared radius
 void average(NearSample& sample, const std::vector<Cell>& cells, const std::vector<double>& squared, double rim) {
-  constexpr double kSameSide = 0.5;  // cosine; what bends more is another face
   Cell mean{Vec3::Zero()};
   for (std::size_t j = 0; j < cells.size(); ++j) {
     const Cell& cell = cells[j];
-    if (squared[j] >= rim || cell.facet_normal.dot(sample.contact.normal) < kSameSide) continue;
+    if (squared[j] >= rim || cell.facet_normal.dot(sample.contact.normal) < tuning().contacts.same_side) continue;
     const double weight = 1.0 - squared[j] / rim;
     mean.facet_normal += weight * cell.area * cell.facet_normal;
     mean.facing_normal += weight * cell.facing_normal;
@@ -292,13 +288,10 @@ void average(NearSample& sample, const std::vector<Cell>& cells, const std::vect
 }  // namespace
 
 void average_patches(std::vector<NearSample>& samples) {
-  constexpr std::size_t kCells = 800;
-  constexpr std::size_t kPatches = 15;  // a patch is a fifteenth of the contact; with its weights it quietens as a
-                                        // twentieth that weighs the same throughout
-  constexpr std::size_t kFewest = 6;
+  const ContactsTuning& t = tuning().contacts;
   if (samples.empty()) return;
-  const std::vector<Cell> cells = cells_of(samples, kCells);
-  const std::size_t wanted = std::min(std::max(kFewest, cells.size() / kPatches), cells.size() - 1);
+  const std::vector<Cell> cells = cells_of(samples, t.cells);
+  const std::size_t wanted = std::min(std::max(t.fewest_in_patch, cells.size() / t.patches), cells.size() - 1);
   std::vector<Vec3> centres;
   for (const Cell& cell : cells) centres.push_back(cell.point / cell.area);
   std::vector<double> squared(cells.size()), sorted;
@@ -312,24 +305,22 @@ void average_patches(std::vector<NearSample>& samples) {
 
 std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothSurface& other, double reach,
                                      double facing_cosine, int wanted) {
+  const ContactsTuning& t = tuning().contacts;
   const auto facing_place = [&](Index triangle, const Vec3& from, double limit) {
-    constexpr double kLooseFacing = -0.5;  // of facets; the smooth normals decide later
-    return other.tree().some_within(from, limit, surface.tree().normal(triangle), kLooseFacing);
+    return other.tree().some_within(from, limit, surface.tree().normal(triangle), t.loose_facing);
   };
   Eigen::AlignedBox3d box = other.tree().box();
   box.min().array() -= reach;
   box.max().array() += reach;
-  const auto pieces =
-      NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted), 0.25 * reach);
+  const auto pieces = NearPart(surface, reach, facing_place).pieces(box, static_cast<std::size_t>(wanted));
 
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
     const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
-    constexpr double kFacetFacing = -0.6;  // facets may bend from the smooth normals by half a segment on each side
-    const auto facing = other.tree().nearest(point, reach, normal, kFacetFacing);
+    const auto facing = other.tree().nearest(point, reach, normal, t.facet_facing);
     if (!facing.found()) return;
-    constexpr double kNothing = 1e-6;
-    if (!leads_across(point - facing.point, kNothing * reach, normal, other.tree().normal(facing.triangle))) return;
+    if (!leads_across(point - facing.point, t.shortest_way * reach, normal, other.tree().normal(facing.triangle)))
+      return;
     const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
     if (normal.dot(facing_normal) > facing_cosine) return;
     out.push_back({{point, normal, facing.point, facing_normal, area, (point - facing.point).dot(facing_normal), point,
@@ -347,7 +338,7 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
     const double distance = box.exteriorDistance(from);
     return distance <= limit ? std::optional(distance) : std::nullopt;
   };
-  const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted), 0.0);
+  const auto pieces = NearPart(surface, 0.0, box_within).pieces(box, static_cast<std::size_t>(wanted));
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
     const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
@@ -359,4 +350,4 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
   return out;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

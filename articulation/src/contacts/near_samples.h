@@ -1,4 +1,5 @@
-/// Points of one surface that face another across a small gap. Private to the module.
+/// @file near_samples.h
+/// Points of one surface that face another across a small gap. Private to the articulation module.
 #pragma once
 
 #include <vector>
@@ -6,7 +7,7 @@
 #include "limber/articulation/contact_region.h"
 #include "parts/smooth_surface.h"
 
-namespace limber {
+namespace limber::internal {
 
 struct NearSample {
   ContactSample contact;
@@ -31,4 +32,4 @@ std::vector<NearSample> inside_samples(const SmoothSurface& surface, const Smoot
 /// are better.
 void average_patches(std::vector<NearSample>& samples);
 
-}  // namespace limber
+}  // namespace limber::internal

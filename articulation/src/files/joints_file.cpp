@@ -233,7 +233,8 @@ JointsFile joints_file(const Assembly& assembly, const std::vector<DetectedJoint
   for (const Component& c : assembly.components) file.components.push_back({c.name, c.faces});
   for (const DetectedJoint& j : joints) {
     JointRecord record{.a = j.a, .b = j.b, .joint = j.joint, .confidence = j.confidence, .reasons = j.reasons};
-    for (const JointHypothesis& h : j.alternatives) record.alternatives.push_back({h.joint, h.confidence, h.reason});
+    for (const JointHypothesis& h : j.other_hypotheses)
+      record.alternatives.push_back({h.joint, h.confidence, h.reason});
     file.joints.push_back(std::move(record));
   }
   return file;

@@ -133,22 +133,22 @@ class Robot {
   }
 
   Mass mass_of(const Component& c) {
-    constexpr double kFill = 0.1;    // of the box, for what bounds no solid
-    constexpr double kLeast = 1e-9;  // kg; lighter bodies are refused by readers
+    constexpr double kFilledPart = 0.1;  // of the box, for what bounds no solid
+    constexpr double kLeastMass = 1e-9;  // kg; lighter bodies are refused by readers
     const double s = options.metres_per_unit;
     SolidProperties solid;
     if (c.closed) solid = solid_properties(bounding_surface(c));
     if (!(std::abs(solid.volume) > 0.0)) {
-      solid = box_properties(c.surface, kFill);
+      solid = box_properties(c.surface, kFilledPart);
       warnings.push_back("Component \"" + c.name + "\" bounds no solid: its mass is that of a tenth of its box.");
     }
     // An inside-out surface has all integrals negative, but for the centre.
     const double sign = solid.volume < 0.0 ? -1.0 : 1.0;
     Mass m{sign * solid.volume * s * s * s * options.density, s * solid.centroid,
            sign * solid.inertia * std::pow(s, 5) * options.density};
-    if (m.mass >= kLeast) return m;
+    if (m.mass >= kLeastMass) return m;
     warnings.push_back("Component \"" + c.name + "\" has a mass of " + exact(m.mass) + " kg: it is given 1e-9 kg.");
-    return {kLeast, m.center, kLeast * std::max(c.diagonal * s * c.diagonal * s, 1e-9) * Mat3::Identity()};
+    return {kLeastMass, m.center, kLeastMass * std::max(c.diagonal * s * c.diagonal * s, 1e-9) * Mat3::Identity()};
   }
 
   static SolidProperties box_properties(const SurfaceMesh& surface, double fill) {
@@ -214,10 +214,9 @@ std::string urdf_freedom(const Robot& robot, const TreeLink& link, const AxisFre
 
 /// Between two freedoms: a link that weighs next to nothing (many readers drop or refuse links without mass).
 std::string urdf_link_between(const std::string& name, const Mass& of) {
-  constexpr double kNothing = 1e-6;
+  constexpr double kShare = 1e-6;  // of the mass of the link that it leads to
   return "  <link" + attribute("name", name) + ">\n" +
-         urdf_inertial({kNothing * of.mass, Vec3::Zero(), kNothing * of.inertia.trace() * Mat3::Identity()},
-                       Vec3::Zero()) +
+         urdf_inertial({kShare * of.mass, Vec3::Zero(), kShare * of.inertia.trace() * Mat3::Identity()}, Vec3::Zero()) +
          "  </link>\n";
 }
 

@@ -110,7 +110,8 @@ std::vector<std::string> shell_names(const GroupedSurface& input, const std::vec
 
 Partition by_connectivity(const GroupedSurface& input, double weld_tolerance) {
   Partition out;
-  out.label = is_soup(input.surface) ? shells_of_soup(input.surface, weld_tolerance) : shells_by_index(input.surface);
+  out.label =
+      is_soup(input.surface) ? internal::shells_of_soup(input.surface, weld_tolerance) : shells_by_index(input.surface);
   out.name = shell_names(input, out.label);
   return out;
 }
@@ -238,13 +239,13 @@ Assembly find_components(const GroupedSurface& input, const ComponentOptions& op
     component.faces = face_ranges(component.triangles, input.face_of);
     component.surface = own_surface(input.surface, component.triangles, scratch);
     component.closed = surface_quality(component.surface).closed_manifold();
-    if (auto caps = component.closed ? std::nullopt : small_hole_caps(component.surface))
+    if (auto caps = component.closed ? std::nullopt : internal::small_hole_caps(component.surface))
       component.closed = true, component.caps = std::move(*caps);
     component.diagonal = box_diagonal(component.surface.vertices);
   }
   if (options.rule == ComponentRule::kConnectivity) {
     propose_by_name(input, out);
-    propose_by_open_edges(out);
+    internal::propose_by_open_edges(out);
   }
   return out;
 }

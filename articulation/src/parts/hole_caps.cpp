@@ -5,10 +5,10 @@
 #include <limits>
 #include <map>
 
-namespace limber {
-namespace {
+#include "tuning.h"
 
-constexpr double kLargestHole = 0.01, kAllHoles = 0.05;  // of the surface's area
+namespace limber::internal {
+namespace {
 
 /// A loop of vertices in the direction of the surface's triangles.
 using Rim = std::vector<Index>;
@@ -81,20 +81,21 @@ std::pair<std::vector<Triangle>, double> least_fan(const SurfaceMesh& surface, c
 }  // namespace
 
 std::optional<std::vector<Triangle>> small_hole_caps(const SurfaceMesh& surface) {
-  constexpr double kFlat = 1e-9;  // volume per area^1.5: a sheet drawn from both sides
+  constexpr double kNoVolume = 1e-9;  // per area^1.5: the round-off of a sheet drawn from both sides
+  const PartsTuning& t = tuning().parts;
   double area = 0.0;
-  for (const Triangle& t : surface.triangles) area += area_of(surface, t);
+  for (const Triangle& triangle : surface.triangles) area += area_of(surface, triangle);
   SurfaceMesh closed = surface;
   double all = 0.0;
   for (const Rim& rim : rims(boundary(surface))) {
     const auto [fan, hole] = least_fan(surface, rim);
     closed.triangles.insert(closed.triangles.end(), fan.begin(), fan.end());
     all += hole;
-    if (hole > kLargestHole * area || all > kAllHoles * area) return std::nullopt;
+    if (hole > t.largest_hole * area || all > t.all_holes * area) return std::nullopt;
   }
-  if (!(std::abs(enclosed_volume(closed)) > kFlat * std::pow(area, 1.5))) return std::nullopt;
+  if (!(std::abs(enclosed_volume(closed)) > kNoVolume * std::pow(area, 1.5))) return std::nullopt;
   return std::vector<Triangle>(closed.triangles.begin() + static_cast<std::ptrdiff_t>(surface.triangles.size()),
                                closed.triangles.end());
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 /// Per vertex the corners (3 · triangle + k) that name it, one list behind the other.
@@ -84,4 +84,4 @@ double SmoothSurface::chord_error(Index triangle) const {
   return most;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -1,4 +1,6 @@
-/// A component's surface as the smooth shape it stands for: normals that turn with it. Private to the module.
+/// @file smooth_surface.h
+/// A component's surface as the smooth shape it stands for: normals that turn with it. Private to the articulation
+/// module.
 #pragma once
 
 #include <array>
@@ -8,7 +10,7 @@
 #include "limber/mesh/surface_mesh.h"
 #include "parts/triangle_tree.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Per corner, the angle-weighted mean of the normals of all triangles at the vertex that bend by less than the crease
 /// angle from the corner's own. Facets alone leave a rotation of a cylinder of N sides a slippage of (π/N)²/3.
@@ -31,4 +33,4 @@ class SmoothSurface {
   std::vector<std::array<Vec3, 3>> corner_normals_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -8,8 +8,9 @@
 #include <unordered_map>
 
 #include "limber/core/disjoint_sets.h"
+#include "tuning.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
 
 struct CellHash {
@@ -25,7 +26,8 @@ std::vector<Index> representatives(const std::vector<Vec3>& vertices, double tol
   Eigen::AlignedBox3d box;
   for (const Vec3& v : vertices) box.extend(v);
   // Cells are never finer than what 53 bits tell apart, so that the cell numbers stay whole.
-  const double size = std::max({tolerance, box.diagonal().norm() * 1e-15, 1e-300});
+  constexpr double kRoundOff = 1e-15, kNotZero = 1e-300;
+  const double size = std::max({tolerance, box.diagonal().norm() * kRoundOff, kNotZero});
   std::unordered_map<std::array<std::int64_t, 3>, std::vector<Index>, CellHash> cells;
   std::vector<Index> of(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -88,13 +90,13 @@ void join_at_edge(std::span<const SoupSide> sides, DisjointSets& sets) {
     double angle;
     std::size_t i, j;
   };
-  constexpr double kFold = 0.01;  // rad; narrower wedges, and gaps, are two parts that touch
+  const double fold = tuning().parts.soup_fold;
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < sides.size(); ++i)
     for (std::size_t j = i + 1; j < sides.size(); ++j) {
       const double angle = material_angle(sides[i], sides[j]);
-      const bool fold = angle < kFold || angle > 2.0 * std::numbers::pi - kFold;
-      if (sides[i].forward != sides[j].forward && !fold) pairs.push_back({angle, i, j});
+      const bool folded = angle < fold || angle > 2.0 * std::numbers::pi - fold;
+      if (sides[i].forward != sides[j].forward && !folded) pairs.push_back({angle, i, j});
     }
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.angle < b.angle; });
   std::vector<char> taken(sides.size(), 0);
@@ -149,4 +151,4 @@ void propose_by_open_edges(Assembly& assembly) {
           {{pair.first, pair.second}, std::to_string(count) + " open edges of the two lie on each other"});
 }
 
-}  // namespace limber
+}  // namespace limber::internal

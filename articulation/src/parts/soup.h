@@ -1,11 +1,13 @@
-/// Surfaces whose triangles or shells share no vertices where they continue each other. Private to the module.
+/// @file soup.h
+/// Components of surfaces whose triangles or shells share no vertices where they continue each other. Private to the
+/// articulation module.
 #pragma once
 
 #include <vector>
 
 #include "limber/articulation/assembly.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Shells of a triangle soup, a label per triangle, numbered by first triangle. Two triangles belong together if they
 /// run through the same edge (vertices within `tolerance`) in opposite senses. Where more than two do, those that
@@ -15,4 +17,4 @@ std::vector<Index> shells_of_soup(const SurfaceMesh& surface, double tolerance);
 /// Proposes to merge components most of whose open edges lie on each other.
 void propose_by_open_edges(Assembly& assembly);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -1,15 +1,17 @@
-/// Nearest points of a triangulated surface. Private to the module.
+/// @file triangle_tree.h
+/// Questions to a triangulated surface that depend on which way its triangles look. Private to the articulation module.
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "limber/mesh/corner_tree.h"
 #include "limber/mesh/surface_mesh.h"
 
-namespace limber {
+namespace limber::internal {
 
-/// A binary tree of boxes along the axes over the triangles of one surface.
+/// mesh's tree over the triangles of one surface, with a box around the unit normals below each node.
 class TriangleTree {
  public:
   /// @param caps that close the surface's holes, over its vertices: for winding(), and for nothing else
@@ -29,50 +31,35 @@ class TriangleTree {
   /// The distance of some such point, if there is one. Quicker than looking for the nearest.
   std::optional<double> some_within(const Vec3& p, double limit, const Vec3& direction, double cosine) const;
 
-  /// How often the surface winds around p, by a ray; of one that its caps close 1 inside and 0 outside.
+  /// How often the surface winds around p, by a ray; of one that its caps close 1 inside and 0 outside. A ray costs the
+  /// logarithm of the number of triangles, which limber::winding_number() costs itself; that one in turn needs no caps
+  /// and answers for surfaces with any holes.
   int winding(const Vec3& p) const;
 
   /// Whether the surface crosses the segment from p to q, its ends included.
   bool crosses(const Vec3& p, const Vec3& q) const;
 
   const Vec3& normal(Index triangle) const { return normals_[static_cast<std::size_t>(triangle)]; }
-  const Eigen::AlignedBox3d& box() const { return nodes_.front().box; }
+  const Eigen::AlignedBox3d& box() const { return box_; }
 
  private:
-  struct Node {
-    Eigen::AlignedBox3d box;
-    Eigen::AlignedBox3d normals;  ///< around the unit normals
-    Index first = 0,
-          count = 0;  ///< count > 0: a leaf with these of placed_; else first is the left child, right next to it
-    /// Whether some unit normal m of it may have direction·m ≤ cosine.
-    bool may_face(const Vec3& direction, double cosine) const;
-  };
-  /// A triangle where the tree needs it.
-  struct Placed {
-    Vec3 a, b, c, normal;
-    Index triangle;
-  };
-  void split(Index node, Index begin, Index end, std::vector<Index>& order, const std::vector<Placed>& placed,
-             const std::vector<Vec3>& centres);
-  /// Calls nearer(placed, point, barycentric, squared distance) for triangles that face and may be nearer than the
-  /// limit, which it may lower, until it returns false. Near nodes come first.
+  using Corners = CornerTree<3>::Corners;
+
+  /// Calls nearer(place, foot, squared distance) for triangles that face and may be nearer than the limit, which it may
+  /// lower, until it returns false. Near nodes come first.
   template <class Nearer>
   void search(const Vec3& p, double& squared_limit, const Vec3& direction, double cosine, Nearer&& nearer) const;
-  static Placed placed(const SurfaceMesh& surface, const Triangle& triangle, Index number);
-  /// Whether the line p + t·direction meets the triangle at t in [0, longest]; then `leaving` tells which way.
-  static bool meets(const Placed& triangle, const Vec3& p, const Vec3& direction, double longest, bool& leaving);
   /// Calls hit(leaving) for each triangle that the line p + t·direction meets at t in [0, longest], until it returns
   /// true; returns whether it did.
   template <class Hit>
   bool cast(const Vec3& p, const Vec3& direction, double longest, Hit&& hit) const;
 
-  std::vector<Node> nodes_;
-  std::vector<Placed> placed_;  ///< leaf after leaf
-  std::vector<Placed> caps_;
-  std::vector<Vec3> normals_;  ///< per triangle; zero where it has no area
+  CornerTree<3> tree_;
+  std::vector<Eigen::AlignedBox3d> normals_of_nodes_;
+  std::vector<Vec3> normals_at_;  ///< per place of the tree
+  std::vector<Vec3> normals_;     ///< per triangle; zero where it has no area
+  std::vector<Corners> caps_;
+  Eigen::AlignedBox3d box_;
 };
 
-/// The point of a triangle nearest to p, in barycentric coordinates.
-Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
-
-}  // namespace limber
+}  // namespace limber::internal

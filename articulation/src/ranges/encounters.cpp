@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ranges/constants.h"
+#include "constants.h"
 
 namespace limber::internal {
 namespace {

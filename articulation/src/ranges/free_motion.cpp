@@ -7,11 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "constants.h"
 #include "limber/core/error.h"
-#include "ranges/constants.h"
 #include "ranges/encounters.h"
 #include "ranges/free_motion_of_bodies.h"
 #include "ranges/motion_search.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
@@ -20,9 +21,7 @@ using internal::kPi;
 using internal::OrbitBody;
 using internal::PathFrame;
 using internal::Tolerances;
-
-constexpr double kDefaultTolerance = 2e-4;       // of the smaller body's diagonal
-constexpr double kDefaultLargestOverlap = 2e-2;  // the same
+using internal::tuning;
 
 double diagonal(std::span<const OrbitBody> bodies) {
   Eigen::AlignedBox3d box;
@@ -37,7 +36,7 @@ void validate(std::span<const MotionBody> bodies, const char* which) {
 }
 
 void validate(const MotionPath& path) {
-  constexpr double kUnit = 1e-6;
+  constexpr double kUnit = 1e-6;  // six digits, as files have them, are a unit vector
   if (!path.origin.allFinite() || !(std::abs(path.axis.norm() - 1.0) <= kUnit))
     throw InvalidArgument("free_motion: the path's axis has length " + std::to_string(path.axis.norm()) +
                           ", expected 1, and a finite origin");
@@ -51,6 +50,8 @@ void FreeMotionOptions::validate() const {
   if (!(tolerance >= 0.0) || !(largest_overlap >= 0.0))
     throw InvalidArgument("FreeMotionOptions: tolerance is " + std::to_string(tolerance) + " and largest_overlap " +
                           std::to_string(largest_overlap) + ", expected numbers >= 0");
+  if (!(crease_angle >= 0.0 && crease_angle <= kPi))
+    throw InvalidArgument("FreeMotionOptions: crease_angle is " + std::to_string(crease_angle) + ", expected 0 to pi");
   if (samples < 100 || samples > 1'000'000)
     throw InvalidArgument("FreeMotionOptions: samples is " + std::to_string(samples) + ", expected 100 to 1000000");
 }
@@ -69,9 +70,8 @@ bool lies_within(const Interval& i, double low, double high, double period) {
 FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBody> moving,
                                 std::span<const OrbitBody> fixed, const Tolerances& t,
                                 const FreeMotionOptions& options) {
-  constexpr std::size_t kNearest = 4, kGrowth = 4;
   const internal::Encounters encounters(frame, moving, fixed, t.largest_overlap + t.nudge);
-  for (std::size_t pairs = kNearest;; pairs *= kGrowth) {
+  for (std::size_t pairs = tuning().ranges.nearest_pairs;; pairs *= tuning().ranges.pairs_growth) {
     const auto near = encounters.nearest(pairs);
     FreeMotion m = internal::search_motion(frame, internal::some_of(moving, near.moving),
                                            internal::some_of(fixed, near.fixed), t, options);
@@ -92,13 +92,13 @@ FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitB
                        const FreeMotionOptions& options, double sagitta) {
   const double size = std::min(diagonal(moving), diagonal(fixed));
   const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
-  const double least = given(options.tolerance, kDefaultTolerance * size);
+  const double least = given(options.tolerance, tuning().ranges.tolerance * size);
   Tolerances t{.least = least,
                .facets = sagitta,
                .across = least,
-               .largest_overlap = given(options.largest_overlap, kDefaultLargestOverlap * size)};
+               .largest_overlap = given(options.largest_overlap, tuning().ranges.largest_overlap * size)};
   t.largest_overlap = std::max(t.largest_overlap, least + sagitta);
-  t.nudge = 1e-2 * least;
+  t.nudge = tuning().ranges.nudge * least;
 
   return motion_among_nearest(PathFrame(path), moving, fixed, t, options);
 }

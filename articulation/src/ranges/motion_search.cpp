@@ -7,19 +7,18 @@
 #include <utility>
 #include <vector>
 
-#include "ranges/constants.h"
+#include "constants.h"
 #include "ranges/orbit_index.h"
 #include "ranges/orbit_samples.h"
 #include "ranges/spans.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
 
-/// The steepest slope (see OrbitPiece) at which any surface is a stop; beyond it, those that are one-sided are, such as
-/// a screw's collar, and all others slide.
-constexpr double kSlope = 2.0;
-
-bool stands(double slope, bool one_sided) { return slope <= kSlope || one_sided; }
+/// Up to RangesTuning::slope any surface is a stop; beyond it, those that are one-sided are, such as a screw's collar,
+/// and all others slide.
+bool stands(double slope, bool one_sided) { return slope <= tuning().ranges.slope || one_sided; }
 /// Of the surface where a piece begins or ends; ∞ where it slides.
 double slope_of_end(const OrbitPiece& p, bool low) {
   const double slope = low ? p.slope_low : p.slope_high;
@@ -163,14 +162,14 @@ Spans dilated(const std::vector<OrbitPiece>& pieces, double by) {
   return spans;
 }
 
-/// The parts of `pieces` that the set `wide` confirms, which is dilated by kSlope · δ. An orbit beside this one meets a
-/// sloping stop later: where the slope explains the difference, the stop begins where this orbit meets it.
+/// The parts of `pieces` that the set `wide` confirms, which is dilated by the steepest slope times δ. An orbit beside
+/// this one meets a sloping stop later: where the slope explains the difference, the stop begins where this orbit meets
+/// it.
 /// @param delta δ as a length of t
 void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double delta) {
-  constexpr double kMargin = 1.1;  // surfaces curve
-  const double by = kSlope * delta;
+  const double margin = tuning().ranges.slope_margin, by = tuning().ranges.slope * delta;
   const auto explains = [&](double slope, double later) {
-    return slope < kInfinity && later <= kMargin * slope * delta + (kMargin - 1.0) * delta;
+    return slope < kInfinity && later <= margin * slope * delta + (margin - 1.0) * delta;
   };
   std::vector<OrbitPiece> kept;
   for (const OrbitPiece& p : pieces)
@@ -207,8 +206,8 @@ void Search::keep_wide(const SurfaceSample& at, bool moving, std::vector<OrbitPi
   const double v = frame_.speed(orbit), delta = tolerances_.across;
   if (pieces.empty()) return;
   // So near to the axis that δ is a good part of a turn, nothing can be told.
-  const double by = kSlope * delta / v;
-  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < 0.5)) return pieces.clear();
+  const double by = tuning().ranges.slope * delta / v;
+  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < tuning().ranges.near_axis)) return pieces.clear();
   Spans wide = dilated(pieces, by);
   thread_local std::vector<Index> near;
   gather(orbit, moving, delta, near);
@@ -232,7 +231,7 @@ bool Search::holds_start(const OrbitPiece& piece, double v) const {
 
 // What touches as read, or overlaps by less than δ along the motion, blocks the way in and not the way out.
 void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
-  constexpr double kInstant = 1e-12;
+  constexpr double kInstant = 1e-12;  // rad or length: above round-off
   for (OrbitPiece& p : pieces) {
     if (p.sheet != 0 && std::abs(p.low) * v <= tolerances_.across) {
       p.low = p.sheet > 0 ? std::max(p.low, 0.0) : std::min(p.low, 0.0) - kInstant;
@@ -257,7 +256,6 @@ void Search::keep_blocked(const SurfaceSample& at, bool moving, std::vector<Orbi
 // What is wide at one δ is wide at all smaller ones, so each point is asked at the δ that those before it left.
 void Search::settle_tolerance() {
   if (tolerances_.across >= tolerances_.largest_overlap) return;
-  constexpr double kGrowth = 1.25;
   std::vector<OrbitPiece> pieces;
   const auto is_deep = [&](std::span<const OrbitPiece> among, const SurfaceSample& at) {
     const double v = speed(at);
@@ -271,7 +269,7 @@ void Search::settle_tolerance() {
         keep_wide(points[i], moving, pieces);
         if (!is_deep(pieces, points[i])) break;
         overlapping_ = tolerances_.across >= tolerances_.largest_overlap;
-        tolerances_.across = std::min(kGrowth * tolerances_.across, tolerances_.largest_overlap);
+        tolerances_.across = std::min(tuning().ranges.overlap_growth * tolerances_.across, tolerances_.largest_overlap);
       }
   }
 }
@@ -328,18 +326,18 @@ void Search::collect() {
 // Over the surface downhill: the point whose orbit is blocked first, by a pattern of steps that halve where none helps.
 template <class PiecesOf>
 Witness Search::downhill(Witness best, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const {
-  constexpr int kDirections = 6, kMostSteps = 400;
-  constexpr double kTurn = 0.4;  // rad; from pattern to pattern, so that the directions do not stay the same
+  const RangesTuning& t = tuning().ranges;
+  const int directions = static_cast<int>(t.directions), most_steps = static_cast<int>(t.most_steps);
   const SampledSurface& over = surface(best.moving);
   std::vector<OrbitPiece> pieces;
   double step = over.spacing();
   int steps = 0;
-  for (int level = 0; step > finest && steps < kMostSteps; ++level) {
+  for (int level = 0; step > finest && steps < most_steps; ++level) {
     const auto& c = over.faces()[static_cast<std::size_t>(best.point.face)].corners;
     const Vec3 e = (c[1] - c[0]).stableNormalized(), n = e.cross(c[2] - c[0]).stableNormalized(), f = n.cross(e);
     bool better = false;
-    for (int k = 0; k < kDirections && !better; ++k, ++steps) {
-      const double angle = kTurn * level + 2.0 * kPi * k / kDirections;
+    for (int k = 0; k < directions && !better; ++k, ++steps) {
+      const double angle = t.pattern_turn * level + 2.0 * kPi * k / directions;
       const SurfaceSample next =
           over.walk(best.point, best.point.p + step * (std::cos(angle) * e + std::sin(angle) * f));
       const auto improves = [&](const OrbitPiece& p) {
@@ -358,23 +356,25 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
 }
 
 Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) const {
-  const double finest = 0.1 * tolerances_.across;
-  return downhill(seed, low, gap, finest,
-                  [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
-                    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
-                    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
-                    keep_blocked(next, seed.moving, out);
-                  });
+  const double finest = tuning().ranges.finest_blocked * tolerances_.across;
+  return downhill(seed, low, gap, finest, [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
+    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
+    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
+    keep_blocked(next, seed.moving, out);
+  });
 }
 
 // A blocked point has the other body all around it, to a distance δ. What belongs to the same overlap may meet it
 // before: the surface within δ of the point, where both surfaces stand against the motion rather than along it.
 Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap) const {
-  const double finest = 0.05 * tolerances_.least, delta = tolerances_.across;
+  const double finest = tuning().ranges.finest_touching * tolerances_.least, delta = tolerances_.across;
   const Orbit centre = frame_.orbit_of(blocked.point.p);
   // How much earlier two surfaces explain; a blocked point may lie on one that slides.
   const double own = slope_at(blocked.point, blocked.moving), met = slope_of_end(blocked.piece, low);
-  const auto explained = [](double slope) { return slope < kInfinity ? std::max(slope, kSlope) : kSlope; };
+  const auto explained = [](double slope) {
+    const double steepest = tuning().ranges.slope;
+    return slope < kInfinity ? std::max(slope, steepest) : steepest;
+  };
   const double earlier = (explained(own) + explained(met)) * delta / frame_.speed(centre);
   const double from = blocked.piece.low - earlier, to = blocked.piece.high + earlier;
   return downhill(blocked, low, gap, finest, [&](const SurfaceSample& next, auto&&, std::vector<OrbitPiece>& out) {
@@ -412,10 +412,9 @@ void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_
 }
 
 void Search::refine() {
-  constexpr std::size_t kSeeds = 6, kSeedsBehind = 2;  // those of free intervals behind an obstacle matter less
-  constexpr std::size_t kMostSpans = 8;                // of more, rows of parts or noise, the nearest ends matter
+  const RangesTuning& t = tuning().ranges;
   const std::size_t count = blocked_.size();
-  const bool nearest_only = reachable_only_ || count > kMostSpans;
+  const bool nearest_only = reachable_only_ || count > t.most_followed;
   ends_.resize(count);
   // Spans on either side of 0; on a circle they may lie at the other end of the list.
   const auto above = static_cast<std::size_t>(
@@ -426,7 +425,7 @@ void Search::refine() {
     (whole.low >= 0.0 ? before : after) = whole.low >= 0.0 ? std::max(before, 0.0) : std::min(after, 0.0);
     Span low = whole, high = whole;
     const bool ends_above = i == above % count, ends_below = i == (above + count - 1) % count;
-    const auto seeds = [](bool reachable) { return reachable ? kSeeds : kSeedsBehind; };
+    const auto seeds = [&](bool reachable) { return reachable ? t.seeds : t.seeds_behind; };
     if (ends_above || !nearest_only) refine_end(low, true, {before, whole.high}, seeds(ends_above), ends_[i].first);
     if (ends_below || !nearest_only) refine_end(high, false, {whole.low, after}, seeds(ends_below), ends_[i].second);
     blocked_[i] = {low.low, high.high};
@@ -468,10 +467,12 @@ FreeMotion Search::result() const {
 
 FreeMotion search_motion(const PathFrame& frame, std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed,
                          const Tolerances& t, const FreeMotionOptions& options) {
-  auto [moving_faces, fixed_faces] = faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge);
+  auto [moving_faces, fixed_faces] =
+      faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge, options.crease_angle);
   const double width = std::min(t.across + t.facets, t.largest_overlap);
-  mark_narrow(frame, kSlope, width, moving_faces);
-  mark_narrow(frame, kSlope, width, fixed_faces);
+  const double slope = tuning().ranges.slope;
+  mark_narrow(frame, slope, width, options.crease_angle, moving_faces);
+  mark_narrow(frame, slope, width, options.crease_angle, fixed_faces);
   const Side moving_side(frame, moving, std::move(moving_faces), options.samples);
   const Side fixed_side(frame, fixed, std::move(fixed_faces), options.samples);
   return Search(frame, moving_side, fixed_side, t, options.reachable_only).run();

@@ -8,8 +8,9 @@
 #include <optional>
 #include <tuple>
 
+#include "constants.h"
 #include "limber/core/disjoint_sets.h"
-#include "ranges/constants.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
@@ -66,7 +67,7 @@ class SideOnPath {
     return out;
   }
 
-  /// The same by the boxes of their clusters of triangles.
+  /// The same by the leaves of their trees.
   OrbitBox close_reach(const OrbitBox& reach) const;
 
   /// Finds the triangles that orbits within `reach` can meet.
@@ -88,7 +89,7 @@ class SideOnPath {
   }
 
  private:
-  /// Calls use(body, box around the orbits, triangles) for clusters that may come within `reach`.
+  /// Calls use(body, box around the orbits, triangles) for leaves of the bodies' trees that may come within `reach`.
   template <class Use>
   void visit(const OrbitBox& reach, Use&& use) const;
   void add_candidate(Index body, Index triangle, VertexNumbers& numbers, const OrbitBox& reach,
@@ -109,14 +110,18 @@ class SideOnPath {
 template <class Use>
 void SideOnPath::visit(const OrbitBox& reach, Use&& use) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    if (!around_[b].overlaps(reach)) continue;
+    if (bodies_[b].triangles() == 0 || !around_[b].overlaps(reach)) continue;
     OrbitBox around;
-    bodies_[b].clusters->visit(
-        [&](const Eigen::AlignedBox3d& box) {
-          around = frame_.box_around(box);
+    const CornerTree<3>& tree = *bodies_[b].tree;
+    tree.any_leaf(
+        [&](std::size_t node) {
+          around = frame_.box_around(tree.box(node));
           return around.overlaps(reach);
         },
-        [&](std::span<const Index> triangles) { use(static_cast<Index>(b), around, triangles); });
+        [&](Index first, Index end) {
+          use(static_cast<Index>(b), around, tree.elements(first, end));
+          return false;
+        });
   }
 }
 
@@ -200,7 +205,7 @@ void SideOnPath::set_sector(OrbitFace& face) {
   if (face.box.low[0] > 0.0) {
     const double start = angle(face, 0);
     const auto [low, high] = std::minmax({0.0, wrapped(angle(face, 1) - start), wrapped(angle(face, 2) - start)});
-    constexpr double kMargin = 1e-9;
+    constexpr double kMargin = 1e-9;  // rad: above round-off
     if (high - low < kPi) face.bearing = start + 0.5 * (low + high), face.sector = 0.5 * (high - low) + kMargin;
   }
   const double off = std::abs(wrapped(face.bearing - face.heading));
@@ -231,19 +236,19 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
 /// +1, −1: the motion leaves the outside of a triangle, or its inside, at all corners; 0: neither, or it lies along the
 /// motion to within a degree, which may be noise. @param normal unit. All in path coordinates
 int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners) {
-  constexpr double kLeast = 0.0175;  // sine of 1 degree
+  const double least = tuning().ranges.one_sided;
   double low = kUnknown, high = kUnknown;
   for (const Vec3& corner : corners) {
     const double along = normal.dot(frame.direction(corner));
     low = std::fmin(low, along), high = std::fmax(high, along);
   }
-  return low >= kLeast ? 1 : high <= -kLeast ? -1 : 0;
+  return low >= least ? 1 : high <= -least ? -1 : 0;
 }
 
-constexpr double kContinues = 0.643;  // cosine of 50 degrees: facets of an octagon, and noise, bend by less
-
-/// @param faces of one side, whose vertices are numbered together
-void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
+/// @param faces of one side, whose vertices are numbered together. @param crease angle below which a face continues
+/// another, rad
+void set_one_sided(const PathFrame& frame, double crease, std::vector<OrbitFace>& faces) {
+  const double continues = std::cos(crease);
   std::vector<int> sides;
   for (OrbitFace& face : faces) {
     sides.push_back(side_of_motion(frame, face.normal, face.corners));
@@ -257,7 +262,7 @@ void set_one_sided(const PathFrame& frame, std::vector<OrbitFace>& faces) {
       const auto others = around.of(vertex);
       faces[f].one_sided = std::none_of(others.begin(), others.end(), [&](Index other) {
         const auto o = static_cast<std::size_t>(other);
-        return sides[o] != sides[f] && faces[o].normal.dot(faces[f].normal) > kContinues;
+        return sides[o] != sides[f] && faces[o].normal.dot(faces[f].normal) > continues;
       });
     }
 }
@@ -271,14 +276,15 @@ double most_along(const PathFrame& frame, const OrbitFace& face) {
 }
 
 /// Faces that continue one another and face the motion the same way. @param along per face; 0: it counts for nothing
-DisjointSets patches_of(const std::vector<OrbitFace>& faces, const std::vector<double>& along) {
+DisjointSets patches_of(const std::vector<OrbitFace>& faces, const std::vector<double>& along, double crease) {
+  const double continues = std::cos(crease);
   const FacesAround around(faces);
   DisjointSets patches(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f)
     for (const Index vertex : faces[f].vertices)
       for (const Index other : around.of(vertex)) {
         const auto o = static_cast<std::size_t>(other);
-        if (o < f && along[o] * along[f] > 0.0 && faces[o].normal.dot(faces[f].normal) > kContinues)
+        if (o < f && along[o] * along[f] > 0.0 && faces[o].normal.dot(faces[f].normal) > continues)
           patches.join(other, static_cast<Index>(f));
       }
   return patches;
@@ -293,7 +299,7 @@ struct PatchExtent {
 };
 
 std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
-  constexpr double kFlat = 0.94;
+  const double flat = tuning().ranges.sharp_edge;
   std::vector<SharpEdge> all;
   all.reserve(3 * surface.triangles.size());
   std::vector<Vec3> normals;
@@ -315,7 +321,7 @@ std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
     std::size_t end = i;
     while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
     if (end - i != 2 || normals[static_cast<std::size_t>(all[i].triangle)].dot(
-                            normals[static_cast<std::size_t>(all[i + 1].triangle)]) < kFlat)
+                            normals[static_cast<std::size_t>(all[i + 1].triangle)]) < flat)
       sharp.insert(sharp.end(), all.begin() + static_cast<std::ptrdiff_t>(i),
                    all.begin() + static_cast<std::ptrdiff_t>(end));
     i = end;
@@ -327,7 +333,7 @@ std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
 
 }  // namespace
 
-void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces) {
+void mark_narrow(const PathFrame& frame, double slope, double width, double crease, std::vector<OrbitFace>& faces) {
   const double stands = 1.0 / std::hypot(1.0, slope);
   std::vector<double> along;
   for (const OrbitFace& face : faces) {
@@ -335,7 +341,7 @@ void mark_narrow(const PathFrame& frame, double slope, double width, std::vector
     if (!face.one_sided && std::abs(along.back()) < stands) along.back() = 0.0;
   }
   if (std::all_of(along.begin(), along.end(), [](double a) { return a == 0.0; })) return;
-  DisjointSets patches = patches_of(faces, along);
+  DisjointSets patches = patches_of(faces, along, crease);
   std::vector<PatchExtent> extents(faces.size());
   const auto extent_of = [&](std::size_t face) -> PatchExtent& {
     return extents[static_cast<std::size_t>(patches.root(static_cast<Index>(face)))];
@@ -366,6 +372,20 @@ FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
       faces_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
 }
 
+/// Of a surface's own triangles and its caps, numbered one after the other.
+std::shared_ptr<const CornerTree<3>> tree_of(const SurfaceMesh& surface, std::span<const Triangle> caps) {
+  constexpr std::size_t kLeaf = 8;  // triangles: bounds of orbits cost more than boxes
+  std::vector<CornerTree<3>::Corners> all;
+  all.reserve(surface.triangles.size() + caps.size());
+  for (const auto triangles : {std::span(surface.triangles), caps})
+    for (const Triangle& t : triangles)
+      all.push_back({surface.vertices[static_cast<std::size_t>(t[0])], surface.vertices[static_cast<std::size_t>(t[1])],
+                     surface.vertices[static_cast<std::size_t>(t[2])]});
+  auto tree = std::make_shared<CornerTree<3>>();
+  if (!all.empty()) tree->build(all, kLeaf);
+  return tree;
+}
+
 OrbitBody orbit_body(const MotionBody& body) {
   OrbitBody out{body.surface, body.closed};
   out.caps = body.caps;
@@ -377,7 +397,7 @@ OrbitBody orbit_body(const MotionBody& body) {
     out.inside_out = enclosed_volume(with_caps) < 0.0;
   }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
-  out.clusters = std::make_shared<const TriangleClusters>(*body.surface, body.caps);
+  out.tree = tree_of(*body.surface, body.caps);
   out.sharp = std::make_shared<const std::vector<SharpEdge>>(sharp_edges(*body.surface));
   return out;
 }
@@ -385,7 +405,7 @@ OrbitBody orbit_body(const MotionBody& body) {
 std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
                                                                           std::span<const OrbitBody> moving,
                                                                           std::span<const OrbitBody> fixed,
-                                                                          double margin) {
+                                                                          double margin, double crease) {
   constexpr double kEverywhere = 1e300;
   const auto grown = [&](OrbitBox box) {
     box.grow(margin);
@@ -411,8 +431,8 @@ std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const 
     };
   };
   std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> out{a.faces(meets(b.tree())), b.faces(meets(a.tree()))};
-  set_one_sided(frame, out.first);
-  set_one_sided(frame, out.second);
+  set_one_sided(frame, crease, out.first);
+  set_one_sided(frame, crease, out.second);
   return out;
 }
 

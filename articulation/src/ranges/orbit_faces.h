@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "parts/triangle_clusters.h"
+#include "limber/mesh/corner_tree.h"
 #include "ranges/path_frame.h"
 
 namespace limber::internal {
@@ -27,7 +27,7 @@ struct OrbitBody {
   Eigen::AlignedBox3d box{};
   std::span<const Triangle> caps{};                       ///< over small holes
   std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
-  std::shared_ptr<const TriangleClusters> clusters{};     ///< of all triangles, with caps; copies share them
+  std::shared_ptr<const CornerTree<3>> tree{};            ///< of all triangles, with caps; copies share it
 
   std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
   const Triangle& triangle(std::size_t i) const {
@@ -75,13 +75,15 @@ class FacesAround {
 };
 
 /// Sets OrbitFace::narrow. @param slope at which a face stands, see OrbitPiece. @param width across the motion, length
-void mark_narrow(const PathFrame& frame, double slope, double width, std::vector<OrbitFace>& faces);
+/// @param crease angle below which a face continues another, rad
+void mark_narrow(const PathFrame& frame, double slope, double width, double crease, std::vector<OrbitFace>& faces);
 
 /// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
 /// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.
+/// @param crease see mark_narrow()
 std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
                                                                           std::span<const OrbitBody> moving,
                                                                           std::span<const OrbitBody> fixed,
-                                                                          double margin);
+                                                                          double margin, double crease);
 
 }  // namespace limber::internal

@@ -5,19 +5,23 @@
 #include <numbers>
 #include <tuple>
 
-#include "ranges/constants.h"
+#include "constants.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
 
 using Kind = MotionPath::Kind;
 
+/// Sine of the angle between an orbit and a plane below which round-off tells where they meet.
+constexpr double kAlong = 1e-9;
+
 /// The zero of a function that changes its sign between two places once: regula falsi after Illinois.
 template <class F>
 double zero_between(const F& f, double a, double fa, double b, double fb) {
-  constexpr int kMostSteps = 60;
-  constexpr double kClose = 1e-14;
-  for (int step = 0; step < kMostSteps && std::abs(b - a) > kClose * (1.0 + std::abs(b)) && fb != 0.0; ++step) {
+  constexpr double kClose = 1e-14;  // round-off
+  for (std::size_t step = 0;
+       step < tuning().ranges.helix_steps && std::abs(b - a) > kClose * (1.0 + std::abs(b)) && fb != 0.0; ++step) {
     const double c = b - fb * (b - a) / (fb - fa), fc = f(c);
     if ((fc < 0.0) != (fb < 0.0))
       a = b, fa = fb;
@@ -108,7 +112,6 @@ void OrbitIndex::crossings(const Orbit& orbit, const std::vector<Index>& near, s
 // Plane n·q = c with q = (x, r cos θ, r sin θ):  r h cos(θ − β) = c − n_x x,  h = |(n_y, n_z)|, β its angle. Most faces
 // are passed by, which is told without an angle: cos θ and sin θ come from those of β and θ − β.
 void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const {
-  constexpr double kAlong = 1e-9;  // sine of the angle below which the circle runs along the plane
   const auto [r, x] = orbit.plane;
   const Vec3& n = face.plane.normal;
   const double distance = face.plane.offset - n.x() * x;
@@ -126,7 +129,6 @@ void OrbitIndex::cross_circle(const Face& face, const Orbit& orbit, std::vector<
 }
 
 void OrbitIndex::cross_line(const Face& face, const Orbit& orbit, std::vector<Crossing>& out) const {
-  constexpr double kAlong = 1e-9;
   const Vec3& n = face.plane.normal;
   if (!(std::abs(n.x()) > kAlong)) return;
   const auto [y, z] = orbit.plane;

@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+
+#include "constants.h"
+#include "limber/mesh/closest_point.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
@@ -12,21 +17,7 @@ double area(const OrbitFace& f) {
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();
 }
 
-/// The point of a triangle nearest to q: that of its plane if it lies inside, else the nearest of its sides.
-Vec3 nearest_point(const OrbitFace& f, const Vec3& q) {
-  const Vec3& n = f.normal;
-  bool inside = n.squaredNorm() > 0.0;
-  Vec3 best = f.corners[0];
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3 &a = f.corners[i], d = f.corners[(i + 1) % 3] - a;
-    if (d.cross(q - a).dot(n) < 0.0) inside = false;
-    const double length2 = d.squaredNorm();
-    const Vec3 p = a + (length2 > 0.0 ? std::clamp(d.dot(q - a) / length2, 0.0, 1.0) : 0.0) * d;
-    if (const double distance = (q - p).squaredNorm(); distance < least) least = distance, best = p;
-  }
-  return inside ? Vec3(q - n.dot(q - f.corners[0]) * n) : best;
-}
+Vec3 nearest_point(const OrbitFace& f, const Vec3& q) { return closest_on_triangle(q, f.corners).point; }
 
 /// Running sums of a measure, for points at even distances along it.
 template <class Items, class Measure>
@@ -50,7 +41,7 @@ SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<Or
   if (faces_.empty()) return;
   around_ = FacesAround(faces_);
   add_face_points(count);
-  add_edge_points(sharp_edges(bodies), std::max(count / 2, 1));
+  add_edge_points(sharp_edges(bodies), std::max(count / static_cast<int>(tuning().ranges.edge_points), 1));
 }
 
 Vec3 SampledSurface::corner(Index face, Index vertex) const {
@@ -88,11 +79,10 @@ void SampledSurface::add_face_points(int count) {
   const std::vector<double> sums = running_sums(faces_, area);
   const double total = sums.back();
   spacing_ = std::sqrt(total / count);
-  // The plastic number's additive recurrence covers a square evenly; folding the square covers a triangle.
-  constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;
+  // The R2 sequence covers a square evenly; folding the square covers a triangle.
   for (int i = 0; i < count && total > 0.0; ++i) {
     const std::size_t f = at_measure(sums, total * (i + 0.5) / count);
-    double u = std::fmod((i + 1) * kFirst, 1.0), v = std::fmod((i + 1) * kSecond, 1.0);
+    double u = std::fmod((i + 1) * kEvenFirst, 1.0), v = std::fmod((i + 1) * kEvenSecond, 1.0);
     if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
     const auto& c = faces_[f].corners;
     points_.push_back({c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]), static_cast<Index>(f)});
@@ -113,7 +103,7 @@ void SampledSurface::add_edge_points(const std::vector<Edge>& edges, int count) 
     const double length = (b - a).norm();
     points_.push_back({length > 0.0 ? Vec3(b + (along - sums[k]) / length * (b - a)) : a, edges[k].face});
   }
-  add_corner_points(edges, 2 * count);
+  add_corner_points(edges, static_cast<int>(tuning().ranges.corner_points) * count);
 }
 
 void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most) {
@@ -128,9 +118,8 @@ void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most)
 }
 
 SurfaceSample SampledSurface::walk(const SurfaceSample& start, const Vec3& target) const {
-  constexpr int kMostFaces = 16;
   SurfaceSample here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
-  for (int step = 0; step < kMostFaces; ++step) {
+  for (std::size_t step = 0; step < tuning().ranges.walked_faces; ++step) {
     SurfaceSample best = here;
     for (const Index v : faces_[static_cast<std::size_t>(here.face)].vertices)
       for (const Index f : around_.of(v)) {

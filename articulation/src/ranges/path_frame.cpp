@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "ranges/constants.h"
+#include "constants.h"
 
 namespace limber::internal {
 namespace {

@@ -6,12 +6,13 @@
 #include <numbers>
 #include <optional>
 
+#include "constants.h"
 #include "counted_progress.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "number_text.h"
-#include "ranges/constants.h"
 #include "ranges/free_motion_of_bodies.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
@@ -21,6 +22,7 @@ using internal::kInfinity;
 using internal::number_text;
 using internal::OrbitBody;
 using internal::some_of;
+using internal::tuning;
 using Kind = MotionPath::Kind;
 
 // Sides ---------------------------------------------------------------------------------------------------------------
@@ -149,11 +151,12 @@ std::vector<OrbitBody> bodies_of(const Assembly& assembly) {
 /// One joint of an assembly with its two sides, ready to be moved along paths.
 class Trial {
  public:
-  Trial(const Assembly& assembly, std::span<const OrbitBody> bodies, const DetectedJoint& j, JointSides sides)
+  Trial(const Assembly& assembly, std::span<const OrbitBody> bodies, const DetectedJoint& j, JointSides sides,
+        double crease)
       : sides_(std::move(sides)), moving_(some_of(bodies, sides_.moving)), fixed_(some_of(bodies, sides_.fixed)) {
     const Component &a = component(assembly, j.a), &b = component(assembly, j.b);
     size_ = std::min(a.diagonal, b.diagonal);
-    sagitta_ = std::max(sagitta_near(j, a), sagitta_near(j, b));
+    sagitta_ = std::max(sagitta_near(j, a, crease), sagitta_near(j, b, crease));
     if (j.joint.type == JointType::kBall) sagitta_ *= 2.0;  // facets of a sphere bend in two directions
   }
 
@@ -161,8 +164,8 @@ class Trial {
 
   FreeMotion along(const MotionPath& path, FreeMotionOptions options) const {
     // Tolerances belong to the two parts that are joined, not to all that hangs on them.
-    if (options.tolerance == 0.0) options.tolerance = kTolerance * size_;
-    if (options.largest_overlap == 0.0) options.largest_overlap = kLargestOverlap * size_;
+    if (options.tolerance == 0.0) options.tolerance = tuning().ranges.tolerance * size_;
+    if (options.largest_overlap == 0.0) options.largest_overlap = tuning().ranges.largest_overlap * size_;
     // A tolerance that was found before has the facets in it.
     const double sagitta = options.tolerance == options.largest_overlap ? 0.0 : sagitta_;
     FreeMotion m = internal::free_motion(moving_, fixed_, path, options, sagitta);
@@ -172,18 +175,15 @@ class Trial {
   }
 
  private:
-  static constexpr double kTolerance = 2e-4, kLargestOverlap = 2e-2;
-
   static const Component& component(const Assembly& assembly, Index i) {
     return assembly.components[static_cast<std::size_t>(i)];
   }
-  static double sagitta_near(const DetectedJoint& joint, const Component& part) {
-    constexpr double kMargin = 0.02;  // of the contact's box: the other part's surface lies beside the points
+  static double sagitta_near(const DetectedJoint& joint, const Component& part, double crease) {
     Vec3 low = Vec3::Constant(kInfinity), high = -low;
     for (const Vec3& p : joint.contact_points) low = low.cwiseMin(p), high = high.cwiseMax(p);
     if (joint.contact_points.empty()) return 0.0;
-    const Vec3 margin = Vec3::Constant(kMargin * (high - low).norm() + joint.gap);
-    return facet_sagitta(part.surface, low - margin, high + margin);
+    const Vec3 margin = Vec3::Constant(tuning().ranges.contact_margin * (high - low).norm() + joint.gap);
+    return facet_sagitta(part.surface, low - margin, high + margin, crease);
   }
 
   JointSides sides_;
@@ -191,12 +191,11 @@ class Trial {
   double size_ = 0.0, sagitta_ = 0.0;
 };
 
-constexpr int kConeRefinements = 4;
-
 /// How many paths are tried for a joint, at most.
 std::size_t path_count(JointSpec joint, const RangeOptions& options) {
-  const std::size_t swings =
-      joint.type == JointType::kBall ? static_cast<std::size_t>(options.cone_directions + 2 * kConeRefinements) : 0;
+  const std::size_t swings = joint.type == JointType::kBall ? static_cast<std::size_t>(options.cone_directions) +
+                                                                  2 * tuning().ranges.cone_refinements
+                                                            : 0;
   return paths_of(joint).size() + swings;
 }
 
@@ -207,7 +206,8 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
   FreeMotionOptions motion = options.motion;
   motion.tolerance = motion.largest_overlap = tolerance;
   motion.reachable_only = true;
-  motion.samples = std::max(100, motion.samples / 3);  // many directions share the work of finding the obstacles
+  const internal::RangesTuning& t = tuning().ranges;
+  motion.samples = static_cast<int>(std::max(t.cone_fewest, static_cast<std::size_t>(motion.samples) / t.cone_samples));
   const auto swing = [&](double psi) {
     const Vec3 axis = std::cos(psi) * axis_of(joint, 1) + std::sin(psi) * axis_of(joint, 2);
     const double high = trial.along(rotation(joint, axis), motion).reachable.high;
@@ -220,7 +220,7 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
     if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
   if (least == kInfinity) return least;
   double d = 0.5 * step;
-  for (int i = 0; i < kConeRefinements; ++i, d *= 0.5)
+  for (std::size_t i = 0; i < t.cone_refinements; ++i, d *= 0.5)
     for (const double psi : {at - d, at + d})
       if (const double angle = swing(psi); angle < least) least = angle, at = psi;
   return std::min(least, std::numbers::pi);
@@ -356,7 +356,7 @@ RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodi
   RangeOfMotion out{.joint = joint.joint, .freedoms = {}, .reasons = {}};
   out.joint.limits = {};
   if (out.joint.type == JointType::kFixed) return out;
-  const Trial trial(assembly, bodies, joint, graph.sides(joint));
+  const Trial trial(assembly, bodies, joint, graph.sides(joint), options.motion.crease_angle);
   for (const NamedPath& p : paths_of(out.joint)) {
     out.freedoms.push_back({p.freedom, trial.along(p.path, options.motion)});
     path_done();

@@ -5,9 +5,13 @@
 
 #include "limber/core/error.h"
 #include "number_text.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
+
+/// Of the time, as progress tells it.
+constexpr double kContactsShare = 0.9;
 
 std::vector<Vec3> points_of(const std::vector<ContactRegion>& regions) {
   std::vector<Vec3> points;
@@ -25,10 +29,7 @@ OrientedBox box_around(const std::vector<Vec3>& points, const Mat3& axes) {
 
 /// Surfaces that curve away from each other touch at a point or a line and hold nothing: their normals disagree over
 /// what is near. Spheres and planes that lie in each other differ by noise alone.
-bool conforms(const ContactRegion& region) {
-  constexpr double kMostSpread = 0.03;  // noise of 0.1 % leaves 0.01; beads that touch have 0.1 and more
-  return region.normal_spread < kMostSpread;
-}
+bool conforms(const ContactRegion& region) { return region.normal_spread < internal::tuning().contacts.most_spread; }
 
 std::string contact_in_words(const std::vector<ContactRegion>& regions) {
   std::size_t samples = 0;
@@ -45,9 +46,9 @@ DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const Slippage
   out.joint = slippage.hypotheses.front().joint;
   out.confidence = slippage.hypotheses.front().confidence;
   out.reasons = {contact_in_words(regions), slippage.hypotheses.front().reason};
-  constexpr double kWorthTelling = 1e-3;
   for (std::size_t i = 1; i < slippage.hypotheses.size(); ++i)
-    if (i == 1 || slippage.hypotheses[i].confidence > kWorthTelling) out.alternatives.push_back(slippage.hypotheses[i]);
+    if (i == 1 || slippage.hypotheses[i].confidence > internal::tuning().types.worth_telling)
+      out.other_hypotheses.push_back(slippage.hypotheses[i]);
   out.contact_points = points_of(regions);
   out.influence = box_around(out.contact_points, out.joint.frame.axes);
   for (const ContactRegion& r : regions) out.gap = std::max(out.gap, r.gap);
@@ -69,10 +70,9 @@ std::vector<DetectedJoint> detect_joints(const Assembly& assembly, const Detecti
   const auto tell = [&](double part, std::string_view what) {
     if (options.progress) options.progress(part, what);
   };
-  constexpr double kContacts = 0.9;  // their share of the time
   tell(0.0, "contacts");
-  auto regions =
-      find_contact_regions(assembly, options.contact, jobs, [&](double part) { tell(kContacts * part, "contacts"); });
+  auto regions = find_contact_regions(assembly, options.contact, jobs,
+                                      [&](double part) { tell(kContactsShare * part, "contacts"); });
   std::erase_if(regions, [](const ContactRegion& r) { return !conforms(r); });
   std::vector<std::vector<ContactRegion>> by_pair;
   for (ContactRegion& region : regions) {
@@ -80,7 +80,7 @@ std::vector<DetectedJoint> detect_joints(const Assembly& assembly, const Detecti
       by_pair.emplace_back();
     by_pair.back().push_back(std::move(region));
   }
-  tell(kContacts, "joints");
+  tell(kContactsShare, "joints");
   std::vector<DetectedJoint> joints(by_pair.size());
   jobs.parallel_for(by_pair.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) joints[i] = joint_of(by_pair[i], options.slippage);

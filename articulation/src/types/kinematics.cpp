@@ -5,6 +5,7 @@
 
 #include "limber/articulation/detect_joints.h"
 #include "limber/core/disjoint_sets.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
@@ -56,27 +57,24 @@ Index freedom_count(const JointSpec& joint) {
   return free.rotations + free.translations - (joint.pitch != 0.0 ? 1 : 0);
 }
 
-/// Axes are known to about a degree: what is dependent in the drawing is so to that accuracy only.
-constexpr double kIndependent = 1e-3;
-
 /// The rank, columns of one norm. Of a few by a pivoted QR; of many, by the pivots of AᵀA = L D Lᵀ in an order of
 /// little fill-in: without pivoting these are the squares of QR's, and a little on the diagonal keeps dependent columns
 /// from dividing by 0.
 Index rank_of(Eigen::SparseMatrix<double> A) {
+  const internal::TypesTuning& t = internal::tuning().types;
   for (Eigen::Index c = 0; c < A.cols(); ++c)
     if (const double norm = A.col(c).norm(); norm > 0.0) A.col(c) *= 1.0 / norm;
-  constexpr Eigen::Index kFew = 1200;
-  if (A.cols() <= kFew) {
+  if (A.cols() <= static_cast<Eigen::Index>(t.dense_columns)) {
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr{Eigen::MatrixXd(A)};
-    qr.setThreshold(kIndependent);
+    qr.setThreshold(t.independent);
     return static_cast<Index>(qr.rank());
   }
-  constexpr double kKeepAway = 1e-12;
+  constexpr double kKeepAway = 1e-12;  // above the round-off of AᵀA
   Eigen::SparseMatrix<double> normal = A.transpose() * A, unit(A.cols(), A.cols());
   unit.setIdentity();
   normal += kKeepAway * unit;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
-  return static_cast<Index>((factor.vectorD().array() > kIndependent * kIndependent).count());
+  return static_cast<Index>((factor.vectorD().array() > t.independent * t.independent).count());
 }
 
 }  // namespace

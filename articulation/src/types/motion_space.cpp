@@ -5,16 +5,16 @@
 #include <cmath>
 #include <numeric>
 
-namespace limber {
+#include "tuning.h"
+
+namespace limber::internal {
 namespace {
 
 /// Weights that fall with the square root of how much area has a similar normal: a wide plate does not drown the small
 /// peg under it. The floor keeps normals that are nothing but noise from counting for much.
 std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
-  constexpr double kSimilar = 0.9;        // cosine
-  constexpr double kFloor = 0.05;         // of the whole area
-  constexpr std::size_t kCompared = 600;  // samples that stand for all
-  const std::size_t stride = 1 + points.size() / kCompared;
+  const TypesTuning& t = tuning().types;
+  const std::size_t stride = 1 + points.size() / t.similar_compared;
   const std::size_t count = (points.size() + stride - 1) / stride;
   // By coordinate, so that several are compared at once.
   std::array<std::vector<double>, 3> normals;
@@ -37,8 +37,8 @@ std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
     last = p.normal;
     const double x = p.normal.x(), y = p.normal.y(), z = p.normal.z();
     for (std::size_t j = 0; j < count; ++j)
-      alike[j] = x * normals[0][j] + y * normals[1][j] + z * normals[2][j] > kSimilar ? areas[j] : 0.0;
-    similar = std::sqrt(kFloor * compared + std::reduce(alike.begin(), alike.end()));
+      alike[j] = x * normals[0][j] + y * normals[1][j] + z * normals[2][j] > t.similar ? areas[j] : 0.0;
+    similar = std::sqrt(t.similar_floor * compared + std::reduce(alike.begin(), alike.end()));
     weights.push_back(p.weight / similar);
   }
   return weights;
@@ -106,8 +106,8 @@ MotionSpace::MotionSpace(const std::vector<ContactRegion>& regions) {
 }
 
 MotionSpace::Spectrum MotionSpace::spectrum(const Eigen::MatrixXd& basis) const {
-  // A small multiple of the identity keeps M definite for samples on a line.
-  const Eigen::Matrix<double, 6, 6> M = M_ + 1e-12 * Eigen::Matrix<double, 6, 6>::Identity();
+  constexpr double kDefinite = 1e-12;  // above round-off: keeps M definite for samples on a line
+  const Eigen::Matrix<double, 6, 6> M = M_ + kDefinite * Eigen::Matrix<double, 6, 6>::Identity();
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(basis.transpose() * C_ * basis,
                                                                          basis.transpose() * M * basis);
   return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
@@ -119,4 +119,4 @@ Eigen::MatrixXd MotionSpace::complement(const Eigen::MatrixXd& basis) const {
   return svd.matrixV().rightCols(6 - basis.cols());
 }
 
-}  // namespace limber
+}  // namespace limber::internal

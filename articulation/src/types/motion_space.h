@@ -1,4 +1,5 @@
-/// Rigid motions of a contact and how much each slips. Private to the module.
+/// @file motion_space.h
+/// Rigid motions of a contact and how much each slips. Private to the articulation module.
 ///
 /// Coordinates are the contact's own: about its centroid, in units of its RMS radius, so that the 6 × 6 matrices are
 /// well scaled. A motion ξ = (ω, v) moves p with ω × p + v.
@@ -10,7 +11,7 @@
 #include "limber/articulation/contact_region.h"
 #include "limber/core/types.h"
 
-namespace limber {
+namespace limber::internal {
 
 using Motion = Eigen::Matrix<double, 6, 1>;
 using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
@@ -60,4 +61,4 @@ Motion rotation_about(const Vec3& axis, const Vec3& through);
 Motion translation_along(const Vec3& direction);
 Mat3 cross_matrix(const Vec3& v);
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -9,12 +9,22 @@
 
 #include "limber/core/error.h"
 #include "number_text.h"
+#include "tuning.h"
 #include "types/joint_frame.h"
 #include "types/motion_space.h"
-#include "types/second_reading.h"
+#include "types/other_hypotheses.h"
 
 namespace limber {
 namespace {
+
+using internal::cross_matrix;
+using internal::Motion;
+using internal::MotionSpace;
+using internal::rotation_about;
+using internal::translation_along;
+using internal::tuning;
+using internal::TypesTuning;
+using internal::WeightedPoint;
 
 /// One family of motions fitted to a contact, in the contact's own coordinates.
 struct Family {
@@ -79,7 +89,7 @@ Vec3 best_centre(const MotionSpace& space, const Vec3& axis) {
   const Eigen::Vector2d b = -K.transpose() * space.C() * rotation_about(axis, Vec3::Zero());
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A);
   Eigen::Vector2d x = Eigen::Vector2d::Zero();
-  constexpr double kUndetermined = 1e-9;  // of the largest possible entry, 1
+  constexpr double kUndetermined = 1e-9;  // round-off of the largest possible entry, 1, with room
   for (int k = 0; k < 2; ++k)
     if (solver.eigenvalues()[k] > kUndetermined)
       x += solver.eigenvectors().col(k) * (solver.eigenvectors().col(k).dot(b) / solver.eigenvalues()[k]);
@@ -98,8 +108,8 @@ Family rotation_family(const Vec3& axis, const Vec3& origin) {
 /// Improves direction and place of an axis in turn.
 Family refined_rotation(const MotionSpace& space, Vec3 axis) {
   Vec3 origin = best_centre(space, axis);
-  constexpr int kRounds = 12;
-  for (int round = 0; round < kRounds; ++round) {
+  constexpr double kSettled = 1e-12;  // rad: round-off
+  for (std::size_t round = 0; round < tuning().types.axis_rounds; ++round) {
     Eigen::MatrixXd about(6, 3);
     for (int k = 0; k < 3; ++k) about.col(k) = rotation_about(Vec3::Unit(k), origin);
     const Vec3 turned = about.topRows<3>() * space.spectrum(about).vectors.col(0);
@@ -107,7 +117,7 @@ Family refined_rotation(const MotionSpace& space, Vec3 axis) {
     const double moved = turned.normalized().cross(axis).norm();
     axis = turned.normalized();
     origin = best_centre(space, axis);
-    if (moved < 1e-12) break;
+    if (moved < kSettled) break;
   }
   return rotation_family(axis, origin);
 }
@@ -116,7 +126,7 @@ Family fit_revolute(const MotionSpace& space) {
   std::vector<Vec3> starts;
   const auto lowest = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors;
   for (int k = 0; k < 3; ++k)
-    if (lowest.col(k).head<3>().norm() > 1e-6 * lowest.col(k).norm())
+    if (lowest.col(k).head<3>().norm() > tuning().types.least_turn * lowest.col(k).norm())
       starts.push_back(lowest.col(k).head<3>().normalized());
   const Eigen::SelfAdjointEigenSolver<Mat3> normals(space.normal_covariance());
   for (int k = 0; k < 3; ++k) starts.push_back(normals.eigenvectors().col(k));
@@ -158,16 +168,12 @@ double pitch_of_facets(const MotionSpace& space, const Vec3& axis, const Vec3& o
 /// thread drawn in whole segments onto another, so that how the facets are cut does not matter. Found by Newton's
 /// method from a pitch that is off by much less than the thread's teeth are wide.
 double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitch) {
-  constexpr int kRounds = 4;
-  constexpr std::size_t kAsked = 800, kFewest = 50;
-  constexpr double kAlike = 0.95;   // cosine
-  constexpr double kNearest = 0.1;  // of the advance of a turn: what is further away is beyond the contact's end
-  constexpr double kMostChange = 0.1;
+  const TypesTuning& t = tuning().types;
   const std::vector<WeightedPoint>& points = space.points();
-  const std::size_t stride = 1 + points.size() / kAsked;
+  const std::size_t stride = 1 + points.size() / t.pitch_compared;
   double found = pitch;
-  for (int round = 0; round < kRounds; ++round) {
-    const double turn = 2.0 * std::numbers::pi * found, limit = std::pow(kNearest * turn, 2);
+  for (std::size_t round = 0; round < t.pitch_rounds; ++round) {
+    const double turn = 2.0 * std::numbers::pi * found, limit = std::pow(t.pitch_nearest * turn, 2);
     double residual = 0.0, slope = 0.0;
     std::size_t count = 0;
     for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -176,7 +182,7 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
       double least = limit;
       for (const WeightedPoint& q : points)
         if (const double squared = (q.facet_point - moved).squaredNorm();
-            squared < least && q.facet_normal.dot(points[i].facet_normal) > kAlike)
+            squared < least && q.facet_normal.dot(points[i].facet_normal) > t.pitch_alike)
           nearest = &q, least = squared;
       if (nearest == nullptr) continue;
       const double along = 2.0 * std::numbers::pi * nearest->facet_normal.dot(axis);
@@ -184,9 +190,9 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
       slope += points[i].weight * along * along;
       ++count;
     }
-    if (count < kFewest || !(slope > 0.0)) return pitch;
+    if (count < t.pitch_fewest || !(slope > 0.0)) return pitch;
     found -= residual / slope;
-    if (!(std::abs(found / pitch - 1.0) < kMostChange)) return pitch;
+    if (!(std::abs(found / pitch - 1.0) < t.pitch_change)) return pitch;
   }
   return found;
 }
@@ -195,7 +201,7 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
 std::optional<Family> fit_screw(const MotionSpace& space) {
   const Motion xi = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors.col(0);
   const Vec3 omega = xi.head<3>(), v = xi.tail<3>();
-  if (omega.norm() <= 1e-3 * xi.norm()) return std::nullopt;
+  if (omega.norm() <= tuning().types.screw_least_turn * xi.norm()) return std::nullopt;
   Family out = rotation_family(omega.normalized(), omega.cross(v) / omega.squaredNorm());
   out.type = JointType::kCylindrical;
   out.pitch = pitch_of_facets(space, out.axis, out.origin, omega.dot(v) / omega.squaredNorm());
@@ -209,7 +215,7 @@ std::optional<Family> fit_screw(const MotionSpace& space) {
 /// How likely a motion slips. The tails keep one measurement from deciding alone.
 double slip_probability(double mu, double threshold) {
   const double p = 1.0 / (1.0 + (mu / threshold) * (mu / threshold));
-  return std::clamp(p, 1e-4, 1.0 - 1e-4);
+  return std::clamp(p, tuning().types.tail, 1.0 - tuning().types.tail);
 }
 
 struct Judged {
@@ -236,31 +242,29 @@ Judged judge(const MotionSpace& space, const Family& family, double threshold) {
   return out;
 }
 
-// A centre far off is a plane, and an axis far off a translation, in disguise.
-constexpr double kFarCentre = 4.0, kFarAxis = 15.0;  // of the contact's RMS radius
-
 /// The screw that slips, if plain motions do not. Those are common and screws are not; one must beat them by far.
 /// @param plain μ of the best rotation or translation
 std::optional<Judged> judged_screw(const MotionSpace& space, double plain, double threshold) {
-  constexpr double kClearly = 0.15, kLeast = 3e-4;
-  if (plain <= kLeast) return std::nullopt;
+  const TypesTuning& t = tuning().types;
+  if (plain <= t.screw_least) return std::nullopt;
   const auto screw = fit_screw(space);
-  if (!screw || screw->origin.norm() > kFarAxis || std::abs(screw->pitch) > kFarAxis) return std::nullopt;
+  if (!screw || screw->origin.norm() > t.far_axis || std::abs(screw->pitch) > t.far_axis) return std::nullopt;
   const Judged out = judge(space, *screw, threshold);
-  return out.slippage < kClearly * plain ? std::optional(out) : std::nullopt;
+  return out.slippage < t.screw_clearly * plain ? std::optional(out) : std::nullopt;
 }
 
 std::vector<Judged> judged_families(const MotionSpace& space, double threshold) {
+  const TypesTuning& t = tuning().types;
   const Family revolute = fit_revolute(space);
   std::vector<Judged> all;
   for (const Family& family :
        {fit_ball(space), fit_planar(space), fit_cylindrical(space), revolute, fit_prismatic(space), Family{}})
     all.push_back(judge(space, family, threshold));
   const double rotation_mu = all[3].slippage, translation_mu = all[4].slippage;
-  if (all[0].family.origin.norm() > kFarCentre) all[0].log_evidence -= 10.0;
-  if (revolute.origin.norm() > kFarAxis) all[3].log_evidence -= 10.0;
+  if (all[0].family.origin.norm() > t.far_centre) all[0].log_evidence -= t.ruled_out;
+  if (revolute.origin.norm() > t.far_axis) all[3].log_evidence -= t.ruled_out;
   if (const auto screw = judged_screw(space, std::min(rotation_mu, translation_mu), threshold)) {
-    all[3].log_evidence -= 5.0;
+    all[3].log_evidence -= t.screw_over_plain;
     all.push_back(*screw);
   }
   return all;
@@ -293,8 +297,8 @@ JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double 
   JointHypothesis out;
   out.joint.type = judged.family.type;
   out.joint.pitch = judged.family.pitch * space.scale();
-  out.joint.frame =
-      joint_frame(judged.family.type, judged.family.axis, space.to_input(judged.family.origin), space.middles());
+  out.joint.frame = internal::joint_frame(judged.family.type, judged.family.axis, space.to_input(judged.family.origin),
+                                          space.middles());
   out.slippage = judged.slippage;
   out.reason = reason(judged, threshold);
   return out;
@@ -313,22 +317,23 @@ JointType type_by_ratio(const MotionSpace& space, double ratio, std::array<doubl
   slips = std::min(slips, 3);
   if (slips == 0) return JointType::kFixed;
   const auto turns = Eigen::JacobiSVD<Eigen::MatrixXd>(solver.eigenvectors().topLeftCorner(3, slips)).singularValues();
-  constexpr double kTurns = 0.2;
-  const auto rotations = std::count_if(turns.begin(), turns.end(), [](double s) { return s > kTurns; });
+  const auto rotations =
+      std::count_if(turns.begin(), turns.end(), [](double s) { return s > tuning().types.ratio_turns; });
   if (slips == 3) return rotations >= 2 ? JointType::kBall : JointType::kPlanar;
   if (slips == 2) return JointType::kCylindrical;
   return rotations > 0 ? JointType::kRevolute : JointType::kPrismatic;
 }
 
-/// All readings of a contact as it stands.
-Slippage readings(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
+/// All hypotheses of a contact as it stands.
+Slippage hypotheses_of(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
   const MotionSpace space(regions);
   Slippage out;
   out.threshold = options.threshold + space.spread();
   auto judged = judged_families(space, out.threshold);
   if (options.method == SlippageMethod::kFixedRatio) {
     const JointType type = type_by_ratio(space, options.ratio, out.mu);
-    for (Judged& j : judged) j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -10.0;
+    for (Judged& j : judged)
+      j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -tuning().types.ruled_out;
   } else {
     const auto mu = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).mu;
     std::copy(mu.begin(), mu.end(), out.mu.begin());
@@ -353,10 +358,9 @@ struct Facing {
 };
 
 std::vector<Facing> faces_of(const std::vector<ContactRegion>& regions) {
-  constexpr std::size_t kCompared = 400;
   std::size_t count = 0;
   for (const ContactRegion& r : regions) count += r.on_a.size() + r.on_b.size();
-  const std::size_t stride = 1 + count / kCompared;
+  const std::size_t stride = 1 + count / tuning().types.stop_compared;
   std::vector<Facing> out;
   std::size_t i = 0;
   for (const ContactRegion& r : regions)
@@ -366,11 +370,9 @@ std::vector<Facing> faces_of(const std::vector<ContactRegion>& regions) {
   return out;
 }
 
-constexpr double kAlike = 0.95;  // cosine: 18 degrees
-
 /// The normal of the largest face that nothing looks against: it holds one way only.
 std::optional<Vec3> one_sided_face(const std::vector<ContactRegion>& regions) {
-  constexpr double kNothing = 0.02, kLeast = 0.02;  // of the face's area; of the contact's
+  const TypesTuning& t = tuning().types;
   const auto faces = faces_of(regions);
   double all = 0.0, largest = 0.0;
   for (const Facing& f : faces) all += f.area;
@@ -379,10 +381,10 @@ std::optional<Vec3> one_sided_face(const std::vector<ContactRegion>& regions) {
     double like = 0.0, against = 0.0;
     for (const Facing& other : faces) {
       const double cosine = f.normal.dot(other.normal);
-      if (cosine > kAlike) like += other.area;
-      if (cosine < -kAlike) against += other.area;
+      if (cosine > t.stop_alike) like += other.area;
+      if (cosine < -t.stop_alike) against += other.area;
     }
-    if (against <= kNothing * like && like > kLeast * all && like > largest) largest = like, out = f.normal;
+    if (against <= t.stop_against * like && like > t.stop_least * all && like > largest) largest = like, out = f.normal;
   }
   return out;
 }
@@ -390,22 +392,23 @@ std::optional<Vec3> one_sided_face(const std::vector<ContactRegion>& regions) {
 std::vector<ContactRegion> without_face(std::vector<ContactRegion> regions, const Vec3& normal) {
   for (ContactRegion& r : regions)
     for (const auto& [side, sign] : {std::pair(&r.on_a, 1.0), {&r.on_b, -1.0}})
-      std::erase_if(*side, [&, sign = sign](const ContactSample& s) { return sign * s.normal.dot(normal) > kAlike; });
+      std::erase_if(*side, [&, sign = sign](const ContactSample& s) {
+        return sign * s.normal.dot(normal) > tuning().types.stop_alike;
+      });
   return regions;
 }
 
 bool slides_along(const JointSpec& joint, const Vec3& direction) {
-  constexpr double kAlong = 0.99;
   return (joint.type == JointType::kPrismatic || (joint.type == JointType::kCylindrical && joint.pitch == 0.0)) &&
-         std::abs(joint.frame.axes.col(0).dot(direction)) > kAlong;
+         std::abs(joint.frame.axes.col(0).dot(direction)) > tuning().types.stop_along;
 }
 
 /// A drawer at its stop touches what a peg in a blind hole touches, a piston at its dead centre what a pin with a head
-/// does. What would slide but for one face that holds one way only stays among the readings, with a share of the first
-/// one's confidence. It does not overtake: nothing in the geometry tells the two apart.
-void add_reading_with_stop(const std::vector<ContactRegion>& regions, const SlippageOptions& options, Slippage& out) {
-  constexpr double kShare = 0.3;
-  constexpr std::size_t kFewest = 40;
+/// does. What would slide but for one face that holds one way only stays among the hypotheses, with a share of the
+/// first one's confidence. It does not overtake: nothing in the geometry tells the two apart.
+void add_hypothesis_with_stop(const std::vector<ContactRegion>& regions, const SlippageOptions& options,
+                              Slippage& out) {
+  const TypesTuning& t = tuning().types;
   JointHypothesis& first = out.hypotheses.front();
   if (first.joint.type != JointType::kFixed && first.joint.type != JointType::kRevolute) return;
   const auto stop = one_sided_face(regions);
@@ -413,12 +416,12 @@ void add_reading_with_stop(const std::vector<ContactRegion>& regions, const Slip
   const auto rest = without_face(regions, *stop);
   std::size_t left = 0;
   for (const ContactRegion& r : rest) left += r.on_a.size() + r.on_b.size();
-  if (left < kFewest) return;
-  JointHypothesis free = readings(rest, options).hypotheses.front();
+  if (left < t.stop_fewest) return;
+  JointHypothesis free = hypotheses_of(rest, options).hypotheses.front();
   if (!slides_along(free.joint, *stop)) return;
-  free.confidence = share_of_first(kShare * free.confidence, out);
+  free.confidence = internal::share_of_first(t.stop_share * free.confidence, out);
   free.reason = "the face that holds it one way only may be a stop; without it " + free.reason;
-  replace_reading(std::move(free), out);
+  internal::replace_hypothesis(std::move(free), out);
 }
 
 }  // namespace
@@ -435,10 +438,10 @@ Slippage analyse_slippage(const std::vector<ContactRegion>& regions, const Slipp
   std::size_t samples = 0;
   for (const ContactRegion& r : regions) samples += r.on_a.size() + r.on_b.size();
   if (samples == 0) throw InvalidArgument("analyse_slippage: the contact has no samples");
-  Slippage out = readings(regions, options);
+  Slippage out = hypotheses_of(regions, options);
   if (options.method == SlippageMethod::kFixedRatio) return out;
-  add_reading_with_stop(regions, options, out);
-  add_reading_of_flange(regions, out);
+  add_hypothesis_with_stop(regions, options, out);
+  internal::add_hypothesis_of_flange(regions, out);
   return out;
 }
 

@@ -6,13 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/corner_tree.h"
 #include "limber/core/error.h"
 #include "limber/mesh/closest_point.h"
+#include "limber/mesh/corner_tree.h"
 
 namespace limber {
 
-struct SurfaceLocator::Tree : internal::CornerTree<3> {};
+struct SurfaceLocator::Tree : CornerTree<3> {};
 
 SurfaceLocator::SurfaceLocator(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
   if (triangles.empty()) throw InvalidArgument("SurfaceLocator: the surface has no triangles");
@@ -43,7 +43,7 @@ SurfaceLocation SurfaceLocator::nearest(const Vec3& p) const {
   SurfaceLocation found;
   double least = std::numeric_limits<double>::infinity();  // squared distance
   tree_->search(
-      p, [&] { return least; },
+      p, [&] { return least; }, [](std::size_t) { return true; },
       [&](Index i) {
         const SurfaceFoot foot = closest_on_triangle(p, tree_->corners(i));
         const double squared = (foot.point - p).squaredNorm();

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/corner_tree.h"
 #include "limber/core/error.h"
 #include "limber/mesh/closest_point.h"
+#include "limber/mesh/corner_tree.h"
 
 namespace limber {
 namespace {
@@ -56,7 +56,7 @@ double largest(const Weights& w) { return std::max({std::abs(w[0]), std::abs(w[1
 
 }  // namespace
 
-struct TetLocator::Tree : internal::CornerTree<4> {};
+struct TetLocator::Tree : CornerTree<4> {};
 
 TetLocator::TetLocator(const TetMesh& mesh) {
   if (mesh.tets.empty()) throw InvalidArgument("TetLocator: the mesh has no tetrahedra");
@@ -80,7 +80,8 @@ TetLocation TetLocator::locate(const Vec3& p) const {
   double least = std::numeric_limits<double>::infinity();  // squared distance
   double smallest_weight = least;                          // largest weight of `found`, outside
   const auto bound = [&] { return inside ? 0.0 : least * (1.0 + kSameDistance); };
-  tree.search(p, bound, [&](Index i) {
+  const auto all_matter = [](std::size_t) { return true; };
+  tree.search(p, bound, all_matter, [&](Index i) {
     const Weights w = barycentric(tree.corners(i), p);
     if (*std::min_element(w.begin(), w.end()) >= -kInside) {
       if (!inside || tree.element(i) < found.tet) found = {tree.element(i), 0.0, w, w};

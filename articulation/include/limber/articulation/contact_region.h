@@ -1,5 +1,20 @@
 /// @file limber/articulation/contact_region.h
 /// Where two components touch: the part of each surface that faces the other across a small gap.
+///
+///   const std::vector<ContactRegion> regions = find_contact_regions(assembly, {.samples = 6000});
+///
+/// Samples are spread evenly by area over what of each surface may lie near the other and face it; each has the nearest
+/// facing point of the other surface. The usual method takes for contact the cluster grown from the smallest
+/// gaps (2.5 times its median gap and what facets add), so that a small hinge is not lost among large faces that run
+/// side by side further apart. Left out are samples whose nearest point lies beside rather than across, that look past
+/// each other while most do not, or behind a third component. Where no surface faces another, one closed component may
+/// lie inside the other: ContactRegion::overlapping.
+///
+/// A pair has no contact where fewer than 20 samples a side are left, the median gap is above `largest_gap`, or only
+/// edges look at each other. Points are placed alike on triangles of one shape, so pose, scale and order do not matter.
+///
+/// Lengths in the input's own unit. Time grows with samples · log(triangles) for a pair; pairs are found by their
+/// boxes. Method: docs/derivations/slippage.md, section 1; the paper's hulls there in section 5.
 #pragma once
 
 #include <functional>
@@ -7,6 +22,7 @@
 #include <vector>
 
 #include "limber/articulation/assembly.h"
+#include "limber/articulation/crease_angle.h"
 #include "limber/core/jobs.h"
 
 namespace limber {
@@ -44,14 +60,15 @@ enum class ContactSearch {
 
 struct ContactRegionOptions {
   ContactSearch method = ContactSearch::kNearest;
-  int samples = 3000;            ///< wanted on each side; 100 … 100,000
-  double facing_cosine = -0.8;   ///< normals whose product is below face each other; −1 … 0
-  double crease_angle = 0.8727;  ///< rad (50°); sharper edges stay sharp in the normals; 0 … π
-  double search = 0.025;         ///< largest gap, of the smaller component's diagonal; > 0
-  double largest_gap = 0.025;    ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
-  double hull_growth = 0.01;     ///< kHulls: of the smaller component's diagonal; > 0, at most `search`
-  double concavity = 0.01;       ///< kHulls: of a piece at most, of its component's diagonal; > 0
-  void validate() const;         ///< @throws InvalidArgument naming the field
+  int samples = 3000;           ///< wanted on each side; 100 … 100,000
+  double facing_cosine = -0.8;  ///< normals whose product is below face each other; −1 … 0
+  /// rad (50°), 0 … π: sharper edges stay sharp in the normals. As in FreeMotionOptions.
+  double crease_angle = kDefaultCreaseAngle;
+  double search = 0.025;       ///< largest gap, of the smaller component's diagonal; > 0
+  double largest_gap = 0.025;  ///< largest median gap, of the contact's own extent; > 0. A wider one is no contact
+  double hull_growth = 0.01;   ///< kHulls: of the smaller component's diagonal; > 0, at most `search`
+  double concavity = 0.01;     ///< kHulls: of a piece at most, of its component's diagonal; > 0
+  void validate() const;       ///< @throws InvalidArgument naming the field
 };
 
 /// Contacts of all pairs of components, ordered by (a, b). Pairs without a contact are absent.

@@ -1,5 +1,22 @@
 /// @file limber/articulation/detect_joints.h
-/// Joints of an assembly from its geometry alone: contacts, the motions they allow, and [X09] Table 1.
+/// Joints of an assembly from its geometry alone [X09 3.1, 3.2].
+///
+///   Warnings warnings;
+///   const Assembly assembly = find_components(read_grouped_surface("lamp.obj", warnings));
+///   const std::vector<DetectedJoint> joints = detect_joints(assembly, {.min_confidence = 0.3});
+///
+/// For each pair of components that come near each other: the contacts (contact_region.h), and for all contacts of the
+/// pair together the type of joint that fits best (slippage.h). At most one joint for a pair. Contacts that hold
+/// nothing, such as two balls that touch at a point, give none.
+///
+/// Types are those of [X09] Table 1 and the screw. Geometry does not tell everything: a peg in a blind hole looks like
+/// a drawer at its stop, a puck on a table like the flange of a bearing that is not drawn, and bolts or glue are not
+/// seen. What else a contact may be stands in DetectedJoint::other_hypotheses.
+///
+/// Limits stay open; range_of_motion.h finds them. Lengths are in the input's own unit, angles in rad; position,
+/// attitude, scale and the order of parts and faces change no type. The same bits for any thread count.
+///
+/// Use: docs/joints.md. Method: docs/derivations/slippage.md. How often it is right: docs/reports/joints-accuracy.md.
 #pragma once
 
 #include <functional>
@@ -32,7 +49,7 @@ struct DetectedJoint {
   JointSpec joint;                   ///< limits open: limber/articulation/range_of_motion.h finds them
   double confidence = 0.0;           ///< 0 … 1
   std::vector<std::string> reasons;  ///< sentences: contact found, motions that slip, what spoke against others
-  std::vector<JointHypothesis> alternatives;  ///< other readings, best first
+  std::vector<JointHypothesis> other_hypotheses;  ///< best first
   OrientedBox influence;
   std::vector<Vec3> contact_points;  ///< on both surfaces, input frame
   double gap = 0.0;                  ///< median distance of the surfaces

@@ -1,32 +1,28 @@
 /// @file limber/articulation/free_motion.h
 /// How far a rigid body can go along one path before it meets another: exact first contacts, all free intervals.
 ///
-/// A path is a rotation about a line, a translation, or a screw: every point p of the moving body M follows its orbit
-/// φ_t(p), t = 0 as read. The position t is blocked where φ_t(M) and the fixed body F overlap:
+/// A path is a rotation about a line, a translation, or a screw. Each point p of the moving body M follows its orbit
+/// φ_t(p), a circle, a line or a helix; t = 0 as drawn. The position t is blocked where φ_t(M) overlaps the fixed body
+/// F:
 ///
 ///   B = ⋃_{p ∈ ∂M} {t : φ_t(p) ∈ F}  ∪  ⋃_{q ∈ ∂F} {t : φ_{−t}(q) ∈ M}                         (1)
 ///
-/// Orbits meet triangles in closed form (circle, line) or by bracketed roots (helix), so each set in (1) is a list of
-/// intervals without a step size: conservative advancement of a single point reaches the same place in one go. p and q
-/// run over samples of both surfaces (vertices, sharp edges, faces); the ends of B are then followed downhill over the
-/// surface until they stay. All free intervals come out together, and what lies behind a thin obstacle is not missed.
+/// An orbit meets a triangle in closed form (circle, line) or at bracketed roots (helix), so each set in (1) is a list
+/// of intervals without a step size, and nothing thin is stepped over. p and q run over samples of both surfaces; the
+/// ends of B are then followed over the surface to where it is met first.
 ///
-/// Parts that fit together touch, overlap a little, or slide on facets that stand for a round surface. So an overlap
-/// counts only if it is wider than a tolerance δ *across* the motion: moved by δ across its orbit in any direction,
-/// the point still meets the other body. δ is `tolerance`, grown to the overlap found as read, plus the sagitta of the
-/// facets, up to `largest_overlap`. Along the motion nothing is lost: the stop is where the surface within δ of such a
-/// point first meets the other body.
-///
-/// Of many bodies in the way only the nearest in either sense are looked at, by the boxes around them, and more only if
-/// the motion does not end among those.
+/// Parts that fit touch everywhere. So an overlap counts only if it is wider than δ across the motion: `tolerance`,
+/// grown to the overlap as drawn and by the sagitta of the facets, up to `largest_overlap`. Along the motion the stop
+/// is where the surfaces first meet. Not seen: what is thinner than 2 δ across the motion, or within 4 δ of the axis.
 ///
 /// Closed surfaces bound solids; open ones are sheets that block where they are crossed, and hide what lies behind.
-/// Source: [X09] 3.3 bisects by collision tests, which sees one interval only; orbits are not in the paper.
+/// Derivation: docs/derivations/orbits.md. Source: [X09] 3.3 bisects by collision tests; orbits are not in the paper.
 #pragma once
 
 #include <span>
 #include <vector>
 
+#include "limber/articulation/crease_angle.h"
 #include "limber/core/types.h"
 #include "limber/mesh/surface_mesh.h"
 #include "limber/model/joint_spec.h"
@@ -53,14 +49,16 @@ struct FreeMotionOptions {
   double tolerance = 0.0;        ///< δ to start with, length; ≥ 0; 0: 2e-4 of the smaller body's diagonal
   double largest_overlap = 0.0;  ///< δ at most, length; ≥ 0; 0: 2e-2 of the smaller body's diagonal
   int samples = 1000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
-  bool reachable_only = false;   ///< saves the work of following the ends of `others`
-  void validate() const;         ///< @throws InvalidArgument naming the field
+  /// rad (50°), 0 … π: a face that bends by less from the next one continues it. As in ContactRegionOptions.
+  double crease_angle = kDefaultCreaseAngle;
+  bool reachable_only = false;  ///< saves the work of following the ends of `others`
+  void validate() const;        ///< @throws InvalidArgument naming the field
 };
 
 /// Where a motion ends.
 struct MotionStop {
   Index body = -1;            ///< of the fixed ones, in the order given; −1: nothing stops
-  Vec3 point = Vec3::Zero();  ///< of the moving body, as read, that touches (or the fixed point, followed back)
+  Vec3 point = Vec3::Zero();  ///< of the moving body, as drawn, that touches (or the fixed point, followed back)
 };
 
 struct FreeMotion {
@@ -70,7 +68,7 @@ struct FreeMotion {
   std::vector<Interval> others;
   MotionStop low, high;      ///< what stops at the ends of `reachable`
   double tolerance = 0.0;    ///< δ as used, length
-  bool overlapping = false;  ///< the bodies overlap by more than largest_overlap as read; such places are left out
+  bool overlapping = false;  ///< the bodies overlap by more than largest_overlap as drawn; such places are left out
 };
 
 /// @param moving, fixed in one frame
@@ -82,6 +80,7 @@ FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const Motio
 
 /// How far the facets of a surface stay from the smooth surface they stand for, within a box: the largest w/2 ·
 /// tan(α/4) over edges that bend by α less than `crease` (rad) between facets of width w.
-double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high, double crease = 0.8727);
+double facet_sagitta(const SurfaceMesh& surface, const Vec3& low, const Vec3& high,
+                     double crease = kDefaultCreaseAngle);
 
 }  // namespace limber

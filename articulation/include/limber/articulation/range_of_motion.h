@@ -1,21 +1,22 @@
 /// @file limber/articulation/range_of_motion.h
-/// How far each joint of an assembly goes before parts collide: its limits, along each of its freedoms.
+/// How far each joint of an assembly goes before components collide: its limits, along each of its freedoms [X09 3.3].
 ///
-/// What moves with component b, and what stays with a: the joints make a graph of the components. In a tree, taking the
-/// joint away leaves two sides: b's moves, a's stays, and so does every component without a joint. In a closed chain
-/// (piston, rod and crank) the rest of the chain moves in ways that one joint alone does not tell: it is left out,
-/// with all that hangs on it. Components that fixed joints hold together count as one.
+///   std::vector<RangeOfMotion> ranges = ranges_of_motion(assembly, joints);
+///   for (std::size_t j = 0; j < joints.size(); ++j) joints[j].joint = ranges[j].joint;   // with limits
 ///
-/// Each freedom is tried on its own, the others at 0: revolute and cylindrical, rotation about x; cylindrical and
-/// prismatic, translation along x; planar, translations along x and y, rotation about z; a screw, rotation with its
-/// advance; a ball, rotations about x, y and z (the three Euler angles, each alone) and swings of x about axes across
-/// it in every direction, the least of which is the cone. See limber/articulation/free_motion.h for how contacts are
-/// found.
+/// With component b of a joint moves b's side of the graph of joints; a's side stays, and so does every component
+/// without a joint. Components that fixed joints hold together count as one. In a closed chain (piston, rod, crank) the
+/// rest of the chain is left out, since one joint alone does not tell how it moves.
 ///
-/// A freedom narrower than a threshold is none: cylindrical becomes revolute or prismatic, a planar joint with one
-/// translation left prismatic, with rotation alone revolute, and what is left without a freedom is fixed.
+/// Each freedom is tried on its own, the others at 0: rotation about x (revolute, cylindrical), translation along x
+/// (prismatic, cylindrical), translations along x and y and rotation about z (planar), rotation with its advance
+/// (screw), rotations about x, y, z and swings of x in every direction, the least of which is the cone (ball). Motions
+/// of several freedoms at once may end earlier. free_motion.h says what stops a motion.
 ///
-/// Source: [X09] 3.3.
+/// A freedom narrower than `min_rotation` or `min_translation` is none, and the joint becomes the type that is left:
+/// cylindrical revolute or prismatic, planar prismatic or revolute, ball revolute, any of them fixed.
+///
+/// Use: docs/range-of-motion.md. How well: docs/reports/range-of-motion.md.
 #pragma once
 
 #include <functional>

@@ -1,16 +1,21 @@
 /// @file limber/articulation/slippage.h
 /// Which rigid motions a contact allows: those along which the surfaces slide on themselves.
 ///
-/// A rigid motion ξ = (ω, v) moves a point p with the velocity ω × p + v; its normal part is c·ξ with c = (p × n, n).
-/// With areas A_i,
+/// A motion ξ = (ω, v) moves a point p with the velocity ω × p + v, whose normal part is c·ξ with c = (p × n, n).
+/// With areas A_i
 ///
 ///   C = Σ A_i c_i c_iᵀ,   M = Σ A_i G_iᵀ G_i,   G_i ξ = ω × p_i + v,   C ξ = μ M ξ                       (1)
 ///
-/// so μ in [0, 1] is the mean squared normal velocity per mean squared velocity: 0 for a motion that slips. Unlike the
-/// eigenvalues of C alone, which [X09] compares with a fixed ratio g, μ depends on no centre and no unit of length.
-/// Some readings look alike: a drawer at its stop and a peg in a blind hole, a flange whose bearing is not drawn and a
-/// puck on a table. The less constrained of the first two and the more constrained of the others is a second reading.
-/// Sources: Gelfand and Guibas, "Shape segmentation using local slippage analysis", 2004; [X09] 3.2.
+/// μ in [0, 1] is the mean squared normal velocity per mean squared velocity: 0 for a motion that slips. It depends on
+/// no centre, basis or unit of length, unlike the eigenvalues of C alone, which [X09] compares with a fixed ratio g.
+///
+/// Each type of joint is a hypothesis: its family of motions is fitted to the contact and is as likely as all its
+/// motions slip, P(μ) = 1/(1 + (μ/τ)²) with τ = threshold + spread of the normals, and all others do not. The shares of
+/// all hypotheses are their confidences. Where two joints touch alike (a stop or the end of a hole, a flange or a
+/// puck) the second is added with a share that does not overtake the first.
+///
+/// Sources: Gelfand and Guibas, "Shape segmentation using local slippage analysis", 2004; [X09] 3.2 and Table 1.
+/// Derivation: docs/derivations/slippage.md.
 #pragma once
 
 #include <array>
@@ -34,7 +39,7 @@ struct SlippageOptions {
   void validate() const;    ///< @throws InvalidArgument naming the field
 };
 
-/// One reading of a contact.
+/// One type of joint that a contact may be.
 struct JointHypothesis {
   JointSpec joint;          ///< limits open
   double slippage = 0.0;    ///< largest μ over the freedoms that the type leaves; small: it slips

@@ -1,21 +1,20 @@
-#include "types/second_reading.h"
+#include "types/other_hypotheses.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <utility>
 
-namespace limber {
+#include "tuning.h"
+
+namespace limber::internal {
 namespace {
 
 /// The middle of a flat contact whose outline is a circle, as far as facets and samples tell.
 std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regions, const JointFrame& plane) {
-  constexpr double kEven = 0.05;  // of the second moments; an ellipse of 1.10 has 0.095
-  constexpr double kRound = 0.9;  // of radii: an octagon has 0.92, a hexagon 0.87, the ellipse 0.91
-  constexpr std::size_t kSectors = 48;
+  const TypesTuning& t = tuning().types;
   using Plane = Eigen::Vector2d;
   std::vector<std::pair<Plane, double>> points;  // with area
   for (const ContactRegion& r : regions)
@@ -28,17 +27,19 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
   if (!(area > 0.0)) return std::nullopt;
   middle /= area;
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
-  std::array<double, kSectors> outline{};
+  std::vector<double> outline(t.round_sectors, 0.0);
+  const auto sectors = static_cast<double>(t.round_sectors);
   for (const auto& [p, weight] : points) {
     const Plane d = p - middle;
     moments += weight * d * d.transpose();
     const double turn = 0.5 + 0.5 * std::atan2(d.y(), d.x()) / std::numbers::pi;
-    double& radius = outline[std::min(static_cast<std::size_t>(turn * kSectors), kSectors - 1)];
+    double& radius = outline[std::min(static_cast<std::size_t>(turn * sectors), outline.size() - 1)];
     radius = std::max(radius, d.norm());
   }
   const Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues();
   const auto [least, most] = std::minmax_element(outline.begin(), outline.end());
-  if (along[1] - along[0] > kEven * (along[1] + along[0]) || *least < kRound * *most) return std::nullopt;
+  if (along[1] - along[0] > t.round_moments * (along[1] + along[0]) || *least < t.round_radii * *most)
+    return std::nullopt;
   return plane.origin + plane.axes.leftCols<2>() * middle;
 }
 
@@ -52,18 +53,17 @@ double share_of_first(double share, Slippage& out) {
   return taken;
 }
 
-void replace_reading(JointHypothesis reading, Slippage& out) {
+void replace_hypothesis(JointHypothesis hypothesis, Slippage& out) {
   const auto others = out.hypotheses.begin() + 1;
   out.hypotheses.erase(std::remove_if(others, out.hypotheses.end(),
-                                      [&](const JointHypothesis& h) { return h.joint.type == reading.joint.type; }),
+                                      [&](const JointHypothesis& h) { return h.joint.type == hypothesis.joint.type; }),
                        out.hypotheses.end());
-  out.hypotheses.push_back(std::move(reading));
+  out.hypotheses.push_back(std::move(hypothesis));
   std::stable_sort(out.hypotheses.begin() + 1, out.hypotheses.end(),
                    [](const JointHypothesis& x, const JointHypothesis& y) { return x.confidence > y.confidence; });
 }
 
-void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
-  constexpr double kShare = 0.2;
+void add_hypothesis_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
   JointHypothesis& first = out.hypotheses.front();
   if (first.joint.type != JointType::kPlanar) return;
   const auto middle = middle_of_round_face(regions, first.joint.frame);
@@ -73,10 +73,10 @@ void add_reading_of_flange(const std::vector<ContactRegion>& regions, Slippage& 
   const Mat3& plane = first.joint.frame.axes;
   turns.joint.frame.origin = *middle;
   turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
-  turns.confidence = share_of_first(kShare, out);
+  turns.confidence = share_of_first(tuning().types.round_share, out);
   turns.reason =
       "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
-  replace_reading(std::move(turns), out);
+  replace_hypothesis(std::move(turns), out);
 }
 
-}  // namespace limber
+}  // namespace limber::internal

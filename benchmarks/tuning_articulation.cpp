@@ -1,0 +1,395 @@
+// tuning_articulation: which numbers of articulation/src/tuning.h matter.
+//   run:  build/release/bin/tuning_articulation [--only TEXT]
+//   see:  a row for each number whose name holds TEXT: what moves in the drawn assemblies when it is halved and doubled.
+//         Angles are halved and doubled where a cosine stands for them, shares stay below 1, and of factors above 1 the
+//         excess is halved and doubled. "same bits": no digit of any result changes; "same score": digits do, but no
+//         count, and no worst error by more than a tenth. Times are of the processor, of one run, and good to a tenth.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <ctime>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "assemblies.h"
+#include "joint_scores.h"
+#include "limber/articulation/detect_joints.h"
+#include "limber/articulation/range_of_motion.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
+#include "tuning.h"
+
+namespace limber::assemblies {
+namespace {
+
+using internal::ScopedTuning;
+using internal::Tuning;
+
+/// All that is varied.
+struct Numbers {
+  Tuning tuning{};
+  DetectionOptions detection{.contact = {.samples = 1500}};  ///< as in the tests of detection
+  RangeOptions ranges{};
+};
+
+/// How a number is halved and doubled.
+enum class Kind { kPlain, kShare, kCosine, kFactor };
+/// What it is measured by.
+enum class Concern { kJoints, kHulls, kRatio, kChains, kRanges };
+
+struct Number {
+  std::string name;
+  Kind kind;
+  Concern concern;
+  std::variant<double*, std::size_t*, int*> value;
+};
+
+double scaled(double value, Kind kind, double by) {
+  switch (kind) {
+    case Kind::kPlain:
+      break;
+    case Kind::kShare:
+      return std::min(by * value, 1.0);
+    case Kind::kCosine:
+      return std::copysign(1.0, value) * std::cos(std::min(by * std::acos(std::abs(value)), std::numbers::pi / 2.0));
+    case Kind::kFactor:
+      return 1.0 + by * (value - 1.0);
+  }
+  return by * value;
+}
+
+void scale(const Number& number, double by) {
+  if (const auto* real = std::get_if<double*>(&number.value)) **real = scaled(**real, number.kind, by);
+  const auto whole = [by](auto& value) {
+    using Whole = std::remove_reference_t<decltype(value)>;
+    value = std::max<Whole>(static_cast<Whole>(by * static_cast<double>(value)), 1);
+  };
+  if (const auto* count = std::get_if<std::size_t*>(&number.value)) whole(**count);
+  if (const auto* count = std::get_if<int*>(&number.value)) whole(**count);
+}
+
+double value_of(const Number& number) {
+  return std::visit([](const auto* value) { return static_cast<double>(*value); }, number.value);
+}
+
+/// The numbers of the sheet, in its order. A test below holds them against the sheet's size.
+std::vector<Number> sheet_of(Tuning& tuning) {
+  using enum Kind;
+  using enum Concern;
+  auto& p = tuning.parts;
+  auto& c = tuning.contacts;
+  auto& t = tuning.types;
+  auto& r = tuning.ranges;
+  return {{"parts.soup_fold", kPlain, kJoints, &p.soup_fold},
+          {"parts.largest_hole", kShare, kJoints, &p.largest_hole},
+          {"parts.all_holes", kShare, kJoints, &p.all_holes},
+          {"contacts.same_length", kPlain, kJoints, &c.same_length},
+          {"contacts.first_look", kPlain, kJoints, &c.first_look},
+          {"contacts.matters", kShare, kJoints, &c.matters},
+          {"contacts.surplus_pieces", kPlain, kJoints, &c.surplus_pieces},
+          {"contacts.own_point", kShare, kJoints, &c.own_point},
+          {"contacts.loose_facing", kCosine, kJoints, &c.loose_facing},
+          {"contacts.facet_facing", kCosine, kJoints, &c.facet_facing},
+          {"contacts.across", kCosine, kJoints, &c.across},
+          {"contacts.shortest_way", kPlain, kJoints, &c.shortest_way},
+          {"contacts.fewest_samples", kPlain, kJoints, &c.fewest_samples},
+          {"contacts.coarse_divisor", kPlain, kJoints, &c.coarse_divisor},
+          {"contacts.coarse_fewest", kPlain, kJoints, &c.coarse_fewest},
+          {"contacts.fine_reach", kFactor, kJoints, &c.fine_reach},
+          {"contacts.cluster_start", kPlain, kJoints, &c.cluster_start},
+          {"contacts.cluster_gaps", kPlain, kJoints, &c.cluster_gaps},
+          {"contacts.cluster_chords", kPlain, kJoints, &c.cluster_chords},
+          {"contacts.cluster_least", kPlain, kJoints, &c.cluster_least},
+          {"contacts.rough", kPlain, kJoints, &c.rough},
+          {"contacts.askew_share", kShare, kJoints, &c.askew_share},
+          {"contacts.askew_times", kPlain, kJoints, &c.askew_times},
+          {"contacts.askew_always", kPlain, kJoints, &c.askew_always},
+          {"contacts.straight_cosine", kCosine, kJoints, &c.straight_cosine},
+          {"contacts.straight_share", kShare, kJoints, &c.straight_share},
+          {"contacts.stray_flat", kShare, kJoints, &c.stray_flat},
+          {"contacts.wider_guides", kShare, kJoints, &c.wider_guides},
+          {"contacts.wider_area", kPlain, kJoints, &c.wider_area},
+          {"contacts.most_spread", kPlain, kJoints, &c.most_spread},
+          {"contacts.flat_thickness", kPlain, kJoints, &c.flat_thickness},
+          {"contacts.quieter", kShare, kJoints, &c.quieter},
+          {"contacts.cells", kPlain, kJoints, &c.cells},
+          {"contacts.patches", kPlain, kJoints, &c.patches},
+          {"contacts.fewest_in_patch", kPlain, kJoints, &c.fewest_in_patch},
+          {"contacts.same_side", kCosine, kJoints, &c.same_side},
+          {"contacts.one_way", kShare, kJoints, &c.one_way},
+          {"contacts.hull_compared", kPlain, kHulls, &c.hull_compared},
+          {"contacts.hull_steps", kPlain, kHulls, &c.hull_steps},
+          {"types.similar", kCosine, kJoints, &t.similar},
+          {"types.similar_floor", kShare, kJoints, &t.similar_floor},
+          {"types.similar_compared", kPlain, kJoints, &t.similar_compared},
+          {"types.axis_rounds", kPlain, kJoints, &t.axis_rounds},
+          {"types.least_turn", kPlain, kJoints, &t.least_turn},
+          {"types.screw_least_turn", kPlain, kJoints, &t.screw_least_turn},
+          {"types.pitch_rounds", kPlain, kJoints, &t.pitch_rounds},
+          {"types.pitch_compared", kPlain, kJoints, &t.pitch_compared},
+          {"types.pitch_fewest", kPlain, kJoints, &t.pitch_fewest},
+          {"types.pitch_alike", kCosine, kJoints, &t.pitch_alike},
+          {"types.pitch_nearest", kPlain, kJoints, &t.pitch_nearest},
+          {"types.pitch_change", kPlain, kJoints, &t.pitch_change},
+          {"types.tail", kPlain, kJoints, &t.tail},
+          {"types.far_centre", kPlain, kJoints, &t.far_centre},
+          {"types.far_axis", kPlain, kJoints, &t.far_axis},
+          {"types.ruled_out", kPlain, kJoints, &t.ruled_out},
+          {"types.screw_clearly", kPlain, kJoints, &t.screw_clearly},
+          {"types.screw_least", kPlain, kJoints, &t.screw_least},
+          {"types.screw_over_plain", kPlain, kJoints, &t.screw_over_plain},
+          {"types.ratio_turns", kPlain, kRatio, &t.ratio_turns},
+          {"types.stop_compared", kPlain, kJoints, &t.stop_compared},
+          {"types.stop_alike", kCosine, kJoints, &t.stop_alike},
+          {"types.stop_against", kPlain, kJoints, &t.stop_against},
+          {"types.stop_least", kPlain, kJoints, &t.stop_least},
+          {"types.stop_along", kCosine, kJoints, &t.stop_along},
+          {"types.stop_fewest", kPlain, kJoints, &t.stop_fewest},
+          {"types.stop_share", kShare, kJoints, &t.stop_share},
+          {"types.round_moments", kPlain, kJoints, &t.round_moments},
+          {"types.round_radii", kShare, kJoints, &t.round_radii},
+          {"types.round_sectors", kPlain, kJoints, &t.round_sectors},
+          {"types.round_share", kShare, kJoints, &t.round_share},
+          {"types.worth_telling", kPlain, kJoints, &t.worth_telling},
+          {"types.frame_aligned", kCosine, kJoints, &t.frame_aligned},
+          {"types.frame_across", kPlain, kJoints, &t.frame_across},
+          {"types.independent", kPlain, kChains, &t.independent},
+          {"types.dense_columns", kPlain, kChains, &t.dense_columns},
+          {"ranges.tolerance", kPlain, kRanges, &r.tolerance},
+          {"ranges.largest_overlap", kPlain, kRanges, &r.largest_overlap},
+          {"ranges.nudge", kPlain, kRanges, &r.nudge},
+          {"ranges.nearest_pairs", kPlain, kRanges, &r.nearest_pairs},
+          {"ranges.pairs_growth", kPlain, kRanges, &r.pairs_growth},
+          {"ranges.contact_margin", kPlain, kRanges, &r.contact_margin},
+          {"ranges.cone_refinements", kPlain, kRanges, &r.cone_refinements},
+          {"ranges.cone_samples", kPlain, kRanges, &r.cone_samples},
+          {"ranges.cone_fewest", kPlain, kRanges, &r.cone_fewest},
+          {"ranges.slope", kPlain, kRanges, &r.slope},
+          {"ranges.one_sided", kPlain, kRanges, &r.one_sided},
+          {"ranges.near_axis", kPlain, kRanges, &r.near_axis},
+          {"ranges.slope_margin", kFactor, kRanges, &r.slope_margin},
+          {"ranges.overlap_growth", kFactor, kRanges, &r.overlap_growth},
+          {"ranges.sharp_edge", kCosine, kRanges, &r.sharp_edge},
+          {"ranges.edge_points", kPlain, kRanges, &r.edge_points},
+          {"ranges.corner_points", kPlain, kRanges, &r.corner_points},
+          {"ranges.walked_faces", kPlain, kRanges, &r.walked_faces},
+          {"ranges.directions", kPlain, kRanges, &r.directions},
+          {"ranges.most_steps", kPlain, kRanges, &r.most_steps},
+          {"ranges.pattern_turn", kPlain, kRanges, &r.pattern_turn},
+          {"ranges.finest_blocked", kPlain, kRanges, &r.finest_blocked},
+          {"ranges.finest_touching", kPlain, kRanges, &r.finest_touching},
+          {"ranges.seeds", kPlain, kRanges, &r.seeds},
+          {"ranges.seeds_behind", kPlain, kRanges, &r.seeds_behind},
+          {"ranges.most_followed", kPlain, kRanges, &r.most_followed},
+          {"ranges.helix_steps", kPlain, kRanges, &r.helix_steps}};
+}
+
+/// Those of the public options that detection and ranges go by.
+std::vector<Number> options_of(Numbers& n) {
+  using enum Kind;
+  using enum Concern;
+  auto& contact = n.detection.contact;
+  return {{"ContactRegionOptions::samples", kPlain, kJoints, &contact.samples},
+          {"ContactRegionOptions::facing_cosine", kCosine, kJoints, &contact.facing_cosine},
+          {"ContactRegionOptions::crease_angle", kPlain, kJoints, &contact.crease_angle},
+          {"ContactRegionOptions::search", kPlain, kJoints, &contact.search},
+          {"ContactRegionOptions::largest_gap", kPlain, kJoints, &contact.largest_gap},
+          {"ContactRegionOptions::hull_growth", kPlain, kHulls, &contact.hull_growth},
+          {"ContactRegionOptions::concavity", kPlain, kHulls, &contact.concavity},
+          {"SlippageOptions::threshold", kPlain, kJoints, &n.detection.slippage.threshold},
+          {"SlippageOptions::ratio", kPlain, kRatio, &n.detection.slippage.ratio},
+          {"FreeMotionOptions::crease_angle", kPlain, kRanges, &n.ranges.motion.crease_angle},
+          {"FreeMotionOptions::samples", kPlain, kRanges, &n.ranges.motion.samples},
+          {"RangeOptions::min_rotation", kPlain, kRanges, &n.ranges.min_rotation},
+          {"RangeOptions::min_translation", kPlain, kRanges, &n.ranges.min_translation},
+          {"RangeOptions::cone_directions", kPlain, kRanges, &n.ranges.cone_directions}};
+}
+
+struct Setting {
+  const char* name;
+  Variant variant;
+};
+
+std::vector<Setting> settings() {
+  return {{"coarse", {.segments = 16, .clearance = 0.0}},
+          {"fine", {.segments = 32, .clearance = 0.005}},
+          {"noisy", {.segments = 32, .clearance = 0.02, .jitter = 1e-3}},
+          {"soup", {.segments = 32, .clearance = -0.005, .soup = true}}};
+}
+
+/// An assembly as drawn, and its joints with all numbers as they are.
+struct Drawn {
+  MadeAssembly made;
+  Assembly assembly;
+  std::vector<DetectedJoint> joints;
+};
+
+/// Those of a setting, drawn once.
+std::vector<Drawn> drawn(const Setting& setting, const DetectionOptions& options, Jobs& jobs) {
+  std::vector<Drawn> out;
+  for (const auto* names : {&tuning_names(), &held_out_names()})
+    for (const std::string& name : *names) {
+      Drawn& d = out.emplace_back(make(name, setting.variant));
+      d.assembly = taken_apart(d.made);
+      d.joints = detect_joints(d.assembly, options, jobs);
+    }
+  return out;
+}
+
+/// What is counted over the assemblies of one setting.
+struct Outcome {
+  int all = 0, right = 0, extra = 0;
+  double worst_angle = 0.0, worst_length = 0.0;  ///< degrees; 1e-3 of the diagonal
+};
+
+struct Outcomes {
+  std::vector<Outcome> of;  ///< settings
+  std::uint64_t bits = 0;   ///< a hash of all results
+  double seconds = 0.0;     ///< of processor time
+
+  void mix(double value) {
+    bits = (bits ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15u, bits ^= bits >> 29;
+  }
+};
+
+void add_joints(const MadeAssembly& made, const DetectionOptions& options, Jobs& jobs, Outcome& out, Outcomes& all) {
+  const Score score = scored(made, options, jobs);
+  out.extra += static_cast<int>(score.extra.size());
+  all.mix(static_cast<double>(score.extra.size()));
+  for (const JointScore& j : score.joints) {
+    ++out.all;
+    out.right += j.right() ? 1 : 0;
+    for (const double value : {static_cast<double>(j.found), j.confidence, j.axis_error, j.origin_error, j.pitch_error})
+      all.mix(value);
+    if (!j.right()) continue;
+    out.worst_angle = std::max(out.worst_angle, j.axis_error);
+    out.worst_length = std::max(out.worst_length, 1e3 * j.origin_error);
+  }
+}
+
+void add_ranges(const Drawn& drawn, const RangeOptions& options, Jobs& jobs, Outcome& out, Outcomes& all) {
+  if (std::none_of(drawn.made.joints.begin(), drawn.made.joints.end(), [](const auto& j) { return !j.ranges.empty(); }))
+    return;
+  for (const RangeScore& r : scored_ranges(drawn.made, drawn.assembly, drawn.joints, jobs, options)) {
+    ++out.all;
+    out.right += r.right() ? 1 : 0;
+    all.mix(r.error);
+    all.mix(r.ends_match);
+    if (!r.right()) continue;
+    double& worst = r.angle ? out.worst_angle : out.worst_length;
+    worst = std::max(worst, r.error);
+  }
+}
+
+/// The sum of mobilities takes the place of the count of joints read right.
+void add_chains(const Drawn& drawn, Outcome& out, Outcomes& all) {
+  const Index mobility = overall_kinematics(drawn.assembly, drawn.joints).mobility;
+  ++out.all;
+  out.right += static_cast<int>(mobility);
+  all.mix(static_cast<double>(mobility));
+}
+
+/// @param settings drawn, in the order of settings()
+Outcomes measure(Numbers n, Concern concern, const std::vector<std::vector<Drawn>>& settings, Jobs& jobs) {
+  const ScopedTuning tuned(n.tuning);
+  if (concern == Concern::kHulls) n.detection.contact.method = decltype(n.detection.contact.method)::kHulls;
+  if (concern == Concern::kRatio) n.detection.slippage.method = SlippageMethod::kFixedRatio;
+  Outcomes all;
+  all.of.resize(settings.size());
+  const std::clock_t begin = std::clock();
+  for (std::size_t s = 0; s < (concern == Concern::kJoints ? settings.size() : 2); ++s)
+    for (const Drawn& d : settings[s])
+      if (concern == Concern::kRanges)
+        add_ranges(d, n.ranges, jobs, all.of[s], all);
+      else if (concern == Concern::kChains)
+        add_chains(d, all.of[s], all);
+      else
+        add_joints(d.made, n.detection, jobs, all.of[s], all);
+  all.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  return all;
+}
+
+std::string change_text(const char* format, auto before, auto after) {
+  char text[80];
+  std::snprintf(text, sizeof text, format, before, after);
+  return text;
+}
+
+/// What one change moves, in words.
+std::string moved(const Outcomes& before, const Outcomes& after) {
+  std::string out;
+  const auto differs = [](double x, double y, double least) {
+    return std::max(x, y) > least && std::abs(x - y) > 0.1 * std::max(x, y);
+  };
+  for (std::size_t s = 0; s < settings().size(); ++s) {
+    const Outcome &x = before.of[s], &y = after.of[s];
+    std::string here;
+    if (x.right != y.right) here += change_text(" right %d → %d", x.right, y.right);
+    if (x.extra != y.extra) here += change_text(" extra %d → %d", x.extra, y.extra);
+    if (differs(x.worst_angle, y.worst_angle, 1e-3))
+      here += change_text(" angle %.2g → %.2g°", x.worst_angle, y.worst_angle);
+    if (differs(x.worst_length, y.worst_length, 1e-3))
+      here += change_text(" length %.2g → %.2g", x.worst_length, y.worst_length);
+    if (!here.empty()) out += (out.empty() ? "" : "; ") + std::string(settings()[s].name) + ":" + here;
+  }
+  if (out.empty()) out = before.bits == after.bits ? "same bits" : "same score";
+  if (std::abs(after.seconds / before.seconds - 1.0) > 0.2)
+    out += change_text(" (time × %.*f)", 2, after.seconds / before.seconds);
+  return out;
+}
+
+int run(std::string_view only) {
+  Numbers n;
+  std::vector<Number> numbers = sheet_of(n.tuning);
+  if (8 * numbers.size() != sizeof(Tuning))
+    return std::fprintf(stderr, "tuning_articulation: %zu numbers listed, the sheet has %zu\n", numbers.size(),
+                        sizeof(Tuning) / 8),
+           1;
+  for (const Number& option : options_of(n)) numbers.push_back(option);
+  TbbJobs jobs;
+  std::vector<std::vector<Drawn>> all_drawn;
+  for (const Setting& setting : settings()) all_drawn.push_back(drawn(setting, n.detection, jobs));
+  std::vector<Outcomes> base;
+  for (const Concern concern :
+       {Concern::kJoints, Concern::kHulls, Concern::kRatio, Concern::kChains, Concern::kRanges}) {
+    static const char* const kNames[] = {"joints", "joints by hulls", "joints by the fixed ratio",
+                                         "sums of mobilities (over assemblies)", "ranges"};
+    base.push_back(measure(n, concern, all_drawn, jobs));
+    std::printf("%s, %.1f s:", kNames[static_cast<int>(concern)], base.back().seconds);
+    for (std::size_t s = 0; s < settings().size(); ++s)
+      if (const Outcome& o = base.back().of[s]; o.all > 0)
+        std::printf(" %s %d right of %d, %d extra, worst %.2g° and %.2g;", settings()[s].name, o.right, o.all, o.extra,
+                    o.worst_angle, o.worst_length);
+    std::printf("\n");
+  }
+  std::printf("\n| number | value | at half | at double |\n|---|---|---|---|\n");
+  const Numbers unchanged = n;
+  for (const Number& number : numbers) {
+    if (number.name.find(only) == std::string::npos) continue;
+    const Outcomes& before = base[static_cast<std::size_t>(number.concern)];
+    std::printf("| %s | %.4g", number.name.c_str(), value_of(number));
+    for (const double by : {0.5, 2.0}) {
+      scale(number, by);
+      std::printf(" | %s", moved(before, measure(n, number.concern, all_drawn, jobs)).c_str());
+      n = unchanged;
+    }
+    std::printf(" |\n");
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace limber::assemblies
+
+int main(int argc, char** argv) {
+  if (argc == 1) return limber::assemblies::run("");
+  if (argc == 3 && std::string_view(argv[1]) == "--only") return limber::assemblies::run(argv[2]);
+  return std::fprintf(stderr, "tuning_articulation: expected --only TEXT, or nothing\n"), 2;
+}
