@@ -1,8 +1,8 @@
 // limber-precompute: a mesh in, an asset out.
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <CLI/CLI.hpp>
 
 #include <chrono>
 #include <cstdio>

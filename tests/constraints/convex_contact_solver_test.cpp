@@ -124,8 +124,7 @@ TEST(ConvexContacts, MotionIsThatOfTheImpulses) {
       const MatrixView J = heap.solver.values(heap.sides[u][s]);
       const std::size_t body = u / 8 - s;
       for (std::size_t c = 0; c < Heap::kWidth; ++c)
-        for (std::size_t r = 0; r < 3; ++r)
-          sum[body][c] += J.row(r)[c] * heap.solver.impulse(u)[static_cast<int>(r)];
+        for (std::size_t r = 0; r < 3; ++r) sum[body][c] += J.row(r)[c] * heap.solver.impulse(u)[static_cast<int>(r)];
     }
   for (std::size_t b = 0; b < sum.size(); ++b)
     for (std::size_t c = 0; c < Heap::kWidth; ++c) {
@@ -198,8 +197,7 @@ TEST(ConvexContacts, ManyContactsOfOneBodyShareOneLoad) {
   solver.end_structure();
   for (std::size_t u = 0; u < sides.size(); ++u) solver.values(sides[u]).row(0)[0] = 1.0, solver.start(u)[0] = -1.0;
   ASSERT_EQ(solver.solve(1.0, {.tolerance = 1e-13}).status, SolveStatus::kSolved);
-  for (std::size_t u = 0; u < sides.size(); ++u)
-    EXPECT_NEAR(solver.impulse(u)[0], 1.0 / (1e-3 + kContacts), 1e-13);
+  for (std::size_t u = 0; u < sides.size(); ++u) EXPECT_NEAR(solver.impulse(u)[0], 1.0 / (1e-3 + kContacts), 1e-13);
 }
 
 }  // namespace

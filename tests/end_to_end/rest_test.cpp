@@ -43,13 +43,13 @@ std::shared_ptr<const ModalModel> bake_box(const RubberBox& box) {
   return bake({.name = "box", .mesh = mesh_of(box)}, o, warnings).asset.bodies[0];
 }
 
-/// Boxes laid upon each other, with their energies by both meters.
+/// Boxes laid upon each other, with their energies by both meters: without recovery, which is work done on them.
 struct Tower : GroundedWorld {
   static constexpr double kHeight = 0.2, kGap = 1e-4;  // m; each of the gaps closes
   static inline const RubberBox kBox{
       .size = {0.4, 0.3, kHeight}, .cells = {3, 2, 2}, .modes = 12, .mass = MassKind::kConsistent};
 
-  Tower() : model(bake_box(kBox)), meter(mesh_of(kBox), kBoxRubber, model) {
+  Tower() : GroundedWorld({.recovery_speed = 0.0}), model(bake_box(kBox)), meter(mesh_of(kBox), kBoxRubber, model) {
     for (int i = 0; i < kBoxes; ++i)
       boxes.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}),
                                                       {0.012 * (i % 2), 0.01 * (i % 3),

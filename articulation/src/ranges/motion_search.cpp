@@ -357,11 +357,12 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
 
 Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) const {
   const double finest = tuning().ranges.finest_blocked * tolerances_.across;
-  return downhill(seed, low, gap, finest, [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
-    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
-    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
-    keep_blocked(next, seed.moving, out);
-  });
+  return downhill(seed, low, gap, finest,
+                  [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
+                    raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
+                    if (std::none_of(out.begin(), out.end(), improves)) return out.clear();
+                    keep_blocked(next, seed.moving, out);
+                  });
 }
 
 // A blocked point has the other body all around it, to a distance δ. What belongs to the same overlap may meet it
