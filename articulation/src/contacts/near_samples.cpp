@@ -293,6 +293,7 @@ void average_patches(std::vector<NearSample>& samples) {
   const std::vector<Cell> cells = cells_of(samples, t.cells);
   const std::size_t wanted = std::min(std::max(t.fewest_in_patch, cells.size() / t.patches), cells.size() - 1);
   std::vector<Vec3> centres;
+  centres.reserve(cells.size());
   for (const Cell& cell : cells) centres.push_back(cell.point / cell.area);
   std::vector<double> squared(cells.size()), sorted;
   for (NearSample& s : samples) {
