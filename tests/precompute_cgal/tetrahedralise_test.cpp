@@ -150,9 +150,9 @@ TEST(Tetrahedralise, FiveVerticesAreEnough) {
 }
 
 TEST(Tetrahedralise, APlateThinnerThanACellKeepsItsVolumeAndStaysInOnePiece) {
-  const double thickness = 0.01;  // cells of 0.035 without regard to it
+  const double thickness = 0.05;
   Warnings warnings;
-  const auto r = tetrahedralise(shapes::box({0, 0, 0}, {1, 1, thickness}), {}, warnings);
+  const auto r = tetrahedralise(shapes::box({0, 0, 0}, {1, 1, thickness}), {.cell_size = 0.18}, warnings);
   EXPECT_NEAR(r.volume_after, thickness, kRoundOff);
   EXPECT_EQ(bodies(r.mesh), 1);
   EXPECT_THAT(warnings, IsEmpty());
@@ -160,9 +160,9 @@ TEST(Tetrahedralise, APlateThinnerThanACellKeepsItsVolumeAndStaysInOnePiece) {
 
 TEST(Tetrahedralise, AThinShellIsWholeAndManifold) {
   SurfaceMesh shell = shapes::sphere({0, 0, 0}, 1.0, 4);
-  shapes::append(shapes::turned(shapes::sphere({0, 0, 0}, 0.97, 4)), shell);
+  shapes::append(shapes::turned(shapes::sphere({0, 0, 0}, 0.92, 4)), shell);
   Warnings warnings;
-  const auto r = tetrahedralise(shell, {}, warnings);  // cells of 0.087 without regard to the thickness of 0.03
+  const auto r = tetrahedralise(shell, {.cell_size = 0.4}, warnings);  // five times as thick as the shell
   EXPECT_NEAR(r.volume_after, r.volume_before, 0.1 * r.volume_before);
   const SurfaceQuality quality = surface_quality(boundary_surface(r.mesh).surface);
   EXPECT_TRUE(quality.closed_manifold());
@@ -171,8 +171,8 @@ TEST(Tetrahedralise, AThinShellIsWholeAndManifold) {
 }
 
 TEST(Tetrahedralise, WhatIsTooThinForTheBudgetIsRefusedWithTheBudgetItAsksFor) {
-  const SurfaceMesh plate = shapes::box({0, 0, 0}, {1, 1, 0.01});
-  const TetrahedralisationOptions poor{.cell_size = 0.2, .max_nodes = 1};
+  const SurfaceMesh plate = shapes::box({0, 0, 0}, {1, 1, 0.03});
+  const TetrahedralisationOptions poor{.cell_size = 0.4, .max_nodes = 1};
   Warnings warnings;
   const std::string message = message_of<ComputationError>([&] { tetrahedralise(plate, poor, warnings); });
   const std::size_t asked = message.find("ask for ");
