@@ -2,6 +2,7 @@
 // forms.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -116,7 +117,8 @@ void PrintTo(const Standing& s, std::ostream* out) { *out << s.shape; }
 class ContactRunOnShape : public ::testing::TestWithParam<Standing> {};
 
 TEST_P(ContactRunOnShape, ABlockComesToRestOnIt) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) / "limber_ContactRunOnShape";
+  const auto folder =
+      std::filesystem::path(::testing::TempDir()) / ("limber_ContactRunOnShape_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   write_file(folder / "box.obj",
              "v -3 -3 -1\nv 3 -3 -1\nv 3 3 -1\nv -3 3 -1\nv -3 -3 1\nv 3 -3 1\nv 3 3 1\nv -3 3 1\n"
