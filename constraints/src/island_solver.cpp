@@ -148,7 +148,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
   if (!options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = close_energy(options, done);
-    if (!(left > 0.0) || convex) return done;  // springs and recovery alone are left, and y has gained nothing
+    if (!(left > 0.0) || (convex && yield(BodyStates(part.table), part.constraints, options, done))) return done;
     if (recovers && !flexibility.empty() && has_recovery()) {
       recovers = false, slowing = -1;
       done = foresee(part, options, whole_step);
@@ -158,7 +158,8 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
-  if (done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
+  if (!convex && done.status == SolveStatus::kSolved &&
+      yield(BodyStates(part.table), part.constraints, options, done))
     return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
