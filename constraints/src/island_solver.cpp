@@ -158,8 +158,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const Part& part, const IslandO
     if (!settled || slowing == kSlowings || !slow_start(left)) break;
     done = foresee(part, options, whole_step);
   }
-  if (!convex && done.status == SolveStatus::kSolved &&
-      yield(BodyStates(part.table), part.constraints, options, done))
+  if (!convex && done.status == SolveStatus::kSolved && yield(BodyStates(part.table), part.constraints, options, done))
     return done;
   refuse_impulses(BodyStates(part.table), part.constraints, options, done);
   return done;
