@@ -34,15 +34,27 @@ void ConvexContactSolver::end_structure() {
   std::size_t widest = kPad;
   for (const Node& node : nodes_) widest = std::max(widest, padded(node.width));
   product_.need(3 * widest);
-  for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
+  for (AlignedBuffer* vector : {&free_, &y_, &d_, &gradient_})
+    std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
 
 MatrixView ConvexContactSolver::values(std::size_t side) {
   return {values_.data() + sides_[side].values, padded(nodes_[sides_[side].node].width)};
 }
 
-std::span<const double> ConvexContactSolver::motion(std::size_t node) const {
-  return {y_.data() + nodes_[node].first, nodes_[node].width};
+/// To be read only.
+MatrixView ConvexContactSolver::jacobian(std::size_t side) const {
+  return const_cast<ConvexContactSolver*>(this)->values(side);
+}
+
+Vec3 ConvexContactSolver::response(std::size_t unit) const {
+  const Unit& of = units_[unit];
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t s = of.first_side; s < of.first_side + of.sides; ++s) {
+    const MatrixView J = jacobian(s);
+    for (std::size_t r = 0; r < of.rows; ++r) sum[static_cast<int>(r)] += dot(J.row(r), J.row(r), J.stride);
+  }
+  return sum;
 }
 
 /// J y
@@ -50,7 +62,7 @@ Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
   double sum[3] = {}, part[3];
   for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
     const Node& node = nodes_[sides_[s].node];
-    const MatrixView J{const_cast<double*>(values_.data()) + sides_[s].values, padded(node.width)};
+    const MatrixView J = jacobian(s);
     multiply_rows(part, J, nullptr, y + node.first, unit.rows, J.stride);
     for (std::size_t r = 0; r < unit.rows; ++r) sum[r] += part[r];
   }
@@ -61,7 +73,7 @@ Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
 void ConvexContactSolver::add_transposed(const Unit& unit, const Vec3& rows, double* y) const {
   for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
     const Node& node = nodes_[sides_[s].node];
-    const MatrixView J{const_cast<double*>(values_.data()) + sides_[s].values, padded(node.width)};
+    const MatrixView J = jacobian(s);
     combine_rows(y + node.first, y + node.first, J, nullptr, rows.data(), unit.rows, J.stride);
   }
 }
@@ -87,13 +99,15 @@ void ConvexContactSolver::begin_with_better_start() {
   if (at_guess < at_free) std::copy_n(guess, size_, free);
 }
 
-ConvexContactReport ConvexContactSolver::solve(double momentum, const ConvexContactOptions& options) {
+ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
   begin_with_better_start();
-  return solve_on(momentum, options);
+  pairs_are_new_ = true;
+  return solve_on(options);
 }
 
-ConvexContactReport ConvexContactSolver::solve_on(double momentum, const ConvexContactOptions& options) {
+ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& options) {
   ConvexContactReport report;
+  const double momentum = std::sqrt(dot(free_.data(), free_.data(), size_));
   find_ends(y_.data());
   for (;; ++report.iterations) {
     const double pressed = gradient();
@@ -102,7 +116,7 @@ ConvexContactReport ConvexContactSolver::solve_on(double momentum, const ConvexC
     report.residual = std::sqrt(dot(g, g, size_)) / scale;
     if (report.residual <= options.tolerance) return report;
     if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
-    if (!structure_holds()) place_pairs();
+    if (pairs_are_new_) place_pairs();
     assemble();
     if (!factor_.factor_symmetric()) break;
     double *d = d_.data(), *y = y_.data();
@@ -123,7 +137,10 @@ double ConvexContactSolver::gradient() {
   for (Unit& unit : units_) {
     const ContactPotential::Value v = unit.potential.at(unit.end);
     unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
-    if (v.acts) add_transposed(unit, v.impulse, g);
+    if (!v.acts) continue;
+    add_transposed(unit, v.impulse, g);
+    pairs_are_new_ = pairs_are_new_ || !unit.has_pressed;
+    unit.has_pressed = true;
   }
   const double pressed = std::sqrt(dot(g, g, size_));
   const double* y = y_.data();
@@ -131,37 +148,31 @@ double ConvexContactSolver::gradient() {
   return pressed;
 }
 
-/// Whether every unit that acts has its pair among those that the factor has blocks for.
-bool ConvexContactSolver::structure_holds() {
-  widths_.clear();
-  for (const Node& node : nodes_) widths_.push_back(node.width);
-  bool holds = widths_ == factor_widths_;
-  pairs_.clear();
-  for (Unit& unit : units_) {
-    unit.placed = false;
-    if (unit.sides < 2) continue;
-    const std::size_t a = sides_[unit.first_side].node, b = sides_[unit.first_side + 1].node;
-    const Pair pair{std::min(a, b), std::max(a, b)};
-    const bool known = std::ranges::binary_search(factor_pairs_, pair);
-    if (unit.acts) pairs_.push_back(pair), holds = holds && known;
-    if (!known || !holds) continue;
-    unit.block = factor_.comes_first(a, b) ? factor_.block(a, b) : factor_.block(b, a);
-    unit.placed = true;
-  }
-  return holds;
+ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {
+  return std::minmax(sides_[unit.first_side].node, sides_[unit.first_side + 1].node);
 }
 
-/// A structure with the pairs that it had, as far as the bodies are the same ones, and those that press.
+/// Finds the blocks of all pairs that have pressed in this problem, in a new structure if that at hand lacks one.
 void ConvexContactSolver::place_pairs() {
-  if (widths_ == factor_widths_) pairs_.insert(pairs_.end(), factor_pairs_.begin(), factor_pairs_.end());
+  widths_.clear(), pairs_.clear();
+  for (const Node& node : nodes_) widths_.push_back(node.width);
+  for (const Unit& unit : units_)
+    if (unit.has_pressed && unit.sides == 2) pairs_.push_back(pair_of(unit));
   std::ranges::sort(pairs_);
   pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-  factor_widths_ = widths_;
-  factor_pairs_ = pairs_;
-  factor_.begin_pattern(widths_);
-  for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
-  factor_.end_pattern();
-  structure_holds();
+  if (widths_ != factor_widths_ || !std::ranges::includes(factor_pairs_, pairs_)) {
+    factor_widths_ = widths_;
+    factor_pairs_ = pairs_;
+    factor_.begin_pattern(widths_);
+    for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
+    factor_.end_pattern();
+  }
+  for (Unit& unit : units_) {
+    if (!unit.has_pressed || unit.sides < 2) continue;
+    const auto [a, b] = pair_of(unit);
+    unit.block = factor_.comes_first(a, b) ? factor_.block(a, b) : factor_.block(b, a);
+  }
+  pairs_are_new_ = false;
 }
 
 /// 1 + Σ Jᵀ ∇²l J
@@ -179,7 +190,7 @@ void ConvexContactSolver::assemble() {
 }
 
 void ConvexContactSolver::add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block) {
-  const MatrixView left = values(a), right = values(b);
+  const MatrixView left = jacobian(a), right = jacobian(b);
   const MatrixView product{product_.data(), right.stride};
   for (std::size_t r = 0; r < unit.rows; ++r) {
     std::fill_n(product.row(r), right.stride, 0.0);

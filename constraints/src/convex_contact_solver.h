@@ -2,7 +2,7 @@
 //
 //   min over y   ½ |y|² + Σ_c l_c(u_c + J_c y)                                                                     (1)
 //
-// y is what contacts change about the end of the step, scaled so that its mass matrix is 1; u_c is where a contact
+// y is what contacts change about the motion of the step, scaled so that its mass matrix is 1; u_c is where a contact
 // would be at the end of the free step, less what it asks for; l_c is the potential of a spring whose impulse stays in
 // a set (contact_potential.h). At the minimum y = Σ J_cᵀ F_c, so that (1) is the complementarity problem of the
 // contacts with their compliance.
@@ -10,7 +10,7 @@
 // Newton's method: (1 + Σ J_cᵀ ∇²l_c J_c) d = −∇, factored in blocks by body (block_factor.h), with an exact search
 // along d, which needs u_c and J_c d alone. It converges from everywhere, as (1) is strongly convex with a Lipschitz
 // gradient. Only pairs of bodies that have pressed on each other have a block: most contacts of a fall are found ahead
-// and exert nothing. The order of elimination is kept from problem to problem while no new pair presses.
+// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses.
 //
 // Energy: with rows linear in the step the bodies gain  Σ l_c(u⁰_c) − l_c(u_c) − ½|y|²  at most, u⁰ being the start of
 // the step: what springs had stored. This needs y as it is, not F: a solve that ends early is still safe by y.
@@ -40,7 +40,8 @@ struct ConvexContactReport {
 
 class ConvexContactSolver {
  public:
-  // Built in this order: nodes, units with their sides, end_structure(), then values, starts and impulses.
+  // Built in this order: nodes, units with their sides, end_structure(), then values and the free motion, then starts,
+  // potentials and impulses.
   void begin_structure();
   /// Degrees of freedom of one body. @return its number
   std::size_t add_node(std::size_t width);
@@ -53,6 +54,12 @@ class ConvexContactSolver {
 
   /// J_c of a side, row by row: rows of its unit × the node's width.
   MatrixView values(std::size_t side);
+  /// The motion of a node without contacts, scaled as y: its size in all is what a residual is measured by.
+  std::span<double> free_motion(std::size_t node) { return part_of(free_, node); }
+  /// J_c of the free motion.
+  Vec3 moved_freely(std::size_t unit) const { return seen(units_[unit], free_.data()); }
+  /// |J_c|² row by row: how far a unit impulse of each moves its own row.
+  Vec3 response(std::size_t unit) const;
   /// u_c, as many numbers as the unit has rows.
   Vec3& start(std::size_t unit) { return units_[unit].start; }
   /// F_c: a guess before solve(), what was found after it.
@@ -64,12 +71,11 @@ class ConvexContactSolver {
   std::size_t units() const { return units_.size(); }
 
   /// From the impulses given, or from the free motion where (1) is less there.
-  /// @param momentum |y| of the free motion, the scale of what is small
-  ConvexContactReport solve(double momentum, const ConvexContactOptions& options);
+  ConvexContactReport solve(const ConvexContactOptions& options);
   /// Goes on from y, after potentials or starts were changed.
-  ConvexContactReport solve_on(double momentum, const ConvexContactOptions& options);
+  ConvexContactReport solve_on(const ConvexContactOptions& options);
   /// y of a node, after solve().
-  std::span<const double> motion(std::size_t node) const;
+  std::span<const double> motion(std::size_t node) { return part_of(y_, node); }
 
  private:
   struct Node {
@@ -82,20 +88,24 @@ class ConvexContactSolver {
     Vec3 impulse = Vec3::Zero();
     Mat3 stiffness = Mat3::Zero();
     bool acts = false;
-    BlockFactor::Block block{};  // of its pair, where it has two sides
-    bool placed = false;         // its pair is in the factor's structure
+    bool has_pressed = false;    // in this problem
+    BlockFactor::Block block{};  // of its pair, where it has two sides and has pressed
   };
   struct Side {
     std::size_t node = 0, values = 0;
   };
   using Pair = std::pair<std::size_t, std::size_t>;
 
+  std::span<double> part_of(AlignedBuffer& vector, std::size_t node) {
+    return {vector.data() + nodes_[node].first, nodes_[node].width};
+  }
+  MatrixView jacobian(std::size_t side) const;
   Vec3 seen(const Unit& unit, const double* y) const;
   void add_transposed(const Unit& unit, const Vec3& rows, double* y) const;
   void begin_with_better_start();
   double gradient();
   void find_ends(const double* y);
-  bool structure_holds();
+  Pair pair_of(const Unit& unit) const;
   void place_pairs();
   void assemble();
   void add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block);
@@ -111,10 +121,11 @@ class ConvexContactSolver {
   std::vector<Unit> units_;
   std::vector<Side> sides_;
   std::size_t numbers_ = 0, size_ = 0;
-  AlignedBuffer values_, y_, d_, gradient_, product_, ordered_;
+  AlignedBuffer values_, free_, y_, d_, gradient_, product_, ordered_;
   BlockFactor factor_;
   std::vector<std::size_t> factor_widths_, widths_;
   std::vector<Pair> factor_pairs_, pairs_;  // sorted
+  bool pairs_are_new_ = true;               // a unit has pressed whose block has not been looked up
 };
 
 }  // namespace limber::internal

@@ -6,7 +6,8 @@
 namespace limber {
 namespace {
 
-constexpr internal::ConvexContactOptions kConvexOptions{};
+// Of what an impulse moves its own contact by within the step, what the contact yields to it by.
+constexpr double kRegularisation = 1e-3;
 
 internal::ContactPotential potential_of(const RowLaw& law) {
   using Set = internal::ContactPotential::Set;
@@ -20,20 +21,21 @@ internal::ContactPotential potential_of(const RowLaw& law) {
 /// The contacts of a large island of nothing else: one convex problem, linear in the free motion of the step.
 SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span<Constraint* const> constraints,
                                              const IslandOptions& options, IslandReport& report) {
+  constexpr internal::ConvexContactOptions kOptions{};
   bodies.write_position_metric(step, theta, metric);
   predict(options);  // without contacts
-  const double momentum = find_displacement();
   place_contacts();
   fill_contacts();
-  start_contacts(options);
-  internal::ConvexContactReport done = contacts.solve(momentum, kConvexOptions);
+  fill_free_motion();
+  start_contacts();
+  internal::ConvexContactReport done = contacts.solve(kOptions);
   report.newton_steps = done.iterations;
   while (done.status == SolveStatus::kSolved && stiffen_pressed()) {
-    done = contacts.solve_on(momentum, kConvexOptions);
+    done = contacts.solve_on({.max_iterations = kOptions.max_iterations - report.newton_steps});
     report.newton_steps += done.iterations;
   }
   report.iterations = 1;
-  report.change = done.residual / kConvexOptions.tolerance;
+  report.change = done.residual / kOptions.tolerance;
   for (std::size_t u = 0; u < contacts.units(); ++u) {
     const std::size_t first = unit_rows[u];
     const auto count = static_cast<std::size_t>(contact_rows(laws[first]));
@@ -55,27 +57,6 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
     take_motion(options);
   measure(states, StepTime::kEnd, constraints, gap);
   return done.status;
-}
-
-/// By degree of freedom, of the motion that is predicted. @return its size as that of y, (1) of convex_contact_solver.h
-double IslandSolver::Impl::find_displacement() {
-  displacement.resize(metric.size());
-  double sum = 0.0;
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
-    const BodyResponse& r = bodies.response(local);
-    const RigidTransform &start = group->frame(slot).pose(), &end = group->predicted_frame(slot).pose();
-    double* own = displacement.data() + bodies.first(local);
-    const Vec3 moved = end.p - start.p, turned = rotation_vector(end.q * start.q.conjugate());
-    for (int i = 0; i < r.translations; ++i) *own++ = moved[i];
-    for (int i = 0; i < r.rotations; ++i) *own++ = r.axes.col(i).dot(turned);
-    const std::span<const double> z0 = group->amplitudes(slot), z1 = group->predicted_amplitudes(slot);
-    for (std::size_t i = 0; i < z0.size(); ++i) *own++ = z1[i] - z0[i];
-    const double* weight = metric.data() + bodies.first(local);
-    for (const double* d = displacement.data() + bodies.first(local); d < own; ++d, ++weight)
-      if (*weight > 0.0) sum += *d * *d / *weight;
-  }
-  return std::sqrt(sum);
 }
 
 /// Each contact a unit of its rows.
@@ -100,67 +81,66 @@ void IslandSolver::Impl::place_contacts() {
 
 /// J D^½
 void IslandSolver::Impl::fill_contacts() {
-  weighted.resize(metric.size());
-  for (std::size_t i = 0; i < metric.size(); ++i) weighted[i] = std::sqrt(metric[i]);
+  take_roots();
   std::size_t next_side = 0;
   for (const std::size_t first : unit_rows) {
     std::size_t sides = 0;
     for (Index r = 0; r < contact_rows(laws[first]); ++r) {
-      const auto row = first + static_cast<std::size_t>(r);
       sides = 0;
       Index last = -1;
-      for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(row)).sides) {
+      for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(first) + r).sides) {
         const Index local = bodies.local(side.body);
         if (local < 0) continue;
         sides += local != last ? 1 : 0;
         last = local;
-        double* to = contacts.values(next_side + sides - 1).row(static_cast<std::size_t>(r));
-        one_row.assign(static_cast<std::size_t>(bodies.response(local).size()), 0.0);
-        bodies.response(local).add_row(side.linear, side.angular, rows.modal(side), one_row.data());
-        const double* weight = weighted.data() + bodies.first(local);
-        for (std::size_t k = 0; k < one_row.size(); ++k) to[k] += one_row[k] * weight[k];
+        add_weighted(side, local, static_cast<std::size_t>(bodies.response(local).size()),
+                     contacts.values(next_side + sides - 1).row(static_cast<std::size_t>(r)));
       }
     }
     next_side += sides;
   }
 }
 
-/// u⁰: where the free motion takes each contact, less what it asks for; compliances; last impulses.
-void IslandSolver::Impl::start_contacts(const IslandOptions&) {
-  give.assign(f.size(), 0.0), slip.assign(f.size(), 0.0);
-  for (const ConstraintRows::Flexibility& g : flexibility)
-    if (g.body < 0) give[static_cast<std::size_t>(g.i)] = g.value;
-  std::size_t u = 0;
-  for (const std::size_t first : unit_rows) {
-    const RowLaw& law = laws[first];
-    const auto count = static_cast<std::size_t>(contact_rows(law));
-    internal::ContactPotential& potential = contacts.potential(u);
-    potential.compliance = std::max(give[first], law.regularisation) / step;
-    Vec3 start = Vec3::Zero(), impulse = Vec3::Zero();
-    for (std::size_t r = 0; r < count; ++r) {
-      const auto at = static_cast<int>(r);
-      start[at] += laws[first + r].start_gap - laws[first + r].offset + moved(first + r);
-      impulse[at] = step * laws[first + r].last_force;
-    }
-    start[0] += law.shift;
-    contacts.start(u) = start, contacts.impulse(u) = impulse;
-    ++u;
+/// How the bodies move without contacts, as they are predicted: D^−½ of it, by degree of freedom.
+void IslandSolver::Impl::fill_free_motion() {
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto& [group, slot, pose] = bodies.body(local);
+    const BodyResponse& r = bodies.response(local);
+    const RigidTransform &start = group->frame(slot).pose(), &end = group->predicted_frame(slot).pose();
+    const Vec3 moved = end.p - start.p, turned = rotation_vector(end.q * start.q.conjugate());
+    const std::span<const double> z0 = group->amplitudes(slot), z1 = group->predicted_amplitudes(slot);
+    const std::span<double> y = contacts.free_motion(nodes[static_cast<std::size_t>(local)]);
+    std::size_t k = 0;
+    for (int i = 0; i < r.translations; ++i) y[k++] = moved[i];
+    for (int i = 0; i < r.rotations; ++i) y[k++] = r.axes.col(i).dot(turned);
+    for (std::size_t i = 0; i < z0.size(); ++i) y[k++] = z1[i] - z0[i];
+    const double* weight = weighted.data() + bodies.first(local);
+    for (k = 0; k < y.size(); ++k) y[k] = weight[k] > 0.0 ? y[k] / weight[k] : 0.0;
   }
 }
 
-/// J times the displacement.
-double IslandSolver::Impl::moved(std::size_t row) const {
-  double sum = 0.0;
-  for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(row)).sides) {
-    const Index local = bodies.local(side.body);
-    if (local < 0) continue;
-    const BodyResponse& r = bodies.response(local);
-    const double* d = displacement.data() + bodies.first(local);
-    for (int i = 0; i < r.translations; ++i) sum += side.linear[i] * *d++;
-    for (int i = 0; i < r.rotations; ++i) sum += r.axes.col(i).dot(side.angular) * *d++;
-    for (const double shape : rows.modal(side)) sum += shape * *d++;
+/// u⁰: where the free motion takes each contact, less what it asks for; compliances; last impulses.
+void IslandSolver::Impl::start_contacts() {
+  give.assign(f.size(), 0.0), slip.assign(f.size(), 0.0);
+  for (const ConstraintRows::Flexibility& g : flexibility)
+    if (g.body < 0) give[static_cast<std::size_t>(g.i)] = g.value;
+  for (std::size_t u = 0; u < contacts.units(); ++u) {
+    const std::size_t first = unit_rows[u];
+    const RowLaw& law = laws[first];
+    Vec3 start = contacts.moved_freely(u), impulse = Vec3::Zero();
+    for (int r = 0; r < contact_rows(law); ++r) {
+      const RowLaw& own = laws[first + static_cast<std::size_t>(r)];
+      start[r] += own.start_gap - own.offset;
+      impulse[r] = step * own.last_force;
+    }
+    start[0] += law.shift;
+    const Vec3 response = contacts.response(u);
+    double compliance = kRegularisation * (law.radius > 0.0 ? response.mean() : response[0]);
+    if (law.largest_yield > 0.0 && compliance * impulse[0] > law.largest_yield)
+      compliance = law.largest_yield / impulse[0];
+    contacts.potential(u).compliance = std::max(give[first] / step, compliance);
+    contacts.start(u) = start, contacts.impulse(u) = impulse;
   }
-  return sum;
 }
 
 /// Contacts that a load presses in farther than it may are made stiffer. @return whether there are any

@@ -45,6 +45,7 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
     }
     const SolveStatus status = improve(report.iterations == 1);
     report.change = largest_change();
+    report.newton_steps = bounded_rows.newton_steps();
     if (report.change <= 1.0 && slack == 1.0) {
       share_anew(states, constraints, options);
       return status;
@@ -154,7 +155,7 @@ void IslandSolver::Impl::assemble_ordered() {
 /// J D^½ of the rows in their order.
 void IslandSolver::Impl::weigh() {
   const std::size_t n = metric.size();
-  for (std::size_t i = 0; i < n; ++i) weighted[i] = std::sqrt(metric[i]);
+  take_roots();
   ordered_G.resize(order.size() * n);
   double* to = ordered_G.data();
   for (const Index row : order) {

@@ -69,6 +69,7 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
 
 /// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
+  if (convex) return;  // its contacts answer to what is held as to all else
   find_accelerations(when, options.gravity);
   bodies.write_frame_metric(metric);
   const std::size_t n = sparse ? 0 : weigh_frames();

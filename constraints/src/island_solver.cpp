@@ -133,10 +133,9 @@ IslandReport IslandSolver::Impl::foresee(const Part& part, const IslandOptions& 
   energy.begin(bodies, options.gravity);
   program_report = {};
   if (holds_contact_forces()) solve_touch(options, done.programs);
-  if (!convex) find_reaction(StepTime::kStart, options, reaction);
+  find_reaction(StepTime::kStart, options, reaction);
   done.status = iterate(states, part.constraints, options, done);
-  done.newton_steps = bounded_rows.newton_steps();
-  if (!convex) answer_at_end(states, part.constraints, options);
+  answer_at_end(states, part.constraints, options);
   return done;
 }
 
@@ -218,7 +217,7 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   if (!sparse) bodies.write_jacobian(rows, J);
   measure(states, StepTime::kStart, constraints, gap);
   start_gap = gap;
-  if (sparse) place_coupling(frame_coupling, true);
+  if (sparse && !convex) place_coupling(frame_coupling, true);
 }
 
 void IslandSolver::Impl::measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
@@ -289,6 +288,7 @@ void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_
 /// The frames' second half of what holds them, and of what strikes them: at the step's end, by the rows there.
 void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints,
                                        const IslandOptions& options) {
+  if (convex) return;  // all of it came at the step's start
   bodies.place(StepTime::kEnd);
   rows.clear();
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);

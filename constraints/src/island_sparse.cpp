@@ -70,9 +70,25 @@ void IslandSolver::Impl::place_coupling(SparseCoupling& into, bool frames_alone)
   into.end_structure();
 }
 
+/// D^½
+void IslandSolver::Impl::take_roots() {
+  weighted.resize(metric.size());
+  for (std::size_t i = 0; i < metric.size(); ++i) weighted[i] = std::sqrt(metric[i]);
+}
+
+/// Adds one side of a row of J D^½: the first of its degrees of freedom, the frame's before the modes.
+void IslandSolver::Impl::add_weighted(const ConstraintRows::Side& side, Index local, std::size_t count, double* to) {
+  const BodyResponse& r = bodies.response(local);
+  one_row.assign(static_cast<std::size_t>(r.size()), 0.0);
+  r.add_row(side.linear, side.angular, rows.modal(side), one_row.data());
+  const double* root = weighted.data() + bodies.first(local);
+  for (std::size_t k = 0; k < count; ++k) to[k] += one_row[k] * root[k];
+}
+
 /// J D^½, then the columns of what bodies yield beyond their modes; and what rows yield by themselves.
 void IslandSolver::Impl::fill_coupling(SparseCoupling& into, bool frames_alone) {
   const std::size_t m = frames_alone ? f.size() : order.size();
+  take_roots();
   into.clear_values();
   std::size_t next = 0;
   for (std::size_t i = 0, count = 1; i < m; i += count) {
@@ -89,11 +105,8 @@ void IslandSolver::Impl::fill_coupling(SparseCoupling& into, bool frames_alone) 
         if (local != last) ++sides;
         last = local;
         double* to = into.values(next + sides - 1).row(r);
-        one_row.assign(static_cast<std::size_t>(bodies.response(local).size()), 0.0);
-        bodies.response(local).add_row(side.linear, side.angular, rows.modal(side), one_row.data());
-        const double* weight = metric.data() + bodies.first(local);
-        const std::size_t own = frames_alone ? width : one_row.size();
-        for (std::size_t k = 0; k < own; ++k) to[k] += one_row[k] * std::sqrt(weight[k]);
+        const std::size_t own = frames_alone ? width : static_cast<std::size_t>(bodies.response(local).size());
+        add_weighted(side, local, own, to);
         if (!frames_alone) std::ranges::copy(residual.row(local, i + r), to + own);
       }
       if (!frames_alone) into.compliance(i + r) = row.law.compliance;

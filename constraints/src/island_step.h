@@ -81,7 +81,6 @@ struct IslandSolver::Impl {
   double slack = 1.0;   // of the rows' tolerance, which this iteration's cones may be off
   bool convex = false;  // large, with nothing but contacts among the rows
   internal::ConvexContactSolver contacts;
-  std::vector<double> displacement;    // by degree of freedom, of the free motion
   std::vector<double> give, slip;      // by row, of contacts in a convex island
   std::vector<std::size_t> unit_rows;  // the first row of each unit
   ProximalSolver frames;
@@ -123,6 +122,8 @@ struct IslandSolver::Impl {
   std::size_t node_width(Index local, bool frames_alone) const;
   void place_coupling(SparseCoupling& into, bool frames_alone);
   void fill_coupling(SparseCoupling& into, bool frames_alone);
+  void take_roots();
+  void add_weighted(const ConstraintRows::Side& side, Index local, std::size_t count, double* to);
   double step = 0.0;
   double theta = 1.0;  // the part of f that frames get at the step's start; the rest at its end
   struct HeldMotion {
@@ -191,9 +192,8 @@ struct IslandSolver::Impl {
                            const IslandOptions& options, IslandReport& report);
   void place_contacts();
   void fill_contacts();
-  double find_displacement();
-  void start_contacts(const IslandOptions& options);
-  double moved(std::size_t row) const;
+  void fill_free_motion();
+  void start_contacts();
   bool stiffen_pressed();
   void take_motion(const IslandOptions& options);
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,

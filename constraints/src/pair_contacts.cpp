@@ -18,9 +18,8 @@ constexpr double kOverlapThatStays = 4e-4;
 // many contacts could share in many ways then have one answer that changes little where gaps change by a picometre;
 // what rests sinks by less than this part of g Δt², 8e-6 m and 3e-7 m at 60 steps a second.
 constexpr double kGive = 3e-3, kGiveBesideResidual = 1e-4;
-// Of what a contact's force moves it within a step, what it may yield to it by; and of the smaller body's arm, the most
-// that may come of it.
-constexpr double kRegularisation = 1e-3, kLargestYield = 1e-4;
+// Of the smaller body's arm, the most that contacts of convex islands may yield.
+constexpr double kLargestYield = 1e-4;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
@@ -82,7 +81,7 @@ void PairContacts::yielded(std::span<const double> compliance, std::span<const d
   at_once_ = true;
   std::size_t row = 0;
   for (PreparedContact& contact : contacts_) {
-    contact.next_give = compliance[row], contact.next_slip = slip[row];
+    contact.give = compliance[row], contact.slip = slip[row];
     row += static_cast<std::size_t>(row_count(contact));
   }
 }
@@ -97,8 +96,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     contact.last_force = impulse / step_;
     contact.held_force = at_once_ ? Vec3(Vec3::Zero())
                                   : Vec3(lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force);
-    contact.give = contact.next_give;
-    contact.slip = contact.next_slip;
+    if (!at_once_) contact.give = give_, contact.slip = 0.0;
     contact.impulse += impulse;
     pressed = pressed || !impulse.isZero(0.0);
     for (std::size_t side = 0; side < 2; ++side)
@@ -121,7 +119,6 @@ void PairContacts::begin(const BodyStates& states) {
               ? (yields_[0] || yields_[1] ? kGiveBesideResidual : kGive) * step_ * step_ / reduced_mass(states, first)
               : 0.0;
   for (PreparedContact& contact : contacts_) {
-    contact.next_give = give_, contact.next_slip = 0.0;
     Vec3 dent = Vec3::Zero();
     for (std::size_t side = 0; side < 2; ++side)
       if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
@@ -264,7 +261,6 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.start_gap = n.dot(a - b);
       law.shift = contact.friction * contact.slip;
       law.largest_yield = kLargestYield * shorter_arm(states, contact);
-      law.regularisation = regularisation(states, contact, on_a, on_b);
     }
     rows.add(on_a, on_b, law);
   }
@@ -281,26 +277,6 @@ void PairContacts::make_spring(const BodyStates& states, const PreparedContact& 
   law.lets_go_within = 0.0;
   law.goes_on = true;
   law.agent_displacement = 0.0;
-}
-
-double PairContacts::regularisation(const BodyStates& states, const PreparedContact& contact, const RowSide& a,
-                                    const RowSide& b) const {
-  double moved = 0.0;  // by a unit impulse within the step
-  for (const RowSide* side : {&a, &b}) {
-    if (side->body < 0) continue;
-    const ConstrainedBody& body = states.body(side->body);
-    const FrameConstants& c = body.group->frame_constants();
-    const Vec3 turn =
-        to_matrix(states.pose(side->body, StepTime::kStart).q * c.principal.q_BP).transpose() * side->angular;
-    moved += step_ * (side->linear.squaredNorm() / c.mass + turn.cwiseAbs2().dot(c.principal.moments.cwiseInverse()));
-    const std::span<const double> response = body.group->position_response();
-    for (std::size_t k = 0; k < side->modal.size(); ++k) moved += response[k] * side->modal[k] * side->modal[k];
-  }
-  const double pressed = contact.axes.col(0).dot(contact.last_force);
-  const double give = kRegularisation * step_ * moved;
-  return give * pressed > kLargestYield * shorter_arm(states, contact)
-             ? kLargestYield * shorter_arm(states, contact) / pressed
-             : give;
 }
 
 double PairContacts::reduced_mass(const BodyStates& states, const PreparedContact& contact) {

@@ -71,9 +71,6 @@ class PairContacts final : public Constraint {
   /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
   void make_spring(const BodyStates& states, const PreparedContact& contact, double gap, RowLaw& law) const;
 
-  /// What a contact may yield by in an island that is solved with yielding contacts.
-  double regularisation(const BodyStates& states, const PreparedContact& contact, const RowSide& a,
-                        const RowSide& b) const;
   static double reduced_mass(const BodyStates& states, const PreparedContact& contact);
 
   std::span<PreparedContact> contacts_;

@@ -48,9 +48,7 @@ struct PreparedContact {
   Vec3 last_force = Vec3::Zero();  // world, on a, N
   Vec3 held_force = Vec3::Zero();  // what of it goes on
   double give = 0.0;               // what the contact yielded to it by itself, m/N
-  double next_give = 0.0;          // in this step
-  double slip = 0.0;               // of the last step, beyond what its spring gave, m
-  double next_slip = 0.0;          // of this one
+  double slip = 0.0;               // beyond what its spring gave, m
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 };

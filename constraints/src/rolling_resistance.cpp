@@ -7,14 +7,6 @@ namespace {
 
 // Turns are braked to this, rad.
 constexpr double kTurnTolerance = 1e-9;
-// Of what the moment turns the pair by within a step, what it may yield by.
-constexpr double kTurnRegularisation = 1e-3;
-
-/// How far a unit moment turns a body, a mean over its axes, per second.
-double turning(const BodyStates& states, Index body) {
-  if (states.is_static(body)) return 0.0;
-  return states.body(body).group->frame_constants().principal.moments.cwiseInverse().mean();
-}
 
 }  // namespace
 
@@ -26,7 +18,6 @@ void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, 
 void RollingResistance::add_rows(const BodyStates& states, StepTime, double step, ConstraintRows& rows) {
   step_ = step;
   next_give_ = 0.0;
-  const double regularisation = kTurnRegularisation * step * step * (turning(states, a_) + turning(states, b_));
   const double radius = step * largest_;
   rows.add_stored_energy(0.5 * give_ * moment_.squaredNorm());
   for (int i = 0; i < 3; ++i) {
@@ -42,7 +33,6 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
               .goes_on = true,
               .last_force = moment_[i],
               .radius = radius,
-              .regularisation = regularisation,
               .contact = true});
   }
 }

@@ -61,9 +61,9 @@ struct RowLaw {
   double radius = 0.0;
   /// Of contacts: the gap at the step's start, without what compliance gives there.
   double start_gap = 0.0;
-  /// Of contacts, their normal row: what the island may let them yield by, gap per force, and the most that is to come
-  /// of it, in the gap's unit.
-  double regularisation = 0.0, largest_yield = 0.0;
+  /// Of contacts, their normal row: the most that they may yield by in islands that are solved with yielding contacts,
+  /// in the gap's unit; 0: without bound.
+  double largest_yield = 0.0;
   /// Of contacts that slide, their normal row: De Saxcé's shift μ |slip| of the last step.
   double shift = 0.0;
   bool contact = false;  ///< of a contact, its normal row or a tangent
