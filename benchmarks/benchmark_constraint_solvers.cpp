@@ -13,7 +13,6 @@
 #include "contact_problems.h"
 #include "cpu_time.h"
 #include "limber/constraints/contact_qp.h"
-#include "limber/constraints/friction_cone.h"
 #include "limber/constraints/least_squares.h"
 #include "limber/constraints/linear_program.h"
 
@@ -21,7 +20,6 @@ namespace limber {
 namespace {
 
 using testing::ContactSample;
-using testing::FrictionSample;
 using testing::make_contacts;
 using testing::Touching;
 
@@ -271,33 +269,6 @@ void handles_orthogonal_decomposition(benchmark::State& state) {
   time_handles(state, [&] { solve_by_orthogonal_decomposition(h.J, h.metric, h.r, h.f); });
 }
 
-/// A stack of range(0) boxes on a slope, four contacts each, with friction.
-void time_friction(benchmark::State& state, const FrictionOptions& options, bool warm) {
-  const FrictionSample s = testing::make_stack(static_cast<int>(state.range(0)), 0.02, 0.5);
-  FrictionSolver solver;
-  std::vector<double> f(s.b.size()), guess(s.b.size());
-  const FrictionProblem problem{.contacts = s.contacts, .A = s.A, .b = s.b, .mu = s.mu};
-  if (warm) solver.solve(problem, guess, options);
-  FrictionResult result;
-  LeastTime time;
-  for (auto _ : state)
-    time.measure([&] {
-      f = guess;
-      result = solver.solve(problem, f, options);
-    });
-  state.counters["us"] = 1e6 * time.seconds();
-  state.counters["sweeps"] = result.sweeps;
-  state.counters["residual"] = result.residual;
-}
-void friction_proximal(benchmark::State& state) { time_friction(state, {}, false); }
-void friction_proximal_warm(benchmark::State& state) { time_friction(state, {}, true); }
-void friction_sweeps(benchmark::State& state) {
-  time_friction(state, {.method = FrictionMethod::kBlockGaussSeidel, .max_sweeps = 5000}, false);
-}
-void friction_staggered(benchmark::State& state) {
-  time_friction(state, {.method = FrictionMethod::kStaggered}, false);
-}
-
 void contact_counts(benchmark::internal::Benchmark* b) {
   b->ArgName("contacts")->Iterations(1);
   for (int m = 1; m <= 128; m *= 2) b->Arg(m);
@@ -307,7 +278,6 @@ void handle_counts(benchmark::internal::Benchmark* b) {
   for (const int k : {32, 40, 64})
     for (const int points : {10, 100, 300}) b->Args({points, k});
 }
-void stacks(benchmark::internal::Benchmark* b) { b->ArgName("boxes")->Arg(1)->Arg(3)->Arg(10); }
 
 BENCHMARK(qp)->Apply(contact_counts);
 BENCHMARK(qp_factored)->Apply(contact_counts);
@@ -321,10 +291,6 @@ BENCHMARK(gauss_seidel_1e4)->Apply(contact_counts);
 BENCHMARK(handles)->Apply(handle_counts);
 BENCHMARK(handles_new_target)->Apply(handle_counts);
 BENCHMARK(handles_orthogonal_decomposition)->ArgNames({"points", "dof"})->Args({10, 40})->Args({100, 40});
-BENCHMARK(friction_proximal)->Apply(stacks);
-BENCHMARK(friction_proximal_warm)->Apply(stacks);
-BENCHMARK(friction_sweeps)->Apply(stacks);
-BENCHMARK(friction_staggered)->Apply(stacks);
 
 }  // namespace
 }  // namespace limber

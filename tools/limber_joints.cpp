@@ -63,6 +63,7 @@ void declare_files(CLI::App& options, Arguments& a) {
 
 void declare_units(CLI::App& options, Arguments& a) {
   std::vector<std::string> units;
+  units.reserve(std::size(kUnits));
   for (const auto& [name, unused] : kUnits) units.emplace_back(name);
   auto* unit = options.add_option("--unit", a.unit, "the model's unit of length, for URDF, MJCF and GLB")
                    ->check(CLI::IsMember(units));

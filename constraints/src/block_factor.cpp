@@ -71,7 +71,7 @@ void BlockFactor::find_order() {
 void BlockFactor::place_columns() {
   entries_.clear();
   numbers_ = 0;
-  std::size_t widest = 0;
+  widest_ = 0;
   for (Column& column : columns_) {
     column.first_entry = entries_.size();
     for_each(neighbours(column.node), words_, [&](std::size_t j) { entries_.push_back({.column = place_[j]}); });
@@ -85,10 +85,9 @@ void BlockFactor::place_columns() {
     }
     column.offset = numbers_;
     numbers_ += column.width * column.stride;
-    widest = std::max(widest, column.width);
+    widest_ = std::max(widest_, column.width);
   }
-  for (AlignedBuffer* values : {&upper_, &lower_, &divided_}) values->need(numbers_);
-  coefficients_.resize(widest), inverse_.resize(widest * widest), exchange_.resize(widest);
+  for (AlignedBuffer* values : {&upper_, &divided_}) values->need(numbers_);
   first_.resize(widths_.size());
   size_ = 0;
   for (const Column& column : columns_) {
@@ -141,77 +140,32 @@ BlockFactor::Block BlockFactor::block(std::size_t i, std::size_t j) const {
 
 void BlockFactor::set_identity() {
   std::fill_n(upper_.data(), padded(numbers_), 0.0);
-  std::fill_n(lower_.data(), padded(numbers_), 0.0);
   for (const Column& column : columns_)
     for (std::size_t i = 0; i < column.width; ++i) upper_.data()[column.offset + i * column.stride + i] = 1.0;
 }
 
-/// The diagonal block's inverse, row by row, to inverse_: Gauss–Jordan with row exchanges.
-bool BlockFactor::invert_pivot(const Column& column) {
-  const std::size_t n = column.width;
-  for (std::size_t i = 0; i < n; ++i)
-    std::copy_n(upper_.data() + column.offset + i * column.stride, n, &inverse_[i * n]);
-  for (std::size_t k = 0; k < n; ++k) {
-    std::size_t p = k;
-    for (std::size_t i = k + 1; i < n; ++i)
-      if (std::abs(inverse_[i * n + k]) > std::abs(inverse_[p * n + k])) p = i;
-    exchange_[k] = p;
-    double* row = &inverse_[k * n];
-    if (p != k) std::swap_ranges(row, row + n, &inverse_[p * n]);
-    if (!(std::abs(row[k]) > 0.0) || !std::isfinite(row[k])) return false;
-    const double pivot = 1.0 / row[k];
-    row[k] = 1.0;
-    for (std::size_t j = 0; j < n; ++j) row[j] *= pivot;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (i == k) continue;
-      double* other = &inverse_[i * n];
-      const double part = std::exchange(other[k], 0.0);
-      for (std::size_t j = 0; j < n; ++j) other[j] -= part * row[j];
-    }
-  }
-  for (std::size_t k = n; k-- > 0;)
-    if (exchange_[k] != k)
-      for (std::size_t i = 0; i < n; ++i) std::swap(inverse_[i * n + k], inverse_[i * n + exchange_[k]]);
-  return true;
-}
-
-bool BlockFactor::factor(double* lower) {
-  used_lower_ = lower;
+bool BlockFactor::factor() {
   double *U = upper_.data(), *W = divided_.data();
-  const bool general = lower != U;
-  double* zero = row_.need(numbers_ == 0 ? kPad : padded(size_));
-  std::fill_n(zero, padded(size_), 0.0);
+  const MatrixView memory = inverse_.need(widest_, widest_);
   for (const Column& column : columns_) {
-    if (!invert_pivot(column)) return false;
     const std::size_t n = column.width, head = padded(n), tail = column.stride - head;
-    const MatrixView rows{U + column.offset + head, column.stride};
-    for (std::size_t i = 0; i < n; ++i) {
-      std::copy_n(&inverse_[i * n], n, W + column.offset + i * column.stride);
-      if (tail > 0)
-        combine_rows(W + column.offset + i * column.stride + head, zero, rows, nullptr, &inverse_[i * n], n, tail);
-    }
+    const MatrixView inverse{memory.values, head}, divided{W + column.offset, column.stride};
+    for (std::size_t i = 0; i < n; ++i) std::copy_n(U + column.offset + i * column.stride, head, inverse.row(i));
+    if (!invert_positive(inverse, n)) return false;
+    for (std::size_t i = 0; i < n; ++i) std::copy_n(inverse.row(i), head, divided.row(i));
+    multiply_block({divided.values + head, column.stride}, inverse, {U + column.offset + head, column.stride}, n, tail);
     for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
       const Entry& entry = entries_[e];
       const Column& target = columns_[entry.column];
-      const auto subtract = [&](double* to, const double* left, double* right) {
-        for (std::size_t r = 0; r < target.width; ++r) {
-          for (std::size_t q = 0; q < n; ++q)
-            coefficients_[q] = -left[column.offset + q * column.stride + entry.at + r];
-          double* row = to + target.offset + r * target.stride;
-          for (std::size_t k = entry.first_run; k < entry.first_run + entry.runs; ++k)
-            combine_rows(row + runs_[k].to, row + runs_[k].to, {right + column.offset + runs_[k].from, column.stride},
-                         nullptr, coefficients_.data(), n, runs_[k].count);
-        }
-      };
-      subtract(U, lower, W);
-      if (general) subtract(lower, W, lower);
+      subtract_runs({U + target.offset, target.stride}, U + column.offset + entry.at, divided, target.width, n,
+                    runs_.data() + entry.first_run, entry.runs);
     }
   }
   return true;
 }
 
 void BlockFactor::solve(double* x) {
-  const double *L = used_lower_, *W = divided_.data();
+  const double *U = upper_.data(), *W = divided_.data();
   double* y = row_.need(padded(size_));
   for (const Column& column : columns_) {
     double* own = x + first_[column.node];
@@ -222,7 +176,7 @@ void BlockFactor::solve(double* x) {
     }
     std::copy_n(y, column.width, own);
     for (std::size_t i = 0; i < column.width; ++i) y[i] = -own[i];
-    gather_blocks(x, blocks_.data() + column.first_entry, column.entries, L, y);
+    gather_blocks(x, blocks_.data() + column.first_entry, column.entries, U, y);
   }
   for (std::size_t c = columns_.size(); c-- > 0;) {
     const Column& column = columns_[c];

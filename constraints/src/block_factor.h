@@ -1,6 +1,7 @@
-// LU decomposition of a sparse matrix in square blocks: one row and column of blocks for each body of an island, blocks
-// off the diagonal where two bodies touch. The order of elimination is that of least degree (Tinney and Walker 1967;
-// George and Liu, SIAM Review 31 (1989) 1), found once for a pattern; pivots are exchanged within diagonal blocks only.
+// Decomposition of a sparse symmetric positive definite matrix in square blocks: one row and column of blocks for each
+// body of an island, blocks off the diagonal where two bodies touch. The order of elimination is that of least degree
+// (Tinney and Walker 1967; George and Liu, SIAM Review 31 (1989) 1), found once for a pattern; pivots are exchanged
+// within diagonal blocks only.
 #pragma once
 
 #include <cstdint>
@@ -33,11 +34,9 @@ class BlockFactor {
   void set_identity();
   /// Blocks (i, j), i first, row by row of i.
   double* upper(const Block& b) { return upper_.data() + b.offset; }
-  /// The transposes of blocks (j, i), i first, row by row of i. Not read by factor_symmetric().
-  double* lower(const Block& b) { return lower_.data() + b.offset; }
 
-  bool factor_symmetric() { return factor(upper_.data()); }
-  bool factor_general() { return factor(lower_.data()); }
+  /// @return false where a pivot is not positive
+  bool factor();
 
   /// Where a node's numbers begin in vectors; each node's part is padded.
   std::size_t first(std::size_t node) const { return first_[node]; }
@@ -53,16 +52,11 @@ class BlockFactor {
     std::size_t column = 0, at = 0;  // at: first number of its block in each row
     std::size_t first_run = 0, runs = 0;
   };
-  struct Run {  // numbers of one row that go to adjacent places in the row of a later node
-    std::size_t from = 0, to = 0, count = 0;
-  };
 
   void find_order();
   void eliminate(std::size_t node);
   void place_columns();
   void find_runs(const Column& column, std::size_t entry);
-  bool factor(double* lower);
-  bool invert_pivot(const Column& column);
   std::uint64_t* neighbours(std::size_t node) { return adjacency_.data() + node * words_; }
 
   std::vector<std::size_t> widths_, place_, first_, degree_, alive_;
@@ -70,13 +64,12 @@ class BlockFactor {
   std::size_t words_ = 0, size_ = 0, numbers_ = 0;
   std::vector<Column> columns_;
   std::vector<Entry> entries_;
-  std::vector<Run> runs_;
-  std::vector<RowBlock> blocks_;           // the entries' in the rows of their column
-  AlignedBuffer upper_, lower_, divided_;  // U, Lᵀ, D⁻¹U
-  AlignedBuffer pivot_, row_;
-  std::vector<double> coefficients_, inverse_;
-  std::vector<std::size_t> exchange_;
-  double* used_lower_ = nullptr;
+  std::vector<RowRun> runs_;       // from the rows of a node to those of a later one
+  std::vector<RowBlock> blocks_;   // the entries' in the rows of their column
+  AlignedBuffer upper_, divided_;  // U, D⁻¹U
+  AlignedBuffer row_;
+  MatrixBuffer inverse_;
+  std::size_t widest_ = 0;
 };
 
 }  // namespace limber

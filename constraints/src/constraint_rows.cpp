@@ -107,10 +107,12 @@ double product(const IslandBodies& bodies, const ConstraintRows& rows, std::span
 void assemble(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric,
               std::span<double> A) {
   const Index m = rows.size();
+  const auto at = [&](Index i, Index j) -> double& {
+    return A[static_cast<std::size_t>(i) * static_cast<std::size_t>(m) + static_cast<std::size_t>(j)];
+  };
   for (Index i = 0; i < m; ++i)
     for (Index j = 0; j <= i; ++j)
-      A[static_cast<std::size_t>(i * m + j)] = A[static_cast<std::size_t>(j * m + i)] =
-          product(bodies, rows, metric, i, j) + (i == j ? rows.row(i).law.compliance : 0.0);
+      at(i, j) = at(j, i) = product(bodies, rows, metric, i, j) + (i == j ? rows.row(i).law.compliance : 0.0);
 }
 
 }  // namespace limber

@@ -81,8 +81,7 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = find(point.id))
-    contact.last_force = known->force, contact.held_force = known->held, contact.give = known->give,
-    contact.slip = known->slip;
+    contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
   contacts.push_back(contact);
 }
 
@@ -137,7 +136,7 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
   const bool knows = known != rolling_memory.end() && known->a == a && known->b == b;
   if (rolling_used == rolling.size()) rolling.push_back(std::make_unique<RollingResistance>());
   RollingResistance& resistance = *rolling[rolling_used++];
-  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()), knows ? known->give : 0.0);
+  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()));
   constraints.push_back(&resistance);
 }
 
@@ -205,7 +204,6 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
                         .a = contact.a.body,
                         .b = contact.b.body,
                         .force = contact.last_force,
-                        .held = contact.held_force,
                         .give = contact.give,
                         .slip = contact.slip,
                         .yielding = contact.yielding});
@@ -222,7 +220,7 @@ void ContactSet::Impl::remember_rolling(std::span<const char> asleep) {
   std::erase_if(rolling_memory, [&](const RollingMemory& m) { return !rests(asleep, m.a, m.b); });
   for (std::size_t i = 0; i < rolling_used; ++i) {
     const auto [a, b] = rolling[i]->bodies();
-    rolling_memory.push_back({a, b, rolling[i]->moment(), rolling[i]->give()});
+    rolling_memory.push_back({a, b, rolling[i]->moment()});
   }
   std::ranges::sort(rolling_memory, by_pair);
 }

@@ -40,6 +40,26 @@ struct ContactPotential {
     return interval(-u[0] / compliance);
   }
 
+  /// The impulse of the set that is nearest.
+  Vec3 nearest(const Vec3& impulse) const { return at(-compliance * impulse).impulse; }
+  /// Of l(u + t d) at t = 0: its first and second derivatives.
+  struct Slope {
+    double first = 0.0, second = 0.0;
+  };
+  Slope along(const Vec3& u, const Vec3& d) const {
+    if (set != Set::kCone) {
+      const Value v = at(u);
+      return {-v.impulse.dot(d), d.dot(v.stiffness * d)};
+    }
+    const double c = 1.0 / compliance, mu = bound, x = -c * u[0], y = -c * u[1], z = -c * u[2];
+    const double across = std::sqrt(y * y + z * z);
+    if (across <= mu * x) return {-(x * d[0] + y * d[1] + z * d[2]), c * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])};
+    if (mu * across <= -x) return {};
+    const double scale = 1.0 / (1.0 + mu * mu), pressed = scale * (x + mu * across);
+    const double out = (y * d[1] + z * d[2]) / across, round = (y * d[2] - z * d[1]) / across, edge = d[0] + mu * out;
+    return {-pressed * edge, c * (scale * edge * edge + mu * pressed / across * round * round)};
+  }
+
  private:
   Value cone(const Vec3& x) const {
     const double mu = bound, along = x[0], across = std::sqrt(x[1] * x[1] + x[2] * x[2]);

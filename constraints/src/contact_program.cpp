@@ -33,7 +33,7 @@ SolveStatus ContactProgramSolver::solve(const ContactProblem& problem, const Con
   constexpr int kRounds = 20;
   constexpr double kSettled = 1e-12;  // of the largest impulse
   choose_rows(problem);
-  const auto cone_rows = static_cast<std::size_t>(3 * problem.cones);
+  const std::size_t cone_rows = 3 * static_cast<std::size_t>(problem.cones);
   SolveStatus status = SolveStatus::kSolved;
   for (int round = 0; round < kRounds; ++round) {
     last_.assign(f.begin(), f.end());
@@ -56,7 +56,7 @@ SolveStatus ContactProgramSolver::solve(const ContactProblem& problem, const Con
 }
 
 void ContactProgramSolver::choose_rows(const ContactProblem& problem) {
-  const auto cone_rows = static_cast<std::size_t>(3 * problem.cones);
+  const std::size_t cone_rows = 3 * static_cast<std::size_t>(problem.cones);
   one_sided_.clear(), rest_.clear();
   for (std::size_t i = 0; i < problem.b.size(); ++i) {
     const bool one_sided = i < cone_rows ? i % 3 == 0 : problem.lower[i] == 0.0 && problem.upper[i] == kUnbounded;

@@ -7,15 +7,20 @@
 #include "limber/constraints/contact_method.h"
 #include "limber/constraints/contact_qp.h"
 #include "limber/constraints/linear_program.h"
-#include "proximal_solver.h"
 
 namespace limber {
 
 /// w = A f + b of contacts and rows with an interval each; impulses and gaps, impulses and speeds, or forces and
 /// accelerations.
-struct ContactProblem : BoundedRows {
-  std::span<const double> gap_before;  ///< n, gap level only: gaps at the step's start, less their offsets
-  double step = 0.0;                   ///< s, gap level only
+struct ContactProblem {
+  int cones = 0;                          ///< the first 3 × cones rows: normal and two tangents each
+  std::span<const double> A = {};         ///< n × n, symmetric positive semidefinite
+  std::span<const double> b = {};         ///< n
+  std::span<const double> friction = {};  ///< μ ≥ 0 of each cone
+  std::span<const double> lower = {};     ///< n; those of cones are not read
+  std::span<const double> upper = {};     ///< n
+  std::span<const double> gap_before;     ///< n, gap level only: gaps at the step's start, less their offsets
+  double step = 0.0;                      ///< s, gap level only
 };
 
 class ContactProgramSolver {

@@ -31,9 +31,6 @@ std::size_t ConvexContactSolver::add_side(std::size_t node) {
 
 void ConvexContactSolver::end_structure() {
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
-  std::size_t widest = kPad;
-  for (const Node& node : nodes_) widest = std::max(widest, padded(node.width));
-  product_.need(3 * widest);
   for (AlignedBuffer* vector : {&free_, &y_, &d_, &gradient_})
     std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
@@ -90,6 +87,11 @@ double ConvexContactSolver::potential_of(const double* y) {
   return sum;
 }
 
+void ConvexContactSolver::set_motion() {
+  std::fill_n(y_.data(), size_, 0.0);
+  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, y_.data());
+}
+
 void ConvexContactSolver::begin_with_better_start() {
   double *free = y_.data(), *guess = d_.data();
   std::fill_n(free, size_, 0.0);
@@ -100,6 +102,7 @@ void ConvexContactSolver::begin_with_better_start() {
 }
 
 ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
+  for (std::size_t u = 0; u < units_.size(); ++u) units_[u].response = response(u);
   begin_with_better_start();
   pairs_are_new_ = true;
   return solve_on(options);
@@ -118,7 +121,7 @@ ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& op
     if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
     if (pairs_are_new_) place_pairs();
     assemble();
-    if (!factor_.factor_symmetric()) break;
+    if (!factor_.factor()) break;
     double *d = d_.data(), *y = y_.data();
     find_direction(g, d);
     for (Unit& unit : units_) unit.change = seen(unit, d);
@@ -130,22 +133,23 @@ ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& op
   return report;
 }
 
-/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l. @return |Σ Jᵀ F|
+/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l. @return the size of the terms of Σ Jᵀ F, which may cancel
 double ConvexContactSolver::gradient() {
   double* g = gradient_.data();
+  double pressed = 0.0;
   std::fill_n(g, size_, 0.0);
   for (Unit& unit : units_) {
     const ContactPotential::Value v = unit.potential.at(unit.end);
     unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
     if (!v.acts) continue;
+    pressed += unit.response.dot(v.impulse.cwiseAbs2());
     add_transposed(unit, v.impulse, g);
     pairs_are_new_ = pairs_are_new_ || !unit.has_pressed;
     unit.has_pressed = true;
   }
-  const double pressed = std::sqrt(dot(g, g, size_));
   const double* y = y_.data();
   for (std::size_t i = 0; i < size_; ++i) g[i] = y[i] - g[i];
-  return pressed;
+  return std::sqrt(pressed);
 }
 
 ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {
@@ -191,27 +195,16 @@ void ConvexContactSolver::assemble() {
 
 void ConvexContactSolver::add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block) {
   const MatrixView left = jacobian(a), right = jacobian(b);
-  const MatrixView product{product_.data(), right.stride};
-  for (std::size_t r = 0; r < unit.rows; ++r) {
-    std::fill_n(product.row(r), right.stride, 0.0);
-    combine_rows(product.row(r), product.row(r), right, nullptr, unit.stiffness.col(static_cast<int>(r)).data(),
-                 unit.rows, right.stride);
-  }
-  double* to = factor_.upper(block);
-  for (std::size_t p = 0; p < nodes_[sides_[a].node].width; ++p, to += block.stride) {
-    double column[3];
-    for (std::size_t r = 0; r < unit.rows; ++r) column[r] = left.row(r)[p];
-    combine_rows(to, to, product, nullptr, column, unit.rows, right.stride);
-  }
+  add_congruence({factor_.upper(block), block.stride}, left, unit.stiffness.data(), right, unit.rows,
+                 nodes_[sides_[a].node].width, right.stride);
 }
 
 ConvexContactSolver::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {
   Slope slope{yd + step * dd, dd};
   for (const Unit& unit : units_) {
-    const ContactPotential::Value v = unit.potential.at(unit.end + step * unit.change);
-    if (!v.acts) continue;
-    slope.first -= v.impulse.dot(unit.change);
-    slope.second += unit.change.dot(v.stiffness * unit.change);
+    const ContactPotential::Slope along = unit.potential.along(unit.end + step * unit.change, unit.change);
+    slope.first += along.first;
+    slope.second += along.second;
   }
   return slope;
 }

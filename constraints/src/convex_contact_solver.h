@@ -28,7 +28,7 @@
 namespace limber::internal {
 
 struct ConvexContactOptions {
-  double tolerance = 1e-6;   ///< of the momenta at hand, > 0
+  double tolerance = 1e-9;   ///< of the momenta at hand, > 0
   int max_iterations = 100;  ///< of Newton's method
 };
 
@@ -58,6 +58,10 @@ class ConvexContactSolver {
   std::span<double> free_motion(std::size_t node) { return part_of(free_, node); }
   /// J_c of the free motion.
   Vec3 moved_freely(std::size_t unit) const { return seen(units_[unit], free_.data()); }
+  /// y of the impulses given.
+  void set_motion();
+  /// J_c y
+  Vec3 moved(std::size_t unit) const { return seen(units_[unit], y_.data()); }
   /// |J_c|² row by row: how far a unit impulse of each moves its own row.
   Vec3 response(std::size_t unit) const;
   /// u_c, as many numbers as the unit has rows.
@@ -85,7 +89,7 @@ class ConvexContactSolver {
     std::size_t rows = 0, first_side = 0, sides = 0;
     ContactPotential potential{};
     Vec3 start = Vec3::Zero(), end = Vec3::Zero(), change = Vec3::Zero();  // u⁰, u, J d
-    Vec3 impulse = Vec3::Zero();
+    Vec3 impulse = Vec3::Zero(), response = Vec3::Zero();
     Mat3 stiffness = Mat3::Zero();
     bool acts = false;
     bool has_pressed = false;    // in this problem
@@ -121,7 +125,7 @@ class ConvexContactSolver {
   std::vector<Unit> units_;
   std::vector<Side> sides_;
   std::size_t numbers_ = 0, size_ = 0;
-  AlignedBuffer values_, free_, y_, d_, gradient_, product_, ordered_;
+  AlignedBuffer values_, free_, y_, d_, gradient_, ordered_;
   BlockFactor factor_;
   std::vector<std::size_t> factor_widths_, widths_;
   std::vector<Pair> factor_pairs_, pairs_;  // sorted

@@ -221,6 +221,79 @@ HWY_ATTR void MultiplyRows(double* out, MatrixView M, const int* rows, const dou
   for (; i < count; ++i) MultiplyBlock<1>(out, M, rows, x, i, n);
 }
 
+HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                            std::size_t n) {
+  const Doubles d;
+  for (std::size_t j = 0; j < n; j += kLanes) {
+    Vector right[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)}, weighted[3];
+    for (std::size_t r = 0; r < rows; ++r) right[r] = hn::Load(d, R.row(r) + j);
+    for (std::size_t r = 0; r < 3; ++r)
+      weighted[r] =
+          hn::MulAdd(hn::Set(d, K[3 * r]), right[0],
+                     hn::MulAdd(hn::Set(d, K[3 * r + 1]), right[1], hn::Mul(hn::Set(d, K[3 * r + 2]), right[2])));
+    for (std::size_t i = 0; i < p; ++i) {
+      Vector sum = hn::Load(d, C.row(i) + j);
+      for (std::size_t r = 0; r < rows; ++r) sum = hn::MulAdd(hn::Set(d, L.row(r)[i]), weighted[r], sum);
+      hn::Store(sum, d, C.row(i) + j);
+    }
+  }
+}
+
+HWY_ATTR bool InvertPositive(MatrixView A, std::size_t n) {
+  const Doubles d;
+  const std::size_t columns = padded(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    double* row = A.row(k);
+    if (!(row[k] > 0.0) || !(row[k] < 1e300)) return false;
+    const double pivot = 1.0 / row[k];
+    row[k] = 1.0;
+    for (std::size_t j = 0; j < columns; j += kLanes)
+      hn::Store(hn::Mul(hn::Set(d, pivot), hn::Load(d, row + j)), d, row + j);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      double* other = A.row(i);
+      const Vector part = hn::Set(d, other[k]);
+      other[k] = 0.0;
+      for (std::size_t j = 0; j < columns; j += kLanes)
+        hn::Store(hn::NegMulAdd(part, hn::Load(d, row + j), hn::Load(d, other + j)), d, other + j);
+    }
+  }
+  return true;
+}
+
+HWY_ATTR void MultiplyBlocks(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns) {
+  const Doubles d;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < columns; j += kPad) {
+      Vector sum[kVectors];
+      for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+      for (std::size_t k = 0; k < n; ++k) {
+        const Vector a = hn::Set(d, A.row(i)[k]);
+        for (std::size_t v = 0; v < kVectors; ++v)
+          sum[v] = hn::MulAdd(a, hn::Load(d, X.row(k) + j + v * kLanes), sum[v]);
+      }
+      for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[v], d, out.row(i) + j + v * kLanes);
+    }
+}
+
+HWY_ATTR void SubtractRuns(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n,
+                           const RowRun* runs, std::size_t count) {
+  const Doubles d;
+  for (const RowRun* run = runs; run != runs + count; ++run)
+    for (std::size_t r = 0; r < rows; ++r)
+      for (std::size_t j = 0; j < run->count; j += kPad) {
+        double* at = to.row(r) + run->to + j;
+        Vector sum[kVectors];
+        for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Load(d, at + v * kLanes);
+        for (std::size_t q = 0; q < n; ++q) {
+          const Vector a = hn::Set(d, left[q * W.stride + r]);
+          for (std::size_t v = 0; v < kVectors; ++v)
+            sum[v] = hn::NegMulAdd(a, hn::Load(d, W.row(q) + run->from + j + v * kLanes), sum[v]);
+        }
+        for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[v], d, at + v * kLanes);
+      }
+}
+
 HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
   const Doubles d;
   for (const RowBlock* b = blocks; b != blocks + count; ++b)
@@ -264,6 +337,10 @@ HWY_EXPORT(Exchange);
 HWY_EXPORT(Gram);
 HWY_EXPORT(SubtractOuter);
 HWY_EXPORT(MultiplyRows);
+HWY_EXPORT(AddCongruence);
+HWY_EXPORT(InvertPositive);
+HWY_EXPORT(MultiplyBlocks);
+HWY_EXPORT(SubtractRuns);
 HWY_EXPORT(GatherBlocks);
 HWY_EXPORT(SpreadBlocks);
 
@@ -316,6 +393,22 @@ void subtract_outer(MatrixView C, const double* x, std::size_t first, std::size_
 
 void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n) {
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(out, M, rows, x, count, padded(n));
+}
+
+void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                    std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(AddCongruence)(C, L, K, R, rows, p, padded(n));
+}
+
+bool invert_positive(MatrixView A, std::size_t n) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(A, n); }
+
+void multiply_block(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns) {
+  HWY_DYNAMIC_DISPATCH(MultiplyBlocks)(out, A, X, n, columns);
+}
+
+void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n, const RowRun* runs,
+                   std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(SubtractRuns)(to, left, W, rows, n, runs, count);
 }
 
 void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {

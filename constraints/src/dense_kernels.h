@@ -53,6 +53,25 @@ struct RowBlock {
   std::size_t row = 0, rows = 0, column = 0, width = 0, values = 0, stride = 0;
 };
 
+/// C += Lᵀ K R: `rows` ≤ 3 rows of L, the first `p` columns of which count, and of R, n columns; K symmetric, 3 × 3.
+void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                    std::size_t n);
+
+/// A ← A⁻¹, n × n, symmetric and positive definite: Gauss–Jordan without exchanges. @return false where a pivot is not
+/// positive
+bool invert_positive(MatrixView A, std::size_t n);
+
+/// Out = A X: n × n and n rows of `columns` numbers, padded.
+void multiply_block(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns);
+
+/// Numbers of one row that go to adjacent places in another; counts padded.
+struct RowRun {
+  std::size_t from = 0, to = 0, count = 0;
+};
+/// To −= Lᵀ W, run after run: `rows` columns of L from `left` on, n rows of L and W.
+void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n, const RowRun* runs,
+                   std::size_t count);
+
 /// x += Gᵀ y, block after block.
 void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y);
 

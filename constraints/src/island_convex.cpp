@@ -1,13 +1,19 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "island_step.h"
 
 namespace limber {
 namespace {
 
-// Of what an impulse moves its own contact by within the step, what the contact yields to it by.
-constexpr double kRegularisation = 1e-3;
+// Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
+// least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
+constexpr double kYield = 1e-3, kYieldOfJoints = 1e-6, kStiffest = 1e-7;
+// Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
+// end: a few milliseconds.
+constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
 
 internal::ContactPotential potential_of(const RowLaw& law) {
   using Set = internal::ContactPotential::Set;
@@ -18,91 +24,174 @@ internal::ContactPotential potential_of(const RowLaw& law) {
 
 }  // namespace
 
-/// The contacts of a large island of nothing else: one convex problem, linear in the free motion of the step.
+/// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
+/// meet the rows' law at the true gaps: the method of multipliers, in which a row's spring yields from what it exerted.
 SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span<Constraint* const> constraints,
                                              const IslandOptions& options, IslandReport& report) {
-  constexpr internal::ConvexContactOptions kOptions{};
   bodies.write_position_metric(step, theta, metric);
-  predict(options);  // without contacts
-  place_contacts();
-  fill_contacts();
-  fill_free_motion();
-  start_contacts();
-  internal::ConvexContactReport done = contacts.solve(kOptions);
-  report.newton_steps = done.iterations;
-  while (done.status == SolveStatus::kSolved && stiffen_pressed()) {
-    done = contacts.solve_on({.max_iterations = kOptions.max_iterations - report.newton_steps});
-    report.newton_steps += done.iterations;
-  }
-  report.iterations = 1;
-  report.change = done.residual / kOptions.tolerance;
-  for (std::size_t u = 0; u < contacts.units(); ++u) {
-    const std::size_t first = unit_rows[u];
-    const auto count = static_cast<std::size_t>(contact_rows(laws[first]));
-    const Vec3& impulse = contacts.impulse(u);
-    const double c = contacts.potential(u).compliance;
-    for (std::size_t r = 0; r < count; ++r) {
-      f[first + r] = impulse[static_cast<int>(r)];
-      give[first + r] = c * step;
-    }
-    // The spring's own part of the slip comes back; the rest is gone.
-    if (count == 3 && impulse[0] > 0.0) slip[first] = (contacts.end(u) + c * impulse).tail<2>().norm();
-  }
-  std::erase_if(flexibility, [](const ConstraintRows::Flexibility& g) { return g.body < 0; });
-  for (std::size_t i = 0; i < give.size(); ++i)
-    flexibility.push_back({static_cast<Index>(i), static_cast<Index>(i), give[i], -1});
-  if (done.status == SolveStatus::kSolved)
+  place_units();
+  fill_units();
+  begin_units();
+  secant.begin(f.size());
+  internal::ConvexContactReport done;
+  bool more = true, stays = false;
+  for (report.iterations = 1;; ++report.iterations) {
+    take_impulses();
     predict(options);
-  else
-    take_motion(options);
-  measure(states, StepTime::kEnd, constraints, gap);
-  return done.status;
+    measure(states, StepTime::kEnd, constraints, gap);
+    report.change = find_starts(report.iterations == 1);
+    if (!more && (report.change <= 1.0 || stays)) return SolveStatus::kSolved;
+    const bool tired = report.newton_steps * static_cast<int>(units.size()) >= kMostSolved;
+    if (report.iterations > options.max_iterations || (contacts_alone && tired)) break;
+    const internal::ConvexContactOptions left{.max_iterations = kMostNewtonSteps - report.newton_steps};
+    done = report.iterations == 1 ? contacts.solve(left) : contacts.solve_on(left);
+    report.newton_steps += done.iterations;
+    if (done.status != SolveStatus::kSolved) break;
+    stays = compare();
+    more = press_early();
+    if (more) secant.begin(f.size());
+    advance_units();
+  }
+  return end_unsettled(done.status, states, constraints, options, report);
 }
 
-/// Each contact a unit of its rows.
-void IslandSolver::Impl::place_contacts() {
+/// Where rounds end before the rows' law is met: contacts alone stay as the last round left them. What Newton's method
+/// left unsolved in the first of them is the motion that it found.
+SolveStatus IslandSolver::Impl::end_unsettled(SolveStatus last, const BodyStates& states,
+                                              std::span<Constraint* const> constraints, const IslandOptions& options,
+                                              IslandReport& report) {
+  if (!contacts_alone) return take_best(states, constraints, options, report);
+  if (report.iterations > 1) return SolveStatus::kSolved;
+  for (std::size_t u = 0; u < units.size(); ++u) units[u].impulse = contacts.impulse(u);
+  take_impulses();
+  take_motion(options);
+  measure(states, StepTime::kEnd, constraints, gap);
+  return last;
+}
+
+/// Each contact a unit of its rows; what a body yields beyond its modes are further degrees of freedom of unit weight.
+void IslandSolver::Impl::place_units() {
+  order.resize(f.size()), place.resize(f.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::iota(place.begin(), place.end(), Index{0});
+  residual.set(bodies, flexibility, place, f.size(), step);
   contacts.begin_structure();
-  nodes.clear(), unit_rows.clear();
+  nodes.clear(), units.clear();
   for (Index local = 0; local < bodies.count(); ++local)
-    nodes.push_back(contacts.add_node(static_cast<std::size_t>(bodies.response(local).size())));
+    nodes.push_back(contacts.add_node(static_cast<std::size_t>(bodies.response(local).size()) + residual.rank(local)));
   for (std::size_t i = 0, count = 1; i < f.size(); i += count) {
     count = static_cast<std::size_t>(contact_rows(laws[i]));
     contacts.add_unit(count, potential_of(laws[i]));
-    unit_rows.push_back(i);
-    Index last = -1;
-    for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(i)).sides) {
-      const Index local = bodies.local(side.body);
-      if (local >= 0 && local != last) contacts.add_side(nodes[static_cast<std::size_t>(local)]);
-      last = local;
-    }
+    units.push_back({.first = i, .rows = count});
+    for_bodies(i, [&](const ConstraintRows::Side&, Index local, bool again) {
+      if (!again) contacts.add_side(nodes[static_cast<std::size_t>(local)]);
+    });
   }
   contacts.end_structure();
 }
 
-/// J D^½
-void IslandSolver::Impl::fill_contacts() {
+/// D^½
+void IslandSolver::Impl::take_roots() {
+  weighted.resize(metric.size());
+  for (std::size_t i = 0; i < metric.size(); ++i) weighted[i] = std::sqrt(metric[i]);
+}
+
+/// J D^½, and what rows yield at first, before the columns of what the bodies do.
+void IslandSolver::Impl::fill_units() {
   take_roots();
-  std::size_t next_side = 0;
-  for (const std::size_t first : unit_rows) {
-    std::size_t sides = 0;
-    for (Index r = 0; r < contact_rows(laws[first]); ++r) {
+  fill_values([&](const ConstraintRows::Side& side, Index local, std::size_t, double* to) {
+    const BodyResponse& r = bodies.response(local);
+    one_row.assign(static_cast<std::size_t>(r.size()), 0.0);
+    r.add_row(side.linear, side.angular, rows.modal(side), one_row.data());
+    const double* root = weighted.data() + bodies.first(local);
+    for (std::size_t k = 0; k < one_row.size(); ++k) to[k] += one_row[k] * root[k];
+  });
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const RowLaw& law = laws[units[u].first];
+    const Vec3 response = contacts.response(u);
+    const double moved = law.radius > 0.0 ? response.mean() : response[0];
+    units[u].response = moved;
+    contacts.potential(u).compliance = law.compliance > 0.0 ? law.compliance
+                                                            : std::max((law.contact ? kYield : kYieldOfJoints) * moved,
+                                                                       std::numeric_limits<double>::min());
+  }
+  fill_values([&](const ConstraintRows::Side&, Index local, std::size_t row, double* to) {
+    std::ranges::copy(residual.row(local, row), to + bodies.response(local).size());
+  });
+}
+
+/// write(side, local, row, values) for each side of each row.
+template <class Write>
+void IslandSolver::Impl::fill_values(Write&& write) {
+  std::size_t next_side = 0, sides = 0;
+  for (const RowUnit& unit : units) {
+    for (std::size_t r = 0; r < unit.rows; ++r) {
       sides = 0;
-      Index last = -1;
-      for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(first) + r).sides) {
-        const Index local = bodies.local(side.body);
-        if (local < 0) continue;
-        sides += local != last ? 1 : 0;
-        last = local;
-        add_weighted(side, local, static_cast<std::size_t>(bodies.response(local).size()),
-                     contacts.values(next_side + sides - 1).row(static_cast<std::size_t>(r)));
-      }
+      for_bodies(unit.first + r, [&](const ConstraintRows::Side& side, Index local, bool again) {
+        sides += again ? 0 : 1;
+        write(side, local, unit.first + r, contacts.values(next_side + sides - 1).row(r));
+      });
     }
     next_side += sides;
   }
 }
 
-/// How the bodies move without contacts, as they are predicted: D^−½ of it, by degree of freedom.
-void IslandSolver::Impl::fill_free_motion() {
+/// From the motion without contacts; springs begin at the impulses of the last step.
+void IslandSolver::Impl::begin_units() {
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    RowUnit& unit = units[u];
+    const RowLaw& law = laws[unit.first];
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto axis = static_cast<int>(r);
+      unit.impulse[axis] = step * reaction[unit.first + r];
+      unit.anchor[axis] = law.contact ? step * laws[unit.first + r].last_force : unit.impulse[axis];
+    }
+    unit.anchor = contacts.potential(u).nearest(unit.anchor);
+    unit.shift = law.shift;
+    unit.dent = kUnbounded;
+  }
+}
+
+/// f of the units' impulses, and the motion that they make in the problem.
+void IslandSolver::Impl::take_impulses() {
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const RowUnit& unit = units[u];
+    contacts.impulse(u) = unit.impulse;
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      f[unit.first + r] = unit.impulse[static_cast<int>(r)] - step * reaction[unit.first + r];
+  }
+  contacts.set_motion();
+}
+
+/// u⁰: the rows' true gaps at the end of the motion that is predicted, less what they ask for, what is linear in the
+/// impulses, and what the springs exert there already.
+/// @return how far the impulses are from the rows' law at those gaps, by tolerance
+double IslandSolver::Impl::find_starts(bool first_round) {
+  if (first_round) find_scale();
+  double largest = 0.0;
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    RowUnit& unit = units[u];
+    const RowLaw& law = laws[unit.first];
+    Vec3 open = Vec3::Zero();
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      open[static_cast<int>(r)] = gap[unit.first + r] - laws[unit.first + r].offset + dent_of(unit.first + r);
+    unit.end = open;
+    if (law.friction > 0.0 && !first_round) unit.shift = law.friction * open.tail<2>().norm();
+    open[0] += unit.shift;
+    const internal::ContactPotential& potential = contacts.potential(u);
+    Vec3 yields = potential.compliance * unit.anchor;
+    if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
+    largest = std::max(
+        largest, (potential.compliance * (potential.at(open - yields).impulse - unit.impulse)).norm() / law.tolerance);
+    unit.moved = contacts.moved(u);
+    contacts.start(u) = open - yields - unit.moved;
+    if (first_round) contacts.impulse(u) = unit.anchor;
+  }
+  return largest;
+}
+
+/// How the bodies move, by degree of freedom: what momenta are at hand.
+void IslandSolver::Impl::find_scale() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
     const BodyResponse& r = bodies.response(local);
@@ -114,48 +203,101 @@ void IslandSolver::Impl::fill_free_motion() {
     for (int i = 0; i < r.translations; ++i) y[k++] = moved[i];
     for (int i = 0; i < r.rotations; ++i) y[k++] = r.axes.col(i).dot(turned);
     for (std::size_t i = 0; i < z0.size(); ++i) y[k++] = z1[i] - z0[i];
-    const double* weight = weighted.data() + bodies.first(local);
-    for (k = 0; k < y.size(); ++k) y[k] = weight[k] > 0.0 ? y[k] / weight[k] : 0.0;
+    const double* root = weighted.data() + bodies.first(local);
+    for (std::size_t i = 0; i < k; ++i) y[i] = root[i] > 0.0 ? y[i] / root[i] : 0.0;
   }
 }
 
-/// u⁰: where the free motion takes each contact, less what it asks for; compliances; last impulses.
-void IslandSolver::Impl::start_contacts() {
-  give.assign(f.size(), 0.0), slip.assign(f.size(), 0.0);
-  for (const ConstraintRows::Flexibility& g : flexibility)
-    if (g.body < 0) give[static_cast<std::size_t>(g.i)] = g.value;
-  for (std::size_t u = 0; u < contacts.units(); ++u) {
-    const std::size_t first = unit_rows[u];
-    const RowLaw& law = laws[first];
-    Vec3 start = contacts.moved_freely(u), impulse = Vec3::Zero();
-    for (int r = 0; r < contact_rows(law); ++r) {
-      const RowLaw& own = laws[first + static_cast<std::size_t>(r)];
-      start[r] += own.start_gap - own.offset;
-      impulse[r] = step * own.last_force;
-    }
-    start[0] += law.shift;
-    const Vec3 response = contacts.response(u);
-    double compliance = kRegularisation * (law.radius > 0.0 ? response.mean() : response[0]);
-    if (law.largest_yield > 0.0 && compliance * impulse[0] > law.largest_yield)
-      compliance = law.largest_yield / impulse[0];
-    contacts.potential(u).compliance = std::max(give[first] / step, compliance);
-    contacts.start(u) = start, contacts.impulse(u) = impulse;
-  }
-}
-
-/// Contacts that a load presses in farther than it may are made stiffer. @return whether there are any
-bool IslandSolver::Impl::stiffen_pressed() {
-  constexpr double kTooFar = 1.5;
-  bool any = false;
-  for (std::size_t u = 0; u < contacts.units(); ++u) {
-    const RowLaw& law = laws[unit_rows[u]];
+/// What the round has changed; springs become stiffer where they yielded by as much as in the round before.
+/// @return whether no gap moves by more than its tolerance
+bool IslandSolver::Impl::compare() {
+  constexpr double kSlow = 0.25, kStiffer = 0.1;
+  bool stays = !contacts_alone;
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    RowUnit& unit = units[u];
+    const RowLaw& law = laws[unit.first];
     double& c = contacts.potential(u).compliance;
-    const double pressed = contacts.impulse(u)[0];
-    if (!(law.largest_yield > 0.0) || c * pressed <= kTooFar * law.largest_yield) continue;
-    c = law.largest_yield / pressed;
-    any = true;
+    const Vec3& found = contacts.impulse(u);
+    const Vec3 moved = contacts.moved(u) - unit.moved;
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto axis = static_cast<int>(r);
+      next_f[unit.first + r] = found[axis] - unit.impulse[axis];
+      change[unit.first + r] = moved[axis] / law.tolerance;
+      stays = stays && std::abs(moved[axis]) <= law.tolerance;
+    }
+    if (law.compliance > 0.0) continue;
+    const double dent = c * (found - unit.anchor).norm();
+    if (dent > kSlow * unit.dent && dent > law.tolerance)
+      c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
+    unit.dent = dent;
   }
-  return any;
+  return stays;
+}
+
+/// The impulses of the next round.
+void IslandSolver::Impl::advance_units() {
+  for (std::size_t u = 0; u < units.size(); ++u)
+    for (std::size_t r = 0; r < units[u].rows; ++r) f[units[u].first + r] = units[u].impulse[static_cast<int>(r)];
+  if (contacts_alone)
+    for (std::size_t i = 0; i < f.size(); ++i) f[i] += next_f[i];
+  else
+    secant.advance(f, next_f, change);
+  take_whole(f);
+}
+
+/// Whole impulses by row, those nearest that rows may exert.
+void IslandSolver::Impl::take_whole(std::span<const double> impulses) {
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    Vec3 whole = Vec3::Zero();
+    for (std::size_t r = 0; r < units[u].rows; ++r) whole[static_cast<int>(r)] = impulses[units[u].first + r];
+    units[u].impulse = units[u].anchor = contacts.potential(u).nearest(whole);
+  }
+}
+
+/// Bodies that something pressed on in the last step.
+void IslandSolver::Impl::begin_early() {
+  early.assign(static_cast<std::size_t>(bodies.count()), 0);
+  contacts_alone = std::ranges::all_of(laws, &RowLaw::contact);
+  all_early = false;
+  if (!convex || theta < 1.0) return;
+  for (std::size_t row = 0; row < laws.size(); ++row)
+    if (laws[row].contact && laws[row].last_force != 0.0)
+      for_bodies(row,
+                 [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
+  all_early = !contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; });
+  if (all_early) std::ranges::fill(early, 1);
+}
+
+/// Where something presses, gravity and held forces come to the frame at the step's start, as contacts do: what rests
+/// has no velocity then, and the work of all is that over one displacement. Bodies in flight fall exactly.
+/// @return whether there are more of them
+bool IslandSolver::Impl::press_early() {
+  bool more = false;
+  for (std::size_t u = 0; theta == 1.0 && u < contacts.units(); ++u) {
+    if (!laws[units[u].first].contact || contacts.impulse(u).isZero(0.0)) continue;
+    for_bodies(units[u].first, [&](const ConstraintRows::Side&, Index local, bool) {
+      more = more || early[static_cast<std::size_t>(local)] == 0;
+      early[static_cast<std::size_t>(local)] = 1;
+    });
+  }
+  if (more && !contacts_alone && !all_early) {
+    all_early = true;
+    std::ranges::fill(early, 1);
+    std::ranges::fill(reaction, 0.0);
+  }
+  return more;
+}
+
+/// What the bodies yield beyond their modes, in a row's gap.
+double IslandSolver::Impl::dent_of(std::size_t row) {
+  double sum = 0.0;
+  for_bodies(row, [&](const ConstraintRows::Side&, Index local, bool) {
+    const std::span<const double> columns = residual.row(local, row);
+    const std::span<const double> y = contacts.motion(nodes[static_cast<std::size_t>(local)]);
+    const auto own = static_cast<std::size_t>(bodies.response(local).size());
+    for (std::size_t k = 0; k < columns.size(); ++k) sum += columns[k] * y[own + k];
+  });
+  return sum;
 }
 
 /// The motion found in place of that under the impulses found, which are not yet in balance with it.

@@ -64,8 +64,9 @@ void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
   }
 }
 
-IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work,
-                                         bool give_back, const IslandOptions& options) {
+IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows,
+                                         std::span<const double> impulses, double agent_work, bool give_back,
+                                         const IslandOptions& options) {
   if (driven_) return {};
   double after = 0.0, damped = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
@@ -83,7 +84,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
   if (excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
-  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies, StepTime::kEnd) : CommonMotion{};
+  const CommonMotion common = is_free(bodies, rows, impulses) ? common_motion(bodies, StepTime::kEnd) : CommonMotion{};
   const double removed = remove_relative_energy(bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
@@ -105,12 +106,12 @@ double IslandEnergy::load_work(const IslandBodies& bodies, double step) {
   return work;
 }
 
-bool IslandEnergy::is_free(const IslandBodies& bodies, const ConstraintRows& rows) {
+bool IslandEnergy::is_free(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> impulses) {
   for (Index local = 0; local < bodies.count(); ++local)
     if (bodies.response(local).translations == 0) return false;
   for (Index i = 0; i < rows.size(); ++i)
     for (const ConstraintRows::Side& side : rows.row(i).sides)
-      if (side.body < 0) return false;
+      if (side.body < 0 && impulses[static_cast<std::size_t>(i)] != 0.0) return false;
   return true;
 }
 
@@ -141,8 +142,9 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies, StepTime wh
 }
 
 double IslandEnergy::start_motion(const IslandBodies& bodies, const ConstraintRows& rows,
-                                  std::vector<FrameMomentum>& momenta) {
-  const CommonMotion common = is_free(bodies, rows) ? common_motion(bodies, StepTime::kStart) : CommonMotion{};
+                                  std::span<const double> impulses, std::vector<FrameMomentum>& momenta) {
+  const CommonMotion common =
+      is_free(bodies, rows, impulses) ? common_motion(bodies, StepTime::kStart) : CommonMotion{};
   double energy = 0.0;
   momenta.clear();
   for (Index local = 0; local < bodies.count(); ++local) {

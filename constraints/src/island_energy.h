@@ -1,6 +1,9 @@
 // The energy of an island over one step, and what is done where it rises (docs/derivations/constraints.md).
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "limber/constraints/island_solver.h"
 
 namespace limber {
@@ -32,14 +35,15 @@ class IslandEnergy {
   };
   /// Slows the predicted relative motion until the energy is at most that before, and the work done on the island.
   /// @param give_back whether what is missing, beyond the modes' damping, is the method's doing: then it is made up for
-  Change guard(const IslandBodies& bodies, const ConstraintRows& rows, double agent_work, bool give_back,
-               const IslandOptions& options);
+  /// @param impulses by row, whole: rows that exert nothing hold nothing
+  Change guard(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> impulses,
+               double agent_work, bool give_back, const IslandOptions& options);
   /// What the frames have beside the common motion at the step's start. @return its energy, J
-  static double start_motion(const IslandBodies& bodies, const ConstraintRows& rows,
+  static double start_motion(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> impulses,
                              std::vector<FrameMomentum>& momenta);
 
  private:
-  static bool is_free(const IslandBodies& bodies, const ConstraintRows& rows);
+  static bool is_free(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> impulses);
   static CommonMotion common_motion(const IslandBodies& bodies, StepTime when);
   static double load_work(const IslandBodies& bodies, double step);
   double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,

@@ -20,46 +20,23 @@ SolveStatus IslandSolver::Impl::iterate(const BodyStates& states, std::span<Cons
   step = options.step;
   if (convex) return solve_convex(states, constraints, options, report);
   bodies.write_position_metric(step, theta, metric);
-  choose_rows();
   sort_rows();
-  constexpr int kIterationsUnsettled = 6, kIterationsUnsettledOfLarge = 3, kIterationsOfStart = 30;
-  constexpr int kNewtonSteps = 1500, kNewtonStepsOfLarge = 500;  // for all problems of the step
-  constexpr std::size_t kFewRows = 200;
-  // Cones are solved as exactly as the last change of the gaps is worth.
-  constexpr double kFirstSlack = 1e6, kSlackOfChange = 1e-3;
-  bounded_rows.begin(sparse || f.size() > kFewRows ? kNewtonStepsOfLarge : kNewtonSteps);
+  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
   factor();
-  if (waiting > 0) begin_with_last_forces();
   report.iterations = 1;
   secant.begin(f.size());
-  slack = sparse ? kFirstSlack : 1.0;
-  int wakings = 0;
   for (;; ++report.iterations) {
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
-    if (waiting > 0 && wake_rows(options)) {
-      ++wakings;
-      sort_rows();
-      factor();
-      secant.begin(f.size());
-    }
-    const SolveStatus status = improve(report.iterations == 1);
+    const SolveStatus status = improve();
     report.change = largest_change();
-    report.newton_steps = bounded_rows.newton_steps();
-    if (report.change <= 1.0 && slack == 1.0) {
+    if (report.change <= 1.0) {
       share_anew(states, constraints, options);
       return status;
     }
-    const bool settled = status != SolveStatus::kIterationLimit;
-    // Cones that do not come together give other impulses every time.
-    const int unsettled = sparse ? kIterationsUnsettledOfLarge : kIterationsUnsettled;
-    const int most = wakings + (settled ? options.max_iterations : std::min(unsettled, options.max_iterations));
-    if (slack > 1.0 && report.iterations <= most) {  // steps of other exactness do not compare
-      slack = std::max(1.0, std::min(kSlackOfChange * report.change, 0.1 * slack));
-      std::copy(next_f.begin(), next_f.end(), f.begin());
-      secant.begin(f.size());
-      continue;
-    }
+    // Rows that are not solved for give other impulses every time.
+    const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, options.max_iterations)
+                                                            : options.max_iterations;
     if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate())
       return differentiate(states, constraints, options, report);
     if (report.iterations > most) return take_best(states, constraints, options, report);
@@ -83,14 +60,6 @@ void IslandSolver::Impl::share_anew(const BodyStates& states, std::span<Constrai
   measure(states, StepTime::kEnd, constraints, gap);
 }
 
-/// What the bodies come through under the forces of the last step tells which contacts need not wait.
-void IslandSolver::Impl::begin_with_last_forces() {
-  for (std::size_t i = 0; i < 3 * cones; ++i) {
-    const auto at = static_cast<std::size_t>(bounded[i]);
-    f[at] = step * laws[at].last_force - step * reaction[at];
-  }
-}
-
 /// Makes ready what all iterations of a step share: the factor of the rows, or A with the equality rows first.
 void IslandSolver::Impl::factor() {
   order_rows();
@@ -99,28 +68,19 @@ void IslandSolver::Impl::factor() {
     return;
   }
   const std::size_t c = bounded.size();
-  b_reduced.resize(c), product.resize(c), ordered_b.resize(order.size());
-  in_blocks = sparse || blocks_pay();
-  if (in_blocks) {
-    place_coupling(coupling, false);
-    fill_coupling(coupling, false);
-  } else {
-    assemble_ordered();
-    A_reduced.resize(c * c);
-  }
+  b_reduced.resize(c), ordered_b.resize(order.size());
+  assemble_ordered();
+  A_reduced.resize(c * c);
   for (std::vector<double>* v : {&f_bounded, &lower_bounded, &upper_bounded, &held_impulse}) v->resize(c);
-  friction.resize(cones), radius.resize(cones);
-  for (std::size_t i = 0; i < cones; ++i) {
-    const RowLaw& law = laws[static_cast<std::size_t>(bounded[3 * i])];
-    friction[i] = law.friction, radius[i] = law.radius;
-  }
+  friction.resize(cones);
+  for (std::size_t i = 0; i < cones; ++i) friction[i] = laws[static_cast<std::size_t>(bounded[3 * i])].friction;
 }
 
 void IslandSolver::Impl::factor_equalities() {
   const std::size_t m = order.size(), n = metric.size();
   std::size_t soft = 0;
   for (const Index row : order) soft += compliance[static_cast<std::size_t>(row)] > 0.0 ? 1 : 0;
-  if (soft == 0 && waiting == 0) {
+  if (soft == 0) {
     least_squares.factor(J, metric, static_cast<int>(m));
     return;
   }
@@ -166,18 +126,6 @@ void IslandSolver::Impl::weigh() {
 
 /// What impulses make of the gaps, compliance left out: J D Jᵀ values.
 void IslandSolver::Impl::respond(std::span<const double> values, std::vector<double>& gaps) {
-  if (sparse) {
-    std::fill(gaps.begin(), gaps.end(), 0.0);
-    for (std::size_t i = 0; i < order.size(); ++i) ordered_b[i] = values[static_cast<std::size_t>(order[i])];
-    coupling.scale({});
-    coupling.multiply(product.data(), ordered_b.data());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const auto at = static_cast<std::size_t>(order[i]);
-      gaps[at] = product[i] - compliance[at] * values[at];
-    }
-    for_flexibilities([&](std::size_t i, std::size_t j, double G) { gaps[i] -= G / step * values[j]; });
-    return;
-  }
   const auto m = static_cast<Eigen::Index>(values.size()), n = static_cast<Eigen::Index>(metric.size());
   const Eigen::Map<const RowMajor> Jacobian(J.data(), m, n);
   Eigen::Map<Eigen::VectorXd> x(weighted.data(), n);
@@ -187,8 +135,8 @@ void IslandSolver::Impl::respond(std::span<const double> values, std::vector<dou
 }
 
 /// One step of Newton's method from f, to next_f; `change` is what it makes of the gaps.
-SolveStatus IslandSolver::Impl::improve(bool first) {
-  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all(first);
+SolveStatus IslandSolver::Impl::improve() {
+  const SolveStatus status = bounded.empty() ? improve_equalities() : improve_all();
   for (std::size_t i = 0; i < f.size(); ++i) b[i] = next_f[i] - f[i];
   respond(b, change);
   return status;
@@ -210,7 +158,7 @@ SolveStatus IslandSolver::Impl::improve_equalities() {
 }
 
 /// Rows with bounds beside the others, which are eliminated first: A f' + b, b = gap − offset − A₀ f.
-SolveStatus IslandSolver::Impl::improve_all(bool first) {
+SolveStatus IslandSolver::Impl::improve_all() {
   respond(f, change);
   for_flexibilities([&](std::size_t i, std::size_t j, double G) { change[i] -= G * reaction[j]; });
   const std::size_t m = order.size(), e = m - bounded.size();
@@ -220,76 +168,54 @@ SolveStatus IslandSolver::Impl::improve_all(bool first) {
     const RowLaw& law = laws[at];
     ordered_b[i] = gap[at] - law.offset - change[at] + law.compliance * step * reaction[at];
   }
-  if (in_blocks)
-    b_reduced = ordered_b;
-  else
-    elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
+  elimination.reduce(A, ordered_b, static_cast<int>(e), A_reduced, b_reduced);
   gap_before.clear();
   for (const Index row : bounded)
     gap_before.push_back(start_gap[static_cast<std::size_t>(row)] - laws[static_cast<std::size_t>(row)].offset);
-  const SolveStatus status = solve_bounded(first);
+  const SolveStatus status = solve_bounded();
   f_equal.resize(e);
-  if (!in_blocks) elimination.recover(f_bounded, f_equal);
+  elimination.recover(f_bounded, f_equal);
   for (std::size_t i = 0; i < m; ++i)
     next_f[static_cast<std::size_t>(order[i])] = i < e ? f_equal[i] : f_bounded[i - e];
   return status;
 }
 
 /// Whether contacts are solved for by linear programs or heuristics.
-bool IslandSolver::Impl::by_program() const {
-  return rule.method == ContactMethod::kGapProgram || (cones > 0 && rule.friction != FrictionModel::kCone);
-}
+bool IslandSolver::Impl::by_program() const { return rule.method == ContactMethod::kGapProgram || cones > 0; }
 
 /// b − A Δt reaction, of the rows with bounds.
 void IslandSolver::Impl::take_held_impulses() {
   const auto size = static_cast<Eigen::Index>(bounded.size());
-  if (in_blocks) {
-    coupling.scale({});
-    coupling.multiply(product.data(), held_impulse.data());
-    for (std::size_t i = 0; i < bounded.size(); ++i) b_reduced[i] -= product[i];
-    return;
-  }
   Eigen::Map<Eigen::VectorXd>(b_reduced.data(), size).noalias() -=
       Eigen::Map<const RowMajor>(A_reduced.data(), size, size) * as_vector(held_impulse);
 }
 
-/// What the rows' gaps may be off, as BoundedRows::noise.
-double IslandSolver::Impl::noise_of_gaps() const {
-  const double kPart = 0.5 * slack;
-  double noise = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < bounded.size(); ++i) {
-    const double own = in_blocks ? coupling.own_block(i, 1)(0, 0) : A_reduced[i * bounded.size() + i];
-    if (own > 0.0)
-      noise = std::min(noise, kPart * laws[static_cast<std::size_t>(bounded[i])].tolerance / std::sqrt(own));
-  }
-  return noise;
-}
-
 /// Bounds and cones are of whole impulses, F = f + Δt reaction: A F + (b − A Δt reaction).
-SolveStatus IslandSolver::Impl::solve_bounded(bool first) {
+SolveStatus IslandSolver::Impl::solve_bounded() {
   const std::size_t n = bounded.size();
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = static_cast<std::size_t>(bounded[i]);
     held_impulse[i] = step * reaction[at];
-    f_bounded[i] = first && i < 3 * cones ? step * laws[at].last_force : f[at] + held_impulse[i];
+    f_bounded[i] = f[at] + held_impulse[i];
     lower_bounded[i] = laws[at].lower, upper_bounded[i] = laws[at].upper;
   }
   take_held_impulses();
-  const BoundedRows problem{.cones = static_cast<int>(cones),
-                            .A = A_reduced,
-                            .b = b_reduced,
-                            .friction = friction,
-                            .radius = radius,
-                            .lower = lower_bounded,
-                            .upper = upper_bounded,
-                            .noise = noise_of_gaps()};
-  const ConeMethod method = !sparse               ? ConeMethod::kSplitBetween
-                            : flexibility.empty() ? ConeMethod::kOnce
-                                                  : ConeMethod::kShortSteps;
-  const SolveStatus status = in_blocks ? bounded_rows.solve(problem, coupling, f_bounded, method)
-                             : by_program()
-                                 ? programs.solve({problem, gap_before, step}, rule, f_bounded, program_report)
-                                 : bounded_rows.solve(problem, f_bounded);
+  const ContactProblem problem{.cones = static_cast<int>(cones),
+                               .A = A_reduced,
+                               .b = b_reduced,
+                               .friction = friction,
+                               .lower = lower_bounded,
+                               .upper = upper_bounded,
+                               .gap_before = gap_before,
+                               .step = step};
+  const SolveStatus status = by_program() ? programs.solve(problem, rule, f_bounded, program_report)
+                                          : qp.solve(ContactQp{.size = static_cast<int>(n),
+                                                               .A = A_reduced,
+                                                               .b = b_reduced,
+                                                               .lower = lower_bounded,
+                                                               .upper = upper_bounded},
+                                                     f_bounded)
+                                                .status;
   for (std::size_t i = 0; i < n; ++i) f_bounded[i] -= held_impulse[i];
   return status;
 }
@@ -306,12 +232,6 @@ void IslandSolver::Impl::keep_within_bounds() {
   if (rule.friction == FrictionModel::kHeuristicNoSlip) return;
   for (std::size_t i = 0; i < cones; ++i) {
     const auto n = static_cast<std::size_t>(bounded[3 * i]), t = n + 1, u = n + 2;
-    if (radius[i] > 0.0) {
-      const Vec3 whole = triple(&f[n]) + step * triple(&reaction[n]);
-      const Vec3 excess = whole - ForceSet{.radius = radius[i]}.project(whole);
-      for (std::size_t r = 0; r < 3; ++r) f[n + r] -= excess[static_cast<int>(r)];
-      continue;
-    }
     const double largest = friction[i] * (f[n] + step * reaction[n]);
     const double along = f[t] + step * reaction[t], across = f[u] + step * reaction[u];
     const double size = std::hypot(along, across);
@@ -324,8 +244,7 @@ void IslandSolver::Impl::keep_within_bounds() {
 /// Whether the island is small enough, and its rows have an interval each.
 bool IslandSolver::Impl::can_differentiate() const {
   constexpr std::size_t kMostRows = 96;
-  return !sparse && f.size() <= kMostRows && cones == 0 && waiting == 0 && flexibility.empty() &&
-         rule.method != ContactMethod::kGapProgram;
+  return f.size() <= kMostRows && cones == 0 && flexibility.empty() && rule.method != ContactMethod::kGapProgram;
 }
 
 /// From the best impulses seen, with the rows' true derivatives.
@@ -366,6 +285,7 @@ SolveStatus IslandSolver::Impl::take_best(const BodyStates& states, std::span<Co
   if (!(report.change <= secant.best())) {
     report.change = secant.best();
     std::copy(secant.best_iterate().begin(), secant.best_iterate().end(), f.begin());
+    if (convex) take_whole(f), take_impulses();
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
   }

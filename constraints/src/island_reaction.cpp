@@ -69,30 +69,23 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
 
 /// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
-  if (convex) return;  // its contacts answer to what is held as to all else
+  if (convex && (contacts_alone || all_early)) return;  // its contacts answer to what is held as to all else
   find_accelerations(when, options.gravity);
   bodies.write_frame_metric(metric);
-  const std::size_t n = sparse ? 0 : weigh_frames();
-  bool equalities = true, any = sparse, solves = !sparse;
+  const std::size_t n = weigh_frames();
+  bool equalities = true, any = false;
   const auto take = [&](std::size_t at) {
-    if (!sparse && lower[at] == 0.0 && upper[at] == 0.0)
+    if (lower[at] == 0.0 && upper[at] == 0.0)
       std::fill_n(frame_G.begin() + static_cast<std::ptrdiff_t>(at * n), n, 0.0);
     any = any || b[at] != 0.0 || lower[at] > 0.0 || upper[at] < 0.0;
-    solves = solves || lower[at] < upper[at];
   };
   bool rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowLaw& law = rows.row(i).law;
-    if (sparse && law.contact && law.holds) {
-      hold_contact(when, i);
-      i += contact_rows(law) - 1;
-      continue;
-    }
-    if (law.radius > 0.0) {
-      hold_vector(when, i);
-      for (std::size_t row = at; row < at + 3; ++row) equalities = equalities && lower[row] == 0.0, take(row);
-      i += contact_rows(law) - 1;
+    if (convex && law.contact) {
+      lower[at] = upper[at] = b[at] = 0.0;
+      take(at);
       continue;
     }
     const HeldMotion held = held_motion(when, i, options);
@@ -112,48 +105,14 @@ void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& optio
     }
     take(at);
   }
-  if (any && solves)
-    answer_rows(when, equalities, answer);
-  else if (any)
-    std::copy(lower.begin(), lower.end(), answer.begin());  // all of it goes on
+  if (any)
+    answer_rows(equalities, answer);
   else
     std::fill(answer.begin(), answer.end(), 0.0);
 }
 
-/// A contact of a large island: its force goes on, of which position n + 1 sees nothing, as what it gets at the end of
-/// step n it gets at the start of the next as well.
-void IslandSolver::Impl::hold_contact(StepTime when, Index normal) {
-  const auto first = static_cast<std::size_t>(normal);
-  const auto count = static_cast<std::size_t>(contact_rows(laws[first]));
-  double before = 0.0, now = 0.0;
-  for (std::size_t i = first; i < first + count; ++i) {
-    lower[i] = when == StepTime::kStart ? laws[i].held_force : f[i] / step + reaction[i];
-    before += laws[i].last_force * laws[i].last_force, now += lower[i] * lower[i];
-  }
-  const double part = when == StepTime::kStart ? 1.0 : lasting_part(std::sqrt(before), std::sqrt(now));
-  for (std::size_t i = first; i < first + count; ++i) lower[i] *= part, upper[i] = lower[i], b[i] = 0.0;
-}
-
-/// A vector in a ball: all of its force goes on, even where the ball has shrunk since, so that what bodies get at the
-/// end of a step and at the start of the next is the same.
-void IslandSolver::Impl::hold_vector(StepTime when, Index first) {
-  const auto begin = static_cast<std::size_t>(first);
-  for (std::size_t at = begin; at < begin + 3; ++at) {
-    lower[at] = upper[at] = when == StepTime::kStart ? laws[at].last_force : f[at] / step + reaction[at];
-    b[at] = 0.0;
-  }
-}
-
 /// The answer to accelerations b within the bounds.
-void IslandSolver::Impl::answer_rows(StepTime when, bool equalities, std::vector<double>& answer) {
-  if (sparse) {
-    fill_coupling(frame_coupling, true);
-    for (std::size_t i = 0; i < answer.size(); ++i)
-      answer[i] = when == StepTime::kStart ? laws[i].last_force : reaction[i];
-    frames.solve({.b = b, .lower = lower, .upper = upper}, frame_coupling, answer,
-                 {.tolerance = 1e-9, .max_sweeps = 0});
-    return;
-  }
+void IslandSolver::Impl::answer_rows(bool equalities, std::vector<double>& answer) {
   std::fill(answer.begin(), answer.end(), 0.0);
   const std::size_t n = frame_G.size() / f.size();
   if (equalities) {
@@ -183,7 +142,7 @@ std::size_t IslandSolver::Impl::weigh_frames() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const BodyResponse& r = bodies.response(local);
     for (int i = 0; i < r.translations + r.rotations; ++i, ++column) {
-      const auto from = static_cast<std::size_t>(bodies.first(local) + i);
+      const std::size_t from = static_cast<std::size_t>(bodies.first(local)) + static_cast<std::size_t>(i);
       const double weight = std::sqrt(metric[from]);
       for (std::size_t row = 0; row < f.size(); ++row)
         frame_G[row * n + column] = weight * J[row * metric.size() + from];

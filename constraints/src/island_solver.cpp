@@ -105,13 +105,13 @@ void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, 
     bodies.body(local).group->commit(bodies.body(local).slot, part.begins, part.ends);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += options.step * reaction[i];
   for (std::size_t i = 0; holds_contact_forces() && i < f.size(); ++i) f[i] += touch_impulse[i];
+  find_slip();
   done.programs.add(program_report);
   report.programs.add(done.programs);
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
-    if (convex)
-      part.constraints[i]->yielded(std::span<const double>(give).subspan(begin, end - begin),
-                                   std::span<const double>(slip).subspan(begin, end - begin));
+    if (convex && theta == 1.0 && (contacts_alone || all_early))
+      part.constraints[i]->slid(std::span<const double>(slip).subspan(begin, end - begin));
     part.constraints[i]->accept(states, std::span<const double>(f).subspan(begin, end - begin));
   }
   if (done.status != SolveStatus::kSolved) report.status = done.status;
@@ -121,6 +121,14 @@ void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, 
   report.change = std::max(report.change, done.change);
   report.energy_removed += done.energy_removed;
   report.energy_surplus = done.energy_surplus;
+}
+
+/// Of contacts that press.
+void IslandSolver::Impl::find_slip() {
+  slip.assign(f.size(), 0.0);
+  for (std::size_t u = 0; convex && u < units.size(); ++u)
+    if (laws[units[u].first].friction > 0.0 && units[u].impulse[0] > 0.0)
+      slip[units[u].first] = units[u].end.tail<2>().norm();
 }
 
 /// What becomes of the members by the end, all but the energy.
@@ -208,16 +216,15 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   flexibility = rows.flexibility();
   stored_energy = rows.stored_energy();
   const auto m = static_cast<std::size_t>(rows.size()), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
-  sparse = is_large();
-  convex = sparse && is_pile();
+  convex = rule.is_convex() && std::ranges::any_of(laws, &RowLaw::contact);
+  begin_early();
   metric.resize(n), weighted.resize(n);
-  if (!sparse) J.resize(m * n);
+  if (!(convex && contacts_alone)) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
   f.assign(m, 0.0), reaction.assign(m, 0.0), end_reaction.assign(m, 0.0);
-  if (!sparse) bodies.write_jacobian(rows, J);
+  if (!(convex && contacts_alone)) bodies.write_jacobian(rows, J);
   measure(states, StepTime::kStart, constraints, gap);
   start_gap = gap;
-  if (sparse && !convex) place_coupling(frame_coupling, true);
 }
 
 void IslandSolver::Impl::measure(const BodyStates& states, StepTime when, std::span<Constraint* const> constraints,
@@ -239,14 +246,12 @@ void IslandSolver::Impl::predict(const IslandOptions& options) {
   predict_under_loads(options);
 }
 
-/// Where contacts alone act gravity and held forces come to the frames at the step's start, as what presses does: what
-/// rests has no velocity then, and the work of all of them is that over one displacement.
 void IslandSolver::Impl::predict_under_loads(const IslandOptions& options) {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads[static_cast<std::size_t>(local)];
     Vec3 gravity = options.gravity;
-    if (convex) {
+    if (early[static_cast<std::size_t>(local)] != 0) {
       const FrameConstants& c = body.group->frame_constants();
       const Vec3 early = options.step * c.mass * gravity,
                  arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
@@ -288,12 +293,12 @@ void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_
 /// The frames' second half of what holds them, and of what strikes them: at the step's end, by the rows there.
 void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints,
                                        const IslandOptions& options) {
-  if (convex) return;  // all of it came at the step's start
+  if (convex && theta == 1.0 && (contacts_alone || all_early)) return;  // all of it came at the step's start
   bodies.place(StepTime::kEnd);
   rows.clear();
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);
   if (holds_contact_forces()) hold_contact_forces(options.step);
-  if (!sparse) bodies.write_jacobian(rows, J);
+  if (!(convex && contacts_alone)) bodies.write_jacobian(rows, J);
   find_reaction(StepTime::kEnd, options, end_reaction);
   sum_loads(end_reaction, 0.5 * options.step, 0.0);
   if (theta < 1.0) add_loads(f, 1.0 - theta, 0.0);

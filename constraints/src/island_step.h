@@ -5,8 +5,7 @@
 //   island_touch.cpp     [H03]'s velocity program, before the rows
 //   island_working_rows.cpp  which rows take part, and in what order
 //   island_newton.cpp    Newton's method for the impulses
-//   island_convex.cpp    contacts of islands with nothing else, as one convex problem
-//   island_sparse.cpp    the rows of islands of many bodies
+//   island_convex.cpp    islands with contacts: all rows as one convex problem, in rounds
 //   island_release.cpp   where within a step an impact lets go
 //   island_guard.cpp     the energy that may have come in, and what is done about more
 #pragma once
@@ -15,7 +14,6 @@
 #include <span>
 #include <vector>
 
-#include "bounded_rows.h"
 #include "contact_program.h"
 #include "convex_contact_solver.h"
 #include "difference_newton.h"
@@ -25,7 +23,6 @@
 #include "limber/constraints/least_squares.h"
 #include "residual_factor.h"
 #include "secant_iteration.h"
-#include "sparse_coupling.h"
 
 namespace limber {
 
@@ -63,31 +60,32 @@ struct IslandSolver::Impl {
   // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
   // Among those the contacts with friction and the vectors in a ball come first, three rows each.
   std::vector<Index> bounded, order, place;
-  std::vector<char> waits;  // by row: of a contact that is left out until the bodies would come through it
-  std::size_t waiting = 0;  // rows
   std::size_t cones = 0;
   std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
-  std::vector<double> held_impulse, friction, radius;
+  std::vector<double> held_impulse, friction;
   std::vector<ConstraintRows::Flexibility> flexibility;  // of the rows at the step's start
   double stored_energy = 0.0;
   std::vector<double> wide_J, wide_metric;  // J and the metric with a degree of freedom for each compliance
-  // Islands of many rows: J and its frames' part in blocks instead, all rows in one problem; no dense matrix is made.
-  bool sparse = false;
-  bool in_blocks = false;  // the rows with bounds: so, or of an island of few rows, by the methods for those
-  SparseCoupling coupling, frame_coupling;
-  ResidualFactor residual;         // of the rows in `coupling`
-  std::vector<std::size_t> nodes;  // of the bodies
-  std::vector<double> one_row, product, widths;
-  double slack = 1.0;   // of the rows' tolerance, which this iteration's cones may be off
-  bool convex = false;  // large, with nothing but contacts among the rows
+  ResidualFactor residual;                  // of what bodies yield beyond their modes
+  std::vector<std::size_t> nodes;           // of the bodies
+  std::vector<double> one_row;
+  bool convex = false;  // contacts are among the rows, by a rule for the convex problem
   internal::ConvexContactSolver contacts;
-  std::vector<double> give, slip;      // by row, of contacts in a convex island
-  std::vector<std::size_t> unit_rows;  // the first row of each unit
-  ProximalSolver frames;
+  struct RowUnit {  // a row, or the rows of one contact or vector
+    std::size_t first = 0, rows = 1;
+    Vec3 impulse = Vec3::Zero();  // whole, that of the round
+    Vec3 anchor = Vec3::Zero();   // from where its spring yields
+    Vec3 moved = Vec3::Zero();    // what all of them make of its gap, to first order
+    Vec3 end = Vec3::Zero();      // its gap, less what it asks for
+    double response = 0.0, shift = 0.0, dent = 0.0;
+  };
+  std::vector<RowUnit> units;
+  bool contacts_alone = false;
+  std::vector<char> early;  // by body: whether it gets gravity and held forces at the step's start
+  bool all_early = false;
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
-  BoundedRowSolver bounded_rows;
   ContactProgramSolver programs;
   ContactRule rule;
   ProgramReport program_report;
@@ -112,18 +110,8 @@ struct IslandSolver::Impl {
   void weigh();
   std::size_t weigh_frames();
   void find_accelerations(StepTime when, const Vec3& gravity);
-  void hold_contact(StepTime when, Index normal);
-  void hold_vector(StepTime when, Index first);
-  void answer_rows(StepTime when, bool equalities, std::vector<double>& answer);
-  bool is_pile() const;
-  bool is_large();
-  bool blocks_pay();
-  double work_in_blocks();
-  std::size_t node_width(Index local, bool frames_alone) const;
-  void place_coupling(SparseCoupling& into, bool frames_alone);
-  void fill_coupling(SparseCoupling& into, bool frames_alone);
+  void answer_rows(bool equalities, std::vector<double>& answer);
   void take_roots();
-  void add_weighted(const ConstraintRows::Side& side, Index local, std::size_t count, double* to);
   double step = 0.0;
   double theta = 1.0;  // the part of f that frames get at the step's start; the rest at its end
   struct HeldMotion {
@@ -154,24 +142,19 @@ struct IslandSolver::Impl {
                       IslandReport& report);
   template <class Action>
   void for_flexibilities(Action&& act) const;
-  bool rows_may_wait() const;
-  void choose_rows();
-  bool wake_rows(const IslandOptions& options);
   void sort_rows();
-  void begin_with_last_forces();
   void factor();
   void factor_equalities();
   void order_rows();
   void assemble_ordered();
   void respond(std::span<const double> values, std::vector<double>& gaps);
   void share_anew(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options);
-  SolveStatus improve(bool first);
+  SolveStatus improve();
   SolveStatus improve_equalities();
-  SolveStatus improve_all(bool first);
-  SolveStatus solve_bounded(bool first);
+  SolveStatus improve_all();
+  SolveStatus solve_bounded();
   bool by_program() const;
   void take_held_impulses();
-  double noise_of_gaps() const;
   bool holds_contact_forces() const { return rule.method == ContactMethod::kVelocityProgram; }
   void solve_touch(const IslandOptions& options, ProgramReport& report);
   void choose_touching(const IslandOptions& options, bool resting);
@@ -190,11 +173,26 @@ struct IslandSolver::Impl {
                             const IslandOptions& options, IslandReport& report);
   SolveStatus solve_convex(const BodyStates& states, std::span<Constraint* const> constraints,
                            const IslandOptions& options, IslandReport& report);
-  void place_contacts();
-  void fill_contacts();
-  void fill_free_motion();
-  void start_contacts();
-  bool stiffen_pressed();
+  SolveStatus end_unsettled(SolveStatus last, const BodyStates& states, std::span<Constraint* const> constraints,
+                            const IslandOptions& options, IslandReport& report);
+  void place_units();
+  void fill_units();
+  template <class Write>
+  void fill_values(Write&& write);
+  void begin_units();
+  double find_starts(bool first_round);
+  void find_scale();
+  bool compare();
+  void advance_units();
+  void take_whole(std::span<const double> impulses);
+  void begin_early();
+  void find_slip();
+  std::vector<double> slip;  // by row
+  bool press_early();
+  double dent_of(std::size_t row);
+  void take_impulses();
+  template <class Action>
+  void for_bodies(std::size_t row, Action&& act) const;
   void take_motion(const IslandOptions& options);
   SolveStatus take_best(const BodyStates& states, std::span<Constraint* const> constraints,
                         const IslandOptions& options, IslandReport& report);
@@ -205,6 +203,7 @@ struct IslandSolver::Impl {
   double largest_recovery_work(double distance, const IslandOptions& options) const;
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
+  void sum_impulses();
   double close_energy(const IslandOptions& options, IslandReport& report);
   bool has_recovery() const;
   void stop_recovery();
@@ -214,6 +213,18 @@ struct IslandSolver::Impl {
   void refuse_impulses(const BodyStates& states, std::span<Constraint* const> constraints, const IslandOptions& options,
                        IslandReport& report);
 };
+
+/// act(side, local, again) for the bodies of a row; again: the one before was the same body.
+template <class Action>
+void IslandSolver::Impl::for_bodies(std::size_t row, Action&& act) const {
+  Index last = -1;
+  for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(row)).sides) {
+    const Index local = bodies.local(side.body);
+    if (local < 0) continue;
+    act(side, local, local == last);
+    last = local;
+  }
+}
 
 /// act(i, j, G_ij) for all pairs of rows that take part and yield to each other, both ways round.
 template <class Action>

@@ -96,13 +96,15 @@ double IslandSolver::Impl::row_acceleration(Index row, const IslandOptions& opti
 SolveStatus IslandSolver::Impl::solve_touching(std::span<double> into, ProgramReport& report) {
   f_touch.assign(touching.size(), 0.0);
   report = {};
-  const BoundedRows problem{.cones = static_cast<int>(mu.size()),
-                            .A = A_touch,
-                            .b = b_touch,
-                            .friction = mu,
-                            .lower = std::span(lower).first(touching.size()),
-                            .upper = std::span(upper).first(touching.size())};
-  const SolveStatus status = programs.solve({problem, {}, step}, rule, f_touch, report);
+  const ContactProblem problem{.cones = static_cast<int>(mu.size()),
+                               .A = A_touch,
+                               .b = b_touch,
+                               .friction = mu,
+                               .lower = std::span(lower).first(touching.size()),
+                               .upper = std::span(upper).first(touching.size()),
+                               .gap_before = {},
+                               .step = step};
+  const SolveStatus status = programs.solve(problem, rule, f_touch, report);
   for (std::size_t i = 0; i < touching.size(); ++i) into[static_cast<std::size_t>(touching[i])] = f_touch[i];
   return status;
 }

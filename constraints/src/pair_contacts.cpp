@@ -18,8 +18,6 @@ constexpr double kOverlapThatStays = 4e-4;
 // many contacts could share in many ways then have one answer that changes little where gaps change by a picometre;
 // what rests sinks by less than this part of g Δt², 8e-6 m and 3e-7 m at 60 steps a second.
 constexpr double kGive = 3e-3, kGiveBesideResidual = 1e-4;
-// Of the smaller body's arm, the most that contacts of convex islands may yield.
-constexpr double kLargestYield = 1e-4;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
@@ -77,11 +75,11 @@ double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motio
   return within;
 }
 
-void PairContacts::yielded(std::span<const double> compliance, std::span<const double> slip) {
+void PairContacts::slid(std::span<const double> slip) {
   at_once_ = true;
   std::size_t row = 0;
   for (PreparedContact& contact : contacts_) {
-    contact.give = compliance[row], contact.slip = slip[row];
+    contact.give = 0.0, contact.slip = slip[row];
     row += static_cast<std::size_t>(row_count(contact));
   }
 }
@@ -92,10 +90,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
   for (PreparedContact& contact : contacts_) {
     Vec3 impulse = impulses[row++] * contact.axes.col(0);
     for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
-    const Vec3 before = contact.last_force;
     contact.last_force = impulse / step_;
-    contact.held_force = at_once_ ? Vec3(Vec3::Zero())
-                                  : Vec3(lasting_part(before.norm(), contact.last_force.norm()) * contact.last_force);
     if (!at_once_) contact.give = give_, contact.slip = 0.0;
     contact.impulse += impulse;
     pressed = pressed || !impulse.isZero(0.0);
@@ -115,7 +110,8 @@ void PairContacts::begin(const BodyStates& states) {
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
   overlap_that_stays_ = 0.0;
   const PreparedContact& first = contacts_.front();
-  give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty
+  give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty &&
+                  !options_->rule.is_convex()
               ? (yields_[0] || yields_[1] ? kGiveBesideResidual : kGive) * step_ * step_ / reduced_mass(states, first)
               : 0.0;
   for (PreparedContact& contact : contacts_) {
@@ -254,13 +250,10 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.goes_on = true;
     }
     law.last_force = n.dot(contact.last_force);
-    law.held_force = n.dot(contact.held_force);
     const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
     const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
     if (axis == 0) {
-      law.start_gap = n.dot(a - b);
       law.shift = contact.friction * contact.slip;
-      law.largest_yield = kLargestYield * shorter_arm(states, contact);
     }
     rows.add(on_a, on_b, law);
   }

@@ -23,7 +23,7 @@ class PairContacts final : public Constraint {
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   bool is_contact() const override { return true; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
-  void yielded(std::span<const double> compliance, std::span<const double> slip) override;
+  void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
 
   /// Since when the bodies have struck each other, after the step, s; 0: they have not.

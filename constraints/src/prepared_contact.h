@@ -46,7 +46,6 @@ struct PreparedContact {
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
-  Vec3 held_force = Vec3::Zero();  // what of it goes on
   double give = 0.0;               // what the contact yielded to it by itself, m/N
   double slip = 0.0;               // beyond what its spring gave, m
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m

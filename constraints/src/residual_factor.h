@@ -1,5 +1,5 @@
 // What the rows of an island yield beyond the bodies' kept modes, as factors by body: G_b/Δt = L_b L_bᵀ, so that a body
-// has the columns of L_b as further degrees of freedom, of unit weight (sparse_coupling.h).
+// has the columns of L_b as further degrees of freedom, of unit weight (convex_contact_solver.h).
 #pragma once
 
 #include <array>

@@ -10,24 +10,21 @@ constexpr double kTurnTolerance = 1e-9;
 
 }  // namespace
 
-void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, double give) {
-  a_ = a, b_ = b, largest_ = largest, moment_ = last, give_ = give;
+void RollingResistance::set(Index a, Index b, double largest, const Vec3& last) {
+  a_ = a, b_ = b, largest_ = largest, moment_ = last;
 }
 
 /// About the world's axes: a ball looks the same from all sides.
 void RollingResistance::add_rows(const BodyStates& states, StepTime, double step, ConstraintRows& rows) {
   step_ = step;
-  next_give_ = 0.0;
   const double radius = step * largest_;
-  rows.add_stored_energy(0.5 * give_ * moment_.squaredNorm());
   for (int i = 0; i < 3; ++i) {
     const Vec3 axis = Vec3::Unit(i);
     const auto side = [&](Index body, double sign) {
       return states.is_static(body) ? RowSide{} : RowSide{.body = body, .angular = sign * axis};
     };
     rows.add(side(a_, 1.0), side(b_, -1.0),
-             {.offset = give_ * moment_[i],
-              .lower = -radius,
+             {.lower = -radius,
               .upper = radius,
               .tolerance = kTurnTolerance,
               .goes_on = true,
@@ -43,13 +40,8 @@ void RollingResistance::gaps(const BodyStates& states, StepTime when, std::span<
   for (int i = 0; i < 3; ++i) gaps[static_cast<std::size_t>(i)] = turned[i];
 }
 
-void RollingResistance::yielded(std::span<const double> compliance, std::span<const double>) {
-  next_give_ = compliance[0];
-}
-
 void RollingResistance::accept(const BodyStates&, std::span<const double> impulses) {
   moment_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
-  give_ = next_give_;
 }
 
 }  // namespace limber

@@ -16,23 +16,20 @@ namespace limber {
 class RollingResistance final : public Constraint {
  public:
   /// @param largest C Σ R F_n, N·m, > 0. @param last what acted on a in the last step, world, N·m
-  /// @param give what the pair turned by under it by itself, rad per N·m
-  void set(Index a, Index b, double largest, const Vec3& last, double give);
+  void set(Index a, Index b, double largest, const Vec3& last);
 
   std::array<Index, 2> bodies() const override { return {a_, b_}; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   bool is_contact() const override { return true; }
-  void yielded(std::span<const double> compliance, std::span<const double> slip) override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
 
   /// On a, mean over the step, world, N·m.
   const Vec3& moment() const { return moment_; }
-  double give() const { return give_; }
 
  private:
   Index a_ = -1, b_ = -1;
-  double largest_ = 0.0, step_ = 0.0, give_ = 0.0, next_give_ = 0.0;
+  double largest_ = 0.0, step_ = 0.0;
   Vec3 moment_ = Vec3::Zero();
 };
 

@@ -19,7 +19,7 @@ struct ById {
     return id(x) < id(y);
   }
 };
-constexpr ById by_id;
+constexpr ById kById;
 
 /// Where a parent is part way through its step: the parabola of its held acceleration through both ends and a constant
 /// turn, as RigidFrame takes it.
@@ -122,20 +122,20 @@ void StepParts::add_events(int part, std::span<const ContactEvent> events) {
   const std::size_t known = merged_.size();
   for (const ContactEvent& event : events) {
     const auto end = merged_.begin() + static_cast<std::ptrdiff_t>(known);
-    const auto found = std::lower_bound(merged_.begin(), end, event, by_id);
+    const auto found = std::lower_bound(merged_.begin(), end, event, kById);
     if (found != end && found->event.id == event.id)
       add_part(event, *found);
     else
       merged_.push_back(first_part(event, part));
   }
-  std::sort(merged_.begin(), merged_.end(), by_id);
+  std::sort(merged_.begin(), merged_.end(), kById);
   if (part + 1 == parts_) tell_events();
 }
 
 StepParts::Merged StepParts::first_part(const ContactEvent& event, int part) const {
   Merged made{event, event.phase != ContactPhase::kEnded, event.phase == ContactPhase::kEnded};
   if (!made.pressed) return made;
-  const auto last = std::lower_bound(last_events_.begin(), last_events_.end(), event, by_id);
+  const auto last = std::lower_bound(last_events_.begin(), last_events_.end(), event, kById);
   const bool pressed_before = last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
   const bool lasting = pressed_before || (part == 0 && event.phase == ContactPhase::kLasting);
   made.event.phase = lasting ? ContactPhase::kLasting : ContactPhase::kBegun;
@@ -156,7 +156,7 @@ void StepParts::add_part(const ContactEvent& event, Merged& merged) {
 void StepParts::tell_events() {
   events_.clear();
   for (const ContactEvent& event : released_)
-    if (!std::binary_search(merged_.begin(), merged_.end(), event, by_id)) {
+    if (!std::binary_search(merged_.begin(), merged_.end(), event, kById)) {
       events_.push_back(event);
       events_.back().phase = ContactPhase::kEnded;
       events_.back().impulse = Vec3::Zero();
@@ -166,7 +166,7 @@ void StepParts::tell_events() {
     events_.push_back(merged.event);
     if (merged.pressed && merged.let_go) released_.push_back(merged.event);
   }
-  std::sort(events_.begin(), events_.end(), by_id);
+  std::sort(events_.begin(), events_.end(), kById);
 }
 
 }  // namespace limber::internal

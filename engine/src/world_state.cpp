@@ -173,14 +173,10 @@ std::uint64_t World::state_hash() const {
   for (const ContactMemory& contact : impl_->contacts.memory()) {
     hash.add(contact.id);
     hash.add(contact.force);
-    hash.add(contact.held);
     hash.add(contact.give);
     hash.add(contact.slip);
   }
-  for (const RollingMemory& rolling : impl_->contacts.rolling()) {
-    hash.add(rolling.moment);
-    hash.add(rolling.give);
-  }
+  for (const RollingMemory& rolling : impl_->contacts.rolling()) hash.add(rolling.moment);
   for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
   for (std::size_t body = 0; body < impl_->entries.size(); ++body)
     for (const DentLoad& load : impl_->contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);

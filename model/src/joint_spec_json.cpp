@@ -61,7 +61,7 @@ Mat3 read_joint_axes(const JsonObject& o) {
   const auto n = o.numbers("frame", 9);
   Mat3 m;
   for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) m(r, c) = n[static_cast<std::size_t>(3 * r + c)];
+    for (int c = 0; c < 3; ++c) m(r, c) = n[3 * static_cast<std::size_t>(r) + static_cast<std::size_t>(c)];
   if (!((m.transpose() * m - Mat3::Identity()).cwiseAbs().maxCoeff() <= kTyped) || !(m.determinant() > 0.0))
     throw InputError(o.where("frame") + ": its columns are not three unit vectors, right-handed and at right angles");
   constexpr double kExact = 1e-12;

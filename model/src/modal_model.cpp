@@ -221,6 +221,7 @@ class Checker {
 
 std::vector<double> visible_scales(const ModalSurface& surface) {
   std::vector<double> scales;
+  scales.reserve(static_cast<std::size_t>(surface.basis.modes()));
   for (Index i = 0; i < surface.basis.modes(); ++i) scales.push_back(visible_mode_scale(surface, i));
   return scales;
 }

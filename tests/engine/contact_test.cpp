@@ -272,12 +272,11 @@ TEST(WorldContact, ABarThatTopplesLiesStill) {
 /// What the dropped modes yield to the contacts at rest is what they would yield if they were kept.
 TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
   constexpr double kHz = 30.0, kFloat = 1e-5;  // of what the dropped modes yield, which is stored in single precision
+  constexpr double kGap = 1e-9;  // m, to which contacts are solved
   const double decay = 0.05 * 2.0 * std::numbers::pi * kHz;
   const auto rest_height = [](const SampleOptions& sample) {
     GroundedWorld scene({.friction = 0.0});
     ModalModelData data = sample_model_data(sample);
-    // Where nothing is dropped, nothing yields: told so, contacts give as little by themselves as beside the others.
-    if (!data.residual_compliance) data.residual_compliance = ResidualCompliance(ResidualCompliance::Form::kFull, 8);
     const auto model = std::make_shared<const ModalModel>(std::move(data));
     const BodyId box = scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}});
     scene.step(300);
@@ -288,7 +287,7 @@ TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
   const double without = rest_height({.modes = 6, .lowest_hz = kHz, .decay = decay});
   const double with = rest_height(few);
   EXPECT_GT(std::abs(without - all), 1e-6);
-  EXPECT_NEAR(with, all, kFloat * std::abs(without - all));
+  EXPECT_NEAR(with, all, kFloat * std::abs(without - all) + kGap);
 }
 
 /// Dents stay with the material, whatever contacts come and go; what they store is counted.
@@ -410,7 +409,7 @@ double worst_of_slide(World& world, double speed, double yaw) {
 }
 
 TEST(WorldContact, ABoxSlidesOverAFloorOfBoxesAndOfTrianglesAsOverAPlane) {
-  constexpr double kChange = 1e-6;  // of the speed
+  constexpr double kChange = 1e-5;  // of the speed: tiles hand loads over within the tolerance of gaps
   HeightField field{.columns = 41, .rows = 5, .spacing_x = 0.25, .spacing_y = 0.25, .heights = {}};
   field.heights.assign(41 * 5, 0.0f);
   for (const double speed : {1.0, 3.0, 10.0})

@@ -77,9 +77,13 @@ TEST(Rolling, ComesToRestAndStaysWhereItIs) {
 }
 
 TEST(Rolling, StaysOnSlopesBelowItsAngleAndGoesDownSteeperOnes) {
-  RollingBall flat(0.9 * std::atan(kResistance));
+  const double angle = 0.9 * std::atan(kResistance);
+  RollingBall flat(angle);
   flat.step(120);
-  EXPECT_LT(std::abs(flat.world.body(flat.ball).pose.p.x()), 1e-3 * kRadius);
+  // Its moment is bound by the last step's force: it rolls for the first step, and is braked over the next ones.
+  const double pull = kGravity * kRolling * std::sin(angle), first = pull * kFrame;
+  const double brake = kGravity * kRolling * kResistance * std::cos(angle) - pull;
+  EXPECT_LT(std::abs(flat.world.body(flat.ball).pose.p.x()), first * kFrame + first * first / (2.0 * brake));
   const double x = flat.world.body(flat.ball).pose.p.x();
   flat.step(60);
   EXPECT_NEAR(flat.world.body(flat.ball).pose.p.x(), x, 10.0 * kGap);
@@ -96,7 +100,7 @@ TEST(Rolling, StaysOnSlopesBelowItsAngleAndGoesDownSteeperOnes) {
 TEST(Rolling, WithoutResistanceGoesOn) {
   RollingBall scene(0.0, 1.0, 0.0, 0.0);
   scene.step(300);
-  EXPECT_NEAR(scene.speed(), 1.0, 1e-9);
+  EXPECT_NEAR(scene.speed(), 1.0, 1e-8);
 }
 
 TEST(Rolling, SpinningEndsToo) {
@@ -138,17 +142,16 @@ TEST(Rolling, APileOfMixedBodiesComesToRest) {
     EXPECT_LT((pile.world.body(pile.bodies[i]).pose.p - before[i]).norm(), kShift) << i;
 }
 
-// Their contacts slide, stick and roll in ways that Newton's method may not settle: then a step ends all the same.
 TEST(Rolling, AFallingPileOfMixedBodiesTakesABoundedNumberOfNewtonSteps) {
-  constexpr int kAllowed = 1500, kMore = 2 * 20 * 8;  // of attempts when those are used up, two in each of 8 iterations
+  constexpr int kAllowed = 100;
   Pile pile(24, -1, true, {.rolling_friction = 0.1});
   int most = 0;
   for (int i = 0; i < 90; ++i) {
     pile.step_once();
     most = std::max(most, pile.world.constraint_report().newton_steps);
   }
-  EXPECT_LE(most, kAllowed + kMore);
-  EXPECT_GE(most, 300) << "the pile is a hard one";
+  EXPECT_LE(most, kAllowed);
+  EXPECT_GE(most, 50) << "the pile is a hard one";
 }
 
 TEST(Rolling, CoefficientsAreChecked) {

@@ -59,18 +59,8 @@ inline ContactSample make_contacts(int contacts, int modes, Touching touching, s
 /// Contacts with friction, three rows each (normal, two tangents): the rows of G over all bodies' columns.
 struct FrictionSample {
   int contacts = 0, columns = 0;
-  std::vector<double> G = {}, A = {}, b = {}, mu = {};  ///< row-major
+  std::vector<double> G = {}, b = {};  ///< row-major
 };
-
-inline FrictionSample friction_sample_of(const Eigen::MatrixXd& G, const Eigen::VectorXd& b, double mu) {
-  ContactSample rows = sample_of(G, b);
-  return {.contacts = rows.contacts / 3,
-          .columns = rows.dimension,
-          .G = std::move(rows.G),
-          .A = std::move(rows.A),
-          .b = std::move(rows.b),
-          .mu = std::vector<double>(static_cast<std::size_t>(rows.contacts / 3), mu)};
-}
 
 /// An orthonormal frame (n, t₁, t₂) as rows.
 inline Eigen::Matrix3d contact_frame(const Eigen::Vector3d& n) {
@@ -82,7 +72,7 @@ inline Eigen::Matrix3d contact_frame(const Eigen::Vector3d& n) {
 }
 
 /// Points all over a unit box of 1 kg with `modes` modes.
-inline FrictionSample make_friction(int contacts, int modes, double mu, std::mt19937& random) {
+inline FrictionSample make_friction(int contacts, int modes, std::mt19937& random) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   Eigen::MatrixXd G(3 * contacts, 6 + modes);
@@ -101,29 +91,8 @@ inline FrictionSample make_friction(int contacts, int modes, double mu, std::mt1
   Eigen::VectorXd y(6 + modes);
   for (int i = 0; i < y.size(); ++i) y[i] = normal(random) * (i < 6 ? 1.0 : 0.3);
   y[2] -= 1.0;
-  return friction_sample_of(G, G * y, mu);
-}
-
-/// `boxes` unit boxes of 1 kg on top of each other on a slope, four contacts each below, after gravity acted for a step
-/// of 1/60 s. Rows are normal to the slope, then down the slope, then across. Box i has columns 6i … 6i + 5.
-inline FrictionSample make_stack(int boxes, double slope, double mu) {
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(12 * boxes, 6 * boxes);
-  for (int i = 0; i < boxes; ++i)
-    for (int corner = 0; corner < 4; ++corner)
-      for (int side = 0; side < 2; ++side) {  // the box above the contact, and the one below
-        if (i - side < 0) continue;
-        const Eigen::Vector3d p(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, side ? 0.5 : -0.5);
-        for (int c = 0; c < 3; ++c) {
-          const Eigen::Vector3d axis = Eigen::Vector3d::Unit((c + 2) % 3) * (side ? -1.0 : 1.0);
-          const int row = 12 * i + 3 * corner + c;
-          G.row(row).segment<3>(6 * (i - side)) = axis;
-          G.row(row).segment<3>(6 * (i - side) + 3) = std::sqrt(6.0) * p.cross(axis);
-        }
-      }
-  Eigen::VectorXd y = Eigen::VectorXd::Zero(6 * boxes);
-  for (int i = 0; i < boxes; ++i)
-    y.segment<3>(6 * i) = 9.81 / 60.0 * Eigen::Vector3d(std::sin(slope), 0.0, -std::cos(slope));
-  return friction_sample_of(G, G * y, mu);
+  ContactSample rows = sample_of(G, G * y);
+  return {.contacts = contacts, .columns = rows.dimension, .G = std::move(rows.G), .b = std::move(rows.b)};
 }
 
 }  // namespace limber::testing

@@ -25,7 +25,7 @@ void Progress::stage(std::string_view what) {
   fraction_ = -1.0;
   if (watcher_.joinable()) return;
   began_ = Clock::now();
-  watcher_ = std::jthread([this](std::stop_token stop) { watch(std::move(stop)); });
+  watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
 void Progress::fraction(double done) {
@@ -40,7 +40,7 @@ void Progress::clear() {
   if (std::exchange(drawn_, false)) std::fputs("\r\033[K", stderr);
 }
 
-void Progress::watch(std::stop_token stop) {
+void Progress::watch(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     wake_.wait_for(lock, stop, kRedraw, [] { return false; });

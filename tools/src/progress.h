@@ -29,7 +29,7 @@ class Progress {
   void clear();
 
  private:
-  void watch(std::stop_token stop);
+  void watch(const std::stop_token& stop);
 
   const std::string name_;
   const bool terminal_;

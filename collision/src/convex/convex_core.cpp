@@ -174,6 +174,7 @@ ConvexCore convex_core(const Capsule& shape) {
 
 ConvexCore convex_core(const Box& shape) {
   std::vector<Vec3> corners;
+  corners.reserve(8);
   for (int i = 0; i < 8; ++i)
     corners.push_back(
         shape.half_extents.cwiseProduct(Vec3(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0)));

@@ -150,7 +150,9 @@ void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
   const int reference = fit_a > fit_b + tuning.reference_preference ? 0 : 1;
   if (std::max(fit_a, fit_b) < tuning.face_alignment) return;
   const Side &side = side_[reference], &other = side_[1 - reference];
-  const ConvexFace& face = reference == 0 ? *on_a : *on_b;
+  const ConvexFace* best = reference == 0 ? on_a : on_b;
+  if (best == nullptr) return;
+  const ConvexFace& face = *best;
   const Vec3 out = side.normal(face);
   load_incident(other, -out);
   for (Index edge = 0; edge < face.count; ++edge) clip_by_edge(side, face, edge);

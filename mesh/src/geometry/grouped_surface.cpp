@@ -17,7 +17,8 @@ void validate(GroupedSurface& surface, const std::string& name, Warnings& warnin
   std::vector<SurfaceGroup> groups;
   for (SurfaceGroup& group : surface.groups) {
     const Index first = kept_before[static_cast<std::size_t>(group.first)];
-    const Index last = kept_before[static_cast<std::size_t>(group.first + group.count)];
+    const Index end = group.first + group.count;
+    const Index last = kept_before[static_cast<std::size_t>(end)];
     group.first = first, group.count = last - first;
     if (group.count > 0) groups.push_back(std::move(group));
   }

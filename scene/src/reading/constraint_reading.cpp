@@ -73,7 +73,7 @@ SceneJoint read_joint(const Json& value, const std::string& where) {
     o.for_each("coordinates",
                [&](const Json& v, const std::string& w) { j.coordinates.push_back(read_coordinate(v, w)); });
   const JointFreedoms free = freedoms(j.spec.type);
-  const auto most = static_cast<std::size_t>(free.rotations + free.translations);
+  const std::size_t most = static_cast<std::size_t>(free.rotations) + static_cast<std::size_t>(free.translations);
   if (j.coordinates.size() > most)
     refuse(o.where("coordinates"), "an array of " + std::to_string(j.coordinates.size()) + " items",
            "at most " + std::to_string(most) + ", which a " + std::string(to_string(j.spec.type)) + " joint has");

@@ -36,6 +36,7 @@ std::size_t choice(const JsonObject& o, const std::string& key, const std::vecto
 template <class Word>
 Word choice_of(const JsonObject& o, const std::string& key, const std::vector<Word>& all, Word otherwise) {
   std::vector<std::string> words;
+  words.reserve(all.size());
   for (const Word word : all) words.emplace_back(to_string(word));
   return all[choice(o, key, words, std::string(to_string(otherwise)))];
 }

@@ -26,7 +26,7 @@ Capsule read_capsule(const JsonObject& o) {
 }
 
 Box read_box(const JsonObject& o) {
-  const Box box{o.vec3("half_extents")};
+  Box box{o.vec3("half_extents")};
   if (!(box.half_extents.minCoeff() > 0.0))
     refuse(o.where("half_extents"), JsonObject::shown(o.at("half_extents")), "three numbers > 0");
   return box;

@@ -13,6 +13,7 @@
 /// (constraint.h); J is their derivative at the step's start.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <span>
 #include <vector>
@@ -47,7 +48,6 @@ struct RowLaw {
   /// The row's force persists from step to step: springs, motors, friction. `last_force` is that of the last step.
   bool goes_on = false;
   double last_force = 0.0;
-  double held_force = 0.0;  ///< of contacts: the part of it that persists beyond the last step's end
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
   double agent_displacement = 0.0;
@@ -59,11 +59,6 @@ struct RowLaw {
   double friction = 0.0;
   /// > 0: of three rows in a row, whose impulses are a vector no longer than this; `lower` and `upper` are ∓ radius.
   double radius = 0.0;
-  /// Of contacts: the gap at the step's start, without what compliance gives there.
-  double start_gap = 0.0;
-  /// Of contacts, their normal row: the most that they may yield by in islands that are solved with yielding contacts,
-  /// in the gap's unit; 0: without bound.
-  double largest_yield = 0.0;
   /// Of contacts that slide, their normal row: De Saxcé's shift μ |slip| of the last step.
   double shift = 0.0;
   bool contact = false;  ///< of a contact, its normal row or a tangent
@@ -75,10 +70,6 @@ struct RowLaw {
   bool slides = false;
 };
 
-/// The part of a contact's force that persists beyond the step's end in large islands: no more than the force of the
-/// step before, so that a blow does not. @param before, now its sizes in the last step and in this one, N
-inline double lasting_part(double before, double now) { return now > before ? before / now : 1.0; }
-
 /// The rows of one island, made anew every step in memory that is kept.
 class ConstraintRows {
  public:
@@ -88,7 +79,7 @@ class ConstraintRows {
     std::size_t modal_begin = 0, modal_count = 0;
   };
   struct Row {
-    Side sides[2];
+    std::array<Side, 2> sides;
     RowLaw law;
   };
 

@@ -11,9 +11,9 @@
 /// yield to each other's forces. The residual displacement is a state of the body: the forces of its last step at the
 /// material points that they pressed on, in its own frame (DentLoad), with the energy ½ FᵀG F.
 ///
-/// *Contact compliance* (`give`): contacts of bodies that flex yield by 3e-3 of what a force moves the reduced mass of
-/// the two within a step, 1e-4 beside a residual compliance. It makes the shares of a load among redundant contacts
-/// unique; a body sinks by at most 3e-3 g Δt² for each body that it carries.
+/// *Contact compliance* (`give`): by rules other than the complementary one with its cone, contacts of bodies that flex
+/// yield by 3e-3 of what a force moves the reduced mass of the two within a step, 1e-4 beside a residual compliance. It
+/// makes the shares of a load among redundant contacts unique.
 ///
 /// *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press at more than
 /// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
@@ -98,7 +98,6 @@ struct ContactMemory {
   std::uint64_t id = 0;       ///< of the ContactPoint
   Index a = -1, b = -1;       ///< bodies
   Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
-  Vec3 held = Vec3::Zero();   ///< what of it goes on into the next step
   double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
   double slip = 0.0;          ///< how far the point slid in the step beyond its spring, m
   Index yielding = -1;        ///< the body that this energy is counted with
@@ -114,7 +113,6 @@ struct StrikeMemory {
 struct RollingMemory {
   Index a = -1, b = -1;        ///< bodies
   Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
-  double give = 0.0;           ///< what the pair turned by under it by itself, rad per N·m
 };
 
 /// A force that pressed on a body in the last step: the source of its residual displacement.

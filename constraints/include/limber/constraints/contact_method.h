@@ -48,6 +48,8 @@ struct ContactRule {
   FrictionModel friction = FrictionModel::kCone;
   ProgramGuard guard = ProgramGuard::kClamp;
 
+  /// Whether contacts are solved for in one convex problem with all other rows.
+  bool is_convex() const { return !is_program() && friction == FrictionModel::kCone; }
   bool is_program() const { return method == ContactMethod::kVelocityProgram || method == ContactMethod::kGapProgram; }
 };
 

@@ -13,12 +13,13 @@
 ///      slowed, or impulses are reduced; where joints alone have lost energy to the method it is given back,
 ///   5. commits the prediction and tells the constraints their impulses (Constraint::accept).
 ///
-/// Large islands of nothing but contacts are one convex problem instead, linear in the step, in which each contact
-/// yields a little and loads come to the frames at the step's start: 1, 3 and 5, without iterations over true gaps.
+/// Islands with contacts solve 3 in rounds of a convex problem, in which every row yields a little less in each: the
+/// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in place
+/// of 2.
 ///
-/// Tolerances are the rows' own; of the convex problem 1e-6 of the momenta at hand. Iterations are bounded
-/// (IslandOptions::max_iterations; 1,500 Newton steps for contacts with friction, 500 above 200 rows). A step that does
-/// not settle keeps the best impulses found, and its status is kIterationLimit.
+/// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 100 Newton steps for contacts,
+/// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that does not settle
+/// keeps the best impulses found, or the motion found where there are none, and its status is kIterationLimit.
 ///
 /// A step is taken in parts where impacts begin and end, if asked for (Constraint::next_cut, RowLaw::lets_go_within;
 /// four times at most), and in halves down to 64ths where free bodies hang on joints alone and it does not settle.
@@ -58,8 +59,8 @@ struct IslandReport {
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most
-  double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance; large islands
-                                ///< of contacts alone: the residual of the convex problem, by its tolerance
+  double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance; with contacts:
+                                ///< how far the impulses are from the rows' law
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
 };
