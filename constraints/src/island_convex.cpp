@@ -10,7 +10,7 @@ namespace {
 
 // Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
 // least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
-constexpr double kYield = 1e-3, kYieldOfJoints = 1e-6, kStiffest = 1e-7;
+constexpr double kYield = 1e-3, kStiffest = 1e-6;
 // Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
 // end: a few milliseconds.
 constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
@@ -34,20 +34,22 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
   begin_units();
   secant.begin(f.size());
   internal::ConvexContactReport done;
-  bool more = true, stays = false;
+  bool more = true;
   for (report.iterations = 1;; ++report.iterations) {
     take_impulses();
     predict(options);
     measure(states, StepTime::kEnd, constraints, gap);
-    report.change = find_starts(report.iterations == 1);
-    if (!more && (report.change <= 1.0 || stays)) return SolveStatus::kSolved;
+    const Distance left = find_starts(report.iterations == 1);
+    report.change = left.from_law;
+    // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
+    if (!more && (left.from_law <= 1.0 || (!contacts_alone && left.moved <= 1.0))) return SolveStatus::kSolved;
     const bool tired = report.newton_steps * static_cast<int>(units.size()) >= kMostSolved;
     if (report.iterations > options.max_iterations || (contacts_alone && tired)) break;
-    const internal::ConvexContactOptions left{.max_iterations = kMostNewtonSteps - report.newton_steps};
-    done = report.iterations == 1 ? contacts.solve(left) : contacts.solve_on(left);
+    const internal::ConvexContactOptions within{.max_iterations = kMostNewtonSteps - report.newton_steps};
+    done = report.iterations == 1 ? contacts.solve(within) : contacts.solve_on(within);
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
-    stays = compare();
+    compare();
     more = press_early();
     if (more) secant.begin(f.size());
     advance_units();
@@ -111,9 +113,9 @@ void IslandSolver::Impl::fill_units() {
     const Vec3 response = contacts.response(u);
     const double moved = law.radius > 0.0 ? response.mean() : response[0];
     units[u].response = moved;
-    contacts.potential(u).compliance = law.compliance > 0.0 ? law.compliance
-                                                            : std::max((law.contact ? kYield : kYieldOfJoints) * moved,
-                                                                       std::numeric_limits<double>::min());
+    contacts.potential(u).compliance =
+        law.compliance > 0.0 ? law.compliance
+                             : std::max((law.contact ? kYield : kStiffest) * moved, std::numeric_limits<double>::min());
   }
   fill_values([&](const ConstraintRows::Side&, Index local, std::size_t row, double* to) {
     std::ranges::copy(residual.row(local, row), to + bodies.response(local).size());
@@ -165,29 +167,31 @@ void IslandSolver::Impl::take_impulses() {
 
 /// u⁰: the rows' true gaps at the end of the motion that is predicted, less what they ask for, what is linear in the
 /// impulses, and what the springs exert there already.
-/// @return how far the impulses are from the rows' law at those gaps, by tolerance
-double IslandSolver::Impl::find_starts(bool first_round) {
+/// @return how far the impulses are from the rows' law at those gaps, and gaps from those of the last round, by
+/// tolerance
+IslandSolver::Impl::Distance IslandSolver::Impl::find_starts(bool first_round) {
   if (first_round) find_scale();
-  double largest = 0.0;
+  Distance distance;
   for (std::size_t u = 0; u < units.size(); ++u) {
     RowUnit& unit = units[u];
     const RowLaw& law = laws[unit.first];
     Vec3 open = Vec3::Zero();
     for (std::size_t r = 0; r < unit.rows; ++r)
       open[static_cast<int>(r)] = gap[unit.first + r] - laws[unit.first + r].offset + dent_of(unit.first + r);
+    distance.moved = first_round ? kUnbounded : std::max(distance.moved, (open - unit.end).norm() / law.tolerance);
     unit.end = open;
     if (law.friction > 0.0 && !first_round) unit.shift = law.friction * open.tail<2>().norm();
     open[0] += unit.shift;
     const internal::ContactPotential& potential = contacts.potential(u);
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
-    largest = std::max(
-        largest, (potential.compliance * (potential.at(open - yields).impulse - unit.impulse)).norm() / law.tolerance);
+    const Vec3 from_law = potential.compliance * (potential.at(open - yields).impulse - unit.impulse);
+    distance.from_law = std::max(distance.from_law, from_law.norm() / law.tolerance);
     unit.moved = contacts.moved(u);
     contacts.start(u) = open - yields - unit.moved;
     if (first_round) contacts.impulse(u) = unit.anchor;
   }
-  return largest;
+  return distance;
 }
 
 /// How the bodies move, by degree of freedom: what momenta are at hand.
@@ -209,10 +213,8 @@ void IslandSolver::Impl::find_scale() {
 }
 
 /// What the round has changed; springs become stiffer where they yielded by as much as in the round before.
-/// @return whether no gap moves by more than its tolerance
-bool IslandSolver::Impl::compare() {
+void IslandSolver::Impl::compare() {
   constexpr double kSlow = 0.25, kStiffer = 0.1;
-  bool stays = !contacts_alone;
   for (std::size_t u = 0; u < units.size(); ++u) {
     RowUnit& unit = units[u];
     const RowLaw& law = laws[unit.first];
@@ -223,7 +225,6 @@ bool IslandSolver::Impl::compare() {
       const auto axis = static_cast<int>(r);
       next_f[unit.first + r] = found[axis] - unit.impulse[axis];
       change[unit.first + r] = moved[axis] / law.tolerance;
-      stays = stays && std::abs(moved[axis]) <= law.tolerance;
     }
     if (law.compliance > 0.0) continue;
     const double dent = c * (found - unit.anchor).norm();
@@ -231,7 +232,6 @@ bool IslandSolver::Impl::compare() {
       c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
     unit.dent = dent;
   }
-  return stays;
 }
 
 /// The impulses of the next round.

@@ -69,7 +69,6 @@ struct IslandSolver::Impl {
   ResidualFactor residual;                  // of what bodies yield beyond their modes
   std::vector<std::size_t> nodes;           // of the bodies
   std::vector<double> one_row;
-  bool convex = false;  // contacts are among the rows, by a rule for the convex problem
   internal::ConvexContactSolver contacts;
   struct RowUnit {  // a row, or the rows of one contact or vector
     std::size_t first = 0, rows = 1;
@@ -80,9 +79,7 @@ struct IslandSolver::Impl {
     double response = 0.0, shift = 0.0, dent = 0.0;
   };
   std::vector<RowUnit> units;
-  bool contacts_alone = false;
   std::vector<char> early;  // by body: whether it gets gravity and held forces at the step's start
-  bool all_early = false;
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
@@ -98,9 +95,12 @@ struct IslandSolver::Impl {
   DifferenceNewton newton;
   std::vector<double> slope, tolerance;
   IslandEnergy energy;
-  bool recovers = true;       // overlapping bodies are pushed apart
-  double slowed = 0.0;        // the part of the frames' relative motion that is taken at the step's start
-  double start_energy = 0.0;  // J, of that motion
+  bool recovers = true;         // overlapping bodies are pushed apart
+  bool convex = false;          // contacts are among the rows, by a rule for the convex problem
+  bool contacts_alone = false;  // among the rows
+  bool all_early = false;       // of `early`
+  double slowed = 0.0;          // the part of the frames' relative motion that is taken at the step's start
+  double start_energy = 0.0;    // J, of that motion
   std::vector<FrameMomentum> start_momenta;
 
   void gather(std::span<const ConstrainedBody> table, std::span<const Index> members,
@@ -180,9 +180,12 @@ struct IslandSolver::Impl {
   template <class Write>
   void fill_values(Write&& write);
   void begin_units();
-  double find_starts(bool first_round);
+  struct Distance {
+    double from_law = 0.0, moved = 0.0;
+  };
+  Distance find_starts(bool first_round);
   void find_scale();
-  bool compare();
+  void compare();
   void advance_units();
   void take_whole(std::span<const double> impulses);
   void begin_early();

@@ -13,6 +13,8 @@
 namespace limber {
 namespace {
 
+using testing::depth_below_origin;
+using testing::kFrame;
 using testing::kMarked;
 using testing::kSampleSize;
 using testing::sample_model;
@@ -149,6 +151,35 @@ TEST(Constraints, BodiesWithoutConstraintsFallAsBefore) {
   for (int i = 0; i < 50; ++i) with.step(), without.step();
   EXPECT_EQ(with.body(a).pose.p, without.body(b).pose.p);
   EXPECT_EQ(with.body(a).pose.q.vector(), without.body(b).pose.q.vector());
+}
+
+/// A hand that goes where the ground is cannot have its way; nothing is thrown, and it drags the block along.
+TEST(Constraints, AHandThatPushesABlockIntoTheGroundThrowsNothing) {
+  constexpr double kDepth = 0.005, kSpeed = 0.5;  // m, m/s
+  for (const int modes : {0, 8}) {
+    ContactFinder finder;
+    World world;
+    world.set_contact_source(&finder, {.friction = 0.5});
+    world.add_static(std::make_shared<Shape>(HalfSpace{}));
+    const auto model = sample_model({.modes = modes, .lowest_hz = 30.0, .decay = 6.0});
+    const BodyId block = world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}});
+    for (int i = 0; i < 30; ++i) world.step();
+    const HandleId hand = world.add_handle(block, kMarked);
+    Vec3 target = world.position(block, kMarked);
+    double farthest = 0.0, fastest = 0.0;
+    int unsettled = 0;
+    for (int i = 0; i < 300; ++i) {
+      target += Vec3(kSpeed * kFrame, 0.0, i < 30 ? -kDepth / 30.0 : 0.0);
+      world.set_handle_target(hand, {.position = target});
+      world.step();
+      unsettled += world.constraint_report().solved ? 0 : 1;
+      farthest = std::max(farthest, (world.position(block, kMarked) - target).norm());
+      fastest = std::max(fastest, world.body(block).velocity.norm());
+    }
+    EXPECT_LE(unsettled, 3) << modes << ": of 300; rounds may use up their Newton steps";
+    EXPECT_LT(farthest, 0.1 * kDepth) << modes << ": it tips instead";
+    EXPECT_LT(fastest, 1.1 * kSpeed) << modes;
+  }
 }
 
 TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {

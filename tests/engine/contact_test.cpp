@@ -272,7 +272,7 @@ TEST(WorldContact, ABarThatTopplesLiesStill) {
 /// What the dropped modes yield to the contacts at rest is what they would yield if they were kept.
 TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
   constexpr double kHz = 30.0, kFloat = 1e-5;  // of what the dropped modes yield, which is stored in single precision
-  constexpr double kGap = 1e-9;  // m, to which contacts are solved
+  constexpr double kGap = 1e-9;                // m, to which contacts are solved
   const double decay = 0.05 * 2.0 * std::numbers::pi * kHz;
   const auto rest_height = [](const SampleOptions& sample) {
     GroundedWorld scene({.friction = 0.0});
