@@ -191,11 +191,6 @@ HWY_ATTR void Gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n) 
     for (std::size_t c = 0; c < r; ++c) C.row(r)[c] = C.row(c)[r];
 }
 
-HWY_ATTR void SubtractOuter(MatrixView C, const double* x, std::size_t first, std::size_t n) {
-  const std::size_t from = first / kPad * kPad;
-  for (std::size_t i = first; i < n; ++i) Add(C.row(i), -x[i], x, from, n);
-}
-
 template <std::size_t kRows>
 HWY_INLINE HWY_ATTR void MultiplyBlock(double* out, MatrixView M, const int* rows, const double* x, std::size_t i,
                                        std::size_t n) {
@@ -335,7 +330,6 @@ HWY_EXPORT(SubstituteForward);
 HWY_EXPORT(SubstituteBackward);
 HWY_EXPORT(Exchange);
 HWY_EXPORT(Gram);
-HWY_EXPORT(SubtractOuter);
 HWY_EXPORT(MultiplyRows);
 HWY_EXPORT(AddCongruence);
 HWY_EXPORT(InvertPositive);
@@ -386,10 +380,6 @@ void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q) {
 }
 
 void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n) { HWY_DYNAMIC_DISPATCH(Gram)(C, X, rows, n); }
-
-void subtract_outer(MatrixView C, const double* x, std::size_t first, std::size_t n) {
-  HWY_DYNAMIC_DISPATCH(SubtractOuter)(C, x, first, n);
-}
 
 void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n) {
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(out, M, rows, x, count, padded(n));

@@ -98,10 +98,6 @@ std::size_t steepest(const double* d, const double* weight, double least, std::s
 /// C = XᵀX for the `rows` rows of X, n columns. All of C is written.
 void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n);
 
-/// C(i, ·) −= x_i·x for rows i in [first, n), columns from first − first mod kPad on: a step of a Cholesky
-/// factorisation.
-void subtract_outer(MatrixView C, const double* x, std::size_t first, std::size_t n);
-
 /// out[i] = M.row(rows[i])·x over n columns. `rows` null: 0, 1, …
 void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n);
 

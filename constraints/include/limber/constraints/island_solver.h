@@ -14,8 +14,8 @@
 ///   5. commits the prediction and tells the constraints their impulses (Constraint::accept).
 ///
 /// Islands with contacts solve 3 in rounds of a convex problem, in which every row yields a little less in each: the
-/// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in place
-/// of 2.
+/// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in
+/// place of 2.
 ///
 /// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 100 Newton steps for contacts,
 /// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that does not settle
