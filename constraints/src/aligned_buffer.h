@@ -1,6 +1,7 @@
 // Memory for the kernels: 64-byte aligned, padded, growing only.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -12,7 +13,8 @@ class AlignedBuffer {
  public:
   /// At least n numbers. What was there is lost if the buffer grows; new memory is zero.
   double* need(std::size_t n) {
-    if (padded(n) > kPad * blocks_.size()) blocks_.assign(padded(n) / kPad, Block{});
+    const std::size_t blocks = padded(n) / kPad;
+    if (blocks > blocks_.size()) blocks_.assign(std::max(blocks, blocks_.size() + blocks_.size() / 2), Block{});
     return data();
   }
   double* data() { return blocks_.empty() ? nullptr : blocks_.front().values; }

@@ -166,6 +166,7 @@ void ConvexContactSolver::place_pairs() {
   pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
   if (widths_ != factor_widths_ || !std::ranges::includes(factor_pairs_, pairs_)) {
     factor_widths_ = widths_;
+    factor_pairs_.reserve(pairs_.capacity());  // which grows in large steps
     factor_pairs_ = pairs_;
     factor_.begin_pattern(widths_);
     for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);

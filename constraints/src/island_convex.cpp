@@ -11,6 +11,8 @@ namespace {
 // Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
 // least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
 constexpr double kYield = 1e-3, kStiffest = 1e-6;
+// How far from the law impulses may be: by what would move their own gap by so many tolerances.
+constexpr double kFarthest = 30.0;
 // Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
 // end: a few milliseconds.
 constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
@@ -185,7 +187,7 @@ IslandSolver::Impl::Distance IslandSolver::Impl::find_starts(bool first_round) {
     const internal::ContactPotential& potential = contacts.potential(u);
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
-    const Vec3 from_law = potential.compliance * (potential.at(open - yields).impulse - unit.impulse);
+    const Vec3 from_law = unit.response / kFarthest * (potential.at(open - yields).impulse - unit.impulse);
     distance.from_law = std::max(distance.from_law, from_law.norm() / law.tolerance);
     unit.moved = contacts.moved(u);
     contacts.start(u) = open - yields - unit.moved;

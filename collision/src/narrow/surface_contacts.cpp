@@ -23,7 +23,9 @@ void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool 
   for (int of = 0; of < 2; ++of) {
     seeds_[of].clear();
     const auto vertices = static_cast<std::size_t>(side_[of]->surface().vertices());
+    constexpr std::size_t kSeedsOfAVertex = 8;  // its neighbours, and where edges come through the other surface
     if (visited_[of].size() < vertices) visited_[of].resize(vertices), exit_normal_[of].resize(vertices);
+    seeds_[of].reserve(kSeedsOfAVertex * vertices);
   }
   if (generation_ > std::numeric_limits<std::uint32_t>::max() - 4) {
     for (std::vector<std::uint32_t>& stamps : visited_) std::fill(stamps.begin(), stamps.end(), 0u);
