@@ -12,9 +12,9 @@
 
 #include "contact_problems.h"
 #include "cpu_time.h"
-#include "limber/constraints/contact_qp.h"
-#include "limber/constraints/least_squares.h"
-#include "limber/constraints/linear_program.h"
+#include "limber/solvers/contact_qp.h"
+#include "limber/solvers/hauser/linear_program.h"
+#include "limber/solvers/least_squares.h"
 
 namespace limber {
 namespace {

@@ -51,7 +51,7 @@ SolveStatus IslandSolver::Impl::solve_convex(const BodyStates& states, std::span
     done = report.iterations == 1 ? contacts.solve(within) : contacts.solve_on(within);
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
-    compare();
+    stiffen();
     more = press_early();
     if (more) secant.begin(f.size());
     advance_units();
@@ -214,36 +214,38 @@ void IslandSolver::Impl::find_scale() {
   }
 }
 
-/// What the round has changed; springs become stiffer where they yielded by as much as in the round before.
-void IslandSolver::Impl::compare() {
+/// Springs become stiffer where they yielded by as much as in the round before.
+void IslandSolver::Impl::stiffen() {
   constexpr double kSlow = 0.25, kStiffer = 0.1;
   for (std::size_t u = 0; u < units.size(); ++u) {
     RowUnit& unit = units[u];
     const RowLaw& law = laws[unit.first];
-    double& c = contacts.potential(u).compliance;
-    const Vec3& found = contacts.impulse(u);
-    const Vec3 moved = contacts.moved(u) - unit.moved;
-    for (std::size_t r = 0; r < unit.rows; ++r) {
-      const auto axis = static_cast<int>(r);
-      next_f[unit.first + r] = found[axis] - unit.impulse[axis];
-      change[unit.first + r] = moved[axis] / law.tolerance;
-    }
     if (law.compliance > 0.0) continue;
-    const double dent = c * (found - unit.anchor).norm();
+    double& c = contacts.potential(u).compliance;
+    const double dent = c * (contacts.impulse(u) - unit.anchor).norm();
     if (dent > kSlow * unit.dent && dent > law.tolerance)
       c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
     unit.dent = dent;
   }
 }
 
-/// The impulses of the next round.
+/// The impulses of the next round: those found; beside joints with what secants tell of the rounds so far.
 void IslandSolver::Impl::advance_units() {
-  for (std::size_t u = 0; u < units.size(); ++u)
-    for (std::size_t r = 0; r < units[u].rows; ++r) f[units[u].first + r] = units[u].impulse[static_cast<int>(r)];
-  if (contacts_alone)
-    for (std::size_t i = 0; i < f.size(); ++i) f[i] += next_f[i];
-  else
-    secant.advance(f, next_f, change);
+  if (contacts_alone) {
+    for (std::size_t u = 0; u < units.size(); ++u) units[u].impulse = units[u].anchor = contacts.impulse(u);
+    return;
+  }
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const RowUnit& unit = units[u];
+    const Vec3 moved = contacts.moved(u) - unit.moved;
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto axis = static_cast<int>(r);
+      f[unit.first + r] = unit.impulse[axis];
+      next_f[unit.first + r] = contacts.impulse(u)[axis] - unit.impulse[axis];
+      change[unit.first + r] = moved[axis] / laws[unit.first].tolerance;
+    }
+  }
+  secant.advance(f, next_f, change);
   take_whole(f);
 }
 

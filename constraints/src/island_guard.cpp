@@ -51,18 +51,19 @@ bool IslandSolver::Impl::is_workless() const {
   return true;
 }
 
-/// Whole ones, to b. Programs give others than these, at a touch: any of their rows may hold.
-void IslandSolver::Impl::sum_impulses() {
+/// Of the rows: in the step, at a touch before it, and at its end.
+std::span<const double> IslandSolver::Impl::whole_impulses() {
   for (std::size_t i = 0; i < f.size(); ++i) b[i] = f[i] + step * (reaction[i] + end_reaction[i]);
-  if (rule.is_program()) std::ranges::fill(b, 1.0);
+  for (std::size_t i = 0; holds_contact_forces() && i < f.size(); ++i) b[i] += touch_impulse[i];
+  return b;
 }
 
 /// What the energy is above what it may be, when all motion at the step's end that may be taken has been.
 double IslandSolver::Impl::close_energy(const IslandOptions& options, IslandReport& report) {
   const bool settled = report.status == SolveStatus::kSolved;
   const bool give_back = options.undisturbed && settled && slowed == 0.0 && is_workless();
-  sum_impulses();
-  const IslandEnergy::Change done = energy.guard(bodies, rows, b, agent_work(options), give_back, options);
+  const IslandEnergy::Change done =
+      energy.guard(bodies, rows, whole_impulses(), agent_work(options), give_back, options);
   report.energy_removed = done.removed + start_energy * slowed * (2.0 - slowed);
   report.energy_surplus = done.surplus;
   return done.left;
@@ -88,8 +89,7 @@ void IslandSolver::Impl::stop_recovery() {
 /// is to begin more slowly, at rest in the end. @return whether there is motion to take
 bool IslandSolver::Impl::slow_start(double left) {
   constexpr double kMore = 1.5;  // of what is left is taken, as the motion taken would not have gone all into height
-  sum_impulses();
-  if (slowed == 0.0) start_energy = IslandEnergy::start_motion(bodies, rows, b, start_momenta);
+  if (slowed == 0.0) start_energy = IslandEnergy::start_motion(bodies, rows, whole_impulses(), start_momenta);
   if (slowed == 1.0 || !(start_energy > 0.0)) return false;
   const double moving = (1.0 - slowed) * (1.0 - slowed) - kMore * left / start_energy;
   constexpr double kLeast = 0.01;  // of the energy: what is slower may as well rest

@@ -208,7 +208,7 @@ SolveStatus IslandSolver::Impl::solve_bounded() {
                                .upper = upper_bounded,
                                .gap_before = gap_before,
                                .step = step};
-  const SolveStatus status = by_program() ? programs.solve(problem, rule, f_bounded, program_report)
+  const SolveStatus status = by_program() ? programs.solve(problem, rule.program(), f_bounded, program_report)
                                           : qp.solve(ContactQp{.size = static_cast<int>(n),
                                                                .A = A_reduced,
                                                                .b = b_reduced,

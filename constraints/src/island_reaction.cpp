@@ -69,7 +69,7 @@ IslandSolver::Impl::HeldMotion IslandSolver::Impl::held_motion(StepTime when, In
 
 /// What the rows that hold answer to held forces, beside those whose force goes on; the others have no row of G.
 void IslandSolver::Impl::find_reaction(StepTime when, const IslandOptions& options, std::vector<double>& answer) {
-  if (convex && (contacts_alone || all_early)) return;  // its contacts answer to what is held as to all else
+  if (!answers_to_loads()) return;
   find_accelerations(when, options.gravity);
   bodies.write_frame_metric(metric);
   const std::size_t n = weigh_frames();

@@ -110,8 +110,7 @@ void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, 
   report.programs.add(done.programs);
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
-    if (convex && theta == 1.0 && (contacts_alone || all_early))
-      part.constraints[i]->slid(std::span<const double>(slip).subspan(begin, end - begin));
+    part.constraints[i]->slid(std::span<const double>(slip).subspan(begin, end - begin));
     part.constraints[i]->accept(states, std::span<const double>(f).subspan(begin, end - begin));
   }
   if (done.status != SolveStatus::kSolved) report.status = done.status;
@@ -123,10 +122,10 @@ void IslandSolver::Impl::commit(const Part& part, const IslandOptions& options, 
   report.energy_surplus = done.energy_surplus;
 }
 
-/// Of contacts that press.
+/// Of contacts that press, where the next step is to begin with it.
 void IslandSolver::Impl::find_slip() {
   slip.assign(f.size(), 0.0);
-  for (std::size_t u = 0; convex && u < units.size(); ++u)
+  for (std::size_t u = 0; takes_loads_early() && u < units.size(); ++u)
     if (laws[units[u].first].friction > 0.0 && units[u].impulse[0] > 0.0)
       slip[units[u].first] = units[u].end.tail<2>().norm();
 }
@@ -219,10 +218,10 @@ void IslandSolver::Impl::gather(std::span<const ConstrainedBody> table, std::spa
   convex = rule.is_convex() && std::ranges::any_of(laws, &RowLaw::contact);
   begin_early();
   metric.resize(n), weighted.resize(n);
-  if (!(convex && contacts_alone)) J.resize(m * n);
+  if (needs_jacobian()) J.resize(m * n);
   for (std::vector<double>* v : {&gap, &start_gap, &b, &lower, &upper, &compliance, &next_f, &change}) v->resize(m);
   f.assign(m, 0.0), reaction.assign(m, 0.0), end_reaction.assign(m, 0.0);
-  if (!(convex && contacts_alone)) bodies.write_jacobian(rows, J);
+  if (needs_jacobian()) bodies.write_jacobian(rows, J);
   measure(states, StepTime::kStart, constraints, gap);
   start_gap = gap;
 }
@@ -293,12 +292,12 @@ void IslandSolver::Impl::add_loads(std::span<const double> values, double frame_
 /// The frames' second half of what holds them, and of what strikes them: at the step's end, by the rows there.
 void IslandSolver::Impl::answer_at_end(const BodyStates& states, std::span<Constraint* const> constraints,
                                        const IslandOptions& options) {
-  if (convex && theta == 1.0 && (contacts_alone || all_early)) return;  // all of it came at the step's start
+  if (takes_loads_early()) return;
   bodies.place(StepTime::kEnd);
   rows.clear();
   for (Constraint* constraint : constraints) constraint->add_rows(states, StepTime::kEnd, options.step, rows);
   if (holds_contact_forces()) hold_contact_forces(options.step);
-  if (!(convex && contacts_alone)) bodies.write_jacobian(rows, J);
+  if (needs_jacobian()) bodies.write_jacobian(rows, J);
   find_reaction(StepTime::kEnd, options, end_reaction);
   sum_loads(end_reaction, 0.5 * options.step, 0.0);
   if (theta < 1.0) add_loads(f, 1.0 - theta, 0.0);

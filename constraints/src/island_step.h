@@ -14,15 +14,15 @@
 #include <span>
 #include <vector>
 
-#include "contact_program.h"
-#include "convex_contact_solver.h"
-#include "difference_newton.h"
 #include "island_energy.h"
-#include "limber/constraints/contact_qp.h"
 #include "limber/constraints/island_solver.h"
-#include "limber/constraints/least_squares.h"
+#include "limber/solvers/contact_qp.h"
+#include "limber/solvers/convex_contact_solver.h"
+#include "limber/solvers/difference_newton.h"
+#include "limber/solvers/hauser/contact_program.h"
+#include "limber/solvers/least_squares.h"
+#include "limber/solvers/secant_iteration.h"
 #include "residual_factor.h"
-#include "secant_iteration.h"
 
 namespace limber {
 
@@ -58,7 +58,7 @@ struct IslandSolver::Impl {
   std::vector<ConstraintLoad> loads;
   std::vector<double> modal_loads;
   // Rows with bounds, and all rows with those last; the problem in that order, and reduced to those.
-  // Among those the contacts with friction and the vectors in a ball come first, three rows each.
+  // Among those the contacts with friction come first, three rows each.
   std::vector<Index> bounded, order, place;
   std::size_t cones = 0;
   std::vector<double> ordered_G, A, ordered_b, A_reduced, b_reduced, f_bounded, lower_bounded, upper_bounded, f_equal;
@@ -79,7 +79,8 @@ struct IslandSolver::Impl {
     double response = 0.0, shift = 0.0, dent = 0.0;
   };
   std::vector<RowUnit> units;
-  std::vector<char> early;  // by body: whether it gets gravity and held forces at the step's start
+  std::vector<char> early;   // by body: whether it gets gravity and held forces at the step's start
+  std::vector<double> slip;  // by row
   LeastSquaresSolver least_squares;
   EqualityElimination elimination;
   ContactQpSolver qp;
@@ -91,8 +92,8 @@ struct IslandSolver::Impl {
   std::vector<double> contact_force;  // by row, N, what it holds over the step
   std::vector<Index> touching;        // rows of its contacts, three each with friction
   std::vector<double> mu, A_touch, b_touch, f_touch;
-  SecantIteration secant;
-  DifferenceNewton newton;
+  internal::SecantIteration secant;
+  internal::DifferenceNewton newton;
   std::vector<double> slope, tolerance;
   IslandEnergy energy;
   bool recovers = true;         // overlapping bodies are pushed apart
@@ -185,12 +186,17 @@ struct IslandSolver::Impl {
   };
   Distance find_starts(bool first_round);
   void find_scale();
-  void compare();
+  void stiffen();
   void advance_units();
   void take_whole(std::span<const double> impulses);
+  /// Of joints, and of contacts by other rules than the convex one: what rows answer to held forces by themselves.
+  bool answers_to_loads() const { return !(convex && (contacts_alone || all_early)); }
+  /// All loads and impulses come at the step's start; nothing is left for its end.
+  bool takes_loads_early() const { return !answers_to_loads() && theta == 1.0; }
+  /// The rows' in full: what answers to loads, and what is solved for by rows.
+  bool needs_jacobian() const { return !(convex && contacts_alone); }
   void begin_early();
   void find_slip();
-  std::vector<double> slip;  // by row
   bool press_early();
   double dent_of(std::size_t row);
   void take_impulses();
@@ -206,7 +212,7 @@ struct IslandSolver::Impl {
   double largest_recovery_work(double distance, const IslandOptions& options) const;
   double agent_work(const IslandOptions& options) const;
   bool is_workless() const;
-  void sum_impulses();
+  std::span<const double> whole_impulses();
   double close_energy(const IslandOptions& options, IslandReport& report);
   bool has_recovery() const;
   void stop_recovery();

@@ -104,7 +104,7 @@ SolveStatus IslandSolver::Impl::solve_touching(std::span<double> into, ProgramRe
                                .upper = std::span(upper).first(touching.size()),
                                .gap_before = {},
                                .step = step};
-  const SolveStatus status = programs.solve(problem, rule, f_touch, report);
+  const SolveStatus status = programs.solve(problem, rule.program(), f_touch, report);
   for (std::size_t i = 0; i < touching.size(); ++i) into[static_cast<std::size_t>(touching[i])] = f_touch[i];
   return status;
 }

@@ -76,10 +76,9 @@ double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motio
 }
 
 void PairContacts::slid(std::span<const double> slip) {
-  at_once_ = true;
   std::size_t row = 0;
   for (PreparedContact& contact : contacts_) {
-    contact.give = 0.0, contact.slip = slip[row];
+    contact.slip = slip[row];
     row += static_cast<std::size_t>(row_count(contact));
   }
 }
@@ -91,7 +90,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     Vec3 impulse = impulses[row++] * contact.axes.col(0);
     for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
     contact.last_force = impulse / step_;
-    if (!at_once_) contact.give = give_, contact.slip = 0.0;
+    contact.give = give_;
     contact.impulse += impulse;
     pressed = pressed || !impulse.isZero(0.0);
     for (std::size_t side = 0; side < 2; ++side)
@@ -105,7 +104,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
 void PairContacts::begin(const BodyStates& states) {
   for (PreparedContact& contact : contacts_)
     contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
-  strikes_ = strikes(states), at_once_ = false;
+  strikes_ = strikes(states);
   for (std::size_t side = 0; side < 2; ++side)
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
   overlap_that_stays_ = 0.0;

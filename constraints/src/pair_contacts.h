@@ -79,7 +79,6 @@ class PairContacts final : public Constraint {
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false, caught_ = false;
-  bool at_once_ = false;  // forces came to the frames at the step's start
   double step_ = 0.0, lasted_ = 0.0;
   double give_ = 0.0;                // of each contact of bodies that flex, m/N
   double overlap_that_stays_ = 0.0;  // m: the kept modes do not show shapes dented by as much

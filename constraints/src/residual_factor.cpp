@@ -43,7 +43,7 @@ std::size_t ResidualFactor::number_in(Index local, std::size_t at) {
 
 void ResidualFactor::factor(Body& body, std::span<const ConstraintRows::Flexibility> pairs) {
   const std::size_t n = body.rows.size();
-  const MatrixView S = matrix_.need(n, n);
+  const internal::MatrixView S = matrix_.need(n, n);
   std::fill_n(S.values, n * S.stride, 0.0);
   for (const ConstraintRows::Flexibility& g : pairs) {
     const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "limber/constraints/constraint_rows.h"
-#include "pivoted_cholesky.h"
+#include "limber/solvers/pivoted_cholesky.h"
 
 namespace limber {
 
@@ -40,8 +40,8 @@ class ResidualFactor {
   std::vector<Body> bodies_;
   std::vector<std::array<Own, 2>> own_;                          // by place: a row has two sides
   std::vector<std::vector<ConstraintRows::Flexibility>> pairs_;  // by body, rows by number
-  MatrixBuffer matrix_;
-  PivotedCholesky cholesky_;
+  internal::MatrixBuffer matrix_;
+  internal::PivotedCholesky cholesky_;
 };
 
 }  // namespace limber

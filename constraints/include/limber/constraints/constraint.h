@@ -57,7 +57,8 @@ class Constraint {
   virtual bool may_be_divided() const { return false; }
   /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
   virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
-  /// Before accept(), where forces came at the step's start: how far contacts slid, by row, m, in their normal rows.
+  /// Before accept(): how far contacts that press slid, m, in their normal rows; 0 where forces did not come at the
+  /// step's start.
   virtual void slid(std::span<const double> /*slip*/) {}
   /// @param impulses of the rows over the step that ends now, N·s, held part included
   virtual void accept(const BodyStates& states, std::span<const double> impulses) = 0;

@@ -33,8 +33,6 @@ struct RowSide {
   std::span<const double> modal{};  ///< k numbers, or none where the modes do not show
 };
 
-inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-
 /// How a row is to be met.
 struct RowLaw {
   double offset = 0.0;         ///< wanted gap at the step's end, in the gap's unit

@@ -99,7 +99,7 @@ struct ContactMemory {
   Index a = -1, b = -1;       ///< bodies
   Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
   double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
-  double slip = 0.0;          ///< how far the point slid in the step beyond its spring, m
+  double slip = 0.0;          ///< how far the point slid in the step, m
   Index yielding = -1;        ///< the body that this energy is counted with
 };
 

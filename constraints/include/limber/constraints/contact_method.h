@@ -17,7 +17,7 @@
 /// docs/reports/contact-methods.md.
 #pragma once
 
-#include "limber/constraints/energy_guard.h"
+#include "limber/solvers/hauser/contact_program.h"
 
 namespace limber {
 
@@ -35,14 +35,6 @@ enum class FrictionModel {
   kHeuristicNoSlip,
 };
 
-/// What happens to a linear program's answer that would add energy (energy_guard.h). It judges the normals' work; what
-/// heuristic friction adds is left to the island's energy guard.
-enum class ProgramGuard {
-  kNone,           ///< it stays, as in [H03]; the island's energy guard (island_solver.h) is off as well
-  kClamp,          ///< the largest part of it that adds none, blended with the complementary answer
-  kComplementary,  ///< the complementary answer takes its place
-};
-
 struct ContactRule {
   ContactMethod method = ContactMethod::kComplementary;
   FrictionModel friction = FrictionModel::kCone;
@@ -51,14 +43,9 @@ struct ContactRule {
   /// Whether contacts are solved for in one convex problem with all other rows.
   bool is_convex() const { return !is_program() && friction == FrictionModel::kCone; }
   bool is_program() const { return method == ContactMethod::kVelocityProgram || method == ContactMethod::kGapProgram; }
-};
-
-/// The results of a step's linear programs; at gap level those of the last iteration.
-struct ProgramReport {
-  EnergyGuardReport guard{};  ///< of solves with at least one force, whatever ProgramGuard does with the answer
-  long different = 0;         ///< of guard.solves: another energy than the complementary answer, by 1e-6 of it
-  long relaxed = 0;           ///< programs without a solution: slack was bought
-  void add(const ProgramReport& other);
+  ContactProgramRule program() const {
+    return {.least_sum = is_program(), .stops_slip = friction == FrictionModel::kHeuristicNoSlip, .guard = guard};
+  }
 };
 
 }  // namespace limber

@@ -33,7 +33,7 @@
 
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
-#include "limber/constraints/solve_status.h"
+#include "limber/solvers/solve_status.h"
 
 namespace limber {
 

@@ -21,7 +21,7 @@
 #include <span>
 
 #include "limber/constraints/material_frame.h"
-#include "limber/constraints/solve_status.h"
+#include "limber/solvers/solve_status.h"
 
 namespace limber {
 

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,8 @@ using Index = std::int32_t;
 
 using Triangle = std::array<Index, 3>;  ///< counter-clockwise seen from outside
 using Tet = std::array<Index, 4>;       ///< positive: (x1−x0)×(x2−x0)·(x3−x0) > 0
+
+inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();  ///< a bound that is none
 
 /// Remarks on input that was accepted after repair or with doubt; each is one full sentence naming the place.
 using Warnings = std::vector<std::string>;

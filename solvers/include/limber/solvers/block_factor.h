@@ -1,0 +1,74 @@
+// Decomposition of a sparse symmetric positive definite matrix in square blocks: one row and column of blocks for each
+// body of an island, blocks off the diagonal where two bodies touch. The order of elimination is that of least degree
+// (Tinney and Walker 1967; George and Liu, SIAM Review 31 (1989) 1), found once for a pattern.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "limber/solvers/aligned_buffer.h"
+
+namespace limber::internal {
+
+class BlockFactor {
+ public:
+  /// Forgets the last pattern. @param widths of the blocks, one per node
+  void begin_pattern(std::span<const std::size_t> widths);
+  /// Blocks (i, j) and (j, i) may hold numbers; i = j always may.
+  void add_edge(std::size_t i, std::size_t j);
+  /// Finds the order and places the blocks. Memory grows to the largest pattern seen.
+  void end_pattern();
+
+  /// Where block (i, j) is kept, i eliminated before j or i = j: row p of node i at values + p · stride, padded.
+  struct Block {
+    std::size_t offset = 0, stride = 0;
+  };
+  bool comes_first(std::size_t i, std::size_t j) const { return place_[i] < place_[j]; }
+  /// @pre i comes first or i = j, and the pair is an edge
+  Block block(std::size_t i, std::size_t j) const;
+
+  /// Zero, but for 1 on the diagonal.
+  void set_identity();
+  /// Blocks (i, j), i first, row by row of i.
+  double* upper(const Block& b) { return upper_.data() + b.offset; }
+
+  /// @return false where a pivot is not positive
+  bool factor();
+
+  /// Where a node's numbers begin in vectors; each node's part is padded.
+  std::size_t first(std::size_t node) const { return first_[node]; }
+  std::size_t size() const { return size_; }
+  /// x ← M⁻¹ x, by the last factor. Padding zero.
+  void solve(double* x);
+
+ private:
+  struct Column {  // one node, in the order of elimination
+    std::size_t node = 0, width = 0, offset = 0, stride = 0, first_entry = 0, entries = 0;
+  };
+  struct Entry {                     // a later node that meets it
+    std::size_t column = 0, at = 0;  // at: first number of its block in each row
+    std::size_t first_run = 0, runs = 0;
+  };
+
+  void find_order();
+  void eliminate(std::size_t node);
+  void place_columns();
+  void find_runs(const Column& column, std::size_t entry);
+  std::uint64_t* neighbours(std::size_t node) { return adjacency_.data() + node * words_; }
+
+  std::vector<std::size_t> widths_, place_, first_, degree_, alive_;
+  std::vector<std::uint64_t> adjacency_;  // by node, in bits
+  std::size_t words_ = 0, size_ = 0, numbers_ = 0;
+  std::vector<Column> columns_;
+  std::vector<Entry> entries_;
+  std::vector<RowRun> runs_;       // from the rows of a node to those of a later one
+  std::vector<RowBlock> blocks_;   // the entries' in the rows of their column
+  AlignedBuffer upper_, divided_;  // U, D⁻¹U
+  AlignedBuffer row_;
+  MatrixBuffer inverse_;
+  std::size_t widest_ = 0;
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,135 @@
+// The contacts of an island as one unconstrained convex problem, in the bodies' degrees of freedom:
+//
+//   min over y   ½ |y|² + Σ_c l_c(u_c + J_c y)                                                                     (1)
+//
+// y is what contacts change about the motion of the step, scaled so that its mass matrix is 1; u_c is where a contact
+// would be at the end of the free step, less what it asks for; l_c is the potential of a spring whose impulse stays in
+// a set (contact_potential.h). At the minimum y = Σ J_cᵀ F_c, so that (1) is the complementarity problem of the
+// contacts with their compliance.
+//
+// Newton's method: (1 + Σ J_cᵀ ∇²l_c J_c) d = −∇, factored in blocks by body (block_factor.h), with an exact search
+// along d, which needs u_c and J_c d alone. It converges from everywhere, as (1) is strongly convex with a Lipschitz
+// gradient. Only pairs of bodies that have pressed on each other have a block: most contacts of a fall are found ahead
+// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses.
+//
+// Energy: with rows linear in the step the bodies gain  Σ l_c(u⁰_c) − l_c(u_c) − ½|y|²  at most, u⁰ being the start of
+// the step: what springs had stored. This needs y as it is, not F: a solve that ends early is still safe by y.
+#pragma once
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "limber/solvers/aligned_buffer.h"
+#include "limber/solvers/block_factor.h"
+#include "limber/solvers/contact_potential.h"
+#include "limber/solvers/solve_status.h"
+
+namespace limber::internal {
+
+struct ConvexContactOptions {
+  double tolerance = 1e-9;   ///< of the momenta at hand, > 0
+  int max_iterations = 100;  ///< of Newton's method
+};
+
+struct ConvexContactReport {
+  SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: y is the best motion found
+  int iterations = 0;
+  double residual = 0.0;  ///< |∇| by the momenta at hand
+};
+
+class ConvexContactSolver {
+ public:
+  // Built in this order: nodes, units with their sides, end_structure(), then values and the free motion, then starts,
+  // potentials and impulses.
+  void begin_structure();
+  /// Degrees of freedom of one body. @return its number
+  std::size_t add_node(std::size_t width);
+  /// The next contact, of one or three rows. @return its number
+  std::size_t add_unit(std::size_t rows, const ContactPotential& potential);
+  /// What the last unit's rows see of a node. @return the side's number
+  std::size_t add_side(std::size_t node);
+  /// All values are zero. Memory grows to the largest problem seen.
+  void end_structure();
+
+  /// J_c of a side, row by row: rows of its unit × the node's width.
+  MatrixView values(std::size_t side);
+  /// The motion of a node without contacts, scaled as y: its size in all is what a residual is measured by.
+  std::span<double> free_motion(std::size_t node) { return part_of(free_, node); }
+  /// J_c of the free motion.
+  Vec3 moved_freely(std::size_t unit) const { return seen(units_[unit], free_.data()); }
+  /// y of the impulses given.
+  void set_motion();
+  /// J_c y
+  Vec3 moved(std::size_t unit) const { return seen(units_[unit], y_.data()); }
+  /// |J_c|² row by row: how far a unit impulse of each moves its own row.
+  Vec3 response(std::size_t unit) const;
+  /// u_c, as many numbers as the unit has rows.
+  Vec3& start(std::size_t unit) { return units_[unit].start; }
+  /// F_c: a guess before solve(), what was found after it.
+  Vec3& impulse(std::size_t unit) { return units_[unit].impulse; }
+  const Vec3& impulse(std::size_t unit) const { return units_[unit].impulse; }
+  /// u_c + J_c y, after solve().
+  const Vec3& end(std::size_t unit) const { return units_[unit].end; }
+  ContactPotential& potential(std::size_t unit) { return units_[unit].potential; }
+  std::size_t units() const { return units_.size(); }
+
+  /// From the impulses given, or from the free motion where (1) is less there.
+  ConvexContactReport solve(const ConvexContactOptions& options);
+  /// Goes on from y, after potentials or starts were changed.
+  ConvexContactReport solve_on(const ConvexContactOptions& options);
+  /// y of a node, after solve().
+  std::span<const double> motion(std::size_t node) { return part_of(y_, node); }
+
+ private:
+  struct Node {
+    std::size_t width = 0, first = 0;
+  };
+  struct Unit {
+    std::size_t rows = 0, first_side = 0, sides = 0;
+    ContactPotential potential{};
+    Vec3 start = Vec3::Zero(), end = Vec3::Zero(), change = Vec3::Zero();  // u⁰, u, J d
+    Vec3 impulse = Vec3::Zero(), response = Vec3::Zero();
+    Mat3 stiffness = Mat3::Zero();
+    bool acts = false;
+    bool has_pressed = false;    // in this problem
+    BlockFactor::Block block{};  // of its pair, where it has two sides and has pressed
+  };
+  struct Side {
+    std::size_t node = 0, values = 0;
+  };
+  using Pair = std::pair<std::size_t, std::size_t>;
+
+  std::span<double> part_of(AlignedBuffer& vector, std::size_t node) {
+    return {vector.data() + nodes_[node].first, nodes_[node].width};
+  }
+  MatrixView jacobian(std::size_t side) const;
+  Vec3 seen(const Unit& unit, const double* y) const;
+  void add_transposed(const Unit& unit, const Vec3& rows, double* y) const;
+  void begin_with_better_start();
+  double gradient();
+  void find_ends(const double* y);
+  Pair pair_of(const Unit& unit) const;
+  void place_pairs();
+  void assemble();
+  void add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block);
+  void find_direction(const double* g, double* d);
+  struct Slope {
+    double first = 0.0, second = 0.0;
+  };
+  Slope slope_at(double step, double yd, double dd) const;
+  double best_step(double slope_at_start) const;
+  double potential_of(const double* y);
+
+  std::vector<Node> nodes_;
+  std::vector<Unit> units_;
+  std::vector<Side> sides_;
+  std::size_t numbers_ = 0, size_ = 0;
+  AlignedBuffer values_, free_, y_, d_, gradient_, ordered_;
+  BlockFactor factor_;
+  std::vector<std::size_t> factor_widths_, widths_;
+  std::vector<Pair> factor_pairs_, pairs_;  // sorted
+  bool pairs_are_new_ = true;               // a unit has pressed whose block has not been looked up
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,92 @@
+/// @file limber/solvers/least_squares.h
+/// Equality rows of any rank: manipulation ([H03] section 3.4.1) and joints.
+///
+///   f = (J D Jᵀ)⁺ r                                                                                        (1)
+///
+/// the least-norm least-squares forces of m rows over d degrees of freedom with a diagonal metric D ≥ 0 (1/mass; H/Δt
+/// for modes under a held force). Conflicting rows are met in the least-squares sense, redundant ones share the force.
+/// Worked in the smaller of m and d with B = J D^½: S = B Bᵀ for m ≤ d, N = BᵀB for m > d, either factored by Cholesky
+/// with diagonal pivoting and a rank cut, P ᵀ S P ≈ L Lᵀ with L of r columns:
+///   S⁺ = L (LᵀL)⁻² Lᵀ  (m ≤ d),      (B Bᵀ)⁺ = B (N⁺)² Bᵀ,  N⁺ = L (LᵀL)⁻² Lᵀ  (m > d)
+/// One step of iterative refinement follows. Cost O(m d min(m, d) + min³) to factor, O(m d) per right-hand side.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "limber/solvers/solve_status.h"
+
+namespace limber {
+
+struct LeastSquaresOptions {
+  double rank_tolerance =
+      1e-11;           ///< pivots below this part of the largest are taken as zero: (singular value ratio)²; > 0
+  double ridge = 0.0;  ///< ≥ 0: (J D Jᵀ + ridge·1) instead of (1), the compliance of a soft handle
+};
+
+struct LeastSquaresResult {
+  SolveStatus status = SolveStatus::kSolved;
+  int rank = 0;
+};
+
+/// Factors once, solves for any number of right-hand sides. Memory grows to the largest problem seen; after that
+/// nothing is allocated. One thread at a time. The same calls give the same bits.
+class LeastSquaresSolver {
+ public:
+  LeastSquaresSolver();
+  ~LeastSquaresSolver();
+  LeastSquaresSolver(LeastSquaresSolver&&) noexcept;
+  LeastSquaresSolver& operator=(LeastSquaresSolver&&) noexcept;
+
+  /// @param J m × d, row-major. @param metric D, d numbers ≥ 0
+  /// @return kInvalidInput if a number is not finite or D has a negative: solve() then gives zero
+  /// @throws InvalidArgument if lengths do not fit or an option is out of range
+  LeastSquaresResult factor(std::span<const double> J, std::span<const double> metric, int rows,
+                            const LeastSquaresOptions& options = {});
+
+  /// f = (J D Jᵀ)⁺ r for the factored J and D. @param r, f m numbers each; may be the same memory
+  /// @throws InvalidArgument if lengths do not fit
+  SolveStatus solve(std::span<const double> r, std::span<double> f);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// (1) by Eigen's complete orthogonal decomposition of B: the reference for LeastSquaresSolver. Allocates; 3–5 times
+/// the time. @throws InvalidArgument if lengths do not fit
+void solve_by_orthogonal_decomposition(std::span<const double> J, std::span<const double> metric,
+                                       std::span<const double> r, std::span<double> f, double rank_tolerance = 1e-11);
+
+/// Removes equality rows e from a problem with other rows c, so that a linear program or QP sees the latter alone:
+///
+///   [w_e]   [A_ee A_ec] [f_e]   [b_e]                    A' = A_cc − A_ce A_ee⁺ A_ec
+///   [w_c] = [A_ce A_cc] [f_c] + [b_c],   w_e = 0:        b' = b_c − A_ce A_ee⁺ b_e,     f_e = −A_ee⁺ (b_e + A_ec f_c)
+///
+/// A_ee may have any rank (kinematic loops): w_e = 0 then holds in the least-squares sense, and f_e is the smallest,
+/// both with the rows scaled to A_ii = 1, so that metres and radians mix. A is symmetric positive semidefinite, so A'
+/// is too.
+class EqualityElimination {
+ public:
+  EqualityElimination();
+  ~EqualityElimination();
+  EqualityElimination(EqualityElimination&&) noexcept;
+  EqualityElimination& operator=(EqualityElimination&&) noexcept;
+
+  /// @param A n × n, symmetric, the e = `equalities` rows first. @param b n
+  /// @param A_reduced (n − e) × (n − e), row-major. @param b_reduced n − e
+  /// @return kInvalidInput if a number is not finite: outputs are zero then
+  /// @throws InvalidArgument if lengths do not fit
+  LeastSquaresResult reduce(std::span<const double> A, std::span<const double> b, int equalities,
+                            std::span<double> A_reduced, std::span<double> b_reduced,
+                            const LeastSquaresOptions& options = {});
+
+  /// The equality forces that go with f_c. @param f_c n − e numbers. @param f_e e numbers
+  void recover(std::span<const double> f_c, std::span<double> f_e) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

@@ -1,0 +1,245 @@
+#include "limber/solvers/convex_contact_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dense_kernels.h"
+
+namespace limber::internal {
+
+void ConvexContactSolver::begin_structure() {
+  nodes_.clear(), units_.clear(), sides_.clear();
+  numbers_ = size_ = 0;
+}
+
+std::size_t ConvexContactSolver::add_node(std::size_t width) {
+  nodes_.push_back({width, size_});
+  size_ += padded(width);
+  return nodes_.size() - 1;
+}
+
+std::size_t ConvexContactSolver::add_unit(std::size_t rows, const ContactPotential& potential) {
+  units_.push_back({.rows = rows, .first_side = sides_.size(), .potential = potential});
+  return units_.size() - 1;
+}
+
+std::size_t ConvexContactSolver::add_side(std::size_t node) {
+  sides_.push_back({node, numbers_});
+  numbers_ += units_.back().rows * padded(nodes_[node].width);
+  ++units_.back().sides;
+  return sides_.size() - 1;
+}
+
+void ConvexContactSolver::end_structure() {
+  std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
+  for (AlignedBuffer* vector : {&free_, &y_, &d_, &gradient_})
+    std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
+}
+
+MatrixView ConvexContactSolver::values(std::size_t side) {
+  return {values_.data() + sides_[side].values, padded(nodes_[sides_[side].node].width)};
+}
+
+/// To be read only.
+MatrixView ConvexContactSolver::jacobian(std::size_t side) const {
+  return const_cast<ConvexContactSolver*>(this)->values(side);
+}
+
+Vec3 ConvexContactSolver::response(std::size_t unit) const {
+  const Unit& of = units_[unit];
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t s = of.first_side; s < of.first_side + of.sides; ++s) {
+    const MatrixView J = jacobian(s);
+    for (std::size_t r = 0; r < of.rows; ++r) sum[static_cast<int>(r)] += dot(J.row(r), J.row(r), J.stride);
+  }
+  return sum;
+}
+
+/// J y
+Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
+  double sum[3] = {}, part[3];
+  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
+    const Node& node = nodes_[sides_[s].node];
+    const MatrixView J = jacobian(s);
+    multiply_rows(part, J, nullptr, y + node.first, unit.rows, J.stride);
+    for (std::size_t r = 0; r < unit.rows; ++r) sum[r] += part[r];
+  }
+  return {sum[0], sum[1], sum[2]};
+}
+
+/// y += Jᵀ rows
+void ConvexContactSolver::add_transposed(const Unit& unit, const Vec3& rows, double* y) const {
+  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
+    const Node& node = nodes_[sides_[s].node];
+    const MatrixView J = jacobian(s);
+    combine_rows(y + node.first, y + node.first, J, nullptr, rows.data(), unit.rows, J.stride);
+  }
+}
+
+void ConvexContactSolver::find_ends(const double* y) {
+  for (Unit& unit : units_) unit.end = unit.start + seen(unit, y);
+}
+
+/// (1)
+double ConvexContactSolver::potential_of(const double* y) {
+  find_ends(y);
+  double sum = 0.5 * dot(y, y, size_);
+  for (const Unit& unit : units_) sum += unit.potential.at(unit.end).potential;
+  return sum;
+}
+
+void ConvexContactSolver::set_motion() {
+  std::fill_n(y_.data(), size_, 0.0);
+  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, y_.data());
+}
+
+void ConvexContactSolver::begin_with_better_start() {
+  double *free = y_.data(), *guess = d_.data();
+  std::fill_n(free, size_, 0.0);
+  std::fill_n(guess, size_, 0.0);
+  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, guess);
+  const double at_free = potential_of(free), at_guess = potential_of(guess);
+  if (at_guess < at_free) std::copy_n(guess, size_, free);
+}
+
+ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
+  for (std::size_t u = 0; u < units_.size(); ++u) units_[u].response = response(u);
+  begin_with_better_start();
+  pairs_are_new_ = true;
+  return solve_on(options);
+}
+
+ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& options) {
+  ConvexContactReport report;
+  const double momentum = std::sqrt(dot(free_.data(), free_.data(), size_));
+  find_ends(y_.data());
+  for (;; ++report.iterations) {
+    const double pressed = gradient();
+    const double* g = gradient_.data();
+    const double scale = std::max({momentum, pressed, std::numeric_limits<double>::min()});
+    report.residual = std::sqrt(dot(g, g, size_)) / scale;
+    if (report.residual <= options.tolerance) return report;
+    if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
+    if (pairs_are_new_) place_pairs();
+    assemble();
+    if (!factor_.factor()) break;
+    double *d = d_.data(), *y = y_.data();
+    find_direction(g, d);
+    for (Unit& unit : units_) unit.change = seen(unit, d);
+    const double step = best_step(dot(g, d, size_));
+    add_scaled(y, step, d, size_);
+    for (Unit& unit : units_) unit.end += step * unit.change;
+  }
+  report.status = SolveStatus::kIterationLimit;
+  return report;
+}
+
+/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l. @return the size of the terms of Σ Jᵀ F, which may cancel
+double ConvexContactSolver::gradient() {
+  double* g = gradient_.data();
+  double pressed = 0.0;
+  std::fill_n(g, size_, 0.0);
+  for (Unit& unit : units_) {
+    const ContactPotential::Value v = unit.potential.at(unit.end);
+    unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
+    if (!v.acts) continue;
+    pressed += unit.response.dot(v.impulse.cwiseAbs2());
+    add_transposed(unit, v.impulse, g);
+    pairs_are_new_ = pairs_are_new_ || !unit.has_pressed;
+    unit.has_pressed = true;
+  }
+  const double* y = y_.data();
+  for (std::size_t i = 0; i < size_; ++i) g[i] = y[i] - g[i];
+  return std::sqrt(pressed);
+}
+
+ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {
+  return std::minmax(sides_[unit.first_side].node, sides_[unit.first_side + 1].node);
+}
+
+/// Finds the blocks of all pairs that have pressed in this problem, in a new structure if that at hand lacks one.
+void ConvexContactSolver::place_pairs() {
+  widths_.clear(), pairs_.clear();
+  for (const Node& node : nodes_) widths_.push_back(node.width);
+  for (const Unit& unit : units_)
+    if (unit.has_pressed && unit.sides == 2) pairs_.push_back(pair_of(unit));
+  std::ranges::sort(pairs_);
+  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+  if (widths_ != factor_widths_ || !std::ranges::includes(factor_pairs_, pairs_)) {
+    factor_widths_ = widths_;
+    factor_pairs_.reserve(pairs_.capacity());  // which grows in large steps
+    factor_pairs_ = pairs_;
+    factor_.begin_pattern(widths_);
+    for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
+    factor_.end_pattern();
+  }
+  for (Unit& unit : units_) {
+    if (!unit.has_pressed || unit.sides < 2) continue;
+    const auto [a, b] = pair_of(unit);
+    unit.block = factor_.comes_first(a, b) ? factor_.block(a, b) : factor_.block(b, a);
+  }
+  pairs_are_new_ = false;
+}
+
+/// 1 + Σ Jᵀ ∇²l J
+void ConvexContactSolver::assemble() {
+  factor_.set_identity();
+  for (const Unit& unit : units_) {
+    if (!unit.acts) continue;
+    for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s)
+      add_product(unit, s, s, factor_.block(sides_[s].node, sides_[s].node));
+    if (unit.sides < 2) continue;
+    std::size_t a = unit.first_side, b = a + 1;
+    if (!factor_.comes_first(sides_[a].node, sides_[b].node)) std::swap(a, b);
+    add_product(unit, a, b, unit.block);
+  }
+}
+
+void ConvexContactSolver::add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block) {
+  const MatrixView left = jacobian(a), right = jacobian(b);
+  add_congruence({factor_.upper(block), block.stride}, left, unit.stiffness.data(), right, unit.rows,
+                 nodes_[sides_[a].node].width, right.stride);
+}
+
+ConvexContactSolver::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {
+  Slope slope{yd + step * dd, dd};
+  for (const Unit& unit : units_) {
+    const ContactPotential::Slope along = unit.potential.along(unit.end + step * unit.change, unit.change);
+    slope.first += along.first;
+    slope.second += along.second;
+  }
+  return slope;
+}
+
+/// d = −(1 + Σ Jᵀ ∇²l J)⁻¹ g
+void ConvexContactSolver::find_direction(const double* g, double* d) {
+  double* x = ordered_.need(factor_.size());
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    std::copy_n(g + nodes_[i].first, padded(nodes_[i].width), x + factor_.first(i));
+  factor_.solve(x);
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    for (std::size_t k = 0; k < nodes_[i].width; ++k) d[nodes_[i].first + k] = -x[factor_.first(i) + k];
+}
+
+/// Where (1) is least along d: Newton's method on its slope, within the bracket found so far.
+double ConvexContactSolver::best_step(double slope_at_start) const {
+  // Of the slope at the start; the full step is worth less of a search, as most are near enough.
+  constexpr double kEnoughOfFullStep = 1e-2, kEnough = 1e-3;
+  constexpr int kMost = 30;
+  const double yd = dot(y_.data(), d_.data(), size_), dd = dot(d_.data(), d_.data(), size_);
+  double step = 1.0, low = 0.0, high = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kMost; ++i) {
+    const Slope slope = slope_at(step, yd, dd);
+    if (std::abs(slope.first) <= (i == 0 ? kEnoughOfFullStep : kEnough) * std::abs(slope_at_start)) break;
+    (slope.first < 0.0 ? low : high) = step;
+    const double next = step - slope.first / slope.second;
+    if (next > low && next < std::min(high, 4.0 * step))
+      step = next;
+    else
+      step = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * step;
+  }
+  return step;
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,420 @@
+#include "dense_kernels.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "dense_kernels.cpp"
+// Accumulators are arrays of vectors, which vectors of a length unknown to the compiler cannot form: those machines run
+// the fixed 128-bit code.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+// foreach_target first
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace limber::internal::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Doubles = hn::CappedTag<double, kPad>;
+using Vector = hn::Vec<Doubles>;
+constexpr std::size_t kLanes = hn::MaxLanes(Doubles());
+constexpr std::size_t kVectors = kPad / kLanes;  // of one padded block
+
+HWY_ATTR bool AllFinite(const double* x, std::size_t n) {
+  const Doubles d;
+  Vector sum = hn::Zero(d);
+  std::size_t i = 0;
+  for (; i + kLanes <= n; i += kLanes) sum = hn::MulAdd(hn::LoadU(d, x + i), hn::Zero(d), sum);  // ∞·0 is NaN
+  double tail = 0.0;
+  for (; i < n; ++i) tail += x[i] * 0.0;
+  return hn::AllTrue(d, hn::Eq(sum, hn::Zero(d))) && tail == 0.0;
+}
+
+// Eight partial sums, added in one order whatever the vector's length.
+HWY_INLINE HWY_ATTR double SumOfBlock(const Vector* parts) {
+  const Doubles d;
+  HWY_ALIGN double p[kPad];
+  for (std::size_t v = 0; v < kVectors; ++v) hn::Store(parts[v], d, p + v * kLanes);
+  return ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]));
+}
+
+HWY_ATTR double Dot(const double* x, const double* y, std::size_t n) {
+  const Doubles d;
+  Vector sum[kVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+  for (std::size_t i = 0; i < n; i += kPad)
+    for (std::size_t v = 0; v < kVectors; ++v)
+      sum[v] = hn::MulAdd(hn::Load(d, x + i + v * kLanes), hn::Load(d, y + i + v * kLanes), sum[v]);
+  return SumOfBlock(sum);
+}
+
+HWY_ATTR void Equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
+  const Doubles d;
+  std::fill_n(C, n, 0.0);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double* row = M.row(i);
+    Vector most = hn::Zero(d);
+    for (std::size_t j = 0; j < n; j += kLanes) most = hn::Max(most, hn::Abs(hn::Load(d, row + j)));
+    R[i] = inverse_power_of_two(hn::GetLane(hn::MaxOfLanes(d, most)));
+    const Vector r = hn::Set(d, R[i]);
+    for (std::size_t j = 0; j < n; j += kLanes)
+      hn::Store(hn::Max(hn::Load(d, C + j), hn::Mul(r, hn::Abs(hn::Load(d, row + j)))), d, C + j);
+  }
+  for (std::size_t j = 0; j < n; ++j) C[j] = inverse_power_of_two(C[j]);
+  for (std::size_t i = 0; i < rows; ++i) {
+    double* row = M.row(i);
+    const Vector r = hn::Set(d, R[i]);
+    for (std::size_t j = 0; j < n; j += kLanes)
+      hn::Store(hn::Mul(hn::Mul(r, hn::Load(d, row + j)), hn::Load(d, C + j)), d, row + j);
+  }
+}
+
+HWY_INLINE HWY_ATTR void Add(double* HWY_RESTRICT y, double a, const double* HWY_RESTRICT x, std::size_t from,
+                             std::size_t to) {
+  const Doubles d;
+  const Vector va = hn::Set(d, a);
+  for (std::size_t i = from; i < to; i += kLanes)
+    hn::Store(hn::MulAdd(va, hn::Load(d, x + i), hn::Load(d, y + i)), d, y + i);
+}
+
+HWY_ATTR void AddScaled(double* y, double a, const double* x, std::size_t n) { Add(y, a, x, 0, n); }
+
+// kBlocks·kPad columns of combine_rows(), in registers.
+template <std::size_t kBlocks>
+HWY_INLINE HWY_ATTR void CombineColumns(double* out, const double* init, MatrixView M, const int* rows,
+                                        const double* coefficients, std::size_t count, std::size_t column) {
+  const Doubles d;
+  constexpr std::size_t kCount = kBlocks * kVectors;
+  Vector sum[kCount];
+  for (std::size_t v = 0; v < kCount; ++v) sum[v] = hn::Load(d, init + column + v * kLanes);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* row = M.row(rows ? static_cast<std::size_t>(rows[i]) : i) + column;
+    const Vector a = hn::Set(d, coefficients[i]);
+    for (std::size_t v = 0; v < kCount; ++v) sum[v] = hn::MulAdd(a, hn::Load(d, row + v * kLanes), sum[v]);
+  }
+  for (std::size_t v = 0; v < kCount; ++v) hn::Store(sum[v], d, out + column + v * kLanes);
+}
+
+// Columns at a time: the accumulators hide the latency of the multiply-adds and fit the registers.
+constexpr std::size_t kWide = kVectors == 1 ? 8 : 4;
+
+HWY_ATTR void CombineRows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
+                          std::size_t count, std::size_t n) {
+  std::size_t column = 0;
+  for (; column + kWide * kPad <= n; column += kWide * kPad)
+    CombineColumns<kWide>(out, init, M, rows, coefficients, count, column);
+  for (; column + 2 * kPad <= n; column += 2 * kPad) CombineColumns<2>(out, init, M, rows, coefficients, count, column);
+  if (column < n) CombineColumns<1>(out, init, M, rows, coefficients, count, column);
+}
+
+HWY_ATTR void Rotate(double* x, double* y, double c, double s, std::size_t n) {
+  const Doubles d;
+  const Vector vc = hn::Set(d, c), vs = hn::Set(d, s);
+  for (std::size_t i = 0; i < n; i += kLanes) {
+    const Vector a = hn::Load(d, x + i), b = hn::Load(d, y + i);
+    hn::Store(hn::MulAdd(vc, a, hn::Mul(vs, b)), d, x + i);
+    hn::Store(hn::NegMulAdd(vs, a, hn::Mul(vc, b)), d, y + i);
+  }
+}
+
+// The triangular solves subtract whole blocks: what is at and before the diagonal is zero, so nothing known changes.
+HWY_ATTR void SubstituteForward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first,
+                                std::size_t n) {
+  for (std::size_t i = first; i < n; ++i) {
+    x[i] *= inverse_diagonal[i];
+    Add(x, -x[i], R.row(i), i / kPad * kPad, n);
+  }
+}
+
+HWY_ATTR void SubstituteBackward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n) {
+  for (std::size_t i = n; i-- > 0;) {
+    x[i] *= inverse_diagonal[i];
+    Add(x, -x[i], L.row(i), 0, i + 1);
+  }
+}
+
+HWY_ATTR void Exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q) {
+  const Doubles d;
+  double* pivot_row = T.row(p);
+  const double inverse = 1.0 / pivot_row[q];
+  const Vector vi = hn::Set(d, inverse);
+  for (std::size_t j = 0; j < T.stride; j += kLanes)
+    hn::Store(hn::Mul(vi, hn::Load(d, pivot_row + j)), d, pivot_row + j);
+  pivot_row[q] = inverse;
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (i == p) continue;
+    double* row = T.row(i);
+    const double factor = row[q];
+    if (factor == 0.0) continue;
+    row[q] = 0.0;
+    Add(row, -factor, pivot_row, 0, T.stride);
+  }
+}
+
+// Rows [i, i + kRows) of C in blocks of two padded columns.
+template <std::size_t kRows, std::size_t kBlocks>
+HWY_INLINE HWY_ATTR void GramBlock(MatrixView C, MatrixView X, std::size_t rows, std::size_t i, std::size_t column) {
+  const Doubles d;
+  constexpr std::size_t kCount = kBlocks * kVectors;
+  Vector sum[kRows][kCount];
+  for (std::size_t r = 0; r < kRows; ++r)
+    for (std::size_t v = 0; v < kCount; ++v) sum[r][v] = hn::Zero(d);
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double* x = X.row(k);
+    Vector row[kCount];
+    for (std::size_t v = 0; v < kCount; ++v) row[v] = hn::Load(d, x + column + v * kLanes);
+    for (std::size_t r = 0; r < kRows; ++r) {
+      const Vector a = hn::Set(d, x[i + r]);
+      for (std::size_t v = 0; v < kCount; ++v) sum[r][v] = hn::MulAdd(a, row[v], sum[r][v]);
+    }
+  }
+  for (std::size_t r = 0; r < kRows; ++r)
+    for (std::size_t v = 0; v < kCount; ++v) hn::Store(sum[r][v], d, C.row(i + r) + column + v * kLanes);
+}
+
+// Rows of C at a time: with AVX-512 8 × 2 accumulators, else what sixteen registers hold.
+constexpr std::size_t kGramRows = kVectors == 1 ? 8 : kVectors == 2 ? 4 : 2;
+constexpr std::size_t kGramBlocks = kVectors == 1 ? 2 : 1;
+
+HWY_ATTR void Gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n) {
+  const std::size_t width = padded(n);
+  std::size_t i = 0;
+  for (; i + kGramRows <= n; i += kGramRows) {
+    std::size_t column = i / kPad * kPad;  // on and above the diagonal
+    for (; column + kGramBlocks * kPad <= width; column += kGramBlocks * kPad)
+      GramBlock<kGramRows, kGramBlocks>(C, X, rows, i, column);
+    if (column < width) GramBlock<kGramRows, 1>(C, X, rows, i, column);
+  }
+  for (; i < n; ++i)
+    for (std::size_t column = i / kPad * kPad; column < width; column += kPad) GramBlock<1, 1>(C, X, rows, i, column);
+  for (std::size_t r = 1; r < n; ++r)
+    for (std::size_t c = 0; c < r; ++c) C.row(r)[c] = C.row(c)[r];
+}
+
+template <std::size_t kRows>
+HWY_INLINE HWY_ATTR void MultiplyBlock(double* out, MatrixView M, const int* rows, const double* x, std::size_t i,
+                                       std::size_t n) {
+  const Doubles d;
+  const double* row[kRows];
+  for (std::size_t r = 0; r < kRows; ++r) row[r] = M.row(rows ? static_cast<std::size_t>(rows[i + r]) : i + r);
+  Vector sum[kRows][kVectors];
+  for (std::size_t r = 0; r < kRows; ++r)
+    for (std::size_t v = 0; v < kVectors; ++v) sum[r][v] = hn::Zero(d);
+  for (std::size_t j = 0; j < n; j += kPad)
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const Vector a = hn::Load(d, x + j + v * kLanes);
+      for (std::size_t r = 0; r < kRows; ++r)
+        sum[r][v] = hn::MulAdd(a, hn::Load(d, row[r] + j + v * kLanes), sum[r][v]);
+    }
+  for (std::size_t r = 0; r < kRows; ++r) out[i + r] = SumOfBlock(sum[r]);
+}
+
+HWY_ATTR void MultiplyRows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count,
+                           std::size_t n) {
+  std::size_t i = 0;
+  for (; i + 4 <= count; i += 4) MultiplyBlock<4>(out, M, rows, x, i, n);
+  for (; i < count; ++i) MultiplyBlock<1>(out, M, rows, x, i, n);
+}
+
+HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                            std::size_t n) {
+  const Doubles d;
+  for (std::size_t j = 0; j < n; j += kLanes) {
+    Vector right[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)}, weighted[3];
+    for (std::size_t r = 0; r < rows; ++r) right[r] = hn::Load(d, R.row(r) + j);
+    for (std::size_t r = 0; r < 3; ++r)
+      weighted[r] =
+          hn::MulAdd(hn::Set(d, K[3 * r]), right[0],
+                     hn::MulAdd(hn::Set(d, K[3 * r + 1]), right[1], hn::Mul(hn::Set(d, K[3 * r + 2]), right[2])));
+    for (std::size_t i = 0; i < p; ++i) {
+      Vector sum = hn::Load(d, C.row(i) + j);
+      for (std::size_t r = 0; r < rows; ++r) sum = hn::MulAdd(hn::Set(d, L.row(r)[i]), weighted[r], sum);
+      hn::Store(sum, d, C.row(i) + j);
+    }
+  }
+}
+
+HWY_ATTR bool InvertPositive(MatrixView A, std::size_t n) {
+  const Doubles d;
+  const std::size_t columns = padded(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    double* row = A.row(k);
+    if (!(row[k] > 0.0) || !(row[k] < 1e300)) return false;
+    const double pivot = 1.0 / row[k];
+    row[k] = 1.0;
+    for (std::size_t j = 0; j < columns; j += kLanes)
+      hn::Store(hn::Mul(hn::Set(d, pivot), hn::Load(d, row + j)), d, row + j);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      double* other = A.row(i);
+      const Vector part = hn::Set(d, other[k]);
+      other[k] = 0.0;
+      for (std::size_t j = 0; j < columns; j += kLanes)
+        hn::Store(hn::NegMulAdd(part, hn::Load(d, row + j), hn::Load(d, other + j)), d, other + j);
+    }
+  }
+  return true;
+}
+
+HWY_ATTR void MultiplyBlocks(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns) {
+  const Doubles d;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < columns; j += kPad) {
+      Vector sum[kVectors];
+      for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+      for (std::size_t k = 0; k < n; ++k) {
+        const Vector a = hn::Set(d, A.row(i)[k]);
+        for (std::size_t v = 0; v < kVectors; ++v)
+          sum[v] = hn::MulAdd(a, hn::Load(d, X.row(k) + j + v * kLanes), sum[v]);
+      }
+      for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[v], d, out.row(i) + j + v * kLanes);
+    }
+}
+
+HWY_ATTR void SubtractRuns(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n,
+                           const RowRun* runs, std::size_t count) {
+  const Doubles d;
+  for (const RowRun* run = runs; run != runs + count; ++run)
+    for (std::size_t r = 0; r < rows; ++r)
+      for (std::size_t j = 0; j < run->count; j += kPad) {
+        double* at = to.row(r) + run->to + j;
+        Vector sum[kVectors];
+        for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Load(d, at + v * kLanes);
+        for (std::size_t q = 0; q < n; ++q) {
+          const Vector a = hn::Set(d, left[q * W.stride + r]);
+          for (std::size_t v = 0; v < kVectors; ++v)
+            sum[v] = hn::NegMulAdd(a, hn::Load(d, W.row(q) + run->from + j + v * kLanes), sum[v]);
+        }
+        for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[v], d, at + v * kLanes);
+      }
+}
+
+HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b)
+    for (std::size_t j = 0; j < b->width; j += kLanes) {
+      Vector sum = hn::Load(d, x + b->column + j);
+      for (std::size_t r = 0; r < b->rows; ++r)
+        sum = hn::MulAdd(hn::Set(d, y[b->row + r]), hn::Load(d, G + b->values + r * b->stride + j), sum);
+      hn::Store(sum, d, x + b->column + j);
+    }
+}
+
+HWY_ATTR void SpreadBlocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b)
+    for (std::size_t r = 0; r < b->rows; ++r) {
+      const double *row = G + b->values + r * b->stride, *from = x + b->column;
+      Vector sum[kVectors];
+      for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+      for (std::size_t j = 0; j < b->width; j += kPad)
+        for (std::size_t v = 0; v < kVectors; ++v)
+          sum[v] = hn::MulAdd(hn::Load(d, from + j + v * kLanes), hn::Load(d, row + j + v * kLanes), sum[v]);
+      y[b->row + r] += SumOfBlock(sum);
+    }
+}
+
+}  // namespace limber::internal::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace limber::internal {
+
+HWY_EXPORT(AllFinite);
+HWY_EXPORT(Equilibrate);
+HWY_EXPORT(Dot);
+HWY_EXPORT(AddScaled);
+HWY_EXPORT(CombineRows);
+HWY_EXPORT(Rotate);
+HWY_EXPORT(SubstituteForward);
+HWY_EXPORT(SubstituteBackward);
+HWY_EXPORT(Exchange);
+HWY_EXPORT(Gram);
+HWY_EXPORT(MultiplyRows);
+HWY_EXPORT(AddCongruence);
+HWY_EXPORT(InvertPositive);
+HWY_EXPORT(MultiplyBlocks);
+HWY_EXPORT(SubtractRuns);
+HWY_EXPORT(GatherBlocks);
+HWY_EXPORT(SpreadBlocks);
+
+bool all_finite(const double* x, std::size_t n) { return HWY_DYNAMIC_DISPATCH(AllFinite)(x, n); }
+
+void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
+  HWY_DYNAMIC_DISPATCH(Equilibrate)(M, rows, padded(n), R, C);
+}
+
+std::size_t steepest(const double* d, const double* weight, double least, std::size_t n) {
+  std::size_t best = n;
+  double square = 0.0, over = 1.0;  // d²/w of the best as a fraction: no division in the loop
+  for (std::size_t i = 0; i < n; ++i)
+    if (d[i] > least && d[i] * d[i] * over > square * weight[i]) best = i, square = d[i] * d[i], over = weight[i];
+  return best;
+}
+
+double dot(const double* x, const double* y, std::size_t n) { return HWY_DYNAMIC_DISPATCH(Dot)(x, y, padded(n)); }
+
+void add_scaled(double* y, double a, const double* x, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(AddScaled)(y, a, x, padded(n));
+}
+
+void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
+                  std::size_t count, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(CombineRows)(out, init, M, rows, coefficients, count, padded(n));
+}
+
+void rotate(double* x, double* y, double c, double s, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(Rotate)(x, y, c, s, padded(n));
+}
+
+void substitute_forward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(SubstituteForward)(R, inverse_diagonal, x, first, n);
+}
+
+void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(SubstituteBackward)(L, inverse_diagonal, x, n);
+}
+
+void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q) {
+  HWY_DYNAMIC_DISPATCH(Exchange)(T, rows, p, q);
+}
+
+void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n) { HWY_DYNAMIC_DISPATCH(Gram)(C, X, rows, n); }
+
+void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(MultiplyRows)(out, M, rows, x, count, padded(n));
+}
+
+void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                    std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(AddCongruence)(C, L, K, R, rows, p, padded(n));
+}
+
+bool invert_positive(MatrixView A, std::size_t n) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(A, n); }
+
+void multiply_block(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns) {
+  HWY_DYNAMIC_DISPATCH(MultiplyBlocks)(out, A, X, n, columns);
+}
+
+void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n, const RowRun* runs,
+                   std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(SubtractRuns)(to, left, W, rows, n, runs, count);
+}
+
+void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
+  HWY_DYNAMIC_DISPATCH(GatherBlocks)(x, blocks, count, G, y);
+}
+
+void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+  HWY_DYNAMIC_DISPATCH(SpreadBlocks)(y, blocks, count, G, x);
+}
+
+void transpose(MatrixView T, MatrixView M, std::size_t rows, std::size_t n) {
+  for (std::size_t j = 0; j < n; ++j) std::fill(T.row(j) + rows, T.row(j) + T.stride, 0.0);
+  for (std::size_t block = 0; block < n; block += kPad)  // a line of each row of M at a time
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t j = block; j < std::min(block + kPad, n); ++j) T.row(j)[i] = M.row(i)[j];
+}
+
+}  // namespace limber::internal
+#endif  // HWY_ONCE

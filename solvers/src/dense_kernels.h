@@ -1,0 +1,88 @@
+// The vector loops of the dense solvers. Raw pointers only: the file that implements them is compiled for several
+// instruction sets, so neither Eigen nor a header that includes it may reach it.
+//
+// Arrays are 64-byte aligned and lengths and strides multiples of kPad (aligned_buffer.h): no loop has a tail. What is
+// behind the last number is read and written, so it must be finite. Every result is the same bits on every instruction
+// set that has fused multiply-add: sums run over rows in order, and dot products over eight partial sums.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "limber/solvers/matrix_view.h"
+
+namespace limber::internal {
+
+/// Whether x[0 … n) holds neither an infinity nor a NaN. x may have any alignment, n any value.
+bool all_finite(const double* x, std::size_t n);
+
+/// Brings the rows, then the columns, of M to entries of about 1: M ← R M C, with powers of two, which round nothing.
+/// R gets `rows` numbers, C n and zeros in its padding.
+void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C);
+
+/// The power of two next below 1/x; 1 for x = 0. @pre x ≥ 0, finite
+inline double inverse_power_of_two(double x) {
+  if (x == 0.0) return 1.0;
+  const std::uint64_t exponent = std::bit_cast<std::uint64_t>(x) >> 52;
+  return std::bit_cast<double>(std::max<std::uint64_t>(2046 - exponent, 1) << 52);
+}
+
+double dot(const double* x, const double* y, std::size_t n);
+
+/// y += a x
+void add_scaled(double* y, double a, const double* x, std::size_t n);
+
+/// out = init + Σ_i coefficients[i]·M.row(rows[i]) over n columns. `rows` null: 0, 1, …; out may be init.
+void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
+                  std::size_t count, std::size_t n);
+
+/// C += Lᵀ K R: `rows` ≤ 3 rows of L, the first `p` columns of which count, and of R, n columns; K symmetric, 3 × 3.
+void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
+                    std::size_t n);
+
+/// A ← A⁻¹, n × n, symmetric and positive definite: Gauss–Jordan without exchanges. @return false where a pivot is not
+/// positive
+bool invert_positive(MatrixView A, std::size_t n);
+
+/// Out = A X: n × n and n rows of `columns` numbers, padded.
+void multiply_block(MatrixView out, MatrixView A, MatrixView X, std::size_t n, std::size_t columns);
+
+/// To −= Lᵀ W, run after run: `rows` columns of L from `left` on, n rows of L and W.
+void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n, const RowRun* runs,
+                   std::size_t count);
+
+/// x += Gᵀ y, block after block.
+void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y);
+
+/// y += G x, block after block.
+void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x);
+
+/// (x, y) ← (c x + s y, c y − s x)
+void rotate(double* x, double* y, double c, double s, std::size_t n);
+
+/// Solves Rᵀx = x, R upper triangular: its rows above the diagonal, zero at and below it; `inverse_diagonal` apart.
+/// The first `first` numbers of the right-hand side are known to be zero.
+void substitute_forward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first, std::size_t n);
+
+/// Solves R x = x with the same R given as L = Rᵀ: its rows below the diagonal, zero at and above it.
+void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n);
+
+/// One exchange of a condensed simplex tableau: T(i, ·) −= T(i, q)·T(p, ·)/T(p, q) for i ≠ p, row p over the pivot,
+/// column q over the negative pivot, the pivot inverted.
+void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q);
+
+/// The entry of d to enter next: the largest d_i²/weight_i among d_i > least; n if there is none.
+std::size_t steepest(const double* d, const double* weight, double least, std::size_t n);
+
+/// C = XᵀX for the `rows` rows of X, n columns. All of C is written.
+void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n);
+
+/// out[i] = M.row(rows[i])·x over n columns. `rows` null: 0, 1, …
+void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, std::size_t count, std::size_t n);
+
+/// T = Mᵀ for `rows` × n numbers of M, with zeros in the padding of T.
+void transpose(MatrixView T, MatrixView M, std::size_t rows, std::size_t n);
+
+}  // namespace limber::internal

@@ -1,0 +1,115 @@
+// The sparse factor of bodies that touch, against a dense one.
+#include "limber/solvers/block_factor.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <random>
+#include <vector>
+
+#include "counted_new.h"
+
+namespace limber::internal {
+namespace {
+
+using Edge = std::pair<std::size_t, std::size_t>;
+
+/// 1 + Σ Gᵀ G over the pairs of a graph, as a contact adds it, with its bodies' numbers at their own places.
+struct System {
+  std::vector<std::size_t> widths, first;
+  std::vector<Edge> edges;
+  Eigen::MatrixXd M;
+
+  System(std::size_t nodes, std::size_t pairs, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < nodes; ++i) {
+      widths.push_back(1 + random() % 21);
+      first.push_back(size);
+      size += widths.back();
+    }
+    M = Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(size), static_cast<Eigen::Index>(size));
+    for (std::size_t p = 0; p < pairs; ++p) {
+      const std::size_t a = random() % nodes, b = random() % nodes;
+      if (a == b) continue;
+      edges.emplace_back(a, b);
+      Eigen::MatrixXd G = Eigen::MatrixXd::Zero(3, M.cols());
+      for (const std::size_t node : {a, b})
+        for (std::size_t k = 0; k < widths[node]; ++k)
+          for (int r = 0; r < 3; ++r) G(r, static_cast<Eigen::Index>(first[node] + k)) = 30.0 * normal(random);
+      M += G.transpose() * G;
+    }
+  }
+
+  void write(BlockFactor& factor) const {
+    factor.set_identity();
+    const auto write_block = [&](std::size_t i, std::size_t j) {
+      const BlockFactor::Block block = factor.block(i, j);
+      for (std::size_t p = 0; p < widths[i]; ++p)
+        for (std::size_t q = 0; q < widths[j]; ++q)
+          factor.upper(block)[p * block.stride + q] =
+              M(static_cast<Eigen::Index>(first[i] + p), static_cast<Eigen::Index>(first[j] + q));
+    };
+    for (std::size_t i = 0; i < widths.size(); ++i) write_block(i, i);
+    for (const auto& [a, b] : edges) factor.comes_first(a, b) ? write_block(a, b) : write_block(b, a);
+  }
+
+  Eigen::VectorXd solve(BlockFactor& factor, const Eigen::VectorXd& b) const {
+    AlignedBuffer memory;
+    double* x = memory.need(factor.size());
+    std::fill_n(x, factor.size(), 0.0);
+    for (std::size_t i = 0; i < widths.size(); ++i) std::copy_n(b.data() + first[i], widths[i], x + factor.first(i));
+    factor.solve(x);
+    Eigen::VectorXd result(b.size());
+    for (std::size_t i = 0; i < widths.size(); ++i)
+      std::copy_n(x + factor.first(i), widths[i], result.data() + first[i]);
+    return result;
+  }
+};
+
+void place(const System& system, BlockFactor& factor) {
+  factor.begin_pattern(system.widths);
+  for (const auto& [a, b] : system.edges) factor.add_edge(a, b);
+  factor.end_pattern();
+}
+
+TEST(BlockFactor, SolvesAsADenseFactorDoes) {
+  BlockFactor factor;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    const System system(1 + seed % 12, 2 * (seed % 17), seed);
+    place(system, factor);
+    system.write(factor);
+    ASSERT_TRUE(factor.factor()) << seed;
+    const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(system.M.cols(), -1.0, 2.0);
+    const Eigen::VectorXd x = system.solve(factor, b);
+    // Backward stability: what is missing, by the size of the terms.
+    EXPECT_LE((system.M * x - b).norm(), 1e-12 * system.M.norm() * x.norm()) << seed;
+  }
+}
+
+TEST(BlockFactor, RefusesWhatIsNotPositive) {
+  System system(4, 6, 3);
+  system.M(5, 5) = -1.0;
+  BlockFactor factor;
+  place(system, factor);
+  system.write(factor);
+  EXPECT_FALSE(factor.factor());
+}
+
+TEST(BlockFactor, AWarmPatternAllocatesNothing) {
+  const System system(8, 20, 5);
+  BlockFactor factor;
+  const auto run = [&] {
+    place(system, factor);
+    system.write(factor);
+    return factor.factor();
+  };
+  ASSERT_TRUE(run());
+  const long before = testing::allocations();
+  ASSERT_TRUE(run());
+  EXPECT_EQ(testing::allocations(), before);
+}
+
+}  // namespace
+}  // namespace limber::internal

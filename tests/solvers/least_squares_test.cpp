@@ -1,0 +1,223 @@
+// Equality rows of any rank against Eigen's complete orthogonal decomposition and by their conditions.
+#include "limber/solvers/least_squares.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "counted_new.h"
+#include "limber/core/error.h"
+
+namespace limber {
+namespace {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct Rows {
+  Matrix J;
+  Eigen::VectorXd metric;
+  Matrix S() const { return J * metric.asDiagonal() * J.transpose(); }
+};
+
+std::span<const double> span_of(const Matrix& M) { return {M.data(), static_cast<std::size_t>(M.size())}; }
+std::span<const double> span_of(const Eigen::VectorXd& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
+std::span<double> span_of(Eigen::VectorXd& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
+
+Eigen::VectorXd random_vector(Eigen::Index n, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd v(n);
+  for (double& x : v) x = normal(random);
+  return v;
+}
+
+/// m rows of rank ≤ `rank` over d degrees of freedom, with a metric that spans two decades.
+Rows make_rows(int m, int d, int rank, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  Rows rows{.J = Matrix(m, d), .metric = Eigen::VectorXd(d)};
+  for (double& x : rows.J.reshaped()) x = uniform(random);
+  for (double& x : rows.metric) x = std::pow(10.0, uniform(random));
+  for (int i = rank; i < m; ++i) rows.J.row(i) = rows.J.row(i % rank) * (1.0 + 0.5 * (i / rank));
+  return rows;
+}
+
+Eigen::VectorXd solve(LeastSquaresSolver& solver, const Rows& rows, const Eigen::VectorXd& r,
+                      const LeastSquaresOptions& options = {}) {
+  Eigen::VectorXd f(r.size());
+  EXPECT_EQ(solver.factor(span_of(rows.J), span_of(rows.metric), static_cast<int>(r.size()), options).status,
+            SolveStatus::kSolved);
+  EXPECT_EQ(solver.solve(span_of(r), span_of(f)), SolveStatus::kSolved);
+  return f;
+}
+
+// Forces of random rows: the condition number of S, up to about 1e6 here, times round-off.
+constexpr double kForces = 1e-9;
+// What the held points miss, relative: round-off of the residual, which one refinement reaches.
+constexpr double kHeld = 1e-12;
+
+TEST(LeastSquares, AgreesWithTheOrthogonalDecomposition) {
+  std::mt19937 random(1);
+  LeastSquaresSolver solver;
+  for (int n = 0; n < 200; ++n) {
+    const int m = 1 + (7 * n) % 60, d = 1 + (11 * n) % 50;
+    const int rank = n % 3 == 0 ? 1 + n % std::min(m, d) : std::min(m, d);
+    const Rows rows = make_rows(m, d, std::min(rank, m), random);
+    const Eigen::VectorXd r = random_vector(m, random);  // conflicting where m > rank
+    const Eigen::VectorXd f = solve(solver, rows, r);
+    Eigen::VectorXd reference(m);
+    solve_by_orthogonal_decomposition(span_of(rows.J), span_of(rows.metric), span_of(r), span_of(reference));
+    EXPECT_LT((f - reference).norm(), kForces * reference.norm()) << n << ": " << m << " × " << d;
+  }
+}
+
+TEST(LeastSquares, HeldPointsReachTheirTargets) {
+  std::mt19937 random(2);
+  LeastSquaresSolver solver;
+  for (const auto& [m, d, rank] : {std::array{3, 46, 3}, {30, 46, 30}, {46, 46, 46}, {90, 46, 20}, {300, 64, 64}}) {
+    const Rows rows = make_rows(m, d, rank, random);
+    const Eigen::VectorXd r = rows.J * random_vector(d, random);  // feasible
+    const Eigen::VectorXd f = solve(solver, rows, r);
+    EXPECT_LT((rows.S() * f - r).norm(), kHeld * r.norm()) << m << " rows of rank " << rank;
+  }
+}
+
+TEST(LeastSquares, ConflictsAreMetInTheLeastSquaresSense) {
+  std::mt19937 random(3);
+  LeastSquaresSolver solver;
+  const Rows rows = make_rows(40, 12, 12, random);
+  const Eigen::VectorXd r = random_vector(40, random);
+  const Eigen::VectorXd f = solve(solver, rows, r);
+  const Eigen::VectorXd miss = r - rows.S() * f;
+  EXPECT_GT(miss.norm(), 0.1);
+  EXPECT_LT((rows.J.transpose() * miss).norm(), kHeld * rows.J.norm() * r.norm());  // no motion comes closer
+}
+
+TEST(LeastSquares, RedundantRowsShareTheForce) {
+  LeastSquaresSolver solver;
+  const Rows rows{.J = Matrix::Ones(5, 1), .metric = Eigen::VectorXd::Constant(1, 2.0)};
+  const Eigen::VectorXd f = solve(solver, rows, Eigen::VectorXd::Constant(5, 1.0));
+  for (const double x : f) EXPECT_NEAR(x, 0.1, kHeld);  // (2·11ᵀ) f = 1
+  const auto result = solver.factor(span_of(rows.J), span_of(rows.metric), 5);
+  EXPECT_EQ(result.rank, 1);
+}
+
+TEST(LeastSquares, RidgeIsComplianceOnTheDiagonal) {
+  std::mt19937 random(4);
+  LeastSquaresSolver solver;
+  for (const auto& [m, d] : {std::pair{8, 20}, {30, 12}}) {
+    const Rows rows = make_rows(m, d, m, random);
+    const Eigen::VectorXd r = random_vector(m, random);
+    const double ridge = 0.3;
+    const Eigen::VectorXd f = solve(solver, rows, r, {.ridge = ridge});
+    const Eigen::VectorXd reference =
+        (Eigen::MatrixXd(rows.S()) + ridge * Eigen::MatrixXd::Identity(m, m)).ldlt().solve(r);
+    EXPECT_LT((f - reference).norm(), kHeld * reference.norm()) << m;
+  }
+}
+
+TEST(LeastSquares, RowsThatNothingMovesAreLeftAlone) {
+  LeastSquaresSolver solver;
+  const Rows rows{.J = Matrix::Zero(3, 4), .metric = Eigen::VectorXd::Ones(4)};
+  EXPECT_EQ(solve(solver, rows, Eigen::VectorXd::Ones(3)).norm(), 0.0);
+  const Rows none{.J = Matrix(3, 0), .metric = Eigen::VectorXd(0)};
+  EXPECT_EQ(solve(solver, none, Eigen::VectorXd::Ones(3)).norm(), 0.0);
+}
+
+TEST(LeastSquares, NumbersThatAreNotFiniteAreAResultNotAnException) {
+  LeastSquaresSolver solver;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> J = {nan}, one = {1.0}, bad = {nan}, negative = {-1.0};
+  std::vector<double> f = {3.0};
+  EXPECT_EQ(solver.factor(J, one, 1).status, SolveStatus::kInvalidInput);
+  EXPECT_EQ(solver.solve(one, f), SolveStatus::kInvalidInput);
+  EXPECT_EQ(f[0], 0.0);
+  EXPECT_EQ(solver.factor(one, negative, 1).status, SolveStatus::kInvalidInput);
+  EXPECT_EQ(solver.factor(one, one, 1).status, SolveStatus::kSolved);
+  EXPECT_EQ(solver.solve(bad, f), SolveStatus::kInvalidInput);
+  EXPECT_THROW(solver.factor(one, one, 2), InvalidArgument);
+}
+
+TEST(LeastSquares, SameBitsEveryTimeAndNoAllocationOnceWarm) {
+  std::mt19937 random(5);
+  LeastSquaresSolver solver, other;
+  const Rows large = make_rows(120, 40, 30, random), small = make_rows(12, 40, 12, random);
+  const Eigen::VectorXd r = random_vector(12, random), r_large = random_vector(120, random);
+  const Eigen::VectorXd f = solve(solver, small, r);
+  Eigen::VectorXd f_large = solve(other, large, r_large);
+  EXPECT_EQ(solve(other, small, r), f);
+  const long before = testing::allocations();
+  other.factor(span_of(large.J), span_of(large.metric), 120);
+  other.solve(span_of(r_large), span_of(f_large));
+  EXPECT_EQ(testing::allocations(), before);
+}
+
+/// Rows of joints (some twice, as in a closed loop) and contacts over one set of motions.
+struct Eliminated {
+  Matrix A;
+  Eigen::VectorXd b;
+  int equalities = 0;
+};
+
+Eliminated make_loop(int equalities, int contacts, int d, int redundant, std::mt19937& random) {
+  const Rows rows = make_rows(equalities + contacts, d, equalities + contacts, random);
+  Matrix J = rows.J;
+  for (int i = 0; i < redundant; ++i) J.row(equalities - 1 - i) = J.row(i) + J.row(i + 1);
+  J.topRows(equalities / 2) *= 1e-3;  // rows in other units
+  const Matrix A = J * J.transpose();
+  return {.A = 0.5 * (A + A.transpose()), .b = J * random_vector(d, random), .equalities = equalities};
+}
+
+TEST(EqualityElimination, ReducedProblemIsTheWholeOneWithJointsHeld) {
+  std::mt19937 random(6);
+  EqualityElimination elimination;
+  for (const int redundant : {0, 1, 3}) {
+    const Eliminated s = make_loop(9, 7, 30, redundant, random);
+    const auto e = s.equalities, c = static_cast<int>(s.b.size()) - e;
+    Matrix A(c, c);
+    Eigen::VectorXd b(c), f(s.b.size()), f_e(e);
+    const auto result =
+        elimination.reduce(span_of(s.A), span_of(s.b), e, {A.data(), static_cast<std::size_t>(A.size())}, span_of(b));
+    EXPECT_EQ(result.rank, e - redundant);
+    const Eigen::VectorXd f_c = random_vector(c, random);
+    elimination.recover(span_of(f_c), span_of(f_e));
+    f << f_e, f_c;
+    const Eigen::VectorXd w = s.A * f + s.b;
+    const double size = s.b.norm() + s.A.norm() * f_c.norm();
+    EXPECT_LT(w.head(e).norm(), kForces * size) << redundant;
+    EXPECT_LT((w.tail(c) - (A * f_c + b)).norm(), kForces * size) << redundant;
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(A).eigenvalues()[0], -kHeld * s.A.norm());
+  }
+}
+
+TEST(EqualityElimination, WithoutJointsNothingChanges) {
+  std::mt19937 random(7);
+  EqualityElimination elimination;
+  const Eliminated s = make_loop(0, 5, 10, 0, random);
+  Matrix A(5, 5);
+  Eigen::VectorXd b(5);
+  elimination.reduce(span_of(s.A), span_of(s.b), 0, {A.data(), 25}, span_of(b));
+  EXPECT_EQ(A, s.A);
+  EXPECT_EQ(b, s.b);
+}
+
+TEST(EqualityElimination, DoesNotAllocateOnceWarm) {
+  std::mt19937 random(8);
+  EqualityElimination elimination;
+  const Eliminated s = make_loop(12, 8, 30, 2, random);
+  Matrix A(8, 8);
+  Eigen::VectorXd b(8), f_e(12);
+  const auto run = [&] {
+    elimination.reduce(span_of(s.A), span_of(s.b), 12, {A.data(), 64}, span_of(b));
+    elimination.recover(span_of(b), span_of(f_e));
+  };
+  run();
+  const long before = testing::allocations();
+  run();
+  EXPECT_EQ(testing::allocations(), before);
+}
+
+}  // namespace
+}  // namespace limber
