@@ -11,18 +11,16 @@ constexpr double kCut = 1e-10;
 
 }  // namespace
 
-void ResidualFactor::set(const IslandBodies& bodies, std::span<const ConstraintRows::Flexibility> flexibility,
-                         std::span<const Index> place, std::size_t rows, double step) {
+void ResidualFactor::set(const IslandBodies& bodies, const ConstraintRows& rows, double step) {
   const auto count = static_cast<std::size_t>(bodies.count());
   if (bodies_.size() < count) bodies_.resize(count), pairs_.resize(count);
   for (std::size_t b = 0; b < count; ++b) bodies_[b].rows.clear(), bodies_[b].rank = 0, pairs_[b].clear();
-  own_.assign(rows, {});
-  for (const ConstraintRows::Flexibility& g : flexibility) {
-    const Index i = place[static_cast<std::size_t>(g.i)], j = place[static_cast<std::size_t>(g.j)];
-    if (g.body < 0 || i < 0 || j < 0) continue;
+  own_.assign(static_cast<std::size_t>(rows.size()), {});
+  for (const ConstraintRows::Flexibility& g : rows.flexibility()) {
+    if (g.body < 0) continue;
     const Index local = bodies.local(g.body);
     const auto number = [&](Index at) { return static_cast<Index>(number_in(local, static_cast<std::size_t>(at))); };
-    pairs_[static_cast<std::size_t>(local)].push_back({number(i), number(j), g.value / step, g.body});
+    pairs_[static_cast<std::size_t>(local)].push_back({number(g.i), number(g.j), g.value / step, g.body});
   }
   for (std::size_t b = 0; b < count; ++b)
     if (!pairs_[b].empty()) factor(bodies_[b], pairs_[b]);

@@ -13,11 +13,8 @@ namespace limber {
 
 class ResidualFactor {
  public:
-  /// Memory grows to the largest island seen.
-  /// @param flexibility of all rows, those of a body alone are read
-  /// @param place of a row among those that take part; −1: it does not. @param rows how many do
-  void set(const IslandBodies& bodies, std::span<const ConstraintRows::Flexibility> flexibility,
-           std::span<const Index> place, std::size_t rows, double step);
+  /// Memory grows to the largest island seen. Of the rows' flexibility, that of bodies alone is read.
+  void set(const IslandBodies& bodies, const ConstraintRows& rows, double step);
   /// Columns of a body's factor.
   std::size_t rank(Index local) const { return bodies_[static_cast<std::size_t>(local)].rank; }
   /// A row's numbers in them; none where the body does not yield to the row.
@@ -25,7 +22,7 @@ class ResidualFactor {
 
  private:
   struct Body {
-    std::vector<std::size_t> rows;  // their places
+    std::vector<std::size_t> rows;  // of the island
     std::vector<double> values;     // row by row, `rank` each
     std::size_t rank = 0;
   };
@@ -38,7 +35,7 @@ class ResidualFactor {
   void factor(Body& body, std::span<const ConstraintRows::Flexibility> pairs);
 
   std::vector<Body> bodies_;
-  std::vector<std::array<Own, 2>> own_;                          // by place: a row has two sides
+  std::vector<std::array<Own, 2>> own_;                          // by row, which has two sides
   std::vector<std::vector<ConstraintRows::Flexibility>> pairs_;  // by body, rows by number
   internal::MatrixBuffer matrix_;
   internal::PivotedCholesky cholesky_;

@@ -220,7 +220,7 @@ IslandReport ConstraintStage::report() const {
     if (r.status != SolveStatus::kSolved) sum.status = r.status;
     sum.bodies += r.bodies;
     sum.rows += r.rows;
-    sum.cuts += r.cuts;
+    sum.attempts.add(r.attempts);
     sum.programs.add(r.programs);
     sum.iterations = std::max(sum.iterations, r.iterations);
     sum.newton_steps = std::max(sum.newton_steps, r.newton_steps);

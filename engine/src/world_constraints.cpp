@@ -97,7 +97,7 @@ ConstraintReport World::constraint_report() const {
           .iterations = impl_->iterations,
           .newton_steps = impl_->newton_steps,
           .programs = impl_->programs,
-          .cuts = impl_->cuts,
+          .attempts = impl_->attempts,
           .solved = impl_->solved,
           .energy_removed = impl_->energy_removed};
 }

@@ -77,7 +77,8 @@ struct World::Impl {
   std::vector<std::vector<DentLoad>> loads_before;  // what dented each entry before the last step
   double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
-  int iterations = 0, newton_steps = 0, cuts = 0;
+  int iterations = 0, newton_steps = 0;
+  StepAttempts attempts;
   ProgramReport programs;
   std::vector<ExactMotion> motions;
   std::size_t alive = 0;

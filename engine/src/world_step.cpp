@@ -7,7 +7,8 @@ namespace limber {
 
 void World::step() {
   Impl& m = *impl_;
-  m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = m.cuts = 0;
+  m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = 0;
+  m.attempts = {};
   m.programs = {};
   m.keep_dents();
   for (int part = 0; part < m.parts->count(); ++part) {
@@ -17,7 +18,7 @@ void World::step() {
     m.solved = m.solved && report.status == SolveStatus::kSolved;
     m.iterations = std::max(m.iterations, report.iterations);
     m.newton_steps = std::max(m.newton_steps, report.newton_steps);
-    m.cuts += report.cuts;
+    m.attempts.add(report.attempts);
     m.programs.add(report.programs);
   }
   m.parts->finish();

@@ -126,7 +126,7 @@ TEST(Impact, AlongTheGroundACutStepIsAsAWholeOne) {
     ExactMotion free;
     scene.group.predict_motion(0, {0.0, 0.0, -kGravity}, free);
     const IslandReport report = scene.step();
-    EXPECT_EQ(report.cuts > 0, struck);
+    EXPECT_EQ(report.attempts.cuts() > 0, struck);
     MotionState end;
     free.evaluate(kStep, end);
     // What touches gets held forces at its part's start, and so their way of half a part too much.

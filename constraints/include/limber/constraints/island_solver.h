@@ -33,6 +33,7 @@
 
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
+#include "limber/constraints/step_attempts.h"
 #include "limber/solvers/solve_status.h"
 
 namespace limber {
@@ -54,8 +55,7 @@ struct IslandOptions {
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
-  /// Of the step, where impacts began or ended (ImpactModel::kHeldFromTouch), or joints did not come together.
-  int cuts = 0;
+  StepAttempts attempts{};
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most

@@ -32,6 +32,7 @@
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/joint_constraint.h"
+#include "limber/constraints/step_attempts.h"
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
 #include "limber/dynamics/body_energy.h"
@@ -135,7 +136,7 @@ struct ConstraintReport {
   int iterations = 0;           ///< the most that an island needed
   int newton_steps = 0;         ///< the same, of the contacts with friction: bounded (island_solver.h)
   ProgramReport programs{};     ///< linear programs of the contact rule
-  int cuts = 0;                 ///< of islands' steps, where bodies struck or let go, or joints did not meet
+  StepAttempts attempts{};      ///< how many islands' steps, or parts of them, were cut or tried in another way
   bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
   double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)
 };

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace limber {
+#include "island_work.h"
+
+namespace limber::internal {
 namespace {
 
 // Energy is given back, and where little of it is too much is taken, at most at this part of the relative kinetic
@@ -47,13 +49,29 @@ RelativeMotion relative_motion(const BodyGroup& group, Index slot, StepTime when
           0.5 * c.mass * velocity.squaredNorm() + 0.5 * omega.dot(angular_momentum)};
 }
 
+/// Of a row, all in all: in the step, at a touch before it, and at its end.
+double whole_impulse(const IslandStep& step, std::size_t row) {
+  return step.f[row] + step.length() * (step.reaction[row] + step.end_reaction[row]) + step.touch_impulse[row];
+}
+
+/// Whether nothing holds the island. Rows that exert nothing hold nothing.
+bool is_free(const IslandStep& step) {
+  for (Index local = 0; local < step.bodies.count(); ++local)
+    if (step.bodies.response(local).translations == 0) return false;
+  for (std::size_t i = 0; i < step.size(); ++i)
+    for (const ConstraintRows::Side& side : step.rows.row(static_cast<Index>(i)).sides)
+      if (side.body < 0 && whole_impulse(step, i) != 0.0) return false;
+  return true;
+}
+
 }  // namespace
 
-void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
+void IslandEnergy::begin(const IslandStep& step) {
+  const Vec3& gravity = step.part.options.gravity;
   before_ = scale_ = recovery_ = 0.0;
   driven_ = false;
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const BodyEnergy energy = group->energy(slot, gravity);
     before_ += energy.total();
@@ -64,19 +82,27 @@ void IslandEnergy::begin(const IslandBodies& bodies, const Vec3& gravity) {
   }
 }
 
-IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const ConstraintRows& rows,
-                                         std::span<const double> impulses, double agent_work, bool give_back,
-                                         const IslandOptions& options) {
+double IslandEnergy::close(const IslandStep& step, IslandReport& report) {
+  const double slowed = step.part.slowed;
+  const bool settled = report.status == SolveStatus::kSolved;
+  const bool give_back = step.part.options.undisturbed && settled && slowed == 0.0 && is_workless(step);
+  const Change done = guard(step, give_back);
+  report.energy_removed = done.removed + (slowed > 0.0 ? start_energy_ * slowed * (2.0 - slowed) : 0.0);
+  report.energy_surplus = done.surplus;
+  return done.left;
+}
+
+IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back) {
   if (driven_) return {};
   double after = 0.0, damped = 0.0;
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
-    after += group->predicted_energy(slot, options.gravity).total();
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
+    after += group->predicted_energy(slot, step.part.options.gravity).total();
     damped += group->predicted_dissipation(slot);
     if (carried(*group, slot)) return {};
   }
-  const double work = agent_work + load_work(bodies, options.step);
-  const double gain = after - before_ - work + options.energy_surplus;
+  const double work = agent_work(step) + load_work(step);
+  const double gain = after - before_ - work + step.part.options.energy_surplus;
   // Of what there was, never of what came out: that may be any number where the rows did not come together.
   const double at_hand = scale_ + std::max(0.0, work);
   const double patience = kPatience * (at_hand > 0.0 ? at_hand : recovery_);
@@ -84,42 +110,18 @@ IslandEnergy::Change IslandEnergy::guard(const IslandBodies& bodies, const Const
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
   if (excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
-  const CommonMotion common = is_free(bodies, rows, impulses) ? common_motion(bodies, StepTime::kEnd) : CommonMotion{};
-  const double removed = remove_relative_energy(bodies, common, excess, excess < patience ? kLargestChange : 1.0);
+  const CommonMotion common = common_motion(step, StepTime::kEnd);
+  const double removed = remove_relative_energy(step.bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
 }
 
-/// Work of the forces that the caller holds over the step.
-double IslandEnergy::load_work(const IslandBodies& bodies, double step) {
-  double work = 0.0;
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
-    const FrameConstants& c = group->frame_constants();
-    const RigidFrame &start = group->frame(slot), &end = group->predicted_frame(slot);
-    work += group->held_force(slot).dot(end.pose().p - start.pose().p) +
-            0.5 * step * group->held_torque(slot).dot(start.angular_velocity(c) + end.angular_velocity(c));
-    const std::span<const double> g = group->held_modal_forces(slot), z0 = group->amplitudes(slot),
-                                  z1 = group->predicted_amplitudes(slot);
-    for (std::size_t i = 0; i < g.size(); ++i) work += g[i] * (z1[i] - z0[i]);
-  }
-  return work;
-}
-
-bool IslandEnergy::is_free(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> impulses) {
-  for (Index local = 0; local < bodies.count(); ++local)
-    if (bodies.response(local).translations == 0) return false;
-  for (Index i = 0; i < rows.size(); ++i)
-    for (const ConstraintRows::Side& side : rows.row(i).sides)
-      if (side.body < 0 && impulses[static_cast<std::size_t>(i)] != 0.0) return false;
-  return true;
-}
-
-CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies, StepTime when) {
+CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) const {
+  if (!is_free(step)) return {};
   double mass = 0.0;
   Vec3 first = Vec3::Zero(), momentum = Vec3::Zero();
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     mass += c.mass;
     first += c.mass * center_at(*group, slot, when);
@@ -128,8 +130,8 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies, StepTime wh
   CommonMotion common{.center = first / mass, .velocity = momentum / mass};
   Mat3 inertia = Mat3::Zero();
   Vec3 angular_momentum = Vec3::Zero();
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     const RigidFrame& frame = frame_at(*group, slot, when);
     const Mat3 R = to_matrix(frame.pose().q);
@@ -141,16 +143,26 @@ CommonMotion IslandEnergy::common_motion(const IslandBodies& bodies, StepTime wh
   return common;
 }
 
-double IslandEnergy::start_motion(const IslandBodies& bodies, const ConstraintRows& rows,
-                                  std::span<const double> impulses, std::vector<FrameMomentum>& momenta) {
-  const CommonMotion common =
-      is_free(bodies, rows, impulses) ? common_motion(bodies, StepTime::kStart) : CommonMotion{};
+bool IslandEnergy::slow_start(const IslandStep& step, double left, StepPart& next) {
+  constexpr double kMore = 1.5;    // of what is left is taken, as the motion taken would not have gone all into height
+  constexpr double kLeast = 0.01;  // of the energy: what is slower may as well rest
+  if (next.slowed == 0.0) start_energy_ = start_motion(step);
+  if (next.slowed == 1.0 || !(start_energy_ > 0.0)) return false;
+  const double moving = (1.0 - next.slowed) * (1.0 - next.slowed) - kMore * left / start_energy_;
+  next.slowed = moving > kLeast ? 1.0 - std::sqrt(moving) : 1.0;
+  next.relative = momenta_;
+  return true;
+}
+
+/// What the frames have beside the common motion at the step's start, to momenta_. @return its energy, J
+double IslandEnergy::start_motion(const IslandStep& step) {
+  const CommonMotion common = common_motion(step, StepTime::kStart);
   double energy = 0.0;
-  momenta.clear();
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
+  momenta_.clear();
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
     const RelativeMotion r = relative_motion(*group, slot, StepTime::kStart, common);
-    momenta.push_back({r.momentum, r.angular_momentum});
+    momenta_.push_back({r.momentum, r.angular_momentum});
     energy += r.energy;
   }
   return energy;
@@ -180,4 +192,4 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   return excess;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

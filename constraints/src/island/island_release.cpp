@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <numbers>
 
-#include "island_step.h"
+#include "island_impl.h"
 
 namespace limber {
 namespace {
+
+using internal::StepPart;
 
 /// A part that settles, and soon: it may be done ten times more.
 bool is_quick(const IslandReport& done) {
@@ -21,58 +23,64 @@ bool is_quick(const IslandReport& done) {
 /// where they let go. The exact wave in a bar has I = F s up to the release at T, F (2T − s) after it in steps that
 /// began before, and F s²/(3s − 2T) in one that begins with the impact. It grows again later, after 4T/3 there: parts
 /// are no longer than impacts may be.
-void IslandSolver::Impl::end_at_release(Part& part, IslandOptions& options, double whole_step, IslandReport& done) {
+void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
   const double latest = longest_impact();
-  if (latest == 0.0 || theta == 1.0 || holds_contact_forces()) return;
-  if (is_part(latest, options.step, whole_step)) {
-    options.step = latest;
+  if (latest == 0.0 || step.theta == 1.0 || step.holds_contact_forces()) return;
+  const auto end_at = [&](double time) {
+    part.options.step = time;
     part.ends = false;
-    done = foresee_guarded(part, options, whole_step);
+    done.attempts[StepAttempt::kCutAtTouch] = 0;
+    done.attempts[StepAttempt::kCutAtRelease] = 1;
+  };
+  const auto again = [&] {
+    const StepAttempts cut = done.attempts;
+    done = foresee_guarded(part);
+    done.attempts.add(cut);
+  };
+  if (is_part(latest, part.options.step, part.whole_step)) {
+    end_at(latest);
+    again();
   }
-  if (!is_quick(done) || !may_let_go(options.step)) return;
-  const double length = options.step, release = find_release(part, options, whole_step);
-  if (is_part(release, length, whole_step)) {
-    options.step = release;
-    part.ends = false;
-  }
-  done = foresee_guarded(part, options, whole_step);
+  if (!is_quick(done) || !may_let_go(part.options.step)) return;
+  const double length = part.options.step, release = find_release(part);
+  if (is_part(release, length, part.whole_step)) end_at(release);
+  again();
 }
 
 /// By when those have let go that are to be cut there, s; 0: there are none.
 double IslandSolver::Impl::longest_impact() const {
   double longest = 0.0;
-  for (const RowLaw& law : laws) longest = std::max(longest, law.lets_go_within);
+  for (std::size_t i = 0; i < step.size(); ++i) longest = std::max(longest, step.law(i).lets_go_within);
   return longest;
 }
 
 /// What presses harder than before does not let go.
 bool IslandSolver::Impl::may_let_go(double length) const {
   double before = 0.0;
-  for (const RowLaw& law : laws)
-    if (law.lets_go_within > 0.0) before += law.last_force;
+  for (std::size_t i = 0; i < step.size(); ++i)
+    if (step.law(i).lets_go_within > 0.0) before += step.law(i).last_force;
   return before == 0.0 || impact_impulse(length) < length * before;
 }
 
 /// Of all impacts of the island, along their normals.
 double IslandSolver::Impl::impact_impulse(double length) const {
   double sum = 0.0;
-  for (std::size_t i = 0; i < laws.size(); ++i)
-    if (laws[i].lets_go_within > 0.0) sum += f[i] + length * reaction[i];
+  for (std::size_t i = 0; i < step.size(); ++i)
+    if (step.law(i).lets_go_within > 0.0) sum += step.f[i] + length * step.reaction[i];
   return sum;
 }
 
 /// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there.
-double IslandSolver::Impl::find_release(const Part& part, IslandOptions options, double whole_step) {
+double IslandSolver::Impl::find_release(StepPart part) {
   constexpr int kTrials = 8;  // places the release to a thirtieth of the part; what is left of it may be cut again
   constexpr double kAlmost = 0.98;      // of the part
   constexpr double kNoticeable = 1e-6;  // of the impulse
-  const double length = options.step, golden = 1.0 / std::numbers::phi, whole = impact_impulse(length);
+  const double length = part.options.step, golden = 1.0 / std::numbers::phi, whole = impact_impulse(length);
   bool quick = true;
   const auto impulse_until = [&](double end) {
     if (!quick) return 0.0;
-    options.step = end;
-    slowed = 0.0, recovers = true;
-    quick = is_quick(foresee(part, options, whole_step));
+    part.options.step = end;
+    quick = is_quick(foresee(part));
     return impact_impulse(end);
   };
   if (whole > 0.0 && impulse_until(kAlmost * length) < (1.0 + kNoticeable) * whole) return length;

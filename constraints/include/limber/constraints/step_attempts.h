@@ -1,0 +1,37 @@
+/// @file limber/constraints/step_attempts.h
+/// In which ways a step of an island may be taken, and how often each was (island_solver.h).
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace limber {
+
+/// What is tried where a step cannot be taken as it is; each has a cost and a cause.
+enum class StepAttempt {
+  kCutAtTouch,       ///< where bodies strike (ImpactModel::kHeldFromTouch)
+  kCutAtRelease,     ///< where an impact lets go
+  kDivided,          ///< into halves, down to 64ths: joints did not come together
+  kWithoutRecovery,  ///< overlapping bodies were not pushed apart: it would have thrown them
+  kSlowed,           ///< relative motion was taken at its start: a swing would have ended too high
+  kYielding,         ///< contacts exerted a 1e-4th less or so
+  kRefused,          ///< parts of all impulses were given up: the step is unsettled
+};
+/// How many parts of steps were taken so.
+class StepAttempts {
+ public:
+  int& operator[](StepAttempt a) { return counts_[static_cast<std::size_t>(a)]; }
+  int operator[](StepAttempt a) const { return counts_[static_cast<std::size_t>(a)]; }
+  /// Of the step.
+  int cuts() const {
+    return (*this)[StepAttempt::kCutAtTouch] + (*this)[StepAttempt::kCutAtRelease] + (*this)[StepAttempt::kDivided];
+  }
+  void add(const StepAttempts& other) {
+    for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] += other.counts_[i];
+  }
+
+ private:
+  std::array<int, 7> counts_{};
+};
+
+}  // namespace limber

@@ -1,0 +1,321 @@
+#include "convex_rounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace limber::internal {
+namespace {
+
+// Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
+// least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
+constexpr double kYield = 1e-3, kStiffest = 1e-6;
+// How far from the law impulses may be: by what would move their own gap by so many tolerances.
+constexpr double kFarthest = 30.0;
+// Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
+// end: a few milliseconds.
+constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
+
+ContactPotential potential_of(const RowLaw& law) {
+  using Set = ContactPotential::Set;
+  if (law.radius > 0.0) return {.set = Set::kBall, .bound = law.radius};
+  if (law.friction > 0.0) return {.set = Set::kCone, .bound = law.friction};
+  return {.set = Set::kInterval, .lower = law.lower, .upper = law.upper};
+}
+
+}  // namespace
+
+/// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
+/// meet the rows' law at the true gaps: the method of multipliers, in which a row's spring yields from what it exerted.
+SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
+  place_units(step);
+  fill_units(step);
+  begin_units(step);
+  secants_.begin(step.size());
+  ConvexContactReport done;
+  bool more = true;
+  for (report.iterations = 1;; ++report.iterations) {
+    take_impulses(step);
+    step.predict();
+    const Distance left = find_starts(step, report.iterations == 1);
+    report.change = left.from_law;
+    // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
+    if (!more && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return SolveStatus::kSolved;
+    const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
+    if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
+    const ConvexContactOptions within{.max_iterations = kMostNewtonSteps - report.newton_steps};
+    done = report.iterations == 1 ? contacts_.solve(within) : contacts_.solve_on(within);
+    report.newton_steps += done.iterations;
+    if (done.status != SolveStatus::kSolved) break;
+    stiffen(step);
+    more = press_early(step);
+    if (more) secants_.begin(step.size());
+    advance_units(step);
+  }
+  return end_unsettled(done.status, step, report);
+}
+
+/// Where rounds end before the rows' law is met: contacts alone stay as the last round left them. What Newton's method
+/// left unsolved in the first of them is the motion that it found.
+SolveStatus ConvexRounds::end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report) {
+  if (!step.contacts_alone) return take_best(step, report);
+  if (report.iterations > 1) return SolveStatus::kSolved;
+  for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = contacts_.impulse(u);
+  take_impulses(step);
+  take_motion(step);
+  return last;
+}
+
+SolveStatus ConvexRounds::take_best(IslandStep& step, IslandReport& report) {
+  if (!(report.change <= secants_.best())) {
+    report.change = secants_.best();
+    take_whole(secants_.best_iterate());
+    take_impulses(step);
+    step.predict();
+  }
+  return SolveStatus::kIterationLimit;
+}
+
+/// Each contact a unit of its rows; what a body yields beyond its modes are further degrees of freedom of unit weight.
+void ConvexRounds::place_units(const IslandStep& step) {
+  const IslandBodies& bodies = step.bodies;
+  residual_.set(bodies, step.rows, step.length());
+  contacts_.begin_structure();
+  nodes_.clear(), units_.clear();
+  for (Index local = 0; local < bodies.count(); ++local)
+    nodes_.push_back(
+        contacts_.add_node(static_cast<std::size_t>(bodies.response(local).size()) + residual_.rank(local)));
+  for (std::size_t i = 0, count = 1; i < step.size(); i += count) {
+    count = static_cast<std::size_t>(contact_rows(step.law(i)));
+    contacts_.add_unit(count, potential_of(step.law(i)));
+    units_.push_back({.first = i, .rows = count});
+    step.for_bodies(i, [&](const ConstraintRows::Side&, Index local, bool again) {
+      if (!again) contacts_.add_side(nodes_[static_cast<std::size_t>(local)]);
+    });
+  }
+  contacts_.end_structure();
+}
+
+/// J D^½, and what rows yield at first, before the columns of what the bodies do.
+void ConvexRounds::fill_units(const IslandStep& step) {
+  const IslandBodies& bodies = step.bodies;
+  root_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
+  bodies.write_position_metric(step.length(), step.theta, root_);
+  for (double& weight : root_) weight = std::sqrt(weight);
+  fill_values(step, [&](const ConstraintRows::Side& side, Index local, std::size_t, double* to) {
+    const BodyResponse& r = bodies.response(local);
+    one_row_.assign(static_cast<std::size_t>(r.size()), 0.0);
+    r.add_row(side.linear, side.angular, step.rows.modal(side), one_row_.data());
+    const double* root = root_.data() + bodies.first(local);
+    for (std::size_t k = 0; k < one_row_.size(); ++k) to[k] += one_row_[k] * root[k];
+  });
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const RowLaw& law = step.law(units_[u].first);
+    const Vec3 response = contacts_.response(u);
+    const double moved = law.radius > 0.0 ? response.mean() : response[0];
+    units_[u].response = moved;
+    contacts_.potential(u).compliance =
+        law.compliance > 0.0 ? law.compliance
+                             : std::max((law.contact ? kYield : kStiffest) * moved, std::numeric_limits<double>::min());
+  }
+  fill_values(step, [&](const ConstraintRows::Side&, Index local, std::size_t row, double* to) {
+    std::ranges::copy(residual_.row(local, row), to + bodies.response(local).size());
+  });
+}
+
+/// write(side, local, row, values) for each side of each row.
+template <class Write>
+void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
+  std::size_t next_side = 0, sides = 0;
+  for (const Unit& unit : units_) {
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      sides = 0;
+      step.for_bodies(unit.first + r, [&](const ConstraintRows::Side& side, Index local, bool again) {
+        sides += again ? 0 : 1;
+        write(side, local, unit.first + r, contacts_.values(next_side + sides - 1).row(r));
+      });
+    }
+    next_side += sides;
+  }
+}
+
+/// From the motion without contacts; springs begin at the impulses of the last step.
+void ConvexRounds::begin_units(const IslandStep& step) {
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Unit& unit = units_[u];
+    const RowLaw& law = step.law(unit.first);
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto axis = static_cast<int>(r);
+      unit.impulse[axis] = step.length() * step.reaction[unit.first + r];
+      unit.anchor[axis] = law.contact ? step.length() * step.law(unit.first + r).last_force : unit.impulse[axis];
+    }
+    unit.anchor = contacts_.potential(u).nearest(unit.anchor);
+    unit.shift = law.shift;
+    unit.dent = kUnbounded;
+  }
+}
+
+/// f of the units' impulses, and the motion that they make in the problem.
+void ConvexRounds::take_impulses(IslandStep& step) {
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const Unit& unit = units_[u];
+    contacts_.impulse(u) = unit.impulse;
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      step.f[unit.first + r] = unit.impulse[static_cast<int>(r)] - step.length() * step.reaction[unit.first + r];
+  }
+  contacts_.set_motion();
+}
+
+/// u⁰: the rows' true gaps at the end of the motion that is predicted, less what they ask for, what is linear in the
+/// impulses, and what the springs exert there already.
+/// @return how far the impulses are from the rows' law at those gaps, and gaps from those of the last round, by
+/// tolerance
+ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool first_round) {
+  if (first_round) find_scale(step);
+  Distance distance;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Unit& unit = units_[u];
+    const RowLaw& law = step.law(unit.first);
+    Vec3 open = Vec3::Zero();
+    for (std::size_t r = 0; r < unit.rows; ++r)
+      open[static_cast<int>(r)] =
+          step.gap[unit.first + r] - step.law(unit.first + r).offset + dent_of(step, unit.first + r);
+    distance.moved = first_round ? kUnbounded : std::max(distance.moved, (open - unit.end).norm() / law.tolerance);
+    unit.end = open;
+    if (law.friction > 0.0 && !first_round) unit.shift = law.friction * open.tail<2>().norm();
+    open[0] += unit.shift;
+    const ContactPotential& potential = contacts_.potential(u);
+    Vec3 yields = potential.compliance * unit.anchor;
+    if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
+    const Vec3 from_law = unit.response / kFarthest * (potential.at(open - yields).impulse - unit.impulse);
+    distance.from_law = std::max(distance.from_law, from_law.norm() / law.tolerance);
+    unit.moved = contacts_.moved(u);
+    contacts_.start(u) = open - yields - unit.moved;
+    if (first_round) contacts_.impulse(u) = unit.anchor;
+  }
+  return distance;
+}
+
+/// How the bodies move, by degree of freedom: what momenta are at hand.
+void ConvexRounds::find_scale(const IslandStep& step) {
+  const IslandBodies& bodies = step.bodies;
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const auto& [group, slot, pose] = bodies.body(local);
+    const BodyResponse& r = bodies.response(local);
+    const RigidTransform &start = group->frame(slot).pose(), &end = group->predicted_frame(slot).pose();
+    const Vec3 moved = end.p - start.p, turned = rotation_vector(end.q * start.q.conjugate());
+    const std::span<const double> z0 = group->amplitudes(slot), z1 = group->predicted_amplitudes(slot);
+    const std::span<double> y = contacts_.free_motion(nodes_[static_cast<std::size_t>(local)]);
+    std::size_t k = 0;
+    for (int i = 0; i < r.translations; ++i) y[k++] = moved[i];
+    for (int i = 0; i < r.rotations; ++i) y[k++] = r.axes.col(i).dot(turned);
+    for (std::size_t i = 0; i < z0.size(); ++i) y[k++] = z1[i] - z0[i];
+    const double* root = root_.data() + bodies.first(local);
+    for (std::size_t i = 0; i < k; ++i) y[i] = root[i] > 0.0 ? y[i] / root[i] : 0.0;
+  }
+}
+
+/// Springs become stiffer where they yielded by as much as in the round before.
+void ConvexRounds::stiffen(const IslandStep& step) {
+  constexpr double kSlow = 0.25, kStiffer = 0.1;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Unit& unit = units_[u];
+    const RowLaw& law = step.law(unit.first);
+    if (law.compliance > 0.0) continue;
+    double& c = contacts_.potential(u).compliance;
+    const double dent = c * (contacts_.impulse(u) - unit.anchor).norm();
+    if (dent > kSlow * unit.dent && dent > law.tolerance)
+      c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
+    unit.dent = dent;
+  }
+}
+
+/// The impulses of the next round: those found; beside joints with what secants tell of the rounds so far.
+void ConvexRounds::advance_units(const IslandStep& step) {
+  if (step.contacts_alone) {
+    for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = units_[u].anchor = contacts_.impulse(u);
+    return;
+  }
+  for (std::vector<double>* v : {&at_, &next_, &change_}) v->resize(step.size());
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const Unit& unit = units_[u];
+    const Vec3 moved = contacts_.moved(u) - unit.moved;
+    for (std::size_t r = 0; r < unit.rows; ++r) {
+      const auto axis = static_cast<int>(r);
+      at_[unit.first + r] = unit.impulse[axis];
+      next_[unit.first + r] = contacts_.impulse(u)[axis] - unit.impulse[axis];
+      change_[unit.first + r] = moved[axis] / step.law(unit.first).tolerance;
+    }
+  }
+  secants_.advance(at_, next_, change_);
+  take_whole(at_);
+}
+
+/// Whole impulses by row, those nearest that rows may exert.
+void ConvexRounds::take_whole(std::span<const double> impulses) {
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Vec3 whole = Vec3::Zero();
+    for (std::size_t r = 0; r < units_[u].rows; ++r) whole[static_cast<int>(r)] = impulses[units_[u].first + r];
+    units_[u].impulse = units_[u].anchor = contacts_.potential(u).nearest(whole);
+  }
+}
+
+/// Where something presses, gravity and held forces come to the frame at the step's start, as contacts do: what rests
+/// has no velocity then, and the work of all is that over one displacement. Bodies in flight fall exactly.
+/// @return whether there are more of them
+bool ConvexRounds::press_early(IslandStep& step) const {
+  std::vector<char>& early = step.loads.early;
+  bool more = false;
+  for (std::size_t u = 0; step.theta == 1.0 && u < units_.size(); ++u) {
+    if (!step.law(units_[u].first).contact || contacts_.impulse(u).isZero(0.0)) continue;
+    step.for_bodies(units_[u].first, [&](const ConstraintRows::Side&, Index local, bool) {
+      more = more || early[static_cast<std::size_t>(local)] == 0;
+      early[static_cast<std::size_t>(local)] = 1;
+    });
+  }
+  if (more && !step.contacts_alone && !step.loads.all_early) {
+    step.loads.all_early = true;
+    std::ranges::fill(early, 1);
+    std::ranges::fill(step.reaction, 0.0);
+  }
+  return more;
+}
+
+/// What the bodies yield beyond their modes, in a row's gap.
+double ConvexRounds::dent_of(const IslandStep& step, std::size_t row) {
+  double sum = 0.0;
+  step.for_bodies(row, [&](const ConstraintRows::Side&, Index local, bool) {
+    const std::span<const double> columns = residual_.row(local, row);
+    const std::span<const double> y = contacts_.motion(nodes_[static_cast<std::size_t>(local)]);
+    const auto own = static_cast<std::size_t>(step.bodies.response(local).size());
+    for (std::size_t k = 0; k < columns.size(); ++k) sum += columns[k] * y[own + k];
+  });
+  return sum;
+}
+
+/// The motion found in place of that under the impulses found, which are not yet in balance with it.
+void ConvexRounds::take_motion(IslandStep& step) {
+  const IslandBodies& bodies = step.bodies;
+  step.loads.clear(bodies);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const BodyResponse& r = bodies.response(local);
+    const std::span<const double> y = contacts_.motion(nodes_[static_cast<std::size_t>(local)]);
+    const double* weight = root_.data() + bodies.first(local);
+    ConstraintLoad& load = step.loads.frames[static_cast<std::size_t>(local)];
+    double* modal = step.loads.modal(local);
+    std::size_t k = 0;
+    for (int i = 0; i < r.translations; ++i, ++k) load.impulse[i] += step.theta * y[k] / weight[k];
+    for (int i = 0; i < r.rotations; ++i, ++k) load.moment += step.theta * y[k] / weight[k] * r.axes.col(i);
+    for (int i = 0; i < r.modes; ++i, ++k)
+      if (weight[k] > 0.0) modal[i] += y[k] / weight[k];
+  }
+  step.predict_under_loads();
+}
+
+void ConvexRounds::write_slip(const IslandStep& step, std::span<double> slip) const {
+  if (!step.takes_loads_early()) return;
+  for (const Unit& unit : units_)
+    if (step.law(unit.first).friction > 0.0 && unit.impulse[0] > 0.0) slip[unit.first] = unit.end.tail<2>().norm();
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,26 @@
+#include "equality_rows.h"
+
+#include <algorithm>
+
+namespace limber::internal {
+
+void EqualityRows::factor(const IslandStep& step, std::span<const double> J, std::span<const double> metric) {
+  const std::size_t m = step.size(), n = metric.size();
+  wide_metric_.assign(metric.begin(), metric.end());
+  for (std::size_t i = 0; i < m; ++i)
+    if (step.law(i).compliance > 0.0) wide_metric_.push_back(step.law(i).compliance);
+  const std::size_t width = wide_metric_.size();
+  if (width == n) {
+    least_squares_.factor(J, metric, static_cast<int>(m));
+    return;
+  }
+  wide_J_.assign(m * width, 0.0);
+  std::size_t soft = n;
+  for (std::size_t i = 0; i < m; ++i) {
+    std::copy_n(J.data() + i * n, n, wide_J_.data() + i * width);
+    if (step.law(i).compliance > 0.0) wide_J_[i * width + soft++] = 1.0;
+  }
+  least_squares_.factor(wide_J_, wide_metric_, static_cast<int>(m));
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,57 @@
+// A step of an island: the parts that it is taken in and the attempts at each.
+//
+//   island_solver.cpp   the step, its parts, and what is told when one has been taken
+//   island_attempts.cpp one part, and what is tried where its energy would rise
+//   island_release.cpp  where within a part an impact lets go
+#pragma once
+
+#include <vector>
+
+#include "convex_rounds.h"
+#include "held_reaction.h"
+#include "island_energy.h"
+#include "island_step.h"
+#include "row_newton.h"
+#include "touch_program.h"
+
+namespace limber {
+
+/// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
+inline bool is_part(double time, double left, double whole_step) {
+  constexpr double kShortest = 1e-3;
+  return time > kShortest * whole_step && left - time > kShortest * whole_step;
+}
+
+struct IslandSolver::Impl {
+  internal::IslandStep step;  // the part at hand
+  internal::HeldReaction reaction;
+  internal::TouchProgram touch;
+  internal::ConvexRounds rounds;
+  internal::RowNewton newton;
+  internal::IslandEnergy energy;
+  std::vector<ExactMotion> motions;    // of the members, where a step may be cut
+  std::vector<double> slip, impulses;  // by row
+  std::vector<double> full_f, full_reaction;
+
+  // The step in parts.
+  void take_cut(internal::StepPart part, IslandReport& report);
+  void take_divided(internal::StepPart part, IslandReport& report);
+  double next_cut(const internal::StepPart& part);
+  void commit(const internal::StepPart& part, const IslandReport& done, IslandReport& report);
+
+  // A part.
+  IslandReport foresee(const internal::StepPart& part);
+  IslandReport foresee_guarded(internal::StepPart part);
+  void act_at_end();
+  bool yield(IslandReport& report);
+  void refuse_impulses(IslandReport& report);
+
+  // Where it ends, if an impact lets go within it.
+  void end_at_release(internal::StepPart& part, IslandReport& done);
+  double longest_impact() const;
+  bool may_let_go(double length) const;
+  double impact_impulse(double length) const;
+  double find_release(internal::StepPart part);
+};
+
+}  // namespace limber

@@ -1,0 +1,164 @@
+#include "island_step.h"
+
+#include <algorithm>
+#include <numbers>
+
+namespace limber::internal {
+
+void IslandLoads::clear(const IslandBodies& bodies) {
+  frames.assign(static_cast<std::size_t>(bodies.count()), {});
+  modes.assign(static_cast<std::size_t>(bodies.degrees_of_freedom()), 0.0);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const BodyResponse& r = bodies.response(local);
+    frames[static_cast<std::size_t>(local)].modal = {modes.data() + bodies.first(local) + r.size() - r.modes,
+                                                     static_cast<std::size_t>(r.modes)};
+  }
+}
+
+void IslandLoads::add(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> values,
+                      double frame_scale, double modal_scale) {
+  for (Index i = 0; i < rows.size(); ++i) {
+    const double value = values[static_cast<std::size_t>(i)];
+    if (value == 0.0) continue;
+    for (const ConstraintRows::Side& side : rows.row(i).sides) {
+      const Index local = bodies.local(side.body);
+      if (local < 0) continue;
+      ConstraintLoad& load = frames[static_cast<std::size_t>(local)];
+      load.impulse += frame_scale * value * side.linear;
+      load.moment += frame_scale * value * side.angular;
+      const std::span<const double> shapes = rows.modal(side);
+      double* sum = modal(local);
+      for (std::size_t k = 0; k < shapes.size(); ++k) sum[k] += modal_scale * value * shapes[k];
+    }
+  }
+}
+
+void IslandStep::begin(const StepPart& of) {
+  part = of;
+  bodies.set(part.table, part.members);
+  rows.clear();
+  first_row.clear();
+  const BodyStates states(part.table);
+  for (Constraint* constraint : part.constraints) {
+    first_row.push_back(rows.size());
+    constraint->add_rows(states, StepTime::kStart, length(), rows);
+  }
+  first_row.push_back(rows.size());
+  if (!part.recovers) stop_recovery();
+  const auto m = static_cast<std::size_t>(rows.size());
+  start_gap.resize(m), gap.resize(m);
+  for (std::vector<double>* impulses : {&f, &reaction, &end_reaction, &touch_impulse}) impulses->assign(m, 0.0);
+  find_kind();
+  begin_early();
+  measure(StepTime::kStart, start_gap);
+  gap = start_gap;
+  set_modal_steps();
+}
+
+/// Overlap stays as it is. Where a part of one body is caught between two of another, contacts that push it either way
+/// would press without bound to come apart; that nothing comes closer they can all have, by standing still.
+void IslandStep::stop_recovery() {
+  for (Index i = 0; i < rows.size(); ++i) {
+    RowLaw& law = rows.row(i).law;
+    if (!law.contact) continue;
+    law.offset -= law.agent_displacement;
+    law.agent_displacement = 0.0;
+  }
+}
+
+bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
+  for (Index i = 0; i < rows.size(); ++i)
+    if (holds(rows.row(i).law)) return true;
+  return false;
+}
+
+/// Forces are truly held, θ = ½, while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
+void IslandStep::find_kind() {
+  contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
+  convex = rule().is_convex() && any_law([](const RowLaw& law) { return law.contact; });
+  theta = contacts_alone && any_law([](const RowLaw& law) { return law.strikes; }) ? 0.5 : 1.0;
+}
+
+/// Bodies that something pressed on in the last step.
+void IslandStep::begin_early() {
+  std::vector<char>& early = loads.early;
+  early.assign(static_cast<std::size_t>(bodies.count()), 0);
+  loads.all_early = false;
+  if (!convex || theta < 1.0) return;
+  for (std::size_t row = 0; row < size(); ++row)
+    if (law(row).contact && law(row).last_force != 0.0)
+      for_bodies(row,
+                 [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
+  loads.all_early = !contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; });
+  if (loads.all_early) std::ranges::fill(early, 1);
+}
+
+/// Makes the modes go through a part of a step, or through an impact, in which all of them move: those that answer
+/// statically would lose what they store, and no hand is there to whip them.
+void IslandStep::set_modal_steps() {
+  if (theta == 1.0 && length() == part.whole_step) return;
+  const auto count = static_cast<std::size_t>(bodies.count());
+  if (loads.steps.size() < count) loads.steps.resize(count);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ModalModelData& data = bodies.body(local).group->model().data();
+    loads.steps[static_cast<std::size_t>(local)].set(
+        data.eigenvalues, data.decays, length(), theta < 1.0 ? ModalStep::kNone : std::numbers::pi / part.whole_step);
+  }
+  bodies.set_modal_steps(std::span(loads.steps).first(count));
+}
+
+void IslandStep::measure(StepTime when, std::vector<double>& into) const {
+  const BodyStates states(part.table);
+  for (std::size_t i = 0; i < part.constraints.size(); ++i) {
+    const auto begin = static_cast<std::size_t>(first_row[i]), end = static_cast<std::size_t>(first_row[i + 1]);
+    part.constraints[i]->gaps(states, when, std::span(into).subspan(begin, end - begin));
+  }
+}
+
+void IslandStep::predict() {
+  loads.clear(bodies);
+  loads.add(bodies, rows, f, theta, 1.0);
+  loads.add(bodies, rows, reaction, 0.5 * length(), length());
+  for (std::size_t i = 0; part.slowed > 0.0 && i < loads.frames.size(); ++i) {
+    loads.frames[i].impulse -= part.slowed * part.relative[i].linear;
+    loads.frames[i].moment -= part.slowed * part.relative[i].angular;
+  }
+  predict_under_loads();
+}
+
+void IslandStep::predict_under_loads() {
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ConstrainedBody& body = bodies.body(local);
+    ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
+    Vec3 gravity = part.options.gravity;
+    if (loads.early[static_cast<std::size_t>(local)] != 0) {
+      const FrameConstants& c = body.group->frame_constants();
+      const Vec3 early = length() * c.mass * gravity, arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+      load.impulse += early + length() * body.group->held_force(body.slot);
+      load.moment += arm.cross(early);
+      gravity = -body.group->held_force(body.slot) / c.mass;
+    }
+    body.group->predict(body.slot, gravity, load, bodies.modal_step(local));
+  }
+  measure(StepTime::kEnd, gap);
+}
+
+void IslandStep::linearise_end() {
+  bodies.place(StepTime::kEnd);
+  end_rows.clear();
+  const BodyStates states(part.table);
+  for (Constraint* constraint : part.constraints) constraint->add_rows(states, StepTime::kEnd, length(), end_rows);
+}
+
+void IslandStep::load_end() {
+  loads.clear(bodies);
+  loads.add(bodies, end_rows, end_reaction, 0.5 * length(), 0.0);
+  if (theta < 1.0) loads.add(bodies, end_rows, f, 1.0 - theta, 0.0);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ConstrainedBody& body = bodies.body(local);
+    const ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
+    body.group->adjust_prediction(body.slot, load.impulse, load.moment, {});
+  }
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,121 @@
+// What all solvers of an island's step share: its bodies, its rows at the step's start and at its end, their impulses,
+// and the bodies' motion under these.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/constraints/island_solver.h"
+
+namespace limber::internal {
+
+inline bool is_equality(const RowLaw& law) {
+  return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded;
+}
+/// Rows of the contact whose normal row this is, or of the vector whose first row it is.
+inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
+
+/// The frame before the step, or as predicted for its end.
+inline const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
+  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
+}
+
+/// Of a body's frame, as its impulses are.
+struct FrameMomentum {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+};
+
+/// A step, or a part of one where it is cut.
+struct StepPart {
+  std::span<const ConstrainedBody> table;
+  std::span<const Index> members;
+  std::span<Constraint* const> constraints;
+  IslandOptions options;    ///< with the part's own length
+  double whole_step = 0.0;  ///< s
+  bool begins = true, ends = true;
+  bool recovers = true;                          ///< overlapping bodies are pushed apart
+  double slowed = 0.0;                           ///< the part of `relative` that is taken from the frames at the start
+  std::span<const FrameMomentum> relative = {};  ///< by member
+};
+
+/// What acts on the bodies of an island, in the form in which they are predicted.
+struct IslandLoads {
+  std::vector<ConstraintLoad> frames;  // by body; their modal parts are parts of:
+  std::vector<double> modes;           // by degree of freedom
+  std::vector<ModalStep> steps;        // how the modes go through the part, where not as their groups go through a step
+  std::vector<char> early;             // by body: whether it gets gravity and held forces at the part's start
+  bool all_early = false;
+
+  void clear(const IslandBodies& bodies);
+  /// @param values by row. @param frame_scale, modal_scale of them, what frames and modes get
+  void add(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> values, double frame_scale,
+           double modal_scale);
+  /// Numbers of a body's modes.
+  double* modal(Index local) {
+    return modes.data() + (frames[static_cast<std::size_t>(local)].modal.data() - modes.data());
+  }
+};
+
+struct IslandStep {
+  StepPart part;
+  IslandBodies bodies;
+  ConstraintRows rows, end_rows;  // linearised at the start, and at the predicted end
+  std::vector<Index> first_row;   // per constraint, and the end
+  bool convex = false;            // contacts are among the rows, by a rule for the convex problem
+  bool contacts_alone = false;    // among the rows
+  double theta = 1.0;             // the part of f that frames get at the start; the rest at the end
+  std::vector<double> start_gap, gap;
+  std::vector<double> f;                       // N·s, beside the reactions
+  std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
+  std::vector<double> touch_impulse;           // N·s, before the step
+  IslandLoads loads;
+
+  /// Linearises the rows. All impulses are zero.
+  void begin(const StepPart& of);
+  double length() const { return part.options.step; }
+  const ContactRule& rule() const { return part.options.contact; }
+  std::size_t size() const { return f.size(); }
+  const RowLaw& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
+  bool any_law(bool (*holds)(const RowLaw&)) const;
+
+  /// The bodies under θ f and the first half of the reaction at the start, their modes under all of both, held; and the
+  /// gaps there.
+  void predict();
+  /// Under the loads as they are.
+  void predict_under_loads();
+  /// Linearises the rows at the predicted end.
+  void linearise_end();
+  /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
+  void load_end();
+
+  /// Of joints, and of contacts by other rules than the convex one: what rows answer to held forces by themselves.
+  bool answers_to_loads() const { return !(convex && (contacts_alone || loads.all_early)); }
+  /// All loads and impulses come at the start; nothing is left for the end.
+  bool takes_loads_early() const { return !answers_to_loads() && theta == 1.0; }
+  /// Contacts get the forces that [H03]'s velocity program has found, and nothing else.
+  bool holds_contact_forces() const { return rule().method == ContactMethod::kVelocityProgram; }
+
+  /// act(side, local, again) for the bodies of a row; again: the one before was the same body.
+  template <class Action>
+  void for_bodies(std::size_t row, Action&& act) const;
+
+ private:
+  void stop_recovery();
+  void find_kind();
+  void begin_early();
+  void set_modal_steps();
+  void measure(StepTime when, std::vector<double>& into) const;
+};
+
+template <class Action>
+void IslandStep::for_bodies(std::size_t row, Action&& act) const {
+  Index last = -1;
+  for (const ConstraintRows::Side& side : rows.row(static_cast<Index>(row)).sides) {
+    const Index local = bodies.local(side.body);
+    if (local < 0) continue;
+    act(side, local, local == last);
+    last = local;
+  }
+}
+
+}  // namespace limber::internal

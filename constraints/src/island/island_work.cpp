@@ -1,0 +1,74 @@
+#include "island_work.h"
+
+#include <algorithm>
+
+namespace limber::internal {
+namespace {
+
+/// What it takes to lift all bodies of the island by a distance within a step. Rows that push overlapping bodies apart
+/// may do no more, however hard they press against each other.
+double largest_recovery_work(const IslandStep& step, double distance) {
+  const double speed = distance / step.length();
+  double work = 0.0;
+  for (Index local = 0; local < step.bodies.count(); ++local)
+    work += step.bodies.body(local).group->frame_constants().mass *
+            (0.5 * speed * speed + step.part.options.gravity.norm() * distance);
+  return work;
+}
+
+/// N, over the step.
+double force(const IslandStep& step, std::size_t row) { return step.f[row] / step.length() + step.reaction[row]; }
+
+}  // namespace
+
+double agent_work(const IslandStep& step) {
+  double work = step.rows.stored_energy();
+  double recovery_work = 0.0, recovery = 0.0;
+  for (std::size_t i = 0; i < step.size(); ++i) {
+    const RowLaw& law = step.law(i);
+    const double given = std::max(0.0, force(step, i) * law.agent_displacement);
+    if (law.lower == 0.0) {
+      recovery_work += given;
+      recovery = std::max(recovery, law.agent_displacement);
+    } else {
+      work += given;
+    }
+    // A spring with one bound pushes on one side alone.
+    const double before = law.lower == 0.0 ? std::min(step.start_gap[i], 0.0) : step.start_gap[i];
+    const double after = law.lower == 0.0 ? std::min(step.gap[i], 0.0) : step.gap[i];
+    work += 0.5 * law.stiffness * (before * before - after * after);
+  }
+  work += std::min(recovery_work, largest_recovery_work(step, recovery));
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    work -= (i == j ? 0.5 : 1.0) * g.value * force(step, i) * force(step, j);
+  }
+  return work;
+}
+
+double load_work(const IslandStep& step) {
+  double work = 0.0;
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const auto& [group, slot, pose] = step.bodies.body(local);
+    const FrameConstants& c = group->frame_constants();
+    const RigidFrame &start = group->frame(slot), &end = group->predicted_frame(slot);
+    work += group->held_force(slot).dot(end.pose().p - start.pose().p) +
+            0.5 * step.length() * group->held_torque(slot).dot(start.angular_velocity(c) + end.angular_velocity(c));
+    const std::span<const double> g = group->held_modal_forces(slot), z0 = group->amplitudes(slot),
+                                  z1 = group->predicted_amplitudes(slot);
+    for (std::size_t i = 0; i < g.size(); ++i) work += g[i] * (z1[i] - z0[i]);
+  }
+  return work;
+}
+
+bool is_workless(const IslandStep& step) {
+  if (step.rows.stored_energy() > 0.0) return false;  // dents that let go
+  for (std::size_t i = 0; i < step.size(); ++i) {
+    const RowLaw& law = step.law(i);
+    if (step.f[i] == 0.0 && step.reaction[i] == 0.0) continue;
+    if (!is_equality(law) || law.compliance > 0.0 || law.agent_displacement != 0.0) return false;
+  }
+  return true;
+}
+
+}  // namespace limber::internal

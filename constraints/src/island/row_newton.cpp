@@ -1,0 +1,167 @@
+#include "row_newton.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+}  // namespace
+
+SolveStatus RowNewton::solve(IslandStep& step, IslandReport& report) {
+  programs_ = {};
+  const SolveStatus status = iterate(step, report);
+  report.programs.add(programs_);
+  return status;
+}
+
+SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
+  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
+  const int allowed = step.part.options.max_iterations;
+  factor(step);
+  F_.resize(step.size());
+  for (std::size_t i = 0; i < F_.size(); ++i) F_[i] = step.length() * step.reaction[i];
+  secants_.begin(F_.size());
+  for (report.iterations = 1;; ++report.iterations) {
+    take(step, F_);
+    const SolveStatus status = improve(step);
+    report.change = largest_change(step);
+    if (report.change <= 1.0) {
+      share_anew(step);
+      return status;
+    }
+    // Rows that are not solved for give other impulses every time.
+    const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, allowed) : allowed;
+    if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate(step))
+      return differentiate(step, report);
+    if (report.iterations > most) return take_best(step, report);
+    for (std::size_t i = 0; i < F_.size(); ++i) {
+      next_[i] -= F_[i];
+      change_[i] /= step.law(i).tolerance;
+    }
+    secants_.advance(F_, next_, change_);
+    bounded_.keep_within(step, F_);
+  }
+}
+
+/// Makes ready what all iterations share.
+void RowNewton::factor(const IslandStep& step) {
+  const auto n = static_cast<std::size_t>(step.bodies.degrees_of_freedom());
+  J_.resize(step.size() * n), metric_.resize(n), x_.resize(n);
+  for (std::vector<double>* v : {&next_, &change_, &b_}) v->resize(step.size());
+  step.bodies.write_jacobian(step.rows, J_);
+  step.bodies.write_position_metric(step.length(), step.theta, metric_);
+  bounded_.sort(step);
+  if (bounded_.any_bounds())
+    bounded_.assemble(step, J_, metric_);
+  else
+    equalities_.factor(step, J_, metric_);
+}
+
+/// One step from F, to next_; change_ is what it makes of the gaps.
+SolveStatus RowNewton::improve(const IslandStep& step) {
+  programs_ = {};
+  SolveStatus status = SolveStatus::kSolved;
+  next_ = F_;
+  if (bounded_.any_bounds()) {
+    respond(F_, b_);
+    for (std::size_t i = 0; i < F_.size(); ++i) b_[i] = step.gap[i] - step.law(i).offset - b_[i];
+    status = bounded_.solve(step, b_, next_, programs_);
+  } else if (!F_.empty()) {
+    for (std::size_t i = 0; i < F_.size(); ++i)
+      b_[i] = step.law(i).offset - step.gap[i] - step.law(i).compliance * F_[i];
+    status = equalities_.solve(b_);
+    for (std::size_t i = 0; i < F_.size(); ++i) next_[i] += b_[i];
+  }
+  for (std::size_t i = 0; i < F_.size(); ++i) b_[i] = next_[i] - F_[i];
+  respond(b_, change_);
+  return status;
+}
+
+/// What impulses make of the gaps, what rows yield by themselves left out: J D Jᵀ impulses.
+void RowNewton::respond(std::span<const double> impulses, std::vector<double>& gaps) {
+  const auto m = static_cast<Eigen::Index>(impulses.size()), n = static_cast<Eigen::Index>(metric_.size());
+  const Eigen::Map<const RowMajor> J(J_.data(), m, n);
+  Eigen::Map<Eigen::VectorXd> x(x_.data(), n);
+  x.noalias() = J.transpose() * Eigen::Map<const Eigen::VectorXd>(impulses.data(), m);
+  x.array() *= Eigen::Map<const Eigen::ArrayXd>(metric_.data(), n);
+  Eigen::Map<Eigen::VectorXd>(gaps.data(), m).noalias() = J * x;
+}
+
+double RowNewton::largest_change(const IslandStep& step) const {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < change_.size(); ++i)
+    largest = std::max(largest, std::abs(change_[i]) / step.law(i).tolerance);
+  return largest;
+}
+
+/// Loads that are shared in another way than at the last measuring change no gap but by what each row yields: then the
+/// last answer is the one.
+void RowNewton::share_anew(IslandStep& step) {
+  if (step.rows.flexibility().empty()) return;
+  std::ranges::fill(change_, 0.0);
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
+    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
+    change_[i] += g.value / step.length() * (next_[j] - F_[j]);
+    if (i != j) change_[j] += g.value / step.length() * (next_[i] - F_[i]);
+  }
+  if (largest_change(step) > 1.0) take(step, next_);
+}
+
+/// Impulses, and the step under them.
+void RowNewton::take(IslandStep& step, std::span<const double> whole) {
+  for (std::size_t i = 0; i < whole.size(); ++i) step.f[i] = whole[i] - step.length() * step.reaction[i];
+  step.predict();
+}
+
+/// The best impulses seen, where Newton's method does not settle: steps in which bodies turn by a radian and more.
+SolveStatus RowNewton::take_best(IslandStep& step, IslandReport& report) {
+  if (!(report.change <= secants_.best())) {
+    report.change = secants_.best();
+    std::ranges::copy(secants_.best_iterate(), F_.begin());
+    take(step, F_);
+  }
+  return SolveStatus::kIterationLimit;
+}
+
+/// Whether the island is small enough, and its rows have an interval each.
+bool RowNewton::can_differentiate(const IslandStep& step) const {
+  constexpr std::size_t kMostRows = 96;
+  return step.size() <= kMostRows && bounded_.contacts() == 0 && step.rows.flexibility().empty() &&
+         step.rule().method != ContactMethod::kGapProgram;
+}
+
+/// From the best impulses seen, with the rows' true derivatives.
+SolveStatus RowNewton::differentiate(IslandStep& step, IslandReport& report) {
+  const std::size_t m = step.size(), n = metric_.size();
+  take_best(step, report);
+  for (std::vector<double>* v : {&slope_, &tolerance_, &lower_, &upper_}) v->resize(m);
+  for (std::size_t i = 0; i < m; ++i) {
+    const RowLaw& law = step.law(i);
+    slope_[i] = law.compliance;
+    for (std::size_t j = 0; j < n; ++j) slope_[i] += metric_[j] * J_[i * n + j] * J_[i * n + j];
+    tolerance_[i] = law.tolerance, lower_[i] = law.lower, upper_[i] = law.upper;
+  }
+  struct Context {
+    RowNewton& self;
+    IslandStep& step;
+    IslandReport& report;
+  } context{*this, step, report};
+  // One captured pointer fits in std::function's own storage, so this allocates nothing.
+  const auto evaluate = [&context](std::span<const double> whole, std::span<double> w) {
+    context.self.take(context.step, whole);
+    ++context.report.iterations;
+    for (std::size_t i = 0; i < w.size(); ++i) {
+      const RowLaw& law = context.step.law(i);
+      w[i] = context.step.gap[i] - law.offset + law.compliance * whole[i];
+    }
+  };
+  report.change =
+      differences_.solve({.slope = slope_, .tolerance = tolerance_, .lower = lower_, .upper = upper_}, evaluate, F_);
+  return report.change <= 1.0 ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
+}
+
+}  // namespace limber::internal
