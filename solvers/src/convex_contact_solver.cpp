@@ -19,8 +19,8 @@ std::size_t ConvexContactSolver::add_node(std::size_t width) {
   return nodes_.size() - 1;
 }
 
-std::size_t ConvexContactSolver::add_unit(std::size_t rows, const ContactPotential& potential) {
-  units_.push_back({.rows = rows, .first_side = sides_.size(), .potential = potential});
+std::size_t ConvexContactSolver::add_unit(std::size_t rows, const ContactPotential& potential, double tolerance) {
+  units_.push_back({.rows = rows, .first_side = sides_.size(), .potential = potential, .tolerance = tolerance});
   return units_.size() - 1;
 }
 
@@ -33,8 +33,7 @@ std::size_t ConvexContactSolver::add_side(std::size_t node) {
 
 void ConvexContactSolver::end_structure() {
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
-  for (AlignedBuffer* vector : {&free_, &y_, &d_, &gradient_})
-    std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
+  for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
 
 MatrixView ConvexContactSolver::values(std::size_t side) {
@@ -104,7 +103,7 @@ void ConvexContactSolver::begin_with_better_start() {
 }
 
 ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
-  for (std::size_t u = 0; u < units_.size(); ++u) units_[u].response = response(u);
+  find_reaches();
   begin_with_better_start();
   pairs_are_new_ = true;
   return solve_on(options);
@@ -112,14 +111,12 @@ ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& optio
 
 ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& options) {
   ConvexContactReport report;
-  const double momentum = std::sqrt(dot(free_.data(), free_.data(), size_));
   find_ends(y_.data());
   for (;; ++report.iterations) {
-    const double pressed = gradient();
+    const auto [residual, round_off] = gradient();
     const double* g = gradient_.data();
-    const double scale = std::max({momentum, pressed, std::numeric_limits<double>::min()});
-    report.residual = std::sqrt(dot(g, g, size_)) / scale;
-    if (report.residual <= options.tolerance) return report;
+    report.residual = residual;
+    if (residual <= std::max(options.tolerance, round_off)) return report;
     if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
     if (pairs_are_new_) place_pairs();
     assemble();
@@ -135,23 +132,41 @@ ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& op
   return report;
 }
 
-/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l. @return the size of the terms of Σ Jᵀ F, which may cancel
-double ConvexContactSolver::gradient() {
+void ConvexContactSolver::find_reaches() {
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    Unit& unit = units_[u];
+    unit.reach = std::sqrt(response(u).maxCoeff());
+    for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
+      double& reach = nodes_[sides_[s].node].reach;
+      reach = std::max(reach, unit.reach / unit.tolerance);
+    }
+  }
+}
+
+/// ∇ = y − Σ Jᵀ F, and each unit's F and ∇²l.
+ConvexContactSolver::Gradient ConvexContactSolver::gradient() {
+  constexpr double kRounded = 8.0 * std::numeric_limits<double>::epsilon();
   double* g = gradient_.data();
-  double pressed = 0.0;
   std::fill_n(g, size_, 0.0);
+  double round_off = 0.0, reach = 0.0;
   for (Unit& unit : units_) {
     const ContactPotential::Value v = unit.potential.at(unit.end);
     unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
     if (!v.acts) continue;
-    pressed += unit.response.dot(v.impulse.cwiseAbs2());
     add_transposed(unit, v.impulse, g);
+    const double rounded = kRounded * unit.reach / unit.potential.compliance;
+    round_off += rounded * rounded * (unit.start.squaredNorm() + unit.end.squaredNorm());
     pairs_are_new_ = pairs_are_new_ || !unit.has_pressed;
     unit.has_pressed = true;
   }
   const double* y = y_.data();
   for (std::size_t i = 0; i < size_; ++i) g[i] = y[i] - g[i];
-  return std::sqrt(pressed);
+  double residual = 0.0;
+  for (const Node& node : nodes_) {
+    residual = std::max(residual, node.reach * std::sqrt(dot(g + node.first, g + node.first, node.width)));
+    reach = std::max(reach, node.reach);
+  }
+  return {residual, reach * std::sqrt(round_off)};
 }
 
 ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {

@@ -10,8 +10,8 @@ namespace {
 // Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
 // least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
 constexpr double kYield = 1e-3, kStiffest = 1e-6;
-// How far from the law impulses may be: by what would move their own gap by so many tolerances.
-constexpr double kFarthest = 30.0;
+// What Newton's method may leave of a round, by what moves a gap by so much of its tolerance.
+constexpr double kLeft = 0.03;
 // Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
 // end: a few milliseconds.
 constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
@@ -43,7 +43,7 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
     if (!more && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return SolveStatus::kSolved;
     const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
-    const ConvexContactOptions within{.max_iterations = kMostNewtonSteps - report.newton_steps};
+    const ConvexContactOptions within{.tolerance = kLeft, .max_iterations = kMostNewtonSteps - report.newton_steps};
     done = report.iterations == 1 ? contacts_.solve(within) : contacts_.solve_on(within);
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
@@ -87,7 +87,7 @@ void ConvexRounds::place_units(const IslandStep& step) {
         contacts_.add_node(static_cast<std::size_t>(bodies.response(local).size()) + residual_.rank(local)));
   for (std::size_t i = 0, count = 1; i < step.size(); i += count) {
     count = static_cast<std::size_t>(contact_rows(step.law(i)));
-    contacts_.add_unit(count, potential_of(step.law(i)));
+    contacts_.add_unit(count, potential_of(step.law(i)), step.law(i).tolerance);
     units_.push_back({.first = i, .rows = count});
     step.for_bodies(i, [&](const ConstraintRows::Side&, Index local, bool again) {
       if (!again) contacts_.add_side(nodes_[static_cast<std::size_t>(local)]);
@@ -166,12 +166,21 @@ void ConvexRounds::take_impulses(IslandStep& step) {
   contacts_.set_motion();
 }
 
+/// The natural residual |F − P(F − u/ρ)| ρ, ρ what an impulse moves its own gap by: a distance, 0 where the impulse is
+/// the law's at the gap u.
+double ConvexRounds::distance_from_law(const Unit& unit, const RowLaw& law, const ContactPotential& potential,
+                                       Vec3 gap) {
+  ContactPotential natural = potential;
+  natural.compliance = std::max(unit.response, std::numeric_limits<double>::min());
+  if (law.compliance > 0.0) gap[0] += law.compliance * unit.impulse[0];
+  return unit.response * (natural.at(gap - natural.compliance * unit.impulse).impulse - unit.impulse).norm();
+}
+
 /// u⁰: the rows' true gaps at the end of the motion that is predicted, less what they ask for, what is linear in the
 /// impulses, and what the springs exert there already.
 /// @return how far the impulses are from the rows' law at those gaps, and gaps from those of the last round, by
 /// tolerance
 ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool first_round) {
-  if (first_round) find_scale(step);
   Distance distance;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
@@ -187,32 +196,12 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
     const ContactPotential& potential = contacts_.potential(u);
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
-    const Vec3 from_law = unit.response / kFarthest * (potential.at(open - yields).impulse - unit.impulse);
-    distance.from_law = std::max(distance.from_law, from_law.norm() / law.tolerance);
+    distance.from_law = std::max(distance.from_law, distance_from_law(unit, law, potential, open) / law.tolerance);
     unit.moved = contacts_.moved(u);
     contacts_.start(u) = open - yields - unit.moved;
     if (first_round) contacts_.impulse(u) = unit.anchor;
   }
   return distance;
-}
-
-/// How the bodies move, by degree of freedom: what momenta are at hand.
-void ConvexRounds::find_scale(const IslandStep& step) {
-  const IslandBodies& bodies = step.bodies;
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const auto& [group, slot, pose] = bodies.body(local);
-    const BodyResponse& r = bodies.response(local);
-    const RigidTransform &start = group->frame(slot).pose(), &end = group->predicted_frame(slot).pose();
-    const Vec3 moved = end.p - start.p, turned = rotation_vector(end.q * start.q.conjugate());
-    const std::span<const double> z0 = group->amplitudes(slot), z1 = group->predicted_amplitudes(slot);
-    const std::span<double> y = contacts_.free_motion(nodes_[static_cast<std::size_t>(local)]);
-    std::size_t k = 0;
-    for (int i = 0; i < r.translations; ++i) y[k++] = moved[i];
-    for (int i = 0; i < r.rotations; ++i) y[k++] = r.axes.col(i).dot(turned);
-    for (std::size_t i = 0; i < z0.size(); ++i) y[k++] = z1[i] - z0[i];
-    const double* root = root_.data() + bodies.first(local);
-    for (std::size_t i = 0; i < k; ++i) y[i] = root[i] > 0.0 ? y[i] / root[i] : 0.0;
-  }
 }
 
 /// Springs become stiffer where they yielded by as much as in the round before.

@@ -10,7 +10,8 @@
 // Newton's method: (1 + Σ J_cᵀ ∇²l_c J_c) d = −∇, factored in blocks by body (block_factor.h), with an exact search
 // along d, which needs u_c and J_c d alone. It converges from everywhere, as (1) is strongly convex with a Lipschitz
 // gradient. Only pairs of bodies that have pressed on each other have a block: most contacts of a fall are found ahead
-// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses.
+// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses. It ends where
+// no unit is farther off than its tolerance, or than what rounding u makes of F = −u/c.
 //
 // Energy: with rows linear in the step the bodies gain  Σ l_c(u⁰_c) − l_c(u_c) − ½|y|²  at most, u⁰ being the start of
 // the step: what springs had stored. This needs y as it is, not F: a solve that ends early is still safe by y.
@@ -28,25 +29,25 @@
 namespace limber::internal {
 
 struct ConvexContactOptions {
-  double tolerance = 1e-9;   ///< of the momenta at hand, > 0
+  double tolerance = 1e-9;   ///< of the residual, > 0
   int max_iterations = 100;  ///< of Newton's method
 };
 
 struct ConvexContactReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: y is the best motion found
   int iterations = 0;
-  double residual = 0.0;  ///< |∇| by the momenta at hand
+  double residual = 0.0;  ///< the farthest that ∇, as a motion, moves a unit, in units of the unit's tolerance
 };
 
 class ConvexContactSolver {
  public:
-  // Built in this order: nodes, units with their sides, end_structure(), then values and the free motion, then starts,
-  // potentials and impulses.
+  // Built in this order: nodes, units with their sides, end_structure(), then values, then starts, potentials and
+  // impulses.
   void begin_structure();
   /// Degrees of freedom of one body. @return its number
   std::size_t add_node(std::size_t width);
-  /// The next contact, of one or three rows. @return its number
-  std::size_t add_unit(std::size_t rows, const ContactPotential& potential);
+  /// The next contact, of one or three rows. @param tolerance of u_c, > 0. @return its number
+  std::size_t add_unit(std::size_t rows, const ContactPotential& potential, double tolerance = 1.0);
   /// What the last unit's rows see of a node. @return the side's number
   std::size_t add_side(std::size_t node);
   /// All values are zero. Memory grows to the largest problem seen.
@@ -54,10 +55,6 @@ class ConvexContactSolver {
 
   /// J_c of a side, row by row: rows of its unit × the node's width.
   MatrixView values(std::size_t side);
-  /// The motion of a node without contacts, scaled as y: its size in all is what a residual is measured by.
-  std::span<double> free_motion(std::size_t node) { return part_of(free_, node); }
-  /// J_c of the free motion.
-  Vec3 moved_freely(std::size_t unit) const { return seen(units_[unit], free_.data()); }
   /// y of the impulses given.
   void set_motion();
   /// J_c y
@@ -84,12 +81,14 @@ class ConvexContactSolver {
  private:
   struct Node {
     std::size_t width = 0, first = 0;
+    double reach = 0.0;  // the largest of its units, in units of their tolerance
   };
   struct Unit {
     std::size_t rows = 0, first_side = 0, sides = 0;
     ContactPotential potential{};
+    double tolerance = 1.0, reach = 0.0;                                   // how far y = 1 moves it at most
     Vec3 start = Vec3::Zero(), end = Vec3::Zero(), change = Vec3::Zero();  // u⁰, u, J d
-    Vec3 impulse = Vec3::Zero(), response = Vec3::Zero();
+    Vec3 impulse = Vec3::Zero();
     Mat3 stiffness = Mat3::Zero();
     bool acts = false;
     bool has_pressed = false;    // in this problem
@@ -107,7 +106,12 @@ class ConvexContactSolver {
   Vec3 seen(const Unit& unit, const double* y) const;
   void add_transposed(const Unit& unit, const Vec3& rows, double* y) const;
   void begin_with_better_start();
-  double gradient();
+  struct Gradient {
+    double residual = 0.0;   // as reported
+    double round_off = 0.0;  // of that, what may be round-off
+  };
+  Gradient gradient();
+  void find_reaches();
   void find_ends(const double* y);
   Pair pair_of(const Unit& unit) const;
   void place_pairs();
@@ -125,7 +129,7 @@ class ConvexContactSolver {
   std::vector<Unit> units_;
   std::vector<Side> sides_;
   std::size_t numbers_ = 0, size_ = 0;
-  AlignedBuffer values_, free_, y_, d_, gradient_, ordered_;
+  AlignedBuffer values_, y_, d_, gradient_, ordered_;
   BlockFactor factor_;
   std::vector<std::size_t> factor_widths_, widths_;
   std::vector<Pair> factor_pairs_, pairs_;  // sorted
