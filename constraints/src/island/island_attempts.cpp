@@ -4,16 +4,7 @@
 #include "island_impl.h"
 
 namespace limber {
-namespace {
-
 using internal::StepPart;
-
-/// Whether overlapping bodies are being pushed apart.
-bool has_recovery(const internal::IslandStep& step) {
-  return step.any_law([](const RowLaw& law) { return law.contact && law.agent_displacement > 0.0; });
-}
-
-}  // namespace
 
 /// What becomes of the members by the end, all but the energy.
 IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
@@ -36,7 +27,8 @@ void IslandSolver::Impl::act_at_end() {
   step.load_end();
 }
 
-/// And the energy with it: where it would rise by more than what drives the island, one attempt after the other.
+/// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
+/// start, if all rows came together, or impulses are refused.
 IslandReport IslandSolver::Impl::foresee_guarded(StepPart part) {
   constexpr int kSlowings = 3;
   const ContactRule& rule = part.options.contact;
@@ -44,50 +36,17 @@ IslandReport IslandSolver::Impl::foresee_guarded(StepPart part) {
   if (!part.options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = energy.close(step, done);
-    if (!(left > 0.0) || (step.convex && yield(done))) return done;
-    if (part.recovers && !step.rows.flexibility().empty() && has_recovery(step)) {
-      part.recovers = false, slowing = -1;
-      done = foresee(part);
-      done.attempts[StepAttempt::kWithoutRecovery] = 1;
-      continue;
-    }
+    if (!(left > 0.0)) return done;
     const bool settled = done.status == SolveStatus::kSolved && !step.holds_contact_forces() && std::isfinite(left);
     if (!settled || slowing == kSlowings || !energy.slow_start(step, left, part)) break;
-    const StepAttempts before = done.attempts;
     done = foresee(part);
-    done.attempts = before;
     done.attempts[StepAttempt::kSlowed] = 1;
   }
-  if (!step.convex && done.status == SolveStatus::kSolved && yield(done)) return done;
   refuse_impulses(done);
   return done;
 }
 
-/// Islands of nothing but contacts: what their gaps may be off is energy where they are at rest, with no motion to take
-/// it from, and most of all in large ones. Forces that are smaller by a part that no gap shows let the pile down by as
-/// much.
-/// @return whether they do
-bool IslandSolver::Impl::yield(IslandReport& report) {
-  if (!step.contacts_alone) return false;
-  full_f = step.f, full_reaction = step.reaction;
-  const auto scale = [&](double part) {
-    for (std::size_t i = 0; i < full_f.size(); ++i)
-      step.f[i] = part * full_f[i], step.reaction[i] = part * full_reaction[i];
-  };
-  for (const double share : {1e-6, 1e-5, 1e-4}) {  // of ½gΔt², at 60 steps a second 0.14 µm at most
-    scale(1.0 - share);
-    step.predict();
-    act_at_end();
-    if (!(energy.close(step, report) > 0.0)) {
-      report.attempts[StepAttempt::kYielding] = 1;
-      return true;
-    }
-  }
-  scale(1.0);
-  return false;
-}
-
-/// Where neither is enough, since the rows did not come together and have left bodies bent, or loads have moved to
+/// Where the rows did not come together and have left bodies bent, or loads have moved to
 /// contacts that have to be filled first: less of the impulses, in the end none. The free step has the energy it began
 /// with. Where contacts alone act, as little less as will do: half of what holds a pile would be half a fall.
 void IslandSolver::Impl::refuse_impulses(IslandReport& report) {

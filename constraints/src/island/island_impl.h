@@ -31,7 +31,6 @@ struct IslandSolver::Impl {
   internal::IslandEnergy energy;
   std::vector<ExactMotion> motions;    // of the members, where a step may be cut
   std::vector<double> slip, impulses;  // by row
-  std::vector<double> full_f, full_reaction;
 
   // The step in parts.
   void take_cut(internal::StepPart part, IslandReport& report);
@@ -43,7 +42,6 @@ struct IslandSolver::Impl {
   IslandReport foresee(const internal::StepPart& part);
   IslandReport foresee_guarded(internal::StepPart part);
   void act_at_end();
-  bool yield(IslandReport& report);
   void refuse_impulses(IslandReport& report);
 
   // Where it ends, if an impact lets go within it.

@@ -44,7 +44,6 @@ void IslandStep::begin(const StepPart& of) {
     constraint->add_rows(states, StepTime::kStart, length(), rows);
   }
   first_row.push_back(rows.size());
-  if (!part.recovers) stop_recovery();
   const auto m = static_cast<std::size_t>(rows.size());
   start_gap.resize(m), gap.resize(m);
   for (std::vector<double>* impulses : {&f, &reaction, &end_reaction, &touch_impulse}) impulses->assign(m, 0.0);
@@ -53,17 +52,6 @@ void IslandStep::begin(const StepPart& of) {
   measure(StepTime::kStart, start_gap);
   gap = start_gap;
   set_modal_steps();
-}
-
-/// Overlap stays as it is. Where a part of one body is caught between two of another, contacts that push it either way
-/// would press without bound to come apart; that nothing comes closer they can all have, by standing still.
-void IslandStep::stop_recovery() {
-  for (Index i = 0; i < rows.size(); ++i) {
-    RowLaw& law = rows.row(i).law;
-    if (!law.contact) continue;
-    law.offset -= law.agent_displacement;
-    law.agent_displacement = 0.0;
-  }
 }
 
 bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {

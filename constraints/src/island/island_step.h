@@ -33,7 +33,6 @@ struct StepPart {
   IslandOptions options;    ///< with the part's own length
   double whole_step = 0.0;  ///< s
   bool begins = true, ends = true;
-  bool recovers = true;                          ///< overlapping bodies are pushed apart
   double slowed = 0.0;                           ///< the part of `relative` that is taken from the frames at the start
   std::span<const FrameMomentum> relative = {};  ///< by member
 };
@@ -100,7 +99,6 @@ struct IslandStep {
   void for_bodies(std::size_t row, Action&& act) const;
 
  private:
-  void stop_recovery();
   void find_kind();
   void begin_early();
   void set_modal_steps();

@@ -29,10 +29,7 @@ SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
     take(step, F_);
     const SolveStatus status = improve(step);
     report.change = largest_change(step);
-    if (report.change <= 1.0) {
-      share_anew(step);
-      return status;
-    }
+    if (report.change <= 1.0) return status;
     // Rows that are not solved for give other impulses every time.
     const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, allowed) : allowed;
     if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate(step))
@@ -96,19 +93,6 @@ double RowNewton::largest_change(const IslandStep& step) const {
   for (std::size_t i = 0; i < change_.size(); ++i)
     largest = std::max(largest, std::abs(change_[i]) / step.law(i).tolerance);
   return largest;
-}
-
-/// Loads that are shared in another way than at the last measuring change no gap but by what each row yields: then the
-/// last answer is the one.
-void RowNewton::share_anew(IslandStep& step) {
-  if (step.rows.flexibility().empty()) return;
-  std::ranges::fill(change_, 0.0);
-  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
-    const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
-    change_[i] += g.value / step.length() * (next_[j] - F_[j]);
-    if (i != j) change_[j] += g.value / step.length() * (next_[i] - F_[i]);
-  }
-  if (largest_change(step) > 1.0) take(step, next_);
 }
 
 /// Impulses, and the step under them.

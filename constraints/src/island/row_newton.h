@@ -24,7 +24,6 @@ class RowNewton {
   SolveStatus improve(const IslandStep& step);
   void respond(std::span<const double> impulses, std::vector<double>& gaps);
   double largest_change(const IslandStep& step) const;
-  void share_anew(IslandStep& step);
   void take(IslandStep& step, std::span<const double> whole);
   SolveStatus take_best(IslandStep& step, IslandReport& report);
   bool can_differentiate(const IslandStep& step) const;

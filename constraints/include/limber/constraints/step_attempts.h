@@ -9,13 +9,11 @@ namespace limber {
 
 /// What is tried where a step cannot be taken as it is; each has a cost and a cause.
 enum class StepAttempt {
-  kCutAtTouch,       ///< where bodies strike (ImpactModel::kHeldFromTouch)
-  kCutAtRelease,     ///< where an impact lets go
-  kDivided,          ///< into halves, down to 64ths: joints did not come together
-  kWithoutRecovery,  ///< overlapping bodies were not pushed apart: it would have thrown them
-  kSlowed,           ///< relative motion was taken at its start: a swing would have ended too high
-  kYielding,         ///< contacts exerted a 1e-4th less or so
-  kRefused,          ///< parts of all impulses were given up: the step is unsettled
+  kCutAtTouch,    ///< where bodies strike (ImpactModel::kHeldFromTouch)
+  kCutAtRelease,  ///< where an impact lets go
+  kDivided,       ///< into halves, down to 64ths: joints did not come together
+  kSlowed,        ///< relative motion was taken at its start: a swing would have ended too high
+  kRefused,       ///< parts of all impulses were given up: the step is unsettled
 };
 /// How many parts of steps were taken so.
 class StepAttempts {
@@ -31,7 +29,7 @@ class StepAttempts {
   }
 
  private:
-  std::array<int, 7> counts_{};
+  std::array<int, 5> counts_{};
 };
 
 }  // namespace limber
