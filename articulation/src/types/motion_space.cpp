@@ -1,6 +1,6 @@
 #include "types/motion_space.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
 #include <numeric>
@@ -42,6 +42,12 @@ std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
     weights.push_back(p.weight / similar);
   }
   return weights;
+}
+
+/// Eigenvalues, ascending, and eigenvectors of a symmetric matrix.
+MotionSpace::Spectrum symmetric_spectrum(const SmallMatrix& A) {
+  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
 }  // namespace
@@ -105,18 +111,32 @@ MotionSpace::MotionSpace(const std::vector<ContactRegion>& regions) {
   normal_covariance_ /= total;
 }
 
-MotionSpace::Spectrum MotionSpace::spectrum(const Eigen::MatrixXd& basis) const {
+MotionSpace::Spectrum MotionSpace::spectrum(const Motions& basis) const {
   constexpr double kDefinite = 1e-12;  // above round-off: keeps M definite for samples on a line
   const Eigen::Matrix<double, 6, 6> M = M_ + kDefinite * Eigen::Matrix<double, 6, 6>::Identity();
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(basis.transpose() * C_ * basis,
-                                                                         basis.transpose() * M * basis);
-  return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
+  // In coordinates in which M is 1.
+  const auto [masses, axes] = symmetric_spectrum(basis.transpose() * M * basis);
+  const SmallMatrix unit = axes * masses.cwiseSqrt().cwiseInverse().asDiagonal();
+  const Motions motions = basis * unit;
+  const auto [mu, vectors] = symmetric_spectrum(motions.transpose() * C_ * motions);
+  return {mu.cwiseMax(0.0), unit * vectors};
 }
 
-Eigen::MatrixXd MotionSpace::complement(const Eigen::MatrixXd& basis) const {
-  const Eigen::MatrixXd rows = basis.transpose() * M_;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullV);
-  return svd.matrixV().rightCols(6 - basis.cols());
+MotionSpace::Spectrum MotionSpace::spectrum_of_C() const { return symmetric_spectrum(C_); }
+
+Motions MotionSpace::complement(const Motions& basis) const {
+  // Reflections that turn M · basis into its upper triangle: the last columns of their product are orthogonal to it.
+  Motions rest = M_ * basis;
+  Eigen::Matrix<double, 6, 6> Q = Eigen::Matrix<double, 6, 6>::Identity();
+  Motion room;
+  for (Eigen::Index j = 0; j < basis.cols(); ++j) {
+    SmallVector essential(5 - j);
+    double factor = 0.0, length = 0.0;
+    rest.col(j).tail(6 - j).makeHouseholder(essential, factor, length);
+    rest.bottomRightCorner(6 - j, basis.cols() - j).applyHouseholderOnTheLeft(essential, factor, room.data());
+    Q.rightCols(6 - j).applyHouseholderOnTheRight(essential, factor, room.data());
+  }
+  return Q.rightCols(6 - basis.cols());
 }
 
 }  // namespace limber::internal

@@ -14,7 +14,11 @@
 namespace limber::internal {
 
 using Motion = Eigen::Matrix<double, 6, 1>;
+/// A few motions, one a column. That there are at most six lets Eigen do without its kernels for large matrices, which
+/// take most of a minute to compile.
 using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
 struct WeightedPoint {
   Vec3 point, normal;
@@ -41,12 +45,16 @@ class MotionSpace {
 
   /// μ of the motions in a subspace, ascending, and the motions in the subspace's coordinates (columns).
   struct Spectrum {
-    Eigen::VectorXd mu;
-    Eigen::MatrixXd vectors;
+    SmallVector mu;
+    SmallMatrix vectors;
   };
-  Spectrum spectrum(const Eigen::MatrixXd& basis) const;
-  /// The motions that are M-orthogonal to a subspace.
-  Eigen::MatrixXd complement(const Eigen::MatrixXd& basis) const;
+  Spectrum spectrum(const Motions& basis) const;
+  /// The same of all motions.
+  Spectrum spectrum() const { return spectrum(Motions::Identity(6, 6)); }
+  /// The motions that are M-orthogonal to a subspace of independent motions.
+  Motions complement(const Motions& basis) const;
+  /// Eigenvalues of C, ascending, and its eigenvectors: [X09]'s, who take M = 1.
+  Spectrum spectrum_of_C() const;
 
  private:
   std::vector<WeightedPoint> points_;

@@ -36,7 +36,8 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
     double& radius = outline[std::min(static_cast<std::size_t>(turn * sectors), outline.size() - 1)];
     radius = std::max(radius, d.norm());
   }
-  const Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues();
+  const Eigen::Vector2d along =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(moments, Eigen::EigenvaluesOnly).eigenvalues();
   const auto [least, most] = std::minmax_element(outline.begin(), outline.end());
   if (along[1] - along[0] > t.round_moments * (along[1] + along[0]) || *least < t.round_radii * *most)
     return std::nullopt;

@@ -1,6 +1,7 @@
 #include "limber/articulation/slippage.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +20,7 @@ namespace {
 
 using internal::cross_matrix;
 using internal::Motion;
+using internal::Motions;
 using internal::MotionSpace;
 using internal::rotation_about;
 using internal::translation_along;
@@ -32,7 +34,7 @@ struct Family {
   Vec3 axis = Vec3::UnitX();
   Vec3 origin = Vec3::Zero();
   double pitch = 0.0;
-  Eigen::MatrixXd motions = Eigen::MatrixXd(6, 0);  ///< that the type leaves
+  Motions motions = Motions(6, 0);  ///< that the type leaves
 };
 
 Vec3 smallest_direction(const Mat3& symmetric) {
@@ -87,7 +89,8 @@ Vec3 best_centre(const MotionSpace& space, const Vec3& axis) {
   K << Eigen::Matrix<double, 3, 2>::Zero(), -cross_matrix(axis) * U;
   const Eigen::Matrix2d A = K.transpose() * space.C() * K;
   const Eigen::Vector2d b = -K.transpose() * space.C() * rotation_about(axis, Vec3::Zero());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(A);
   Eigen::Vector2d x = Eigen::Vector2d::Zero();
   constexpr double kUndetermined = 1e-9;  // round-off of the largest possible entry, 1, with room
   for (int k = 0; k < 2; ++k)
@@ -110,7 +113,7 @@ Family refined_rotation(const MotionSpace& space, Vec3 axis) {
   Vec3 origin = best_centre(space, axis);
   constexpr double kSettled = 1e-12;  // rad: round-off
   for (std::size_t round = 0; round < tuning().types.axis_rounds; ++round) {
-    Eigen::MatrixXd about(6, 3);
+    Motions about(6, 3);
     for (int k = 0; k < 3; ++k) about.col(k) = rotation_about(Vec3::Unit(k), origin);
     const Vec3 turned = about.topRows<3>() * space.spectrum(about).vectors.col(0);
     if (turned.norm() == 0.0) break;
@@ -124,7 +127,7 @@ Family refined_rotation(const MotionSpace& space, Vec3 axis) {
 
 Family fit_revolute(const MotionSpace& space) {
   std::vector<Vec3> starts;
-  const auto lowest = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors;
+  const auto lowest = space.spectrum().vectors;
   for (int k = 0; k < 3; ++k)
     if (lowest.col(k).head<3>().norm() > tuning().types.least_turn * lowest.col(k).norm())
       starts.push_back(lowest.col(k).head<3>().normalized());
@@ -199,7 +202,7 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
 
 /// The motion that slips best of all, if it turns: ω·v/ω² is its pitch, ω × v/ω² a point of its axis.
 std::optional<Family> fit_screw(const MotionSpace& space) {
-  const Motion xi = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).vectors.col(0);
+  const Motion xi = space.spectrum().vectors.col(0);
   const Vec3 omega = xi.head<3>(), v = xi.tail<3>();
   if (omega.norm() <= tuning().types.screw_least_turn * xi.norm()) return std::nullopt;
   Family out = rotation_family(omega.normalized(), omega.cross(v) / omega.squaredNorm());
@@ -234,9 +237,7 @@ Judged judge(const MotionSpace& space, const Family& family, double threshold) {
     for (const double mu : free) out.log_evidence += std::log(slip_probability(mu, threshold));
     out.slippage = free[free.size() - 1];
   }
-  const Eigen::MatrixXd others =
-      family.motions.cols() > 0 ? space.complement(family.motions) : Eigen::MatrixXd(Eigen::MatrixXd::Identity(6, 6));
-  const auto held = space.spectrum(others).mu;
+  const auto held = space.spectrum(space.complement(family.motions)).mu;
   for (const double mu : held) out.log_evidence += std::log(1.0 - slip_probability(mu, threshold));
   out.blocked = held[0];
   return out;
@@ -307,18 +308,19 @@ JointHypothesis in_words(const MotionSpace& space, const Judged& judged, double 
 /// [X09] 3.2: how many eigenvalues of C about the centroid are below the largest by the ratio g, and how many of their
 /// motions turn.
 JointType type_by_ratio(const MotionSpace& space, double ratio, std::array<double, 6>& relative) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(space.C());
+  const auto [values, vectors] = space.spectrum_of_C();
   int slips = 0;
-  const double largest = solver.eigenvalues()[5];
+  const double largest = values[5];
   for (int j = 0; j < 6; ++j) {
-    relative[static_cast<std::size_t>(j)] = std::max(0.0, solver.eigenvalues()[j] / largest);
-    if (solver.eigenvalues()[j] * ratio < largest) ++slips;
+    relative[static_cast<std::size_t>(j)] = std::max(0.0, values[j] / largest);
+    if (values[j] * ratio < largest) ++slips;
   }
   slips = std::min(slips, 3);
   if (slips == 0) return JointType::kFixed;
-  const auto turns = Eigen::JacobiSVD<Eigen::MatrixXd>(solver.eigenvectors().topLeftCorner(3, slips)).singularValues();
-  const auto rotations =
-      std::count_if(turns.begin(), turns.end(), [](double s) { return s > tuning().types.ratio_turns; });
+  // Squares of the singular values of the turns.
+  const Mat3 turns = vectors.topLeftCorner(3, slips) * vectors.topLeftCorner(3, slips).transpose();
+  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(turns, Eigen::EigenvaluesOnly).eigenvalues();
+  const auto rotations = (squares.array() > std::pow(tuning().types.ratio_turns, 2)).count();
   if (slips == 3) return rotations >= 2 ? JointType::kBall : JointType::kPlanar;
   if (slips == 2) return JointType::kCylindrical;
   return rotations > 0 ? JointType::kRevolute : JointType::kPrismatic;
@@ -335,7 +337,7 @@ Slippage hypotheses_of(const std::vector<ContactRegion>& regions, const Slippage
     for (Judged& j : judged)
       j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -tuning().types.ruled_out;
   } else {
-    const auto mu = space.spectrum(Eigen::MatrixXd::Identity(6, 6)).mu;
+    const auto mu = space.spectrum().mu;
     std::copy(mu.begin(), mu.end(), out.mu.begin());
   }
   std::stable_sort(judged.begin(), judged.end(),
