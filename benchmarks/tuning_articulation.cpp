@@ -1,6 +1,6 @@
 // tuning_articulation: which numbers of articulation/src/tuning.h matter.
-//   run:  build/release/bin/tuning_articulation [--only TEXT]
-//   see:  a row for each number whose name holds TEXT: what moves in the drawn assemblies when it is halved and doubled.
+//   run:  build/benchmark/bin/tuning_articulation [--only TEXT…]
+//   see:  a row for each number whose name holds a TEXT: what moves in the drawn assemblies when it is halved and doubled.
 //         Angles are halved and doubled where a cosine stands for them, shares stay below 1, and of factors above 1 the
 //         excess is halved and doubled. "same bits": no digit of any result changes; "same score": digits do, but no
 //         count, and no worst error by more than a tenth. Times are of the processor, of one run, and good to a tenth.
@@ -12,6 +12,7 @@
 #include <ctime>
 #include <functional>
 #include <numbers>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,12 +24,12 @@
 #include "limber/articulation/detect_joints.h"
 #include "limber/articulation/range_of_motion.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
+#include "scoped_value.h"
 #include "tuning.h"
 
 namespace limber::assemblies {
 namespace {
 
-using internal::ScopedTuning;
 using internal::Tuning;
 
 /// All that is varied.
@@ -110,8 +111,6 @@ std::vector<Number> sheet_of(Tuning& tuning) {
           {"contacts.askew_share", kShare, kJoints, &c.askew_share},
           {"contacts.askew_times", kPlain, kJoints, &c.askew_times},
           {"contacts.askew_always", kPlain, kJoints, &c.askew_always},
-          {"contacts.straight_cosine", kCosine, kJoints, &c.straight_cosine},
-          {"contacts.straight_share", kShare, kJoints, &c.straight_share},
           {"contacts.stray_flat", kShare, kJoints, &c.stray_flat},
           {"contacts.wider_guides", kShare, kJoints, &c.wider_guides},
           {"contacts.wider_area", kPlain, kJoints, &c.wider_area},
@@ -295,16 +294,19 @@ void add_chains(const Drawn& drawn, Outcome& out, Outcomes& all) {
   all.mix(static_cast<double>(mobility));
 }
 
-/// @param settings drawn, in the order of settings()
-Outcomes measure(Numbers n, Concern concern, const std::vector<std::vector<Drawn>>& settings, Jobs& jobs) {
-  const ScopedTuning tuned(n.tuning);
+/// In how many of the settings, the first ones, a concern is measured.
+std::size_t settings_of(Concern concern) { return concern == Concern::kJoints ? settings().size() : 2; }
+
+/// @param all_drawn in the order of settings()
+Outcomes measure(Numbers n, Concern concern, const std::vector<std::vector<Drawn>>& all_drawn, Jobs& jobs) {
+  const testing::ScopedValue tuned(internal::tuning_in_use, n.tuning);
   if (concern == Concern::kHulls) n.detection.contact.method = decltype(n.detection.contact.method)::kHulls;
   if (concern == Concern::kRatio) n.detection.slippage.method = SlippageMethod::kFixedRatio;
   Outcomes all;
-  all.of.resize(settings.size());
+  all.of.resize(settings().size());
   const std::clock_t begin = std::clock();
-  for (std::size_t s = 0; s < (concern == Concern::kJoints ? settings.size() : 2); ++s)
-    for (const Drawn& d : settings[s])
+  for (std::size_t s = 0; s < settings_of(concern); ++s)
+    for (const Drawn& d : all_drawn[s])
       if (concern == Concern::kRanges)
         add_ranges(d, n.ranges, jobs, all.of[s], all);
       else if (concern == Concern::kChains)
@@ -344,7 +346,8 @@ std::string moved(const Outcomes& before, const Outcomes& after) {
   return out;
 }
 
-int run(std::string_view only) {
+/// @param only parts of the names that are asked for; none: all
+int run(std::span<const std::string_view> only) {
   Numbers n;
   std::vector<Number> numbers = sheet_of(n.tuning);
   if (8 * numbers.size() != sizeof(Tuning))
@@ -352,15 +355,25 @@ int run(std::string_view only) {
                         sizeof(Tuning) / 8),
            1;
   for (const Number& option : options_of(n)) numbers.push_back(option);
+  std::erase_if(numbers, [&](const Number& number) {
+    return !only.empty() && std::none_of(only.begin(), only.end(), [&](std::string_view text) {
+      return number.name.find(text) != std::string::npos;
+    });
+  });
   TbbJobs jobs;
   std::vector<std::vector<Drawn>> all_drawn;
-  for (const Setting& setting : settings()) all_drawn.push_back(drawn(setting, n.detection, jobs));
+  const bool joints =
+      std::any_of(numbers.begin(), numbers.end(), [](const Number& x) { return x.concern == Concern::kJoints; });
+  for (std::size_t s = 0; s < settings_of(joints ? Concern::kJoints : Concern::kRanges); ++s)
+    all_drawn.push_back(drawn(settings()[s], n.detection, jobs));
   std::vector<Outcomes> base;
   for (const Concern concern :
        {Concern::kJoints, Concern::kHulls, Concern::kRatio, Concern::kChains, Concern::kRanges}) {
     static const char* const kNames[] = {"joints", "joints by hulls", "joints by the fixed ratio",
                                          "sums of mobilities (over assemblies)", "ranges"};
-    base.push_back(measure(n, concern, all_drawn, jobs));
+    base.emplace_back();
+    if (std::none_of(numbers.begin(), numbers.end(), [&](const Number& x) { return x.concern == concern; })) continue;
+    base.back() = measure(n, concern, all_drawn, jobs);
     std::printf("%s, %.1f s:", kNames[static_cast<int>(concern)], base.back().seconds);
     for (std::size_t s = 0; s < settings().size(); ++s)
       if (const Outcome& o = base.back().of[s]; o.all > 0)
@@ -371,7 +384,6 @@ int run(std::string_view only) {
   std::printf("\n| number | value | at half | at double |\n|---|---|---|---|\n");
   const Numbers unchanged = n;
   for (const Number& number : numbers) {
-    if (number.name.find(only) == std::string::npos) continue;
     const Outcomes& before = base[static_cast<std::size_t>(number.concern)];
     std::printf("| %s | %.4g", number.name.c_str(), value_of(number));
     for (const double by : {0.5, 2.0}) {
@@ -389,7 +401,8 @@ int run(std::string_view only) {
 }  // namespace limber::assemblies
 
 int main(int argc, char** argv) {
-  if (argc == 1) return limber::assemblies::run("");
-  if (argc == 3 && std::string_view(argv[1]) == "--only") return limber::assemblies::run(argv[2]);
-  return std::fprintf(stderr, "tuning_articulation: expected --only TEXT, or nothing\n"), 2;
+  const std::vector<std::string_view> words(argv + 1, argv + argc);
+  if (words.empty()) return limber::assemblies::run({});
+  if (words.size() > 1 && words[0] == "--only") return limber::assemblies::run(std::span(words).subspan(1));
+  return std::fprintf(stderr, "tuning_articulation: expected --only TEXT…, or nothing\n"), 2;
 }

@@ -13,8 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "block_model.h"
-#include "contact_bodies.h"
 #include "cpu_time.h"
 #include "finder_scenes.h"
 #include "limber/collision/broad_phase.h"
@@ -23,16 +21,16 @@
 #include "limber/dynamics/body_group.h"
 #include "narrow_phase_reference.h"
 #include "random_states.h"
+#include "scoped_value.h"
 #include "sheet_model.h"
-#include "solid_bodies.h"
 #include "tuning.h"
+#include "tuning_collision_pairs.h"
+#include "wavy_model.h"
 
 namespace limber {
 namespace {
 
 using internal::CollisionTuning;
-using testing::Body;
-using testing::PairReference;
 using testing::Random;
 
 // -- The numbers ------------------------------------------------------------------------------------------------------
@@ -104,162 +102,6 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(finder, look_farther),
 };
 
-// -- Pairs of bodies --------------------------------------------------------------------------------------------------
-
-/// Two bodies in one place, and what is known of their contacts.
-struct Pair {
-  std::unique_ptr<Body> a, b;
-  double margin;
-  OverlapMethod overlap = OverlapMethod::kRestDepth;
-  Vec3 ahead = Vec3::Zero();                   // expected motion of a
-  std::unique_ptr<PairReference> reference{};  // all contacts
-  std::optional<double> upright{};             // all normals are ±z, by as much of it
-  std::optional<double> free_after{};          // nothing is in the way of the motion ahead, by as much
-};
-
-std::unique_ptr<Body> modal(std::shared_ptr<const ModalModel> model) {
-  return std::make_unique<Body>(std::move(model));
-}
-std::unique_ptr<Body> box_of_triangles(const Vec3& half) {
-  return modal(testing::wavy_model(shapes::box(-half, half), 0));
-}
-
-/// Bent bodies at random, judged by brute force.
-void add_random_pairs(std::vector<Pair>& pairs) {
-  Random random(71);
-  const auto coarse = testing::lumpy_sphere(1, 5), fine = testing::lumpy_sphere(2, 3);
-  const Vec3 half(0.5, 0.3, 0.4);
-  for (int i = 0; i < 160; ++i) {
-    Pair pair{modal(coarse), i % 2 == 0 ? modal(fine) : std::make_unique<Body>(Shape{Box{half}}), 0.08,
-              OverlapMethod::kNearestPoint};
-    pair.a->place(random.pose(1.0), random.amplitudes(5, 0.05));
-    const RigidTransform X{random.pose(1.0).q,
-                           pair.a->pose.p + random.uniform(0.6, 1.1) * random.vector(1.0).normalized()};
-    if (i % 2 == 0)
-      pair.b->place(X, random.amplitudes(3, 0.05));
-    else
-      pair.b->place_box(X, half);
-    pair.reference = std::make_unique<PairReference>(pair.a->plain(), pair.b->plain(), pair.margin);
-    pairs.push_back(std::move(pair));
-  }
-}
-
-/// Boxes on a box: flush, a little off, apart, sunk in and tilted.
-void add_resting_boxes(std::vector<Pair>& pairs) {
-  const Vec3 half(0.25, 0.1875, 0.125);
-  for (const double off : {0.0, 1e-12, 1e-6, 1e-3, 0.03})
-    for (const double gap : {0.0, 1e-9, 1e-5, 1e-3, -1e-9, -1e-5, -1e-3, -0.02, -0.05})
-      for (const double tilt : {0.0, 1e-6, 1e-3, 0.005, 0.015, 0.03}) {
-        Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 2e-3};
-        const Quaternion q = quaternion_from_rotation_vector({tilt, 0.7 * tilt, 0.0});
-        pair.a->place({q, {off, -off, 2.0 * half.z() + gap}});
-        pair.b->place({});
-        if (off == 0.0 || -gap < off) pair.upright = tilt;  // else the sides are the nearer way out
-        pairs.push_back(std::move(pair));
-      }
-}
-
-/// Bars laid across each other, tilted, so that their rims have crossed.
-void add_crossed_bars(std::vector<Pair>& pairs) {
-  Random random(72);
-  for (int i = 0; i < 60; ++i) {
-    Pair pair{box_of_triangles({0.1, 1.0, 0.1}), box_of_triangles({1.0, 0.1, 0.1}), 0.0};
-    const Vec3 tilt(random.uniform(-0.1, 0.1), random.uniform(-0.3, 0.3), random.uniform(-0.5, 0.5));
-    pair.a->place({quaternion_from_rotation_vector(tilt), {0.0, 0.0, 0.2 + random.uniform(-0.02, 0.03)}});
-    pair.b->place({});
-    pair.upright = 0.45;  // within the cone of the tilts
-    pairs.push_back(std::move(pair));
-  }
-}
-
-/// A box that is about to slide onto the next one of the same height, level to round-off and to a part of an edge.
-void add_seams(std::vector<Pair>& pairs) {
-  const Vec3 half(0.25, 0.1875, 0.125);
-  for (const double above : {1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-5, -2e-5, -4e-5, -1e-4})
-    for (const double move : {0.15, 0.3}) {
-      Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 0.2};
-      pair.a->place({.p = {-2.0 * half.x() - 0.1, 0.013, 2.0 * half.z() + above}});
-      pair.b->place({});
-      pair.ahead = {move, 0.0, 0.0};
-      pair.free_after = 2.0 * std::abs(above) + 1e-8;
-      pairs.push_back(std::move(pair));
-    }
-}
-
-/// Blocks that flex on blocks that flex, about flat on each other, and boxes at random: nothing is known but what the
-/// numbers give as they are.
-void add_unjudged(std::vector<Pair>& pairs) {
-  Random random(77);
-  const auto block = testing::block_model(4);
-  for (int i = 0; i < 60; ++i) {
-    Pair pair{modal(block), modal(block), 0.01};
-    const double bent = std::pow(10.0, random.uniform(-5.0, -1.5));
-    const Vec3 tilt = std::pow(10.0, random.uniform(-5.0, -1.0)) * random.vector(1.0);
-    pair.a->place(
-        {quaternion_from_rotation_vector(tilt), {random.uniform(-0.3, 0.3), 1.0 + random.uniform(-0.01, 0.01), 0.1}},
-        random.amplitudes(4, bent));
-    pair.b->place({}, random.amplitudes(4, bent));
-    pairs.push_back(std::move(pair));
-  }
-  const Vec3 half(0.25, 0.2, 0.15);
-  for (int i = 0; i < 120; ++i) {
-    Pair pair{box_of_triangles(half), std::make_unique<Body>(Shape{Box{half}}), 0.02};
-    pair.a->place({random.pose(1.0).q, random.uniform(0.3, 0.5) * random.vector(1.0).normalized()});
-    pair.b->place({});
-    pair.ahead = 0.1 * random.vector(1.0);
-    pairs.push_back(std::move(pair));
-  }
-}
-
-/// Solids bent by a tenth and by half, one within the other, by the rest shape and by their tetrahedra.
-void add_solids(std::vector<Pair>& pairs) {
-  Random random(73);
-  const auto bar = testing::solid(testing::solid_box({0.75, 0.25, 0.25}, {6, 2, 2}), 4);
-  const auto ball = testing::solid(testing::tet_ball(0.4, 4), 3);
-  for (int i = 0; i < 40; ++i) {
-    Pair pair{modal(bar), modal(ball), 0.02, i % 2 == 0 ? OverlapMethod::kRestDepth : OverlapMethod::kTetOverlap};
-    pair.a->use_volume(), pair.b->use_volume();
-    pair.a->place(random.pose(1.0), random.amplitudes(4, i % 4 < 2 ? 0.05 : 0.25));
-    pair.b->place({random.pose(1.0).q, pair.a->pose.p + 0.5 * random.vector(1.0).normalized()},
-                  random.amplitudes(3, 0.05));
-    pairs.push_back(std::move(pair));
-  }
-}
-
-ConvexHull hull(Random& random) {
-  ConvexHull shape;
-  for (int i = 0; i < 24; ++i) shape.points.push_back(0.4 * random.vector(1.0));
-  return shape;
-}
-
-/// Rigid convex shapes in all positions, and bricks all but flush.
-void add_convex_pairs(std::vector<Pair>& pairs) {
-  Random random(74);
-  const Vec3 half(0.3, 0.24, 0.18);
-  const auto shape = [&](int kind) {
-    return kind == 0   ? Shape{Box{half}}
-           : kind == 1 ? Shape{Capsule{0.2, 0.3}}
-           : kind == 2 ? Shape{hull(random)}
-                       : Shape{Sphere{0.3}};
-  };
-  for (int i = 0; i < 240; ++i) {
-    Pair pair{std::make_unique<Body>(shape(i % 4)), std::make_unique<Body>(shape(i / 4 % 3)), 0.05};
-    pair.a->place(random.pose(1.0));
-    pair.b->place({random.pose(1.0).q, pair.a->pose.p + random.uniform(0.3, 0.7) * random.vector(1.0).normalized()});
-    pairs.push_back(std::move(pair));
-  }
-  for (int i = 0; i < 120; ++i) {
-    Pair pair{std::make_unique<Body>(Shape{Box{half}}), std::make_unique<Body>(Shape{Box{half}}), 0.01};
-    const double small = std::pow(10.0, random.uniform(-16.0, -2.0));
-    pair.b->place({});
-    pair.a->place(
-        {quaternion_from_rotation_vector(Vec3(0.0, 0.0, random.uniform(-3.0, 3.0)) + small * random.vector(1.0)),
-         {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), 2.0 * half.z() + small * random.uniform(-1.0, 1.0)}});
-    pair.upright = 3.0 * small;
-    pairs.push_back(std::move(pair));
-  }
-}
-
 // -- What comes out ---------------------------------------------------------------------------------------------------
 
 using Contacts = std::vector<ContactPoint>;
@@ -275,18 +117,16 @@ struct Outcome {
 
 class Scenes {
  public:
-  Scenes() {
-    add_random_pairs(pairs_), add_resting_boxes(pairs_), add_crossed_bars(pairs_), add_seams(pairs_);
-    add_solids(pairs_), add_unjudged(pairs_);
+  Scenes() : pairs_(surface_pairs()) {
     convex_from_ = pairs_.size();
-    add_convex_pairs(pairs_);
+    for (TuningPair& pair : convex_pairs()) pairs_.push_back(std::move(pair));
     make_shots();
     make_crossing_boxes();
   }
 
   Outcome answer() {
     Outcome r;
-    for (const Pair& pair : pairs_) {
+    for (const TuningPair& pair : pairs_) {
       r.contacts.push_back(contacts_of(pair));
       judge(pair, r.contacts.back(), r);
     }
@@ -314,7 +154,7 @@ class Scenes {
     ExactMotion sheet, ball;
   };
 
-  static void judge(const Pair& pair, const Contacts& contacts, Outcome& r) {
+  static void judge(const TuningPair& pair, const Contacts& contacts, Outcome& r) {
     if (pair.reference) {
       const testing::Comparison c = testing::compare(contacts, *pair.reference, *pair.a, *pair.b);
       r.missed += static_cast<int>(c.missed.size()), r.extra += static_cast<int>(c.extra.size());
@@ -329,7 +169,7 @@ class Scenes {
       for (const ContactPoint& c : contacts) r.wrong += c.gap + c.normal.dot(pair.ahead) < -*pair.free_after ? 1 : 0;
   }
 
-  Contacts contacts_of(const Pair& pair) {
+  Contacts contacts_of(const TuningPair& pair) {
     Contacts contacts;
     CollisionBody a = pair.a->body(0);
     a.displacement = pair.ahead;
@@ -437,7 +277,7 @@ class Scenes {
     }
   }
 
-  std::vector<Pair> pairs_;
+  std::vector<TuningPair> pairs_;
   std::size_t convex_from_ = 0;
   std::vector<Shot> shots_;
   std::vector<Vec3> places_, speeds_;
@@ -512,7 +352,7 @@ int print_table() {
       double time = 0.0;
       Outcome changed;
       {
-        const internal::ScopedCollisionTuning in_force(tuning);
+        const testing::ScopedValue in_force(internal::collision_tuning_in_use, tuning);
         changed = scenes.answer();
         time = scenes.seconds(number.room);
       }

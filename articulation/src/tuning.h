@@ -91,9 +91,6 @@ struct ContactsTuning {
   double askew_times = 8.0;
   /// Squared sine, 5e-3 … 0.1: besides. 8°; the end face of a nut leans by 34° from the bolt's flank beside it.
   double askew_always = 0.02;
-  /// Cosine, 0.7 … 1, and share of the area, 0.1 … 0.5: a contact most of whose nearest points lie slanting is one of
-  /// edges. Not measured.
-  double straight_cosine = 0.9, straight_share = 0.25;
   /// Largest eigenvalue of Σ A n nᵀ / Σ A, 0.8 … 1: above it a contact is flat and guides nothing. Case: the dog as it
   /// was first drawn, where a bar passes a flange more closely than the bearing fits.
   double stray_flat = 0.95;
@@ -299,22 +296,9 @@ struct Tuning {
   RangesTuning ranges{};
 };
 
-/// The process-wide value; written by ScopedTuning alone.
+/// The process-wide value. Measurements and tests put other numbers in its place, while nothing of the module runs.
 inline constinit Tuning tuning_in_use{};
 
 inline const Tuning& tuning() { return tuning_in_use; }
-
-/// Puts other numbers in place while it lives, for measurements and tests. Nothing of the module may run in another
-/// thread while one is made or goes.
-class ScopedTuning {
- public:
-  explicit ScopedTuning(const Tuning& other) : before_(tuning_in_use) { tuning_in_use = other; }
-  ~ScopedTuning() { tuning_in_use = before_; }
-  ScopedTuning(const ScopedTuning&) = delete;
-  ScopedTuning& operator=(const ScopedTuning&) = delete;
-
- private:
-  Tuning before_;
-};
 
 }  // namespace limber::internal

@@ -124,23 +124,9 @@ struct CollisionTuning {
   FinderTuning finder{};
 };
 
-inline CollisionTuning collision_tuning_in_force{};
+/// The process-wide value. Measurements and tests put other numbers in its place, while nothing of the module runs.
+inline constinit CollisionTuning collision_tuning_in_use{};
 
-inline const CollisionTuning& collision_tuning() { return collision_tuning_in_force; }
-
-/// Puts other numbers in force for as long as it lives. For measurements and tests: the numbers are the process', and
-/// no call of the module may run while one begins or ends.
-class ScopedCollisionTuning {
- public:
-  explicit ScopedCollisionTuning(const CollisionTuning& tuning) : before_(collision_tuning_in_force) {
-    collision_tuning_in_force = tuning;
-  }
-  ~ScopedCollisionTuning() { collision_tuning_in_force = before_; }
-  ScopedCollisionTuning(const ScopedCollisionTuning&) = delete;
-  ScopedCollisionTuning& operator=(const ScopedCollisionTuning&) = delete;
-
- private:
-  CollisionTuning before_;
-};
+inline const CollisionTuning& collision_tuning() { return collision_tuning_in_use; }
 
 }  // namespace limber::internal

@@ -125,11 +125,11 @@ void World::interpolated_amplitudes(BodyId id, double interpolation, std::span<f
 void World::interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const {
   const Impl::Entry& e = impl_->entry(id, "interpolated_weights");
   require_fraction(interpolation, "interpolated_weights");
-  const std::span<const double> per_amplitude = impl_->group(e).model().weight_per_amplitude();
-  require_count(weights.size(), per_amplitude.size(), "interpolated_weights", "weights");
+  const std::span<const double> scales = impl_->group(e).model().data().mode_scales;
+  require_count(weights.size(), scales.size(), "interpolated_weights", "weights");
   impl_->interpolate(id, interpolation, weights.data());
   for (std::size_t i = 0; i < weights.size(); ++i)
-    weights[i] = static_cast<float>(static_cast<double>(weights[i]) * per_amplitude[i]);
+    weights[i] = static_cast<float>(static_cast<double>(weights[i]) / scales[i]);
 }
 
 }  // namespace limber

@@ -258,7 +258,6 @@ ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   (void)to_string(data_.motion);
   Checker(data_).check();
   if (data_.mode_scales.empty()) data_.mode_scales = visible_scales(data_.render);
-  for (const double scale : data_.mode_scales) weight_per_amplitude_.push_back(1.0 / scale);
   collision_rows_ = VertexRows(collision().basis);
   collision_extent_ = extent(collision());
 }

@@ -9,6 +9,7 @@
 #include "limber/articulation/range_of_motion.h"
 #include "limber/core/error.h"
 #include "ranges/orbit_faces.h"
+#include "scoped_value.h"
 #include "shapes.h"
 
 namespace limber::internal {
@@ -19,7 +20,7 @@ TEST(Tuning, IsReplacedForAsLongAsAScopeLasts) {
   {
     Tuning other = tuning();
     other.types.stop_share = 0.5 * usual;
-    const ScopedTuning scoped(other);
+    const testing::ScopedValue scoped(tuning_in_use, other);
     EXPECT_EQ(tuning().types.stop_share, 0.5 * usual);
   }
   EXPECT_EQ(tuning().types.stop_share, usual);

@@ -15,6 +15,7 @@
 #include "narrow_phase_bodies.h"
 #include "narrow_phase_reference.h"
 #include "random_states.h"
+#include "scoped_value.h"
 #include "tuning.h"
 #include "wavy_model.h"
 
@@ -37,6 +38,7 @@ using testing::Near;
 using testing::PairReference;
 using testing::point_a;
 using testing::Random;
+using testing::ScopedValue;
 using testing::sheet;
 using testing::trials;
 using testing::winding_number;
@@ -127,7 +129,7 @@ TEST(NarrowPhase, ContactsByOtherNumbersAreNotThoseOfTheReference) {
     for (const double factor : {0.5, 2.0}) {
       internal::CollisionTuning tuning;
       tuning.narrow.rocking *= factor;
-      const internal::ScopedCollisionTuning in_force(tuning);
+      const ScopedValue in_force(internal::collision_tuning_in_use, tuning);
       const auto contacts = contacts_of(a, b, 0.08, {.overlap = OverlapMethod::kNearestPoint});
       const Comparison compared = compare(contacts, reference, a, b);
       (factor < 1.0 ? missed : extra) += factor < 1.0 ? compared.missed.size() : compared.extra.size();

@@ -11,6 +11,11 @@
 namespace limber::testing {
 
 inline constexpr double kPileSize = 0.3;  // of its bodies, m
+#if defined(__SANITIZE_ADDRESS__)
+inline constexpr int kPileBoxes = 9;  // of a test's pile; the sanitizers take twenty times as long
+#else
+inline constexpr int kPileBoxes = 18;
+#endif
 
 /// A pit with sloping sides, so that what rolls comes to rest, and bodies above it in layers of nine.
 struct Pile : GroundedWorld {

@@ -176,22 +176,6 @@ void drop_askew(BothSides& sides) {
   for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
-/// Whether surfaces look at each other, or only edges of theirs do: past an edge the nearest point is a slanting way
-/// off.
-bool look_straight(const BothSides& sides, double diagonal) {
-  const ContactsTuning& t = tuning().contacts;
-  double straight = 0.0, all = 0.0;
-  for (const auto* side : {&sides.a, &sides.b})
-    for (const NearSample& s : *side) {
-      const Vec3 way = s.contact.point - s.contact.facing_point;
-      const double across = std::max(std::abs(way.dot(s.contact.normal)), std::abs(way.dot(s.facing_facet)));
-      all += s.contact.area;
-      if (s.distance <= t.shortest_way * diagonal || across >= t.straight_cosine * s.distance)
-        straight += s.contact.area;
-    }
-  return straight > t.straight_share * all;
-}
-
 /// What is measured over the samples of both sides.
 ContactRegion summarised(const Pair& pair, const BothSides& sides) {
   ContactRegion out;
@@ -375,7 +359,6 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   drop_hidden(pair, parts, sides);
 
   if (!tell_enough(sides)) return overlap(pair, a, b, coarse);
-  if (!look_straight(sides, diagonal)) return {};
   quieten(sides);
   ContactRegion out = summarised(pair, sides);
   if (out.gap > options.largest_gap * out.extent) return {};

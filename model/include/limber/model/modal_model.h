@@ -67,7 +67,8 @@ struct ModalModelData {
   std::vector<double> decays;       ///< ξ, 1/s, ≥ 0, per mode
   std::vector<Vec3> participation;  ///< ∫ρ w_i dV, kg^½: zero for kFree
   std::vector<Mat3> moments;  ///< ∫ρ x w_iᵀ dV, kg^½·m, x from the body origin: element (a, b) is ∫ρ x_a w_ib
-  /// s_i, kg^½·m: the amplitude that a glTF viewer shows at weight 1 of the asset's morph target i, which is s_i w_i.
+  /// s_i, kg^½·m: the amplitude that a glTF viewer shows at weight 1 of the asset's morph target i, which is s_i w_i;
+  /// an amplitude z_i is the weight z_i/s_i.
   /// Powers of two whose reciprocals are finite. Empty: chosen by visible_mode_scale() when the ModalModel is made.
   std::vector<double> mode_scales;
 
@@ -100,9 +101,6 @@ class ModalModel {
 
   const SurfaceExtent& collision_extent() const { return collision_extent_; }
 
-  /// 1/s_i, kg^−½·m^−1: an amplitude z_i is the weight z_i/s_i of the asset's morph target i.
-  const std::vector<double>& weight_per_amplitude() const { return weight_per_amplitude_; }
-
   /// Undamped frequency of a mode, √λ/2π, Hz.
   double frequency_hz(Index mode) const;
 
@@ -110,7 +108,6 @@ class ModalModel {
   ModalModelData data_;
   VertexRows collision_rows_;
   SurfaceExtent collision_extent_;
-  std::vector<double> weight_per_amplitude_;
 };
 
 }  // namespace limber
