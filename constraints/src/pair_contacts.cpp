@@ -35,6 +35,16 @@ double longest_rebound(const PreparedSide& a, const PreparedSide& b) {
   return longest;
 }
 
+/// A vertex of a surface, or what is round.
+bool is_pointed(const PreparedSide& side) {
+  return is_round(side) || (side.model != nullptr && std::ranges::count(side.at.weight, 0.0) == 2);
+}
+
+/// A point within a triangle of a surface, or a rigid shape with faces.
+bool has_face(const PreparedSide& side) {
+  return !is_round(side) && (side.model == nullptr || std::ranges::count(side.at.weight, 0.0) == 0);
+}
+
 }  // namespace
 
 void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents,
@@ -65,6 +75,29 @@ void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<doubl
     for (int t = 1; t < 3; ++t)
       gaps[row++] = contact.axes.col(t).dot(slip) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
   }
+}
+
+/// Of the gap n·d, d from b's point to a's: n·d̈ + 2 ṅ·ḋ + n̈·d, of what slides along an axis e: e·d̈. At a touch d is
+/// along n, by the radii of what is round, and n̈·n = −|ṅ|².
+void PairContacts::bias_accelerations(const BodyStates& states, std::span<double> bias) const {
+  std::size_t row = 0;
+  for (const PreparedContact& contact : contacts_) {
+    const PointMotion a = contact.a.motion(states), b = contact.b.motion(states);
+    const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact);
+    bias[row++] = n.dot(a.bias - b.bias) + 2.0 * turn.dot(a.velocity - b.velocity) -
+                  turn.squaredNorm() * n.dot(a.place - b.place);
+    for (Index axis = 1; axis < row_count(contact); ++axis) bias[row++] = contact.axes.col(axis).dot(a.bias - b.bias);
+  }
+}
+
+/// ṅ of a normal that is that of a face: it turns with the frame of the body whose face it is. Of edges, and between
+/// two rigid shapes or two round ones, which one's it is cannot be told from the points: 0.
+Vec3 PairContacts::turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
+  const PreparedSide* owner = nullptr;
+  if (is_pointed(contact.a) && has_face(contact.b)) owner = &contact.b;
+  if (is_pointed(contact.b) && has_face(contact.a)) owner = &contact.a;
+  return owner != nullptr ? states.angular_velocity(owner->body, StepTime::kStart).cross(contact.axes.col(0))
+                          : Vec3(Vec3::Zero());
 }
 
 double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motions, double within) {

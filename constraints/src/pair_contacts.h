@@ -21,6 +21,7 @@ class PairContacts final : public Constraint {
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
+  void bias_accelerations(const BodyStates& states, std::span<double> bias) const override;
   bool is_contact() const override { return true; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
   void slid(std::span<const double> slip) override;
@@ -39,6 +40,8 @@ class PairContacts final : public Constraint {
 
   /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
   static Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b);
+
+  static Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact);
 
   static Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact);
 

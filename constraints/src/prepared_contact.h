@@ -14,6 +14,11 @@
 
 namespace limber {
 
+/// A material point at the step's start; `bias` is its acceleration if the body keeps its velocities.
+struct PointMotion {
+  Vec3 place, velocity, bias;
+};
+
 /// One side of a contact, prepared.
 struct PreparedSide {
   Index body = -1;
@@ -34,6 +39,18 @@ struct PreparedSide {
     Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
     if (model != nullptr) v += X.q * displacement(*model, at, states.rates(body, when));
     return v;
+  }
+  /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R U ż,
+  /// [H03] equation 20.
+  PointMotion motion(const BodyStates& states) const {
+    const RigidTransform& X = states.pose(body, StepTime::kStart);
+    const Vec3 omega = states.angular_velocity(body, StepTime::kStart),
+               place = position(states, StepTime::kStart) - rim;
+    const Vec3 turning = omega.cross(place - X.p);
+    Vec3 deforming = Vec3::Zero();
+    if (model != nullptr) deforming = X.q * displacement(*model, at, states.rates(body, StepTime::kStart));
+    return {place, states.velocity(body, StepTime::kStart) + turning + deforming,
+            omega.cross(turning) + 2.0 * omega.cross(deforming)};
   }
 };
 

@@ -5,10 +5,12 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "contact_problems.h"
 #include "limber/core/types.h"
+#include "linear_program_vertices.h"
 
 namespace limber {
 namespace {
@@ -77,6 +79,63 @@ TEST(ContactProgram, TheSolveWithoutSlipLeavesNoNormalOpen) {
     mended += worst_normal(kHeuristic) < -1e-3 ? 1 : 0;
   }
   EXPECT_GE(mended, 10);
+}
+
+/// Small ones are looked at vertex by vertex.
+TEST(ContactProgram, TheLeastSumIsThatOfTheBestVertex) {
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 120; ++trial) {
+    const int n = 1 + trial % 5;
+    const testing::ContactSample sample =
+        testing::make_contacts(n, 6, trial % 2 == 0 ? testing::Touching::kPlane : testing::Touching::kAround, random);
+    const Eigen::Map<const Eigen::MatrixXd> A(sample.A.data(), n, n);
+    const Eigen::Map<const Eigen::VectorXd> b(sample.b.data(), n);
+    const std::vector<double> lower(static_cast<std::size_t>(n), 0.0), upper(static_cast<std::size_t>(n), kUnbounded);
+    Eigen::VectorXd f = Eigen::VectorXd::Zero(n);
+    ContactProgramSolver solver;
+    ProgramReport report;
+    const ContactProblem problem{
+        .A = sample.A, .b = sample.b, .friction = {}, .lower = lower, .upper = upper, .gap_before = {}};
+    EXPECT_EQ(solver.solve(problem, {.guard = ProgramGuard::kNone}, {f.data(), static_cast<std::size_t>(n)}, report),
+              SolveStatus::kSolved);
+    EXPECT_GE((A * f + b).minCoeff(), -1e-9);
+    EXPECT_NEAR(f.sum(), testing::least_sum_of_all_vertices(A, b), 1e-8 * (1.0 + f.sum())) << trial;
+  }
+}
+
+/// Where friction stayed below μ f_n there is no slip, what slid keeps its friction, and normals are complementary.
+TEST(ContactProgram, TheSolveWithoutSlipLeavesNoneWhereItSticks) {
+  constexpr double kMu = 0.6;
+  std::mt19937 random(9);
+  int stuck = 0, sliding = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const testing::ContactSample sample = testing::make_contacts(9, 6, testing::Touching::kPlane, random);
+    const std::vector<double> friction(3, kMu), lower(9, 0.0), upper(9, 0.0);
+    const ContactProblem problem{.cones = 3,
+                                 .A = sample.A,
+                                 .b = sample.b,
+                                 .friction = friction,
+                                 .lower = lower,
+                                 .upper = upper,
+                                 .gap_before = {}};
+    Eigen::VectorXd first = Eigen::VectorXd::Zero(9), f = first;
+    ContactProgramSolver solver;
+    ProgramReport report;
+    solver.solve(problem, kHeuristic, {first.data(), 9}, report);
+    solver.solve(problem, kNoSlip, {f.data(), 9}, report);
+    const Eigen::VectorXd w = Eigen::Map<const Eigen::MatrixXd>(sample.A.data(), 9, 9) * f +
+                              Eigen::Map<const Eigen::VectorXd>(sample.b.data(), 9);
+    for (int n = 0; n < 9; n += 3) {
+      EXPECT_GE(f[n], 0.0);
+      EXPECT_NEAR(f[n] * w[n], 0.0, 1e-9);
+      const bool sticks = first[n] > 0.0 && first.segment<2>(n + 1).norm() < (1.0 - 1e-9) * kMu * first[n];
+      ++(sticks ? stuck : sliding);
+      const Eigen::Vector2d rest = sticks ? w.segment<2>(n + 1) : Eigen::Vector2d((f - first).segment<2>(n + 1));
+      EXPECT_NEAR(rest.norm(), 0.0, 1e-9) << trial;
+    }
+  }
+  EXPECT_GT(stuck, 20);
+  EXPECT_GT(sliding, 20);
 }
 
 /// Two balls' worth of contacts on a line: the program of least sum takes one of the answers of least total impulse,

@@ -24,6 +24,7 @@ SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
   factor(step);
   F_.resize(step.size());
   for (std::size_t i = 0; i < F_.size(); ++i) F_[i] = step.length() * step.reaction[i];
+  bounded_.keep_within(step, F_);
   secants_.begin(F_.size());
   for (report.iterations = 1;; ++report.iterations) {
     take(step, F_);

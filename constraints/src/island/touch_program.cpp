@@ -34,6 +34,7 @@ void TouchProgram::solve(IslandStep& step, HeldReaction& reaction, ProgramReport
   solve_touching(step, step.touch_impulse, report);
   apply(step);
   choose_touching(step, reaction, true);
+  find_bias(step);
   b_.clear();
   for (const Index row : touching_) {
     // Friction is to take away in the step what still slides.
@@ -83,9 +84,30 @@ double TouchProgram::speed(const IslandStep& step, const HeldReaction& reaction,
                    [](const ConstrainedBody& body, std::size_t i) { return body.group->rates(body.slot)[i]; });
 }
 
-/// J a of bodies that nothing touches; the turning of J is left out. Modes that answer statically hold still.
+/// What rows accelerate by without forces: J̇v, and what the turning of the bodies themselves makes of their frames,
+/// α = I⁻¹(−ω × I ω).
+void TouchProgram::find_bias(const IslandStep& step) {
+  bias_.resize(step.size());
+  const BodyStates states(step.part.table);
+  for (std::size_t i = 0; i < step.part.constraints.size(); ++i) {
+    const auto begin = static_cast<std::size_t>(step.first_row[i]),
+               end = static_cast<std::size_t>(step.first_row[i + 1]);
+    step.part.constraints[i]->bias_accelerations(states, std::span(bias_).subspan(begin, end - begin));
+  }
+  for (std::size_t row = 0; row < bias_.size(); ++row)
+    step.for_bodies(row, [&](const ConstraintRows::Side& side, Index local, bool) {
+      const auto& [group, slot, pose] = step.bodies.body(local);
+      const FrameConstants& c = group->frame_constants();
+      const BodyResponse& r = step.bodies.response(local);
+      const Vec3 torque = group->frame(slot).angular_momentum(c).cross(group->frame(slot).angular_velocity(c));
+      for (int i = 0; i < r.rotations; ++i)
+        bias_[row] += r.axes.col(i).dot(side.angular) * r.inverse_moments[i] * r.axes.col(i).dot(torque);
+    });
+}
+
+/// J a + J̇v of bodies that nothing touches. Modes that answer statically hold still.
 double TouchProgram::acceleration(const IslandStep& step, const HeldReaction& reaction, Index row) const {
-  return reaction.motion_of(step, StepTime::kStart, row).acceleration +
+  return reaction.motion_of(step, StepTime::kStart, row).acceleration + bias_[static_cast<std::size_t>(row)] +
          modal_sum(step, row, [](const ConstrainedBody& body, std::size_t i) {
            const BodyGroup& group = *body.group;
            const ModalModelData& data = group.model().data();

@@ -21,6 +21,7 @@ class TouchProgram {
  private:
   void choose_touching(const IslandStep& step, const HeldReaction& reaction, bool resting);
   void assemble(const IslandStep& step);
+  void find_bias(const IslandStep& step);
   double speed(const IslandStep& step, const HeldReaction& reaction, Index row) const;
   double acceleration(const IslandStep& step, const HeldReaction& reaction, Index row) const;
   void solve_touching(const IslandStep& step, std::vector<double>& into, ProgramReport& report);
@@ -28,7 +29,7 @@ class TouchProgram {
 
   std::vector<double> force_;    // N, by row, held over the step
   std::vector<Index> touching_;  // rows, three for each contact with friction
-  std::vector<double> J_, metric_, mu_, A_, b_, f_, lower_, upper_;
+  std::vector<double> J_, metric_, mu_, A_, b_, f_, lower_, upper_, bias_;
   ContactProgramSolver programs_;
 };
 

@@ -2,6 +2,7 @@
 /// What puts rows into an island: handles, joints, contacts, or your own.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -49,6 +50,10 @@ class Constraint {
   /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
   /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
+  /// J̇v of the rows at the step's start, in their order: what the gaps' rates change by while the bodies keep their
+  /// velocities. For [H03]'s acceleration program (contact_method.h), which sees contacts alone. @param bias as many
+  /// numbers
+  virtual void bias_accelerations(const BodyStates&, std::span<double> bias) const { std::ranges::fill(bias, 0.0); }
   /// Whether it is contact: an island of nothing else may have its step cut where bodies strike and let go. Each part
   /// is then a step for the functions here.
   virtual bool is_contact() const { return false; }

@@ -3,18 +3,22 @@
 /// (contact_constraint.h); J their Jacobian, g₀ and g the gaps at the step's start and end, f impulses, F forces.
 ///
 ///   kPenalty           f = Δt F,  F = max(0, −k g − c (g − min(0, g₀))/Δt)                      [H03]'s first method
-///   kVelocityProgram   min Σp, J v + A p ≥ 0, p ≥ 0 at the touch; min ΣF, J a + A F ≥ 0, F ≥ 0    [H03]'s second
+///   kVelocityProgram   min Σp, J v + A p ≥ 0, p ≥ 0 at the touch; min ΣF, J a + J̇v + A F ≥ 0, F ≥ 0  [H03]'s second
 ///                      for what then rests; A = J M⁻¹Jᵀ of frames and modes
 ///   kGapProgram        min Σf, g ≥ 0, f ≥ 0                              the same at the end of the step, force held
 ///   kComplementary     0 ≤ f ⊥ g ≥ 0                                     the default
 ///
 /// kPenalty takes its spring at the step's end, as a compliance 1/(Δt k + c) of the row ([H03]: at its start): stable
-/// for every k, c and step. n contacts under a weight m g sink in by m g/(n k). With kCone its steps do not settle in
-/// piles. kVelocityProgram cuts the step at the touch, four times at most, in islands of free bodies with nothing but
-/// contacts. It does not look at the gap otherwise, so what sinks in stays so; it leaves J̇v out of J a. Its forces hold
-/// the accelerations of the step's start, which is rough for stiff modes. Programs that are degenerate or have no
-/// solution never fail a step: slack is bought at a price (linear_program.h) and counted as relaxed. Side by side:
-/// docs/reports/contact-methods.md.
+/// for every k, c and step. n contacts under a weight m g sink in by m g/(n k). kVelocityProgram cuts the step at the
+/// touch, four times at most, in islands of free bodies with nothing but contacts. It does not look at the gap
+/// otherwise, so what sinks in stays so. Its forces hold the accelerations of the step's start, which is rough for
+/// stiff modes. Programs that are degenerate or have no solution never fail a step: slack is bought at a price
+/// (linear_program.h) and counted as relaxed. Side by side: docs/reports/contact-methods.md.
+///
+/// J̇v is [H03]'s equation 20: ω × (ω × p) + 2 ω × R U ż of each point; J a has α = I⁻¹(−ω × I ω) of each frame. Where
+/// the normal is that of a face that a vertex or a round body touches, it turns with the frame of the face's body and
+/// adds 2 ṅ·ḋ − |ṅ|² n·d, d between the points. Left out: how a face turns as it bends, and the normals of crossing
+/// edges, of two rigid shapes and of two round ones, which do not belong to one body.
 #pragma once
 
 #include "limber/solvers/hauser/contact_program.h"
