@@ -47,6 +47,7 @@ struct IslandSolver::Impl {
   // Where it ends, if an impact lets go within it.
   void end_at_release(internal::StepPart& part, IslandReport& done);
   double longest_impact() const;
+  double last_impact_force() const;
   bool may_let_go(double length) const;
   double impact_impulse(double length) const;
   double find_release(internal::StepPart part);

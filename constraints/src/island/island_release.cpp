@@ -21,8 +21,8 @@ bool is_quick(const IslandReport& done) {
 /// A force that is held cannot end within a step. But the impulse I(s) that keeps the gaps of an impact closed until s
 /// grows as long as they press, dI/ds being the force then; from where it shrinks on they would have to pull. That is
 /// where they let go. The exact wave in a bar has I = F s up to the release at T, F (2T − s) after it in steps that
-/// began before, and F s²/(3s − 2T) in one that begins with the impact. It grows again later, after 4T/3 there: parts
-/// are no longer than impacts may be.
+/// began before, and F s²/(3s − 2T) in one that begins with the impact. It grows again later, after 4T/3 there: the
+/// release is its first maximum.
 void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
   const double latest = longest_impact();
   if (latest == 0.0 || step.theta == 1.0 || step.holds_contact_forces()) return;
@@ -54,11 +54,17 @@ double IslandSolver::Impl::longest_impact() const {
   return longest;
 }
 
-/// What presses harder than before does not let go.
-bool IslandSolver::Impl::may_let_go(double length) const {
+/// Of all impacts of the island in the last step; 0: they begin.
+double IslandSolver::Impl::last_impact_force() const {
   double before = 0.0;
   for (std::size_t i = 0; i < step.size(); ++i)
     if (step.law(i).lets_go_within > 0.0) before += step.law(i).last_force;
+  return before;
+}
+
+/// What presses harder than before does not let go.
+bool IslandSolver::Impl::may_let_go(double length) const {
+  const double before = last_impact_force();
   return before == 0.0 || impact_impulse(length) < length * before;
 }
 
@@ -70,21 +76,36 @@ double IslandSolver::Impl::impact_impulse(double length) const {
   return sum;
 }
 
-/// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there.
+/// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there. Where the
+/// impact begins with the part, the first such end: between ends of which each is a quarter later than the one before.
 double IslandSolver::Impl::find_release(StepPart part) {
   constexpr int kTrials = 8;  // places the release to a thirtieth of the part; what is left of it may be cut again
-  constexpr double kAlmost = 0.98;      // of the part
-  constexpr double kNoticeable = 1e-6;  // of the impulse
+  constexpr double kAlmost = 0.98;                      // of the part
+  constexpr double kNoticeable = 1e-6;                  // of the impulse
+  constexpr double kSoonest = 1.0 / 16, kLater = 1.25;  // of the part; of the end before
   const double length = part.options.step, golden = 1.0 / std::numbers::phi, whole = impact_impulse(length);
+  const bool begins = last_impact_force() == 0.0;
   bool quick = true;
   const auto impulse_until = [&](double end) {
     if (!quick) return 0.0;
+    if (end == length) return whole;
     part.options.step = end;
     quick = is_quick(foresee(part));
     return impact_impulse(end);
   };
-  if (whole > 0.0 && impulse_until(kAlmost * length) < (1.0 + kNoticeable) * whole) return length;
-  double begin = 0.0, end = length, first = (1.0 - golden) * length, second = golden * length;
+  double begin = 0.0, end = length, at_end = whole;
+  if (begins) {
+    end = kSoonest * length, at_end = impulse_until(end);
+    double between = 0.0, at_between = 0.0;
+    while (quick && at_end >= at_between && end < length) {
+      begin = between, between = end, at_between = at_end;
+      end = std::min(kLater * end, length), at_end = impulse_until(end);
+    }
+    if (!quick || at_end >= at_between) return length;
+  } else if (whole > 0.0 && impulse_until(kAlmost * length) < (1.0 + kNoticeable) * whole) {
+    return length;
+  }
+  double first = end - golden * (end - begin), second = begin + golden * (end - begin);
   double at_first = impulse_until(first), at_second = impulse_until(second);
   for (int trial = 2; trial < kTrials && quick; ++trial) {
     if (at_first < at_second) {
@@ -98,7 +119,7 @@ double IslandSolver::Impl::find_release(StepPart part) {
     }
   }
   if (!quick) return length;
-  return std::max(at_first, at_second) > whole ? (at_first < at_second ? second : first) : length;
+  return std::max(at_first, at_second) > at_end ? (at_first < at_second ? second : first) : length;
 }
 
 }  // namespace limber

@@ -23,8 +23,8 @@ SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
   const int allowed = step.part.options.max_iterations;
   factor(step);
   F_.resize(step.size());
-  for (std::size_t i = 0; i < F_.size(); ++i) F_[i] = step.length() * step.reaction[i];
-  bounded_.keep_within(step, F_);
+  for (std::size_t i = 0; i < F_.size(); ++i)
+    F_[i] = std::clamp(step.length() * step.reaction[i], step.law(i).lower, step.law(i).upper);
   secants_.begin(F_.size());
   for (report.iterations = 1;; ++report.iterations) {
     take(step, F_);
