@@ -29,6 +29,7 @@ class ConstraintStage {
   /// Forgets it, and all constraints on it.
   void remove_body(Index body);
   BodyStates states() const { return BodyStates(table_); }
+  std::span<const ConstrainedBody> table() const { return table_; }
   bool moves(Index body) const { return body >= 0 && table_[static_cast<std::size_t>(body)].group != nullptr; }
   /// Stops a body, or lets it go on: one that sleeps is no member of any island.
   void set_asleep(Index body, bool asleep);

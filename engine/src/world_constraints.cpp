@@ -41,6 +41,38 @@ HandleView World::handle(HandleId id) const {
   return {.target = h.target(), .force = h.force(), .error = h.error()};
 }
 
+ManipulationResult World::manipulate(std::span<const BodyWish> wishes, std::span<const BodyForce> forces,
+                                     std::span<double> impulses, ManipulationLevel level, int max_iterations) {
+  const bool places = level == ManipulationLevel::kPosition || level == ManipulationLevel::kPositionImpulse;
+  if (places && impl_->options.substeps > 1)
+    throw InvalidArgument("World::manipulate: places are wanted in a world of " +
+                          std::to_string(impl_->options.substeps) + " substeps, expected 1; use handles");
+  const auto frame = [&](BodyId id, const SurfacePoint& at) -> MaterialFrame {
+    const ModalModel& model = impl_->group(impl_->entry(id, "manipulate")).model();
+    validate(model, at);
+    return {static_cast<Index>(id.index), model, at};
+  };
+  std::vector<PointWish> wanted;
+  for (const BodyWish& wish : wishes) wanted.push_back({frame(wish.body, wish.at), wish.direction, wish.wanted});
+  std::vector<PointForce> acting;
+  for (const BodyForce& force : forces) acting.push_back({frame(force.body, force.at), force.direction});
+  const ManipulationResult result =
+      limber::manipulate(impl_->constraints.table(), wanted, acting, impulses,
+                         {.level = level, .gravity = impl_->options.gravity, .max_iterations = max_iterations});
+  const auto act = [&](std::size_t i, BodyId id, const SurfacePoint& at, const Vec3& direction) {
+    const auto body = static_cast<Index>(id.index);
+    impl_->sleep.wake(body);
+    if (level == ManipulationLevel::kAcceleration)
+      impl_->parts->hold_force(body, at, impulses[i] * direction);
+    else if (level != ManipulationLevel::kPosition)
+      impl_->constraints.disturb(body);
+  };
+  for (std::size_t i = 0; i < forces.size(); ++i) act(i, forces[i].body, forces[i].at, forces[i].direction);
+  for (std::size_t i = 0; forces.empty() && i < wishes.size(); ++i)
+    act(i, wishes[i].body, wishes[i].at, wishes[i].direction);
+  return result;
+}
+
 JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a,
                          const JointAttachment& on_b, bool collide_connected) {
   spec.validate();

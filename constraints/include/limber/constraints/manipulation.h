@@ -15,7 +15,8 @@
 /// a feedback that can grow without bound when it is repeated step after step.
 ///
 /// Handles (handle.h) do what kPosition does for forces at the held points, together with joints and limits, without
-/// allocation, and keep modes above the Nyquist rate still. This is for the rest. Allocates.
+/// allocation, and keep modes above the Nyquist rate still. This is for the rest. Allocates. By body ids:
+/// World::manipulate.
 #pragma once
 
 #include <span>

@@ -32,6 +32,7 @@
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/joint_constraint.h"
+#include "limber/constraints/manipulation.h"
 #include "limber/constraints/step_attempts.h"
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
@@ -118,6 +119,21 @@ struct HandleView {
   HandleTarget target{};      ///< for the coming step
   Vec3 force = Vec3::Zero();  ///< mean force on the body, world, N
   double error = 0.0;         ///< distance from the target along the held directions, m
+};
+
+/// One direction in which a point of a body is to do something: PointWish of manipulation.h by BodyId.
+struct BodyWish {
+  BodyId body{};
+  SurfacePoint at{};
+  Vec3 direction = Vec3::UnitX();  ///< unit, world
+  double wanted = 0.0;             ///< along it: m/s², m/s, or the world coordinate at the coming step's end, m
+};
+
+/// One direction in which a force may act on a point of a body.
+struct BodyForce {
+  BodyId body{};
+  SurfacePoint at{};
+  Vec3 direction = Vec3::UnitX();  ///< unit, world
 };
 
 /// What a joint does, as of the last step. The first `coordinates` numbers of each array count.
@@ -215,6 +231,20 @@ class World {
   /// Where the point is wanted at the end of the coming step, and how it goes on from there.
   void set_handle_target(HandleId id, const HandleTarget& target);
   HandleView handle(HandleId id) const;
+
+  // Manipulation -----------------------------------------------------------------------------------------------------
+  /// Gives points accelerations, velocities or places by forces at the same or at other points, of least norm, in the
+  /// least-squares sense ([H03] section 3.4.1; manipulation.h). They are loads of the coming step like those of
+  /// apply_force() and apply_impulse(), and reckon with gravity and the loads given before. Handles, joints and
+  /// contacts are not foreseen: they answer in the step. Allocates.
+  /// @param forces where forces may act; empty: along the wishes themselves
+  /// @param impulses out, one per force: N for kAcceleration, N·s else
+  /// @param max_iterations of places, which are nonlinear where bodies turn; ≥ 1
+  /// @throws InvalidArgument also for a direction that is not a unit vector, for kAcceleration of a body with fixed
+  /// nodes, and for places in a world with substeps: its held forces would end before the step does
+  ManipulationResult manipulate(std::span<const BodyWish> wishes, std::span<const BodyForce> forces,
+                                std::span<double> impulses, ManipulationLevel level = ManipulationLevel::kPosition,
+                                int max_iterations = 6);
 
   // Joints -----------------------------------------------------------------------------------------------------------
   /// Joins two bodies as they stand: the pose now is the joint's reference, all its coordinates are 0.
