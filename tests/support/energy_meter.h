@@ -22,9 +22,10 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <array>
+#include <Eigen/SparseCore>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "dense_fem.h"
 #include "limber/engine/world.h"
@@ -43,7 +44,8 @@ class EnergyMeter {
  public:
   /// @param model of a free body, baked from the mesh with consistent masses; with a volume block if it has modes
   EnergyMeter(const TetMesh& mesh, const Material& material, std::shared_ptr<const ModalModel> model)
-      : model_(std::move(model)), fem_(dense_model(mesh, std::array{material}, false)) {
+      : model_(std::move(model)) {
+    assemble(mesh, material);
     const Vec3 origin = model_->data().origin_in_input;
     rest_.resize(3 * static_cast<Eigen::Index>(mesh.nodes.size()));
     shapes_.resize(rest_.size(), model_->modes());
@@ -67,15 +69,37 @@ class EnergyMeter {
     const Eigen::VectorXd velocity = uniform(v) + cross(omega, place) + shapes_ * rates;
 
     NodeEnergy energy;
-    energy.kinetic = 0.5 * velocity.dot(fem_.M * velocity);
-    energy.strain = 0.5 * u.dot(fem_.K * u);
-    energy.potential = -(q_BW * gravity).dot(sum_of(fem_.M * (place + uniform(q_BW * body.pose.p))));
+    energy.kinetic = 0.5 * velocity.dot(M_ * velocity);
+    energy.strain = 0.5 * u.dot(K_ * u);
+    energy.potential = -(q_BW * gravity).dot(sum_of(M_ * (place + uniform(q_BW * body.pose.p))));
     const double turn = omega.norm() * z.norm();
-    energy.spin_bound = turn * (std::sqrt(turning.dot(fem_.M * turning)) + 0.5 * turn + rates.norm());
+    energy.spin_bound = turn * (std::sqrt(turning.dot(M_ * turning)) + 0.5 * turn + rates.norm());
     return energy;
   }
 
  private:
+  /// The element matrices of dense_fem.h, summed.
+  void assemble(const TetMesh& mesh, const Material& material) {
+    std::vector<Eigen::Triplet<double>> stiffness, mass;
+    for (const Tet& t : mesh.tets) {
+      Eigen::Matrix<double, 3, 4> x;
+      for (int a = 0; a < 4; ++a) x.col(a) = mesh.nodes[t[a]];
+      const auto K = dense_tet_stiffness(x, material);
+      const double volume = std::abs((x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).dot(x.col(3) - x.col(0))) / 6.0;
+      const auto M = dense_tet_mass(material.density * volume, false);
+      for (int i = 0; i < 12; ++i)
+        for (int j = 0; j < 12; ++j) {
+          const auto row = 3 * t[i / 3] + i % 3, column = 3 * t[j / 3] + j % 3;
+          stiffness.emplace_back(row, column, K(i, j));
+          if (i % 3 == j % 3) mass.emplace_back(row, column, M(i / 3, j / 3));
+        }
+    }
+    const auto size = static_cast<Eigen::Index>(3 * mesh.nodes.size());
+    K_.resize(size, size), M_.resize(size, size);
+    K_.setFromTriplets(stiffness.begin(), stiffness.end());
+    M_.setFromTriplets(mass.begin(), mass.end());
+  }
+
   Eigen::VectorXd uniform(const Vec3& v) const { return v.replicate(rest_.size() / 3, 1); }
   static Eigen::VectorXd cross(const Vec3& omega, const Eigen::VectorXd& x) {
     Eigen::VectorXd out(x.size());
@@ -89,7 +113,7 @@ class EnergyMeter {
   }
 
   std::shared_ptr<const ModalModel> model_;
-  DenseModel fem_;
+  Eigen::SparseMatrix<double> K_, M_;
   Eigen::VectorXd rest_;
   Eigen::MatrixXd shapes_;
 };
