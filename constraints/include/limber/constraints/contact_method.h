@@ -9,11 +9,11 @@
 ///   kComplementary     0 ≤ f ⊥ g ≥ 0                                     the default
 ///
 /// kPenalty takes its spring at the step's end, as a compliance 1/(Δt k + c) of the row ([H03]: at its start): stable
-/// for every k, c and step. n contacts under a weight m g sink in by m g/(n k). kVelocityProgram cuts the step at the
-/// touch, four times at most, in islands of free bodies with nothing but contacts. It does not look at the gap
-/// otherwise, so what sinks in stays so. Its forces hold the accelerations of the step's start, which is rough for
-/// stiff modes. Programs that are degenerate or have no solution never fail a step: slack is bought at a price
-/// (linear_program.h) and counted as relaxed. Side by side: docs/reports/contact-methods.md.
+/// for every k, c and step. n contacts under a weight m g sink in by m g/(n k). A pile may leave some steps unsettled.
+/// kVelocityProgram cuts the step at the touch, four times at most, in islands of free bodies with nothing but
+/// contacts. It does not look at the gap otherwise, so what sinks in stays so. Its forces hold the accelerations of the
+/// step's start, which is rough for stiff modes. Programs that are degenerate or have no solution never fail a step:
+/// slack is bought at a price (linear_program.h) and counted as relaxed. Side by side: docs/reports/contact-methods.md.
 ///
 /// J̇v is [H03]'s equation 20: ω × (ω × p) + 2 ω × R U ż of each point; J a has α = I⁻¹(−ω × I ω) of each frame. Where
 /// the normal is that of a face that a vertex or a round body touches, it turns with the frame of the face's body and
