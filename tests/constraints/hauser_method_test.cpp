@@ -120,7 +120,7 @@ TEST(HauserMethod, BackingUpStopsWhatFallsAtTheTimeOfItsTouch) {
     const double time = (at_touch - kSpeed) / kGravity;
     ASSERT_LT(time, step);
     const IslandReport report = island.step();
-    EXPECT_EQ(report.cuts, 1);
+    EXPECT_EQ(report.attempts.cuts(), 1);
     EXPECT_NEAR(island.group.frame(0).pose().p.z(), kBelow, 1e-9);
     EXPECT_NEAR(island.group.frame(0).velocity().z(), 0.0, 1e-9);
     EXPECT_NEAR(island.impulse().z(), island.mass() * (at_touch + kGravity * (step - time)), 1e-8);
