@@ -35,7 +35,7 @@ Asset bar_for(const std::string& name) {
   return bake({.name = name, .mesh = std::move(mesh)}, options, warnings).asset;
 }
 
-RunResult played(const Scene& scene) {
+RunResult played(const limber::Scene& scene) {
   std::map<std::string, Asset> assets;
   for (const auto& [name, file] : scene.assets) assets.emplace(name, bar_for(name));
   return run_scene(scene, make_models(scene, assets),
@@ -76,7 +76,7 @@ double energy_at(const RunResult& r, std::size_t key) {
 }
 
 /// Where nothing but strikes acts, centres of mass go straight on, and a strike adds its impulse.
-void expect_momenta_of_free_flight(const Scene& scene, const RunResult& r) {
+void expect_momenta_of_free_flight(const limber::Scene& scene, const RunResult& r) {
   for (const BodyTrack& body : r.trajectory.bodies) {
     const SceneBody& start = *std::find_if(scene.bodies.begin(), scene.bodies.end(),
                                            [&](const SceneBody& b) { return b.name == body.name; });
@@ -110,7 +110,7 @@ TEST(ShippedScenes, PlayAsPhysicsSays) {
   int scenes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(LIMBER_SOURCE_DIR "/assets/scenes")) {
     SCOPED_TRACE(entry.path());
-    const Scene scene = read_scene(entry.path());
+    const limber::Scene scene = read_scene(entry.path());
     const RunResult r = played(scene);
     ++scenes;
     EXPECT_EQ(static_cast<double>(r.steps) * scene.step, kSeconds);

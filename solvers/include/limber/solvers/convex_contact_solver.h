@@ -10,8 +10,8 @@
 // Newton's method: (1 + Σ J_cᵀ ∇²l_c J_c) d = −∇, factored in blocks by body (block_factor.h), with an exact search
 // along d, which needs u_c and J_c d alone. It converges from everywhere, as (1) is strongly convex with a Lipschitz
 // gradient. Only pairs of bodies that have pressed on each other have a block: most contacts of a fall are found ahead
-// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses. It ends where
-// no unit is farther off than its tolerance, or than what rounding u makes of F = −u/c.
+// and exert nothing. The order of elimination is kept from problem to problem while no other pair presses. It ends
+// where no unit is farther off than its tolerance, or than what rounding u makes of F = −u/c.
 //
 // Energy: with rows linear in the step the bodies gain  Σ l_c(u⁰_c) − l_c(u_c) − ½|y|²  at most, u⁰ being the start of
 // the step: what springs had stored. This needs y as it is, not F: a solve that ends early is still safe by y.
