@@ -142,8 +142,10 @@ void PairContacts::begin(const BodyStates& states) {
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
   overlap_that_stays_ = 0.0;
   const PreparedContact& first = contacts_.front();
-  give_ = (flexes(first.a) || flexes(first.b)) && options_->rule.method != ContactMethod::kPenalty &&
-                  !options_->rule.is_convex()
+  const ContactRule& rule = options_->rule;
+  const bool by_gaps =
+      rule.method == ContactMethod::kGapProgram || (rule.method == ContactMethod::kComplementary && !rule.is_convex());
+  give_ = by_gaps && (flexes(first.a) || flexes(first.b))
               ? (yields_[0] || yields_[1] ? kGiveBesideResidual : kGive) * step_ * step_ / reduced_mass(states, first)
               : 0.0;
   for (PreparedContact& contact : contacts_) {

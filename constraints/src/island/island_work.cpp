@@ -65,6 +65,7 @@ bool is_workless(const IslandStep& step) {
   if (step.rows.stored_energy() > 0.0) return false;  // dents that let go
   for (std::size_t i = 0; i < step.size(); ++i) {
     const RowLaw& law = step.law(i);
+    if (step.touch_impulse[i] != 0.0) return false;
     if (step.f[i] == 0.0 && step.reaction[i] == 0.0) continue;
     if (!is_equality(law) || law.compliance > 0.0 || law.agent_displacement != 0.0) return false;
   }
