@@ -1,0 +1,151 @@
+// Poses at the sizes of [X09] Table 2: what an iteration costs, how many a drag takes, what the surface costs; the
+// constrained form beside full Gauss–Newton on the paper's energies. Models are drawn ones and the bunny of
+// glmark2-data, with cells chosen to be as many as the paper's, so that rows compare in size, not in shape.
+//   benchmark_posing [--model NAME]
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include "assemblies.h"
+#include "limber/mesh/read_mesh.h"
+#include "limber/posing/posing_session.h"
+#include "true_joints.h"
+
+namespace {
+
+using limber::Index;
+using limber::Vec3;
+
+double now() {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// A model, which of its parts are soft with which cells, and where it is pulled.
+struct Case {
+  const char* name;
+  limber::JointedModel model;
+  Index pinned = 0, pulled = 0;  // pinned −1: held by handles at the corners of its lower side instead
+  std::vector<Index> soft{};
+  double cell = 0.0;
+  const char* paper = "";  // solve and reconstruction there, ms
+};
+
+limber::JointedModel drawn(const std::string& name, int segments) {
+  const auto made = limber::assemblies::make(name, {.segments = segments});
+  return limber::jointed_model(made.surface, limber::assemblies::true_joints(made), name);
+}
+
+/// The bunny with its ears as parts: what lies above a plane and on either side of another, joined by balls.
+limber::JointedModel bunny(const std::filesystem::path& path) {
+  limber::Warnings warnings;
+  limber::JointedModel out;
+  out.surface = limber::read_surface_mesh(path, warnings);
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : out.surface.vertices) box.extend(p);
+  const Vec3 size = box.sizes();
+  const double ears = box.min().y() + 0.75 * size.y();
+  out.parts = {{"body", {}}, {"ears", {}}};
+  Vec3 seam = Vec3::Zero();
+  double count = 0.0;
+  for (std::size_t t = 0; t < out.surface.triangles.size(); ++t) {
+    Vec3 middle = Vec3::Zero();
+    for (const Index v : out.surface.triangles[t]) middle += out.surface.vertices[static_cast<std::size_t>(v)] / 3.0;
+    const bool ear = middle.y() > ears;
+    out.parts[ear ? 1 : 0].triangles.push_back(static_cast<Index>(t));
+    if (std::abs(middle.y() - ears) < 0.01 * size.y()) seam += middle, count += 1.0;
+  }
+  limber::ModelJoint joint{.a = 0, .b = 1};
+  joint.joint.type = limber::JointType::kBall;
+  joint.joint.frame.origin = seam / count;
+  out.joints.push_back(joint);
+  return out;
+}
+
+Vec3 furthest(const limber::JointedModel& model, Index part) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : model.surface.vertices) box.extend(p);
+  Vec3 best = box.center();
+  for (const Index t : model.parts[static_cast<std::size_t>(part)].triangles)
+    for (const Index v : model.surface.triangles[static_cast<std::size_t>(t)])
+      if (const Vec3& p = model.surface.vertices[static_cast<std::size_t>(v)];
+          (p - box.center()).norm() > (best - box.center()).norm())
+        best = p;
+  return best;
+}
+
+/// The vertex of a part that lies furthest along a direction.
+Vec3 extreme(const limber::JointedModel& model, Index part, const Vec3& way) {
+  Vec3 best = model.surface.vertices.front();
+  double most = -1e300;
+  for (const Index t : model.parts[static_cast<std::size_t>(part)].triangles)
+    for (const Index v : model.surface.triangles[static_cast<std::size_t>(t)])
+      if (const Vec3& p = model.surface.vertices[static_cast<std::size_t>(v)]; p.dot(way) > most)
+        most = p.dot(way), best = p;
+  return best;
+}
+
+void run(const Case& c, limber::PoseFormulation formulation) {
+  limber::PosingSession session(c.model, {.formulation = formulation});
+  for (const Index p : c.soft) session.set_part(p, {.cells = limber::Subdivision::kUniform, .cell_size = c.cell});
+  if (c.pinned >= 0) session.set_pinned(c.pinned, true);
+  const Vec3 grip = furthest(c.model, c.pulled);
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : c.model.surface.vertices) box.extend(p);
+  const double size = box.diagonal().norm();
+  if (c.pinned < 0)
+    for (const auto& [x, z] : {std::pair(-1, -1), std::pair(-1, 1), std::pair(1, -1), std::pair(1, 1)})
+      session.add_handle(0, extreme(c.model, 0, Vec3(x, -3, z)));
+  const limber::HandleId hand = session.add_handle(c.pulled, grip);
+  const bool paper = formulation == limber::PoseFormulation::kPenalty;
+  const int frames = paper ? 3 : 10;
+  std::vector<double> per_iteration, per_frame, surface;
+  int iterations = 0;
+  std::vector<Vec3> positions(c.model.surface.vertices.size()), normals(positions.size());
+  for (int f = 1; f <= frames; ++f) {
+    session.move_handle(hand, grip + 0.005 * f * size * Vec3(0.3, 0.5, -0.8));
+    const double start = now();
+    const limber::PoseResult r = session.solve();
+    const double solved = now();
+    session.reconstruct(positions);
+    surface.push_back(now() - solved);
+    per_frame.push_back(solved - start);
+    per_iteration.push_back((solved - start) / r.iterations);
+    iterations += r.iterations;
+  }
+  std::printf(
+      "%-9s %-11s %6zu cells %6zu vertices  iteration %8.3f ms  %5.1f iterations  frame %8.2f ms  surface %6.3f ms  "
+      "paper %s\n",
+      c.name, paper ? "penalty" : "constrained", session.cells().size(), positions.size(), median(per_iteration),
+      static_cast<double>(iterations) / frames, median(per_frame), median(surface), c.paper);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const char* only = argc == 3 && std::strcmp(argv[1], "--model") == 0 ? argv[2] : nullptr;
+  std::vector<Case> cases;
+  const auto wanted = [&](const char* name) { return only == nullptr || std::strcmp(only, name) == 0; };
+  if (wanted("lamp")) cases.push_back({"lamp", drawn("lamp", 128), 0, 4, {2, 3}, 0.025, "3.42, 10.40"});
+  if (wanted("humanoid"))
+    cases.push_back({"humanoid", drawn("humanoid", 64), 0, 9, {2, 3, 4, 5, 6, 7, 8, 9}, 0.035, "29.58, 13.20"});
+  const std::filesystem::path rabbit = "/usr/share/glmark2/models/bunny.obj";
+  if (wanted("bunny") && std::filesystem::exists(rabbit)) {
+    Case c{"bunny", bunny(rabbit), -1, 1, {0, 1}, 0.0, "103.09, 35.74"};
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : c.model.surface.vertices) box.extend(p);
+    c.cell = 0.0335 * box.diagonal().norm();
+    cases.push_back(std::move(c));
+  }
+  for (const Case& c : cases)
+    for (const auto formulation : {limber::PoseFormulation::kConstrained, limber::PoseFormulation::kPenalty})
+      run(c, formulation);
+}

@@ -1,0 +1,110 @@
+/// @file limber/posing/posing_session.h
+/// Direct manipulation of a jointed model: pull on points, and parts turn in their joints and bend [X09 4].
+///
+///   PosingSession lamp(jointed_model(assembly, joints), {.tolerance = 1e-8});
+///   lamp.set_pinned(lamp.model().part_named("base"), true);
+///   const HandleId hand = lamp.add_handle(lamp.model().part_named("shade"), tip);
+///   lamp.move_handle(hand, target);
+///   const PoseResult result = lamp.solve();
+///   lamp.reconstruct(positions);
+///
+/// Every change keeps the pose: nothing starts over when a joint becomes another or a rigid part soft. Lengths are in
+/// the model's own unit and frame, angles in rad. Not thread-safe; several sessions may run at the same time.
+///
+/// What a pose minimises: strain of deformable parts, ½ Σ w |T_a x − T_b x|² over what neighbouring cells share, and
+/// ½ k |y − target|² of every handle's point y; subject to joints, limits and pins. Derivation:
+/// docs/derivations/posing.md.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "limber/core/rigid_transform.h"
+#include "limber/posing/cells.h"
+#include "limber/posing/jointed_model.h"
+#include "limber/posing/posing_options.h"
+
+namespace limber {
+
+/// Names a handle for as long as it is there; never used again after.
+struct HandleId {
+  Index number = -1;
+  friend bool operator==(HandleId, HandleId) = default;
+};
+
+/// A cell as it stands: x at rest is at rotation · (x − centre) + place. Orthonormal but in the penalty form.
+struct PosedCell {
+  Index part = 0;
+  Index body = 0;  ///< cells of equal number share their transformation
+  Cell rest{};
+  Mat3 axes = Mat3::Identity();  ///< of the cell at rest
+  Mat3 rotation = Mat3::Identity();
+  Vec3 place = Vec3::Zero();  ///< of the cell's centre
+};
+
+/// A joint's coordinates as it stands, as its limits count them: rotation, then translations; a ball: its cone angle.
+struct PosedJoint {
+  std::vector<double> coordinates{};  ///< rad, length; empty for fixed
+  double error = 0.0;                 ///< how far the joint is from holding: rad, of the model's diagonal
+};
+
+class PosingSession {
+ public:
+  /// All parts rigid, nothing pinned, no handle. @throws InvalidArgument from model.validate() and options.validate()
+  explicit PosingSession(JointedModel model, const PosingOptions& options = {});
+  ~PosingSession();
+  PosingSession(PosingSession&&) noexcept;
+  PosingSession& operator=(PosingSession&&) noexcept;
+
+  /// The model with its joints as they are now.
+  const JointedModel& model() const;
+  const PosingOptions& options() const;
+
+  // Changes. Each can be undone. All throw InvalidArgument for a part, joint or handle that is not there.
+
+  /// Grips the point of a part that is at `point` at rest. Its target is where it is now.
+  /// @throws InvalidArgument if `point` is not finite or further from the part's surface than a tenth of its diagonal
+  HandleId add_handle(Index part, const Vec3& point);
+  /// Moves of one handle that follow each other are undone together. @throws InvalidArgument if it is not finite
+  void move_handle(HandleId handle, const Vec3& target);
+  void remove_handle(HandleId handle);
+  /// Where a handle's point is.
+  Vec3 handle_point(HandleId handle) const;
+
+  /// A pinned part stays where it stands now.
+  void set_pinned(Index part, bool pinned);
+  /// Makes a part rigid or deformable, finer or stiffer. It keeps its shape as far as the new cells can show it.
+  void set_part(Index part, const PartOptions& options);
+  PartOptions part_options(Index part) const;
+  /// Another type, frame or other limits. If the pose does not meet them, the next solve() first puts it there.
+  void set_joint(Index joint, const JointSpec& spec);
+
+  /// Takes back the last change, pose included. @return false if there is none
+  bool undo();
+
+  // Poses
+
+  /// Finds the pose, from the one there is. Never to a worse one: joints and limits hold (PoseResult::Status says where
+  /// they cannot), and the energy is no higher.
+  PoseResult solve();
+  /// Back to rest; handles stay where their targets are.
+  void reset_pose();
+
+  std::vector<PosedCell> cells() const;
+  PosedJoint joint(Index joint) const;
+  /// How a part has moved from rest, if all of it moves as one: rigid, and no piece of another part.
+  std::optional<RigidTransform> motion(Index part) const;
+
+  /// Where the model's vertices are. @param positions one per vertex. @throws InvalidArgument if there are not
+  void reconstruct(std::span<Vec3> positions) const;
+  /// The same with unit normals, area-weighted over the triangles around each vertex.
+  void reconstruct(std::span<Vec3> positions, std::span<Vec3> normals) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

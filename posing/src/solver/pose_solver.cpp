@@ -1,0 +1,299 @@
+#include "solver/pose_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "limber/core/error.h"
+#include "pose_transfer.h"
+
+namespace limber::internal {
+namespace {
+
+// Numbers of the method. What a converged pose is depends on none of them.
+// Of the mass matrix, in stiffness · size: small beside all that resists, so that iterations are few, and large enough
+// for round-off. A single body has nothing soft of its own; in a block of many, bending is far softer than its links.
+constexpr double kProximal = 1e-7, kProximalOfLinked = 1e-10;
+constexpr double kLargestTurn = 0.8;  // rad of a body in one step: beyond, rotations are far from their linearisation
+constexpr double kFeasible = 1e-11;   // to which joints and limits are put back; of the size, rad
+constexpr double kSlack = 1e-12;      // a limit that is nearer counts as reached
+constexpr int kRestorations = 12;     // Newton steps to put a pose back onto its joints
+constexpr double kArmijo = 1e-4;      // of the decrease that the quadratic model promises
+constexpr double kEnergyRoundOff = 1e-12;  // a promise of less, of the energy, is none
+// Levenberg–Marquardt damping, in units of the loads' own moments: what second derivatives that are left out amount to.
+constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLargestDamping = 1e6;
+constexpr int kAnew = -1;  // age of a matrix that is to be made
+// A step that promises less than this part of the one before converges as well with the matrix there is: made for an
+// earlier pose, and in the bodies' own frames little changed since.
+constexpr double kContraction = 0.1;
+constexpr double kGauge = 1e-12;  // prefers no turn where handles leave it open
+
+std::vector<bool> interface_bodies(const PoseStructure& structure) {
+  std::vector<bool> out(structure.bodies.size(), false);
+  for (const BodyJoint& joint : structure.joints)
+    out[static_cast<std::size_t>(joint.a)] = out[static_cast<std::size_t>(joint.b)] = true;
+  return out;
+}
+
+std::vector<double> body_radii(const PoseStructure& structure) {
+  std::vector<double> out(structure.bodies.size(), 0.0);
+  for (const PlacedCell& c : structure.cells) {
+    double& r = out[static_cast<std::size_t>(c.body)];
+    r = std::max(
+        r, (c.cell.centre - structure.bodies[static_cast<std::size_t>(c.body)].centre).norm() + c.cell.half.norm());
+  }
+  return out;
+}
+
+JointRows all_rows(const PoseStructure& structure, const Pose& pose) {
+  JointRows out;
+  for (std::size_t j = 0; j < structure.joints.size(); ++j)
+    append_joint_rows(structure, structure.joints[j], pose.bodies, pose.turns[j], out);
+  return out;
+}
+
+double beyond(const CoordinateRow& c) { return std::max(c.limit.low - c.row.value, c.row.value - c.limit.high); }
+
+/// The row that says "no further": value ≤ 0 holds.
+Row stop(const CoordinateRow& c, bool high) {
+  Row out = c.row;
+  if (high) {
+    out.value = c.row.value - c.limit.high;
+  } else {
+    out.value = c.limit.low - c.row.value;
+    out.J_a = -c.row.J_a, out.J_b = -c.row.J_b;
+  }
+  return out;
+}
+
+bool all_finite(const Pose& pose) {
+  return std::all_of(pose.bodies.begin(), pose.bodies.end(), [](const RigidTransform& X) {
+    return X.p.allFinite() && std::isfinite(X.q.w + X.q.x + X.q.y + X.q.z);
+  });
+}
+
+}  // namespace
+
+Feasibility feasibility(const PoseStructure& structure, const Pose& pose) {
+  const JointRows rows = all_rows(structure, pose);
+  Feasibility out;
+  for (const Row& r : rows.constraints) out.joints = std::max(out.joints, std::abs(r.value));
+  for (const CoordinateRow& c : rows.coordinates) out.limits = std::max(out.limits, beyond(c));
+  return out;
+}
+
+/// Rows at a pose: joints, then limits.
+struct PoseSolver::Linearised {
+  std::vector<Row> rows{};
+  std::vector<bool> pushes{};
+  VectorX values() const {
+    VectorX out(static_cast<Eigen::Index>(rows.size()));
+    for (std::size_t i = 0; i < rows.size(); ++i) out[static_cast<Eigen::Index>(i)] = rows[i].value;
+    return out;
+  }
+};
+
+PoseSolver::PoseSolver(const PoseStructure& structure, const PosingOptions& options, std::vector<HandleTerm> handles)
+    : structure_(&structure),
+      options_(options),
+      handles_(std::move(handles)),
+      radius_(body_radii(structure)),
+      system_(structure, interface_bodies(structure), kProximal * structure.size, kProximalOfLinked * structure.size) {}
+
+void PoseSolver::set_targets(const std::vector<Vec3>& targets) {
+  for (std::size_t i = 0; i < handles_.size(); ++i) handles_[i].target = targets[i];
+}
+
+double PoseSolver::energy(const Pose& pose) const {
+  const std::vector<Mat3> R = rotations_of(pose.bodies);
+  return strain_energy(*structure_, pose.bodies, R) + handle_energy(handles_, pose.bodies, R);
+}
+
+PoseSolver::Linearised PoseSolver::linearise(const Pose& pose) const {
+  const JointRows joints = all_rows(*structure_, pose);
+  Linearised out;
+  out.rows = joints.constraints;
+  out.pushes.assign(out.rows.size(), false);
+  for (const CoordinateRow& c : joints.coordinates)
+    for (const bool high : {false, true})
+      if (std::isfinite(high ? c.limit.high : c.limit.low)) {
+        out.rows.push_back(stop(c, high));
+        out.pushes.push_back(true);
+      }
+  return out;
+}
+
+/// A rigid motion of everything that brings the handles nearest to their targets, if nothing is pinned and it helps:
+/// what no joint and no strain resists should not take iterations.
+void PoseSolver::start_with_rigid_motion(Pose& pose) const {
+  if (handles_.empty()) return;
+  for (const PoseBody& body : structure_->bodies)
+    if (body.pinned) return;
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();
+  std::vector<Vec3> points;
+  for (const HandleTerm& h : handles_) {
+    points.push_back(pose.bodies[static_cast<std::size_t>(h.body)] * h.arm);
+    from += points.back(), to += h.target;
+  }
+  const double n = static_cast<double>(points.size());
+  from /= n, to /= n;
+  Mat3 correlation = Mat3::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i)
+    correlation += (handles_[i].target - to) * (points[i] - from).transpose();
+  correlation += kGauge * structure_->size * structure_->size * Mat3::Identity();
+  const Quaternion turn = normalized(quaternion_from_matrix(nearest_rotation(correlation)));
+  const RigidTransform motion{turn, to - turn * from};
+  Pose trial = pose;
+  for (RigidTransform& X : trial.bodies) X = {normalized(motion.q * X.q), motion * X.p};
+  if (energy(trial) < energy(pose)) pose = trial;
+}
+
+Pose PoseSolver::advanced(const Pose& pose, const VectorX& step, double part) const {
+  Pose out = pose;
+  for (std::size_t b = 0; b < out.bodies.size(); ++b)
+    if (const Index at = system_.dof(static_cast<Index>(b)); at >= 0)
+      out.bodies[b] = moved(pose.bodies[b], part * step.segment<6>(at));
+  for (std::size_t j = 0; j < out.turns.size(); ++j)
+    out.turns[j] = joint_turn(*structure_, structure_->joints[j], out.bodies, pose.turns[j]);
+  return out;
+}
+
+/// How far a step moves a point at most, of the size.
+double PoseSolver::reach(const VectorX& step) const {
+  double out = 0.0;
+  for (std::size_t b = 0; b < radius_.size(); ++b)
+    if (const Index at = system_.dof(static_cast<Index>(b)); at >= 0)
+      out = std::max(out, step.segment<3>(at).norm() * radius_[b] + step.segment<3>(at + 3).norm());
+  return out / structure_->size;
+}
+
+/// Newton's method on joints and the limits that are passed, by the least motion in the metric of H. @return whether
+/// they hold
+bool PoseSolver::make_feasible(Pose& pose) {
+  VectorX lambda;
+  for (int i = 0; i <= kRestorations; ++i) {
+    const Feasibility now = feasibility(*structure_, pose);
+    if (!(std::isfinite(now.joints) && std::isfinite(now.limits))) return false;
+    if (now.joints <= kFeasible && now.limits <= kSlack) return true;
+    if (i == kRestorations) break;
+    const Linearised at = linearise(pose);
+    const auto rows = system_.at_interface(at.rows);
+    lambda.setZero(static_cast<Eigen::Index>(at.rows.size()));
+    solve_bounded(system_.compliance(rows), at.values(), at.pushes, lambda);
+    VectorX step = VectorX::Zero(system_.dofs());
+    system_.subtract_response(rows, lambda, step);
+    double turn = 0.0;
+    for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, step.segment<3>(d).norm());
+    pose = advanced(pose, step, std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn)));
+  }
+  return false;
+}
+
+/// What acts on single bodies: handles, and the curvature that all forces on a body give its turning. Joints pull at
+/// their anchors with the multipliers of the step before.
+std::vector<TwistMatrix> PoseSolver::second_derivatives(BodyLoads loads, const Linearised& at,
+                                                        const std::vector<Mat3>& R) const {
+  std::vector<double> couples(R.size(), 0.0);
+  if (multipliers_.size() == static_cast<Eigen::Index>(at.rows.size()))
+    for (std::size_t i = 0; i < at.rows.size(); ++i) {
+      const double l = multipliers_[static_cast<Eigen::Index>(i)];
+      const Row& row = at.rows[i];
+      loads.moments[static_cast<std::size_t>(row.a)] += l * row.arm_a * row.J_a.tail<3>().transpose();
+      loads.moments[static_cast<std::size_t>(row.b)] += l * row.arm_b * row.J_b.tail<3>().transpose();
+      couples[static_cast<std::size_t>(row.a)] += std::abs(l) * row.J_a.head<3>().norm();
+      couples[static_cast<std::size_t>(row.b)] += std::abs(l) * row.J_b.head<3>().norm();
+    }
+  std::vector<TwistMatrix> out(R.size(), TwistMatrix::Zero());
+  for (std::size_t b = 0; b < out.size(); ++b)
+    out[b].topLeftCorner<3, 3>() =
+        turning_stiffness(loads.moments[b]) + damping_ * (loads.moments[b].norm() + couples[b]) * Mat3::Identity();
+  for (const HandleTerm& h : handles_)
+    out[static_cast<std::size_t>(h.body)] += own_block(h.weight, h.arm, Mat3::Zero());
+  return out;
+}
+
+/// One iteration: a step is taken if the energy falls, else the next is damped more.
+PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
+  const std::vector<Mat3> R = rotations_of(pose.bodies);
+  const Linearised at = linearise(pose);
+  const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
+  if (factor_.age < 0) system_.factor(R, second_derivatives(acting, at, R));
+  ++factor_.age;
+  VectorX gradient = VectorX::Zero(system_.dofs());
+  for (std::size_t b = 0; b < acting.gradient.size(); ++b)
+    if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0) gradient.segment<6>(d) = acting.gradient[b];
+  VectorX u;
+  system_.solve(-gradient, u);
+  const auto rows = system_.at_interface(at.rows);
+  if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
+    multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
+  solve_bounded(system_.compliance(rows), at.values() + system_.apply(rows, u), at.pushes, multipliers_);
+  system_.subtract_response(rows, multipliers_, u);
+
+  double turn = 0.0;
+  for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, u.segment<3>(d).norm());
+  const double part = std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn));
+  const double promised = part * (1.0 - 0.5 * part) * system_.square(u);
+  Step out{.moved = part * reach(u), .outcome = Step::Outcome::kRejected};
+  Pose trial = advanced(pose, u, part);
+  const double lower =
+      make_feasible(trial) && all_finite(trial) ? energy(trial) : std::numeric_limits<double>::infinity();
+  const bool last = out.moved <= options_.tolerance || promised <= kEnergyRoundOff * value;
+  if (lower <= value - kArmijo * promised || (last && lower <= value)) {
+    if (damping_ > 0.0 && lower <= value - 0.5 * promised) {
+      damping_ = damping_ > kFirstDamping ? damping_ / kDampingFactor : 0.0;
+      factor_.age = kAnew;
+    }
+    if (promised > kContraction * factor_.promised) factor_.age = kAnew;
+    factor_.promised = promised;
+    pose = std::move(trial);
+    value = lower;
+    out.outcome = Step::Outcome::kTaken;
+  } else {
+    if (factor_.age == 0) damping_ = std::max(kDampingFactor * damping_, kFirstDamping);
+    factor_.age = kAnew;
+  }
+  if (last) out.outcome = Step::Outcome::kLast;
+  return out;
+}
+
+PoseResult PoseSolver::solve(Pose& pose) {
+  using Status = PoseResult::Status;
+  PoseResult result;
+  Pose trial = pose;
+  result.initial_energy = energy(pose);
+  const auto tell = [&](Status status, const Pose& at) {
+    result.status = status;
+    result.energy = energy(at);
+    const Feasibility f = feasibility(*structure_, at);
+    result.joint_error = f.joints, result.limit_violation = std::max(0.0, f.limits);
+    for (const HandleTerm& h : handles_)
+      result.handle_error =
+          std::max(result.handle_error, (at.bodies[static_cast<std::size_t>(h.body)] * h.arm - h.target).norm());
+    return result;
+  };
+  multipliers_.resize(0);
+  if (damping_ > 0.0) factor_.age = kAnew;
+  damping_ = 0.0;
+  factor_.promised = std::numeric_limits<double>::infinity();
+  if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
+    // What handles resist must not count: joints come first, however far the handles are dragged off by it.
+    system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()));
+    factor_.age = kAnew;
+  }
+  if (!make_feasible(trial)) return tell(Status::kInfeasible, pose);
+  start_with_rigid_motion(trial);
+  double value = energy(trial);
+  Status status = Status::kIterationLimit;
+  while (status == Status::kIterationLimit && result.iterations < options_.max_iterations) {
+    const Step done = step(trial, value);
+    ++result.iterations;
+    result.last_step = done.moved;
+    if (done.outcome == Step::Outcome::kLast) status = Status::kConverged;
+    if (done.outcome == Step::Outcome::kRejected && damping_ > kLargestDamping) status = Status::kStalled;
+  }
+  pose = std::move(trial);
+  return tell(status, pose);
+}
+
+}  // namespace limber::internal

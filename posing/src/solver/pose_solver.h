@@ -1,0 +1,71 @@
+// Poses by Newton's method on rigid motions with joints and limits as constraints.
+#pragma once
+
+#include <vector>
+
+#include "limber/posing/posing_options.h"
+#include "solver/bounded_system.h"
+#include "solver/pose_energy.h"
+
+namespace limber::internal {
+
+/// A pose and what of it is history: how often joints have turned round.
+struct Pose {
+  BodyPoses bodies{};
+  std::vector<double> turns{};  // per joint of the structure, rad
+};
+
+/// How far joints and limits are from being met: of the model's size, rad.
+struct Feasibility {
+  double joints = 0.0, limits = 0.0;
+};
+Feasibility feasibility(const PoseStructure& structure, const Pose& pose);
+
+/// Minimises strain + handles over poses that the joints allow.
+///
+/// Each iteration linearises joints and limits and takes the energy's quadratic model (ElasticSystem; with the turning
+/// stiffness of all loads, so that it is Newton's but for negative curvature). The step follows from a dense problem in
+/// the multipliers of joints and limits alone; the trial pose is put back onto the joints and taken if
+/// its energy is lower; else the next step is damped more. Poses between are feasible too. The matrix is made anew when
+/// steps no longer shrink as they should with it, also from one call to the next: most iterations are two
+/// substitutions.
+class PoseSolver {
+ public:
+  /// The structure must outlive the solver.
+  PoseSolver(const PoseStructure& structure, const PosingOptions& options, std::vector<HandleTerm> handles);
+
+  /// @param pose in: where to begin; out: no worse. Unchanged if it is kInfeasible.
+  PoseResult solve(Pose& pose);
+
+  /// New targets, in the order of the handles.
+  void set_targets(const std::vector<Vec3>& targets);
+
+ private:
+  struct Linearised;
+  struct Step {
+    double moved = 0.0;  // a point at most, of the size
+    enum class Outcome { kTaken, kRejected, kLast } outcome = Outcome::kTaken;
+  };
+  void start_with_rigid_motion(Pose& pose) const;
+  bool make_feasible(Pose& pose);
+  Linearised linearise(const Pose& pose) const;
+  std::vector<TwistMatrix> second_derivatives(BodyLoads loads, const Linearised& at, const std::vector<Mat3>& R) const;
+  double energy(const Pose& pose) const;
+  Step step(Pose& pose, double& value);
+  Pose advanced(const Pose& pose, const VectorX& step, double part) const;
+  double reach(const VectorX& step) const;
+
+  const PoseStructure* structure_;
+  PosingOptions options_;
+  std::vector<HandleTerm> handles_;
+  std::vector<double> radius_;  // per body: of the ball around its centre that holds its cells
+  ElasticSystem system_;
+  VectorX multipliers_;  // of the last step's rows
+  double damping_ = 0.0;
+  struct {
+    int age = -1;           // steps that the matrix has been used for; −1: it is to be made anew
+    double promised = 0.0;  // decrease by the step before
+  } factor_;
+};
+
+}  // namespace limber::internal

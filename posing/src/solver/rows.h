@@ -1,0 +1,54 @@
+// Joints and limits as rows: functions of two bodies' poses with their derivatives.
+//
+// Bodies move by twists ξ = (ω, v) in their own frames: R ← R exp[ω], p ← p + R v to first order. A joint's relative
+// pose in its frame J (axes X, anchor arms s_a, s_b at rest) is
+//   Q = Xᵀ R_aᵀ R_b X,   t = Xᵀ R_aᵀ (p_b + R_b s_b − p_a − R_a s_a)
+// and each row is a function c(Q, t), so that with D = ∂c/∂Q and τ = ∂c/∂t
+//   ∂c/∂ω_a = X Σ_l D_l × Q_l …,  derived in docs/derivations/posing.md.
+#pragma once
+
+#include <vector>
+
+#include "structure.h"
+
+namespace limber::internal {
+
+using Twist = Eigen::Matrix<double, 6, 1>;  // ω, v
+
+/// One scalar equation between two bodies (b only: a = −1) that is linearised.
+struct Row {
+  Index a = -1, b = -1;
+  Twist J_a = Twist::Zero(), J_b = Twist::Zero();
+  double value = 0.0;
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  // where its force acts, from the bodies' centres, in their frames
+};
+
+/// A coordinate of a joint, with its limits.
+struct CoordinateRow {
+  Row row{};
+  Interval limit{};
+  bool angle = false;  ///< rad; otherwise of the model's size
+};
+
+/// What holds a joint, and what it leaves free. Lengths are told in units of `size`.
+struct JointRows {
+  std::vector<Row> constraints{};
+  std::vector<CoordinateRow> coordinates{};
+};
+
+/// @param turn the joint's angle about its axis before, near which the angle is told (it does not jump at ±π)
+void append_joint_rows(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses, double turn,
+                       JointRows& out);
+
+/// The angle about the axis that turns (x; planar: z), told near `near`; 0 for types without.
+double joint_turn(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses, double near);
+
+/// All coordinates of a joint, rotation before translations, in rad and the model's unit; a ball: its cone angle.
+std::vector<double> joint_coordinates(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses,
+                                      double turn);
+
+/// A body's pose moved by a twist in its own frame: along the screw, so that bodies that move by the same twist in the
+/// world stay in place relative to each other.
+RigidTransform moved(const RigidTransform& X, const Twist& twist);
+
+}  // namespace limber::internal

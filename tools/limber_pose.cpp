@@ -1,0 +1,149 @@
+// limber-pose: poses a jointed model by handles, frame by frame.
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "limber/articulation/joints_file.h"
+#include "limber/core/error.h"
+#include "limber/mesh_assimp/read_surface_mesh.h"
+#include "limber/model/morph_targets.h"
+#include "limber/posing/handles_file.h"
+#include "limber/posing/pose_recording.h"
+#include "program.h"
+
+namespace limber::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string model, joints, handles, output, obj;
+  double scale = 1.0;
+  PosingOptions options;
+};
+
+void declare(CLI::App& options, Arguments& a) {
+  options.add_option("MODEL", a.model, "surface of all parts: OBJ, STL, PLY, glTF, OFF, 3DS, ...")->required();
+  options.add_option("--joints", a.joints, "joints file of the model, as limber-joints writes it")
+      ->type_name("JOINTS.json")
+      ->required();
+  options.add_option("--handles", a.handles, "what is pinned, soft and pulled, frame by frame")
+      ->type_name("HANDLES.json")
+      ->required();
+  options.add_option("-o,--output", a.output, "write the poses as an animation for any glTF viewer")
+      ->type_name("FILE.glb");
+  options.add_option("--obj", a.obj, "write the surface of each frame: STEM_0000.obj, STEM_0001.obj, ...")
+      ->type_name("STEM");
+  options.add_option("--scale", a.scale, "metres per unit of the model, for the GLB")
+      ->type_name("M")
+      ->check(positive_number())
+      ->capture_default_str();
+  options
+      .add_option("--handle-stiffness", a.options.handle_stiffness, "of handles, in material stiffness times diagonal")
+      ->type_name("K")
+      ->check(positive_number())
+      ->capture_default_str();
+  options
+      .add_option("--tolerance", a.options.tolerance,
+                  "a pose is found when a step moves nothing further; of the diagonal")
+      ->type_name("PART")
+      ->check(positive_number())
+      ->capture_default_str();
+  options.add_option("--iterations", a.options.max_iterations, "most of one frame")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  options.add_flag_callback(
+      "--unweighted-strain", [&a] { a.options.strain = StrainWeights::kUnweighted; },
+      "the strain energy without weights of volume, as in the paper");
+  options.add_flag_callback(
+      "--penalty", [&a] { a.options.formulation = PoseFormulation::kPenalty; },
+      "rigidity, joints and limits as energies with large weights, as in the paper, instead of constraints");
+}
+
+std::string obj_text(const SurfaceMesh& surface, const std::vector<Vec3>& positions) {
+  std::string out;
+  for (const Vec3& p : positions) out += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
+  for (const auto& [i, j, k] : surface.triangles) out += fmt::format("f {} {} {}\n", i + 1, j + 1, k + 1);
+  return out;
+}
+
+Json json_of(const PoseResult& r, double time) {
+  return {{"time", time},
+          {"status", to_string(r.status)},
+          {"iterations", r.iterations},
+          {"energy", r.energy},
+          {"handle_error", r.handle_error},
+          {"joint_error", r.joint_error},
+          {"limit_violation", r.limit_violation}};
+}
+
+void pose(Program& program, const Arguments& a) {
+  if (a.output.empty() && a.obj.empty())
+    throw InvalidArgument("nothing to do: one of --output and --obj is needed; see --help");
+  for (const std::string& file : {a.model, a.joints, a.handles}) program.add_input(file);
+  program.progress().stage("reading");
+  const std::string joints_name = "\"" + std::filesystem::path(a.joints).filename().string() + "\"",
+                    handles_name = "\"" + std::filesystem::path(a.handles).filename().string() + "\"";
+  const GroupedSurface surface = read_any_grouped_surface(a.model, program.warnings());
+  const JointsFile joints = read_joints(a.joints);
+  const HandlesFile handles = read_handles(a.handles);
+  PosingSession session(jointed_model(surface, joints, joints_name), a.options);
+  const std::vector<HandleId> ids = apply_handles(handles, handles_name, session);
+
+  PoseRecording recording(session, a.scale);
+  std::vector<Vec3> positions(session.model().surface.vertices.size());
+  Json& report = program.report();
+  report["parts"] = session.model().parts.size();
+  report["joints"] = session.model().joints.size();
+  report["cells"] = session.cells().size();
+  report["frames"] = Json::array();
+  std::size_t converged = 0;
+  double seconds = 0.0;
+  program.progress().stage("posing");
+  for (std::size_t f = 0; f < handles.frames.size(); ++f) {
+    const HandlesFile::Frame& frame = handles.frames[f];
+    for (const auto& [handle, target] : frame.targets) session.move_handle(ids[handle], target);
+    const auto start = std::chrono::steady_clock::now();
+    const PoseResult result = session.solve();
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (result.status == PoseResult::Status::kInfeasible)
+      throw ComputationError(
+          fmt::format("{} frames[{}]: joints, limits and pins contradict each other", handles_name, f));
+    converged += result.status == PoseResult::Status::kConverged ? 1 : 0;
+    report["frames"].push_back(json_of(result, frame.time));
+    recording.add(frame.time, session);
+    if (!a.obj.empty()) {
+      session.reconstruct(positions);
+      program.write_file(fmt::format("{}_{:04}.obj", a.obj, f), obj_text(session.model().surface, positions));
+    }
+    program.progress().fraction(static_cast<double>(f + 1) / static_cast<double>(handles.frames.size()));
+  }
+  if (!a.output.empty()) program.write_file(a.output, recording.glb());
+  if (recording.most_targets() > static_cast<std::size_t>(kMaxMorphTargets))
+    program.warnings().push_back(
+        fmt::format("A part that bends has {} morph targets, one a frame, but many viewers hold at most {}.",
+                    recording.most_targets(), kMaxMorphTargets));
+  report["seconds"] = {{"posing", seconds}};
+  program.print(fmt::format("{} parts, {} joints, {} cells; {} frames, {} converged\n", session.model().parts.size(),
+                            session.model().joints.size(), session.cells().size(), handles.frames.size(), converged));
+}
+
+}  // namespace
+}  // namespace limber::tools
+
+int main(int argc, char** argv) {
+  using namespace limber::tools;
+  Program program(
+      "limber-pose",
+      "Poses a jointed model: pulls on points of its parts, which turn in their joints within their limits, and "
+      "bend where they are soft. Lengths in the model's own unit, times in seconds.");
+  Arguments arguments;
+  declare(program.options(), arguments);
+  return program.run(argc, argv, [&] { pose(program, arguments); });
+}
