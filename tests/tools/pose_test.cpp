@@ -122,7 +122,7 @@ TEST_F(PoseProgram, WrongFilesAreToldInOneLineAndLeaveNothing) {
   expect_refused(wrong, 1, "\"rigid\", \"uniform\" or \"octree\"");
 
   Json joints = Json::parse(read_file(folder_ / "door.json"));
-  joints["components"][0]["faces"] = {{0, 100000}};
+  joints["components"].back()["faces"][0][1] = 100000;
   write_file(folder_ / "door.json", joints.dump());
   expect_refused(handles_, 1, "is it another model's file?");
 }

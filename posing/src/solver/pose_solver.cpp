@@ -273,13 +273,12 @@ PoseResult PoseSolver::solve(Pose& pose) {
     return result;
   };
   multipliers_.resize(0);
-  if (damping_ > 0.0) factor_.age = kAnew;
   damping_ = 0.0;
+  factor_.age = kAnew;
   factor_.promised = std::numeric_limits<double>::infinity();
   if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
     // What handles resist must not count: joints come first, however far the handles are dragged off by it.
     system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()));
-    factor_.age = kAnew;
   }
   if (!make_feasible(trial)) return tell(Status::kInfeasible, pose);
   start_with_rigid_motion(trial);

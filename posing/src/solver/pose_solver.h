@@ -26,9 +26,8 @@ Feasibility feasibility(const PoseStructure& structure, const Pose& pose);
 /// Each iteration linearises joints and limits and takes the energy's quadratic model (ElasticSystem; with the turning
 /// stiffness of all loads, so that it is Newton's but for negative curvature). The step follows from a dense problem in
 /// the multipliers of joints and limits alone; the trial pose is put back onto the joints and taken if
-/// its energy is lower; else the next step is damped more. Poses between are feasible too. The matrix is made anew when
-/// steps no longer shrink as they should with it, also from one call to the next: most iterations are two
-/// substitutions.
+/// its energy is lower; else the next step is damped more. Poses between are feasible too. The matrix is made
+/// once a call, and anew where steps do not shrink fast enough with it.
 class PoseSolver {
  public:
   /// The structure must outlive the solver.
