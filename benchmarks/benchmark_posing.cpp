@@ -103,7 +103,7 @@ void run(const Case& c, limber::PoseFormulation formulation) {
   if (c.pinned < 0)
     for (const auto& [x, z] : {std::pair(-1, -1), std::pair(-1, 1), std::pair(1, -1), std::pair(1, 1)})
       session.add_handle(0, extreme(c.model, 0, Vec3(x, -3, z)));
-  const limber::HandleId hand = session.add_handle(c.pulled, grip);
+  const limber::PoseHandle hand = session.add_handle(c.pulled, grip);
   const bool paper = formulation == limber::PoseFormulation::kPenalty;
   const int frames = paper ? 3 : 10;
   std::vector<double> per_iteration, per_frame, surface;

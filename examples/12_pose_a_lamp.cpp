@@ -24,7 +24,7 @@ int main(int argc, char** argv) try {
   const limber::Index triangle = lamp.model().parts[static_cast<std::size_t>(shade)].triangles.front();
   const auto vertex = static_cast<std::size_t>(lamp.model().surface.triangles[static_cast<std::size_t>(triangle)][0]);
   const limber::Vec3 grip = lamp.model().surface.vertices[vertex];
-  const limber::HandleId hand = lamp.add_handle(shade, grip);
+  const limber::PoseHandle hand = lamp.add_handle(shade, grip);
   double worst = 0.0;
   for (int frame = 1; frame <= 10; ++frame) {
     lamp.move_handle(hand, grip + 0.05 * frame * limber::Vec3(0.8, 0.2, 0.56));

@@ -94,7 +94,7 @@ void pose(Program& program, const Arguments& a) {
   const JointsFile joints = read_joints(a.joints);
   const HandlesFile handles = read_handles(a.handles);
   PosingSession session(jointed_model(surface, joints, joints_name), a.options);
-  const std::vector<HandleId> ids = apply_handles(handles, handles_name, session);
+  const std::vector<PoseHandle> ids = apply_handles(handles, handles_name, session);
 
   PoseRecording recording(session, a.scale);
   std::vector<Vec3> positions(session.model().surface.vertices.size());

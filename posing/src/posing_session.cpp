@@ -68,7 +68,7 @@ struct PosingSession::Impl {
                             ", expected 0 to " + std::to_string(static_cast<Index>(count) - 1));
   }
 
-  Handle& handle(HandleId id) {
+  Handle& handle(PoseHandle id) {
     const auto found =
         std::find_if(now.handles.begin(), now.handles.end(), [&](const Handle& h) { return h.number == id.number; });
     if (found == now.handles.end())
@@ -171,7 +171,7 @@ PosingSession& PosingSession::operator=(PosingSession&&) noexcept = default;
 const JointedModel& PosingSession::model() const { return impl_->model; }
 const PosingOptions& PosingSession::options() const { return impl_->options; }
 
-HandleId PosingSession::add_handle(Index part, const Vec3& point) {
+PoseHandle PosingSession::add_handle(Index part, const Vec3& point) {
   impl_->require(part, impl_->model.parts.size(), "part");
   require_finite(point, "the handle's point");
   SurfaceMesh surface{impl_->model.surface.vertices, {}};
@@ -195,7 +195,7 @@ HandleId PosingSession::add_handle(Index part, const Vec3& point) {
   return {h.number};
 }
 
-void PosingSession::move_handle(HandleId handle, const Vec3& target) {
+void PosingSession::move_handle(PoseHandle handle, const Vec3& target) {
   require_finite(target, "the handle's target");
   impl_->handle(handle);  // or it throws before anything changes
   if (impl_->last_moved != handle.number) {
@@ -205,13 +205,13 @@ void PosingSession::move_handle(HandleId handle, const Vec3& target) {
   impl_->handle(handle).target = target;
 }
 
-void PosingSession::remove_handle(HandleId handle) {
+void PosingSession::remove_handle(PoseHandle handle) {
   impl_->handle(handle);
   impl_->begin_change();
   std::erase_if(impl_->now.handles, [&](const Handle& h) { return h.number == handle.number; });
 }
 
-Vec3 PosingSession::handle_point(HandleId handle) const { return impl_->place_of(impl_->handle(handle)); }
+Vec3 PosingSession::handle_point(PoseHandle handle) const { return impl_->place_of(impl_->handle(handle)); }
 
 void PosingSession::set_pinned(Index part, bool pinned) {
   impl_->require(part, impl_->model.parts.size(), "part");

@@ -43,7 +43,7 @@ struct Dragged {
   double size;
   Index last;
   Vec3 grip;
-  HandleId handle{};
+  PoseHandle handle{};
 };
 
 double beyond(const Interval& limit, double q) { return std::max({limit.low - q, q - limit.high, 0.0}); }
@@ -197,7 +197,7 @@ TEST(Drags, ARigidMotionOfAllHandlesIsReproduced) {
     PosingSession session(assembly_model("lamp"), {.tolerance = 1e-12});
     const double size = size_of(session.model());
     if (soft) session.set_part(2, {.cells = Subdivision::kUniform, .cell_size = 0.04});
-    std::vector<std::pair<HandleId, Vec3>> handles;
+    std::vector<std::pair<PoseHandle, Vec3>> handles;
     for (Index part = 0; part < 5; ++part)
       for (const Vec3& from : {Vec3(1, 2, 3), Vec3(-3, 1, 0), Vec3(0, -5, 1)}) {
         const Vec3 grip = furthest_point(session.model(), part, from);

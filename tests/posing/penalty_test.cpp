@@ -123,7 +123,7 @@ TEST(PenaltyEnergy, ALampFollowsItsHandleAndLeavesItsJointsAlmostWhole) {
   session.set_pinned(0, true);
   const Index shade = session.model().part_named("shade");
   const Vec3 grip = furthest_point(session.model(), shade, Vec3(-1, -2, -3));
-  const HandleId handle = session.add_handle(shade, grip);
+  const PoseHandle handle = session.add_handle(shade, grip);
   session.move_handle(handle, grip + Vec3(0.03, 0.05, -0.06));
   PoseResult r = session.solve();
   const double before = r.initial_energy;

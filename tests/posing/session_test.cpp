@@ -27,7 +27,7 @@ class Lamp : public ::testing::Test {
   PosingSession session_{assembly_model("lamp")};
   double size_ = size_of(session_.model());
   Vec3 tip_ = furthest_point(session_.model(), session_.model().part_named("shade"), Vec3(-1, -2, -3));
-  HandleId handle_{};
+  PoseHandle handle_{};
 };
 
 TEST_F(Lamp, StandsAtRestUntilItIsPulled) {

@@ -109,7 +109,7 @@ HandlesFile read_handles(const std::filesystem::path& path) {
   return parse_handles(read_file(path), "\"" + path.filename().string() + "\"");
 }
 
-std::vector<HandleId> apply_handles(const HandlesFile& file, const std::string& name, PosingSession& session) {
+std::vector<PoseHandle> apply_handles(const HandlesFile& file, const std::string& name, PosingSession& session) {
   const auto at = [&](const std::string& place, auto&& change) {
     try {
       return change();
@@ -121,7 +121,7 @@ std::vector<HandleId> apply_handles(const HandlesFile& file, const std::string& 
   for (const auto& entry : file.parts)
     at("parts." + entry.first, [&] { session.set_part(model.part_named(entry.first), entry.second); });
   for (const std::string& part : file.pinned) at("pinned", [&] { session.set_pinned(model.part_named(part), true); });
-  std::vector<HandleId> out;
+  std::vector<PoseHandle> out;
   for (const HandlesFile::Handle& h : file.handles)
     out.push_back(at("handles." + h.name, [&] { return session.add_handle(model.part_named(h.part), h.point); }));
   return out;

@@ -34,6 +34,6 @@ HandlesFile read_handles(const std::filesystem::path& path);
 
 /// Sets parts, pins and handles of a session as the file says. @return the handles, in the file's order
 /// @throws InputError naming the place in the file: a part that is not there, a point that is on no surface
-std::vector<HandleId> apply_handles(const HandlesFile& file, const std::string& name, PosingSession& session);
+std::vector<PoseHandle> apply_handles(const HandlesFile& file, const std::string& name, PosingSession& session);
 
 }  // namespace limber

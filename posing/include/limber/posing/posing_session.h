@@ -3,7 +3,7 @@
 ///
 ///   PosingSession lamp(jointed_model(assembly, joints), {.tolerance = 1e-8});
 ///   lamp.set_pinned(lamp.model().part_named("base"), true);
-///   const HandleId hand = lamp.add_handle(lamp.model().part_named("shade"), tip);
+///   const PoseHandle hand = lamp.add_handle(lamp.model().part_named("shade"), tip);
 ///   lamp.move_handle(hand, target);
 ///   const PoseResult result = lamp.solve();
 ///   lamp.reconstruct(positions);
@@ -29,9 +29,9 @@
 namespace limber {
 
 /// Names a handle for as long as it is there; never used again after.
-struct HandleId {
+struct PoseHandle {
   Index number = -1;
-  friend bool operator==(HandleId, HandleId) = default;
+  friend bool operator==(PoseHandle, PoseHandle) = default;
 };
 
 /// A cell as it stands: x at rest is at rotation · (x − centre) + place. Orthonormal but in the penalty form.
@@ -66,12 +66,12 @@ class PosingSession {
 
   /// Grips the point of a part that is at `point` at rest. Its target is where it is now.
   /// @throws InvalidArgument if `point` is not finite or further from the part's surface than a tenth of its diagonal
-  HandleId add_handle(Index part, const Vec3& point);
+  PoseHandle add_handle(Index part, const Vec3& point);
   /// Moves of one handle that follow each other are undone together. @throws InvalidArgument if it is not finite
-  void move_handle(HandleId handle, const Vec3& target);
-  void remove_handle(HandleId handle);
+  void move_handle(PoseHandle handle, const Vec3& target);
+  void remove_handle(PoseHandle handle);
   /// Where a handle's point is.
-  Vec3 handle_point(HandleId handle) const;
+  Vec3 handle_point(PoseHandle handle) const;
 
   /// A pinned part stays where it stands now.
   void set_pinned(Index part, bool pinned);
