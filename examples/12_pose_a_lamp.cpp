@@ -2,7 +2,7 @@
 //   bake:  make_assembly lamp --out lamp.obj
 //   run:   12_pose_a_lamp lamp.obj lamp.joints.json
 //   see:   ten frames of a drag: iterations, how far the shade is from the hand, the joints' angles; the last frames
-//          are out of reach, and nothing comes apart
+//          stretch the soft arm and still settle when their iterations are over, and nothing comes apart
 //   next:  docs/posing.md
 #include <cmath>
 #include <cstdio>
