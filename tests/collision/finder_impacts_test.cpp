@@ -36,7 +36,8 @@ struct MovingScene {
   std::vector<Impact> impacts(ContactSource& finder, Jobs& jobs = serial_jobs()) {
     std::vector<Impact> result;
     point();
-    finder.find_impacts(scene.states(), pointers, kStep, kImpactMargin, result, jobs);
+    finder.find_impacts({.states = scene.states(), .motions = pointers, .step = kStep, .margin = kImpactMargin}, result,
+                        jobs);
     return result;
   }
   void point() {
@@ -107,6 +108,33 @@ TEST(ContactFinderImpacts, ManyBodiesTogetherHaveTheImpactsOfEachPairAloneInOrde
   EXPECT_TRUE(same(moving.impacts(finder, two), alone));
 }
 
+TEST(ContactFinderImpacts, AFewBodiesMeetWhatTheyMeetWhereAllOthersStandStill) {
+  MovingScene moving = flying_balls(150);
+  ContactFinder all, few;
+  moving.scene.add_all_to(all);
+  moving.scene.add_all_to(few);
+  const std::vector<Index> movers{7, 30, 31, 90, 151};
+  moving.point();
+  for (std::size_t i = 0; i < moving.pointers.size(); ++i)
+    if (!std::binary_search(movers.begin(), movers.end(), static_cast<Index>(i))) moving.pointers[i] = nullptr;
+  const std::vector<BodyState> states = moving.scene.states();
+  ImpactQuery query{.states = states, .motions = moving.pointers, .step = kStep, .margin = kImpactMargin};
+  std::vector<Impact> expected, found;
+  all.find_impacts(query, expected, serial_jobs());
+  ASSERT_FALSE(expected.empty());
+  std::vector<ContactPoint> contacts;
+  few.find_contacts({.states = states}, contacts, serial_jobs());
+  query.bodies = movers;
+  few.find_impacts(query, found, serial_jobs());
+  EXPECT_TRUE(same(found, expected));
+
+  const std::vector<std::pair<Index, Index>> known{{expected.front().a, expected.front().b}};
+  query.except = known;
+  few.find_impacts(query, found, serial_jobs());
+  expected.erase(expected.begin());
+  EXPECT_TRUE(same(found, expected));
+}
+
 TEST(ContactFinderImpacts, WhatTouchesAlreadyOrStandsStillIsNoImpact) {
   MovingScene moving;
   moving.add_still(HalfSpace{}, {});
@@ -158,7 +186,8 @@ TEST(ContactFinderImpacts, AWarmQueryAllocatesNothing) {
   const auto& states = moving.scene.states();
   std::vector<Impact> impacts;
   const auto query = [&] {
-    finder.find_impacts(states, moving.pointers, kStep, kImpactMargin, impacts, serial_jobs());
+    finder.find_impacts({.states = states, .motions = moving.pointers, .step = kStep, .margin = kImpactMargin}, impacts,
+                        serial_jobs());
   };
   query();
   const long before = testing::allocations();
@@ -175,7 +204,8 @@ TEST(ContactFinderImpacts, WrongMotionsAreRefused) {
   std::vector<Impact> impacts;
   const auto& states = moving.scene.states();
   const auto find = [&](double step, double margin) {
-    finder.find_impacts(states, moving.pointers, step, margin, impacts, serial_jobs());
+    finder.find_impacts({.states = states, .motions = moving.pointers, .step = step, .margin = margin}, impacts,
+                        serial_jobs());
   };
   EXPECT_NO_THROW(find(kStep, kImpactMargin));
   EXPECT_THROW(find(2.0 * kStep, kImpactMargin), InvalidArgument);  // the motions end before

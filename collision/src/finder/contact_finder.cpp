@@ -120,6 +120,8 @@ void check_state(Index index, const FoundBody& body, const BodyState& state) {
     refuse(index, "displacement or rotation is not finite", "finite numbers");
   if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
     refuse(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
+  if (!(state.look_ahead >= 0.0))
+    refuse(index, "look_ahead is " + std::to_string(state.look_ahead), "a number of at least 0");
   if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
     refuse(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
 }
@@ -134,6 +136,9 @@ void bind_state(DeformedSurface& surface, Index index, const FoundBody& body, st
     refuse(index, e.what(), "smaller amplitudes");
   }
 }
+
+/// How far contacts are looked for, where features decide.
+double reach_of_features(const BodyState& state) { return std::min(state.reach, state.look_ahead); }
 
 void check_length(const char* name, double length) {
   if (!(length >= 0.0 && std::isfinite(length)))
@@ -162,17 +167,20 @@ struct ContactFinder::Impl {
   // Of the query under way.
   std::span<const BodyState> states;
   std::span<const ExactMotion* const> motions;  ///< none where contacts are asked for
+  std::span<const Index> some;                  ///< the bodies that are asked for; none: all
+  double farthest_beyond = 0.0;                 ///< by how much a reach exceeds that of features
   double step = 0.0, margin = 0.0;
   Vec3 origin = Vec3::Zero();
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
+  std::vector<Index> near;                       ///< one body
   std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
   std::vector<ImpactTime> times;                 ///< by pair
 
   // Of the last query, ascending.
-  std::vector<PairIds> kept_pairs;
-  std::vector<std::uint64_t> kept_ids;
+  std::vector<PairIds> kept_pairs, last_pairs;
+  std::vector<std::uint64_t> kept_ids, last_ids;
 
   FoundBody& present(Index body, const char* function) {
     if (!contains(body))
@@ -194,13 +202,15 @@ struct ContactFinder::Impl {
   bool stays_in_place(Index body, const BodyState& state) const;
   void check_and_list();
   void check_motion(Index index) const;
+  void check_place(Index index);
   void find_near_pairs(Jobs& jobs);
+  void find_pairs_of_some();
   void make_boxes(Jobs& jobs);
   void make_box(std::size_t entry, Worker& worker);
   Aabb swept_box(Index index, Worker& worker) const;
   void place();
   void merge_self_pairs();
-  void drop_still_pairs();
+  void drop_pairs(std::span<const std::pair<Index, Index>> except);
   void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
   void find_in_pair(const BodyPair& pair, Worker& worker, std::vector<ContactPoint>& contacts) const;
@@ -208,6 +218,8 @@ struct ContactFinder::Impl {
   double spacing(const BodyPair& pair) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
+  void keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids);
+  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
   void find_impacts_in_pairs(Jobs& jobs);
   ImpactTime find_impact(const BodyPair& pair, Worker& worker) const;
   MovingBody moving_body(Index index) const;
@@ -229,20 +241,24 @@ bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
 /// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
 void ContactFinder::Impl::check_and_list() {
   to_place.clear();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    if (!bodies[i].present) continue;
-    const auto index = static_cast<Index>(i);
-    if (motion(index) != nullptr) {
-      check_motion(index);
-    } else {
-      if (i >= states.size())
-        throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
-                              std::to_string(i) + " too");
-      if (stays_in_place(index, states[i])) continue;
-      check_state(index, bodies[i], states[i]);
-    }
-    to_place.push_back(index);
+  for (std::size_t i = 0; some.empty() && i < bodies.size(); ++i)
+    if (bodies[i].present) check_place(static_cast<Index>(i));
+  for (const Index index : some)
+    if (contains(index)) check_place(index);
+}
+
+void ContactFinder::Impl::check_place(Index index) {
+  const auto i = static_cast<std::size_t>(index);
+  if (motion(index) != nullptr) {
+    check_motion(index);
+  } else {
+    if (i >= states.size())
+      throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
+                            std::to_string(i) + " too");
+    if (stays_in_place(index, states[i])) return;
+    check_state(index, bodies[i], states[i]);
   }
+  to_place.push_back(index);
 }
 
 void ContactFinder::Impl::check_motion(Index index) const {
@@ -270,9 +286,9 @@ void ContactFinder::Impl::make_box(std::size_t entry, Worker& worker) {
     boxes[entry] = swept_box(index, worker);
   } else if (body.modal) {
     bind_state(worker.root, index, body, state(index).amplitudes);
-    boxes[entry] = world_box(worker.root.bounds(0), state(index).pose).grown(state(index).reach);
+    boxes[entry] = world_box(worker.root.bounds(0), state(index).pose).grown(reach_of_features(state(index)));
   } else if (!body.is_half_space()) {
-    boxes[entry] = world_box(*body.rigid, state(index).pose).grown(state(index).reach);
+    boxes[entry] = world_box(*body.rigid, state(index).pose).grown(reach_of_features(state(index)));
   }
 }
 
@@ -290,6 +306,10 @@ Aabb ContactFinder::Impl::swept_box(Index index, Worker& worker) const {
 }
 
 void ContactFinder::Impl::place() {
+  farthest_beyond = 0.0;
+  for (const Index index : to_place)
+    if (motion(index) == nullptr)
+      farthest_beyond = std::max(farthest_beyond, state(index).reach - reach_of_features(state(index)));
   for (std::size_t i = 0; i < to_place.size(); ++i) {
     const Index index = to_place[i];
     FoundBody& body = at(index);
@@ -312,8 +332,23 @@ void ContactFinder::Impl::find_near_pairs(Jobs& jobs) {
   workers.start_query(options, jobs.concurrency());
   make_boxes(jobs);
   place();
-  broad_phase.find_pairs(margin, pairs, jobs);
+  if (some.empty())
+    broad_phase.find_pairs(margin, margin + farthest_beyond, pairs, jobs);
+  else
+    find_pairs_of_some();
   check_sleepers_in_pairs();
+}
+
+void ContactFinder::Impl::find_pairs_of_some() {
+  pairs.clear();
+  for (std::size_t i = 0; i < to_place.size(); ++i) {
+    const Index index = to_place[i];
+    near.clear();
+    broad_phase.find_near(index, margin, margin + farthest_beyond, near);
+    for (const Index other : near)
+      if (index < other || !asked_for(other)) pairs.push_back({std::min(index, other), std::max(index, other)});
+  }
+  std::sort(pairs.begin(), pairs.end());
 }
 
 /// Bodies that find themselves and are awake, among the pairs in their order.
@@ -322,7 +357,7 @@ void ContactFinder::Impl::merge_self_pairs() {
   merged_pairs.clear();
   auto next = pairs.begin();
   for (const Index body : self_touching) {
-    if (state(body).asleep) continue;
+    if (state(body).asleep || !asked_for(body)) continue;
     const BodyPair self{body, body};
     for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
     merged_pairs.push_back(self);
@@ -376,7 +411,9 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
   if (pair.a == pair.b) {
     worker.narrow.find_self_contacts(a, margin, origin, contacts);
   } else {
-    const double reaches = state(pair.a).reach + state(pair.b).reach;
+    const bool plane = at(pair.a).is_half_space() || at(pair.b).is_half_space();
+    const BodyState &s = state(pair.a), &t = state(pair.b);
+    const double reaches = plane ? s.reach + t.reach : reach_of_features(s) + reach_of_features(t);
     worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
@@ -395,21 +432,40 @@ void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   });
 }
 
-void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
-  contacts.clear();
-  for (const auto& some : found) contacts.insert(contacts.end(), some.begin(), some.end());
-  kept_pairs.clear();
-  kept_ids.clear();
-  for (const ContactPoint& c : contacts) {
-    const BodyPair pair{c.a.body, c.b.body};
-    if (kept_pairs.empty() || kept_pairs.back().pair != pair) kept_pairs.push_back({pair, kept_ids.size(), 0});
-    ++kept_pairs.back().count;
-    kept_ids.push_back(c.id);
-  }
+void ContactFinder::Impl::keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids) {
+  if (kept_pairs.empty() || kept_pairs.back().pair != pair) kept_pairs.push_back({pair, kept_ids.size(), 0});
+  kept_pairs.back().count += ids.size();
+  kept_ids.insert(kept_ids.end(), ids.begin(), ids.end());
 }
 
-void ContactFinder::Impl::drop_still_pairs() {
-  std::erase_if(pairs, [&](const BodyPair& pair) { return motion(pair.a) == nullptr && motion(pair.b) == nullptr; });
+/// What was kept of pairs that nobody asks for stays among the rest, in their order.
+void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
+  contacts.clear();
+  for (const auto& some_contacts : found) contacts.insert(contacts.end(), some_contacts.begin(), some_contacts.end());
+  kept_pairs.swap(last_pairs);
+  kept_ids.swap(last_ids);
+  kept_pairs.clear();
+  kept_ids.clear();
+  auto last = last_pairs.begin();
+  const auto keep_others = [&](const BodyPair* before) {
+    for (; !some.empty() && last != last_pairs.end() && (before == nullptr || last->pair < *before); ++last)
+      if (!asked_for(last->pair.a) && !asked_for(last->pair.b))
+        keep_ids(last->pair, std::span(last_ids).subspan(last->first, last->count));
+  };
+  for (const ContactPoint& c : contacts) {
+    const BodyPair pair{c.a.body, c.b.body};
+    keep_others(&pair);
+    keep_ids(pair, {&c.id, 1});
+  }
+  keep_others(nullptr);
+}
+
+/// What stands still, and what nobody asks for.
+void ContactFinder::Impl::drop_pairs(std::span<const std::pair<Index, Index>> except) {
+  std::erase_if(pairs, [&](const BodyPair& pair) {
+    return (motion(pair.a) == nullptr && motion(pair.b) == nullptr) ||
+           std::ranges::binary_search(except, std::pair(pair.a, pair.b));
+  });
 }
 
 MovingBody ContactFinder::Impl::moving_body(Index index) const {
@@ -499,6 +555,7 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
     throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
   m.states = query.states;
   m.motions = {};
+  m.some = query.bodies;
   m.margin = query.margin;
   m.origin = query.origin;
   m.find_near_pairs(jobs);
@@ -507,17 +564,17 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   m.gather(contacts);
 }
 
-void ContactFinder::find_impacts(std::span<const BodyState> states, std::span<const ExactMotion* const> motions,
-                                 double step, double margin, std::vector<Impact>& impacts, Jobs& jobs) {
+void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) {
   Impl& m = *impl_;
-  check_length("step", step);
-  check_length("margin", margin);
-  m.states = states;
-  m.motions = motions;
-  m.step = step;
-  m.margin = margin;
+  check_length("step", query.step);
+  check_length("margin", query.margin);
+  m.states = query.states;
+  m.motions = query.motions;
+  m.some = query.bodies;
+  m.step = query.step;
+  m.margin = query.margin;
   m.find_near_pairs(jobs);
-  m.drop_still_pairs();
+  m.drop_pairs(query.except);
   m.find_impacts_in_pairs(jobs);
   m.gather(impacts);
 }

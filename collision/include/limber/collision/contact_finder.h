@@ -61,8 +61,7 @@ class ContactFinder final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  void find_impacts(std::span<const BodyState> states, std::span<const ExactMotion* const> motions, double step,
-                    double margin, std::vector<Impact>& impacts, Jobs& jobs) override;
+  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
 
  private:
   struct Impl;

@@ -5,8 +5,10 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "limber/core/jobs.h"
@@ -40,6 +42,10 @@ struct BodyState {
   /// How far any of its points may come beyond this state, m, ≥ 0: contacts up to the sum of both bodies' reaches (and
   /// the query's margin) are found, so what a step may bring together is there before it.
   double reach = 0.0;
+  /// How far ahead a contact is worth finding: it is a plane between features, good near them alone. Where `reach` is
+  /// larger, contacts up to here are found in its place, but for half-spaces, which are planes for good; what comes
+  /// together beyond is a matter of find_impacts(). m, ≥ 0.
+  double look_ahead = std::numeric_limits<double>::infinity();
   /// The free motion expected until the next query: of the body origin, m, and the rotation vector, rad; world. A
   /// source may choose normals by it for what is apart but would be passed; zero: nothing moves.
   Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
@@ -50,6 +56,20 @@ struct ContactQuery {
   std::span<const BodyState> states{};  ///< by body index; entries of indices that hold no body are not read
   double margin = 0.0;                  ///< m, ≥ 0: gaps up to here are contacts
   Vec3 origin = Vec3::Zero();           ///< world; positions come out relative to it
+  /// Ascending; none: all. Otherwise only pairs of these bodies are looked at, among each other and with those that do
+  /// not move; all else is as it was in the last query.
+  std::span<const Index> bodies{};
+};
+
+struct ImpactQuery {
+  std::span<const BodyState> states{};            ///< by body index: where those are that have no motion
+  std::span<const ExactMotion* const> motions{};  ///< by body index; null: no such body, or one that does not move
+  double step = 0.0;                              ///< s, ≥ 0, at most that of the motions
+  double margin = 0.0;                            ///< m, ≥ 0: bodies this near each other touch
+  /// Ascending; none: all that have a motion. Otherwise these alone have one, and all others stand where they were in
+  /// the last query of all contacts, or within their reach of it: a few bodies cost what they meet.
+  std::span<const Index> bodies{};
+  std::span<const std::pair<Index, Index>> except{};  ///< (a, b), a < b, ascending: pairs that are not looked at
 };
 
 /// One body's side of a contact.
@@ -102,9 +122,7 @@ class ContactSource {
 
   /// First times within [0, step] at which bodies that are farther apart than `margin` come within it, by conservative
   /// advancement on the exact motion; ordered by (time, a, b).
-  /// @param motions by body index; null: no such body, or one that does not move (`states` has its place)
-  virtual void find_impacts(std::span<const BodyState> states, std::span<const ExactMotion* const> motions, double step,
-                            double margin, std::vector<Impact>& impacts, Jobs& jobs) = 0;
+  virtual void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) = 0;
 };
 
 }  // namespace limber
