@@ -185,12 +185,13 @@ void ContactSet::finish(std::span<const char> asleep) {
     }
   s.remember(asleep);
   s.dents.finish(asleep);
-  s.strikes.clear();
+  std::erase_if(s.strikes, [&](const StrikeMemory& m) { return !rests(asleep, m.a, m.b); });
   for (std::size_t i = 0; i < s.pairs_used; ++i)
     if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
       const auto [a, b] = s.pairs[i]->bodies();
       s.strikes.push_back({a, b, lasted});
     }
+  std::ranges::sort(s.strikes, by_pair);
   std::sort(s.events.begin(), s.events.end(), by_id);
 }
 

@@ -242,14 +242,20 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded, 
     }
 }
 
-void BodyGroup::predict_motion(Index slot, const Vec3& gravity, double h, ExactMotion& motion) const {
+/// @param answers of the modes to the load's impulse, where it has one
+void BodyGroup::predict_motion(Index slot, const Vec3& gravity, double h, const ConstraintLoad& constrained,
+                               std::span<const double> answers, ExactMotion& motion) const {
   const Body& b = body(slot);
-  const FrameLoad load{gravity, b.force, b.torque};
+  const FrameLoad load{gravity, b.force + constrained.force, b.torque + constrained.torque};
   const ModalModelData& data = model_->data();
   RigidFrame frame = b.frame;
+  if (!constrained.impulse.isZero(0.0) || !constrained.moment.isZero(0.0))
+    frame.apply_impulse(constants_, constrained.impulse, constrained.moment);
   const FrameExcitation excitation = frame.begin_step(constants_, load, first_moment(slot), h, &motion.path());
   motion.set_modes(data.eigenvalues, data.decays, amplitudes(slot), rates(slot));
   if (b.modes_loaded) std::ranges::copy(forces_.modes(slot), motion.forces().begin());
+  for (std::size_t i = 0; i < constrained.modal.size(); ++i)
+    motion.forces()[i] += answers[i] * constrained.modal[i] / h;
   if (!couplings_.empty()) excite_modes(motion.forces().data(), excitation);
   if (b.modes_static) motion.release(static_amplitudes(slot));
   for (const DelayedImpulse& impulse : b.delayed)

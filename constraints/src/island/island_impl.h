@@ -33,6 +33,7 @@ struct IslandSolver::Impl {
   std::vector<double> slip, impulses;  // by row
 
   // The step in parts.
+  void take_watched(internal::StepPart part, IslandReport& report);
   void take_cut(internal::StepPart part, IslandReport& report);
   void take_divided(internal::StepPart part, IslandReport& report);
   double next_cut(const internal::StepPart& part);

@@ -40,11 +40,32 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
   IslandReport report{.bodies = static_cast<int>(members.size())};
   const StepPart whole{
       .table = table, .members = members, .constraints = constraints, .options = options, .whole_step = options.step};
-  if (may_divide(whole))
+  if (options.watch != nullptr)
+    impl_->take_watched(whole, report);
+  else if (may_divide(whole))
     impl_->take_divided(whole, report);
   else
     impl_->take_cut(whole, report);
   return report;
+}
+
+/// One part, as long as the watch lets it be. A shorter one is another motion, which the watch is shown in its turn.
+void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
+  constexpr int kMostLooks = 8;
+  constexpr double kShortest = 1e-9;  // of the whole step: less is no motion
+  IslandOptions& options = part.options;
+  if (options.whole_step > 0.0) part.whole_step = options.whole_step;
+  part.begins = options.begins, part.ends = false;
+  IslandReport done;
+  for (int looks = 1;; ++looks) {
+    done = foresee_guarded(part);
+    const double clear = options.watch->clear_until({part.members, step.motions}, options.step);
+    if (!(clear < options.step) || looks == kMostLooks) break;
+    if (clear < kShortest * part.whole_step) return;
+    options.step = clear;
+  }
+  report.taken = options.step;
+  commit(part, done, report);
 }
 
 /// A step, in parts where impacts begin or let go.

@@ -115,6 +115,8 @@ void IslandStep::predict() {
 }
 
 void IslandStep::predict_under_loads() {
+  if (part.options.watch != nullptr && motions.size() < static_cast<std::size_t>(bodies.count()))
+    motions.resize(static_cast<std::size_t>(bodies.count()));
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
@@ -127,6 +129,9 @@ void IslandStep::predict_under_loads() {
       gravity = -body.group->held_force(body.slot) / c.mass;
     }
     body.group->predict(body.slot, gravity, load, bodies.modal_step(local));
+    if (part.options.watch != nullptr)
+      body.group->predict_motion(body.slot, gravity, load, bodies.modal_step(local),
+                                 motions[static_cast<std::size_t>(local)]);
   }
   measure(StepTime::kEnd, gap);
 }

@@ -68,6 +68,7 @@ struct IslandStep {
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
   std::vector<double> touch_impulse;           // N·s, before the step
   IslandLoads loads;
+  std::vector<ExactMotion> motions;  // by body, under the loads; where there is a watch
 
   /// Linearises the rows. All impulses are zero.
   void begin(const StepPart& of);

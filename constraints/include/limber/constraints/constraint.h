@@ -28,12 +28,21 @@ class BodyStates {
   std::span<const ConstrainedBody> table_;
 };
 
-/// How the bodies of an island would go through the rest of a step if nothing touched them.
+/// How the bodies of an island would go through the rest of a step: if nothing touched them, or as it is told.
 struct FreeMotions {
   std::span<const Index> members;        ///< bodies, ascending
   std::span<const ExactMotion> motions;  ///< one for each
   /// Null: the body stands still.
   const ExactMotion* of(Index body) const;
+};
+
+/// Looks at a motion before it happens.
+class MotionWatch {
+ public:
+  virtual ~MotionWatch() = default;
+  /// @param motions of an island's members over the coming step, constraint forces and all
+  /// @return how far they may go, s; their length or more: all the way
+  virtual double clear_until(const FreeMotions& motions, double length) = 0;
 };
 
 /// Rows with one owner, who knows their true gaps. In every step the solver calls add_rows() at its start, gaps() after

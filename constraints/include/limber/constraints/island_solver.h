@@ -50,11 +50,18 @@ struct IslandOptions {
   /// J: the energy error carried over from the last step, IslandReport::energy_surplus; at most 1e-7 of the energies
   /// at hand, of bodies that had no motion to take it from.
   double energy_surplus = 0.0;
+
+  // For a step that is one of several parts of a longer one. A watch is shown each motion that is found; where it may
+  // not go all the way, a shorter part is taken, until the watch is content. There are no other cuts then.
+  MotionWatch* watch = nullptr;
+  double whole_step = 0.0;  ///< s; 0: `step` is the whole one
+  bool begins = true;       ///< the whole step
 };
 
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
+  double taken = 0.0;  ///< s, where there is a watch; 0: it lets nothing go on, and nothing has been done
   StepAttempts attempts{};
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most

@@ -104,7 +104,15 @@ class BodyGroup {
     predict_motion(slot, gravity, step_length(), motion);
   }
   /// The same over another length, s: what is left of a step that is cut.
-  void predict_motion(Index slot, const Vec3& gravity, double length, ExactMotion& motion) const;
+  void predict_motion(Index slot, const Vec3& gravity, double length, ExactMotion& motion) const {
+    predict_motion(slot, gravity, length, {}, {}, motion);
+  }
+  /// The same under `load`: how the body gets to where predict() with the same arguments says that it ends. Modes that
+  /// answer statically come to their answer at the end alone.
+  void predict_motion(Index slot, const Vec3& gravity, const ConstraintLoad& load, const ModalStep& modes,
+                      ExactMotion& motion) const {
+    predict_motion(slot, gravity, modes.length(), load, modes.velocity_response(), motion);
+  }
 
   /// Whether advance() leaves the body alone: it is predicted and committed by whoever solves its constraints.
   void set_constrained(Index slot, bool constrained) { body(slot).constrained = constrained; }
@@ -210,6 +218,8 @@ class BodyGroup {
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
   const Body& body(Index slot) const { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
+  void predict_motion(Index slot, const Vec3& gravity, double length, const ConstraintLoad& load,
+                      std::span<const double> answers, ExactMotion& motion) const;
   void advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const;
   void excite_modes(double* forces, const FrameExcitation& excitation) const;
   void leave_static_answer(Index slot, double* z) const;
