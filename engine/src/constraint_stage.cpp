@@ -11,6 +11,7 @@ void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
     table_.resize(i + 1);
     disturbed_.resize(i + 1);
     asleep_.resize(i + 1);
+    held_back_.resize(i + 1);
     surplus_.resize(i + 1);
   }
   table_[i] = at;
@@ -88,10 +89,14 @@ void ConstraintStage::set_asleep(Index body, bool asleep) {
 
 /// Bodies of islands that are no more advance by themselves again.
 void ConstraintStage::release_bodies() {
-  for (const Index body : members_)
-    if (moves(body))
-      table_[static_cast<std::size_t>(body)].group->set_constrained(table_[static_cast<std::size_t>(body)].slot, false);
+  set_constrained(members_, false);
   members_.clear();
+}
+
+void ConstraintStage::set_constrained(std::span<const Index> bodies, bool constrained) {
+  for (const Index body : bodies)
+    if (const ConstrainedBody& at = table_[static_cast<std::size_t>(body)]; at.group != nullptr)
+      at.group->set_constrained(at.slot, constrained);
 }
 
 void ConstraintStage::set_contacts(std::span<Constraint* const> contacts) {
@@ -103,6 +108,7 @@ void ConstraintStage::find_islands() {
   if (!stale_) return;
   stale_ = false;
   release_bodies();
+  set_constrained(held_bodies_, true);
   islands_.clear();
   constraints_.clear();
   reports_.clear();
@@ -121,8 +127,7 @@ void ConstraintStage::find_islands() {
   number_islands();
   list_members();
   list_constraints();
-  for (const Index body : members_)
-    table_[static_cast<std::size_t>(body)].group->set_constrained(table_[static_cast<std::size_t>(body)].slot, true);
+  set_constrained(members_, true);
   if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
   reports_.assign(islands_.size(), {});
 }
@@ -186,6 +191,47 @@ void ConstraintStage::list_constraints() {
       constraints_[island->first_constraint + island->constraints++] = constraint;
 }
 
+void ConstraintStage::hold_back(std::span<const Index> bodies) {
+  held_bodies_.assign(bodies.begin(), bodies.end());
+  for (const Index body : bodies) held_back_[static_cast<std::size_t>(body)] = 1;
+  stale_ = stale_ || !bodies.empty();
+  together_report_ = {};
+}
+
+void ConstraintStage::let_go() {
+  set_constrained(held_bodies_, false);
+  for (const Index body : held_bodies_) held_back_[static_cast<std::size_t>(body)] = 0;
+  held_bodies_.clear();
+  stale_ = true;
+}
+
+double ConstraintStage::step_together(std::span<const Index> members, std::span<Constraint* const> contacts,
+                                      const IslandOptions& options) {
+  together_.clear();
+  for (const Entry& entry : entries_)
+    if (Constraint* constraint = entry.constraint())
+      if (std::ranges::any_of(constraint->bodies(),
+                              [&](Index body) { return std::ranges::binary_search(members, body); }))
+        together_.push_back(constraint);
+  together_.insert(together_.end(), contacts.begin(), contacts.end());
+  IslandOptions own = options;
+  for (const Index body : members) own.energy_surplus += surplus_[static_cast<std::size_t>(body)];
+  const IslandReport report = together_solver_.step(table_, members, together_, own);
+  for (const Index body : members) {
+    disturbed_[static_cast<std::size_t>(body)] = false;
+    surplus_[static_cast<std::size_t>(body)] = report.energy_surplus / static_cast<double>(members.size());
+  }
+  add_report(report, together_report_);
+  return report.taken;
+}
+
+void ConstraintStage::end_together(std::span<const Index> members) {
+  for (const Index body : members) {
+    const ConstrainedBody& at = table_[static_cast<std::size_t>(body)];
+    at.group->commit(at.slot, false, true);
+  }
+}
+
 void ConstraintStage::step(Jobs& jobs, const IslandOptions& options) {
   if (islands_.empty()) return;
   options_ = options;
@@ -215,20 +261,22 @@ void ConstraintStage::step_island(std::size_t island, const IslandOptions& optio
 }
 
 IslandReport ConstraintStage::report() const {
-  IslandReport sum;
-  for (const IslandReport& r : reports_) {
-    if (r.status != SolveStatus::kSolved) sum.status = r.status;
-    sum.bodies += r.bodies;
-    sum.rows += r.rows;
-    sum.attempts.add(r.attempts);
-    sum.programs.add(r.programs);
-    sum.iterations = std::max(sum.iterations, r.iterations);
-    sum.newton_steps = std::max(sum.newton_steps, r.newton_steps);
-    sum.change = std::max(sum.change, r.change);
-    sum.energy_removed += r.energy_removed;
-    sum.energy_surplus += r.energy_surplus;
-  }
+  IslandReport sum = together_report_;
+  for (const IslandReport& r : reports_) add_report(r, sum);
   return sum;
+}
+
+void ConstraintStage::add_report(const IslandReport& r, IslandReport& sum) {
+  if (r.status != SolveStatus::kSolved) sum.status = r.status;
+  sum.bodies += r.bodies;
+  sum.rows += r.rows;
+  sum.attempts.add(r.attempts);
+  sum.programs.add(r.programs);
+  sum.iterations = std::max(sum.iterations, r.iterations);
+  sum.newton_steps = std::max(sum.newton_steps, r.newton_steps);
+  sum.change = std::max(sum.change, r.change);
+  sum.energy_removed += r.energy_removed;
+  sum.energy_surplus += r.energy_surplus;
 }
 
 }  // namespace limber::internal

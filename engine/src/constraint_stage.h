@@ -50,6 +50,17 @@ class ConstraintStage {
   /// Advances all islands.
   void step(Jobs& jobs, const IslandOptions& options);
 
+  // Bodies that take the step by themselves.
+  /// They and the constraints on them are left alone by what is above. @param bodies ascending by clusters
+  void hold_back(std::span<const Index> bodies);
+  /// All of those that were held back take part again.
+  void let_go();
+  /// Advances some of them, as one problem, by one part of a step. @return its length, s
+  double step_together(std::span<const Index> members, std::span<Constraint* const> contacts,
+                       const IslandOptions& options);
+  /// After the last part.
+  void end_together(std::span<const Index> members);
+
   /// Sums over the islands of the last step.
   IslandReport report() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
@@ -73,10 +84,15 @@ class ConstraintStage {
   void list_constraints();
   void step_island(std::size_t island, const IslandOptions& options);
   void release_bodies();
-  bool acts(Index body) const { return moves(body) && asleep_[static_cast<std::size_t>(body)] == 0; }
+  bool acts(Index body) const {
+    return moves(body) && asleep_[static_cast<std::size_t>(body)] == 0 &&
+           held_back_[static_cast<std::size_t>(body)] == 0;
+  }
+  void set_constrained(std::span<const Index> bodies, bool constrained);
+  static void add_report(const IslandReport& report, IslandReport& sum);
 
   std::vector<ConstrainedBody> table_;
-  std::vector<char> asleep_;
+  std::vector<char> asleep_, held_back_;
   std::vector<char> disturbed_;  // char: written by different threads
   std::vector<double> surplus_;  // per body: its share of its island's
   std::vector<Entry> entries_;
@@ -92,6 +108,10 @@ class ConstraintStage {
   std::vector<Constraint*> constraints_;
   std::vector<IslandSolver> solvers_;  // one per island
   std::vector<IslandReport> reports_;
+  std::vector<Index> held_bodies_;
+  std::vector<Constraint*> together_;
+  IslandSolver together_solver_;
+  IslandReport together_report_;  // of all their parts
   IslandOptions options_;
 };
 

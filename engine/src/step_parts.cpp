@@ -114,11 +114,12 @@ void StepParts::finish() {
   }
 }
 
+void StepParts::begin_events() {
+  merged_.clear();
+  std::swap(events_, last_events_);
+}
+
 void StepParts::add_events(int part, std::span<const ContactEvent> events) {
-  if (part == 0) {
-    merged_.clear();
-    std::swap(events_, last_events_);
-  }
   const std::size_t known = merged_.size();
   for (const ContactEvent& event : events) {
     const auto end = merged_.begin() + static_cast<std::ptrdiff_t>(known);
@@ -129,7 +130,6 @@ void StepParts::add_events(int part, std::span<const ContactEvent> events) {
       merged_.push_back(first_part(event, part));
   }
   std::sort(merged_.begin(), merged_.end(), kById);
-  if (part + 1 == parts_) tell_events();
 }
 
 StepParts::Merged StepParts::first_part(const ContactEvent& event, int part) const {
@@ -153,7 +153,7 @@ void StepParts::add_part(const ContactEvent& event, Merged& merged) {
 }
 
 /// What pressed in any part; and what has let go since it was last told to press.
-void StepParts::tell_events() {
+void StepParts::end_events() {
   events_.clear();
   for (const ContactEvent& event : released_)
     if (!std::binary_search(merged_.begin(), merged_.end(), event, kById)) {

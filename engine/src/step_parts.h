@@ -33,9 +33,11 @@ class StepParts {
   /// After the last one.
   void finish();
 
-  /// Takes the events of one part; after the last, events() are those of the step: one for each contact that pressed in
-  /// any part, with the sum of its impulses and the place where it pressed last.
+  /// Events of a step: begin, those of each part in turn, end. Then events() are those of the step: one for each
+  /// contact that pressed in any part, with the sum of its impulses and the place where it pressed last.
+  void begin_events();
   void add_events(int part, std::span<const ContactEvent> events);
+  void end_events();
   std::span<const ContactEvent> events() const { return events_; }
 
  private:
@@ -63,7 +65,6 @@ class StepParts {
   void lead_handles(int part);
   Merged first_part(const ContactEvent& event, int part) const;
   static void add_part(const ContactEvent& event, Merged& merged);
-  void tell_events();
 
   ConstraintStage* constraints_;
   int parts_;

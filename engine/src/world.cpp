@@ -44,6 +44,7 @@ namespace limber {
 namespace {
 
 using internal::DentedSurface;
+using internal::extent_of;
 using internal::require_count;
 using internal::require_finite;
 using internal::require_pose;
@@ -57,24 +58,6 @@ double checked(std::optional<double> friction, const char* function) {
     throw InvalidArgument(std::string("World::") + function + ": friction is " + std::to_string(*friction) +
                           ", expected a finite number of at least 0");
   return friction.value_or(kNotGiven);
-}
-
-/// Of a ball about the body origin that holds all of a shape, m.
-double radius_of(const Shape& shape) {
-  const auto farthest = [](const std::vector<Vec3>& points) {
-    double r = 0.0;
-    for (const Vec3& p : points) r = std::max(r, p.norm());
-    return r;
-  };
-  if (const auto* ball = std::get_if<Sphere>(&shape)) return ball->radius;
-  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius + capsule->half_length;
-  if (const auto* box = std::get_if<Box>(&shape)) return box->half_extents.norm();
-  if (const auto* hull = std::get_if<ConvexHull>(&shape)) return farthest(hull->points);
-  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return farthest(mesh->vertices);
-  const auto& field = std::get<HeightField>(shape);
-  double height = 0.0;
-  for (const float h : field.heights) height = std::max(height, std::abs(static_cast<double>(h)));
-  return Vec3((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y, height).norm();
 }
 
 }  // namespace
@@ -124,6 +107,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
     if (std::holds_alternative<HalfSpace>(*placement.shape))
       throw InvalidArgument("World::add_body: the shape is a half-space, expected one that ends");
   }
+  const internal::ShapeExtent extent = placement.shape ? extent_of(*placement.shape) : extent_of(*model);
   const Index group = impl_->group_of(std::move(model));
   const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
                                                                          placement.angular_velocity);
@@ -132,7 +116,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
                                   .shape = placement.shape,
                                   .filter = placement.filter,
                                   .friction = friction,
-                                  .radius = placement.shape ? radius_of(*placement.shape) : 0.0});
+                                  .extent = extent});
   impl_->constraints.set_body(static_cast<Index>(id.index),
                               {.group = &impl_->group(impl_->entries[id.index]), .slot = slot});
   impl_->sleep.add(static_cast<Index>(id.index));

@@ -2,6 +2,7 @@
 //
 //   world.cpp              bodies, time and loads
 //   world_step.cpp         a step, contacts on the way to the islands
+//   world_passing.cpp      bodies that come farther than contacts are looked for
 //   world_constraints.cpp  handles, joints, the source of contacts
 //   world_state.cpp        what can be read and set of bodies, and the hash of all of it
 //   world_drawing.cpp      surfaces between two steps
@@ -17,6 +18,8 @@
 #include "limber/dynamics/exact_motion.h"
 #include "limber/dynamics/reconstruct.h"
 #include "limber/engine/world.h"
+#include "passing_bodies.h"
+#include "shape_extent.h"
 #include "sleep_stage.h"
 #include "step_parts.h"
 
@@ -41,9 +44,9 @@ struct World::Impl {
     std::shared_ptr<const Shape> shape{};
     RigidTransform pose{};  // of a static one
     CollisionFilter filter{};
-    double friction = -1.0;  // negative: that of the contact options
-    double radius = 0.0;     // of a shape that moves
-    bool placed = false;     // of a static one: the source has seen where it stands
+    double friction = -1.0;          // negative: that of the contact options
+    internal::ShapeExtent extent{};  // of what moves
+    bool placed = false;             // of a static one: the source has seen where it stands
   };
   /// Two bodies that do not meet as long as some joint between them stands.
   struct Apart {
@@ -73,7 +76,6 @@ struct World::Impl {
   ContactOptions contact_options;
   std::vector<BodyState> states;                    // by entries' indices, for the source
   std::vector<double> friction;                     // the same
-  std::vector<double> still;                        // zeros: how far a rigid shape's points move with the modes
   std::vector<std::vector<DentLoad>> loads_before;  // what dented each entry before the last step
   double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
@@ -81,6 +83,7 @@ struct World::Impl {
   StepAttempts attempts;
   ProgramReport programs;
   std::vector<ExactMotion> motions;
+  internal::PassingBodies passing;
   std::size_t alive = 0;
   std::uint64_t steps = 0;
   double accumulator = 0.0, dropped = 0.0;
@@ -134,7 +137,19 @@ struct World::Impl {
   void let_meet(std::uint32_t joint);
   void wake_bodies_of(std::uint32_t constraint);
   void write_states();
+  void write_state(Index body, double length);
+  bool can_wait(Index body) const;
   void find_contacts();
+  bool find_passing();
+  void list_fast();
+  void find_first_touches();
+  void add_brisk();
+  void join_passing();
+  bool look_farther();
+  void set_contacts(std::span<const ContactPoint> found);
+  void advance_passing(int part);
+  void advance_cluster(std::span<const Index> members, int part);
+  std::span<const ContactPoint> contacts_of_cluster(std::span<const Index> members, bool first, double left);
   bool wake_what_is_touched();
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();

@@ -1,5 +1,5 @@
 /// @file sheet_model.h
-/// A square sheet of 1 m and 1 mm thickness that bends: thin, two-sided, of as many triangles and modes as wanted.
+/// A square sheet that bends: thin, two-sided, of as many triangles and modes as wanted.
 #pragma once
 
 #include <cmath>
@@ -13,26 +13,32 @@ namespace limber::testing {
 
 inline constexpr double kSheetSide = 1.0, kSheetThickness = 1e-3;
 
+struct SheetSize {
+  double side = kSheetSide, thickness = kSheetThickness;  ///< m
+  double mass = 1.0;                                      ///< kg
+};
+
 /// Standing waves over the square, two by two waves more for each four modes; nearly orthonormal over a mass of 1 kg.
+/// @param x, y by the side
 inline double sheet_shape(double x, double y, int mode) {
-  const auto wave = [](double at, int n) { return std::cos(std::numbers::pi * n * (at / kSheetSide + 0.5)); };
+  const auto wave = [](double at, int n) { return std::cos(std::numbers::pi * n * (at + 0.5)); };
   const int block = mode / 4;
   return 2.0 * wave(x, 2 * block + 1 + mode % 2) * wave(y, 2 * block + 1 + mode / 2 % 2);
 }
 
 /// 4 · cells² + 8 · cells triangles; modes of 20, 55, 90, … Hz that move z only, ξ = 1 1/s.
-inline std::shared_ptr<const ModalModel> sheet_model(int cells, int modes) {
+inline std::shared_ptr<const ModalModel> sheet_model(int cells, int modes, const SheetSize& size = {}) {
   ModalModelData d;
   d.name = "sheet";
-  d.mass = 1.0;
-  d.volume = kSheetSide * kSheetSide * kSheetThickness;
-  d.inertia = Vec3(1.0, 1.0, 2.0).asDiagonal() * (kSheetSide * kSheetSide / 12.0);
+  d.mass = size.mass;
+  d.volume = size.side * size.side * size.thickness;
+  d.inertia = Vec3(1.0, 1.0, 2.0).asDiagonal() * (size.mass * size.side * size.side / 12.0);
   ModalSurface s;
   for (int side = 0; side < 2; ++side)
     for (int j = 0; j <= cells; ++j)
       for (int i = 0; i <= cells; ++i) {
-        const Vec3 r(kSheetSide * (static_cast<double>(i) / cells - 0.5),
-                     kSheetSide * (static_cast<double>(j) / cells - 0.5), kSheetThickness * (side - 0.5));
+        const Vec3 r(size.side * (static_cast<double>(i) / cells - 0.5),
+                     size.side * (static_cast<double>(j) / cells - 0.5), size.thickness * (side - 0.5));
         s.rest.push_back(r.cast<float>());
       }
   const auto vertex = [cells](int side, int i, int j) { return Index{(side * (cells + 1) + j) * (cells + 1) + i}; };
@@ -60,7 +66,8 @@ inline std::shared_ptr<const ModalModel> sheet_model(int cells, int modes) {
     d.moments.push_back(Mat3::Zero());
     for (Index v = 0; v < s.vertices(); ++v) {
       const Vec3 r = s.rest[static_cast<std::size_t>(v)].cast<double>();
-      s.basis.set(v, mode, {0.0f, 0.0f, static_cast<float>(sheet_shape(r.x(), r.y(), mode))});
+      const double shape = sheet_shape(r.x() / size.side, r.y() / size.side, mode) / std::sqrt(size.mass);
+      s.basis.set(v, mode, {0.0f, 0.0f, static_cast<float>(shape)});
     }
   }
   d.render = std::move(s);

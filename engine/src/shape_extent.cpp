@@ -1,0 +1,44 @@
+#include "shape_extent.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+template <class Points>
+ShapeExtent extent_of_points(const Points& points) {
+  double radius = 0.0;
+  Vec3 low = points.front().template cast<double>(), high = low;
+  for (const auto& point : points) {
+    const Vec3 p = point.template cast<double>();
+    radius = std::max(radius, p.norm());
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return {radius, 0.5 * (high - low).minCoeff()};
+}
+
+struct ExtentOf {
+  ShapeExtent operator()(const HalfSpace&) const { return {}; }
+  ShapeExtent operator()(const Sphere& ball) const { return {ball.radius, ball.radius}; }
+  ShapeExtent operator()(const Capsule& c) const { return {c.radius + c.half_length, c.radius}; }
+  ShapeExtent operator()(const Box& box) const { return {box.half_extents.norm(), box.half_extents.minCoeff()}; }
+  ShapeExtent operator()(const ConvexHull& hull) const { return extent_of_points(hull.points); }
+  ShapeExtent operator()(const TriangleMesh& mesh) const { return extent_of_points(mesh.vertices); }
+  ShapeExtent operator()(const HeightField& field) const {
+    const auto [low, high] = std::ranges::minmax(field.heights);
+    const Vec3 side((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y,
+                    static_cast<double>(high) - low);
+    const double height = std::max(std::abs(low), std::abs(high));
+    return {Vec3(side.x(), side.y(), height).norm(), 0.5 * side.minCoeff()};
+  }
+};
+
+}  // namespace
+
+ShapeExtent extent_of(const Shape& shape) { return std::visit(ExtentOf{}, shape); }
+
+ShapeExtent extent_of(const ModalModel& model) { return extent_of_points(model.collision().rest); }
+
+}  // namespace limber::internal

@@ -1,0 +1,19 @@
+// How large what a body shows to others is, m.
+#pragma once
+
+#include "limber/model/modal_model.h"
+#include "limber/model/shape.h"
+
+namespace limber::internal {
+
+struct ShapeExtent {
+  double radius = 0.0;          ///< of a ball about the body origin that holds all of it
+  double half_thickness = 0.0;  ///< half the shortest side of its box in the body frame
+};
+
+/// @pre valid, and no half-space
+ShapeExtent extent_of(const Shape& shape);
+/// Of the collision surface at rest.
+ShapeExtent extent_of(const ModalModel& model);
+
+}  // namespace limber::internal
