@@ -15,9 +15,11 @@ void PassingBodies::leave_out(std::span<const char> asleep, std::span<const Cont
 }
 
 void PassingBodies::list_touching(std::span<const ContactPoint> in_force) {
-  touching = crept;
-  for (const ContactPoint& c : in_force)
-    if (c.gap <= first_margin) touching.emplace_back(c.a.body, c.b.body);
+  touching.clear();
+  for (const ContactPoint& c : in_force) {
+    const std::pair pair(c.a.body, c.b.body);
+    if (c.gap <= first_margin || std::ranges::find(crept, pair) != crept.end()) touching.push_back(pair);
+  }
   std::ranges::sort(touching);
   const auto [begin, end] = std::ranges::unique(touching);
   touching.erase(begin, end);
