@@ -113,10 +113,12 @@ TEST(ContactFinderImpacts, AFewBodiesMeetWhatTheyMeetWhereAllOthersStandStill) {
   ContactFinder all, few;
   moving.scene.add_all_to(all);
   moving.scene.add_all_to(few);
-  const std::vector<Index> movers{7, 30, 31, 90, 151};
   moving.point();
-  for (std::size_t i = 0; i < moving.pointers.size(); ++i)
-    if (!std::binary_search(movers.begin(), movers.end(), static_cast<Index>(i))) moving.pointers[i] = nullptr;
+  std::vector<Index> movers;
+  for (std::size_t i = 0; i < moving.pointers.size(); ++i) {
+    if (i % 3 != 0) moving.pointers[i] = nullptr;
+    if (moving.pointers[i] != nullptr) movers.push_back(static_cast<Index>(i));
+  }
   const std::vector<BodyState> states = moving.scene.states();
   ImpactQuery query{.states = states, .motions = moving.pointers, .step = kStep, .margin = kImpactMargin};
   std::vector<Impact> expected, found;
