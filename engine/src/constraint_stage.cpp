@@ -228,7 +228,7 @@ double ConstraintStage::step_together(std::span<const Index> members, std::span<
 void ConstraintStage::end_together(std::span<const Index> members) {
   for (const Index body : members) {
     const ConstrainedBody& at = table_[static_cast<std::size_t>(body)];
-    at.group->commit(at.slot, false, true);
+    at.group->end_step(at.slot);
   }
 }
 

@@ -134,6 +134,8 @@ class BodyGroup {
   /// Makes the last prediction the state, and clears the loads, as advance() does.
   /// @param begins, ends whether it is the first and the last part of a step: held loads stay until the last
   void commit(Index slot, bool begins = true, bool ends = true);
+  /// Ends a step whose last part was committed without an end: the loads are cleared.
+  void end_step(Index slot) { clear_loads(slot); }
 
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
   /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none
