@@ -1,10 +1,10 @@
 // Bodies that a step takes farther than contacts are looked for ahead.
 //
-// A contact found ahead is a plane between features, good as far as a body is thick. A body that may come farther is
-// fast; what it would meet beyond is found on its exact motion (ContactSource::find_impacts). Bodies that meet so, with
-// all that they are tied to, are a cluster: it waits while all else takes the step, and then takes the step by itself,
-// in parts. Each part ends where two bodies first touch; contacts are found there, and the next part goes on from
-// there.
+// A contact found ahead is a plane between features, good as far as a body is thick. What fast bodies meet is found on
+// their exact motion (ContactSource::find_impacts). Two that meet and come farther, as the other sees it, than the
+// thinner is thick are, with all that they are tied to, a cluster: it waits while all else takes the step, and then
+// takes the step by itself, in parts. Each part ends where two bodies first touch; contacts are found there, and the
+// next part goes on from there.
 //
 //   all but clusters:   contacts → islands → the whole step            no body farther than its look-ahead
 //   one cluster after the other, while all else stands still:
@@ -26,13 +26,15 @@ namespace limber::internal {
 
 struct PassingBodies {
   /// Part of the smallest look-ahead at hand at which bodies touch.
-  static constexpr double kTouch = 0.1;
+  static constexpr double kTouch = 0.05;
+  /// Of the look-ahead: what moves less far within a step passes nothing.
+  static constexpr double kSlow = 0.5;
   /// Of that part, for those who come after: what came to a touch is apart then.
   static constexpr double kNearer = 0.45;
   /// rad, about which a body may turn while contacts hold it: by then other parts of it would touch.
   static constexpr double kMostTurn = 0.5;
   /// Of a cluster's step.
-  static constexpr int kMostParts = 16;
+  static constexpr int kMostParts = 4;
 
   std::vector<Index> fast;      // ascending
   std::vector<char> farther;    // by body: contacts are looked for as far as it comes, as its step cannot be cut

@@ -143,6 +143,7 @@ struct World::Impl {
   bool find_passing();
   void list_fast();
   void find_first_touches();
+  bool planes_last(Index a, Index b) const;
   void add_brisk();
   void join_passing();
   bool look_farther();

@@ -32,7 +32,8 @@ bool World::Impl::find_passing() {
 void World::Impl::list_fast() {
   passing.fast.clear();
   for (std::size_t i = 0; i < entries.size(); ++i)
-    if (entries[i].alive && entries[i].group >= 0 && !states[i].asleep && states[i].reach > states[i].look_ahead)
+    if (entries[i].alive && entries[i].group >= 0 && !states[i].asleep &&
+        states[i].reach > PassingBodies::kSlow * states[i].look_ahead)
       passing.fast.push_back(static_cast<Index>(i));
 }
 
@@ -60,6 +61,15 @@ void World::Impl::find_first_touches() {
                         .except = p.touching},
                        p.touches, *jobs);
   for (const Index body : p.fast) p.motions[static_cast<std::size_t>(body)] = nullptr;
+  std::erase_if(p.touches, [&](const Impact& touch) { return planes_last(touch.a, touch.b); });
+}
+
+/// Whether contacts found ahead are good for two bodies: the step moves one by less than the thinner's thickness, as
+/// the other sees it.
+bool World::Impl::planes_last(Index a, Index b) const {
+  const BodyState &x = states[static_cast<std::size_t>(a)], &y = states[static_cast<std::size_t>(b)];
+  const double turns = std::max(0.0, x.reach - x.displacement.norm()) + std::max(0.0, y.reach - y.displacement.norm());
+  return (x.displacement - y.displacement).norm() + turns <= std::min(x.look_ahead, y.look_ahead);
 }
 
 /// What touches already, and goes on faster than by its fall.

@@ -51,7 +51,7 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
 
 /// One part, as long as the watch lets it be. A shorter one is another motion, which the watch is shown in its turn.
 void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
-  constexpr int kMostLooks = 8;
+  constexpr int kMostLooks = 3;
   constexpr double kShortest = 1e-9;  // of the whole step: less is no motion
   IslandOptions& options = part.options;
   if (options.whole_step > 0.0) part.whole_step = options.whole_step;
