@@ -10,6 +10,7 @@
 
 #include "limber/articulation/joints_file.h"
 #include "limber/core/error.h"
+#include "limber/mesh/write_mesh.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/model/morph_targets.h"
 #include "limber/posing/handles_file.h"
@@ -66,13 +67,6 @@ void declare(CLI::App& options, Arguments& a) {
       "rigidity, joints and limits as energies with large weights, as in the paper, instead of constraints");
 }
 
-std::string obj_text(const SurfaceMesh& surface, const std::vector<Vec3>& positions) {
-  std::string out;
-  for (const Vec3& p : positions) out += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
-  for (const auto& [i, j, k] : surface.triangles) out += fmt::format("f {} {} {}\n", i + 1, j + 1, k + 1);
-  return out;
-}
-
 Json json_of(const PoseResult& r, double time) {
   return {{"time", time},
           {"status", to_string(r.status)},
@@ -120,7 +114,8 @@ void pose(Program& program, const Arguments& a) {
     recording.add(frame.time, session);
     if (!a.obj.empty()) {
       session.reconstruct(positions);
-      program.write_file(fmt::format("{}_{:04}.obj", a.obj, f), obj_text(session.model().surface, positions));
+      program.write_file(fmt::format("{}_{:04}.obj", a.obj, f),
+                         obj_text({.vertices = positions, .triangles = session.model().surface.triangles}));
     }
     program.progress().fraction(static_cast<double>(f + 1) / static_cast<double>(handles.frames.size()));
   }

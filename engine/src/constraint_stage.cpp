@@ -215,12 +215,9 @@ double ConstraintStage::step_together(std::span<const Index> members, std::span<
         together_.push_back(constraint);
   together_.insert(together_.end(), contacts.begin(), contacts.end());
   IslandOptions own = options;
-  for (const Index body : members) own.energy_surplus += surplus_[static_cast<std::size_t>(body)];
+  own.energy_surplus = surplus_of(members);
   const IslandReport report = together_solver_.step(table_, members, together_, own);
-  for (const Index body : members) {
-    disturbed_[static_cast<std::size_t>(body)] = false;
-    surplus_[static_cast<std::size_t>(body)] = report.energy_surplus / static_cast<double>(members.size());
-  }
+  have_stepped(members, report);
   add_report(report, together_report_);
   return report.taken;
 }
@@ -245,15 +242,22 @@ void ConstraintStage::step_island(std::size_t island, const IslandOptions& optio
   const Island& at = islands_[island];
   const std::span<const Index> members = std::span(members_).subspan(at.first_member, at.members);
   IslandOptions own = options;
-  own.undisturbed = true;
-  own.energy_surplus = 0.0;
-  for (const Index body : members) {
-    own.undisturbed = own.undisturbed && !disturbed_[static_cast<std::size_t>(body)];
-    own.energy_surplus += surplus_[static_cast<std::size_t>(body)];
-  }
+  own.undisturbed =
+      std::ranges::none_of(members, [&](Index body) { return disturbed_[static_cast<std::size_t>(body)] != 0; });
+  own.energy_surplus = surplus_of(members);
   IslandReport& report = reports_[island];
   report =
       solvers_[island].step(table_, members, std::span(constraints_).subspan(at.first_constraint, at.constraints), own);
+  have_stepped(members, report);
+}
+
+double ConstraintStage::surplus_of(std::span<const Index> members) const {
+  double sum = 0.0;
+  for (const Index body : members) sum += surplus_[static_cast<std::size_t>(body)];
+  return sum;
+}
+
+void ConstraintStage::have_stepped(std::span<const Index> members, const IslandReport& report) {
   for (const Index body : members) {
     disturbed_[static_cast<std::size_t>(body)] = false;
     surplus_[static_cast<std::size_t>(body)] = report.energy_surplus / static_cast<double>(members.size());

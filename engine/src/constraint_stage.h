@@ -84,6 +84,8 @@ class ConstraintStage {
   void list_constraints();
   void step_island(std::size_t island, const IslandOptions& options);
   void release_bodies();
+  double surplus_of(std::span<const Index> members) const;
+  void have_stepped(std::span<const Index> members, const IslandReport& report);
   bool acts(Index body) const {
     return moves(body) && asleep_[static_cast<std::size_t>(body)] == 0 &&
            held_back_[static_cast<std::size_t>(body)] == 0;

@@ -16,14 +16,14 @@ ShapeExtent extent_of_points(const Points& points) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  return {radius, 0.5 * (high - low).minCoeff()};
+  return {radius, (high - low).minCoeff()};
 }
 
 struct ExtentOf {
   ShapeExtent operator()(const HalfSpace&) const { return {}; }
-  ShapeExtent operator()(const Sphere& ball) const { return {ball.radius, ball.radius}; }
-  ShapeExtent operator()(const Capsule& c) const { return {c.radius + c.half_length, c.radius}; }
-  ShapeExtent operator()(const Box& box) const { return {box.half_extents.norm(), box.half_extents.minCoeff()}; }
+  ShapeExtent operator()(const Sphere& ball) const { return {ball.radius, 2.0 * ball.radius}; }
+  ShapeExtent operator()(const Capsule& c) const { return {c.radius + c.half_length, 2.0 * c.radius}; }
+  ShapeExtent operator()(const Box& box) const { return {box.half_extents.norm(), 2.0 * box.half_extents.minCoeff()}; }
   ShapeExtent operator()(const ConvexHull& hull) const { return extent_of_points(hull.points); }
   ShapeExtent operator()(const TriangleMesh& mesh) const { return extent_of_points(mesh.vertices); }
   ShapeExtent operator()(const HeightField& field) const {
@@ -31,7 +31,7 @@ struct ExtentOf {
     const Vec3 side((field.columns - 1) * field.spacing_x, (field.rows - 1) * field.spacing_y,
                     static_cast<double>(high) - low);
     const double height = std::max(std::abs(low), std::abs(high));
-    return {Vec3(side.x(), side.y(), height).norm(), 0.5 * side.minCoeff()};
+    return {Vec3(side.x(), side.y(), height).norm(), side.minCoeff()};
   }
 };
 

@@ -7,8 +7,8 @@
 namespace limber::internal {
 
 struct ShapeExtent {
-  double radius = 0.0;          ///< of a ball about the body origin that holds all of it
-  double half_thickness = 0.0;  ///< half the shortest side of its box in the body frame
+  double radius = 0.0;     ///< of a ball about the body origin that holds all of it
+  double thickness = 0.0;  ///< the shortest side of its box in the body frame
 };
 
 /// @pre valid, and no half-space

@@ -153,11 +153,10 @@ void World::Impl::advance_passing(int part) {
   p.wears_shape.assign(entries.size(), 0);
   for (const Index member : p.members) {
     const auto i = static_cast<std::size_t>(member);
-    p.wears_shape[i] = entries[i].shape != nullptr;
+    const Shape* shape = entries[i].shape.get();
+    p.wears_shape[i] = shape != nullptr;
+    p.turns[i] = shape == nullptr || !std::holds_alternative<Sphere>(*shape);
   }
-  for (const Index member : p.members)
-    if (const Entry& e = entries[static_cast<std::size_t>(member)]; e.shape && std::holds_alternative<Sphere>(*e.shape))
-      p.turns[static_cast<std::size_t>(member)] = 0;
   std::size_t begin = 0;
   for (const std::size_t end : p.ends) {
     advance_cluster(std::span(p.members).subspan(begin, end - begin), part);

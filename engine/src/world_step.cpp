@@ -103,7 +103,7 @@ void World::Impl::write_state(Index body, double length) {
   states[i].rotation = length * frame.angular_velocity(bodies.frame_constants());
   const SurfaceExtent& extent = bodies.model().collision_extent();
   states[i].reach = e.shape ? motions[i].reach(e.extent.radius, {}) : motions[i].reach(extent.radius, extent.shape);
-  if (!passing.looks_farther(body) && can_wait(body)) states[i].look_ahead = 2.0 * e.extent.half_thickness;
+  if (!passing.looks_farther(body) && can_wait(body)) states[i].look_ahead = e.extent.thickness;
 }
 
 /// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.

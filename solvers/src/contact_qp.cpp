@@ -8,6 +8,7 @@
 #include "argument_checks.h"
 #include "dense_kernels.h"
 #include "free_set_factor.h"
+#include "limber/core/types.h"
 #include "limber/solvers/aligned_buffer.h"
 
 namespace limber {
@@ -16,7 +17,6 @@ using namespace internal;  // kernels and checks
 namespace {
 
 using Numbers = std::span<const double>;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A row that differs from those of the free forces by a part σ has a pivot of σ², taken as zero below about 1e-14, and
 // is pulled by at most σ. A larger pull is no rounding.
@@ -227,7 +227,7 @@ class ActiveSet {
 
   // f_j += step·change; whether it arrived at the bound that clips it.
   bool advance(std::size_t j, double change, double step) {
-    const bool at_bound = clip(j, change, kInfinity) <= step;
+    const bool at_bound = clip(j, change, kUnbounded) <= step;
     f_[j] = at_bound ? (change < 0.0 ? problem_.lower[j] : problem_.upper[j])
                      : std::clamp(f_[j] + step * change, problem_.lower[j], problem_.upper[j]);
     return at_bound;
@@ -281,9 +281,9 @@ class ActiveSet {
     memory_.factor.solve_upper(step_);
     const double way = pull(j) > 0.0 ? 1.0 : -1.0;
     for (std::size_t i = 0; i < k; ++i) step_[i] *= -way;
-    double step = clip(j, way, kInfinity);
+    double step = clip(j, way, kUnbounded);
     for (std::size_t i = 0; i < k; ++i) step = clip(static_cast<std::size_t>(P_[i]), step_[i], step);
-    if (step == kInfinity) {
+    if (step == kUnbounded) {
       if (std::abs(pull(j)) > kNearlyDependent * largest())
         add_compliance();
       else
@@ -360,11 +360,11 @@ bool take(const P& problem, const ContactQpOptions& options, Memory& memory, Pro
   taken = {.m = m,
            .b = copy_padded(memory.b, problem.b, m),
            .lower = copy_padded(memory.lower, problem.lower, m, 0.0),
-           .upper = copy_padded(memory.upper, problem.upper, m, kInfinity),
+           .upper = copy_padded(memory.upper, problem.upper, m, kUnbounded),
            .options = options};
   if (!all_finite(taken.b, m)) return false;
   for (std::size_t j = 0; j < m; ++j)
-    if (!(taken.lower[j] <= taken.upper[j]) || taken.lower[j] == kInfinity || taken.upper[j] == -kInfinity)
+    if (!(taken.lower[j] <= taken.upper[j]) || taken.lower[j] == kUnbounded || taken.upper[j] == -kUnbounded)
       return false;
   return true;
 }

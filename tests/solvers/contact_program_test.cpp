@@ -18,6 +18,19 @@ namespace {
 constexpr ContactProgramRule kLeastSum{}, kHeuristic{.least_sum = false},
     kNoSlip{.least_sum = false, .stops_slip = true};
 
+using Numbers = std::span<const double>;
+
+/// @param friction of the contacts that come first, three rows each
+ContactProblem problem_of(const testing::ContactSample& sample, Numbers lower, Numbers upper, Numbers friction = {}) {
+  return {.cones = static_cast<int>(friction.size()),
+          .A = sample.A,
+          .b = sample.b,
+          .friction = friction,
+          .lower = lower,
+          .upper = upper,
+          .gap_before = {}};
+}
+
 /// A unit mass on one contact that comes down with `down` and slides with `slip`.
 struct OneContact {
   std::vector<double> A{1, 0, 0, 0, 1, 0, 0, 0, 1}, b, friction{0.5}, lower{0, 0, 0}, upper{0, 0, 0}, f{0, 0, 0};
@@ -56,13 +69,7 @@ TEST(ContactProgram, TheSolveWithoutSlipLeavesNoNormalOpen) {
   for (int trial = 0; trial < 100; ++trial) {
     const testing::ContactSample sample = testing::make_contacts(12, 6, testing::Touching::kPlane, random);
     std::vector<double> friction(4, 5.0), lower(12, 0.0), upper(12, 0.0);
-    const ContactProblem problem{.cones = 4,
-                                 .A = sample.A,
-                                 .b = sample.b,
-                                 .friction = friction,
-                                 .lower = lower,
-                                 .upper = upper,
-                                 .gap_before = {}};
+    const ContactProblem problem = problem_of(sample, lower, upper, friction);
     const Eigen::Map<const Eigen::MatrixXd> A(sample.A.data(), 12, 12);
     const Eigen::Map<const Eigen::VectorXd> b(sample.b.data(), 12);
     const auto worst_normal = [&](const ContactProgramRule& rule) {
@@ -94,8 +101,7 @@ TEST(ContactProgram, TheLeastSumIsThatOfTheBestVertex) {
     Eigen::VectorXd f = Eigen::VectorXd::Zero(n);
     ContactProgramSolver solver;
     ProgramReport report;
-    const ContactProblem problem{
-        .A = sample.A, .b = sample.b, .friction = {}, .lower = lower, .upper = upper, .gap_before = {}};
+    const ContactProblem problem = problem_of(sample, lower, upper);
     EXPECT_EQ(solver.solve(problem, {.guard = ProgramGuard::kNone}, {f.data(), static_cast<std::size_t>(n)}, report),
               SolveStatus::kSolved);
     EXPECT_GE((A * f + b).minCoeff(), -1e-9);
@@ -111,13 +117,7 @@ TEST(ContactProgram, TheSolveWithoutSlipLeavesNoneWhereItSticks) {
   for (int trial = 0; trial < 100; ++trial) {
     const testing::ContactSample sample = testing::make_contacts(9, 6, testing::Touching::kPlane, random);
     const std::vector<double> friction(3, kMu), lower(9, 0.0), upper(9, 0.0);
-    const ContactProblem problem{.cones = 3,
-                                 .A = sample.A,
-                                 .b = sample.b,
-                                 .friction = friction,
-                                 .lower = lower,
-                                 .upper = upper,
-                                 .gap_before = {}};
+    const ContactProblem problem = problem_of(sample, lower, upper, friction);
     Eigen::VectorXd first = Eigen::VectorXd::Zero(9), f = first;
     ContactProgramSolver solver;
     ProgramReport report;
@@ -146,8 +146,7 @@ TEST(ContactProgram, TheGuardLetsNoEnergyIn) {
   for (int trial = 0; trial < 200; ++trial) {
     const testing::ContactSample sample = testing::make_contacts(10, 4, testing::Touching::kAround, random);
     std::vector<double> lower(10, 0.0), upper(10, kUnbounded);
-    const ContactProblem problem{
-        .A = sample.A, .b = sample.b, .friction = {}, .lower = lower, .upper = upper, .gap_before = {}};
+    const ContactProblem problem = problem_of(sample, lower, upper);
     const auto energy = [&](ProgramGuard guard) {
       ContactProgramSolver solver;
       ProgramReport report;

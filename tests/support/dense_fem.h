@@ -60,23 +60,30 @@ inline Eigen::Matrix4d dense_tet_mass(double rho_volume, bool lumped) {
   return M;
 }
 
+/// add(nodes, K, M) for each tetrahedron: its stiffness, 12 × 12, and its mass, 4 × 4. @param material_of(element)
+template <class MaterialOf, class Add>
+void for_each_element(const TetMesh& mesh, bool lumped, MaterialOf&& material_of, Add&& add) {
+  for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
+    const Tet& t = mesh.tets[e];
+    const Material& m = material_of(e);
+    Eigen::Matrix<double, 3, 4> x;
+    for (int a = 0; a < 4; ++a) x.col(a) = mesh.nodes[t[a]];
+    const double volume = std::abs((x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).dot(x.col(3) - x.col(0))) / 6.0;
+    add(t, dense_tet_stiffness(x, m), dense_tet_mass(m.density * volume, lumped));
+  }
+}
+
 inline DenseModel dense_model(const TetMesh& mesh, std::span<const Material> materials, bool lumped) {
   const auto size = static_cast<Eigen::Index>(3 * mesh.nodes.size());
   DenseModel model{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, size)};
-  for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
-    const Tet& t = mesh.tets[e];
-    const Material& m = materials[mesh.tet_region[e]];
-    Eigen::Matrix<double, 3, 4> x;
-    for (int a = 0; a < 4; ++a) x.col(a) = mesh.nodes[t[a]];
-    const auto K = dense_tet_stiffness(x, m);
-    const double volume = std::abs((x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).dot(x.col(3) - x.col(0))) / 6.0;
-    const auto M = dense_tet_mass(m.density * volume, lumped);
+  const auto material_of = [&](std::size_t e) -> const Material& { return materials[mesh.tet_region[e]]; };
+  for_each_element(mesh, lumped, material_of, [&](const Tet& t, const auto& K, const auto& M) {
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
-        model.K.block<3, 3>(3 * t[a], 3 * t[b]) += K.block<3, 3>(3 * a, 3 * b);
+        model.K.block<3, 3>(3 * t[a], 3 * t[b]) += K.template block<3, 3>(3 * a, 3 * b);
         model.M.block<3, 3>(3 * t[a], 3 * t[b]).diagonal().array() += M(a, b);
       }
-  }
+  });
   return model;
 }
 

@@ -81,19 +81,15 @@ class EnergyMeter {
   /// The element matrices of dense_fem.h, summed.
   void assemble(const TetMesh& mesh, const Material& material) {
     std::vector<Eigen::Triplet<double>> stiffness, mass;
-    for (const Tet& t : mesh.tets) {
-      Eigen::Matrix<double, 3, 4> x;
-      for (int a = 0; a < 4; ++a) x.col(a) = mesh.nodes[t[a]];
-      const auto K = dense_tet_stiffness(x, material);
-      const double volume = std::abs((x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).dot(x.col(3) - x.col(0))) / 6.0;
-      const auto M = dense_tet_mass(material.density * volume, false);
+    const auto material_of = [&](std::size_t) -> const Material& { return material; };
+    for_each_element(mesh, false, material_of, [&](const Tet& t, const auto& K, const auto& M) {
       for (int i = 0; i < 12; ++i)
         for (int j = 0; j < 12; ++j) {
           const auto row = 3 * t[i / 3] + i % 3, column = 3 * t[j / 3] + j % 3;
           stiffness.emplace_back(row, column, K(i, j));
           if (i % 3 == j % 3) mass.emplace_back(row, column, M(i / 3, j / 3));
         }
-    }
+    });
     const auto size = static_cast<Eigen::Index>(3 * mesh.nodes.size());
     K_.resize(size, size), M_.resize(size, size);
     K_.setFromTriplets(stiffness.begin(), stiffness.end());

@@ -6,18 +6,12 @@
 #include "limber/articulation/robot_files.h"
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
+#include "limber/model/pose_keys.h"
 
 namespace limber {
 namespace {
 
-/// Linear colours of components, in turn.
-constexpr std::array<std::array<float, 4>, 6> kParts{{{0.60f, 0.60f, 0.58f, 1.0f},
-                                                      {0.25f, 0.42f, 0.60f, 1.0f},
-                                                      {0.62f, 0.50f, 0.30f, 1.0f},
-                                                      {0.36f, 0.52f, 0.34f, 1.0f},
-                                                      {0.46f, 0.36f, 0.56f, 1.0f},
-                                                      {0.58f, 0.34f, 0.32f, 1.0f}}};
-/// Of joints, by type.
+/// Linear colours of joints, by type.
 constexpr std::array<std::array<float, 4>, 6> kJoints{{{0.95f, 0.10f, 0.60f, 1.0f},
                                                        {0.95f, 0.05f, 0.02f, 1.0f},
                                                        {0.95f, 0.45f, 0.00f, 1.0f},
@@ -94,7 +88,7 @@ std::string assembly_glb(const Assembly& assembly, const std::vector<DetectedJoi
     throw InvalidArgument("assembly_glb: metres_per_unit is " + std::to_string(metres_per_unit) + ", expected > 0");
   GlbBuilder glb;
   std::vector<int> parts, kinds;
-  for (const auto& c : kParts)
+  for (const auto& c : kPartColors)
     parts.push_back(glb.add_material({.name = "part", .base_color = c, .double_sided = true}));
   for (std::size_t t = 0; t < kJoints.size(); ++t)
     kinds.push_back(

@@ -14,6 +14,7 @@ IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
   if (step.holds_contact_forces()) touch.solve(step, reaction, done.programs);
   reaction.find(step, StepTime::kStart);
   done.status = step.convex ? rounds.solve(step, done) : newton.solve(step, done);
+  if (part.options.watch != nullptr) step.trace(motions);
   act_at_end();
   return done;
 }
@@ -46,9 +47,9 @@ IslandReport IslandSolver::Impl::foresee_guarded(StepPart part) {
   return done;
 }
 
-/// Where the rows did not come together and have left bodies bent, or loads have moved to
-/// contacts that have to be filled first: less of the impulses, in the end none. The free step has the energy it began
-/// with. Where contacts alone act, as little less as will do: half of what holds a pile would be half a fall.
+/// Where the rows did not come together and have left bodies bent, or loads have moved to contacts that have to be
+/// filled first: less of the impulses, in the end none. The free step has the energy it began with. Where contacts
+/// alone act, as little less as will do: half of what holds a pile would be half a fall.
 void IslandSolver::Impl::refuse_impulses(IslandReport& report) {
   constexpr double kLeast = 4e-4;
   report.status = SolveStatus::kIterationLimit;
@@ -63,6 +64,7 @@ void IslandSolver::Impl::refuse_impulses(IslandReport& report) {
       step.reaction[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * step.reaction[i];
     }
     step.predict();
+    if (step.part.options.watch != nullptr) step.trace(motions);
     if (!(energy.close(step, report) > 0.0)) return;
   }
 }

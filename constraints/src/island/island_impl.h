@@ -29,7 +29,7 @@ struct IslandSolver::Impl {
   internal::ConvexRounds rounds;
   internal::RowNewton newton;
   internal::IslandEnergy energy;
-  std::vector<ExactMotion> motions;    // of the members, where a step may be cut
+  std::vector<ExactMotion> motions;    // of the members, where a step may be cut or is watched
   std::vector<double> slip, impulses;  // by row
 
   // The step in parts.

@@ -59,7 +59,7 @@ void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
   IslandReport done;
   for (int looks = 1;; ++looks) {
     done = foresee_guarded(part);
-    const double clear = options.watch->clear_until({part.members, step.motions}, options.step);
+    const double clear = options.watch->clear_until({part.members, motions}, options.step);
     if (!(clear < options.step) || looks == kMostLooks) break;
     if (clear < kShortest * part.whole_step) return;
     options.step = clear;

@@ -115,25 +115,36 @@ void IslandStep::predict() {
 }
 
 void IslandStep::predict_under_loads() {
-  if (part.options.watch != nullptr && motions.size() < static_cast<std::size_t>(bodies.count()))
-    motions.resize(static_cast<std::size_t>(bodies.count()));
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
-    Vec3 gravity = part.options.gravity;
     if (loads.early[static_cast<std::size_t>(local)] != 0) {
       const FrameConstants& c = body.group->frame_constants();
-      const Vec3 early = length() * c.mass * gravity, arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+      const Vec3 early = length() * c.mass * part.options.gravity,
+                 arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
       load.impulse += early + length() * body.group->held_force(body.slot);
       load.moment += arm.cross(early);
-      gravity = -body.group->held_force(body.slot) / c.mass;
     }
-    body.group->predict(body.slot, gravity, load, bodies.modal_step(local));
-    if (part.options.watch != nullptr)
-      body.group->predict_motion(body.slot, gravity, load, bodies.modal_step(local),
-                                 motions[static_cast<std::size_t>(local)]);
+    body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
   measure(StepTime::kEnd, gap);
+}
+
+/// What is left of gravity and held forces for the whole part, where those come at its start.
+Vec3 IslandStep::held_gravity(Index local) const {
+  if (loads.early[static_cast<std::size_t>(local)] == 0) return part.options.gravity;
+  const ConstrainedBody& body = bodies.body(local);
+  return -body.group->held_force(body.slot) / body.group->frame_constants().mass;
+}
+
+void IslandStep::trace(std::vector<ExactMotion>& motions) const {
+  const auto count = static_cast<std::size_t>(bodies.count());
+  if (motions.size() < count) motions.resize(count);
+  for (Index local = 0; local < bodies.count(); ++local) {
+    const ConstrainedBody& body = bodies.body(local);
+    const auto i = static_cast<std::size_t>(local);
+    body.group->predict_motion(body.slot, held_gravity(local), loads.frames[i], bodies.modal_step(local), motions[i]);
+  }
 }
 
 void IslandStep::linearise_end() {

@@ -68,7 +68,6 @@ struct IslandStep {
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
   std::vector<double> touch_impulse;           // N·s, before the step
   IslandLoads loads;
-  std::vector<ExactMotion> motions;  // by body, under the loads; where there is a watch
 
   /// Linearises the rows. All impulses are zero.
   void begin(const StepPart& of);
@@ -83,6 +82,8 @@ struct IslandStep {
   void predict();
   /// Under the loads as they are.
   void predict_under_loads();
+  /// How the bodies get to where they were predicted last. @param motions by body
+  void trace(std::vector<ExactMotion>& motions) const;
   /// Linearises the rows at the predicted end.
   void linearise_end();
   /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
@@ -100,6 +101,7 @@ struct IslandStep {
   void for_bodies(std::size_t row, Action&& act) const;
 
  private:
+  Vec3 held_gravity(Index local) const;
   void find_kind();
   void begin_early();
   void set_modal_steps();

@@ -116,15 +116,17 @@ void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh) {
   write_file(path, out.str());
 }
 
-void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface) {
+std::string obj_text(const SurfaceMesh& surface) {
   Text out;
   for (const Vec3& x : surface.vertices) out << "v " << x << "\n";
   for (const Triangle& t : surface.triangles) {
     for (const Index v : t) check_index(v, surface.vertices.size(), "vertex of a triangle");
     out << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
   }
-  write_file(path, out.str());
+  return out.str();
 }
+
+void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface) { write_file(path, obj_text(surface)); }
 
 std::string stl_bytes(const SurfaceMesh& surface) {
   for (const Triangle& t : surface.triangles)

@@ -6,16 +6,10 @@
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
+#include "limber/model/pose_keys.h"
 
 namespace limber {
 namespace {
-
-constexpr std::array<std::array<float, 4>, 6> kColours{{{0.60f, 0.60f, 0.58f, 1.0f},
-                                                        {0.25f, 0.42f, 0.60f, 1.0f},
-                                                        {0.62f, 0.50f, 0.30f, 1.0f},
-                                                        {0.36f, 0.52f, 0.34f, 1.0f},
-                                                        {0.46f, 0.36f, 0.56f, 1.0f},
-                                                        {0.58f, 0.34f, 0.32f, 1.0f}}};
 
 struct Part {
   std::string name{};
@@ -42,19 +36,11 @@ struct PoseRecording::Impl {
   }
 
   void add_rigid(GlbBuilder& glb, GlbAnimation& animation, const Part& part, int mesh, int keys) const {
-    std::vector<float> places, turns;
-    Quaternion before{};
-    for (const RigidTransform& X : part.motions) {
-      Quaternion q = normalized(X.q);  // the sense that is nearer to the key before
-      if (q.w * before.w + q.vector().dot(before.vector()) < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
-      before = q;
-      for (int k = 0; k < 3; ++k) places.push_back(static_cast<float>(scale * X.p[k]));
-      for (const double x : {q.x, q.y, q.z, q.w}) turns.push_back(static_cast<float>(x));
-    }
     const int node = glb.add_node({.name = part.name, .mesh = mesh});
+    animation.channels.push_back({node, GlbPath::kTranslation, keys,
+                                  glb.add_key_values(translation_keys(part.motions, scale), GlbPath::kTranslation)});
     animation.channels.push_back(
-        {node, GlbPath::kTranslation, keys, glb.add_key_values(places, GlbPath::kTranslation)});
-    animation.channels.push_back({node, GlbPath::kRotation, keys, glb.add_key_values(turns, GlbPath::kRotation)});
+        {node, GlbPath::kRotation, keys, glb.add_key_values(rotation_keys(part.motions), GlbPath::kRotation)});
   }
 
   void add_bending(GlbBuilder& glb, GlbAnimation& animation, const Part& part, int mesh, int keys) const {
@@ -129,8 +115,10 @@ std::string PoseRecording::glb() const {
     const Part& part = impl_->parts[p];
     const std::vector<float> rest = impl_->rest_of(part), normals = unit_normals(rest, part.triangles);
     GlbMesh mesh{.name = part.name};
-    mesh.material = glb.add_material(
-        {.name = part.name, .base_color = kColours[p % kColours.size()], .roughness = 0.6f, .double_sided = true});
+    mesh.material = glb.add_material({.name = part.name,
+                                      .base_color = kPartColors[p % kPartColors.size()],
+                                      .roughness = 0.6f,
+                                      .double_sided = true});
     mesh.position = glb.add_vertex_vectors(rest);
     mesh.normal = glb.add_vertex_vectors(normals);
     mesh.triangles = glb.add_triangles(part.triangles);

@@ -9,6 +9,7 @@
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
+#include "limber/model/pose_keys.h"
 #include "limber/scene/shape_surface.h"
 
 namespace limber {
@@ -200,26 +201,6 @@ std::vector<int> add_statics(GlbBuilder& glb, const Trajectory& trajectory) {
   return nodes;
 }
 
-std::vector<float> translations(const BodyTrack& body) {
-  std::vector<float> out;
-  for (const RigidTransform& X : body.poses)
-    for (int a = 0; a < 3; ++a) out.push_back(narrow(X.p[a]));
-  return out;
-}
-
-/// q and −q are one attitude; neighbours take the signs between which linear interpolation goes the short way.
-std::vector<float> rotations(const BodyTrack& body) {
-  std::vector<float> out;
-  Quaternion last;
-  for (const RigidTransform& X : body.poses) {
-    Quaternion q = normalized(X.q);
-    if (q.w * last.w + q.x * last.x + q.y * last.y + q.z * last.z < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
-    out.insert(out.end(), {narrow(q.x), narrow(q.y), narrow(q.z), narrow(q.w)});
-    last = q;
-  }
-  return out;
-}
-
 std::vector<float> weights(const BodyTrack& body, const RecordedModel& record, bool unsigned_weights) {
   std::vector<float> out;
   for (std::size_t key = 0; key < body.poses.size(); ++key) {
@@ -338,8 +319,8 @@ Recording make_recording(const Trajectory& trajectory, const RecordingOptions& o
       const auto add = [&](GlbPath path, const std::vector<float>& values) {
         animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
       };
-      add(GlbPath::kTranslation, translations(body));
-      add(GlbPath::kRotation, rotations(body));
+      add(GlbPath::kTranslation, translation_keys(body.poses));
+      add(GlbPath::kRotation, rotation_keys(body.poses));
       if (!cast.record.recorded.empty()) add(GlbPath::kWeights, weights(body, cast.record, options.unsigned_weights));
     }
     warn_of_fast_modes(trajectory, cast.record, recording.warnings);

@@ -7,6 +7,7 @@
 
 #include "argument_checks.h"
 #include "dense_kernels.h"
+#include "limber/core/types.h"
 #include "limber/solvers/aligned_buffer.h"
 
 namespace limber {
@@ -15,7 +16,6 @@ using namespace internal;  // kernels and checks
 namespace {
 
 using Numbers = std::span<const double>;
-constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 // An entry of the tableau this small beside the largest of its column is taken for rounding, not for a pivot.
 constexpr double kPivotTolerance = 1e-11;
@@ -45,7 +45,7 @@ struct LinearProgramSolver::Impl {
   double* values = nullptr;          // the values beside it
   std::vector<int> basic, nonbasic;  // the variable of each row and column
   std::vector<char> flipped;         // per y: the tableau holds bound − y instead
-  double bound = kNoBound;           // of every y: slack's price; ∞ until the program proves infeasible
+  double bound = kUnbounded;         // of every y: slack's price; ∞ until the program proves infeasible
   bool has_basis = false;
   std::vector<int> entering, rows;  // of restore_basis() and set_costs()
   std::vector<double> coefficients;
@@ -54,7 +54,7 @@ struct LinearProgramSolver::Impl {
   int idle = 0;  // pivots in a row that led nowhere
 
   bool is_y(int variable) const { return static_cast<std::size_t>(variable) < r; }
-  bool is_bounded(int variable) const { return bound < kNoBound && is_y(variable); }
+  bool is_bounded(int variable) const { return bound < kUnbounded && is_y(variable); }
   double& value(std::size_t row) const { return T.row(row)[r]; }
   double* costs() const { return T.row(n); }
   bool bland() const { return idle > 20 + static_cast<int>(r + n); }
@@ -111,7 +111,7 @@ void LinearProgramSolver::Impl::fill_tableau() {
 
 void LinearProgramSolver::Impl::start_cold() {
   fill_tableau();
-  bound = kNoBound;
+  bound = kUnbounded;
   flipped.assign(r, 0);
   nonbasic.resize(r), basic.resize(n);
   weight = weight_memory.need(r);
@@ -191,7 +191,7 @@ void LinearProgramSolver::Impl::gather_column(std::size_t q) {
 double LinearProgramSolver::Impl::ratio(std::size_t row, double allowed) const {
   if (column[row] > 0.0) return (values[row] + allowed) / column[row];
   if (column[row] < 0.0 && is_bounded(basic[row])) return (bound - values[row] + allowed * bound) / -column[row];
-  return kNoBound;
+  return kUnbounded;
 }
 
 // The row to leave. Two passes: the shortest step with every value allowed a little below zero, then the largest entry
@@ -199,10 +199,10 @@ double LinearProgramSolver::Impl::ratio(std::size_t row, double allowed) const {
 std::size_t LinearProgramSolver::Impl::choose_leaving(double largest) const {
   const double least = kPivotTolerance * largest;
   const bool first_index = bland();
-  double shortest = kNoBound;
+  double shortest = kUnbounded;
   for (std::size_t p = 0; p < n; ++p)
     if (std::abs(column[p]) > least) shortest = std::min(shortest, ratio(p, first_index ? 0.0 : kRatioTolerance));
-  if (shortest == kNoBound) return n;
+  if (shortest == kUnbounded) return n;
   std::size_t best = n;
   for (std::size_t p = 0; p < n; ++p) {
     if (std::abs(column[p]) <= least || ratio(p, 0.0) > shortest) continue;
@@ -265,9 +265,9 @@ void LinearProgramSolver::Impl::optimise(int limit) {
     double largest = 0.0;
     for (std::size_t p = 0; p < n; ++p) largest = std::max(largest, std::abs(column[p]));
     const std::size_t p = choose_leaving(largest);
-    const double step = p == n ? kNoBound : std::max(0.0, ratio(p, 0.0));
+    const double step = p == n ? kUnbounded : std::max(0.0, ratio(p, 0.0));
     if (p == n && !is_bounded(nonbasic[q])) {
-      if (bound == kNoBound && lifts_y(q, kPivotTolerance * largest))
+      if (bound == kUnbounded && lifts_y(q, kPivotTolerance * largest))
         price_slack();
       else
         costs()[q] = 0.0;  // only slacks would grow, which cost nothing: rounding
@@ -324,7 +324,7 @@ LinearProgramResult LinearProgramSolver::Impl::run(std::span<double> f) {
     optimise(limit);
     extract(f);
     violated = violation(f);
-    const bool infeasible = bound < kNoBound;
+    const bool infeasible = bound < kUnbounded;
     if (violated <= options.tolerance || infeasible || result.status == SolveStatus::kIterationLimit ||
         result.refactorizations == kMaxRefactorizations)
       break;
@@ -359,7 +359,7 @@ void check(const LinearProgram& program, Numbers f, const LinearProgramOptions& 
 
 bool fit_to_solve(const LinearProgram& program) {
   return all_finite(program.A.data(), program.A.size()) && all_finite(program.b.data(), program.b.size()) &&
-         std::all_of(program.c.begin(), program.c.end(), [](double x) { return x >= 0.0 && x < kNoBound; });
+         std::all_of(program.c.begin(), program.c.end(), [](double x) { return x >= 0.0 && x < kUnbounded; });
 }
 
 LinearProgramResult refuse_program(std::span<double> f) {
@@ -389,7 +389,7 @@ LinearProgramResult LinearProgramSolver::solve_warm(const LinearProgram& program
                                                     const LinearProgramOptions& options) {
   check(program, f, options);
   const bool same_shape = impl_->r == program.b.size() && impl_->n == f.size();
-  if (!impl_->has_basis || !same_shape || impl_->bound < kNoBound || !fit_to_solve(program))
+  if (!impl_->has_basis || !same_shape || impl_->bound < kUnbounded || !fit_to_solve(program))
     return solve(program, f, options);
   impl_->options = options;
   impl_->take(program);
@@ -407,7 +407,7 @@ LinearProgramResult LinearProgramSolver::solve_again(Numbers b, std::span<double
   if (!all_finite(b.data(), b.size())) return refuse_program(f);
   impl_->options = options;
   impl_->take_b(b);
-  if (impl_->bound < kNoBound)
+  if (impl_->bound < kUnbounded)
     impl_->start_cold();
   else
     impl_->set_costs();

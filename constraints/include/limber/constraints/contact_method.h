@@ -42,7 +42,7 @@ enum class FrictionModel {
 struct ContactRule {
   ContactMethod method = ContactMethod::kComplementary;
   FrictionModel friction = FrictionModel::kCone;
-  ProgramGuard guard = ProgramGuard::kClamp;
+  ProgramGuard guard = ProgramGuard::kClamp;  ///< kNone: the island's energy guard (island_solver.h) is off as well
 
   /// Whether contacts are solved for in one convex problem with all other rows.
   bool is_convex() const { return !is_program() && friction == FrictionModel::kCone; }

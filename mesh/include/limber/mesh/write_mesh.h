@@ -16,8 +16,10 @@ namespace limber {
 /// write_file())
 void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
 
-/// Wavefront OBJ: positions and triangles.
-/// @throws InvalidArgument if an index is out of range. @throws InputError (see write_file())
+/// Wavefront OBJ: positions and triangles; numbers read back to the same bits.
+/// @throws InvalidArgument if an index is out of range
+std::string obj_text(const SurfaceMesh& surface);
+/// The same as a file. @throws InputError (see write_file())
 void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface);
 
 /// Binary STL: three float32 corners and a normal per triangle; vertices are not shared.

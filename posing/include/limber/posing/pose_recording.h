@@ -19,7 +19,7 @@ class PoseRecording {
   PoseRecording& operator=(PoseRecording&&) noexcept;
 
   /// Adds the pose as it is. @param time s, ≥ 0, after the frames before
-  /// @throws InvalidArgument if it is not, or the parts that bend are no longer the same
+  /// @throws InvalidArgument if it is not, or other parts bend than at the recording's start
   void add(double time, const PosingSession& session);
 
   /// The file's bytes. @throws InvalidArgument if there is no frame

@@ -1,4 +1,6 @@
-// Contacts by [H03]'s rules: a linear program for the normals, a heuristic for friction after it.
+/// @file limber/solvers/hauser/contact_program.h
+/// Contacts by [H03]'s rules: a linear program for the normals (linear_program.h) and its guard (energy_guard.h), a
+/// heuristic for friction after it.
 #pragma once
 
 #include <span>
@@ -13,7 +15,7 @@ namespace limber {
 /// What happens to a linear program's answer that would add energy (energy_guard.h). It judges the normals' work; what
 /// heuristic friction adds is left to the caller's.
 enum class ProgramGuard {
-  kNone,           ///< it stays, as in [H03]; the island's energy guard (island_solver.h) is off as well
+  kNone,           ///< it stays, as in [H03]
   kClamp,          ///< the largest part of it that adds none, blended with the complementary answer
   kComplementary,  ///< the complementary answer takes its place
 };

@@ -1,0 +1,90 @@
+// What finds contacts and what finds impacts share:
+//
+//   contact_finder.cpp  the bodies, and what is found in each pair of them
+//   near_pairs.cpp      the states of a query, where they place the bodies, and which of these are near each other
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "finder/found_body.h"
+#include "limber/dynamics/exact_motion.h"
+
+namespace limber {
+
+struct ContactFinder::Impl {
+  explicit Impl(const ContactFinderOptions& o) : options(o) { options.validate(); }
+
+  ContactFinderOptions options;
+  internal::GeometryCache geometries;
+  std::vector<internal::FoundBody> bodies;
+  std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
+  BroadPhase broad_phase;
+  internal::Workers workers;
+
+  // Of the query under way.
+  std::span<const BodyState> states;
+  std::span<const ExactMotion* const> motions;  ///< none where contacts are asked for
+  std::span<const Index> some;                  ///< the bodies that are asked for; none: all
+  double farthest_beyond = 0.0;                 ///< by how much a reach exceeds that of features
+  double step = 0.0, margin = 0.0;
+  Vec3 origin = Vec3::Zero();
+  std::vector<Index> to_place;
+  std::vector<Aabb> boxes;  ///< by entry of to_place
+  std::vector<BodyPair> pairs, merged_pairs;
+  std::vector<Index> near;                       ///< one body
+  std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
+  std::vector<ImpactTime> times;                 ///< by pair
+
+  // Of the last query, ascending.
+  std::vector<internal::PairIds> kept_pairs, last_pairs;
+  std::vector<std::uint64_t> kept_ids, last_ids;
+
+  internal::FoundBody& present(Index body, const char* function) {
+    if (!contains(body))
+      throw InvalidArgument("ContactFinder::" + std::string(function) + ": index " + std::to_string(body) +
+                            " holds no body, expected one that was added");
+    return at(body);
+  }
+  bool contains(Index body) const {
+    return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).present;
+  }
+  internal::FoundBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
+  const internal::FoundBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  /// How far contacts are looked for, where features decide.
+  static double reach_of_features(const BodyState& state) { return std::min(state.reach, state.look_ahead); }
+  const ExactMotion* motion(Index body) const {
+    return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
+  }
+
+  void set_finds_itself(Index body, bool finds);
+  bool stays_in_place(Index body, const BodyState& state) const;
+  void check_and_list();
+  void check_motion(Index index) const;
+  void check_place(Index index);
+  void find_near_pairs(Jobs& jobs);
+  void find_pairs_of_some();
+  void make_boxes(Jobs& jobs);
+  void make_box(std::size_t entry, internal::Worker& worker);
+  Aabb swept_box(Index index, internal::Worker& worker) const;
+  void place();
+  void merge_self_pairs();
+  void drop_pairs(std::span<const std::pair<Index, Index>> except);
+  void check_sleepers_in_pairs();
+  void find_in_pairs(Jobs& jobs);
+  void find_in_pair(const BodyPair& pair, internal::Worker& worker, std::vector<ContactPoint>& contacts) const;
+  CollisionBody collision_body(Index body, internal::Worker& worker) const;
+  double spacing(const BodyPair& pair) const;
+  std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
+  void gather(std::vector<ContactPoint>& contacts);
+  void keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids);
+  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
+  void find_impacts_in_pairs(Jobs& jobs);
+  ImpactTime find_impact(const BodyPair& pair, internal::Worker& worker) const;
+  MovingBody moving_body(Index index) const;
+  void gather(std::vector<Impact>& impacts) const;
+};
+
+}  // namespace limber
