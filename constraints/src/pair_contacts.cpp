@@ -7,8 +7,8 @@
 namespace limber {
 namespace {
 
-// Gaps are met to this part of the distances at hand.
-constexpr double kRelativeTolerance = 1e-9;
+// Gaps are met to this part of the arms at hand.
+constexpr double kRelativeTolerance = 3e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
 // Of the radius of a body that contacts dent: overlap of this much stays, up to the deepest dent.
@@ -43,6 +43,15 @@ bool is_pointed(const PreparedSide& side) {
 /// A point within a triangle of a surface, or a rigid shape with faces.
 bool has_face(const PreparedSide& side) {
   return !is_round(side) && (side.model == nullptr || std::ranges::count(side.at.weight, 0.0) == 0);
+}
+
+/// How closely a gap can be met: by the arms of its points a and b, and their place.
+double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
+                     const Vec3& b) {
+  double arms = 0.0;
+  if (!states.is_static(contact.a.body)) arms += (a - states.pose(contact.a.body, when).p).norm();
+  if (!states.is_static(contact.b.body)) arms += (b - states.pose(contact.b.body, when).p).norm();
+  return distance_tolerance(kRelativeTolerance, arms, a);
 }
 
 }  // namespace
@@ -200,7 +209,7 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
     return n.dot(a - b);
   };
   double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
-  const double least = kRelativeTolerance * a.norm();
+  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b);
   if (!(gap_open > least && gap_closed < 0.0)) return within;
   for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
     // Secants from both ends close in from one side alone: every third step halves.
@@ -258,10 +267,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
                                ConstraintRows& rows) {
   const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
   const Vec3 end = point_of_action(contact, a, b);
-  double length = a.norm();
-  if (!states.is_static(contact.a.body)) length += (a - states.pose(contact.a.body, when).p).norm();
-  if (!states.is_static(contact.b.body)) length += (b - states.pose(contact.b.body, when).p).norm();
-  const double tolerance = kRelativeTolerance * length + std::numeric_limits<double>::min();
+  const double tolerance = gap_tolerance(states, when, contact, a, b);
   for (Index axis = 0; axis < row_count(contact); ++axis) {
     const Vec3 n = contact.axes.col(axis);
     RowLaw law{.tolerance = tolerance, .contact = true};

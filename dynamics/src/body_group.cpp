@@ -47,12 +47,32 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
       predicted_rates_(model_->modes()),
       predicted_forces_(model_->modes()),
       predicted_static_(model_->modes()) {
-  whole_.set(model_->data().eigenvalues, model_->data().decays, positive(step), std::numbers::pi / step);
+  set_step_length(step);
   if (constants_.motion == FrameMotion::kFree) return;
   const ModalModelData& data = model_->data();
   for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
     const Mat3& S = data.moments[i];
     couplings_.push_back({data.participation[i], -cross_moment(S), S.trace() * Mat3::Identity() - S});
+  }
+}
+
+void BodyGroup::set_step_length(double step) {
+  were_static_.assign(whole_.velocity_response().begin(), whole_.velocity_response().end());
+  whole_.set(model_->data().eigenvalues, model_->data().decays, positive(step), std::numbers::pi / step);
+  for (Index slot = 0; slot < slots(); ++slot)
+    if (occupied(slot)) split_static_answer(slot);
+}
+
+/// A mode that now answers as an oscillator goes on from where it is; one that was an oscillator swings about its static
+/// displacement under what held it in the last step.
+void BodyGroup::split_static_answer(Index slot) {
+  Body& b = body(slot);
+  const std::span<double> answer = static_amplitudes_.modes(slot);
+  for (std::size_t i = 0; i < answer.size(); ++i) {
+    const bool was = were_static_[i] == 0.0, is = whole_.velocity_response()[i] == 0.0;
+    if (was == is) continue;
+    answer[i] = is && b.held ? predicted_forces_.modes(slot)[i] / model_->data().eigenvalues[i] : 0.0;
+    b.modes_static = b.modes_static || answer[i] != 0.0;
   }
 }
 
@@ -95,8 +115,7 @@ void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, s
   std::copy(amplitudes.begin(), amplitudes.end(), amplitudes_.modes(slot).begin());
   std::copy(rates.begin(), rates.end(), rates_.modes(slot).begin());
   previous_amplitudes_.copy_from(amplitudes_, slot);
-  static_amplitudes_.clear(slot);
-  body(slot).modes_static = false;
+  forget_static_answer(slot);
 }
 
 void BodyGroup::set_parent(Index slot, const KinematicFrame& at_step_end) { body(slot).frame.set_parent(at_step_end); }
@@ -160,7 +179,11 @@ void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
   const ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
   const FrameExcitation excitation = b.frame.begin_step(constants_, load, first_moment(slot), h);
   if (!couplings_.empty()) excite_modes(modes.forces, excitation);
-  if (b.modes_static) leave_static_answer(slot, modes.z);
+  if (b.modes_static) {
+    leave_static_answer(slot, modes.z);
+    forget_static_answer(slot);
+  }
+  b.held = false;
   advance_modes(slot, modes, b.modes_loaded || !couplings_.empty(), whole_);
   b.frame.end_step(constants_, load, first_moment(slot), h);
   clear_loads(slot);
@@ -185,6 +208,7 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   const bool constrained = add_modal_load(load.modal, modes.forces, step);
   if (b.modes_static) leave_static_answer(slot, modes.z);
   advance_modes(slot, modes, b.modes_loaded || constrained || !couplings_.empty(), step);
+  p.held = constrained;
   p.modes_static = constrained && answer_statically(slot, load.modal, step);
   p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
 }
@@ -199,6 +223,7 @@ void BodyGroup::commit(Index slot, bool begins, bool ends) {
   if (p.modes_static) static_amplitudes_.copy_from(predicted_static_, slot);
   if (b.modes_static && !p.modes_static) static_amplitudes_.clear(slot);
   b.modes_static = p.modes_static;
+  b.held = p.held;
   if (ends) clear_loads(slot);
 }
 
@@ -274,6 +299,11 @@ Vec3 BodyGroup::first_moment_at_end(const ExactMotion& motion) const {
 void BodyGroup::leave_static_answer(Index slot, double* z) const {
   const std::span<const double> answer = static_amplitudes_.modes(slot);
   for (std::size_t i = 0; i < answer.size(); ++i) z[i] -= answer[i];
+}
+
+void BodyGroup::forget_static_answer(Index slot) {
+  static_amplitudes_.clear(slot);
+  body(slot).modes_static = false;
 }
 
 /// @return whether there is any

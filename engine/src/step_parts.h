@@ -19,6 +19,8 @@ class StepParts {
 
   int count() const { return parts_; }
   double length() const { return step_ / parts_; }
+  void set_step(double step) { step_ = step; }
+  bool impulses_wait() const { return !impulses_.empty(); }
 
   // Remembered until the step has been taken. The first part's share is the caller's.
   void hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W);

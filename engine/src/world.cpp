@@ -226,7 +226,28 @@ int World::advance(double real_seconds) {
 }
 
 double World::interpolation_factor() const { return impl_->accumulator / impl_->options.step; }
-double World::time() const { return static_cast<double>(impl_->steps) * impl_->options.step; }
+void World::set_step(double seconds) {
+  Impl& m = *impl_;
+  WorldOptions options = m.options;
+  options.step = seconds;
+  options.validate();
+  const auto waits = [&](const Impl::Entry& e) {
+    return e.alive && e.group >= 0 && m.group(e).has_delayed_impulse(e.slot);
+  };
+  if (m.parts->impulses_wait() || std::any_of(m.entries.begin(), m.entries.end(), waits))
+    throw InvalidArgument("World::set_step: an impulse with a delay waits for the coming step; set the step first");
+  for (const auto& group : m.groups)
+    if (group) group->set_step_length(seconds / options.substeps);
+  m.parts->set_step(seconds);
+  m.accumulator = std::min(m.accumulator / m.options.step * seconds, std::nextafter(seconds, 0.0));
+  m.time_before = time();
+  m.steps_before = m.steps;
+  m.options.step = seconds;
+}
+
+double World::time() const {
+  return impl_->time_before + static_cast<double>(impl_->steps - impl_->steps_before) * impl_->options.step;
+}
 std::uint64_t World::step_count() const { return impl_->steps; }
 double World::dropped_seconds() const { return impl_->dropped; }
 const WorldOptions& World::options() const { return impl_->options; }

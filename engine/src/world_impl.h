@@ -85,7 +85,8 @@ struct World::Impl {
   std::vector<ExactMotion> motions;
   internal::PassingBodies passing;
   std::size_t alive = 0;
-  std::uint64_t steps = 0;
+  std::uint64_t steps = 0, steps_before = 0;  // taken; those before the step's length was last set
+  double time_before = 0.0;                   // s, of these
   double accumulator = 0.0, dropped = 0.0;
   // Scratch of drawing, kept so that it is not allocated again.
   struct Drawn {

@@ -149,6 +149,7 @@ Vec3 World::dent(BodyId id, const SurfacePoint& at) const {
 std::uint64_t World::state_hash() const {
   Hash hash;
   hash.add(impl_->steps);
+  hash.add(impl_->options.step);
   for (const Impl::Entry& e : impl_->entries) {
     hash.add(std::uint64_t{e.generation});
     if (!e.alive || e.group < 0) continue;

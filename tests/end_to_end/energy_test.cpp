@@ -1,12 +1,11 @@
-// No energy from nowhere: a part of the grid of energy_scenes.h, by World::energy and by the nodes of the meshes. All
-// of it is benchmarks/energy_grid's.
+// No energy from nowhere: a part of the grid of stability_scenes.h, by World::energy and by the nodes of the meshes. All
+// of it: `limber-benchmark stability --grid energy`.
 #include <gtest/gtest.h>
 
-#include <sstream>
 #include <utility>
 
 #include "asked.h"
-#include "energy_scenes.h"
+#include "stability_scenes.h"
 
 namespace limber::testing {
 namespace {
@@ -19,19 +18,12 @@ constexpr int kEvery = 13, kEveryPile = 131;
 constexpr double kRise = 1e-6;  // of the energy's scale, in a step
 constexpr int kSteps = 30;
 
-std::string text(const EnergyCase& at) {
-  std::ostringstream out;
-  out << name(at.scene) << ", E " << at.youngs_modulus << " Pa, nu " << at.poisson_ratio << ", step " << at.step
-      << " s, damping " << at.damping_ratio << ", " << at.modes << " modes, mass ratio " << at.mass_ratio;
-  return out.str();
-}
-
 /// By World::energy, which the energy guard minds: no step ends with more than it began with, and no moment has more
 /// than the first. By the nodes, which nothing minds: their kinetic energy is World's but for the change of inertia
 /// (spin_bound), so no moment has more than the first but for that. A step can: modes above the step's Nyquist rate
 /// have static answers, whose strain World::energy counts beside that of what vibrates and without their product
 /// (body_energy.h).
-void expect_no_energy_from_nowhere(const EnergyResult& r, double node_rise) {
+void expect_no_energy_from_nowhere(const StabilityResult& r, double node_rise) {
   EXPECT_TRUE(r.finite);
   EXPECT_LE(r.worst_rise, kRise);
   EXPECT_LE(r.total_rise, kRise);
@@ -40,22 +32,22 @@ void expect_no_energy_from_nowhere(const EnergyResult& r, double node_rise) {
   EXPECT_LE(r.node_worst_rise, node_rise + 2.0 * r.spin_bound);
 }
 
-class EnergyOfBars : public ::testing::TestWithParam<EnergyScene> {};
+class EnergyOfBars : public ::testing::TestWithParam<StabilityScene> {};
 
 TEST_P(EnergyOfBars, NeverRisesWhateverTheStiffnessStepDampingModesAndWeights) {
-  const bool pile = GetParam() == EnergyScene::kPile;  // takes twenty times as long as the others
+  const bool pile = GetParam() == StabilityScene::kPile;  // takes twenty times as long as the others
   const auto every = static_cast<std::size_t>(asked("LIMBER_EVERY", pile ? kEveryPile : kEvery));
   // Stiff bars in a pile, one ten thousand times as heavy as the other: 7.8e-4 is measured. A regression guard.
   const double node_rise = pile ? 1e-3 : kRise;
-  const std::vector<EnergyCase> grid = energy_grid();
+  const std::vector<StabilityCase> grid = energy_grid();
   int cases = 0, sharp = 0;
   for (std::size_t i = 0; i < grid.size(); i += every) {
     if (grid[i].scene != GetParam()) continue;
     SCOPED_TRACE(text(grid[i]));
-    const EnergyResult r = run(grid[i], kSteps);
+    const StabilityResult r = run(grid[i], kSteps);
     expect_no_energy_from_nowhere(r, node_rise);
     // The strain of the mesh is the elastic energy, where contacts do not ask modes above the Nyquist rate for answers.
-    if (GetParam() == EnergyScene::kHandle || GetParam() == EnergyScene::kChain) {
+    if (GetParam() == StabilityScene::kHandle || GetParam() == StabilityScene::kChain) {
       EXPECT_LE(r.strain_difference, kRise);
     }
     ++cases;
@@ -66,14 +58,14 @@ TEST_P(EnergyOfBars, NeverRisesWhateverTheStiffnessStepDampingModesAndWeights) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EnergyOfBars,
-                         ::testing::Values(EnergyScene::kGround, EnergyScene::kPile, EnergyScene::kHandle,
-                                           EnergyScene::kChain),
+                         ::testing::Values(StabilityScene::kGround, StabilityScene::kPile, StabilityScene::kHandle,
+                                           StabilityScene::kChain),
                          [](const auto& scene) { return std::string(name(scene.param)); });
 
 // What blew up once: rubber of 100 Pa at a tenth of a second, with weights of 1 : 10,000, where Newton's method does
 // not settle. The impulses it ends with are refused then.
 TEST(EnergyOfBars, OfImpulsesThatDidNotComeTogetherIsRefused) {
-  const EnergyResult r = run({.scene = EnergyScene::kChain,
+  const StabilityResult r = run({.scene = StabilityScene::kChain,
                               .youngs_modulus = 100.0,
                               .poisson_ratio = 0.499,
                               .step = 0.1,
@@ -87,8 +79,8 @@ TEST(EnergyOfBars, OfImpulsesThatDidNotComeTogetherIsRefused) {
 // motion left there to take. It begins such a step more slowly, and stays where it is held.
 TEST(EnergyOfBars, AHeldOneIsNeverLetGoWhereItTurnsRound) {
   for (const int modes : {0, 8}) {
-    const EnergyResult r =
-        run({.scene = EnergyScene::kHandle, .youngs_modulus = 1e8, .poisson_ratio = 0.499, .step = 0.1, .modes = modes},
+    const StabilityResult r =
+        run({.scene = StabilityScene::kHandle, .youngs_modulus = 1e8, .poisson_ratio = 0.499, .step = 0.1, .modes = modes},
             200);
     EXPECT_EQ(r.unsettled, 0) << modes;
     expect_no_energy_from_nowhere(r, kRise);
@@ -100,7 +92,7 @@ TEST(EnergyOfBars, AHeldOneIsNeverLetGoWhereItTurnsRound) {
 TEST(EnergyOfBars, AChainWithAHeavyEndSettlesOrAlmostAtATenthOfASecond) {
   constexpr int kUnsettledGuard = 5;
   for (const auto& [step, unsettled] : {std::pair(1.0 / 60.0, 0), std::pair(0.1, kUnsettledGuard)}) {
-    const EnergyResult r = run({.scene = EnergyScene::kChain, .step = step, .modes = 0, .mass_ratio = 1e4}, 120);
+    const StabilityResult r = run({.scene = StabilityScene::kChain, .step = step, .modes = 0, .mass_ratio = 1e4}, 120);
     EXPECT_LE(r.unsettled, unsettled) << step;
     expect_no_energy_from_nowhere(r, kRise);
   }

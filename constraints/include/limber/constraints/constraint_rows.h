@@ -68,6 +68,13 @@ struct RowLaw {
   bool slides = false;
 };
 
+/// RowLaw::tolerance of a distance: a part of the lengths that it depends on, and what is lost of it to the digits of
+/// its place in the world, some roundings of its coordinates.
+inline double distance_tolerance(double part, double length, const Vec3& place) {
+  constexpr double kRoundings = 16.0 * std::numeric_limits<double>::epsilon();
+  return part * length + kRoundings * place.norm() + std::numeric_limits<double>::min();
+}
+
 /// The rows of one island, made anew every step in memory that is kept.
 class ConstraintRows {
  public:

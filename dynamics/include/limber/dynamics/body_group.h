@@ -51,6 +51,10 @@ class BodyGroup {
   const std::shared_ptr<const ModalModel>& shared_model() const { return model_; }
   const FrameConstants& frame_constants() const { return constants_; }
   double step_length() const { return whole_.length(); }
+  /// Changes the length of the steps to come. Modes that pass the Nyquist rate of the new step go on from where they
+  /// are: what held them in the last step is taken for their static displacement. No impulse may be waiting for its time in the next one. Allocates nothing.
+  /// @throws InvalidArgument if step is not in (0, 1e100]
+  void set_step_length(double step);
   const ModalStep& modal_step() const { return whole_; }
 
   // Bodies. Adding may allocate; a vacant slot is used first. The new body is at rest shape.
@@ -202,12 +206,14 @@ class BodyGroup {
     bool asleep = false;
     bool modes_loaded = false;              // forces_ is not zero
     bool modes_static = false;              // static_amplitudes_ are not zero
+    bool held = false;                      // a constraint acted on the modes in the last step
     std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
   };
 
   /// The frame at the end of a step that was predicted.
   struct Prediction {
     RigidFrame frame;
+    bool held = false;
     bool modes_static = false;
   };
 
@@ -225,6 +231,8 @@ class BodyGroup {
   void advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const;
   void excite_modes(double* forces, const FrameExcitation& excitation) const;
   void leave_static_answer(Index slot, double* z) const;
+  void forget_static_answer(Index slot);
+  void split_static_answer(Index slot);
   static bool add_modal_load(std::span<const double> modal, double* forces, const ModalStep& step);
   bool answer_statically(Index slot, std::span<const double> modal, const ModalStep& step);
   void clear_loads(Index slot);
@@ -241,6 +249,7 @@ class BodyGroup {
   std::shared_ptr<const ModalModel> model_;
   FrameConstants constants_;
   ModalStep whole_;
+  std::vector<double> were_static_;  // velocity responses of the step before the last change of its length
   /// Per mode what it feels of the frame: p, −∫ρ x × w and the symmetric matrix tr(S) 1 − S.
   struct Coupling {
     Vec3 field, angular_acceleration;

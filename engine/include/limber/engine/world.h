@@ -203,9 +203,13 @@ class World {
   int advance(double real_seconds);
   /// Takes one step.
   void step();
+  /// Changes the length of the steps to come, for loops whose frames vary; given before the loads of the coming step.
+  /// What advance() keeps for the next step stays the same fraction of one, so that drawing goes on where it is.
+  /// @param seconds > 0. @throws InvalidArgument also while an impulse waits for a later time within the coming step
+  void set_step(double seconds);
   /// Fraction of a step left in the accumulator, in [0, 1): how far to draw between the last two states.
   double interpolation_factor() const;
-  double time() const;  ///< s: steps × step length
+  double time() const;  ///< s: the lengths of all steps taken
   std::uint64_t step_count() const;
   double dropped_seconds() const;  ///< real time given up by max_steps_per_advance
   const WorldOptions& options() const;

@@ -1,4 +1,4 @@
-// limber-benchmark: how long limber takes, beside what it computes. Tables as CSV and JSON, plots as SVG.
+#include "step.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -15,6 +14,7 @@
 #include "limber/engine/world.h"
 #include "limber/model/asset.h"
 #include "limber/scene/scene_model.h"
+#include "plot.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct StepArguments {
   std::string asset, csv, plot;
   std::vector<int> bodies{1, 10, 100, 1000}, modes{0, 8, 20, 32, 40, 64};
   int vertices = 2600;
@@ -31,7 +31,7 @@ struct Arguments {
 };
 
 /// One measured case.
-struct Row {
+struct StepRow {
   Index modes = 0, bodies = 0, vertices = 0;
   double advance_median = 0.0, advance_p99 = 0.0;  // s per step of the whole world
   double positions = 0.0, normals = 0.0;           // s per reconstruction of all bodies; normals: positions and normals
@@ -137,9 +137,9 @@ double quantile(const std::vector<double>& sorted, double q) {
   return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
 }
 
-Row measure(const std::shared_ptr<const ModalModel>& model, Index bodies, const Arguments& a) {
+StepRow measure(const std::shared_ptr<const ModalModel>& model, Index bodies, const StepArguments& a) {
   Flight flight(model, bodies, a.step);
-  Row row{.modes = model->modes(), .bodies = bodies, .vertices = model->render().vertices()};
+  StepRow row{.modes = model->modes(), .bodies = bodies, .vertices = model->render().vertices()};
   const double before = flight.energy();
   const auto steps = time(a.seconds_per_row, [&] { flight.world.step(); });
   row.advance_median = quantile(steps, 0.5);
@@ -151,17 +151,17 @@ Row measure(const std::shared_ptr<const ModalModel>& model, Index bodies, const 
   return row;
 }
 
-std::vector<std::shared_ptr<const ModalModel>> models(const Arguments& a) {
+std::vector<std::shared_ptr<const ModalModel>> models(const StepArguments& a) {
   std::vector<std::shared_ptr<const ModalModel>> all;
   if (!a.asset.empty()) return {read_asset(a.asset).bodies.front()};
   for (const int k : a.modes) all.push_back(synthetic_model(k, a.vertices));
   return all;
 }
 
-double per_body_ns(double seconds, const Row& r) { return 1e9 * seconds / r.bodies; }
-double per_vertex_ns(double seconds, const Row& r) { return per_body_ns(seconds, r) / r.vertices; }
+double per_body_ns(double seconds, const StepRow& r) { return 1e9 * seconds / r.bodies; }
+double per_vertex_ns(double seconds, const StepRow& r) { return per_body_ns(seconds, r) / r.vertices; }
 
-Json json_row(const Row& r) {
+Json json_row(const StepRow& r) {
   Json row{{"modes", r.modes},
            {"bodies", r.bodies},
            {"vertices", r.vertices},
@@ -175,11 +175,11 @@ Json json_row(const Row& r) {
   return row;
 }
 
-std::string csv_of(const std::vector<Row>& rows) {
+std::string csv_of(const std::vector<StepRow>& rows) {
   std::string csv =
       "modes,bodies,vertices,step_us_median,step_us_p99,step_ns_per_body,positions_ns_per_vertex,"
       "positions_and_normals_ns_per_vertex,energy_drift\n";
-  for (const Row& r : rows)
+  for (const StepRow& r : rows)
     csv += fmt::format("{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.3g}\n", r.modes, r.bodies, r.vertices,
                        1e6 * r.advance_median, 1e6 * r.advance_p99, per_body_ns(r.advance_median, r),
                        per_vertex_ns(r.positions, r), per_vertex_ns(r.normals, r), r.energy_drift);
@@ -187,44 +187,35 @@ std::string csv_of(const std::vector<Row>& rows) {
 }
 
 /// Time per body against modes, a line per number of bodies, by gnuplot.
-std::string svg_of(const std::vector<Row>& rows, const std::vector<int>& bodies) {
-  const auto folder = std::filesystem::temp_directory_path() /
-                      fmt::format("limber-benchmark-{}", Clock::now().time_since_epoch().count());
-  std::filesystem::create_directory(folder);
-  write_file(folder / "rows.csv", csv_of(rows));
+std::string svg_of(const std::vector<StepRow>& rows, const std::vector<int>& bodies) {
   std::string plot =
-      "set terminal svg size 760,480 font 'sans-serif,13' background rgb 'white' name 'step'\n"
-      "set output 'out.svg'\nset datafile separator ','\nset xlabel 'modes'\n"
+      "set datafile separator ','\nset xlabel 'modes'\n"
       "set ylabel 'one step in free flight, ns per body (median)'\nset yrange [0:*]\nset key left top\nset grid\nplot ";
   for (std::size_t i = 0; i < bodies.size(); ++i)
-    plot += fmt::format("{}'rows.csv' using ($2=={} ? $1 : NaN):6 with linespoints pt 7 title '{} bodies'",
+    plot += fmt::format("{}'data.csv' using ($2=={} ? $1 : NaN):6 with linespoints pt 7 title '{} bodies'",
                         i == 0 ? "" : ", ", bodies[i], bodies[i]);
-  write_file(folder / "plot.gp", plot + "\n");
-  const int code = std::system(("cd '" + folder.string() + "' && gnuplot plot.gp >/dev/null 2>&1").c_str());
-  std::string svg = code == 0 ? read_file(folder / "out.svg") : "";
-  std::filesystem::remove_all(folder);
-  return svg;
+  return svg_by_gnuplot({760, 480}, csv_of(rows), plot);
 }
 
-void check(const Arguments& a) {
+void check(const StepArguments& a) {
   for (const int n : a.bodies)
     if (n < 1 || n > 1'000'000) throw InvalidArgument(fmt::format("--bodies: is {}, expected 1 to 1000000", n));
   for (const int k : a.modes)
     if (k < 0 || k > 1000) throw InvalidArgument(fmt::format("--modes: is {}, expected 0 to 1000", k));
 }
 
-std::string text_of(const Row& r) {
+std::string text_of(const StepRow& r) {
   return fmt::format("{:>6} {:>7} {:>9} {:>14.1f} {:>14.2f} {:>18.2f} {:>13.1e}\n", r.modes, r.bodies, r.vertices,
                      per_body_ns(r.advance_median, r), per_vertex_ns(r.positions, r), per_vertex_ns(r.normals, r),
                      r.energy_drift);
 }
 
-void benchmark_step(Program& program, const Arguments& a) {
+void benchmark_step(Program& program, const StepArguments& a) {
   check(a);
   program.print(fmt::format("{:>6} {:>7} {:>9} {:>14} {:>14} {:>18} {:>13}\n", "modes", "bodies", "vertices",
                             "step ns/body", "positions ns/v", "with normals ns/v", "energy drift"));
   if (!a.asset.empty()) program.add_input(a.asset);
-  std::vector<Row> rows;
+  std::vector<StepRow> rows;
   for (const auto& model : models(a))
     for (const int bodies : a.bodies) {
       program.progress().stage(fmt::format("{} modes, {} bodies", model->modes(), bodies));
@@ -236,16 +227,12 @@ void benchmark_step(Program& program, const Arguments& a) {
   report["step"] = a.step;
   report["model"] = a.asset.empty() ? "synthetic" : std::filesystem::path(a.asset).filename().string();
   report["seconds"]["rows"] = Json::array();
-  for (const Row& r : rows) report["seconds"]["rows"].push_back(json_row(r));
+  for (const StepRow& r : rows) report["seconds"]["rows"].push_back(json_row(r));
   if (!a.csv.empty()) program.write_file(a.csv, csv_of(rows));
-  if (a.plot.empty()) return;
-  if (const std::string svg = svg_of(rows, a.bodies); !svg.empty())
-    program.write_file(a.plot, svg);
-  else
-    program.warnings().push_back("No plot was made: gnuplot is missing or failed; apt-get install gnuplot-nox.");
+  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows, a.bodies));
 }
 
-void declare_step(CLI::App& app, Arguments& a) {
+void declare_step(CLI::App& app, StepArguments& a) {
   app.add_option("--asset", a.asset, "model to use; default: synthetic ones")->type_name("ASSET.glb");
   app.add_option("--modes", a.modes, "modes of the synthetic models")
       ->type_name("K,...")
@@ -269,15 +256,15 @@ void declare_step(CLI::App& app, Arguments& a) {
 }
 
 }  // namespace
+
+std::function<void(Program&)> add_step(CLI::App& programs) {
+  const auto arguments = std::make_shared<StepArguments>();
+  CLI::App* app = programs.add_subcommand("step", "free flight: one step, and reconstruction, per body, mode and vertex");
+  declare_step(*app, *arguments);
+  return [arguments, app](Program& program) {
+    if (app->parsed()) benchmark_step(program, *arguments);
+  };
+}
+
 }  // namespace limber::tools
 
-int main(int argc, char** argv) {
-  using namespace limber::tools;
-  Program program("limber-benchmark", "Measures limber on this machine, in one thread.");
-  Arguments arguments;
-  program.options().require_subcommand(1)->fallthrough();  // so that --report may follow the subcommand
-  CLI::App* step =
-      program.options().add_subcommand("step", "free flight: one step, and reconstruction, per body, mode and vertex");
-  declare_step(*step, arguments);
-  return program.run(argc, argv, [&] { benchmark_step(program, arguments); });
-}
