@@ -108,6 +108,9 @@ struct FinderTuning {
   double kept_spacing = 1.1;
   /// How many more they may be than the best choice, per contact of it that covers the middle [0 to 1]. Steady.
   double kept_surplus = 0.5;
+  /// Part of a patch's extent by which a contact may be farther than one that stands for it and still be pressed with
+  /// it in full; at twice of it not at all [1e-3 to 2e-2]: the depth of dents.
+  double pressed_with = 5e-3;
   double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
   /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
   /// `look_again` [1 to 4] times what the bounds gave, at least `look_nearer` [0.01 to 0.2] of the time before. After

@@ -34,6 +34,7 @@ void ContactOptions::validate() const {
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<PreparedContact> contacts;
+  std::vector<VertexShare> regions;                // of their sides
   std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
@@ -52,6 +53,8 @@ struct ContactSet::Impl {
   double lasted(Index a, Index b) const;
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
+  void reserve_regions(std::span<const ContactPoint> points);
+  void add_region(PreparedSide& side, const ContactSide& found);
 };
 
 const ContactMemory* ContactSet::Impl::find(std::uint64_t id) const {
@@ -74,6 +77,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   };
   PreparedContact contact{
       .id = point.id, .a = make_side(states, point.a, point.normal), .b = make_side(states, point.b, -point.normal)};
+  add_region(contact.a, point.a);
+  add_region(contact.b, point.b);
   contact.axes = frame_along(point.normal);
   contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
   contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
@@ -83,6 +88,26 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   if (const ContactMemory* known = find(point.id))
     contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
   contacts.push_back(contact);
+}
+
+/// So that spans of them stay where they are.
+void ContactSet::Impl::reserve_regions(std::span<const ContactPoint> points) {
+  std::size_t most = 0;
+  for (const ContactPoint& point : points)
+    most += std::max<std::size_t>(3, point.a.region.size()) + std::max<std::size_t>(3, point.b.region.size());
+  regions.clear();
+  regions.reserve(most);
+}
+
+/// The vertices that a contact's force is spread over, its point's own where it stands for no others.
+void ContactSet::Impl::add_region(PreparedSide& side, const ContactSide& found) {
+  if (!yields(side)) return;
+  const std::size_t first = regions.size();
+  regions.insert(regions.end(), found.region.begin(), found.region.end());
+  const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
+  for (std::size_t c = 0; c < 3 && found.region.empty(); ++c)
+    if (side.at.weight[c] != 0.0) regions.push_back({.vertex = corners[c], .share = side.at.weight[c]});
+  side.region = std::span(regions).subspan(first);
 }
 
 ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -103,6 +128,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
   s.give_energy.resize(bodies);
   s.dents.reserve(bodies);
+  s.reserve_regions(points);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
   s.pairs_used = s.rolling_used = 0;

@@ -1,42 +1,46 @@
 #include "contact_dents.h"
 
+#include <algorithm>
+
 namespace limber {
 namespace {
 
-/// What a force at `j` does at `i`, body frame.
-Mat3 flexibility(const ModalModel& model, const SurfacePoint& i, const SurfacePoint& j) {
-  const ResidualCompliance& compliance = *model.data().residual_compliance;
-  const std::vector<Triangle>& triangles = model.collision().triangles;
-  const Triangle &at_i = triangles[static_cast<std::size_t>(i.triangle)],
-                 &at_j = triangles[static_cast<std::size_t>(j.triangle)];
-  Mat3 G = Mat3::Zero();
-  for (std::size_t p = 0; p < 3; ++p)
-    for (std::size_t q = 0; q < 3; ++q)
-      if (const double weight = i.weight[p] * j.weight[q]; weight != 0.0)
-        G += weight * compliance.block(at_i[p], at_j[q]);
-  return G;
+const ResidualCompliance& compliance_of(const BodyStates& states, Index body) {
+  return *states.body(body).group->model().data().residual_compliance;
 }
 
-const ModalModel& model_of(const BodyStates& states, Index body) { return states.body(body).group->model(); }
-
-Vec3 displacement_in_body(const ModalModel& model, std::span<const DentLoad> loads, const SurfacePoint& at) {
+Vec3 displacement_in_body(const ResidualCompliance& compliance, std::span<const DentLoad> loads, Index vertex) {
+  const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
   Vec3 u = Vec3::Zero();
-  for (const DentLoad& load : loads) u += flexibility(model, at, load.at) * load.force;
+  for (const DentLoad& load : loads)
+    if (!local || load.vertex == vertex) u += compliance.block(vertex, load.vertex) * load.force;
   return u;
 }
 
 }  // namespace
+
+std::size_t VertexNumbers::operator()(Index vertex) {
+  const auto v = static_cast<std::size_t>(vertex);
+  if (known_.size() <= v) known_.resize(v + 1);
+  if (known_[v].round != round_) known_[v] = {round_, count_++};
+  return known_[v].number;
+}
 
 void ContactDents::reserve(std::size_t bodies) {
   if (bodies_.size() < bodies) bodies_.resize(bodies);
 }
 
 bool ContactDents::yields(const BodyStates& states, Index body) {
-  return !states.is_static(body) && model_of(states, body).data().residual_compliance.has_value();
+  return !states.is_static(body) && states.body(body).group->model().data().residual_compliance.has_value();
 }
 
-Vec3 ContactDents::displacement(const BodyStates& states, Index body, const SurfacePoint& at) const {
-  return states.pose(body, StepTime::kStart).q * displacement_in_body(model_of(states, body), this->at(body).loads, at);
+Vec3 ContactDents::displacement(const BodyStates& states, Index body, Region region) {
+  const Body& b = at(body);
+  if (b.loads.empty()) return Vec3::Zero();
+  const ResidualCompliance& compliance = compliance_of(states, body);
+  Vec3 u = Vec3::Zero();
+  for (const VertexShare& s : region) u += s.share * displacement_in_body(compliance, b.loads, s.vertex);
+  return states.pose(body, StepTime::kStart).q * u;
 }
 
 void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
@@ -45,34 +49,57 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
   if (!b.gathers || side.first <= b.rows.back().first) {
     b.gathers = true;
     b.rows.clear();
+    b.in_regions.clear();
+    b.vertices.clear();
     rows.add_stored_energy(energy(states, body));
   }
   b.rows.push_back(side);
-  const ModalModel& model = model_of(states, body);
+  find_answers(compliance_of(states, body), side.region, b);
   for (const Rows& other : b.rows) {
-    const Mat3 G = side.axes.transpose() * flexibility(model, side.at, other.at) * other.axes;
+    Mat3 answer = Mat3::Zero();
+    for (const VertexShare& s : other.region) answer += s.share * b.answer[b.in_regions(s.vertex)];
+    const Mat3 G = other.axes.transpose() * answer * side.axes;
     const bool itself = &other == &b.rows.back();
     for (Index p = 0; p < side.count; ++p)
       for (Index q = 0; q < (itself ? p + 1 : other.count); ++q)
-        rows.add_flexibility(body, side.first + p, other.first + q, G(p, q));
+        rows.add_flexibility(body, side.first + p, other.first + q, G(q, p));
   }
 }
 
-void ContactDents::press(Index body, const DentLoad& load) {
+/// Displacements of the vertices of all regions so far by a unit force on one of these.
+void ContactDents::find_answers(const ResidualCompliance& compliance, Region region, Body& b) {
+  for (const VertexShare& s : region)
+    if (b.in_regions(s.vertex) == b.vertices.size()) b.vertices.push_back(s.vertex);
+  b.answer.assign(b.vertices.size(), Mat3::Zero());
+  const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
+  for (const VertexShare& s : region) {
+    if (local) b.answer[b.in_regions(s.vertex)] += s.share * compliance.block(s.vertex, s.vertex);
+    for (std::size_t v = 0; v < b.vertices.size() && !local; ++v)
+      b.answer[v] += s.share * compliance.block(b.vertices[v], s.vertex);
+  }
+}
+
+void ContactDents::press(Index body, Region region, const Vec3& force) {
   Body& b = at(body);
   if (b.gathers) {
     b.gathers = false;
     b.loads.clear();
+    b.of_loads.clear();
   }
   b.pressed = true;
-  if (!load.force.isZero(0.0)) b.loads.push_back(load);
+  if (force.isZero(0.0)) return;
+  for (const VertexShare& s : region) {
+    const std::size_t number = b.of_loads(s.vertex);
+    if (number == b.loads.size()) b.loads.push_back({.vertex = s.vertex});
+    b.loads[number].force += s.share * force;
+  }
 }
 
 void ContactDents::finish(std::span<const char> asleep) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     Body& b = bodies_[i];
     const bool sleeps = i < asleep.size() && asleep[i] != 0;
-    if (!b.pressed && !sleeps) b.loads.clear();
+    if (!b.pressed && !sleeps) b.loads.clear(), b.of_loads.clear();
     b.pressed = b.gathers = false;
   }
 }
@@ -92,7 +119,7 @@ double ContactDents::energy(const BodyStates& states, Index body) const {
   const std::span<const DentLoad> loads = this->loads(body);
   double energy = 0.0;
   for (const DentLoad& load : loads)
-    energy += 0.5 * load.force.dot(displacement_in_body(model_of(states, body), loads, load.at));
+    energy += 0.5 * load.force.dot(displacement_in_body(compliance_of(states, body), loads, load.vertex));
   return energy;
 }
 

@@ -1,11 +1,12 @@
 // What contact forces press into bodies beyond their kept modes (residual_compliance.h), from step to step.
 //
-// A body remembers the forces f_j of its last step at the material points p_j that they pressed on, in its own frame:
+// A body remembers what contacts pressed its vertices v with in its last step, f_v, in its own frame:
 //
-//   u(p) = Σ_j G(p, p_j) f_j,     energy ½ Σ_j f_j · u(p_j)
+//   u_v = Σ_w G_vw f_w,     energy ½ Σ_v f_v · u_v
 //
-// This is a state of the body, not of its contacts: it turns with the body, and where contacts come and go, slide on
-// to other triangles or are thinned in another way, each of them finds the dent that is there.
+// A contact gives shares w(v) of its force to the vertices of its region and is moved by the mean Σ_v w(v) u_v of their
+// displacements. This is a state of the body, not of its contacts: it turns with the body, and where contacts come and
+// go, slide on to other triangles or are thinned in another way, each of them finds the dent that is there.
 //
 // Forces are found in the next step: all contacts of a body yield to each other, whichever body they are with.
 #pragma once
@@ -17,11 +18,31 @@
 
 namespace limber {
 
+/// Numbers vertices in the order in which they are asked for.
+class VertexNumbers {
+ public:
+  void clear() { ++round_, count_ = 0; }
+  /// A new one is count() as it was before.
+  std::size_t operator()(Index vertex);
+  std::size_t count() const { return count_; }
+
+ private:
+  struct Known {
+    std::uint64_t round = 0;
+    std::size_t number = 0;
+  };
+  std::vector<Known> known_;  // by vertex
+  std::uint64_t round_ = 1;
+  std::size_t count_ = 0;
+};
+
 class ContactDents {
  public:
+  using Region = std::span<const VertexShare>;
+
   /// A contact's side as rows of the island at hand: `rows` of them from `first` on, along the columns of `axes`.
   struct Rows {
-    SurfacePoint at{};
+    Region region{};
     Mat3 axes = Mat3::Identity();  // body frame, turned round for the body that is pressed the other way
     Index first = 0, count = 0;
   };
@@ -31,13 +52,13 @@ class ContactDents {
   /// Whether a body has a residual compliance at all. @pre it is in the table
   static bool yields(const BodyStates& states, Index body);
 
-  /// Displacement of a material point by the forces remembered, world.
-  Vec3 displacement(const BodyStates& states, Index body, const SurfacePoint& at) const;
+  /// Mean displacement of a region by the forces remembered, world.
+  Vec3 displacement(const BodyStates& states, Index body, Region region);
   /// Adds a side's rows: they yield to each other and to all those that the body has already in this part of a step;
   /// with the body's first, what it has stored.
   void add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows);
-  /// Takes the force of a side in the place of those of the last step, or part of one.
-  void press(Index body, const DentLoad& load);
+  /// Takes the force of a side in the place of those of the last step, or part of one. @param force body frame, N
+  void press(Index body, Region region, const Vec3& force);
 
   /// After a step: bodies that nothing has pressed let go of what they had. @param asleep by body: keep theirs
   void finish(std::span<const char> asleep);
@@ -51,12 +72,17 @@ class ContactDents {
  private:
   struct Body {
     std::vector<DentLoad> loads;
-    std::vector<Rows> rows;  // of the part of a step at hand
-    bool gathers = false;    // rows are being added; the loads are those of the part before
-    bool pressed = false;    // in this step
+    VertexNumbers of_loads;
+    std::vector<Rows> rows;    // of the part of a step at hand
+    VertexNumbers in_regions;  // of all of these
+    std::vector<Index> vertices;
+    std::vector<Mat3> answer;  // of each of them to a force on one region
+    bool gathers = false;      // rows are being added; the loads are those of the part before
+    bool pressed = false;      // in this step
   };
   Body& at(Index body) { return bodies_[static_cast<std::size_t>(body)]; }
   const Body& at(Index body) const { return bodies_[static_cast<std::size_t>(body)]; }
+  static void find_answers(const ResidualCompliance& compliance, Region region, Body& b);
 
   std::vector<Body> bodies_;
 };

@@ -11,8 +11,6 @@ namespace {
 constexpr double kRelativeTolerance = 3e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
-// Of the radius of a body that contacts dent: overlap of this much stays, up to the deepest dent.
-constexpr double kOverlapThatStays = 4e-4;
 // Of what a force moves the reduced mass of two bodies within a step: so far each contact of bodies that flex yields by
 // itself, in place of what the modes do not show, or beside it where the model knows (residual compliance). Loads that
 // many contacts could share in many ways then have one answer that changes little where gaps change by a picometre;
@@ -137,8 +135,8 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     pressed = pressed || !impulse.isZero(0.0);
     for (std::size_t side = 0; side < 2; ++side)
       if (yields_[side])
-        dents_->press(body(contact, side),
-                      {at(contact, side), turn_[side].conjugate() * (sign(side) * contact.last_force)});
+        dents_->press(body(contact, side), region(contact, side),
+                      turn_[side].conjugate() * (sign(side) * contact.last_force));
   }
   lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
 }
@@ -149,7 +147,6 @@ void PairContacts::begin(const BodyStates& states) {
   strikes_ = strikes(states);
   for (std::size_t side = 0; side < 2; ++side)
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
-  overlap_that_stays_ = 0.0;
   const PreparedContact& first = contacts_.front();
   const ContactRule& rule = options_->rule;
   const bool by_gaps =
@@ -160,15 +157,9 @@ void PairContacts::begin(const BodyStates& states) {
   for (PreparedContact& contact : contacts_) {
     Vec3 dent = Vec3::Zero();
     for (std::size_t side = 0; side < 2; ++side)
-      if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), at(contact, side));
+      if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), region(contact, side));
     contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
-    overlap_that_stays_ = std::max(overlap_that_stays_, contact.dent[0]);
   }
-  for (std::size_t side = 0; side < 2; ++side)
-    if (yields_[side])
-      overlap_that_stays_ =
-          std::min(overlap_that_stays_,
-                   kOverlapThatStays * states.body(body(first, side)).group->model().collision_extent().radius);
   caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
 }
 
@@ -193,8 +184,8 @@ Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const Prepare
   return contact.a.rolled(states) - contact.b.rolled(states);
 }
 
-const SurfacePoint& PairContacts::at(const PreparedContact& contact, std::size_t side) {
-  return (side == 0 ? contact.a : contact.b).at;
+std::span<const VertexShare> PairContacts::region(const PreparedContact& contact, std::size_t side) {
+  return (side == 0 ? contact.a : contact.b).region;
 }
 
 double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
@@ -257,7 +248,7 @@ void PairContacts::add_flexibility(const BodyStates& states, Index first, Constr
     Index row = first;
     for (const PreparedContact& contact : contacts_) {
       const Mat3 axes = sign(side) * (R.transpose() * contact.axes);
-      dents_->add_rows(states, body(contact, side), {at(contact, side), axes, row, row_count(contact)}, rows);
+      dents_->add_rows(states, body(contact, side), {region(contact, side), axes, row, row_count(contact)}, rows);
       row += row_count(contact);
     }
   }
@@ -274,8 +265,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     if (axis == 0) {
       const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
       const double recovery =
-          caught_ ? 0.0
-                  : std::min(kRecovery * std::max(0.0, -gap - overlap_that_stays_), step_ * options_->recovery_speed);
+          caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
       law.offset = std::min(0.0, gap) + recovery;
       law.agent_displacement = recovery;
       law.lower = 0.0;

@@ -46,7 +46,7 @@ class PairContacts final : public Constraint {
   static Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact);
 
   /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
-  static const SurfacePoint& at(const PreparedContact& contact, std::size_t side);
+  static std::span<const VertexShare> region(const PreparedContact& contact, std::size_t side);
   static Index body(const PreparedContact& contact, std::size_t side) {
     return (side == 0 ? contact.a : contact.b).body;
   }
@@ -83,8 +83,7 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
-  double give_ = 0.0;                // of each contact of bodies that flex, m/N
-  double overlap_that_stays_ = 0.0;  // m: the kept modes do not show shapes dented by as much
+  double give_ = 0.0;  // of each contact of bodies that flex, m/N
   std::vector<double> modal_a_, modal_b_;
   Passage passage_a_, passage_b_;
 };

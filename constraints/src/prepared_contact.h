@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "contact_geometry.h"
@@ -24,6 +25,7 @@ struct PreparedSide {
   Index body = -1;
   const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
   SurfacePoint at{};
+  std::span<const VertexShare> region{};  // of its residual compliance; none where it has none
   Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 

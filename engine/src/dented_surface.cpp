@@ -46,12 +46,9 @@ void DentedSurface::displacements(std::span<const DentLoad> before, std::span<co
 void DentedSurface::add_forces(std::span<const DentLoad> loads, double part) {
   if (part == 0.0) return;
   for (const DentLoad& load : loads) {
-    const Triangle& t = model_->collision().triangles[static_cast<std::size_t>(load.at.triangle)];
-    for (std::size_t i = 0; i < 3; ++i) {
-      Vec3& force = forces_[static_cast<std::size_t>(t[i])];
-      if (force.isZero(0.0)) pressed_.push_back(t[i]);
-      force += part * load.at.weight[i] * load.force;
-    }
+    Vec3& force = forces_[static_cast<std::size_t>(load.vertex)];
+    if (force.isZero(0.0)) pressed_.push_back(load.vertex);
+    force += part * load.force;
   }
   std::ranges::sort(pressed_);  // a force may have been taken away and come again
   pressed_.erase(std::unique(pressed_.begin(), pressed_.end()), pressed_.end());
@@ -83,11 +80,7 @@ DentedSurface::Place DentedSurface::place(Index render_vertex) const {
 
 Vec3 DentedSurface::displacement(std::span<const DentLoad> loads, Index vertex) const {
   Vec3 u = Vec3::Zero();
-  for (const DentLoad& load : loads) {
-    const Triangle& t = model_->collision().triangles[static_cast<std::size_t>(load.at.triangle)];
-    for (std::size_t i = 0; i < 3; ++i)
-      u += load.at.weight[i] * (model_->data().residual_compliance->block(vertex, t[i]) * load.force);
-  }
+  for (const DentLoad& load : loads) u += model_->data().residual_compliance->block(vertex, load.vertex) * load.force;
   return u;
 }
 

@@ -303,6 +303,56 @@ TEST(ContactClusters, AWarmReductionAllocatesNothing) {
   EXPECT_EQ(testing::allocations() - before, 0);
 }
 
+/// Σ_r φ_r = 1, Σ_r φ_r x_r = x, φ > 0, over what is kept of several shapes, with and without contacts in the middle.
+TEST(ContactClusters, WeightsSumToOneAndReproduceLinearFields) {
+  for (const Region& region : kRegions)
+    for (const double spacing : {kInfinity, 0.7}) {
+      auto contacts = samples(region.inside, 0.125);
+      ContactClusters clusters;
+      clusters.reduce(contacts, 0, spacing, {}, true);
+      const std::span<const ContactPoint> all = clusters.all();
+      std::vector<double> sum(all.size());
+      std::vector<Vec3> mean(all.size(), Vec3::Zero());
+      for (const ContactWeight& w : clusters.weights()) {
+        EXPECT_GT(w.weight, 0.0);
+        EXPECT_TRUE(clusters.kept(w.kept));
+        sum[static_cast<std::size_t>(w.contact)] += w.weight;
+        mean[static_cast<std::size_t>(w.contact)] += w.weight * all[static_cast<std::size_t>(w.kept)].position;
+      }
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        EXPECT_NEAR(sum[i], 1.0, kRoundOff) << region.name;
+        if (contains(contacts, all[i].position)) {
+          EXPECT_LT((mean[i] - all[i].position).norm(), kRoundOff) << region.name;
+        }
+        EXPECT_TRUE(contains(contacts, mean[i])) << region.name;
+      }
+    }
+}
+
+/// The corners of a square have the same parts of it, whatever their order.
+TEST(ContactClusters, WeightsOfASquareAreThoseOfItsSymmetry) {
+  auto contacts = samples(kRegions[0].inside, 0.25);
+  ContactClusters clusters;
+  clusters.reduce(contacts, 0, kInfinity, {}, true);
+  ASSERT_EQ(contacts.size(), 4u);
+  std::vector<double> part(clusters.all().size());
+  for (const ContactWeight& w : clusters.weights()) part[static_cast<std::size_t>(w.kept)] += w.weight;
+  for (std::size_t i = 0; i < part.size(); ++i)
+    EXPECT_NEAR(part[i], clusters.kept(static_cast<Index>(i)) ? 81.0 / 4.0 : 0.0, 1e-9);
+}
+
+TEST(ContactClusters, WhatIsFartherIsNotPressedWithWhatIsKept) {
+  auto contacts = samples(kRegions[0].inside, 0.25);
+  for (ContactPoint& c : contacts) c.gap = 0.1 * (1.0 + c.position.x());  // 0 to 0.2 of an extent of 2.8: a tilted face
+  ContactClusters clusters;
+  clusters.reduce(contacts, 0, kInfinity, {}, true);
+  for (const ContactWeight& w : clusters.weights()) {
+    const double farther =
+        clusters.all()[static_cast<std::size_t>(w.contact)].gap - clusters.all()[static_cast<std::size_t>(w.kept)].gap;
+    EXPECT_LT(farther, 1e-2 * std::sqrt(8.0));
+  }
+}
+
 TEST(ContactClusters, OptionsOutOfRangeAreRefused) {
   EXPECT_THROW(ContactClusters({.max_points = -1}), InvalidArgument);
   EXPECT_THROW(ContactClusters({.max_normal_angle = 0.0}), InvalidArgument);

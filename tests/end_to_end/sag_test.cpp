@@ -72,7 +72,9 @@ double sag_of_world(int modes, bool residual) {
                      {across, below - origin});
   }
   const BodyId id = world.add_body(model);
-  for (int i = 0; i < 400; ++i) world.step();
+  // Nothing holds it sideways, and a bar that has turned on its supports sags more, so that it goes on turning: its sag
+  // is that of the straight one once it has come to rest and before it has turned.
+  for (int i = 0; i < 100; ++i) world.step();
   EXPECT_LT(std::abs(world.body(id).velocity.z()), 1e-5);  // nothing holds it sideways
   // The node in the middle, as a point of the surface.
   const Vec3 middle = mesh.nodes[static_cast<std::size_t>(lower_nodes(kCells / 2)[0])] - origin;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "convex/convex_polygon.h"
+#include "finder/patch_weights.h"
 #include "limber/core/error.h"
 #include "tuning.h"
 
@@ -16,6 +17,7 @@ using internal::convex_hull;
 using internal::diameter;
 using internal::kMostCorners;
 using internal::largest_polygon;
+using internal::PatchWeights;
 using internal::PlanePoint;
 
 namespace {
@@ -67,8 +69,14 @@ struct ContactClusters::Impl {
 
   double spacing = 0.0;
 
+  bool weigh = false;
+  std::vector<ContactPoint> all;
+  std::vector<ContactWeight> weights;
+  PatchWeights patch_weights;
+
   void find_patches();
   void reduce_patch();
+  void weigh_patch();
   void project();
   void choose();
   void add_corners();
@@ -202,6 +210,20 @@ void ContactClusters::Impl::reduce_patch() {
   project();
   choose();
   for (const PlanePoint& p : kept) keep[static_cast<std::size_t>(p.item)] = 1;
+  if (weigh) weigh_patch();
+}
+
+void ContactClusters::Impl::weigh_patch() {
+  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
+  const double pressed_with = internal::collision_tuning().finder.pressed_with * diameter(all_corners);
+  patch_weights.set(kept);
+  for (const PlanePoint& p : place)
+    for (const PatchWeights::Weight& w : patch_weights.find(p)) {
+      const PlanePoint& r = kept[w.kept];
+      const double farther = gap(p) - gap(r);
+      const double part = farther <= pressed_with ? 1.0 : std::max(0.0, 2.0 - farther / pressed_with);
+      if (part > 0.0) weights.push_back({.contact = p.item, .kept = r.item, .weight = part * w.value});
+    }
 }
 
 ContactClusters::ContactClusters(const ContactClusterOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -210,12 +232,16 @@ ContactClusters::ContactClusters(ContactClusters&&) noexcept = default;
 ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = default;
 
 void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
-                             std::span<const std::uint64_t> previous) {
+                             std::span<const std::uint64_t> previous, bool weigh) {
   Impl& m = *impl_;
+  m.weigh = weigh;
+  m.weights.clear();
   m.contacts = std::span(contacts).subspan(first);
   m.previous = previous;
   std::sort(m.contacts.begin(), m.contacts.end(),
             [](const ContactPoint& a, const ContactPoint& b) { return a.id < b.id; });
+  m.keep.assign(m.contacts.size(), 1);
+  if (weigh) m.all.assign(m.contacts.begin(), m.contacts.end());
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
   m.spacing = spacing;
   m.find_patches();
@@ -231,5 +257,9 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
     if (m.keep[c] != 0) contacts[end++] = contacts[first + c];
   contacts.resize(end);
 }
+
+std::span<const ContactPoint> ContactClusters::all() const { return impl_->all; }
+bool ContactClusters::kept(Index contact) const { return impl_->keep[static_cast<std::size_t>(contact)] != 0; }
+std::span<const ContactWeight> ContactClusters::weights() const { return impl_->weights; }
 
 }  // namespace limber

@@ -10,9 +10,11 @@
 
 namespace limber {
 
+using internal::ContactRegions;
 using internal::FoundBody;
 using internal::ModalGeometry;
 using internal::PairIds;
+using internal::RegionSide;
 using internal::Worker;
 using internal::Workers;
 
@@ -80,8 +82,14 @@ std::span<const std::uint64_t> ContactFinder::Impl::kept_last_time(const BodyPai
   return std::span(kept_ids).subspan(known->first, known->count);
 }
 
-void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
-                                       std::vector<ContactPoint>& contacts) const {
+RegionSide ContactFinder::Impl::region_side(Index index) const {
+  const FoundBody& body = at(index);
+  if (!body.modal || !body.modal->surface->model()->data().residual_compliance) return {};
+  return {body.modal->surface.get(), state(index).pose.q};
+}
+
+void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Found& into) const {
+  std::vector<ContactPoint>& contacts = into.contacts;
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
@@ -93,14 +101,19 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
     worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
-  worker.clusters.reduce(contacts, first, spacing(pair), kept_last_time(pair));
+  const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
+  const bool yields = sides[0].surface != nullptr || sides[1].surface != nullptr;
+  worker.clusters.reduce(contacts, first, spacing(pair), kept_last_time(pair), yields);
+  if (yields) worker.regions.find(worker.clusters, sides, into.regions);
+  into.regions.counts.reserve(contacts.capacity());
+  into.regions.counts.resize(contacts.size(), {0, 0});
 }
 
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   const std::size_t per_chunk = internal::collision_tuning().finder.pairs_per_chunk;
   const std::size_t chunks = (pairs.size() + per_chunk - 1) / per_chunk;
   if (found.size() < chunks) found.resize(chunks);
-  for (auto& contacts : found) contacts.clear();
+  for (Found& part : found) part.contacts.clear(), part.regions.clear();
   jobs.parallel_for(chunks, 1, [this, per_chunk](std::size_t begin, std::size_t end) {
     const Workers::Lease worker(workers);
     for (std::size_t p = begin * per_chunk; p < std::min(end * per_chunk, pairs.size()); ++p)
@@ -117,7 +130,14 @@ void ContactFinder::Impl::keep_ids(const BodyPair& pair, std::span<const std::ui
 /// What was kept of pairs that nobody asks for stays among the rest, in their order.
 void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
   contacts.clear();
-  for (const auto& some_contacts : found) contacts.insert(contacts.end(), some_contacts.begin(), some_contacts.end());
+  ContactRegions& regions = some.empty() ? regions_of_all : regions_of_some;
+  regions.clear();
+  regions.counts.reserve(contacts.capacity());
+  for (const Found& part : found) {
+    contacts.insert(contacts.end(), part.contacts.begin(), part.contacts.end());
+    regions.append(part.regions);
+  }
+  regions.give_to(contacts);
   kept_pairs.swap(last_pairs);
   kept_ids.swap(last_ids);
   kept_pairs.clear();

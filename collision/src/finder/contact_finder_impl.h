@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "finder/contact_regions.h"
 #include "finder/found_body.h"
 #include "limber/dynamics/exact_motion.h"
 
@@ -33,9 +34,14 @@ struct ContactFinder::Impl {
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
-  std::vector<Index> near;                       ///< one body
-  std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
-  std::vector<ImpactTime> times;                 ///< by pair
+  std::vector<Index> near;  ///< one body
+  struct Found {
+    std::vector<ContactPoint> contacts;
+    internal::ContactRegions regions;
+  };
+  std::vector<Found> found;                                  ///< by chunk of pairs
+  internal::ContactRegions regions_of_all, regions_of_some;  ///< what contacts' regions are kept in
+  std::vector<ImpactTime> times;                             ///< by pair
 
   // Of the last query, ascending.
   std::vector<internal::PairIds> kept_pairs, last_pairs;
@@ -74,7 +80,8 @@ struct ContactFinder::Impl {
   void drop_pairs(std::span<const std::pair<Index, Index>> except);
   void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
-  void find_in_pair(const BodyPair& pair, internal::Worker& worker, std::vector<ContactPoint>& contacts) const;
+  void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
+  internal::RegionSide region_side(Index body) const;
   CollisionBody collision_body(Index body, internal::Worker& worker) const;
   double spacing(const BodyPair& pair) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "finder/contact_regions.h"
 #include "finder/geometry_cache.h"
 #include "finder/surface_pool.h"
 #include "limber/collision/broad_phase.h"
@@ -33,6 +34,7 @@ struct Worker {
   explicit Worker(const ContactFinderOptions& options) : narrow(options.narrow_phase), clusters(options.clusters) {}
   NarrowPhase narrow;
   ContactClusters clusters;
+  RegionFinder regions;
   SurfacePool pool;
   DeformedSurface root;  ///< for boxes of whole bodies
   TimeOfImpact time_of_impact;

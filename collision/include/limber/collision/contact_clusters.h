@@ -37,6 +37,12 @@ struct ContactClusterOptions {
   void validate() const;           ///< @throws InvalidArgument naming the field and its value
 };
 
+/// What a contact that is kept stands for: its share φ of another one's force.
+struct ContactWeight {
+  Index contact = 0, kept = 0;  ///< by place in all()
+  double weight = 0.0;
+};
+
 /// Holds the scratch of one thread; a warm one allocates nothing.
 class ContactClusters {
  public:
@@ -51,8 +57,20 @@ class ContactClusters {
   /// @param spacing m: seen along its normal, no contact of a patch that is left out is farther than this (by a tenth
   ///   more where those of last time are kept) from one that is kept; > 0, infinity: corners alone
   /// @param previous ids that were kept for this pair last time, ascending
+  /// @param weigh whether all() and weights() are wanted
   void reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
-              std::span<const std::uint64_t> previous);
+              std::span<const std::uint64_t> previous, bool weigh = false);
+
+  /// What reduce() was given last, ascending in id, and which contacts of it were kept.
+  std::span<const ContactPoint> all() const;
+  bool kept(Index contact) const;
+  /// Of all contacts of patches that were thinned, by contact: seen along the patch's normal, Σ_r φ_r = 1 and
+  /// Σ_r φ_r x_r = x over the kept ones r of the patch, φ_r > 0 (x the nearest point of their hull where it is
+  /// outside). So forces at all contacts, given to the kept ones by φ, keep their sum and torque.
+  ///
+  /// Where a contact is farther than a kept one it is not pressed with it: then φ falls to 0 as the difference of their
+  /// gaps grows from 5e-3 to 1e-2 of the patch's extent.
+  std::span<const ContactWeight> weights() const;
 
  private:
   struct Impl;

@@ -7,9 +7,14 @@
 /// what sticks does not creep. Both points of a contact are carried along by their bodies, deformation included; of
 /// round surfaces (ContactSide::radius) the centre is, and slip counts rolling. The normal stays as it was found.
 ///
-/// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. All contacts of a body
-/// yield to each other's forces. The residual displacement is a state of the body: the forces of its last step at the
-/// material points that they pressed on, in its own frame (DentLoad), with the energy ½ FᵀG F.
+/// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. A contact that stands for
+/// a region (ContactSide::region, shares w_r(v) of vertices v) spreads its force over it and yields by the mean of it:
+///
+///   G_rs = Σ_vw w_r(v) G_vw w_s(w),
+///
+/// symmetric and positive semidefinite, for all contacts of a body among each other; frame and modes feel the force at
+/// the point. The residual displacement is a state of the body: what its last step pressed its vertices with, in its
+/// own frame (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
 /// *Contact compliance* (`give`): by rules other than the complementary one with its cone, contacts of bodies that flex
 /// yield by 3e-3 of what a force moves the reduced mass of the two within a step, 1e-4 beside a residual compliance. It
@@ -19,9 +24,8 @@
 /// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
 /// held over the step (θ = ½) only in islands of nothing but contacts.
 ///
-/// *Overlap* at the start shrinks by a fifth a step, at most at `recovery_speed`; that is work done on the island,
-/// bounded by what lifts it at that speed. It stays up to the largest residual displacement of the pair, at most 4e-4
-/// of the radius of either body.
+/// *Overlap* at the start, what dents leave of it, shrinks by a fifth a step, at most at `recovery_speed`; that is work
+/// done on the island, bounded by what lifts it at that speed.
 ///
 /// Only options throw, InvalidArgument. What to expect: docs/contact.md.
 #pragma once
@@ -115,9 +119,9 @@ struct RollingMemory {
   Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
 };
 
-/// A force that pressed on a body in the last step: the source of its residual displacement.
+/// What the contacts of the last step pressed on a vertex with: the source of a body's residual displacement.
 struct DentLoad {
-  SurfacePoint at{};
+  Index vertex = -1;          ///< of the collision surface
   Vec3 force = Vec3::Zero();  ///< body frame, N
 };
 

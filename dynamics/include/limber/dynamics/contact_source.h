@@ -72,6 +72,12 @@ struct ImpactQuery {
   std::span<const std::pair<Index, Index>> except{};  ///< (a, b), a < b, ascending: pairs that are not looked at
 };
 
+/// What a vertex of a body's collision surface takes of a contact's force.
+struct VertexShare {
+  Index vertex = -1;
+  double share = 0.0;  ///< > 0
+};
+
 /// One body's side of a contact.
 struct ContactSide {
   Index body = -1;
@@ -83,6 +89,11 @@ struct ContactSide {
   /// body turns, what it touches with is another point of it, always this far from the ball's centre against the
   /// normal.
   double radius = 0.0;
+  /// Of a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
+  /// force is spread over; shares sum to 1. The force has its torque at the point nevertheless. None: it acts at the
+  /// point alone. Kept by the source until its next query of all bodies; of a query of some bodies until its next
+  /// query.
+  std::span<const VertexShare> region{};
 };
 
 /// Two points that are, or may come, together:  gap = normal · (p_a − p_b), negative where the bodies overlap.

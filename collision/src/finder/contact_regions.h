@@ -1,0 +1,55 @@
+// What contacts that are kept stand for, as shares of vertices (ContactSide::region).
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "limber/collision/collision_surface.h"
+#include "limber/collision/contact_clusters.h"
+#include "limber/core/quaternion.h"
+#include "limber/dynamics/contact_source.h"
+
+namespace limber::internal {
+
+/// Regions of some contacts, in their order; a warm one allocates nothing.
+struct ContactRegions {
+  std::vector<VertexShare> shares;
+  std::vector<std::array<std::size_t, 2>> counts;  ///< by contact: how many shares its sides have
+
+  void clear() { shares.clear(), counts.clear(); }
+  void append(const ContactRegions& others);
+  /// @pre one for each contact
+  void give_to(std::span<ContactPoint> contacts) const;
+};
+
+/// One side of a pair: its surface where it yields, else null, and how its body is turned.
+struct RegionSide {
+  const CollisionSurface* surface = nullptr;
+  Quaternion turn{};
+};
+
+/// The contact r of a patch stands for its contacts i with w_i = φ_r(i) a_i / Σ_j φ_r(j) a_j. The area a_i is what a
+/// uniform pressure along the normal gives to the vertices that touch there: a third of the triangles about them, seen
+/// along the normal at rest.
+class RegionFinder {
+ public:
+  /// Appends the regions of what the clusters have kept last.
+  void find(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides, ContactRegions& regions);
+
+ private:
+  struct Part {
+    Index kept = 0, contact = 0;
+    double area = 0.0;
+  };
+  void weigh(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides);
+  void spread(std::span<const ContactPoint> all, std::span<const Part> parts, const CollisionSurface& surface,
+              std::size_t side, ContactRegions& regions);
+
+  std::vector<double> areas_;
+  std::vector<Part> parts_;
+  std::vector<double> shares_;  // by vertex; zeros between calls
+  std::vector<Index> touched_;
+};
+
+}  // namespace limber::internal
