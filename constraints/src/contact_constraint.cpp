@@ -49,6 +49,7 @@ struct ContactSet::Impl {
 
   void remember(std::span<const char> asleep);
   void remember_rolling(std::span<const char> asleep);
+  void find_give_energy();
   const ContactMemory* find(std::uint64_t id) const;
   double lasted(Index a, Index b) const;
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
@@ -238,6 +239,10 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
     if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
   remember_rolling(asleep);
+  find_give_energy();
+}
+
+void ContactSet::Impl::find_give_energy() {
   std::ranges::fill(give_energy, 0.0);
   for (const ContactMemory& m : memory)
     if (m.give > 0.0) give_energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
@@ -268,6 +273,21 @@ void ContactSet::clear() {
   impl_->events.clear();
   impl_->resting.clear();
   impl_->dents.clear();
+  impl_->give_energy.clear();
+}
+
+void ContactSet::save_state(StateWriter& state) const {
+  const Impl& s = *impl_;
+  state(s.options, s.memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
+}
+
+void ContactSet::restore_state(StateReader& state) {
+  Impl& s = *impl_;
+  s.contacts.clear();
+  s.constraints.clear();
+  state(s.options, s.memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
+  s.give_energy.resize(s.dents.bodies());
+  s.find_give_energy();
 }
 
 void ContactSet::forget(Index body) { impl_->dents.forget(body); }

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "limber/constraints/contact_constraint.h"
@@ -49,6 +50,7 @@ class ContactDents {
 
   /// Room for the bodies of a table. Nothing below allocates for them once warm.
   void reserve(std::size_t bodies);
+  std::size_t bodies() const { return bodies_.size(); }
   /// Whether a body has a residual compliance at all. @pre it is in the table
   static bool yields(const BodyStates& states, Index body);
 
@@ -70,7 +72,18 @@ class ContactDents {
   double energy(const BodyStates& states, Index body) const;
 
  private:
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.bodies_);
+  }
+
   struct Body {
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.loads);
+    }
+
     std::vector<DentLoad> loads;
     VertexNumbers of_loads;
     std::vector<Rows> rows;    // of the part of a step at hand

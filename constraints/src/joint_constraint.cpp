@@ -68,6 +68,14 @@ void JointConstraint::set_actuation(int coordinate, const JointActuation& actuat
   actuation_[static_cast<std::size_t>(coordinate)] = actuation;
 }
 
+void JointConstraint::restore_state(StateReader& state) {
+  state(*this);
+  freedoms_ = coordinate_count(spec_.type);
+  plan_.clear();
+  plan_locked_rows();
+  plan_limits();
+}
+
 // What the rows are ---------------------------------------------------------------------------------------------------
 
 void JointConstraint::plan_locked_rows() {

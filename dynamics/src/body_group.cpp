@@ -383,6 +383,23 @@ BodyEnergy BodyGroup::energy_of(const RigidFrame& frame, std::span<const double>
   return energy;
 }
 
+void BodyGroup::save_state(Index slot, StateWriter& state) const {
+  const Body& b = bodies_[static_cast<std::size_t>(slot)];
+  state(b);
+  for (const ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  if (b.modes_loaded) state.numbers(forces_.modes(slot));
+  if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
+}
+
+void BodyGroup::restore_state(Index slot, StateReader& state) {
+  Body& b = body(slot);
+  state(b);
+  for (ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  for (ModeRows* rows : {&forces_, &static_amplitudes_}) rows->clear(slot);
+  if (b.modes_loaded) state.numbers(forces_.modes(slot));
+  if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
+}
+
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }
 
 Vec3 BodyGroup::first_moment_of(std::span<const double> z) const {

@@ -71,6 +71,44 @@ void ConstraintStage::remove(std::uint32_t index) {
   if (++entry.generation != 0) vacant_.push_back(index);
 }
 
+ConstraintStage::Kind ConstraintStage::kind_of(const Entry& entry) {
+  return entry.handle ? Kind::kHandle : entry.joint ? Kind::kJoint : Kind::kVacant;
+}
+
+void ConstraintStage::save_state(std::size_t bodies, StateWriter& state) const {
+  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], disturbed_[i], surplus_[i]);
+  state(vacant_, static_cast<std::uint64_t>(entries_.size()));
+  for (const Entry& entry : entries_) {
+    state(entry.generation, kind_of(entry));
+    if (entry.handle) state(*entry.handle);
+    if (entry.joint) state(*entry.joint);
+  }
+}
+
+void ConstraintStage::restore_state(std::size_t bodies, StateReader& state) {
+  release_bodies();
+  contacts_.clear();
+  stale_ = true;
+  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], disturbed_[i], surplus_[i]);
+  state(vacant_);
+  entries_.resize(state.read<std::uint64_t>());
+  for (Entry& entry : entries_) {
+    const Kind known = kind_of(entry);
+    entry.generation = state.read<std::uint32_t>();
+    const Kind kind = state.read<Kind>();
+    if (kind != known) entry.handle.reset(), entry.joint.reset();
+    if (kind == Kind::kHandle) {
+      if (!entry.handle) entry.handle = std::make_unique<Handle>(MaterialFrame(JointFrame{}), Vec3::Zero());
+      state(*entry.handle);
+    }
+    if (kind == Kind::kJoint) {
+      const MaterialFrame any(JointFrame{});
+      if (!entry.joint) entry.joint = std::make_unique<JointConstraint>(any, any, JointSpec{});
+      entry.joint->restore_state(state);
+    }
+  }
+}
+
 void ConstraintStage::disturb_bodies_of(std::uint32_t index) {
   for (const Index body : entries_[index].constraint()->bodies())
     if (body >= 0) disturb(body);

@@ -61,6 +61,12 @@ class ConstraintStage {
   /// After the last part.
   void end_together(std::span<const Index> members);
 
+  // All constraints, and what the coming step knows of bodies. Between steps.
+  /// @param bodies how many, of those that set_body() named
+  void save_state(std::size_t bodies, StateWriter& state) const;
+  /// Constraints made since are removed, those removed since made again.
+  void restore_state(std::size_t bodies, StateReader& state);
+
   /// Sums over the islands of the last step.
   IslandReport report() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
@@ -77,6 +83,8 @@ class ConstraintStage {
   struct Island {
     std::size_t first_member = 0, members = 0, first_constraint = 0, constraints = 0;
   };
+  enum class Kind : std::uint8_t { kVacant, kHandle, kJoint };
+  static Kind kind_of(const Entry& entry);
   std::uint32_t place(Entry&& entry);
   Index root_of(const Constraint* constraint);
   void number_islands();

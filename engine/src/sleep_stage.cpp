@@ -93,6 +93,16 @@ bool SleepStage::at_rest(Index body, const SleepOptions& options) const {
   return (r.push - r.pushed).norm() <= data.mass * options.speed;
 }
 
+void SleepStage::save_state(std::size_t bodies, StateWriter& state) const {
+  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], rest_[i]);
+  state(supports_);
+}
+
+void SleepStage::restore_state(std::size_t bodies, StateReader& state) {
+  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], rest_[i]);
+  state(supports_);
+}
+
 void SleepStage::put_to_sleep(std::span<const Index> members) {
   for (std::size_t m = 0; m < members.size(); ++m) {
     asleep_[static_cast<std::size_t>(members[m])] = 1;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "constraint_stage.h"
@@ -33,15 +34,29 @@ class SleepStage {
   /// @param events of the step
   void update(const SleepOptions& options, double h, std::span<const ContactEvent> events);
 
+  /// Of as many bodies. Their groups and `constraints` know by themselves who sleeps.
+  void save_state(std::size_t bodies, StateWriter& state) const;
+  void restore_state(std::size_t bodies, StateReader& state);
+
  private:
   struct Rest {
     double calm = 0.0;           // s
     Index next = -1;             // of those that fell asleep together, in a ring
     Vec3 push = Vec3::Zero();    // of all contacts over the last step, N·s
     Vec3 pushed = Vec3::Zero();  // and over the one before
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.calm, s.next, s.push, s.pushed);
+    }
   };
   struct Support {
     Index what, sleeper;
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.what, s.sleeper);
+    }
   };
   bool at_rest(Index body, const SleepOptions& options) const;
   void put_to_sleep(std::span<const Index> members);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "constraint_stage.h"
@@ -43,16 +44,33 @@ class StepParts {
   std::span<const ContactEvent> events() const { return events_; }
 
  private:
+  friend struct limber::StateFields;
+  /// Between steps.
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.forces_, s.impulses_, s.leads_, s.events_, s.released_);
+  }
+
   struct Load {
     Index body;
     SurfacePoint at;
     Vec3 load;  // world, N or N·s
     int part;   // of an impulse
     double delay;
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.body, s.at, s.load, s.part, s.delay);
+    }
   };
   struct Lead {
     Index body;
     KinematicFrame start, target;
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.body, s.start, s.target);
+    }
   };
   struct HandlePath {
     Vec3 start;

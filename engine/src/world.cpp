@@ -252,6 +252,12 @@ std::uint64_t World::step_count() const { return impl_->steps; }
 double World::dropped_seconds() const { return impl_->dropped; }
 const WorldOptions& World::options() const { return impl_->options; }
 
+void World::set_gravity(const Vec3& gravity) {
+  require_finite(gravity, "set_gravity", "gravity");
+  impl_->sleep.wake_all();
+  impl_->options.gravity = gravity;
+}
+
 // Loads ---------------------------------------------------------------------------------------------------------------
 
 void World::apply_force(BodyId id, const SurfacePoint& at, const Vec3& newtons, Axes axes) {

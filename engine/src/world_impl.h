@@ -5,10 +5,12 @@
 //   world_passing.cpp      bodies that come farther than contacts are looked for
 //   world_constraints.cpp  handles, joints, the source of contacts
 //   world_state.cpp        what can be read and set of bodies, and the hash of all of it
+//   world_saving.cpp       all of it as bytes, and back
 //   world_drawing.cpp      surfaces between two steps
 #pragma once
 
 #include <string>
+#include <tuple>
 #include <type_traits>
 
 #include "constraint_stage.h"
@@ -52,6 +54,12 @@ struct World::Impl {
   struct Apart {
     Index a, b;
     std::uint32_t joint;  // its place
+
+    friend bool operator==(const Apart&, const Apart&) = default;
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.a, s.b, s.joint);
+    }
   };
   /// Slots [begin, end) of a group: what one job advances.
   struct Range {
@@ -68,7 +76,7 @@ struct World::Impl {
   internal::ConstraintStage constraints;                         // bodies by their entries' indices
   internal::SleepStage sleep{constraints};
   std::optional<internal::StepParts> parts{};
-  std::vector<Apart> apart;
+  std::vector<Apart> apart, apart_then;  // the second: scratch of restore_state()
   ContactSource* source = nullptr;
   ContactSet contacts;
   std::vector<ContactPoint> touching;
@@ -136,6 +144,11 @@ struct World::Impl {
   bool are_apart(Index a, Index b) const;
   void keep_apart(Index a, Index b, std::uint32_t joint);
   void let_meet(std::uint32_t joint);
+  void set_apart(std::span<const Apart> pairs);
+  void save_structure(StateWriter& state) const;
+  void save_motion(StateWriter& state) const;
+  std::vector<BodyId> check_structure(StateReader& state) const;
+  void restore_motion(StateReader& state);
   void wake_bodies_of(std::uint32_t constraint);
   void write_states();
   void write_state(Index body, double length);

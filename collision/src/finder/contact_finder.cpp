@@ -244,6 +244,13 @@ void ContactFinder::exclude_pair(Index a, Index b, bool excluded) {
   impl_->broad_phase.exclude_pair(a, b, excluded);
 }
 
+void ContactFinder::save_state(StateWriter& state) const { state(impl_->kept_pairs, impl_->kept_ids); }
+
+void ContactFinder::restore_state(StateReader& state) {
+  state(impl_->kept_pairs, impl_->kept_ids);
+  for (FoundBody& body : impl_->bodies) body.placed_asleep = false;
+}
+
 void ContactFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
   Impl& m = *impl_;
   check_length("margin", query.margin);

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <mutex>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -82,6 +83,11 @@ class Workers {
 struct PairIds {
   BodyPair pair;
   std::size_t first = 0, count = 0;
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.pair.a, s.pair.b, s.first, s.count);
+  }
 };
 
 }  // namespace limber::internal

@@ -62,6 +62,9 @@ class ContactFinder final : public ContactSource {
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
   void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
+  /// The ids of the last query's contacts: which of a patch are kept depends on them.
+  void save_state(StateWriter& state) const override;
+  void restore_state(StateReader& state) override;
 
  private:
   struct Impl;

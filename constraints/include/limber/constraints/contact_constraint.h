@@ -33,6 +33,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "limber/constraints/constraint.h"
@@ -80,6 +82,13 @@ struct ContactOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, ContactOptions>
+auto state_fields(Self& s) {
+  return std::tie(s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance, s.rule.method,
+                  s.rule.friction, s.rule.guard, s.penalty_frequency, s.penalty_damping, s.impact, s.impact_speed);
+}
+
 /// What became of a contact in the last step.
 enum class ContactPhase {
   kBegun,    ///< pressed now, and not before
@@ -95,6 +104,11 @@ struct ContactEvent {
   Vec3 position = Vec3::Zero();  ///< world, at the start of the step in which it was last pressed
   Vec3 normal = Vec3::Zero();    ///< world, out of b into a
   Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s; zero for kEnded
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.id, s.a, s.b, s.phase, s.position, s.normal, s.impulse);
+  }
 };
 
 /// What a scene's contacts remember of a step: with the bodies' states it is all that the next step depends on.
@@ -105,24 +119,44 @@ struct ContactMemory {
   double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
   double slip = 0.0;          ///< how far the point slid in the step, m
   Index yielding = -1;        ///< the body that this energy is counted with
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.id, s.a, s.b, s.force, s.give, s.slip, s.yielding);
+  }
 };
 
 /// And of a pair of bodies that strike each other.
 struct StrikeMemory {
   Index a = -1, b = -1;  ///< bodies
   double since = 0.0;    ///< how long they have been at it, s
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.a, s.b, s.since);
+  }
 };
 
 /// And of a pair that resists rolling.
 struct RollingMemory {
   Index a = -1, b = -1;        ///< bodies
   Vec3 moment = Vec3::Zero();  ///< on a, mean over the step, world, N·m
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.a, s.b, s.moment);
+  }
 };
 
 /// What the contacts of the last step pressed on a vertex with: the source of a body's residual displacement.
 struct DentLoad {
   Index vertex = -1;          ///< of the collision surface
   Vec3 force = Vec3::Zero();  ///< body frame, N
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.at, s.force);
+  }
 };
 
 /// All contacts of one scene, remembered from step to step. In every step: update(), then the island solver with
@@ -164,6 +198,9 @@ class ContactSet {
   void forget(Index body);
   /// Forgets what it knows of earlier steps.
   void clear();
+  /// The options, and all that the coming steps depend on. Between finish() and update().
+  void save_state(StateWriter& state) const;
+  void restore_state(StateReader& state);
 
  private:
   struct Impl;

@@ -8,6 +8,7 @@
 ///   F = −k (p − target) − c d/dt (p − target)
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "limber/constraints/material_frame.h"
@@ -51,6 +52,13 @@ class Handle final : public Constraint {
   void accept(const BodyStates& states, std::span<const double> impulses) override;
 
  private:
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.point_, s.options_.directions, s.options_.max_force, s.options_.stiffness, s.options_.damping,
+                    s.now_, s.next_.position, s.next_.velocity, s.error_, s.force_, s.last_force_);
+  }
+
   MaterialFrame point_;
   HandleOptions options_;
   Vec3 now_;  // the target at the start of the step

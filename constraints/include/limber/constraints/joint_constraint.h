@@ -17,9 +17,12 @@
 #pragma once
 
 #include <array>
+#include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "limber/constraints/material_frame.h"
+#include "limber/core/state_archive.h"
 #include "limber/model/joint_spec.h"
 
 namespace limber {
@@ -34,6 +37,12 @@ struct JointActuation {
   double friction = 0.0;         ///< ≥ 0
   void validate() const;         ///< @throws InvalidArgument naming the field and its value
 };
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, JointActuation>
+auto state_fields(Self& s) {
+  return std::tie(s.motor_velocity, s.motor_max_force, s.drive_target, s.drive_stiffness, s.drive_damping, s.friction);
+}
 
 class JointConstraint final : public Constraint {
  public:
@@ -64,7 +73,18 @@ class JointConstraint final : public Constraint {
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
 
+  /// Reads a joint in the place of this one. @param state written of any joint
+  void restore_state(StateReader& state);
+
  private:
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.a_, s.b_, s.spec_.type, s.spec_.frame.origin, s.spec_.frame.axes, s.spec_.limits, s.spec_.pitch,
+                    s.actuation_, s.last_, s.coordinate_force_, s.motor_force_, s.drive_force_, s.friction_force_,
+                    s.force_);
+  }
+
   /// Both frames at one instant.
   struct Placement {
     Vec3 o_a, o_b, d;  // d in a's axes

@@ -11,6 +11,7 @@
 
 #include <memory>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "limber/constraints/constraint.h"
@@ -48,6 +49,12 @@ class MaterialFrame {
                       std::vector<double>& modal) const;
 
  private:
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.body_, s.rest_.origin, s.rest_.axes, s.displacement_, s.rotation_);
+  }
+
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
 

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "limber/core/state_archive.h"
 #include "limber/dynamics/body_energy.h"
 #include "limber/dynamics/modal_step.h"
 #include "limber/dynamics/rigid_frame.h"
@@ -166,6 +167,11 @@ class BodyGroup {
   /// Whether something comes part way into the next step: an impulse with a delay.
   bool has_delayed_impulse(Index slot) const { return !bodies_[static_cast<std::size_t>(slot)].delayed.empty(); }
 
+  /// Everything that the coming steps of one body depend on, and what is drawn between the last two states.
+  void save_state(Index slot, StateWriter& state) const;
+  /// @param state of the same slot or another one of the same model, between two steps
+  void restore_state(Index slot, StateReader& state);
+
   /// First mass moment about the body origin, deformed: m c + Σ z_i p_i, body axes, kg·m.
   Vec3 first_moment(Index slot) const;
 
@@ -195,6 +201,11 @@ class BodyGroup {
     SurfacePoint at;
     Vec3 impulse_B;  // N·s
     double time;     // s into the next step
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.at, s.impulse_B, s.time);
+    }
   };
 
   struct Body {
@@ -208,6 +219,12 @@ class BodyGroup {
     bool modes_static = false;              // static_amplitudes_ are not zero
     bool held = false;                      // a constraint acted on the modes in the last step
     std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
+
+    /// `occupied` and `constrained` are others' business.
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.delayed);
+    }
   };
 
   /// The frame at the end of a step that was predicted.

@@ -13,6 +13,7 @@
 
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/core/state_archive.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
 
@@ -134,6 +135,12 @@ class ContactSource {
   /// First times within [0, step] at which bodies that are farther apart than `margin` come within it, by conservative
   /// advancement on the exact motion; ordered by (time, a, b).
   virtual void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) = 0;
+
+  /// Appends what the contacts of coming queries depend on beside the queries themselves, and restore_state() takes it
+  /// back; nothing, for a source that remembers nothing. Bodies and pairs that are excluded are no part of it.
+  virtual void save_state(StateWriter&) const {}
+  /// Bodies may then be elsewhere than in the last query, those that are asleep too.
+  virtual void restore_state(StateReader&) {}
 };
 
 }  // namespace limber

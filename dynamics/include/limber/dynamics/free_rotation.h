@@ -19,6 +19,7 @@
 #pragma once
 
 #include <array>
+#include <tuple>
 
 #include "limber/core/quaternion.h"
 #include "limber/core/types.h"
@@ -52,6 +53,13 @@ class FreeRotation {
   double parameter() const { return parameter_; }
 
  private:
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.q_WF_, s.q_QB_, s.parameter_, s.complementary_, s.spin_, s.angle_, s.rate_, s.l1_, s.l2_, s.l3_,
+                    s.nome_, s.log_nome_, s.tilt_, s.cosine_, s.sine_);
+  }
+
   static constexpr int kTerms = 5;
   struct Orbit;  // the elliptic parameters of one motion, needed only while the series are made
 

@@ -16,6 +16,8 @@
 #pragma once
 
 #include <cstdint>
+#include <tuple>
+#include <type_traits>
 
 #include "limber/core/rigid_transform.h"
 #include "limber/dynamics/frame_path.h"
@@ -32,6 +34,12 @@ struct KinematicFrame {
   Vec3 velocity = Vec3::Zero(), acceleration = Vec3::Zero();                  ///< of the body origin; world, m/s, m/s²
   Vec3 angular_velocity = Vec3::Zero(), angular_acceleration = Vec3::Zero();  ///< world, rad/s, rad/s²
 };
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, KinematicFrame>
+auto state_fields(Self& s) {
+  return std::tie(s.pose, s.velocity, s.acceleration, s.angular_velocity, s.angular_acceleration);
+}
 
 /// The part of a model that its frame needs; never changes, shared by all instances.
 struct FrameConstants {
@@ -110,6 +118,13 @@ class RigidFrame {
   void place_parent_between(const KinematicFrame& before, const KinematicFrame& after, double part);
   void add_excitation(const FrameConstants& c, const Vec3& gravity, double weight, FrameExcitation& sum) const;
   Vec3 line_in_world(const FrameConstants& c) const { return pose_.q * c.line_axis; }
+
+  friend struct StateFields;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.pose_, s.velocity_, s.momentum_, s.rotation_, s.rotation_step_, s.rotation_steps_, s.disturbed_,
+                    s.parent_, s.next_parent_, s.parent_was_set_, s.angle_, s.angle_rate_);
+  }
 
   RigidTransform pose_;
   Vec3 velocity_;

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <span>
+#include <tuple>
+#include <type_traits>
 
 #include "limber/core/types.h"
 #include "limber/model/modal_model.h"
@@ -16,6 +18,10 @@ struct SurfacePoint {
   Index triangle = 0;
   std::array<double, 3> weight{1.0, 0.0, 0.0};  ///< sums to 1
 };
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, SurfacePoint>
+auto state_fields(Self& s) { return std::tie(s.surface, s.triangle, s.weight); }
 
 /// @throws InvalidArgument if the triangle does not exist, or the weights are not finite or do not sum to 1 (to 1e-6)
 void validate(const ModalModel& model, const SurfacePoint& at);

@@ -22,6 +22,7 @@
 /// finite, and for arrays of the wrong length.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -213,6 +214,8 @@ class World {
   std::uint64_t step_count() const;
   double dropped_seconds() const;  ///< real time given up by max_steps_per_advance
   const WorldOptions& options() const;
+  /// From the coming step on, m/s², world. Wakes all bodies.
+  void set_gravity(const Vec3& gravity);
 
   // Loads, all at the deformed point ----------------------------------------------------------------------------------
   /// Held over the next step; several add up. World axes once applied: a force in body axes does not turn with the body
@@ -329,8 +332,26 @@ class World {
   /// Jobs. It covers what the next step depends on: time, poses, momenta, amplitudes and rates, targets of handles,
   /// coordinates of joints, what contacts remember (their forces, by id), who sleeps and how long the others have been
   /// at rest. set_pose(), set_velocity() and set_amplitudes() set a body's own state alone: a body put back to where it
-  /// was meets contacts that remember other forces, and friction that was held starts anew.
+  /// was meets contacts that remember other forces, and friction that was held starts anew: see save_state().
   std::uint64_t state_hash() const;
+
+  // Rollback ---------------------------------------------------------------------------------------------------------
+  /// Replaces `state` by all that coming steps depend on: bodies, loads that wait, handles, joints and their actuation,
+  /// what contacts remember, who sleeps, gravity, contact options, time; and the last two states for drawing. A world
+  /// that is restored goes on as it did then, bit for bit, with the same calls. Allocates nothing where `state` has
+  /// room, as after saving a world like this before.
+  ///
+  /// The bytes are for worlds with the same bodies in builds of the same version of limber and machines of the same
+  /// byte order: keep them in memory or send them to another player, but do not store them for later versions.
+  void save_state(std::vector<std::byte>& state) const;
+  /// Goes back to a saved state. Bodies added since are removed, handles and joints made since are too, and those
+  /// removed since are there again: ids mean what they meant. Ids given since may be given again.
+  /// Not part of a state: the Jobs, the contact source and the veto, and constraint_report(), which stays that of the
+  /// last step taken.
+  /// @throws InvalidArgument, and changes nothing, for bytes that are damaged or of another version, a step or
+  /// substeps other than this world's, a body that was removed since or is another one now, and a contact source where
+  /// there was none or none where there was one
+  void restore_state(std::span<const std::byte> state);
 
  private:
   struct Impl;

@@ -21,6 +21,8 @@
 #include <limits>
 #include <optional>
 #include <string_view>
+#include <tuple>
+#include <type_traits>
 
 #include "limber/core/types.h"
 
@@ -57,6 +59,14 @@ struct JointLimits {
 
   friend bool operator==(const JointLimits&, const JointLimits&) = default;
 };
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, Interval>
+auto state_fields(Self& s) { return std::tie(s.low, s.high); }
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, JointLimits>
+auto state_fields(Self& s) { return std::tie(s.rotation, s.translation, s.cone, s.euler); }
 
 /// Frame J: a point and three orthonormal, right-handed axes (columns x, y, z).
 struct JointFrame {
