@@ -27,6 +27,13 @@ void BlockFactor::begin_pattern(std::span<const std::size_t> widths) {
   widths_.assign(widths.begin(), widths.end());
   words_ = (widths_.size() + kBits - 1) / kBits;
   adjacency_.assign(words_ * widths_.size(), 0);
+  kept_.assign(widths_.size(), false);
+  eliminated_ = widths_.size();
+}
+
+void BlockFactor::keep(std::size_t node) {
+  if (!kept_[node]) --eliminated_;
+  kept_[node] = true;
 }
 
 void BlockFactor::add_edge(std::size_t i, std::size_t j) {
@@ -56,7 +63,7 @@ void BlockFactor::find_order() {
   for (std::size_t step = 0; step < n; ++step) {
     std::size_t next = n;
     for (std::size_t i = 0; i < n; ++i)
-      if (place_[i] == n && (next == n || degree_[i] < degree_[next])) next = i;
+      if (place_[i] == n && kept_[i] == (step >= eliminated_) && (next == n || degree_[i] < degree_[next])) next = i;
     place_[next] = step;
     columns_.push_back({.node = next, .width = widths_[next]});
     const std::uint64_t* around = neighbours(next);
@@ -72,8 +79,7 @@ void BlockFactor::find_order() {
 
 void BlockFactor::place_columns() {
   entries_.clear();
-  numbers_ = 0;
-  widest_ = 0;
+  numbers_ = widest_ = longest_ = 0;
   for (Column& column : columns_) {
     column.first_entry = entries_.size();
     for_each(neighbours(column.node), words_, [&](std::size_t j) { entries_.push_back({.column = place_[j]}); });
@@ -88,8 +94,9 @@ void BlockFactor::place_columns() {
     column.offset = numbers_;
     numbers_ += column.width * column.stride;
     widest_ = std::max(widest_, column.width);
+    longest_ = std::max(longest_, column.stride);
   }
-  for (AlignedBuffer* values : {&upper_, &divided_}) values->need(numbers_);
+  upper_.need(numbers_);
   first_.resize(widths_.size());
   size_ = 0;
   for (const Column& column : columns_) {
@@ -147,15 +154,17 @@ void BlockFactor::set_identity() {
 }
 
 bool BlockFactor::factor() {
-  double *U = upper_.data(), *W = divided_.data();
+  double* U = upper_.data();
   const MatrixView memory = inverse_.need(widest_, widest_);
-  for (const Column& column : columns_) {
+  double* divided_memory = divided_.need(widest_, longest_).values;
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const Column& column = columns_[c];
     const std::size_t n = column.width, head = padded(n), tail = column.stride - head;
-    const MatrixView inverse{memory.values, head}, divided{W + column.offset, column.stride};
+    const MatrixView inverse{memory.values, head}, divided{divided_memory, column.stride};
     for (std::size_t i = 0; i < n; ++i) std::copy_n(U + column.offset + i * column.stride, head, inverse.row(i));
     if (!invert_positive(inverse, n)) return false;
-    for (std::size_t i = 0; i < n; ++i) std::copy_n(inverse.row(i), head, divided.row(i));
     multiply_block({divided.values + head, column.stride}, inverse, {U + column.offset + head, column.stride}, n, tail);
+    for (std::size_t i = 0; i < n; ++i) std::copy_n(inverse.row(i), head, U + column.offset + i * column.stride);
     for (std::size_t e = column.first_entry; e < column.first_entry + column.entries; ++e) {
       const Entry& entry = entries_[e];
       const Column& target = columns_[entry.column];
@@ -166,27 +175,42 @@ bool BlockFactor::factor() {
   return true;
 }
 
-void BlockFactor::solve(double* x) {
-  const double *U = upper_.data(), *W = divided_.data();
-  double* y = row_.need(padded(size_));
-  for (const Column& column : columns_) {
+void BlockFactor::times_inverse_pivot(const Column& column, const double* x, double* out) const {
+  const double* inverse = upper_.data() + column.offset;
+  for (std::size_t i = 0; i < column.width; ++i) {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < column.width; ++j) sum += inverse[i * column.stride + j] * x[j];
+    out[i] = sum;
+  }
+}
+
+void BlockFactor::reduce(double* x) {
+  double* y = row_.need(2 * padded(widest_));
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const Column& column = columns_[c];
     double* own = x + first_[column.node];
-    for (std::size_t i = 0; i < column.width; ++i) {
-      double sum = 0.0;
-      for (std::size_t j = 0; j < column.width; ++j) sum += W[column.offset + i * column.stride + j] * own[j];
-      y[i] = sum;
-    }
+    times_inverse_pivot(column, own, y);
     std::copy_n(y, column.width, own);
     for (std::size_t i = 0; i < column.width; ++i) y[i] = -own[i];
-    gather_blocks(x, blocks_.data() + column.first_entry, column.entries, U, y);
+    gather_blocks(x, blocks_.data() + column.first_entry, column.entries, upper_.data(), y);
   }
-  for (std::size_t c = columns_.size(); c-- > 0;) {
+}
+
+void BlockFactor::expand(double* x) {
+  double *y = row_.need(2 * padded(widest_)), *part = y + padded(widest_);
+  for (std::size_t c = eliminated_; c-- > 0;) {
     const Column& column = columns_[c];
     double* own = x + first_[column.node];
     std::fill_n(y, column.width, 0.0);
-    spread_blocks(y, blocks_.data() + column.first_entry, column.entries, W, x);
-    for (std::size_t q = 0; q < column.width; ++q) own[q] -= y[q];
+    spread_blocks(y, blocks_.data() + column.first_entry, column.entries, upper_.data(), x);
+    times_inverse_pivot(column, y, part);
+    for (std::size_t q = 0; q < column.width; ++q) own[q] -= part[q];
   }
+}
+
+void BlockFactor::solve(double* x) {
+  reduce(x);
+  expand(x);
 }
 
 }  // namespace limber::internal

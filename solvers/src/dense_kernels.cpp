@@ -271,22 +271,38 @@ HWY_ATTR void MultiplyBlocks(MatrixView out, MatrixView A, MatrixView X, std::si
     }
 }
 
+// Rows [r, r + kRows) of subtract_runs(), each padded block of columns in registers.
+template <std::size_t kRows>
+HWY_INLINE HWY_ATTR void SubtractRun(MatrixView to, const double* left, MatrixView W, std::size_t r, std::size_t n,
+                                     const RowRun& run) {
+  const Doubles d;
+  for (std::size_t j = 0; j < run.count; j += kPad) {
+    Vector sum[kRows][kVectors];
+    for (std::size_t k = 0; k < kRows; ++k)
+      for (std::size_t v = 0; v < kVectors; ++v) sum[k][v] = hn::Load(d, to.row(r + k) + run.to + j + v * kLanes);
+    for (std::size_t q = 0; q < n; ++q) {
+      Vector row[kVectors];
+      for (std::size_t v = 0; v < kVectors; ++v) row[v] = hn::Load(d, W.row(q) + run.from + j + v * kLanes);
+      for (std::size_t k = 0; k < kRows; ++k) {
+        const Vector a = hn::Set(d, left[q * W.stride + r + k]);
+        for (std::size_t v = 0; v < kVectors; ++v) sum[k][v] = hn::NegMulAdd(a, row[v], sum[k][v]);
+      }
+    }
+    for (std::size_t k = 0; k < kRows; ++k)
+      for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[k][v], d, to.row(r + k) + run.to + j + v * kLanes);
+  }
+}
+
+// Rows at a time: their sums hide the latency of the multiply-adds and, two registers each, fit sixteen.
+constexpr std::size_t kRunRows = kVectors <= 2 ? 6 : 3;
+
 HWY_ATTR void SubtractRuns(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n,
                            const RowRun* runs, std::size_t count) {
-  const Doubles d;
-  for (const RowRun* run = runs; run != runs + count; ++run)
-    for (std::size_t r = 0; r < rows; ++r)
-      for (std::size_t j = 0; j < run->count; j += kPad) {
-        double* at = to.row(r) + run->to + j;
-        Vector sum[kVectors];
-        for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Load(d, at + v * kLanes);
-        for (std::size_t q = 0; q < n; ++q) {
-          const Vector a = hn::Set(d, left[q * W.stride + r]);
-          for (std::size_t v = 0; v < kVectors; ++v)
-            sum[v] = hn::NegMulAdd(a, hn::Load(d, W.row(q) + run->from + j + v * kLanes), sum[v]);
-        }
-        for (std::size_t v = 0; v < kVectors; ++v) hn::Store(sum[v], d, at + v * kLanes);
-      }
+  for (const RowRun* run = runs; run != runs + count; ++run) {
+    std::size_t r = 0;
+    for (; r + kRunRows <= rows; r += kRunRows) SubtractRun<kRunRows>(to, left, W, r, n, *run);
+    for (; r < rows; ++r) SubtractRun<1>(to, left, W, r, n, *run);
+  }
 }
 
 HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {

@@ -1,16 +1,13 @@
 #include "solver/elastic_system.h"
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "limber/core/disjoint_sets.h"
-#include "limber/core/error.h"
+#include "limber/solvers/block_factor.h"
 
 namespace limber::internal {
 namespace {
-
-using SparseMatrix = Eigen::SparseMatrix<double>;
-using Factor = Eigen::SimplicialLLT<SparseMatrix>;
 
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
@@ -46,19 +43,26 @@ TwistMatrix own_block(double weight, const Vec3& arm, const Mat3& spread) {
   return out;
 }
 
-/// Bodies that links connect. The lower triangle of its matrix, columns of six.
+/// Bodies that links connect; its numbers in vectors are those of its factor, eight to a body.
 struct ElasticSystem::Block {
   std::vector<Index> bodies{};      // ascending
   std::vector<Index> links{};       // of the structure, between bodies that are not pinned
   std::vector<Index> edge_links{};  // to a pinned body
   std::vector<Index> interface {};  // places in `bodies`
   Index first = 0;                  // dof
+  Index interface_first = 0;        // interface dof
   double volume = 0.0;
-  SparseMatrix matrix{};
-  std::vector<std::array<Index, 6>> link_at{};  // per link and column: where its six values begin in the matrix
-  std::unique_ptr<Factor> factor = std::make_unique<Factor>();  // Eigen's do not move
-  MatrixX columns{};                                            // H⁻¹ E, 6 per interface body
-  MatrixX compliance{};                                         // Eᵀ H⁻¹ E
+  BlockFactor factor{};
+  std::vector<BlockFactor::Block> own{};                       // per body
+  std::vector<std::pair<BlockFactor::Block, bool>> between{};  // per link; whether its rows are a's
+  MatrixX inverse{};                                           // S⁻¹
+  AlignedBuffer vector{};                                      // between the sweeps
+
+  void scatter(const VectorX& f) {
+    double* x = vector.need(factor.size());
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      Eigen::Map<Twist>(x + factor.first(i)) = f.segment<6>(first + 6 * static_cast<Index>(i));
+  }
 };
 
 ElasticSystem::~ElasticSystem() = default;
@@ -75,7 +79,7 @@ ElasticSystem::ElasticSystem(const PoseStructure& structure, const std::vector<b
     if (!pinned(link.a) && !pinned(link.b)) sets.join(link.a, link.b);
   dof_.assign(bodies.size(), -1);
   block_of_.assign(bodies.size(), -1);
-  slot_of_.assign(bodies.size(), -1);
+  interface_dof_.assign(bodies.size(), -1);
   std::vector<Index> block_of_root(bodies.size(), -1);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (bodies[b].pinned) continue;
@@ -87,18 +91,6 @@ ElasticSystem::ElasticSystem(const PoseStructure& structure, const std::vector<b
     block_of_[b] = block;
     blocks_[static_cast<std::size_t>(block)].bodies.push_back(static_cast<Index>(b));
   }
-  for (Block& block : blocks_) {
-    block.first = dofs_;
-    for (std::size_t i = 0; i < block.bodies.size(); ++i) {
-      const auto b = static_cast<std::size_t>(block.bodies[i]);
-      dof_[b] = dofs_;
-      dofs_ += 6;
-      block.volume += bodies[b].volume;
-      if (!interface[b]) continue;
-      slot_of_[b] = static_cast<Index>(block.interface.size());
-      block.interface.push_back(static_cast<Index>(i));
-    }
-  }
   for (std::size_t l = 0; l < structure.links.size(); ++l) {
     const StrainLink& link = structure.links[l];
     if (pinned(link.a) && pinned(link.b)) continue;
@@ -107,35 +99,47 @@ ElasticSystem::ElasticSystem(const PoseStructure& structure, const std::vector<b
         blocks_[static_cast<std::size_t>(block_of_[static_cast<std::size_t>(pinned(link.a) ? link.b : link.a)])];
     (edge ? block.edge_links : block.links).push_back(static_cast<Index>(l));
   }
-  for (Block& block : blocks_) {
-    // The pattern, once: column by column, the diagonal block and then the links below it, ascending.
-    const auto n = static_cast<Index>(6 * block.bodies.size());
-    std::vector<Eigen::Triplet<double>> pattern;
-    const auto add = [&](Index row, Index column) {
-      for (Index c = 0; c < 6; ++c)
-        for (Index r = row == column ? c : 0; r < 6; ++r) pattern.emplace_back(row + r, column + c, 1.0);
-    };
-    for (Index i = 0; i < n; i += 6) add(i, i);
-    for (const Index l : block.links) {
-      const StrainLink& link = structure.links[static_cast<std::size_t>(l)];
-      add(dof(link.b) - block.first, dof(link.a) - block.first);
-    }
-    block.matrix.resize(n, n);
-    block.matrix.setFromTriplets(pattern.begin(), pattern.end());
-    block.factor->analyzePattern(block.matrix);
-    const auto* inner = block.matrix.innerIndexPtr();
-    const auto* outer = block.matrix.outerIndexPtr();
-    for (const Index l : block.links) {
-      const StrainLink& link = structure.links[static_cast<std::size_t>(l)];
-      const Index row = dof(link.b) - block.first, column = dof(link.a) - block.first;
-      std::array<Index, 6> at{};
-      for (Index c = 0; c < 6; ++c) {
-        const auto* begin = inner + outer[column + c];
-        at[static_cast<std::size_t>(c)] =
-            static_cast<Index>(std::lower_bound(begin, inner + outer[column + c + 1], row) - inner);
-      }
-      block.link_at.push_back(at);
-    }
+  for (Block& block : blocks_) number(block, interface);
+  for (Block& block : blocks_) place(block);
+}
+
+/// Where the block's unknowns are.
+void ElasticSystem::number(Block& block, const std::vector<bool>& interface) {
+  block.first = dofs_;
+  block.interface_first = interface_dofs_;
+  for (std::size_t i = 0; i < block.bodies.size(); ++i) {
+    const auto b = static_cast<std::size_t>(block.bodies[i]);
+    dof_[b] = dofs_;
+    dofs_ += 6;
+    block.volume += structure_->bodies[b].volume;
+    if (!interface[b]) continue;
+    interface_dof_[b] = interface_dofs_;
+    interface_dofs_ += 6;
+    block.interface.push_back(static_cast<Index>(i));
+  }
+}
+
+/// The pattern of the block's matrix, once.
+void ElasticSystem::place(Block& block) const {
+  const auto node = [&](Index body) { return static_cast<std::size_t>((dof(body) - block.first) / 6); };
+  block.factor.begin_pattern(std::vector<std::size_t>(block.bodies.size(), 6));
+  for (const Index l : block.links) {
+    const StrainLink& link = structure_->links[static_cast<std::size_t>(l)];
+    block.factor.add_edge(node(link.a), node(link.b));
+  }
+  for (const Index i : block.interface) {
+    block.factor.keep(static_cast<std::size_t>(i));
+    for (const Index j : block.interface)
+      block.factor.add_edge(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+  }
+  block.factor.end_pattern();
+  for (std::size_t i = 0; i < block.bodies.size(); ++i) block.own.push_back(block.factor.block(i, i));
+  for (const Index l : block.links) {
+    const StrainLink& link = structure_->links[static_cast<std::size_t>(l)];
+    const bool rows_a = block.factor.comes_first(node(link.a), node(link.b));
+    block.between.emplace_back(
+        rows_a ? block.factor.block(node(link.a), node(link.b)) : block.factor.block(node(link.b), node(link.a)),
+        rows_a);
   }
 }
 
@@ -154,109 +158,128 @@ void ElasticSystem::assemble(Block& block, const std::vector<Mat3>& rotations,
     diagonal[i].bottomRightCorner<3, 3>() = mass * Mat3::Identity();
     diagonal[i] += added[b];
   }
-  double* values = block.matrix.valuePtr();
+  block.factor.set_identity();
+  const auto write = [&](const BlockFactor::Block& at, const TwistMatrix& m) {
+    double* values = block.factor.upper(at);
+    for (int r = 0; r < 6; ++r) Eigen::Map<Twist>(values + static_cast<std::size_t>(r) * at.stride) = m.row(r);
+  };
   for (std::size_t i = 0; i < block.links.size(); ++i) {
     const StrainLink& link = s.links[static_cast<std::size_t>(block.links[i])];
     own(link.a) += own_block(link.weight, link.arm_a, link.spread);
     own(link.b) += own_block(link.weight, link.arm_b, link.spread);
     const TwistMatrix between = cross_block(
         link, rotations[static_cast<std::size_t>(link.b)].transpose() * rotations[static_cast<std::size_t>(link.a)]);
-    for (int c = 0; c < 6; ++c)
-      Eigen::Map<Twist>(values + block.link_at[i][static_cast<std::size_t>(c)]) = between.col(c);
+    const auto& [at, rows_a] = block.between[i];
+    write(at, rows_a ? TwistMatrix(between.transpose()) : between);
   }
   for (const Index l : block.edge_links) {
     const StrainLink& link = s.links[static_cast<std::size_t>(l)];
     const bool a = dof(link.a) >= 0;
     own(a ? link.a : link.b) += own_block(link.weight, a ? link.arm_a : link.arm_b, link.spread);
   }
-  const auto* outer = block.matrix.outerIndexPtr();
-  for (std::size_t i = 0; i < diagonal.size(); ++i)
-    for (int c = 0; c < 6; ++c)
-      for (int r = c; r < 6; ++r) values[outer[6 * static_cast<int>(i) + c] + r - c] = diagonal[i](r, c);
+  for (std::size_t i = 0; i < diagonal.size(); ++i) write(block.own[i], diagonal[i]);
 }
 
-void ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added) {
+bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added) {
   for (Block& block : blocks_) {
     assemble(block, rotations, added);
-    block.factor->factorize(block.matrix);
-    if (block.factor->info() != Eigen::Success)
-      throw ComputationError("posing: the strain matrix is not positive definite, expected finite poses");
-    MatrixX unit = MatrixX::Zero(block.matrix.rows(), static_cast<Eigen::Index>(6 * block.interface.size()));
+    if (!block.factor.factor()) return false;
+    const auto n = static_cast<Eigen::Index>(6 * block.interface.size());
+    MatrixX S(n, n);
     for (std::size_t i = 0; i < block.interface.size(); ++i)
-      unit.block<6, 6>(6 * block.interface[i], static_cast<Eigen::Index>(6 * i)).setIdentity();
-    block.columns = block.factor->solve(unit);
-    block.compliance.resize(unit.cols(), unit.cols());
+      for (std::size_t j = 0; j < block.interface.size(); ++j) {
+        const auto a = static_cast<std::size_t>(block.interface[i]), b = static_cast<std::size_t>(block.interface[j]);
+        if (a != b && !block.factor.comes_first(a, b)) continue;
+        const BlockFactor::Block at = block.factor.block(a, b);
+        const auto row = static_cast<Eigen::Index>(6 * i), column = static_cast<Eigen::Index>(6 * j);
+        for (int r = 0; r < 6; ++r)
+          S.block<1, 6>(row + r, column) =
+              Eigen::Map<const Twist>(block.factor.upper(at) + static_cast<std::size_t>(r) * at.stride).transpose();
+        S.block<6, 6>(column, row) = S.block<6, 6>(row, column).transpose().eval();
+      }
+    const Eigen::LLT<MatrixX> llt(S);
+    if (llt.info() != Eigen::Success) return false;
+    block.inverse = llt.solve(MatrixX::Identity(n, n));
+  }
+  return true;
+}
+
+void ElasticSystem::reduce(const VectorX& f, VectorX& interface) {
+  interface.resize(interface_dofs_);
+  for (Block& block : blocks_) {
+    block.scatter(f);
+    double* x = block.vector.data();
+    block.factor.reduce(x);
+    VectorX left(static_cast<Eigen::Index>(6 * block.interface.size()));
     for (std::size_t i = 0; i < block.interface.size(); ++i)
-      block.compliance.middleRows<6>(static_cast<Eigen::Index>(6 * i)) =
-          block.columns.middleRows<6>(6 * block.interface[i]);
+      left.segment<6>(static_cast<Eigen::Index>(6 * i)) =
+          Eigen::Map<const Twist>(x + block.factor.first(static_cast<std::size_t>(block.interface[i])));
+    interface.segment(block.interface_first, left.size()) = block.inverse * left;
   }
 }
 
-void ElasticSystem::solve(const VectorX& f, VectorX& u) const {
+void ElasticSystem::expand(const VectorX& interface, VectorX& u) {
   u.resize(dofs_);
-  for (const Block& block : blocks_)
-    u.segment(block.first, block.matrix.rows()) = block.factor->solve(f.segment(block.first, block.matrix.rows()));
-}
-
-double ElasticSystem::square(const VectorX& u) const {
-  double out = 0.0;
-  for (const Block& block : blocks_) {
-    const auto own = u.segment(block.first, block.matrix.rows());
-    out += own.dot(block.matrix.selfadjointView<Eigen::Lower>() * own);
+  for (Block& block : blocks_) {
+    double* x = block.vector.data();
+    for (std::size_t i = 0; i < block.interface.size(); ++i)
+      Eigen::Map<Twist>(x + block.factor.first(static_cast<std::size_t>(block.interface[i]))) =
+          interface.segment<6>(block.interface_first + 6 * static_cast<Index>(i));
+    block.factor.expand(x);
+    for (std::size_t i = 0; i < block.bodies.size(); ++i)
+      u.segment<6>(block.first + 6 * static_cast<Index>(i)) = Eigen::Map<const Twist>(x + block.factor.first(i));
   }
-  return out;
 }
 
-ElasticSystem::InterfaceRows ElasticSystem::at_interface(const std::vector<Row>& rows) const {
-  InterfaceRows out(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto piece = [&](Index body, const Twist& J) -> InterfaceRow {
-      if (body < 0 || dof(body) < 0) return {};
-      return {block_of_[static_cast<std::size_t>(body)], slot_of_[static_cast<std::size_t>(body)], J};
-    };
-    out[i] = {piece(rows[i].a, rows[i].J_a), piece(rows[i].b, rows[i].J_b)};
-  }
-  return out;
+void ElasticSystem::follow(const VectorX& interface, VectorX& u) {
+  for (Block& block : blocks_) std::fill_n(block.vector.need(block.factor.size()), block.factor.size(), 0.0);
+  expand(interface, u);
 }
 
-MatrixX ElasticSystem::compliance(const InterfaceRows& rows) const {
+MatrixX ElasticSystem::compliance(const std::vector<Row>& rows) const {
   const auto m = static_cast<Eigen::Index>(rows.size());
   MatrixX out = MatrixX::Zero(m, m);
   // Rows that act on a block meet there alone.
-  std::vector<std::vector<std::pair<Eigen::Index, const InterfaceRow*>>> acting(blocks_.size());
-  for (Eigen::Index i = 0; i < m; ++i)
-    for (const InterfaceRow& piece : rows[static_cast<std::size_t>(i)])
-      if (piece.block >= 0) acting[static_cast<std::size_t>(piece.block)].emplace_back(i, &piece);
+  struct Piece {
+    Eigen::Index row;
+    Index offset;  // of the body within its block's interface
+    const Twist* J;
+  };
+  std::vector<std::vector<Piece>> acting(blocks_.size());
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const Row& row = rows[static_cast<std::size_t>(i)];
+    for (const auto& [body, J] : {std::pair(row.a, &row.J_a), std::pair(row.b, &row.J_b)}) {
+      if (body < 0 || dof(body) < 0) continue;
+      const auto b = static_cast<std::size_t>(block_of_[static_cast<std::size_t>(body)]);
+      acting[b].push_back({i, interface_dof(body) - blocks_[b].interface_first, J});
+    }
+  }
   for (std::size_t b = 0; b < blocks_.size(); ++b)
-    for (const auto& [i, row] : acting[b]) {
-      const VectorX response = blocks_[b].compliance.middleCols<6>(6 * row->offset) * row->J;
-      for (const auto& [j, other] : acting[b]) out(i, j) += other->J.dot(response.segment<6>(6 * other->offset));
+    for (const Piece& piece : acting[b]) {
+      const VectorX response = blocks_[b].inverse.middleCols<6>(piece.offset) * *piece.J;
+      for (const Piece& other : acting[b]) out(piece.row, other.row) += other.J->dot(response.segment<6>(other.offset));
     }
   return out;
 }
 
-VectorX ElasticSystem::apply(const InterfaceRows& rows, const VectorX& u) const {
+VectorX ElasticSystem::apply(const std::vector<Row>& rows, const VectorX& interface) const {
   VectorX out = VectorX::Zero(static_cast<Eigen::Index>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i)
-    for (const InterfaceRow& piece : rows[i]) {
-      if (piece.block < 0) continue;
-      const Block& block = blocks_[static_cast<std::size_t>(piece.block)];
-      out[static_cast<Eigen::Index>(i)] +=
-          piece.J.dot(u.segment<6>(block.first + 6 * block.interface[static_cast<std::size_t>(piece.offset)]));
-    }
+    for (const auto& [body, J] : {std::pair(rows[i].a, &rows[i].J_a), std::pair(rows[i].b, &rows[i].J_b)})
+      if (body >= 0 && dof(body) >= 0)
+        out[static_cast<Eigen::Index>(i)] += J->dot(interface.segment<6>(interface_dof(body)));
   return out;
 }
 
-void ElasticSystem::subtract_response(const InterfaceRows& rows, const VectorX& lambda, VectorX& u) const {
-  std::vector<VectorX> force(blocks_.size());
-  for (std::size_t b = 0; b < blocks_.size(); ++b) force[b] = VectorX::Zero(blocks_[b].columns.cols());
+void ElasticSystem::subtract_response(const std::vector<Row>& rows, const VectorX& lambda, VectorX& interface) const {
+  VectorX force = VectorX::Zero(interface_dofs_);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    for (const InterfaceRow& piece : rows[i])
-      if (piece.block >= 0)
-        force[static_cast<std::size_t>(piece.block)].segment<6>(6 * piece.offset) +=
-            lambda[static_cast<Eigen::Index>(i)] * piece.J;
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
-    if (!force[b].isZero(0.0)) u.segment(blocks_[b].first, blocks_[b].columns.rows()) -= blocks_[b].columns * force[b];
+    for (const auto& [body, J] : {std::pair(rows[i].a, &rows[i].J_a), std::pair(rows[i].b, &rows[i].J_b)})
+      if (body >= 0 && dof(body) >= 0)
+        force.segment<6>(interface_dof(body)) += lambda[static_cast<Eigen::Index>(i)] * *J;
+  for (const Block& block : blocks_)
+    interface.segment(block.interface_first, block.inverse.rows()) -=
+        block.inverse * force.segment(block.interface_first, block.inverse.rows());
 }
 
 }  // namespace limber::internal

@@ -17,8 +17,10 @@ TwistMatrix own_block(double weight, const Vec3& arm, const Mat3& spread);
 
 /// H = strain's Gauss–Newton matrix + what acts on single bodies + a small mass matrix, over the twists of all bodies
 /// that are not pinned. It falls apart into blocks, the sets of bodies that links connect: joints and limits are not in
-/// it. They act on few bodies, the *interface*; what a force there does to all bodies is kept as dense columns H⁻¹E,
-/// and with them every problem with joints and limits is a small dense one.
+/// it. They act on few bodies, the *interface*. All others are eliminated (a sparse Cholesky factor in blocks of six),
+/// what is left at the interface is a small dense matrix per block, S, and every problem with joints and limits is one
+/// of S alone, between the two sweeps of a solution:
+///   reduce(f); at the interface: u_I = S⁻¹ (f_I − Jᵀ λ) with λ from J S⁻¹ Jᵀ; expand(u)
 class ElasticSystem {
  public:
   /// @param interface bodies on which rows act. @param proximal weight of the mass matrix of single bodies, and of
@@ -34,39 +36,38 @@ class ElasticSystem {
   Index dof(Index body) const { return dof_[static_cast<std::size_t>(body)]; }
 
   /// Assembles and factors H at a pose. @param rotations per body. @param added per body, of what acts on it alone
-  /// (handles, curvature); positive semidefinite
-  void factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added);
+  /// (handles, curvature). @return whether H is positive definite; it always is if what is added is semidefinite
+  bool factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added);
 
-  /// u = H⁻¹ f
-  void solve(const VectorX& f, VectorX& u) const;
+  /// The first sweep of H⁻¹ f. @param interface out: S⁻¹ of what is left of f there
+  void reduce(const VectorX& f, VectorX& interface);
+  /// The second, for any twists of the interface. @param u out: of all bodies
+  void expand(const VectorX& interface, VectorX& u);
+  /// The same without forces on other bodies: what the interface's twists do to all.
+  void follow(const VectorX& interface, VectorX& u);
 
-  /// uᵀ H u
-  double square(const VectorX& u) const;
+  // Twists of the interface: six per body that is in it and not pinned.
+  Index interface_dofs() const { return interface_dofs_; }
+  /// Where a body's six are among them; −1: not in it, or pinned.
+  Index interface_dof(Index body) const { return interface_dof_[static_cast<std::size_t>(body)]; }
 
-  /// A row's derivative in the unknowns of the interface: sparse.
-  struct InterfaceRow {
-    Index block = -1;  // of the first of two pieces; −1: nothing there
-    Index offset = 0;  // of the body within its block's interface
-    Twist J = Twist::Zero();
-  };
-  using InterfaceRows = std::vector<std::array<InterfaceRow, 2>>;
-  InterfaceRows at_interface(const std::vector<Row>& rows) const;
-
-  /// J H⁻¹ Jᵀ
-  MatrixX compliance(const InterfaceRows& rows) const;
+  /// J S⁻¹ Jᵀ, which is J H⁻¹ Jᵀ. @param rows on the interface
+  MatrixX compliance(const std::vector<Row>& rows) const;
   /// J u
-  VectorX apply(const InterfaceRows& rows, const VectorX& u) const;
-  /// u −= H⁻¹ Jᵀ λ
-  void subtract_response(const InterfaceRows& rows, const VectorX& lambda, VectorX& u) const;
+  VectorX apply(const std::vector<Row>& rows, const VectorX& interface) const;
+  /// u −= S⁻¹ Jᵀ λ
+  void subtract_response(const std::vector<Row>& rows, const VectorX& lambda, VectorX& interface) const;
 
  private:
   struct Block;
+  void number(Block& block, const std::vector<bool>& interface);
+  void place(Block& block) const;
   void assemble(Block& block, const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added) const;
 
   const PoseStructure* structure_;
   double proximal_, proximal_of_linked_;
-  Index dofs_ = 0;
-  std::vector<Index> dof_, block_of_, slot_of_;  // per body; slot: within its block's interface, or −1
+  Index dofs_ = 0, interface_dofs_ = 0;
+  std::vector<Index> dof_, block_of_, interface_dof_;  // per body
   std::vector<Block> blocks_;
 };
 

@@ -62,10 +62,13 @@ BodyLoads loads(const PoseStructure& structure, const std::vector<HandleTerm>& h
 }
 
 Mat3 turning_stiffness(const Mat3& moment) {
-  const Mat3 full = 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity();
+  return 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity();
+}
+
+Mat3 positive_part(const Mat3& symmetric) {
   Eigen::SelfAdjointEigenSolver<Mat3> split;
-  split.computeDirect(full);
-  if (split.eigenvalues()[0] >= 0.0) return full;
+  split.computeDirect(symmetric);
+  if (split.eigenvalues()[0] >= 0.0) return symmetric;
   return split.eigenvectors() * split.eigenvalues().cwiseMax(0.0).asDiagonal() * split.eigenvectors().transpose();
 }
 

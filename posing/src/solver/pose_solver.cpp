@@ -13,7 +13,7 @@ namespace {
 // Numbers of the method. What a converged pose is depends on none of them.
 // Of the mass matrix, in stiffness · size: small beside all that resists, so that iterations are few, and large enough
 // for round-off. A single body has nothing soft of its own; in a block of many, bending is far softer than its links.
-constexpr double kProximal = 1e-7, kProximalOfLinked = 1e-10;
+constexpr double kProximal = 1e-7, kProximalOfLinked = 1e-8;
 constexpr double kLargestTurn = 0.8;  // rad of a body in one step: beyond, rotations are far from their linearisation
 constexpr double kFeasible = 1e-11;   // to which joints and limits are put back; of the size, rad
 constexpr double kSlack = 1e-12;      // a limit that is nearer counts as reached
@@ -25,7 +25,7 @@ constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLargestDamping = 
 constexpr int kAnew = -1;  // age of a matrix that is to be made
 // A step that promises less than this part of the one before converges as well with the matrix there is: made for an
 // earlier pose, and in the bodies' own frames little changed since.
-constexpr double kContraction = 0.1;
+constexpr double kContraction = 0.3;
 constexpr double kGauge = 1e-12;  // prefers no turn where handles leave it open
 
 std::vector<bool> interface_bodies(const PoseStructure& structure) {
@@ -84,6 +84,14 @@ Feasibility feasibility(const PoseStructure& structure, const Pose& pose) {
 
 /// Rows at a pose: joints, then limits.
 struct PoseSolver::Linearised {
+  /// Energy that the pose has for not quite meeting joints and limits.
+  double worth(const VectorX& multipliers) const {
+    double out = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      out += std::abs(multipliers[static_cast<Eigen::Index>(i)]) *
+             (pushes[i] ? std::max(0.0, rows[i].value) : std::abs(rows[i].value));
+    return out;
+  }
   std::vector<Row> rows{};
   std::vector<bool> pushes{};
   VectorX values() const {
@@ -153,9 +161,14 @@ Pose PoseSolver::advanced(const Pose& pose, const VectorX& step, double part) co
   for (std::size_t b = 0; b < out.bodies.size(); ++b)
     if (const Index at = system_.dof(static_cast<Index>(b)); at >= 0)
       out.bodies[b] = moved(pose.bodies[b], part * step.segment<6>(at));
-  for (std::size_t j = 0; j < out.turns.size(); ++j)
-    out.turns[j] = joint_turn(*structure_, structure_->joints[j], out.bodies, pose.turns[j]);
+  tell_turns(out);
   return out;
+}
+
+/// Angles of joints, told on from where they were.
+void PoseSolver::tell_turns(Pose& pose) const {
+  for (std::size_t j = 0; j < pose.turns.size(); ++j)
+    pose.turns[j] = joint_turn(*structure_, structure_->joints[j], pose.bodies, pose.turns[j]);
 }
 
 /// How far a step moves a point at most, of the size.
@@ -167,32 +180,48 @@ double PoseSolver::reach(const VectorX& step) const {
   return out / structure_->size;
 }
 
-/// Newton's method on joints and the limits that are passed, by the least motion in the metric of H. @return whether
-/// they hold
+/// Newton's method on joints and the limits that are passed, by the least motion in the metric of H. Only the interface
+/// counts for that; the other bodies follow at the end. @return whether they hold
 bool PoseSolver::make_feasible(Pose& pose) {
-  VectorX lambda;
+  VectorX lambda, gone = VectorX::Zero(system_.interface_dofs());
   for (int i = 0; i <= kRestorations; ++i) {
     const Feasibility now = feasibility(*structure_, pose);
     if (!(std::isfinite(now.joints) && std::isfinite(now.limits))) return false;
-    if (now.joints <= kFeasible && now.limits <= kSlack) return true;
+    if (now.joints <= kFeasible && now.limits <= kSlack) {
+      if (i > 0) bring_along(gone, pose);
+      return true;
+    }
     if (i == kRestorations) break;
     const Linearised at = linearise(pose);
-    const auto rows = system_.at_interface(at.rows);
     lambda.setZero(static_cast<Eigen::Index>(at.rows.size()));
-    solve_bounded(system_.compliance(rows), at.values(), at.pushes, lambda);
-    VectorX step = VectorX::Zero(system_.dofs());
-    system_.subtract_response(rows, lambda, step);
+    solve_bounded(system_.compliance(at.rows), at.values(), at.pushes, lambda);
+    VectorX step = VectorX::Zero(system_.interface_dofs());
+    system_.subtract_response(at.rows, lambda, step);
     double turn = 0.0;
-    for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, step.segment<3>(d).norm());
-    pose = advanced(pose, step, std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn)));
+    for (Index d = 0; d < system_.interface_dofs(); d += 6) turn = std::max(turn, step.segment<3>(d).norm());
+    step *= std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn));
+    for (std::size_t body = 0; body < pose.bodies.size(); ++body)
+      if (const Index d = system_.interface_dof(static_cast<Index>(body)); d >= 0)
+        pose.bodies[body] = moved(pose.bodies[body], step.segment<6>(d));
+    tell_turns(pose);
+    gone += step;
   }
   return false;
+}
+
+/// What bodies off the interface do when those on it have moved.
+void PoseSolver::bring_along(const VectorX& interface, Pose& pose) {
+  VectorX step;
+  system_.follow(interface, step);
+  for (std::size_t b = 0; b < pose.bodies.size(); ++b)
+    if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0 && system_.interface_dof(static_cast<Index>(b)) < 0)
+      pose.bodies[b] = moved(pose.bodies[b], step.segment<6>(d));
 }
 
 /// What acts on single bodies: handles, and the curvature that all forces on a body give its turning. Joints pull at
 /// their anchors with the multipliers of the step before.
 std::vector<TwistMatrix> PoseSolver::second_derivatives(BodyLoads loads, const Linearised& at,
-                                                        const std::vector<Mat3>& R) const {
+                                                        const std::vector<Mat3>& R, bool whole) const {
   std::vector<double> couples(R.size(), 0.0);
   if (multipliers_.size() == static_cast<Eigen::Index>(at.rows.size()))
     for (std::size_t i = 0; i < at.rows.size(); ++i) {
@@ -204,12 +233,22 @@ std::vector<TwistMatrix> PoseSolver::second_derivatives(BodyLoads loads, const L
       couples[static_cast<std::size_t>(row.b)] += std::abs(l) * row.J_b.head<3>().norm();
     }
   std::vector<TwistMatrix> out(R.size(), TwistMatrix::Zero());
-  for (std::size_t b = 0; b < out.size(); ++b)
-    out[b].topLeftCorner<3, 3>() =
-        turning_stiffness(loads.moments[b]) + damping_ * (loads.moments[b].norm() + couples[b]) * Mat3::Identity();
+  for (std::size_t b = 0; b < out.size(); ++b) {
+    const Mat3 turning = turning_stiffness(loads.moments[b]);
+    out[b].topLeftCorner<3, 3>() = (whole ? turning : positive_part(turning)) +
+                                   damping_ * (loads.moments[b].norm() + couples[b]) * Mat3::Identity();
+  }
   for (const HandleTerm& h : handles_)
     out[static_cast<std::size_t>(h.body)] += own_block(h.weight, h.arm, Mat3::Zero());
   return out;
+}
+
+/// H with all its curvature, which makes steps Newton's; where that has a direction in which the energy bends down,
+/// with the positive part of each body's.
+void PoseSolver::make_matrix(const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R) {
+  if (system_.factor(R, second_derivatives(acting, at, R, true))) return;
+  if (!system_.factor(R, second_derivatives(acting, at, R, false)))
+    throw ComputationError("posing: the strain matrix is not positive definite, expected finite poses");
 }
 
 /// One iteration: a step is taken if the energy falls, else the next is damped more.
@@ -217,39 +256,41 @@ PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
   const std::vector<Mat3> R = rotations_of(pose.bodies);
   const Linearised at = linearise(pose);
   const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
-  if (factor_.age < 0) system_.factor(R, second_derivatives(acting, at, R));
+  if (factor_.age < 0) make_matrix(acting, at, R);
   ++factor_.age;
   VectorX gradient = VectorX::Zero(system_.dofs());
   for (std::size_t b = 0; b < acting.gradient.size(); ++b)
     if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0) gradient.segment<6>(d) = acting.gradient[b];
-  VectorX u;
-  system_.solve(-gradient, u);
-  const auto rows = system_.at_interface(at.rows);
+  VectorX interface, u;
+  system_.reduce(-gradient, interface);
   if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
     multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
-  solve_bounded(system_.compliance(rows), at.values() + system_.apply(rows, u), at.pushes, multipliers_);
-  system_.subtract_response(rows, multipliers_, u);
+  solve_bounded(system_.compliance(at.rows), at.values() + system_.apply(at.rows, interface), at.pushes, multipliers_);
+  system_.subtract_response(at.rows, multipliers_, interface);
+  system_.expand(interface, u);
 
   double turn = 0.0;
   for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, u.segment<3>(d).norm());
   const double part = std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn));
-  const double promised = part * (1.0 - 0.5 * part) * system_.square(u);
+  // uᵀHu, as Hu = −g − Jᵀλ
+  const double square = -gradient.dot(u) - multipliers_.dot(system_.apply(at.rows, interface));
+  const double promised = part * (1.0 - 0.5 * part) * std::max(0.0, square);
   Step out{.moved = part * reach(u), .outcome = Step::Outcome::kRejected};
   Pose trial = advanced(pose, u, part);
   const double lower =
       make_feasible(trial) && all_finite(trial) ? energy(trial) : std::numeric_limits<double>::infinity();
-  const bool last = out.moved <= options_.tolerance || promised <= kEnergyRoundOff * value;
+  const bool last = out.moved <= options_.tolerance || promised <= kEnergyRoundOff * value + at.worth(multipliers_);
   if (lower <= value - kArmijo * promised || (last && lower <= value)) {
     if (damping_ > 0.0 && lower <= value - 0.5 * promised) {
       damping_ = damping_ > kFirstDamping ? damping_ / kDampingFactor : 0.0;
       factor_.age = kAnew;
     }
-    if (promised > kContraction * factor_.promised) factor_.age = kAnew;
+    if (!last && promised > kContraction * factor_.promised) factor_.age = kAnew;
     factor_.promised = promised;
     pose = std::move(trial);
     value = lower;
     out.outcome = Step::Outcome::kTaken;
-  } else {
+  } else if (!last) {
     if (factor_.age == 0) damping_ = std::max(kDampingFactor * damping_, kFirstDamping);
     factor_.age = kAnew;
   }
@@ -272,13 +313,13 @@ PoseResult PoseSolver::solve(Pose& pose) {
           std::max(result.handle_error, (at.bodies[static_cast<std::size_t>(h.body)] * h.arm - h.target).norm());
     return result;
   };
-  multipliers_.resize(0);
+  if (damping_ > 0.0) factor_.age = kAnew;
   damping_ = 0.0;
-  factor_.age = kAnew;
   factor_.promised = std::numeric_limits<double>::infinity();
   if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
     // What handles resist must not count: joints come first, however far the handles are dragged off by it.
     system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()));
+    factor_.age = kAnew;
   }
   if (!make_feasible(trial)) return tell(Status::kInfeasible, pose);
   start_with_rigid_motion(trial);

@@ -47,8 +47,12 @@ class PoseSolver {
   };
   void start_with_rigid_motion(Pose& pose) const;
   bool make_feasible(Pose& pose);
+  void bring_along(const VectorX& interface, Pose& pose);
+  void tell_turns(Pose& pose) const;
   Linearised linearise(const Pose& pose) const;
-  std::vector<TwistMatrix> second_derivatives(BodyLoads loads, const Linearised& at, const std::vector<Mat3>& R) const;
+  std::vector<TwistMatrix> second_derivatives(BodyLoads loads, const Linearised& at, const std::vector<Mat3>& R,
+                                              bool whole) const;
+  void make_matrix(const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R);
   double energy(const Pose& pose) const;
   Step step(Pose& pose, double& value);
   Pose advanced(const Pose& pose, const VectorX& step, double part) const;

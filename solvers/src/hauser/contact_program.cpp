@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limber/core/types.h"
+
 namespace limber {
 namespace {
 
