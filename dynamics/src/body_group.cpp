@@ -389,6 +389,7 @@ void BodyGroup::save_state(Index slot, StateWriter& state) const {
   for (const ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_}) state.numbers(rows->modes(slot));
   if (b.modes_loaded) state.numbers(forces_.modes(slot));
   if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
+  if (b.held) state.numbers(predicted_forces_.modes(slot));
 }
 
 void BodyGroup::restore_state(Index slot, StateReader& state) {
@@ -398,6 +399,7 @@ void BodyGroup::restore_state(Index slot, StateReader& state) {
   for (ModeRows* rows : {&forces_, &static_amplitudes_}) rows->clear(slot);
   if (b.modes_loaded) state.numbers(forces_.modes(slot));
   if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
+  if (b.held) state.numbers(predicted_forces_.modes(slot));
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }

@@ -236,13 +236,17 @@ void World::set_step(double seconds) {
   };
   if (m.parts->impulses_wait() || std::any_of(m.entries.begin(), m.entries.end(), waits))
     throw InvalidArgument("World::set_step: an impulse with a delay waits for the coming step; set the step first");
-  for (const auto& group : m.groups)
-    if (group) group->set_step_length(seconds / options.substeps);
-  m.parts->set_step(seconds);
   m.accumulator = std::min(m.accumulator / m.options.step * seconds, std::nextafter(seconds, 0.0));
   m.time_before = time();
   m.steps_before = m.steps;
-  m.options.step = seconds;
+  m.set_length(seconds);
+}
+
+void World::Impl::set_length(double step) {
+  for (const auto& group : groups)
+    if (group) group->set_step_length(step / options.substeps);
+  parts->set_step(step);
+  options.step = step;
 }
 
 double World::time() const {

@@ -168,6 +168,7 @@ struct World::Impl {
   bool wake_what_is_touched();
   Index group_of(std::shared_ptr<const ModalModel> model);
   void make_ranges();
+  void set_length(double step);
   void advance_part(int part);
   void keep_dents();
   std::span<const DentLoad> dents_before(BodyId id) const;

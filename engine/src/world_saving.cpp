@@ -92,7 +92,7 @@ void World::restore_state(std::span<const std::byte> state) {
 
 /// What has to be the same, first: nothing is changed before it has been looked at.
 void World::Impl::save_structure(StateWriter& state) const {
-  state(options.step, options.substeps, source != nullptr, static_cast<std::uint64_t>(entries.size()));
+  state(options.substeps, source != nullptr, static_cast<std::uint64_t>(entries.size()));
   for (const Entry& e : entries) {
     state(e.generation, e.alive);
     if (e.alive) state(e.group >= 0 ? fingerprint(group(e).model()) : std::uint64_t{0});
@@ -101,8 +101,6 @@ void World::Impl::save_structure(StateWriter& state) const {
 
 /// @return bodies that have come since
 std::vector<BodyId> World::Impl::check_structure(StateReader& state) const {
-  const auto step = state.read<double>();
-  if (step != options.step) refuse("steps of " + std::to_string(step) + " s, expected " + std::to_string(options.step));
   const auto substeps = state.read<int>();
   if (substeps != options.substeps)
     refuse(std::to_string(substeps) + " substeps, expected " + std::to_string(options.substeps));
@@ -133,7 +131,7 @@ std::vector<BodyId> World::Impl::check_structure(StateReader& state) const {
 void World::Impl::save_motion(StateWriter& state) const {
   state(static_cast<std::uint64_t>(entries.size()));
   for (const Entry& e : entries) state(e.generation, e.placed);
-  state(vacant_entries, steps, accumulator, dropped, options.gravity);
+  state(options.step, vacant_entries, steps, steps_before, time_before, accumulator, dropped, options.gravity);
   for (const Entry& e : entries)
     if (e.alive && e.group >= 0) group(e).save_state(e.slot, state);
   constraints.save_state(entries.size(), state);
@@ -151,7 +149,8 @@ void World::Impl::restore_motion(StateReader& state) {
   state(count);
   entries.resize(static_cast<std::size_t>(count));
   for (Entry& e : entries) state(e.generation, e.placed);
-  state(vacant_entries, steps, accumulator, dropped, options.gravity);
+  if (const auto step = state.read<double>(); step != options.step) set_length(step);
+  state(vacant_entries, steps, steps_before, time_before, accumulator, dropped, options.gravity);
   for (const Entry& e : entries)
     if (e.alive && e.group >= 0) group(e).restore_state(e.slot, state);
   constraints.restore_state(entries.size(), state);

@@ -254,8 +254,6 @@ TEST(Rollback, WhatDoesNotFitIsRefusedAndChangesNothing) {
     damaged[at] ^= std::byte{4};
     refused(damaged);
   }
-  GroundedWorld other({}, {.step = 1.0 / 120.0});
-  refused(saved(other.world));
   GroundedWorld doubled({}, {.substeps = 2});
   refused(saved(doubled.world));
   World bare;

@@ -54,6 +54,33 @@ TEST(VaryingStep, WhatLiesStillStaysWhereItIs) {
   EXPECT_LT((at.world.body(box).pose.p - start).norm(), 1e-6);
 }
 
+/// Modes pass the Nyquist rate of one step or the other, while the box strikes the ground and lies there.
+TEST(VaryingStep, AStateThatIsRestoredBringsItsStepWithIt) {
+  GroundedWorld at;
+  at.world.add_body(damped_box(6, 30.0), {.pose = {quaternion_from_rotation_vector({0.2, 0.3, 0.0}), {0, 0, 0.4}}});
+  const auto future = [&] {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> length(1.0 / 600.0, 1.0 / 30.0);
+    std::vector<std::uint64_t> hashes;
+    for (int i = 0; i < 60; ++i) {
+      at.world.set_step(length(random));
+      at.world.step();
+      hashes.push_back(at.world.state_hash());
+    }
+    return hashes;
+  };
+  for (int begin = 0; begin < 3; ++begin) {
+    std::vector<std::byte> state;
+    at.world.save_state(state);
+    const double step = at.world.options().step, time = at.world.time();
+    const auto first = future();
+    at.world.restore_state(state);
+    EXPECT_EQ(at.world.options().step, step);
+    EXPECT_EQ(at.world.time(), time);
+    EXPECT_EQ(future(), first);
+  }
+}
+
 TEST(VaryingStep, KeepsTimeAndDrawingGoingOn) {
   World world({.step = 0.1});
   EXPECT_EQ(world.advance(0.25), 2);

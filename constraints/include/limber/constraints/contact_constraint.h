@@ -155,7 +155,7 @@ struct DentLoad {
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.at, s.force);
+    return std::tie(s.vertex, s.force);
   }
 };
 

@@ -223,7 +223,7 @@ class BodyGroup {
     /// `occupied` and `constrained` are others' business.
     template <class Self>
     static auto state_fields(Self& s) {
-      return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.delayed);
+      return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.held, s.delayed);
     }
   };
 

@@ -337,7 +337,7 @@ class World {
 
   // Rollback ---------------------------------------------------------------------------------------------------------
   /// Replaces `state` by all that coming steps depend on: bodies, loads that wait, handles, joints and their actuation,
-  /// what contacts remember, who sleeps, gravity, contact options, time; and the last two states for drawing. A world
+  /// what contacts remember, who sleeps, gravity, the step, contact options, time; and the last two states for drawing. A world
   /// that is restored goes on as it did then, bit for bit, with the same calls. Allocates nothing where `state` has
   /// room, as after saving a world like this before.
   ///
@@ -348,7 +348,7 @@ class World {
   /// removed since are there again: ids mean what they meant. Ids given since may be given again.
   /// Not part of a state: the Jobs, the contact source and the veto, and constraint_report(), which stays that of the
   /// last step taken.
-  /// @throws InvalidArgument, and changes nothing, for bytes that are damaged or of another version, a step or
+  /// @throws InvalidArgument, and changes nothing, for bytes that are damaged or of another version, for
   /// substeps other than this world's, a body that was removed since or is another one now, and a contact source where
   /// there was none or none where there was one
   void restore_state(std::span<const std::byte> state);
