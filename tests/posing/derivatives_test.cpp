@@ -85,6 +85,41 @@ TEST_P(JointDerivatives, AreThoseOfFiniteDifferences) {
   }
 }
 
+TEST_P(JointDerivatives, OfSecondOrderAreThoseOfFiniteDifferences) {
+  const PoseStructure s = two_boxes(GetParam().first, GetParam().second);
+  constexpr double kSecondStep = 1e-4, kSecondDifference = 1e-6;
+  Dice dice;
+  for (int trial = 0; trial < 5; ++trial) {
+    const BodyPoses poses = anywhere(s, dice);
+    JointRows rows;
+    append_joint_rows(s, s.joints[0], poses, 0.0, rows);
+    const std::size_t held = GetParam().second == 0.0 ? rows.constraints.size() : 0;  // an angle is curved in Q
+    for (std::size_t r = 0; r < held; ++r) {
+      const Row& row = rows.constraints[r];
+      const PairMatrix K = joint_curvature(s, s.joints[0], poses, row.dQ, row.dt);
+      EXPECT_EQ((K - K.transpose()).norm(), 0.0);
+      for (int along = 0; along < 8; ++along) {
+        const Twist a = Twist::NullaryExpr([&] { return dice(); }), b = Twist::NullaryExpr([&] { return dice(); });
+        const auto value = [&](double h) {
+          BodyPoses at = poses;
+          at[0] = moved(poses[0], h * a), at[1] = moved(poses[1], h * b);
+          JointRows there;
+          append_joint_rows(s, s.joints[0], at, 0.0, there);
+          return there.constraints[r].value;
+        };
+        Eigen::Matrix<double, 12, 1> x;
+        x << a, b;
+        const auto screw = [](const Twist& J, const Twist& u) {  // what forces that balance do not make
+          return J.tail<3>().dot(u.head<3>().cross(u.tail<3>()));
+        };
+        EXPECT_NEAR((value(kSecondStep) + value(-kSecondStep) - 2.0 * value(0.0)) / (kSecondStep * kSecondStep),
+                    x.dot(K * x) + screw(row.J_a, a) + screw(row.J_b, b), kSecondDifference)
+            << "row " << r;
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(AllTypes, JointDerivatives,
                          ::testing::Values(std::pair(JointType::kBall, 0.0), std::pair(JointType::kRevolute, 0.0),
                                            std::pair(JointType::kCylindrical, 0.0),
@@ -183,7 +218,7 @@ TEST(PoseEnergy, ItsMatrixIsTheSecondDerivativeWhereNothingIsStrained) {
   ElasticSystem system(s, interface, 0.0, 0.0);
   std::vector<TwistMatrix> anchors(s.bodies.size(), TwistMatrix::Zero());
   anchors[0].setIdentity();
-  system.factor(rotations_of(poses), anchors);
+  ASSERT_TRUE(system.factor(rotations_of(poses), anchors, {}));
   Dice dice;
   for (int trial = 0; trial < 5; ++trial) {
     VectorX f(system.dofs()), at_interface, u;

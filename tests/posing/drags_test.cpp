@@ -169,6 +169,25 @@ TEST(Drags, AHandleOutOfReachSettles) {
   EXPECT_LT(largest_distance(before, vertices_of(d.session)), 1e-4 * d.size);
 }
 
+// Stretched by a handle that it cannot reach, at joints' limits. Further calls find next to nothing.
+TEST(Drags, ASoftBodyPulledOutOfReachSettles) {
+  for (const double cell : {0.03, 0.05})
+    for (const double far : {2.0, 10.0}) {
+      Dragged d("lamp", true, cell);
+      const PoseResult first = d.drag_to(d.grip + far * d.size * Vec3(0.3, 0.5, -0.8));
+      EXPECT_EQ(first.status, PoseResult::Status::kConverged) << cell << " " << far;
+      expect_whole(d, first);
+      double energy = first.energy;
+      for (int i = 0; i < 3; ++i) {
+        const PoseResult next = d.session.solve();
+        EXPECT_EQ(next.status, PoseResult::Status::kConverged);
+        EXPECT_LE(next.iterations, 20);
+        energy = next.energy;
+      }
+      EXPECT_LT(first.energy - energy, 2e-5 * energy) << cell << " " << far;
+    }
+}
+
 TEST(Drags, WhatAPinnedPartSeparatesFromTheHandlesStays) {
   Dragged d("humanoid");  // the torso is pinned: other limbs hang on it
   const std::vector<Vec3> rest = vertices_of(d.session);

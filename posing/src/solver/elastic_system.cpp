@@ -9,19 +9,13 @@
 namespace limber::internal {
 namespace {
 
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 /// The part of a link's matrix between its bodies, rows b and columns a. @param turn R_bᵀ R_a
 TwistMatrix cross_block(const StrainLink& link, const Mat3& turn) {
-  const Mat3 sa = cross_matrix(link.arm_a), sb = cross_matrix(link.arm_b);
+  const Mat3 sa = skew(link.arm_a), sb = skew(link.arm_b);
   TwistMatrix out;
   Mat3 rotation = -link.weight * sb * turn * sa;
   for (int k = 0; k < 3; ++k) {
-    const Mat3 l = cross_matrix(link.spread.col(k));
+    const Mat3 l = skew(link.spread.col(k));
     rotation -= l * turn * l;
   }
   out.topLeftCorner<3, 3>() = -rotation;
@@ -34,7 +28,7 @@ TwistMatrix cross_block(const StrainLink& link, const Mat3& turn) {
 }  // namespace
 
 TwistMatrix own_block(double weight, const Vec3& arm, const Mat3& spread) {
-  const Mat3 s = cross_matrix(arm), second = spread * spread.transpose();
+  const Mat3 s = skew(arm), second = spread * spread.transpose();
   TwistMatrix out;
   out.topLeftCorner<3, 3>() = -weight * s * s + second.trace() * Mat3::Identity() - second;
   out.topRightCorner<3, 3>() = weight * s;
@@ -55,7 +49,6 @@ struct ElasticSystem::Block {
   BlockFactor factor{};
   std::vector<BlockFactor::Block> own{};                       // per body
   std::vector<std::pair<BlockFactor::Block, bool>> between{};  // per link; whether its rows are a's
-  MatrixX inverse{};                                           // S⁻¹
   AlignedBuffer vector{};                                      // between the sweeps
 
   void scatter(const VectorX& f) {
@@ -180,42 +173,54 @@ void ElasticSystem::assemble(Block& block, const std::vector<Mat3>& rotations,
   for (std::size_t i = 0; i < diagonal.size(); ++i) write(block.own[i], diagonal[i]);
 }
 
-bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added) {
+/// What is left at the block's interface, into S.
+void ElasticSystem::take_interface(Block& block, MatrixX& S) const {
+  for (std::size_t i = 0; i < block.interface.size(); ++i)
+    for (std::size_t j = 0; j < block.interface.size(); ++j) {
+      const auto a = static_cast<std::size_t>(block.interface[i]), b = static_cast<std::size_t>(block.interface[j]);
+      if (a != b && !block.factor.comes_first(a, b)) continue;
+      const BlockFactor::Block at = block.factor.block(a, b);
+      const auto row = block.interface_first + static_cast<Eigen::Index>(6 * i),
+                 column = block.interface_first + static_cast<Eigen::Index>(6 * j);
+      for (int r = 0; r < 6; ++r)
+        S.block<1, 6>(row + r, column) =
+            Eigen::Map<const Twist>(block.factor.upper(at) + static_cast<std::size_t>(r) * at.stride).transpose();
+      if (a != b) S.block<6, 6>(column, row) = S.block<6, 6>(row, column).transpose();
+    }
+}
+
+bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added,
+                           const std::vector<PairTerm>& between) {
+  MatrixX S = MatrixX::Zero(interface_dofs_, interface_dofs_);
   for (Block& block : blocks_) {
     assemble(block, rotations, added);
     if (!block.factor.factor()) return false;
-    const auto n = static_cast<Eigen::Index>(6 * block.interface.size());
-    MatrixX S(n, n);
-    for (std::size_t i = 0; i < block.interface.size(); ++i)
-      for (std::size_t j = 0; j < block.interface.size(); ++j) {
-        const auto a = static_cast<std::size_t>(block.interface[i]), b = static_cast<std::size_t>(block.interface[j]);
-        if (a != b && !block.factor.comes_first(a, b)) continue;
-        const BlockFactor::Block at = block.factor.block(a, b);
-        const auto row = static_cast<Eigen::Index>(6 * i), column = static_cast<Eigen::Index>(6 * j);
-        for (int r = 0; r < 6; ++r)
-          S.block<1, 6>(row + r, column) =
-              Eigen::Map<const Twist>(block.factor.upper(at) + static_cast<std::size_t>(r) * at.stride).transpose();
-        S.block<6, 6>(column, row) = S.block<6, 6>(row, column).transpose().eval();
-      }
-    const Eigen::LLT<MatrixX> llt(S);
-    if (llt.info() != Eigen::Success) return false;
-    block.inverse = llt.solve(MatrixX::Identity(n, n));
+    take_interface(block, S);
   }
+  for (const PairTerm& term : between) {
+    const std::array<Index, 2> at{interface_dof(term.a), interface_dof(term.b)};
+    for (std::size_t i = 0; i < 2; ++i)
+      for (std::size_t j = 0; j < 2; ++j)
+        if (at[i] >= 0 && at[j] >= 0)
+          S.block<6, 6>(at[i], at[j]) += term.matrix.block<6, 6>(6 * static_cast<int>(i), 6 * static_cast<int>(j));
+  }
+  const Eigen::LLT<MatrixX> llt(S);
+  if (llt.info() != Eigen::Success) return false;
+  inverse_ = llt.solve(MatrixX::Identity(S.rows(), S.cols()));
   return true;
 }
 
 void ElasticSystem::reduce(const VectorX& f, VectorX& interface) {
-  interface.resize(interface_dofs_);
+  VectorX left(interface_dofs_);
   for (Block& block : blocks_) {
     block.scatter(f);
     double* x = block.vector.data();
     block.factor.reduce(x);
-    VectorX left(static_cast<Eigen::Index>(6 * block.interface.size()));
     for (std::size_t i = 0; i < block.interface.size(); ++i)
-      left.segment<6>(static_cast<Eigen::Index>(6 * i)) =
+      left.segment<6>(block.interface_first + static_cast<Eigen::Index>(6 * i)) =
           Eigen::Map<const Twist>(x + block.factor.first(static_cast<std::size_t>(block.interface[i])));
-    interface.segment(block.interface_first, left.size()) = block.inverse * left;
   }
+  interface = inverse_ * left;
 }
 
 void ElasticSystem::expand(const VectorX& interface, VectorX& u) {
@@ -236,29 +241,22 @@ void ElasticSystem::follow(const VectorX& interface, VectorX& u) {
   expand(interface, u);
 }
 
+/// Jᵀ f at the interface.
+void ElasticSystem::add_force(const Row& row, double f, VectorX& interface) const {
+  for (const auto& [body, J] : {std::pair(row.a, &row.J_a), std::pair(row.b, &row.J_b)})
+    if (body >= 0 && dof(body) >= 0) interface.segment<6>(interface_dof(body)) += f * *J;
+}
+
 MatrixX ElasticSystem::compliance(const std::vector<Row>& rows) const {
   const auto m = static_cast<Eigen::Index>(rows.size());
-  MatrixX out = MatrixX::Zero(m, m);
-  // Rows that act on a block meet there alone.
-  struct Piece {
-    Eigen::Index row;
-    Index offset;  // of the body within its block's interface
-    const Twist* J;
-  };
-  std::vector<std::vector<Piece>> acting(blocks_.size());
+  MatrixX out(m, m);
   for (Eigen::Index i = 0; i < m; ++i) {
     const Row& row = rows[static_cast<std::size_t>(i)];
-    for (const auto& [body, J] : {std::pair(row.a, &row.J_a), std::pair(row.b, &row.J_b)}) {
-      if (body < 0 || dof(body) < 0) continue;
-      const auto b = static_cast<std::size_t>(block_of_[static_cast<std::size_t>(body)]);
-      acting[b].push_back({i, interface_dof(body) - blocks_[b].interface_first, J});
-    }
+    VectorX response = VectorX::Zero(interface_dofs_);
+    for (const auto& [body, J] : {std::pair(row.a, &row.J_a), std::pair(row.b, &row.J_b)})
+      if (body >= 0 && dof(body) >= 0) response += inverse_.middleCols<6>(interface_dof(body)) * *J;
+    out.row(i) = apply(rows, response);
   }
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
-    for (const Piece& piece : acting[b]) {
-      const VectorX response = blocks_[b].inverse.middleCols<6>(piece.offset) * *piece.J;
-      for (const Piece& other : acting[b]) out(piece.row, other.row) += other.J->dot(response.segment<6>(other.offset));
-    }
   return out;
 }
 
@@ -273,13 +271,8 @@ VectorX ElasticSystem::apply(const std::vector<Row>& rows, const VectorX& interf
 
 void ElasticSystem::subtract_response(const std::vector<Row>& rows, const VectorX& lambda, VectorX& interface) const {
   VectorX force = VectorX::Zero(interface_dofs_);
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    for (const auto& [body, J] : {std::pair(rows[i].a, &rows[i].J_a), std::pair(rows[i].b, &rows[i].J_b)})
-      if (body >= 0 && dof(body) >= 0)
-        force.segment<6>(interface_dof(body)) += lambda[static_cast<Eigen::Index>(i)] * *J;
-  for (const Block& block : blocks_)
-    interface.segment(block.interface_first, block.inverse.rows()) -=
-        block.inverse * force.segment(block.interface_first, block.inverse.rows());
+  for (std::size_t i = 0; i < rows.size(); ++i) add_force(rows[i], lambda[static_cast<Eigen::Index>(i)], force);
+  interface -= inverse_ * force;
 }
 
 }  // namespace limber::internal

@@ -61,10 +61,6 @@ BodyLoads loads(const PoseStructure& structure, const std::vector<HandleTerm>& h
   return out;
 }
 
-Mat3 turning_stiffness(const Mat3& moment) {
-  return 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity();
-}
-
 Mat3 positive_part(const Mat3& symmetric) {
   Eigen::SelfAdjointEigenSolver<Mat3> split;
   split.computeDirect(symmetric);

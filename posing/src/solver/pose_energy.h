@@ -28,9 +28,6 @@ struct BodyLoads {
 BodyLoads loads(const PoseStructure& structure, const std::vector<HandleTerm>& handles, const BodyPoses& poses,
                 const std::vector<Mat3>& R);
 
-/// What a turn adds to the second derivative of an energy of points y = p + R s with gradients e:
-///   Σ ½ (s eᵀ + e sᵀ) − (s·e) 1, the curvature of the points' arcs: negative where what is turned is pressed.
-Mat3 turning_stiffness(const Mat3& moment);
 Mat3 positive_part(const Mat3& symmetric);
 
 }  // namespace limber::internal

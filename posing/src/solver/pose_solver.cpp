@@ -19,9 +19,8 @@ constexpr double kFeasible = 1e-11;   // to which joints and limits are put back
 constexpr double kSlack = 1e-12;      // a limit that is nearer counts as reached
 constexpr int kRestorations = 12;     // Newton steps to put a pose back onto its joints
 constexpr double kArmijo = 1e-4;      // of the decrease that the quadratic model promises
-constexpr double kEnergyRoundOff = 1e-12;  // a promise of less, of the energy, is none
 // Levenberg–Marquardt damping, in units of the loads' own moments: what second derivatives that are left out amount to.
-constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLargestDamping = 1e6;
+constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLeastDamping = 1e-5, kLargestDamping = 1e6;
 constexpr int kAnew = -1;  // age of a matrix that is to be made
 // A step that promises less than this part of the one before converges as well with the matrix there is: made for an
 // earlier pose, and in the bodies' own frames little changed since.
@@ -47,8 +46,13 @@ std::vector<double> body_radii(const PoseStructure& structure) {
 
 JointRows all_rows(const PoseStructure& structure, const Pose& pose) {
   JointRows out;
-  for (std::size_t j = 0; j < structure.joints.size(); ++j)
+  for (std::size_t j = 0; j < structure.joints.size(); ++j) {
+    const std::size_t constraints = out.constraints.size(), coordinates = out.coordinates.size();
     append_joint_rows(structure, structure.joints[j], pose.bodies, pose.turns[j], out);
+    for (std::size_t i = constraints; i < out.constraints.size(); ++i) out.constraints[i].joint = static_cast<Index>(j);
+    for (std::size_t i = coordinates; i < out.coordinates.size(); ++i)
+      out.coordinates[i].row.joint = static_cast<Index>(j);
+  }
   return out;
 }
 
@@ -62,6 +66,7 @@ Row stop(const CoordinateRow& c, bool high) {
   } else {
     out.value = c.limit.low - c.row.value;
     out.J_a = -c.row.J_a, out.J_b = -c.row.J_b;
+    out.dQ = -c.row.dQ, out.dt = -c.row.dt, out.bend = -c.row.bend;
   }
   return out;
 }
@@ -218,37 +223,73 @@ void PoseSolver::bring_along(const VectorX& interface, Pose& pose) {
       pose.bodies[b] = moved(pose.bodies[b], step.segment<6>(d));
 }
 
-/// What acts on single bodies: handles, and the curvature that all forces on a body give its turning. Joints pull at
-/// their anchors with the multipliers of the step before.
-std::vector<TwistMatrix> PoseSolver::second_derivatives(BodyLoads loads, const Linearised& at,
-                                                        const std::vector<Mat3>& R, bool whole) const {
-  std::vector<double> couples(R.size(), 0.0);
-  if (multipliers_.size() == static_cast<Eigen::Index>(at.rows.size()))
-    for (std::size_t i = 0; i < at.rows.size(); ++i) {
-      const double l = multipliers_[static_cast<Eigen::Index>(i)];
-      const Row& row = at.rows[i];
-      loads.moments[static_cast<std::size_t>(row.a)] += l * row.arm_a * row.J_a.tail<3>().transpose();
-      loads.moments[static_cast<std::size_t>(row.b)] += l * row.arm_b * row.J_b.tail<3>().transpose();
-      couples[static_cast<std::size_t>(row.a)] += std::abs(l) * row.J_a.head<3>().norm();
-      couples[static_cast<std::size_t>(row.b)] += std::abs(l) * row.J_b.head<3>().norm();
-    }
-  std::vector<TwistMatrix> out(R.size(), TwistMatrix::Zero());
-  for (std::size_t b = 0; b < out.size(); ++b) {
-    const Mat3 turning = turning_stiffness(loads.moments[b]);
-    out[b].topLeftCorner<3, 3>() = (whole ? turning : positive_part(turning)) +
-                                   damping_ * (loads.moments[b].norm() + couples[b]) * Mat3::Identity();
+/// The matrix. All second derivatives of energy and joints make steps Newton's; joints' own rows are added as stiff
+/// springs, which changes no step that keeps them and makes the matrix positive where only the joints hold it. Where it
+/// still is not, far from where it is going, it is that of single bodies: the positive part of what all forces on each,
+/// its joints' too, give its turning.
+void PoseSolver::make_matrix(const Pose& pose, const BodyLoads& acting, const Linearised& at,
+                             const std::vector<Mat3>& R) {
+  if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
+    multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
+  const Moments moments = joint_moments(acting, at);
+  std::vector<TwistMatrix> whole = handle_stiffness(), single = whole;
+  for (std::size_t b = 0; b < whole.size(); ++b) {
+    const Mat3 damping = damping_ * moments.most[b] * Mat3::Identity();
+    whole[b].topLeftCorner<3, 3>() += turning_stiffness(acting.moments[b]) + damping;
+    single[b].topLeftCorner<3, 3>() += positive_part(turning_stiffness(moments.all[b])) + damping;
   }
+  if (system_.factor(R, whole, joint_terms(pose, at))) return;
+  if (!system_.factor(R, single, {}))
+    throw ComputationError("posing: the strain matrix is not positive definite, expected finite poses");
+}
+
+/// Moments of what acts on bodies, their joints' too; and what they may come to with the joints' couples.
+PoseSolver::Moments PoseSolver::joint_moments(const BodyLoads& acting, const Linearised& at) const {
+  Moments out{acting.moments, std::vector<double>(acting.moments.size(), 0.0)};
+  for (std::size_t i = 0; i < at.rows.size(); ++i) {
+    const double l = multipliers_[static_cast<Eigen::Index>(i)];
+    const Row& row = at.rows[i];
+    const auto a = static_cast<std::size_t>(row.a), b = static_cast<std::size_t>(row.b);
+    out.all[a] += l * row.arm_a * row.J_a.tail<3>().transpose();
+    out.all[b] += l * row.arm_b * row.J_b.tail<3>().transpose();
+    out.most[a] += std::abs(l) * row.J_a.head<3>().norm();
+    out.most[b] += std::abs(l) * row.J_b.head<3>().norm();
+  }
+  for (std::size_t b = 0; b < out.most.size(); ++b) out.most[b] += out.all[b].norm();
+  return out;
+}
+
+std::vector<TwistMatrix> PoseSolver::handle_stiffness() const {
+  std::vector<TwistMatrix> out(structure_->bodies.size(), TwistMatrix::Zero());
   for (const HandleTerm& h : handles_)
     out[static_cast<std::size_t>(h.body)] += own_block(h.weight, h.arm, Mat3::Zero());
   return out;
 }
 
-/// H with all its curvature, which makes steps Newton's; where that has a direction in which the energy bends down,
-/// with the positive part of each body's.
-void PoseSolver::make_matrix(const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R) {
-  if (system_.factor(R, second_derivatives(acting, at, R, true))) return;
-  if (!system_.factor(R, second_derivatives(acting, at, R, false)))
-    throw ComputationError("posing: the strain matrix is not positive definite, expected finite poses");
+/// Per joint the curvature of its rows with their multipliers, and its constraints as springs.
+std::vector<PairTerm> PoseSolver::joint_terms(const Pose& pose, const Linearised& at) const {
+  const double size = structure_->size;
+  const double spring = size * size * size + (at.rows.empty() ? 0.0 : multipliers_.cwiseAbs().maxCoeff());
+  std::vector<PairTerm> out(structure_->joints.size());
+  std::vector<Mat3> dQ(out.size(), Mat3::Zero());
+  std::vector<Vec3> dt(out.size(), Vec3::Zero());
+  for (std::size_t i = 0; i < at.rows.size(); ++i) {
+    const Row& row = at.rows[i];
+    const auto j = static_cast<std::size_t>(row.joint);
+    const double l = multipliers_[static_cast<Eigen::Index>(i)];
+    dQ[j] += l * row.dQ, dt[j] += l * row.dt;
+    out[j].matrix += l * row.bend * row.across * row.across.transpose();
+    if (at.pushes[i]) continue;
+    PairVector J;
+    J << row.J_a, row.J_b;
+    out[j].matrix += spring * J * J.transpose();
+  }
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    const BodyJoint& joint = structure_->joints[j];
+    out[j].a = joint.a, out[j].b = joint.b;
+    out[j].matrix += joint_curvature(*structure_, joint, pose.bodies, dQ[j], dt[j]);
+  }
+  return out;
 }
 
 /// One iteration: a step is taken if the energy falls, else the next is damped more.
@@ -256,7 +297,7 @@ PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
   const std::vector<Mat3> R = rotations_of(pose.bodies);
   const Linearised at = linearise(pose);
   const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
-  if (factor_.age < 0) make_matrix(acting, at, R);
+  if (factor_.age < 0) make_matrix(pose, acting, at, R);
   ++factor_.age;
   VectorX gradient = VectorX::Zero(system_.dofs());
   for (std::size_t b = 0; b < acting.gradient.size(); ++b)
@@ -279,10 +320,11 @@ PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
   Pose trial = advanced(pose, u, part);
   const double lower =
       make_feasible(trial) && all_finite(trial) ? energy(trial) : std::numeric_limits<double>::infinity();
-  const bool last = out.moved <= options_.tolerance || promised <= kEnergyRoundOff * value + at.worth(multipliers_);
+  const bool last =
+      out.moved <= options_.tolerance || promised <= options_.energy_tolerance * value + at.worth(multipliers_);
   if (lower <= value - kArmijo * promised || (last && lower <= value)) {
     if (damping_ > 0.0 && lower <= value - 0.5 * promised) {
-      damping_ = damping_ > kFirstDamping ? damping_ / kDampingFactor : 0.0;
+      damping_ = damping_ > kLeastDamping ? damping_ / kDampingFactor : 0.0;
       factor_.age = kAnew;
     }
     if (!last && promised > kContraction * factor_.promised) factor_.age = kAnew;
@@ -318,7 +360,7 @@ PoseResult PoseSolver::solve(Pose& pose) {
   factor_.promised = std::numeric_limits<double>::infinity();
   if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
     // What handles resist must not count: joints come first, however far the handles are dragged off by it.
-    system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()));
+    system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()), {});
     factor_.age = kAnew;
   }
   if (!make_feasible(trial)) return tell(Status::kInfeasible, pose);

@@ -50,9 +50,14 @@ class PoseSolver {
   void bring_along(const VectorX& interface, Pose& pose);
   void tell_turns(Pose& pose) const;
   Linearised linearise(const Pose& pose) const;
-  std::vector<TwistMatrix> second_derivatives(BodyLoads loads, const Linearised& at, const std::vector<Mat3>& R,
-                                              bool whole) const;
-  void make_matrix(const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R);
+  void make_matrix(const Pose& pose, const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R);
+  struct Moments {
+    std::vector<Mat3> all{};
+    std::vector<double> most{};
+  };
+  Moments joint_moments(const BodyLoads& acting, const Linearised& at) const;
+  std::vector<TwistMatrix> handle_stiffness() const;
+  std::vector<PairTerm> joint_terms(const Pose& pose, const Linearised& at) const;
   double energy(const Pose& pose) const;
   Step step(Pose& pose, double& value);
   Pose advanced(const Pose& pose, const VectorX& step, double part) const;

@@ -35,6 +35,7 @@ struct Relative {
     const Vec3 force_b = turn.transpose() * force;
     out.J_b << axes * turn_b + arm_b.cross(force_b), force_b;
     out.arm_a = reach, out.arm_b = arm_b;
+    out.dQ = dQ, out.dt = dt;
     return out;
   }
 
@@ -130,6 +131,7 @@ class RowWriter {
     row.value -= pitch * turn.value;
     row.J_a -= pitch * turn.J_a;
     row.J_b -= pitch * turn.J_b;
+    row.dQ -= pitch * turn.dQ;
     out_.constraints.push_back(row);
   }
 
@@ -147,8 +149,13 @@ class RowWriter {
       Mat3 ds = Mat3::Zero();
       ds(1, 0) = s > 0.0 ? Q(1, 0) / s : 1.0;
       ds(2, 0) = s > 0.0 ? Q(2, 0) / s : 0.0;
-      coordinate(at_.row(joint_, std::atan2(s, c), (c * ds - s * entry(0, 0)) / n, Vec3::Zero()),
-                 {-std::numbers::pi, l.cone}, true);
+      Row row = at_.row(joint_, std::atan2(s, c), (c * ds - s * entry(0, 0)) / n, Vec3::Zero());
+      if (s > 0.0) {  // round the cone
+        const Row round = at_.row(joint_, 0.0, (Q(1, 0) * entry(2, 0) - Q(2, 0) * entry(1, 0)) / s, Vec3::Zero());
+        row.bend = c / (n * s);
+        row.across << round.J_a, round.J_b;
+      }
+      coordinate(row, {-std::numbers::pi, l.cone}, true);
     }
     // Q = R_x(α) R_y(β) R_z(γ)
     const auto ratio = [&](double s, double c, const Mat3& ds, const Mat3& dc, const Interval& limit) {
@@ -170,9 +177,38 @@ class RowWriter {
 
 }  // namespace
 
+Mat3 skew(const Vec3& v) {
+  Mat3 m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+Mat3 turning_stiffness(const Mat3& moment) {
+  return 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity();
+}
+
 void append_joint_rows(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses, double turn,
                        JointRows& out) {
   RowWriter(structure, joint, poses, turn, out).write();
+}
+
+PairMatrix joint_curvature(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses,
+                           const Mat3& dQ, const Vec3& dt) {
+  const Relative at(structure, joint, poses);
+  const Mat3 D = at.axes * dQ * at.axes.transpose();
+  const Vec3 force = at.axes * dt, force_b = at.turn.transpose() * force, reach = at.arm_a + at.axes * at.t;
+  PairMatrix out = PairMatrix::Zero();
+  out.block<3, 3>(0, 0) = turning_stiffness(reach * force.transpose() + at.turn * D.transpose());
+  out.block<3, 3>(6, 6) = turning_stiffness(at.arm_b * force_b.transpose() + D.transpose() * at.turn);
+  const Mat3 F = skew(force);
+  out.block<3, 3>(0, 3) = -F;
+  out.block<3, 3>(0, 9) = F * at.turn;
+  out.block<3, 3>(0, 6) = -F * at.turn * skew(at.arm_b);
+  for (int i = 0; i < 3; ++i)  // −D : [a] T [b]
+    for (int j = 0; j < 3; ++j)
+      out(i, 6 + j) -= D.cwiseProduct(skew(Vec3::Unit(i)) * at.turn * skew(Vec3::Unit(j))).sum();
+  out.block<9, 3>(3, 0) = out.block<3, 9>(0, 3).transpose();
+  return out;
 }
 
 double joint_turn(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses, double near) {

@@ -15,12 +15,29 @@ namespace limber::internal {
 
 using Twist = Eigen::Matrix<double, 6, 1>;  // ω, v
 
+/// a ×
+Mat3 skew(const Vec3& a);
+
+/// What a turn adds to the second derivative of an energy of points y = p + R s with gradients e:
+///   Σ ½ (s eᵀ + e sᵀ) − (s·e) 1, the curvature of the points' arcs: negative where what is turned is pressed.
+Mat3 turning_stiffness(const Mat3& moment);
+
+/// Second derivatives by two bodies' twists (ω_a, v_a, ω_b, v_b).
+using PairMatrix = Eigen::Matrix<double, 12, 12>;
+using PairVector = Eigen::Matrix<double, 12, 1>;
+
 /// One scalar equation between two bodies (b only: a = −1) that is linearised.
 struct Row {
   Index a = -1, b = -1;
+  Index joint = -1;  // of the structure
   Twist J_a = Twist::Zero(), J_b = Twist::Zero();
   double value = 0.0;
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  // where its force acts, from the bodies' centres, in their frames
+  Mat3 dQ = Mat3::Zero();                           // ∂c/∂Q, ∂c/∂t, in the joint's frame
+  Vec3 dt = Vec3::Zero();
+  // A row that is curved in Q adds bend · (across · twists)² to its second derivative.
+  double bend = 0.0;
+  PairVector across = PairVector::Zero();
 };
 
 /// A coordinate of a joint, with its limits.
@@ -35,6 +52,13 @@ struct JointRows {
   std::vector<Row> constraints{};
   std::vector<CoordinateRow> coordinates{};
 };
+
+/// The second derivative of a sum of a joint's rows, of Q and t to second order in the twists. Left out are ½ f·(ω × v)
+/// of either body with the force f on it, which add up to nothing where forces balance, and what c itself is curved in
+/// Q.
+/// @param dQ, dt ∂c/∂Q and ∂c/∂t, of one row or the sum of several
+PairMatrix joint_curvature(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses,
+                           const Mat3& dQ, const Vec3& dt);
 
 /// @param turn the joint's angle about its axis before, near which the angle is told (it does not jump at ±π)
 void append_joint_rows(const PoseStructure& structure, const BodyJoint& joint, const BodyPoses& poses, double turn,

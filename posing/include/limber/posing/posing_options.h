@@ -30,7 +30,8 @@ struct PosingOptions {
   StrainWeights strain = StrainWeights::kVolume;
   double handle_stiffness = 10.0;  ///< of a handle, in units of material stiffness times the model's diagonal; > 0
   double tolerance = 1e-8;         ///< of the diagonal: converged when a step moves no point further; > 0
-  int max_iterations = 100;        ///< of one solve(); ≥ 1
+  double energy_tolerance = 1e-7;  ///< of the energy: or when it promises to lower it by no more; ≥ 0
+  int max_iterations = 200;        ///< of one solve(); ≥ 1
   double rigidity_weight = 1e5;    ///< kPenalty: of rigid parts' and cells' rigidity, [X09]; > 0
   double joint_weight = 1e5;       ///< kPenalty: of joints and limits, [X09]; > 0
   void validate() const;           ///< @throws InvalidArgument naming the field and its value
@@ -38,7 +39,7 @@ struct PosingOptions {
 
 struct PoseResult {
   enum class Status {
-    kConverged,       ///< the last step moved no point by more than the tolerance
+    kConverged,       ///< one of the two tolerances was met
     kIterationLimit,  ///< max_iterations were done; the pose is feasible, and better than the one before
     kStalled,         ///< no step lowers the energy any further: round-off, or a kink where a limit begins
     kInfeasible,      ///< joints, limits and pins contradict each other: the pose is the one before
