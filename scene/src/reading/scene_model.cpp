@@ -134,11 +134,14 @@ std::size_t shape_bytes(const ModalModelData& data) {
   return bytes;
 }
 
-std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept) {
+std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept, double damping) {
   for (std::size_t i = 0; i < kept.size(); ++i)
     if (kept[i] < 0 || kept[i] >= model.modes() || (i > 0 && kept[i] <= kept[i - 1]))
       throw InvalidArgument("reduce_model: kept[" + std::to_string(i) + "] is " + std::to_string(kept[i]) +
                             ", expected ascending modes below " + std::to_string(model.modes()));
+  if (!(damping >= 0.0 && std::isfinite(damping)))
+    throw InvalidArgument("reduce_model: damping is " + std::to_string(damping) +
+                          ", expected a finite factor of at least 0");
   const ModalModelData& all = model.data();
   ModalModelData lean;
   lean.name = all.name;
@@ -151,6 +154,7 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   lean.inertia = all.inertia;
   lean.eigenvalues = pick(all.eigenvalues, kept);
   lean.decays = pick(all.decays, kept);
+  for (double& decay : lean.decays) decay *= damping;
   lean.participation = pick(all.participation, kept);
   lean.mode_scales = pick(all.mode_scales, kept);
   lean.moments = pick(all.moments, kept);

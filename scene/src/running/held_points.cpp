@@ -59,4 +59,14 @@ void HeldPoints::note(const World& world, std::int64_t n) {
   }
 }
 
+void HeldPoints::save_state(StateWriter& state) const {
+  for (std::size_t i = 0; i < planned_.size(); ++i)
+    state(planned_[i].id.index, planned_[i].id.generation, reports_[i].point);
+}
+
+void HeldPoints::restore_state(StateReader& state) {
+  for (std::size_t i = 0; i < planned_.size(); ++i)
+    state(planned_[i].id.index, planned_[i].id.generation, reports_[i].point);
+}
+
 }  // namespace limber::internal

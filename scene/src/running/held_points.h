@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "limber/engine/world.h"
-#include "limber/scene/run.h"
 #include "limber/scene/scene_file.h"
+#include "limber/scene/scene_player.h"
 
 namespace limber::internal {
 
@@ -23,6 +23,10 @@ class HeldPoints {
   /// After step n.
   void note(const World& world, std::int64_t n);
   const std::vector<HandleReport>& reports() const { return reports_; }
+
+  /// Which handles are held, and from where they are led.
+  void save_state(StateWriter& state) const;
+  void restore_state(StateReader& state);
 
  private:
   struct Planned {

@@ -4,46 +4,14 @@
 #include <chrono>
 #include <cmath>
 
-#include "limber/collision/contact_finder.h"
 #include "limber/core/error.h"
-#include "running/frame_movement.h"
-#include "running/held_points.h"
-#include "running/step_times.h"
-#include "running/surface_place.h"
 
 namespace limber {
 namespace {
 
-using internal::find_place;
-using internal::frame_over_step;
-using internal::HeldPoints;
-using internal::step_at_or_after;
-using internal::time_in_steps;
-using internal::TimeInSteps;
-
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-struct PlannedStrike {
-  TimeInSteps when;
-  const Strike* strike = nullptr;
-  std::size_t body = 0;
-  std::size_t order = 0;  // in the report
-};
-
-struct PlannedForce {
-  std::int64_t first = 0, end = 0;  // steps
-  const HeldForce* force = nullptr;
-  std::size_t body = 0;
-  SurfacePoint at;  // found when it begins
-  std::size_t order = 0;
-};
-
-struct MovedBody {
-  std::size_t body = 0;
-  RigidTransform start;
-};
 
 class Run {
  public:
@@ -51,28 +19,21 @@ class Run {
       : scene_(scene),
         models_(models),
         options_(options),
-        world_({.step = scene.step, .substeps = scene.substeps, .gravity = scene.gravity, .sleep = scene.sleep},
-               options.jobs ? *options.jobs : serial_jobs()),
-        steps_(options.steps < 0 ? scene.steps : options.steps) {
-    add_bodies();
-    add_statics();
-    add_joints();
-    plan_loads();
-    plan_handles();
+        steps_(options.steps < 0 ? scene.steps : options.steps),
+        player_(scene, models, steps_, options.jobs ? *options.jobs : serial_jobs()) {
+    number_bodies();
+    for (const SceneJoint& j : scene_.joints) result_.joints.push_back({.a = j.a, .b = j.b, .view = {}});
     start_tracks();
   }
 
   RunResult play() {
     keep_key(0);
     for (std::int64_t n = 0; n < steps_; ++n) {
-      move_frames(n);
-      strike(n);
-      push(n);
-      held_.hold(world_, n);
+      player_.begin_step();
       const auto began = Clock::now();
       world_.step();
       result_.seconds_advance += seconds_since(began);
-      held_.note(world_, n);
+      player_.end_step();
       note_joints();
       note_contacts(n);
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
@@ -81,97 +42,18 @@ class Run {
   }
 
  private:
-  void add_bodies() {
-    if (scene_.contact) world_.set_contact_source(&finder_, *scene_.contact);
-    if (models_.of_body.size() != scene_.bodies.size())
-      throw InvalidArgument("run_scene: there are " + std::to_string(models_.of_body.size()) +
-                            " models, expected one per body, " + std::to_string(scene_.bodies.size()));
-    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
-      const SceneBody& body = scene_.bodies[i];
-      BodyPlacement placement = start_of(body);
-      if (i < models_.shape_of_body.size()) placement.shape = models_.shape_of_body[i];
-      ids_.push_back(world_.add_body(models_.of_body[i], placement));
-      number(ids_.back(), i);
-      if (std::holds_alternative<std::monostate>(body.movement)) continue;
-      if (models_.of_body[i]->data().motion == FrameMotion::kFree)
-        throw InputError(body.where + ".motion: the body \"" + body.name +
-                         "\" has no fixed nodes, expected none or an asset baked with --fix");
-      moved_.push_back({i, start_of(body).pose});
-    }
-  }
-
   /// Contacts tell bodies by the indices of their ids.
-  void number(BodyId id, std::size_t in_trajectory) {
-    number_of_.resize(std::max<std::size_t>(number_of_.size(), id.index + 1));
-    number_of_[id.index] = in_trajectory;
-  }
-
-  void add_statics() {
+  void number_bodies() {
+    const auto number = [&](BodyId id, std::size_t in_trajectory) {
+      number_of_.resize(std::max<std::size_t>(number_of_.size(), id.index + 1));
+      number_of_[id.index] = in_trajectory;
+    };
+    for (std::size_t i = 0; i < ids_.size(); ++i) number(ids_[i], i);
     for (std::size_t i = 0; i < scene_.statics.size(); ++i) {
-      const SceneStatic& s = scene_.statics[i];
-      const auto& shape = models_.shape_of_static[i];
-      number(world_.add_static(shape, s.pose, s.filter, s.friction), scene_.bodies.size() + i);
-      result_.trajectory.statics.push_back({s.name, shape, s.pose});
+      number(player_.statics()[i], scene_.bodies.size() + i);
+      result_.trajectory.statics.push_back(
+          {scene_.statics[i].name, models_.shape_of_static[i], scene_.statics[i].pose});
     }
-  }
-
-  BodyId body_named(const std::string& name) const {
-    BodyId id;
-    if (!name.empty()) for_bodies_named(name, [&](std::size_t body) { id = ids_[body]; });
-    return id;
-  }
-
-  void add_joints() {
-    for (const SceneJoint& j : scene_.joints) {
-      const JointAttachment patch{.radius = j.patch_radius};
-      joints_.push_back(world_.add_joint(body_named(j.a), body_named(j.b), j.spec, patch, patch, j.collide));
-      for (std::size_t c = 0; c < j.coordinates.size(); ++c)
-        world_.set_joint_actuation(joints_.back(), static_cast<int>(c), j.coordinates[c]);
-      result_.joints.push_back({.a = j.a, .b = j.b, .view = {}});
-    }
-  }
-
-  void plan_handles() {
-    for (const SceneHandle& h : scene_.handles)
-      for_bodies_named(h.body, [&](std::size_t body) { held_.plan(h, ids_[body], scene_.bodies[body].name); });
-    held_.begin(scene_.step, steps_);
-  }
-
-  /// A first pose key at time 0 is where the body starts.
-  static BodyPlacement start_of(const SceneBody& body) {
-    BodyPlacement placement = body.placement;
-    if (const auto* keys = std::get_if<std::vector<PoseKey>>(&body.movement); keys && keys->front().time == 0.0)
-      placement.pose = keys->front().pose;
-    return placement;
-  }
-
-  template <class F>
-  void for_bodies_named(const std::string& name, F&& visit) const {
-    for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
-      if (scene_.bodies[i].name == name || scene_.bodies[i].group == name) visit(i);
-  }
-
-  void plan_loads() {
-    for (const Strike& s : scene_.strikes)
-      for_bodies_named(s.body, [&](std::size_t body) {
-        strikes_.push_back({.when = time_in_steps(s.time, scene_.step), .strike = &s, .body = body});
-      });
-    for (const HeldForce& f : scene_.forces)
-      for_bodies_named(f.body, [&](std::size_t body) {
-        forces_.push_back({.first = step_at_or_after(f.start, scene_.step),
-                           .end = step_at_or_after(f.start + f.duration, scene_.step),
-                           .force = &f,
-                           .body = body,
-                           .at = {}});
-      });
-    std::erase_if(strikes_, [&](const PlannedStrike& s) { return s.when.step >= steps_; });
-    std::erase_if(forces_, [&](const PlannedForce& f) { return f.first >= steps_; });
-    result_.strikes.resize(strikes_.size());
-    result_.forces.resize(forces_.size());
-    for (std::size_t i = 0; i < strikes_.size(); ++i) strikes_[i].order = i;
-    for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i].order = i;
-    std::stable_sort(strikes_.begin(), strikes_.end(),
-                     [](const auto& a, const auto& b) { return a.when.step < b.when.step; });
   }
 
   void start_tracks() {
@@ -200,39 +82,10 @@ class Run {
                             " GiB of states, expected at most 4 GiB");
   }
 
-  void move_frames(std::int64_t n) {
-    const double t = static_cast<double>(n) * scene_.step;
-    for (const MovedBody& m : moved_)
-      world_.set_kinematic_frame(ids_[m.body],
-                                 frame_over_step(scene_.bodies[m.body].movement, m.start, t, scene_.step));
-  }
-
-  void strike(std::int64_t n) {
-    for (; next_strike_ < strikes_.size() && strikes_[next_strike_].when.step == n; ++next_strike_) {
-      const PlannedStrike& p = strikes_[next_strike_];
-      const BodyId id = ids_[p.body];
-      const SurfacePoint at = find_place(p.strike->at, world_, id, p.strike->where);
-      world_.apply_impulse(id, at, p.strike->impulse, p.strike->axes, p.when.delay);
-      result_.strikes[p.order] = {scene_.bodies[p.body].name, n, p.when.delay, world_.position(id, at)};
-    }
-  }
-
-  void push(std::int64_t n) {
-    for (PlannedForce& f : forces_) {
-      if (n < f.first || n >= f.end) continue;
-      const BodyId id = ids_[f.body];
-      if (n == f.first) {
-        f.at = find_place(f.force->at, world_, id, f.force->where);
-        result_.forces[f.order] = {scene_.bodies[f.body].name, n, 0.0, world_.position(id, f.at)};
-      }
-      world_.apply_force(id, f.at, f.force->force, f.force->axes);
-    }
-  }
-
   void note_joints() {
-    for (std::size_t i = 0; i < joints_.size(); ++i) {
+    for (std::size_t i = 0; i < player_.joints().size(); ++i) {
       JointReport& report = result_.joints[i];
-      report.view = world_.joint(joints_[i]);
+      report.view = world_.joint(player_.joints()[i]);
       report.largest_distance_error = std::max(report.largest_distance_error, report.view.distance_error);
       report.largest_angle_error = std::max(report.largest_angle_error, report.view.angle_error);
     }
@@ -291,7 +144,9 @@ class Run {
   RunResult finish() {
     result_.steps = steps_;
     result_.state_hash = world_.state_hash();
-    result_.handles = held_.reports();
+    result_.strikes.assign(player_.strikes().begin(), player_.strikes().end());
+    result_.forces.assign(player_.forces().begin(), player_.forces().end());
+    result_.handles.assign(player_.handles().begin(), player_.handles().end());
     result_.asleep = std::count_if(ids_.begin(), ids_.end(), [&](BodyId id) { return world_.is_asleep(id); });
     for (const BodyTrack& track : result_.trajectory.bodies) {
       result_.energy_before += track.energies.front().total();
@@ -303,17 +158,11 @@ class Run {
   const Scene& scene_;
   const SceneModels& models_;
   const RunOptions& options_;
-  ContactFinder finder_;  // outlives the world
-  World world_;
   std::int64_t steps_ = 0, stride_ = 1;
-  std::vector<BodyId> ids_;
+  ScenePlayer player_;
+  World& world_ = player_.world();
+  std::span<const BodyId> ids_ = player_.bodies();
   std::vector<std::size_t> number_of_;  // in the trajectory, by BodyId::index
-  std::vector<JointId> joints_;
-  HeldPoints held_;
-  std::vector<PlannedStrike> strikes_;
-  std::vector<PlannedForce> forces_;
-  std::size_t next_strike_ = 0;
-  std::vector<MovedBody> moved_;
   std::vector<float> positions_, normals_;
   RunResult result_;
 };

@@ -13,6 +13,7 @@
 #include "limber/engine/world.h"
 #include "limber/scene/scene_file.h"
 #include "limber/scene/scene_model.h"
+#include "limber/scene/scene_player.h"
 
 namespace limber {
 
@@ -70,24 +71,6 @@ struct Trajectory {
   std::vector<ContactRecord> contacts;  ///< of every step, with RunOptions::keep_contacts
 
   const std::string& name(std::size_t body) const;  ///< of a body or, from bodies.size() on, of a static shape
-};
-
-/// What a load hit.
-struct LoadReport {
-  std::string body;
-  std::int64_t step = 0;      ///< 0-based step in which it began
-  double delay = 0.0;         ///< s after that step's start (strikes)
-  Vec3 point = Vec3::Zero();  ///< where it acted, world, m
-};
-
-/// What a handle did.
-struct HandleReport {
-  std::string body;
-  std::int64_t step = 0;       ///< 0-based step in which it took hold
-  Vec3 point = Vec3::Zero();   ///< where it took hold, world, m
-  double largest_error = 0.0;  ///< distance from the target along the held directions at the end of a step, m
-  Vec3 force = Vec3::Zero();   ///< on the body in the last step that it held, world, N
-  double largest_force = 0.0;  ///< N
 };
 
 /// What a joint does at the end, and the farthest that it was off.

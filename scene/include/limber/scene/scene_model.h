@@ -44,8 +44,10 @@ SceneModels load_models(const Scene& scene);
 /// Scene::assets
 SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& assets);
 
-/// A model with some of the modes and without its volume block. @param kept ascending, in range @throws InvalidArgument
-std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept);
+/// A model with some of the modes and without its volume block. @param kept ascending, in range
+/// @param damping factor on the decays of all modes, ≥ 0 @throws InvalidArgument
+std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept,
+                                               double damping = 1.0);
 
 /// Bytes of a model's surfaces, bases and volume block in memory.
 std::size_t shape_bytes(const ModalModelData& data);

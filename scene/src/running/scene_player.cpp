@@ -1,0 +1,240 @@
+#include "limber/scene/scene_player.h"
+
+#include <algorithm>
+#include <string>
+
+#include "limber/collision/contact_finder.h"
+#include "limber/core/error.h"
+#include "limber/core/state_archive.h"
+#include "running/frame_movement.h"
+#include "running/held_points.h"
+#include "running/step_times.h"
+#include "running/surface_place.h"
+
+namespace limber {
+namespace {
+
+using internal::find_place;
+using internal::frame_over_step;
+using internal::HeldPoints;
+using internal::step_at_or_after;
+using internal::time_in_steps;
+using internal::TimeInSteps;
+
+struct PlannedStrike {
+  TimeInSteps when;
+  const Strike* strike = nullptr;
+  std::size_t body = 0;
+  std::size_t order = 0;  // in the report
+};
+
+struct PlannedForce {
+  std::int64_t first = 0, end = 0;  // steps
+  const HeldForce* force = nullptr;
+  std::size_t body = 0;
+  SurfacePoint at;  // found when it begins
+  std::size_t order = 0;
+};
+
+struct MovedBody {
+  std::size_t body = 0;
+  RigidTransform start;
+};
+
+/// A first pose key at time 0 is where the body starts.
+BodyPlacement start_of(const SceneBody& body) {
+  BodyPlacement placement = body.placement;
+  if (const auto* keys = std::get_if<std::vector<PoseKey>>(&body.movement); keys && keys->front().time == 0.0)
+    placement.pose = keys->front().pose;
+  return placement;
+}
+
+}  // namespace
+
+struct ScenePlayer::Impl {
+  Impl(const Scene& s, const SceneModels& m, std::int64_t n, Jobs& jobs)
+      : scene(s),
+        models(m),
+        steps(n),
+        world({.step = s.step, .substeps = s.substeps, .gravity = s.gravity, .sleep = s.sleep}, jobs) {
+    add_bodies();
+    for (std::size_t i = 0; i < scene.statics.size(); ++i) {
+      const SceneStatic& standing = scene.statics[i];
+      statics.push_back(world.add_static(models.shape_of_static[i], standing.pose, standing.filter, standing.friction));
+    }
+    add_joints();
+    plan_loads();
+    for (const SceneHandle& h : scene.handles)
+      for_bodies_named(h.body, [&](std::size_t body) { held.plan(h, bodies[body], scene.bodies[body].name); });
+    held.begin(scene.step, steps);
+  }
+
+  void add_bodies();
+  void add_joints();
+  void plan_loads();
+  void move_frames();
+  void strike();
+  void push();
+  BodyId body_named(const std::string& name) const {
+    BodyId id;
+    if (!name.empty()) for_bodies_named(name, [&](std::size_t body) { id = bodies[body]; });
+    return id;
+  }
+  template <class F>
+  void for_bodies_named(const std::string& name, F&& visit) const {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+      if (scene.bodies[i].name == name || scene.bodies[i].group == name) visit(i);
+  }
+
+  const Scene& scene;
+  const SceneModels& models;
+  std::int64_t steps = 0, taken = 0;
+  ContactFinder finder;  // outlives the world
+  World world;
+  std::vector<BodyId> bodies, statics;
+  std::vector<JointId> joints;
+  HeldPoints held;
+  std::vector<PlannedStrike> strikes;
+  std::vector<PlannedForce> forces;
+  std::uint64_t next_strike = 0;
+  std::vector<MovedBody> moved;
+  std::vector<LoadReport> strike_reports, force_reports;
+};
+
+void ScenePlayer::Impl::add_bodies() {
+  if (scene.contact) world.set_contact_source(&finder, *scene.contact);
+  if (models.of_body.size() != scene.bodies.size())
+    throw InvalidArgument("ScenePlayer: there are " + std::to_string(models.of_body.size()) +
+                          " models, expected one per body, " + std::to_string(scene.bodies.size()));
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const SceneBody& body = scene.bodies[i];
+    BodyPlacement placement = start_of(body);
+    if (i < models.shape_of_body.size()) placement.shape = models.shape_of_body[i];
+    bodies.push_back(world.add_body(models.of_body[i], placement));
+    if (std::holds_alternative<std::monostate>(body.movement)) continue;
+    if (models.of_body[i]->data().motion == FrameMotion::kFree)
+      throw InputError(body.where + ".motion: the body \"" + body.name +
+                       "\" has no fixed nodes, expected none or an asset baked with --fix");
+    moved.push_back({i, start_of(body).pose});
+  }
+}
+
+void ScenePlayer::Impl::add_joints() {
+  for (const SceneJoint& j : scene.joints) {
+    const JointAttachment patch{.radius = j.patch_radius};
+    joints.push_back(world.add_joint(body_named(j.a), body_named(j.b), j.spec, patch, patch, j.collide));
+    for (std::size_t c = 0; c < j.coordinates.size(); ++c)
+      world.set_joint_actuation(joints.back(), static_cast<int>(c), j.coordinates[c]);
+  }
+}
+
+void ScenePlayer::Impl::plan_loads() {
+  for (const Strike& s : scene.strikes)
+    for_bodies_named(s.body, [&](std::size_t body) {
+      strikes.push_back({.when = time_in_steps(s.time, scene.step), .strike = &s, .body = body});
+    });
+  for (const HeldForce& f : scene.forces)
+    for_bodies_named(f.body, [&](std::size_t body) {
+      forces.push_back({.first = step_at_or_after(f.start, scene.step),
+                        .end = step_at_or_after(f.start + f.duration, scene.step),
+                        .force = &f,
+                        .body = body,
+                        .at = {}});
+    });
+  std::erase_if(strikes, [&](const PlannedStrike& s) { return s.when.step >= steps; });
+  std::erase_if(forces, [&](const PlannedForce& f) { return f.first >= steps; });
+  strike_reports.resize(strikes.size());
+  force_reports.resize(forces.size());
+  for (std::size_t i = 0; i < strikes.size(); ++i) strikes[i].order = i;
+  for (std::size_t i = 0; i < forces.size(); ++i) forces[i].order = i;
+  std::stable_sort(strikes.begin(), strikes.end(),
+                   [](const auto& a, const auto& b) { return a.when.step < b.when.step; });
+}
+
+void ScenePlayer::Impl::move_frames() {
+  const double t = static_cast<double>(taken) * scene.step;
+  for (const MovedBody& m : moved)
+    world.set_kinematic_frame(bodies[m.body], frame_over_step(scene.bodies[m.body].movement, m.start, t, scene.step));
+}
+
+void ScenePlayer::Impl::strike() {
+  for (; next_strike < strikes.size() && strikes[next_strike].when.step == taken; ++next_strike) {
+    const PlannedStrike& p = strikes[next_strike];
+    const BodyId id = bodies[p.body];
+    const SurfacePoint at = find_place(p.strike->at, world, id, p.strike->where);
+    world.apply_impulse(id, at, p.strike->impulse, p.strike->axes, p.when.delay);
+    strike_reports[p.order] = {scene.bodies[p.body].name, taken, p.when.delay, world.position(id, at)};
+  }
+}
+
+void ScenePlayer::Impl::push() {
+  for (PlannedForce& f : forces) {
+    if (taken < f.first || taken >= f.end) continue;
+    const BodyId id = bodies[f.body];
+    if (taken == f.first) {
+      f.at = find_place(f.force->at, world, id, f.force->where);
+      force_reports[f.order] = {scene.bodies[f.body].name, taken, 0.0, world.position(id, f.at)};
+    }
+    world.apply_force(id, f.at, f.force->force, f.force->axes);
+  }
+}
+
+ScenePlayer::ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, Jobs& jobs)
+    : impl_(std::make_unique<Impl>(scene, models, steps, jobs)) {}
+ScenePlayer::~ScenePlayer() = default;
+ScenePlayer::ScenePlayer(ScenePlayer&&) noexcept = default;
+ScenePlayer& ScenePlayer::operator=(ScenePlayer&&) noexcept = default;
+
+World& ScenePlayer::world() { return impl_->world; }
+const World& ScenePlayer::world() const { return impl_->world; }
+std::span<const BodyId> ScenePlayer::bodies() const { return impl_->bodies; }
+std::span<const BodyId> ScenePlayer::statics() const { return impl_->statics; }
+std::span<const JointId> ScenePlayer::joints() const { return impl_->joints; }
+std::int64_t ScenePlayer::steps_taken() const { return impl_->taken; }
+std::span<const LoadReport> ScenePlayer::strikes() const { return impl_->strike_reports; }
+std::span<const LoadReport> ScenePlayer::forces() const { return impl_->force_reports; }
+std::span<const HandleReport> ScenePlayer::handles() const { return impl_->held.reports(); }
+
+void ScenePlayer::begin_step() {
+  impl_->move_frames();
+  impl_->strike();
+  impl_->push();
+  impl_->held.hold(impl_->world, impl_->taken);
+}
+
+void ScenePlayer::end_step() {
+  impl_->held.note(impl_->world, impl_->taken);
+  ++impl_->taken;
+}
+
+void ScenePlayer::step() {
+  begin_step();
+  impl_->world.step();
+  end_step();
+}
+
+/// What the scene has begun comes last, and how many bytes of the world's are before it at the very end.
+void ScenePlayer::save_state(std::vector<std::byte>& state) const {
+  impl_->world.save_state(state);
+  const auto world_bytes = static_cast<std::uint64_t>(state.size());
+  StateWriter writer(state);
+  writer(impl_->taken, impl_->next_strike);
+  for (const PlannedForce& force : impl_->forces) writer(force.at);
+  impl_->held.save_state(writer);
+  writer(world_bytes);
+}
+
+void ScenePlayer::restore_state(std::span<const std::byte> state) {
+  constexpr std::size_t kLength = sizeof(std::uint64_t);
+  std::uint64_t world_bytes = 0;
+  if (state.size() >= kLength) StateReader(state.last(kLength))(world_bytes);
+  if (state.size() < kLength || world_bytes > state.size() - kLength)
+    throw InvalidArgument("ScenePlayer::restore_state: the bytes are no state of save_state()");
+  impl_->world.restore_state(state.first(static_cast<std::size_t>(world_bytes)));
+  StateReader reader(state.subspan(static_cast<std::size_t>(world_bytes)));
+  reader(impl_->taken, impl_->next_strike);
+  for (PlannedForce& force : impl_->forces) reader(force.at);
+  impl_->held.restore_state(reader);
+}
+
+}  // namespace limber
