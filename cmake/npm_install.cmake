@@ -1,4 +1,4 @@
-# cmake -P install.cmake, in the folder of package.json: npm ci, unless what lies there is that of the lock file already.
+# cmake -P npm_install.cmake, in the folder of package.json: npm ci, unless what lies there is that of the lock file already.
 file(SHA256 package-lock.json wanted)
 set(installed "")
 if(EXISTS node_modules/.installed)

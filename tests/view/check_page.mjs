@@ -1,0 +1,217 @@
+// node check_page.mjs PAGE.html [PICTURE.png]: opens a page of limber-view in headless Chromium, from disk, and plays with it as a
+// person would. Every claim that does not hold is a line, and the exit code is 1.
+//   CHROMIUM   the browser's program; otherwise chromium on the PATH
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const [file, picture] = process.argv.slice(2);
+const program = process.env.CHROMIUM ?? execFileSync('sh', ['-c', 'command -v chromium']).toString().trim();
+const folder = mkdtempSync(join(tmpdir(), 'limber-page-'));
+const wrong = [], check = (holds, claim) => { if (!holds) wrong.push(claim); };
+const wait = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+
+const browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
+  executablePath: program,
+  headless: true,
+  viewport: { width: 900, height: 560 },
+  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
+    '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+});
+
+/** Opens a page and waits until it plays or says why not. */
+async function open(path) {
+  const page = await browser.newPage(), url = pathToFileURL(resolve(path)).href;
+  page.on('console', (message) => { if (message.type() === 'error') wrong.push(`console: ${message.text()}`); });
+  page.on('pageerror', (error) => wrong.push(`an error in the page: ${error.message}`));
+  page.on('request', (request) => {
+    if (request.url() !== url && !/^(data|blob):/.test(request.url())) wrong.push(`a request: ${request.url().slice(0, 200)}`);
+  });
+  await page.goto(url);
+  for (let tries = 0; tries < 150; ++tries) {
+    if (await page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== '')) break;
+    await wait(100);
+  }
+  return page;
+}
+
+/** Where a body's nearest surface is on the screen: the middle of what is drawn of it. */
+const onScreen = (page, body) => page.evaluate((body) => {
+  const app = globalThis.limber, { stage } = app, canvas = stage.renderer.domElement.getBoundingClientRect();
+  const positions = app.engine.reconstruct(body), p = stage.controls.target.clone();
+  stage.camera.updateMatrixWorld();
+  const corners = stage.bodies[body].mesh.geometry.index.array, corner = p.clone();
+  for (let t = 0; t < corners.length; t += 3) {  // the middle of a triangle that nothing hides
+    p.set(0, 0, 0);
+    for (let i = 0; i < 3; ++i) p.addScaledVector(corner.fromArray(positions, 3 * corners[t + i]), 1 / 3);
+    p.project(stage.camera);
+    const at = { clientX: Math.round(canvas.left + (p.x + 1) * 0.5 * canvas.width), clientY: Math.round(canvas.top + (1 - p.y) * 0.5 * canvas.height) };
+    const { from, along } = stage.ray(at), hit = app.engine.cast(from, along);
+    if (hit?.body === body && document.elementFromPoint(at.clientX, at.clientY) === stage.renderer.domElement) return [at.clientX, at.clientY];
+  }
+  return null;
+}, body);
+const hash = (page) => page.evaluate(() => globalThis.limber.engine.hash());
+const steps = (page, count) => page.evaluate((count) => {
+  const app = globalThis.limber, hashes = [];
+  for (let i = 0; i < count; ++i) app.step(), hashes.push(app.engine.hash());
+  app.show();
+  return hashes;
+}, count);
+const place = (page, body) => page.evaluate((body) => {
+  const app = globalThis.limber, first = app.engine.sizes.slice(0, body).reduce((sum, size) => sum + size, 0);
+  return [...app.engine.frame().slice(first, first + 3)];
+}, body);
+const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+
+async function playsByItself(page) {
+  check(await page.evaluate(() => globalThis.limber !== undefined), `it opens: "${await page.evaluate(() => document.getElementById('message').textContent)}"`);
+  const before = await page.evaluate(() => globalThis.limber.engine.steps());
+  let after = before;
+  for (let tries = 0; tries < 100 && after === before; ++tries) {
+    await wait(200);
+    after = await page.evaluate(() => globalThis.limber.engine.steps());
+  }
+  check(after > before, 'it goes on by itself');
+  const policy = await page.evaluate(() => document.querySelector('meta[http-equiv="Content-Security-Policy"]').content);
+  check(/default-src 'none'/.test(policy) && !/unsafe-inline|unsafe-eval|https?:|\*/.test(policy.replace("'wasm-unsafe-eval'", '')), `the policy is strict: ${policy}`);
+}
+
+async function isDragged(page) {
+  await page.evaluate(() => globalThis.limber.setPlaying(false));
+  const at = await onScreen(page, 0), start = await place(page, 0);
+  check(at !== null, 'a body is seen');
+  if (at === null) return;
+  await page.mouse.move(...at);
+  await page.mouse.down();
+  check(await page.evaluate(() => globalThis.limber.engine.hand().holds), 'a press on a body takes hold of it');
+  await page.mouse.move(at[0] - 60, at[1] - 90, { steps: 4 });
+  await steps(page, 60);
+  const force = await page.evaluate(() => Math.hypot(...globalThis.limber.engine.hand().force));
+  check(force > 0 && (await page.evaluate(() => document.getElementById('panel').textContent)).includes('hand pulls'), 'its force is told');
+  const size = await page.evaluate(() => globalThis.limber.stage.size);
+  check(distance(await place(page, 0), start) > 0.02 * size, 'it follows');
+  await page.mouse.up();
+  check(!(await page.evaluate(() => globalThis.limber.engine.hand().holds)), 'it is let go');
+}
+
+async function goesBack(page) {
+  await page.evaluate(() => globalThis.limber.restart());
+  await page.evaluate(() => globalThis.limber.setPlaying(false));
+  const first = await steps(page, 25), start = await hash(page);
+  check(new Set(first).size === first.length, 'every step changes the state');
+  const input = page.locator('#panel label:has-text("Time") input');
+  const last = Number(await input.getAttribute('max'));
+  await input.evaluate((slider) => { slider.value = slider.max - 15; slider.dispatchEvent(new Event('input')); });
+  const steppedBack = await page.evaluate(() => globalThis.limber.engine.steps());
+  check(steppedBack === (await page.evaluate((key) => globalThis.limber.engine.keptStep(key), last - 15)), 'scrubbing goes back');
+  check((await hash(page)) === first[first.length - 16], 'the state there is what it was');
+  const again = await steps(page, 15);
+  check(again.every((value, i) => value === first[first.length - 15 + i]) && (await hash(page)) === start, 'the same steps follow');
+  await page.evaluate(() => globalThis.limber.drop(0));
+  const dropped = await steps(page, 3), count = await page.evaluate(() => globalThis.limber.engine.scene.bodies.length);
+  await page.evaluate((key) => globalThis.limber.goTo(key), last);
+  check((await page.evaluate(() => globalThis.limber.stage.bodies.length)) === count - 1, 'a body dropped since is gone');
+  await page.evaluate(() => globalThis.limber.goTo(globalThis.limber.engine.kept() - 1));
+  check((await hash(page)) === dropped[2], 'and there again later');
+}
+
+/** Outlines of what the GPU bends and of what World::reconstruct() gives. @return pixels drawn, and farther off than one */
+const outlines = (page, body) => page.evaluate((body) => {
+  const app = globalThis.limber, { stage } = app, seen = stage.bodies[body].mesh, gl = stage.renderer.getContext();
+  const hidden = [stage.still, stage.joints, stage.hand, ...stage.bodies.map((b) => b.mesh)].filter((x) => x !== seen);
+  for (const x of hidden) x.visible = false;
+  const background = stage.scene.background, shown = seen.material;
+  stage.scene.background = background.clone().set(0xff00ff);
+  const width = gl.drawingBufferWidth, height = gl.drawingBufferHeight;
+  const drawn = () => {
+    stage.renderer.shadowMap.enabled = false;
+    stage.renderer.render(stage.scene, stage.camera);
+    const pixels = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    const off = (i) => 255 - pixels[4 * i] + pixels[4 * i + 1] + 255 - pixels[4 * i + 2];
+    return Uint8Array.from({ length: width * height }, (_, i) => (off(i) > 150 ? 1 : 0));
+  };
+  const bent = drawn();
+  const Mesh = seen.constructor, Geometry = seen.geometry.constructor, Attribute = seen.geometry.attributes.position.constructor;
+  const geometry = new Geometry();
+  geometry.setAttribute('position', new Attribute(app.engine.reconstruct(body), 3));
+  geometry.setIndex(seen.geometry.index);
+  geometry.computeVertexNormals();
+  const material = new shown.constructor({ side: shown.side }), other = new Mesh(geometry, material);
+  other.frustumCulled = false;
+  stage.scene.add(other);
+  seen.visible = false;
+  const reconstructed = drawn();
+  stage.scene.remove(other);
+  for (const x of [seen, ...hidden]) x.visible = true;
+  stage.scene.background = background;
+  stage.renderer.shadowMap.enabled = true;
+  const near = (mask, x, y) => {
+    for (let j = Math.max(0, y - 1); j <= Math.min(height - 1, y + 1); ++j)
+      for (let i = Math.max(0, x - 1); i <= Math.min(width - 1, x + 1); ++i) if (mask[j * width + i]) return true;
+    return false;
+  };
+  let count = 0, off = 0;
+  for (let y = 0; y < height; ++y)
+    for (let x = 0; x < width; ++x) {
+      count += reconstructed[y * width + x];
+      if ((bent[y * width + x] && !near(reconstructed, x, y)) || (reconstructed[y * width + x] && !near(bent, x, y))) ++off;
+    }
+  return { count, off, bent: bent.reduce((sum, x, i) => (x ? (31 * sum + i) % 1000003 : sum), 7), share: count / bent.length };
+}, body);
+
+async function showsWhatTheEngineHas(page) {
+  await page.evaluate(() => globalThis.limber.showMode(0, 0, 0));
+  const atRest = await outlines(page, 0);
+  for (const mode of [0, 1]) {
+    await page.evaluate((mode) => globalThis.limber.showMode(0, mode, -1), mode);
+    const seen = await outlines(page, 0);
+    check(seen.count > 500 && seen.share < 0.9, `mode ${mode}: the body is drawn, ${seen.count} pixels`);
+    check(seen.off === 0, `mode ${mode}: the picture is the engine's surface within a pixel, ${seen.off} are off`);
+    check(seen.bent !== atRest.bent, `mode ${mode}: it is seen to bend`);
+  }
+}
+
+async function tellsOfDamage() {
+  const text = readFileSync(file, 'utf8'), begin = text.indexOf('<script type="application/json" id="files">');
+  const asset = text.indexOf('"base64":"', begin) + 10;
+  const damaged = join(folder, 'damaged.html');
+  writeFileSync(damaged, text.slice(0, asset + 400) + (text[asset + 400] === 'A' ? 'B' : 'A') + text.slice(asset + 401));
+  const page = await open(damaged);
+  const message = page.locator('#message.error');
+  check((await message.count()) === 1, 'a damaged asset is told');
+  const line = (await message.count()) === 1 ? await message.textContent() : '';
+  check(line.length > 10 && !line.includes('\n'), `in one line: "${line}"`);
+  await page.close();
+}
+
+try {
+  const page = await open(file);
+  await playsByItself(page);
+  if (wrong.length === 0) {
+    await isDragged(page);
+    await goesBack(page);
+    if (picture !== undefined) {
+      await page.evaluate(() => globalThis.limber.restart());
+      await page.evaluate(() => globalThis.limber.setPlaying(false));
+      await steps(page, 60);
+      await page.screenshot({ path: picture });
+    }
+    await showsWhatTheEngineHas(page);
+    check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed').length)) === 0, 'no text has become markup');
+  }
+  await page.close();
+  await tellsOfDamage();
+} catch (error) {
+  wrong.push(`the check itself: ${error.message}`);
+} finally {
+  await browser.close();
+  rmSync(folder, { recursive: true, force: true });
+}
+for (const claim of wrong) console.error(`check_page: does not hold: ${claim}`);
+console.log(wrong.length === 0 ? `check_page: ${file} holds` : `check_page: ${wrong.length} claims do not hold`);
+process.exit(wrong.length === 0 ? 0 : 1);

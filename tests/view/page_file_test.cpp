@@ -1,0 +1,88 @@
+// Scenes and assets as pages.
+#include "limber/view/page_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "block_model.h"
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/scene/scene_file.h"
+#include "limber/scene/scene_model.h"
+
+namespace limber {
+namespace {
+
+constexpr const char* kMarkup = "</script><script>alert(1)</script><!--";
+
+struct Folder {
+  explicit Folder(const char* name) : path(std::filesystem::path(::testing::TempDir()) / name) {
+    std::filesystem::create_directories(path / "deep");
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  std::filesystem::path path;
+};
+
+/// What stands between the two halves of a page.
+std::string inside(const std::string& page) {
+  EXPECT_TRUE(page.starts_with("<before>") && page.ends_with("<after>")) << page.substr(0, 40);
+  return page.substr(8, page.size() - 15);
+}
+
+TEST(PageFile, NamesWithMarkupAreTextAlone) {
+  const Folder folder("page_file_markup");
+  write_asset(folder.path / "deep" / "b.glb", {.bodies = {testing::block_model(2, kMarkup)}});
+  nlohmann::json scene = {{"step", 0.01}, {"duration", 1}, {"assets", {{kMarkup, "deep/b.glb"}}}};
+  scene["bodies"].push_back({{"name", kMarkup}, {"asset", kMarkup}});
+  write_file(folder.path / "s.json", scene.dump());
+  const PageContent content = page_of_scene(folder.path / "s.json");
+  const std::string json = inside(page_with("<before>@FILES@<after>", content));
+  EXPECT_EQ(json.find_first_of("<>&"), json.npos);
+  EXPECT_THAT(json, ::testing::Not(::testing::HasSubstr("deep"))) << "nor where files were";
+}
+
+/// The page's files alone make the same scene.
+TEST(PageFile, TheFilesInsideAreTheWholeScene) {
+  const Folder folder("page_file_whole"), other("page_file_unpacked");
+  write_asset(folder.path / "deep" / "b.glb", testing::block_asset(3));
+  write_file(folder.path / "tet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  write_file(folder.path / "s.json", R"({"step": 0.01, "duration": 1, "contact": {},
+    "assets": {"x": "deep/b.glb", "y": "deep/../deep/b.glb"},
+    "statics": [{"name": "rock", "shape": {"hull": {"file": "tet.obj"}}}],
+    "bodies": [{"name": "a", "asset": "x", "position": [0, 0, 3]}, {"name": "b", "asset": "y", "position": [3, 0, 3]}]})");
+  const PageContent content = page_of_scene(folder.path / "s.json");
+  EXPECT_EQ(content.files.size(), 3u) << "one asset, one shape, the scene";
+  for (const PageFile& file : content.files)
+    write_file(other.path / std::filesystem::path(file.path).filename(), file.bytes);
+  const Scene scene = read_scene(other.path / "s.json");
+  EXPECT_EQ(load_models(scene).of_body[0]->modes(), 3);
+  EXPECT_EQ(scene.bodies.size(), 2u);
+}
+
+TEST(PageFile, AnAssetFallsOnTheGround) {
+  const Folder folder("page_file_asset");
+  write_asset(folder.path / "b.glb", {.bodies = {testing::block_model(2), testing::block_model(1, "other")}});
+  const PageContent content = page_of_asset(folder.path / "b.glb");
+  for (const PageFile& file : content.files)
+    write_file(folder.path / std::filesystem::path(file.path).filename(), file.bytes);
+  const Scene scene = read_scene(folder.path / std::filesystem::path(content.scene).filename());
+  ASSERT_EQ(scene.bodies.size(), 2u);
+  EXPECT_TRUE(scene.contact.has_value());
+  EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), 1.0, 1e-6);
+  EXPECT_GT(scene.bodies[1].placement.pose.p.x() - scene.bodies[0].placement.pose.p.x(), testing::kBlockLength);
+}
+
+TEST(PageFile, WhatIsWrongIsToldBeforeThereIsAPage) {
+  const Folder folder("page_file_wrong");
+  write_file(folder.path / "b.glb", "no asset");
+  write_file(folder.path / "s.json", R"({"step": 0.01, "duration": 1, "assets": {"x": "b.glb"},
+    "bodies": [{"name": "a", "asset": "x"}]})");
+  EXPECT_THROW(page_of_scene(folder.path / "s.json"), InputError);
+  EXPECT_THROW(page_of_asset(folder.path / "b.glb"), InputError);
+  EXPECT_THROW(page_with("<html>", {}), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace limber

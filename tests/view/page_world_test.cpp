@@ -1,0 +1,192 @@
+// What the page drives, without a page.
+#include "limber/view/page_world.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "block_model.h"
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/scene/run.h"
+
+namespace limber {
+namespace {
+
+constexpr Index kModes = 3;
+constexpr const char* kScene = R"({"step": 0.01, "duration": 10, "assets": {"block": "block.glb"}, "contact": {},
+  "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+  "bodies": [{"name": "a", "asset": "block", "position": [0, 0, 0.8]},
+             {"name": "b", "asset": "block", "position": [5, 0, 0.8]}],
+  "joints": [{"b": "b", "type": "ball", "origin": [5, 0, 2]}],
+  "strikes": [{"body": "a", "time": 0.2, "at": {"vertex": 0}, "impulse": [0, 0.3, 0]}]})";
+
+/// A scene in a folder of its own.
+class PageWorldTest : public ::testing::Test {
+ protected:
+  PageWorldTest() {
+    std::filesystem::create_directories(folder_);
+    write_asset(folder_ / "block.glb", testing::block_asset(kModes));
+    write_file(scene(), kScene);
+  }
+  ~PageWorldTest() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path scene() const { return folder_ / "falls.json"; }
+
+ private:
+  const std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+void step(PageWorld& page, int count) {
+  for (int i = 0; i < count; ++i) page.step(), page.keep();
+}
+
+TEST_F(PageWorldTest, LeftAloneItIsTheSceneThatSimulatePlays) {
+  PageWorld page(scene());
+  step(page, 50);
+  const Scene told = read_scene(scene());
+  EXPECT_EQ(page.state_hash(), run_scene(told, load_models(told), {.steps = 50}).state_hash);
+}
+
+/// The shader's sum, here in double precision, against the engine's own surface.
+TEST_F(PageWorldTest, ModelAndFrameGiveTheSurfaceThatTheEngineReconstructs) {
+  PageWorld page(scene());
+  step(page, 40);
+  page.show_mode(0, 1, 0.2);
+  const PageModel& model = page.models()[0];
+  const std::size_t vertices = model.rest.size() / 3;
+  const std::span<const float> frame = page.frame();
+  const RigidTransform X{.q = normalized(Quaternion{frame[3], frame[4], frame[5], frame[6]}),
+                         .p = {frame[0], frame[1], frame[2]}};
+  std::vector<float> positions(3 * vertices);
+  page.reconstruct(0, positions.data());
+  for (std::size_t v = 0; v < vertices; ++v) {
+    Vec3 x(model.rest[3 * v], model.rest[3 * v + 1], model.rest[3 * v + 2]);
+    for (std::size_t i = 0; i < kModes; ++i) {
+      const float* shape = &model.shapes[8 * (i * vertices + v)];
+      x += static_cast<double>(frame[7 + i]) * Vec3(shape[0], shape[1], shape[2]);
+    }
+    const Vec3 expected(positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]);
+    EXPECT_LT((X * x - expected).norm(), 1e-6) << v;  // m, of a block of 2 m in single precision
+  }
+}
+
+TEST_F(PageWorldTest, NormalsFollowTheSurfaceToFirstOrder) {
+  const PageWorld page(scene());
+  const PageModel& model = page.models()[0];
+  const std::size_t vertices = model.rest.size() / 3;
+  // A block that bends in y: where its side looks along y, n_x changes by −du_y/dx.
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const float* shape = &model.shapes[8 * v];
+    const float* normal = &model.normals[3 * v];
+    const double along = static_cast<double>(normal[0] * shape[4] + normal[1] * shape[5] + normal[2] * shape[6]);
+    if (std::abs(std::abs(model.rest[3 * v]) - 1.0f) < 1e-3f) continue;  // an end: three sides meet there
+    EXPECT_NEAR(along, 0.0, 1e-5) << "a turn does not change the length of a normal";
+  }
+}
+
+TEST_F(PageWorldTest, ARayMeetsTheNearestBody) {
+  const PageWorld page(scene());
+  const PageHit hit = page.cast_ray({-10, 0.1, 0.9}, {2, 0, 0});
+  EXPECT_EQ(hit.body, 0);
+  EXPECT_NEAR(hit.point.x(), -1.0, 1e-6);
+  EXPECT_NEAR(hit.distance, 9.0, 1e-6);
+  EXPECT_EQ(page.cast_ray({-10, 0.1, 5.0}, {1, 0, 0}).body, -1);
+}
+
+TEST_F(PageWorldTest, ADragLiftsTheBodyAndLetsItGo) {
+  PageWorld page(scene());
+  step(page, 60);
+  ASSERT_TRUE(page.grab(page.cast_ray({0, 0, 10}, {0, 0, -1})));
+  page.drag_to({0, 0, 4});
+  step(page, 200);
+  EXPECT_TRUE(page.holds());
+  EXPECT_GT(page.frame()[2], 2.0f);
+  // It swings there, and stays up: in the mean the hand bears the weight, but for what momentum is left at the end.
+  constexpr int kSteps = 1000;
+  constexpr double kWeight = testing::kBlockMass * 9.80665;
+  double mean = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    page.step();
+    mean += page.hand().force.z() / kSteps;
+  }
+  EXPECT_NEAR(mean, kWeight, 0.1 * kWeight);
+  page.let_go();
+  EXPECT_FALSE(page.holds());
+  step(page, 300);
+  EXPECT_LT(page.frame()[2], 1.2f) << "it has fallen";
+}
+
+TEST_F(PageWorldTest, GoingBackAndForthGivesTheSameHashes) {
+  PageWorld page(scene());
+  std::vector<std::uint64_t> hashes{page.state_hash()};
+  for (int i = 0; i < 60; ++i) {
+    if (i == 10) page.grab(page.cast_ray({0, 0, 10}, {0, 0, -1})), page.drag_to({1, 0, 3});
+    if (i == 25) page.let_go();
+    if (i == 30) page.drop(0, {0, 0, 3});
+    if (i == 40) page.drop(0, {0.5, 0, 5});
+    step(page, 1);
+    hashes.push_back(page.state_hash());
+  }
+  ASSERT_EQ(page.kept(), 61);
+  for (const int key : {60, 0, 35, 20, 59, 10, 45, 31, 60}) {
+    page.go_to(key);
+    EXPECT_EQ(page.steps_taken(), page.kept_step(key));
+    EXPECT_EQ(page.state_hash(), hashes[static_cast<std::size_t>(key)]) << key;
+  }
+  page.go_to(26);
+  page.let_go();
+  step(page, 1);
+  EXPECT_EQ(page.kept(), 28) << "what came after belongs to another future";
+  EXPECT_EQ(page.state_hash(), hashes[27]);
+}
+
+TEST_F(PageWorldTest, PokesPushPinsHoldAndGravityTurns) {
+  PageWorld page(scene());
+  PageSettings settings = page.settings();
+  settings.poke_speed = 2.0;
+  page.set_live(settings);
+  page.poke(page.cast_ray({0, 10, 0.8}, {0, -1, 0}), {0, -3, 0});
+  EXPECT_NEAR(page.world().linear_momentum({0, 1}).y(), -2.0 * testing::kBlockMass, 1e-9);
+  page.pin(page.cast_ray({0, 0, 10}, {0, 0, -1}));
+  EXPECT_EQ(page.pins(), 1);
+  settings.gravity = {0, 0, 3};
+  page.set_live(settings);
+  step(page, 100);
+  EXPECT_LT(page.frame()[2], 2.5f) << "it is held";
+  page.unpin();
+  step(page, 100);
+  EXPECT_GT(page.frame()[2], 1.5f) << "it rises";
+}
+
+TEST_F(PageWorldTest, SettingsOfTheNextStartAreTaken) {
+  PageWorld page(scene());
+  PageSettings settings = page.settings();
+  settings.modes = 1;
+  settings.damping = 2.0;
+  settings.step = 1.0 / 30.0;
+  settings.friction = 0.1;
+  page.restart(settings);
+  EXPECT_EQ(page.steps_taken(), 0);
+  EXPECT_EQ(page.models()[0].frequencies.size(), 1u);
+  EXPECT_EQ(page.world().model({0, 1}).data().decays[0], 2.0 * testing::block_decay(0));
+  EXPECT_EQ(page.world().options().step, 1.0 / 30.0);
+  settings.step = -1.0;
+  EXPECT_THROW(page.restart(settings), InvalidArgument);
+  EXPECT_EQ(page.world().options().step, 1.0 / 30.0);
+}
+
+TEST_F(PageWorldTest, TheDescriptionNamesWhatIsThere) {
+  const PageWorld page(scene());
+  const auto json = nlohmann::json::parse(page.description());
+  EXPECT_EQ(json["bodies"].size(), 2u);
+  EXPECT_EQ(json["models"].size(), 1u);
+  EXPECT_EQ(json["models"][0]["vertices"], 68);
+  EXPECT_EQ(json["joints"][0]["type"], "ball");
+  EXPECT_EQ(json["statics"][0]["ground"], true);
+}
+
+}  // namespace
+}  // namespace limber

@@ -1,0 +1,154 @@
+// The page's engine as plain C functions: what web/engine.js calls. Texts are UTF-8 and end with zero; arrays stay
+// valid until the next call. Functions that can fail return 0 and leave one line in page_error().
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "limber/view/page_world.h"
+
+#ifdef __EMSCRIPTEN__
+#include <emscripten.h>
+#else
+#define EMSCRIPTEN_KEEPALIVE
+#endif
+
+namespace {
+
+using limber::PageHit;
+using limber::PageSettings;
+using limber::PageWorld;
+using limber::Vec3;
+
+std::unique_ptr<PageWorld> page;
+std::string error, text;
+PageHit hit;
+double answer[16];
+
+template <class F>
+int guarded(F&& work) {
+  try {
+    work();
+    return 1;
+  } catch (const std::exception& e) {
+    error = e.what();
+    return 0;
+  }
+}
+
+/// From 11 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, method.
+PageSettings settings_of(const double* n) {
+  PageSettings s;
+  s.gravity = {n[0], n[1], n[2]};
+  s.drag_frequency = n[3];
+  s.poke_speed = n[4];
+  s.step = n[5];
+  s.substeps = static_cast<int>(n[6]);
+  s.modes = static_cast<limber::Index>(n[7]);
+  s.damping = n[8];
+  s.friction = n[9];
+  s.method = static_cast<limber::ContactMethod>(static_cast<int>(n[10]));
+  return s;
+}
+
+}  // namespace
+
+extern "C" {
+
+EMSCRIPTEN_KEEPALIVE const char* page_error() { return error.c_str(); }
+EMSCRIPTEN_KEEPALIVE int page_open(const char* scene) {
+  return guarded([&] { page = std::make_unique<PageWorld>(scene); });
+}
+EMSCRIPTEN_KEEPALIVE const char* page_description() {
+  return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";
+}
+
+// What there is of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each).
+EMSCRIPTEN_KEEPALIVE const void* page_model_data(int model, int what) {
+  const limber::PageModel& m = page->models()[static_cast<std::size_t>(model)];
+  switch (what) {
+    case 0:
+      return m.rest.data();
+    case 1:
+      return m.normals.data();
+    case 2:
+      return m.shapes.data();
+    default:
+      return m.triangles.data();
+  }
+}
+
+EMSCRIPTEN_KEEPALIVE int page_set_live(const double* settings) {
+  return guarded([&] { page->set_live(settings_of(settings)); });
+}
+EMSCRIPTEN_KEEPALIVE int page_restart(const double* settings) {
+  return guarded([&] { page->restart(settings_of(settings)); });
+}
+EMSCRIPTEN_KEEPALIVE int page_step() {
+  return guarded([] { page->step(); });
+}
+EMSCRIPTEN_KEEPALIVE double page_steps_taken() { return static_cast<double>(page->steps_taken()); }
+EMSCRIPTEN_KEEPALIVE const char* page_hash() {
+  char digits[17];
+  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(page->state_hash()));
+  text = digits;
+  return text.c_str();
+}
+EMSCRIPTEN_KEEPALIVE const float* page_frame() { return page->frame().data(); }
+EMSCRIPTEN_KEEPALIVE const double* page_numbers() { return page->numbers().data(); }
+EMSCRIPTEN_KEEPALIVE const double* page_joint_frames() { return page->joint_frames().data(); }
+
+// The hit stays until the next cast. @return body (−1: none), point, distance
+EMSCRIPTEN_KEEPALIVE const double* page_cast(double x, double y, double z, double dx, double dy, double dz) {
+  hit = page->cast_ray({x, y, z}, {dx, dy, dz});
+  answer[0] = hit.body;
+  for (int i = 0; i < 3; ++i) answer[1 + i] = hit.point[i];
+  answer[4] = hit.distance;
+  return answer;
+}
+EMSCRIPTEN_KEEPALIVE int page_grab() { return page->grab(hit) ? 1 : 0; }
+EMSCRIPTEN_KEEPALIVE void page_drag_to(double x, double y, double z) { page->drag_to({x, y, z}); }
+EMSCRIPTEN_KEEPALIVE void page_let_go() { page->let_go(); }
+// Whether something is held, the point, its target, the force on the body, pins.
+EMSCRIPTEN_KEEPALIVE const double* page_hand() {
+  const limber::HandleView view = page->hand();
+  const Vec3 point = page->held_point();
+  answer[0] = page->holds() ? 1.0 : 0.0;
+  for (int i = 0; i < 3; ++i) {
+    answer[1 + i] = point[i];
+    answer[4 + i] = view.target.position[i];
+    answer[7 + i] = view.force[i];
+  }
+  answer[10] = page->pins();
+  return answer;
+}
+EMSCRIPTEN_KEEPALIVE int page_pin() {
+  return guarded([] { page->pin(hit); });
+}
+EMSCRIPTEN_KEEPALIVE void page_unpin() { page->unpin(); }
+EMSCRIPTEN_KEEPALIVE int page_poke(double dx, double dy, double dz) {
+  return guarded([&] { page->poke(hit, {dx, dy, dz}); });
+}
+EMSCRIPTEN_KEEPALIVE int page_drop(int model, double x, double y, double z) {
+  return guarded([&] { page->drop(model, {x, y, z}); });
+}
+EMSCRIPTEN_KEEPALIVE int page_show_mode(int body, int mode, double amplitude) {
+  return guarded([&] { page->show_mode(body, mode, amplitude); });
+}
+
+EMSCRIPTEN_KEEPALIVE int page_keep() {
+  return guarded([] { page->keep(); });
+}
+EMSCRIPTEN_KEEPALIVE int page_kept() { return page->kept(); }
+EMSCRIPTEN_KEEPALIVE double page_kept_step(int key) { return static_cast<double>(page->kept_step(key)); }
+EMSCRIPTEN_KEEPALIVE int page_go_to(int key) {
+  return guarded([&] { page->go_to(key); });
+}
+
+// Surface by the engine itself, for comparison with what is drawn: 3 V floats of body `body` into `positions`.
+EMSCRIPTEN_KEEPALIVE int page_reconstruct(int body, float* positions) {
+  return guarded([&] { page->reconstruct(body, positions); });
+}
+
+}  // extern "C"

@@ -1,0 +1,38 @@
+/// @file limber/view/page_file.h
+/// A scene and all its files as one HTML page (limber-view): engine, drawing and assets inside.
+///
+/// The page asks nothing of a network and runs nothing but its own script, whose hash its Content-Security-Policy
+/// names. What comes from files is data: bytes as base64, texts as JSON in which no markup can stand.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace limber {
+
+/// A file as the page sees it, below /scene/.
+struct PageFile {
+  std::string path{};
+  std::string bytes{};
+};
+
+struct PageContent {
+  std::string scene{};  ///< path of the scene's file among these
+  std::vector<PageFile> files{};
+};
+
+/// A scene with its assets and the files of its shapes, which get names of our own. Reads and checks all of it.
+/// @throws InputError as read_scene() and load_models()
+PageContent page_of_scene(const std::filesystem::path& scene);
+
+/// A scene made for an asset: its bodies side by side, free ones fall on the ground from half their size.
+/// @throws InputError as read_asset()
+PageContent page_of_asset(const std::filesystem::path& asset);
+
+/// @param empty the page without a scene, which limber-view has inside
+/// @throws InvalidArgument where `empty` has no place for files
+std::string page_with(std::string_view empty, const PageContent& content);
+
+}  // namespace limber

@@ -1,0 +1,118 @@
+/// @file limber/view/page_world.h
+/// A scene as the page drives it: stepped, dragged, poked, pinned, set anew and taken back. The page compiles this to
+/// WebAssembly (view/engine); it works natively too.
+///
+/// Numbers for drawing are in single precision, everything else in double.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "limber/engine/world.h"
+
+namespace limber {
+
+/// What a person may set. The first three act at once, the others where the scene starts anew.
+struct PageSettings {
+  Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s²
+  double drag_frequency = 3.0;          ///< Hz, of a body's mass on the spring by which it is dragged; > 0
+  double poke_speed = 1.0;              ///< m/s, that a poke gives a body's mass; ≥ 0
+  double step = 1.0 / 60.0;             ///< s; > 0
+  int substeps = 1;                     ///< ≥ 1
+  Index modes = 256;                    ///< of each model at most; ≥ 0
+  double damping = 1.0;                 ///< factor on the decay of every mode; ≥ 0
+  double friction = 0.5;                ///< ≥ 0, where the scene has contact
+  ContactMethod method = ContactMethod::kComplementary;
+};
+
+/// A model once for all its bodies, made for a vertex shader.
+struct PageModel {
+  std::string name{};
+  std::vector<float> rest{}, normals{};    ///< 3 V each: of the rest shape, m; unit
+  std::vector<std::uint32_t> triangles{};  ///< 3 T
+  /// 8 V k: for mode i and vertex v from 8 (i V + v) on the shape (kg^−½), 0, and how the normal, of length 1 at rest,
+  /// changes to first order, 0.
+  std::vector<float> shapes{};
+  std::vector<double> frequencies{};  ///< Hz, k
+  /// The amplitude at which a mode moves some vertex by a tenth of the model's size, k.
+  std::vector<double> visible_amplitudes{};
+};
+
+/// The first point of any body that a ray meets.
+struct PageHit {
+  int body = -1;  ///< −1: none
+  SurfacePoint at{};
+  Vec3 point = Vec3::Zero();  ///< world
+  double distance = 0.0;      ///< m
+};
+
+class PageWorld {
+ public:
+  /// @throws InputError as read_scene() and load_models()
+  explicit PageWorld(const std::filesystem::path& scene);
+  ~PageWorld();
+
+  /// What stands where, as JSON: settings, models, bodies (model, name), statics with their triangles, joints. Names
+  /// are text of the scene and its assets: nothing that may become markup.
+  std::string description() const;
+  const std::vector<PageModel>& models() const;
+  const World& world() const;
+
+  PageSettings settings() const;
+  /// Gravity and hands at once.
+  void set_live(const PageSettings& settings);
+  /// Starts the scene anew. @throws InvalidArgument for numbers out of range, and then changes nothing
+  void restart(const PageSettings& settings);
+
+  void step();
+  std::int64_t steps_taken() const;
+  std::uint64_t state_hash() const;
+
+  /// Per body its pose (position, then quaternion w, x, y, z) and its amplitudes; bodies in order.
+  std::span<const float> frame();
+  /// time (s), kinetic energy of the frames, of the modes, elastic, potential (J), bodies asleep, contacts that press,
+  /// rows, iterations, settled (0 or 1).
+  std::span<const double> numbers();
+  /// What World::reconstruct() makes of a body: 3 V floats, world.
+  void reconstruct(int body, float* positions) const;
+  /// Per joint: origin and x axis in the world, coordinates (3).
+  std::span<const double> joint_frames();
+
+  // Hands.
+  PageHit cast_ray(const Vec3& from, const Vec3& direction) const;
+  /// Takes hold of a point softly; one at a time. @return whether there was one to take
+  bool grab(const PageHit& hit);
+  void drag_to(const Vec3& target);
+  void let_go();
+  bool holds() const;
+  /// Force on the body, N, the point held and its target, world, m.
+  HandleView hand() const;
+  Vec3 held_point() const;
+  /// Holds a point where it is for good, or lets all such points go.
+  void pin(const PageHit& hit);
+  void unpin();
+  int pins() const;
+  void poke(const PageHit& hit, const Vec3& direction);
+  /// Another body of a model.
+  void drop(int model, const Vec3& position);
+  /// Shows a mode by itself: all others of the body are at rest.
+  void show_mode(int body, Index mode, double amplitude);
+
+  // History: states at steps taken, the oldest thinned out when there are too many.
+  void keep();
+  int kept() const;
+  std::int64_t kept_step(int key) const;
+  /// Back, or forth again, to a kept state, to the bit: a hand that held something then holds it again.
+  void go_to(int key);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

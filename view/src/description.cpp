@@ -1,0 +1,102 @@
+#include "description.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "limber/scene/shape_surface.h"
+
+namespace limber::internal {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json interval(const Interval& i) {
+  const auto end = [](double x) { return std::isfinite(x) ? Json(x) : Json(); };
+  return Json::array({end(i.low), end(i.high)});
+}
+
+/// Limits by coordinate.
+Json limits(const JointSpec& spec) {
+  const JointLimits& l = spec.limits;
+  switch (spec.type) {
+    case JointType::kRevolute:
+      return Json::array({interval(l.rotation)});
+    case JointType::kPrismatic:
+      return Json::array({interval(l.translation[0])});
+    case JointType::kCylindrical:
+      return Json::array({interval(l.rotation), interval(l.translation[0])});
+    case JointType::kPlanar:
+      return Json::array({interval(l.translation[0]), interval(l.translation[1]), interval(l.rotation)});
+    case JointType::kBall:
+      return Json::array({interval(l.euler[0]), interval(l.euler[1]), interval(l.euler[2])});
+    case JointType::kFixed:
+      break;
+  }
+  return Json::array();
+}
+
+Json static_shape(const SceneStatic& standing, const Shape& shape) {
+  constexpr double kHalfSide = 3.0;  // m, of what is shown of a half-space
+  const TriangleMesh mesh = surface_of(shape, Vec3::Zero(), kHalfSide);
+  Json points = Json::array(), corners = Json::array();
+  for (const Vec3& p : mesh.vertices) {
+    const Vec3 x = standing.pose * p;
+    for (int i = 0; i < 3; ++i) points.push_back(x[i]);
+  }
+  for (const Triangle& t : mesh.triangles)
+    for (const Index v : t) corners.push_back(v);
+  return {{"name", standing.name},
+          {"ground", std::holds_alternative<HalfSpace>(shape)},
+          {"points", std::move(points)},
+          {"triangles", std::move(corners)}};
+}
+
+}  // namespace
+
+std::vector<JointPlace> joint_places(const Scene& scene, const World& world, std::span<const PageBody> bodies) {
+  std::vector<JointPlace> places;
+  for (const SceneJoint& joint : scene.joints) {
+    const std::string& on = joint.a.empty() ? joint.b : joint.a;
+    JointPlace place{.on = {}, .origin = joint.spec.frame.origin, .axis = joint.spec.frame.axes.col(0)};
+    for (const PageBody& body : bodies) {
+      if (body.name != on) continue;
+      const RigidTransform X = world.body(body.id).pose.inverse();
+      place = {body.id, X * place.origin, X.q * place.axis};
+    }
+    places.push_back(place);
+  }
+  return places;
+}
+
+std::string describe(const Scene& scene, const SceneModels& models, std::span<const PageModel> shown,
+                     std::span<const PageBody> bodies, const PageSettings& settings) {
+  Json out;
+  out["name"] = scene.name;
+  out["settings"] = {{"gravity", vector(settings.gravity)}, {"drag_frequency", settings.drag_frequency},
+                     {"poke_speed", settings.poke_speed},   {"step", settings.step},
+                     {"substeps", settings.substeps},       {"modes", settings.modes},
+                     {"damping", settings.damping},         {"friction", settings.friction},
+                     {"method", to_string(settings.method)}};
+  out["contact"] = scene.contact.has_value();
+  out["models"] = Json::array();
+  for (const PageModel& model : shown)
+    out["models"].push_back({{"name", model.name},
+                             {"vertices", model.rest.size() / 3},
+                             {"triangles", model.triangles.size() / 3},
+                             {"frequencies", model.frequencies},
+                             {"visible_amplitudes", model.visible_amplitudes}});
+  out["bodies"] = Json::array();
+  for (const PageBody& body : bodies) out["bodies"].push_back({{"name", body.name}, {"model", body.model}});
+  out["statics"] = Json::array();
+  for (std::size_t i = 0; i < scene.statics.size(); ++i)
+    out["statics"].push_back(static_shape(scene.statics[i], *models.shape_of_static[i]));
+  out["joints"] = Json::array();
+  for (const SceneJoint& joint : scene.joints)
+    out["joints"].push_back(
+        {{"type", to_string(joint.spec.type)}, {"a", joint.a}, {"b", joint.b}, {"limits", limits(joint.spec)}});
+  return out.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
+}  // namespace limber::internal

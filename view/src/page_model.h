@@ -1,0 +1,16 @@
+/// @file page_model.h
+/// A model as a vertex shader takes it.
+#pragma once
+
+#include "limber/model/modal_model.h"
+#include "limber/view/page_world.h"
+
+namespace limber::internal {
+
+PageModel page_model(const ModalModel& model);
+
+/// With the first modes alone, and other damping. Residual compliance answers for those left out.
+std::shared_ptr<const ModalModel> with_settings(const std::shared_ptr<const ModalModel>& model,
+                                                const PageSettings& settings);
+
+}  // namespace limber::internal

@@ -1,0 +1,319 @@
+#include "limber/view/page_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+#include "description.h"
+#include "limber/core/error.h"
+#include "limber/scene/scene_player.h"
+#include "limber/scene/surface_ray.h"
+#include "page_history.h"
+#include "page_model.h"
+
+namespace limber {
+namespace {
+
+constexpr std::int64_t kForever = std::int64_t{1} << 40;  // steps: what the scene does ends by its own times
+
+void check(const PageSettings& s) {
+  const auto number = [](double value, bool open, const char* name) {
+    if (!(value >= 0.0) || (open && value == 0.0) || std::isinf(value))
+      throw InvalidArgument(std::string("PageSettings: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number " + (open ? "above 0" : "of at least 0"));
+  };
+  if (!s.gravity.allFinite()) throw InvalidArgument("PageSettings: gravity is not finite");
+  number(s.drag_frequency, true, "drag_frequency");
+  number(s.poke_speed, false, "poke_speed");
+  number(s.step, true, "step");
+  number(s.damping, false, "damping");
+  number(s.friction, false, "friction");
+  if (s.substeps < 1) throw InvalidArgument("PageSettings: substeps is " + std::to_string(s.substeps) + ", expected 1");
+  if (s.modes < 0) throw InvalidArgument("PageSettings: modes is " + std::to_string(s.modes) + ", expected 0 or more");
+}
+
+}  // namespace
+
+struct PageWorld::Impl {
+  explicit Impl(const std::filesystem::path& path) : told(read_scene(path)), baked(load_models(told)) {
+    settings.gravity = told.gravity;
+    settings.step = told.step;
+    settings.substeps = told.substeps;
+    if (told.contact) settings.friction = told.contact->friction, settings.method = told.contact->rule.method;
+  }
+
+  void start();
+  World& world() { return player->world(); }
+  const World& world() const { return player->world(); }
+  BodyId id(int body) const { return bodies[static_cast<std::size_t>(body)].id; }
+  void add_dropped(std::size_t count);
+  void forget_removed();
+
+  const Scene told;
+  const SceneModels baked;  // as they come from the assets
+  PageSettings settings;
+  Scene scene;         // with the settings
+  SceneModels models;  // the same
+  std::vector<std::shared_ptr<const ModalModel>> kinds;
+  std::vector<PageModel> shown;
+  std::optional<ScenePlayer> player;
+  std::vector<internal::PageBody> bodies;
+  std::vector<int> drops;  // model of each body dropped so far, in this history
+  internal::Hands hands;
+  internal::PageHistory history;
+  std::vector<float> frame;
+  std::vector<double> numbers, joint_frames, amplitudes;
+  std::vector<internal::JointPlace> joint_places;
+};
+
+void PageWorld::Impl::start() {
+  player.reset();  // it refers to what follows
+  scene = told;
+  scene.step = settings.step;
+  scene.substeps = settings.substeps;
+  scene.gravity = settings.gravity;
+  if (scene.contact) scene.contact->friction = settings.friction, scene.contact->rule.method = settings.method;
+  models = baked;
+  std::map<const ModalModel*, int> kind_of;
+  kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();
+  std::vector<int> kind_of_body;
+  for (std::shared_ptr<const ModalModel>& model : models.of_body) {
+    const auto [found, fresh] = kind_of.emplace(model.get(), static_cast<int>(kinds.size()));
+    if (fresh) {
+      kinds.push_back(internal::with_settings(model, settings));
+      shown.push_back(internal::page_model(*kinds.back()));
+    }
+    model = kinds[static_cast<std::size_t>(found->second)];
+    kind_of_body.push_back(found->second);
+  }
+  player.emplace(scene, models, kForever);
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
+  hands = {};
+  joint_places = internal::joint_places(scene, world(), bodies);
+}
+
+PageWorld::PageWorld(const std::filesystem::path& scene) : impl_(std::make_unique<Impl>(scene)) {
+  impl_->start();
+  keep();
+}
+PageWorld::~PageWorld() = default;
+
+std::string PageWorld::description() const {
+  const Impl& m = *impl_;
+  return internal::describe(m.scene, m.models, m.shown, m.bodies, m.settings);
+}
+const std::vector<PageModel>& PageWorld::models() const { return impl_->shown; }
+const World& PageWorld::world() const { return impl_->world(); }
+PageSettings PageWorld::settings() const { return impl_->settings; }
+
+void PageWorld::set_live(const PageSettings& settings) {
+  check(settings);
+  PageSettings& now = impl_->settings;
+  if (settings.gravity != now.gravity) impl_->world().set_gravity(settings.gravity);
+  now.gravity = settings.gravity;
+  now.drag_frequency = settings.drag_frequency;
+  now.poke_speed = settings.poke_speed;
+}
+
+void PageWorld::restart(const PageSettings& settings) {
+  check(settings);
+  impl_->settings = settings;
+  impl_->start();
+  keep();
+}
+
+void PageWorld::step() { impl_->player->step(); }
+std::int64_t PageWorld::steps_taken() const { return impl_->player->steps_taken(); }
+std::uint64_t PageWorld::state_hash() const { return impl_->world().state_hash(); }
+
+std::span<const float> PageWorld::frame() {
+  Impl& m = *impl_;
+  m.frame.clear();
+  for (const internal::PageBody& body : m.bodies) {
+    const BodyView view = m.world().body(body.id);
+    const auto& [q, p] = view.pose;
+    for (const double x : {p.x(), p.y(), p.z(), q.w, q.x, q.y, q.z}) m.frame.push_back(static_cast<float>(x));
+    for (const double z : view.amplitudes) m.frame.push_back(static_cast<float>(z));
+  }
+  return m.frame;
+}
+
+std::span<const double> PageWorld::numbers() {
+  Impl& m = *impl_;
+  BodyEnergy sum;
+  double asleep = 0.0;
+  for (const internal::PageBody& body : m.bodies) {
+    const BodyEnergy energy = m.world().energy(body.id);
+    sum.kinetic_rigid += energy.kinetic_rigid;
+    sum.kinetic_modal += energy.kinetic_modal;
+    sum.elastic += energy.elastic;
+    sum.potential += energy.potential;
+    if (m.world().is_asleep(body.id)) asleep += 1.0;
+  }
+  const std::span<const ContactEvent> events = m.world().contact_events();
+  const auto pressing = std::count_if(events.begin(), events.end(),
+                                      [](const ContactEvent& e) { return e.phase != ContactPhase::kEnded; });
+  const ConstraintReport report = m.world().constraint_report();
+  m.numbers = {m.world().time(),
+               sum.kinetic_rigid,
+               sum.kinetic_modal,
+               sum.elastic,
+               sum.potential,
+               asleep,
+               static_cast<double>(pressing),
+               static_cast<double>(report.rows),
+               static_cast<double>(report.iterations),
+               report.solved ? 1.0 : 0.0};
+  return m.numbers;
+}
+
+std::span<const double> PageWorld::joint_frames() {
+  Impl& m = *impl_;
+  m.joint_frames.clear();
+  for (std::size_t i = 0; i < m.joint_places.size(); ++i) {
+    const internal::JointPlace& place = m.joint_places[i];
+    const RigidTransform X = place.on.generation == 0 ? RigidTransform{} : m.world().body(place.on).pose;
+    const Vec3 origin = X * place.origin, axis = X.q * place.axis;
+    const JointView view = m.world().joint(m.player->joints()[i]);
+    for (const double x : {origin.x(), origin.y(), origin.z(), axis.x(), axis.y(), axis.z()})
+      m.joint_frames.push_back(x);
+    m.joint_frames.insert(m.joint_frames.end(), view.position.begin(), view.position.end());
+  }
+  return m.joint_frames;
+}
+
+void PageWorld::reconstruct(int body, float* positions) const {
+  const World& w = impl_->world();
+  const auto vertices = static_cast<std::size_t>(w.model(impl_->id(body)).render().vertices());
+  w.reconstruct(impl_->id(body), std::span(positions, 3 * vertices), {});
+}
+
+// Hands ---------------------------------------------------------------------------------------------------------------
+
+PageHit PageWorld::cast_ray(const Vec3& from, const Vec3& direction) const {
+  const Impl& m = *impl_;
+  PageHit best{.distance = std::numeric_limits<double>::infinity()};
+  const Vec3 along = direction.normalized();
+  for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+    const std::optional<SurfaceHit> hit = first_hit(m.world(), m.bodies[i].id, from, along);
+    if (!hit || hit->parameter >= best.distance) continue;
+    best = {static_cast<int>(i), hit->at, from + hit->parameter * along, hit->parameter};
+  }
+  return best;
+}
+
+bool PageWorld::grab(const PageHit& hit) {
+  let_go();
+  if (hit.body < 0) return false;
+  Impl& m = *impl_;
+  m.hands.body = m.id(hit.body);
+  m.hands.at = hit.at;
+  const double mass = m.world().model(m.hands.body).data().mass,
+               omega = 2.0 * std::numbers::pi * m.settings.drag_frequency;
+  m.hands.hand =
+      m.world().add_handle(m.hands.body, hit.at, {.stiffness = mass * omega * omega, .damping = 1.4 * mass * omega});
+  return true;
+}
+
+void PageWorld::drag_to(const Vec3& target) {
+  if (holds() && target.allFinite()) impl_->world().set_handle_target(impl_->hands.hand, {.position = target});
+}
+
+void PageWorld::let_go() {
+  if (holds()) impl_->world().remove_handle(impl_->hands.hand);
+  impl_->hands.hand = {};
+}
+
+bool PageWorld::holds() const { return impl_->world().contains(impl_->hands.hand); }
+HandleView PageWorld::hand() const { return holds() ? impl_->world().handle(impl_->hands.hand) : HandleView{}; }
+Vec3 PageWorld::held_point() const {
+  return holds() ? impl_->world().position(impl_->hands.body, impl_->hands.at) : Vec3(Vec3::Zero());
+}
+
+void PageWorld::pin(const PageHit& hit) {
+  if (hit.body >= 0) impl_->hands.pins.push_back(impl_->world().add_handle(impl_->id(hit.body), hit.at));
+}
+
+void PageWorld::unpin() {
+  for (const HandleId pin : impl_->hands.pins)
+    if (impl_->world().contains(pin)) impl_->world().remove_handle(pin);
+  impl_->hands.pins.clear();
+}
+
+int PageWorld::pins() const {
+  return static_cast<int>(std::count_if(impl_->hands.pins.begin(), impl_->hands.pins.end(),
+                                        [&](HandleId h) { return impl_->world().contains(h); }));
+}
+
+void PageWorld::poke(const PageHit& hit, const Vec3& direction) {
+  if (hit.body < 0) return;
+  Impl& m = *impl_;
+  const double mass = m.world().model(m.id(hit.body)).data().mass;
+  m.world().apply_impulse(m.id(hit.body), hit.at, mass * m.settings.poke_speed * direction.normalized());
+}
+
+void PageWorld::drop(int model, const Vec3& position) {
+  Impl& m = *impl_;
+  if (model < 0 || static_cast<std::size_t>(model) >= m.kinds.size())
+    throw InvalidArgument("PageWorld::drop: model " + std::to_string(model) + ", expected 0 to " +
+                          std::to_string(m.kinds.size() - 1));
+  const auto dropped = static_cast<std::size_t>(
+      std::count_if(m.bodies.begin(), m.bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
+  m.drops.resize(dropped);  // those of a future that will not be
+  m.drops.push_back(model);
+  m.add_dropped(m.drops.size());
+  m.world().set_pose(m.bodies.back().id, {{}, position});
+}
+
+/// Until there are `count` of them. Ids are given in the same order again.
+void PageWorld::Impl::add_dropped(std::size_t count) {
+  auto there = static_cast<std::size_t>(
+      std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
+  for (; there < count; ++there) {
+    const int kind = drops[there];
+    bodies.push_back({world().add_body(kinds[static_cast<std::size_t>(kind)]), kind,
+                      "dropped[" + std::to_string(there) + "]", true});
+  }
+}
+
+void PageWorld::Impl::forget_removed() {
+  std::erase_if(bodies, [&](const internal::PageBody& body) { return !world().contains(body.id); });
+}
+
+void PageWorld::show_mode(int body, Index mode, double amplitude) {
+  Impl& m = *impl_;
+  const BodyId id = m.id(body);
+  m.amplitudes.assign(static_cast<std::size_t>(m.world().model(id).modes()), 0.0);
+  const std::vector<double> rest = m.amplitudes;
+  if (mode >= 0 && static_cast<std::size_t>(mode) < m.amplitudes.size())
+    m.amplitudes[static_cast<std::size_t>(mode)] = amplitude;
+  m.world().set_amplitudes(id, m.amplitudes, rest);
+}
+
+// History -------------------------------------------------------------------------------------------------------------
+
+void PageWorld::keep() {
+  Impl& m = *impl_;
+  const auto dropped =
+      std::count_if(m.bodies.begin(), m.bodies.end(), [](const internal::PageBody& b) { return b.dropped; });
+  m.history.keep(*m.player, m.hands, static_cast<std::size_t>(dropped));
+}
+
+int PageWorld::kept() const { return impl_->history.size(); }
+std::int64_t PageWorld::kept_step(int key) const { return impl_->history.at(key).step; }
+
+void PageWorld::go_to(int key) {
+  Impl& m = *impl_;
+  const internal::PageHistory::Key& at = m.history.at(key);
+  m.add_dropped(at.dropped);
+  m.player->restore_state(at.state);
+  m.forget_removed();
+  m.hands = at.hands;
+  m.settings.gravity = m.world().options().gravity;
+}
+
+}  // namespace limber

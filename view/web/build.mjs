@@ -1,0 +1,44 @@
+// node build.mjs ENGINE_FOLDER OUT.cpp: the page without a scene, all in one file, as a C++ constant. ENGINE_FOLDER has
+// page_engine.mjs and page_engine.wasm; limber-view puts the files of a scene in the place of "@FILES@".
+import { createHash } from 'node:crypto';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { gzipSync } from 'node:zlib';
+import esbuild from 'esbuild';
+
+const [engine, out] = process.argv.slice(2);
+const here = dirname(fileURLToPath(import.meta.url)), read = (...path) => readFileSync(join(...path), 'utf8');
+
+const bundle = await esbuild.build({
+  entryPoints: [join(here, 'main.js')],
+  bundle: true,
+  minify: true,
+  write: false,
+  format: 'iife',
+  target: 'es2022',
+  platform: 'browser',
+  alias: { 'page-engine': join(engine, 'page_engine.mjs') },
+  external: ['module', 'fs', 'path', 'url', 'crypto', 'worker_threads', 'ws'],  // what the engine asks Node for
+  legalComments: 'none',
+  charset: 'ascii',
+});
+const script = bundle.outputFiles[0].text.replaceAll('</script', '<\\/script').replaceAll('<!--', '<\\!--'), style = read(here, 'style.css');
+const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
+const parts = {
+  CSP: `default-src 'none'; script-src ${hash(script)} 'wasm-unsafe-eval'; style-src ${hash(style)}; img-src data:; base-uri 'none'; form-action 'none'`,
+  STYLE: style,
+  SCRIPT: script,
+  LICENCES: ['In this page: limber (MIT licence), three.js, Eigen (MPL-2.0), Highway (Apache-2.0), JSON for Modern C++ (MIT), and the C and C++ libraries of Emscripten (MIT, Apache-2.0 with LLVM exception).',
+    `three.js:\n${read(here, 'node_modules', 'three', 'LICENSE')}`].join('\n\n'),
+  ENGINE: gzipSync(readFileSync(join(engine, 'page_engine.wasm')), { level: 9 }).toString('base64'),
+};
+for (const text of Object.values(parts)) if (/<\/(script|style)/i.test(text)) throw new Error('a part of the page would end its element');
+const page = read(here, 'index.html').replace(/@([A-Z]+)@/g, (all, name) => parts[name] ?? all);
+
+// Pieces that every compiler takes, each by itself: an escape at the end of one must not run into the next.
+const pieces = [];
+for (let at = 0; at < page.length; at += 8000) pieces.push(`    R"~page~(${page.slice(at, at + 8000)})~page~"`);
+if (page.includes(')~page~"')) throw new Error('the page has what ends its constant');
+writeFileSync(out, `// Made by build.mjs.\n#include "empty_page.h"\n\nnamespace limber {\n\nstd::string_view empty_page() {\n` +
+  `  static constexpr char kPage[] =\n${pieces.join('\n')};\n  return {kPage, sizeof kPage - 1};\n}\n\n}  // namespace limber\n`);

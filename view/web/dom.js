@@ -1,0 +1,43 @@
+// Elements are made of texts, never of markup.
+export function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.startsWith('on')) made.addEventListener(name.slice(2), value);
+    else if (name.startsWith('aria-') || name === 'role' || name === 'for') made.setAttribute(name, value);
+    else made[name] = value;
+  }
+  made.append(...children);
+  return made;
+}
+
+export function button(text, act, properties = {}) {
+  return element('button', { type: 'button', textContent: text, onclick: act, ...properties });
+}
+
+/** A labelled slider. @param show from the number to its text */
+export function slider(text, { min, max, step, value, show = (x) => x.toPrecision(3) }, act) {
+  const output = element('output', { textContent: show(value) });
+  const input = element('input', { type: 'range', min, max, step });
+  input.value = value;
+  input.addEventListener('input', () => {
+    output.textContent = show(Number(input.value));
+    act(Number(input.value));
+  });
+  const label = element('label', {}, text, input, output);
+  label.set = (x) => {
+    input.value = x;
+    output.textContent = show(x);
+  };
+  return label;
+}
+
+export function choice(text, options, value, act) {
+  const select = element('select', { onchange: () => act(select.value) },
+    ...options.map(([name, shown]) => element('option', { value: name, textContent: shown })));
+  select.value = value;
+  return element('label', {}, text, select, '');
+}
+
+export function section(title, open, ...children) {
+  return element('details', { open }, element('summary', { textContent: title }), ...children);
+}

@@ -1,0 +1,111 @@
+// The engine: WebAssembly behind plain functions, with texts and arrays copied out where they are to last.
+import makePageEngine from 'page-engine';
+
+export function bytesOf(base64) {
+  const text = atob(base64.trim());
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
+  return bytes;
+}
+
+async function unzipped(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** @param wasm compressed by gzip. @param files [{path, base64}], their paths below /scene/. @throws Error with the engine's own line */
+export async function openEngine(wasm, files, scene) {
+  const module = await makePageEngine({ wasmBinary: await unzipped(wasm), print() {}, printErr() {} });
+  for (const { path, base64 } of files) {
+    module.FS.mkdirTree(path.slice(0, path.lastIndexOf('/')));
+    module.FS.writeFile(path, bytesOf(base64));
+  }
+  return new Engine(module, scene);
+}
+
+class Engine {
+  constructor(module, scene) {
+    this.module = module;
+    const length = module.lengthBytesUTF8(scene) + 1, at = module._malloc(length);
+    module.stringToUTF8(scene, at, length);
+    const opened = module._page_open(at);
+    module._free(at);
+    this.check(opened);
+    this.settingsAt = module._malloc(11 * 8);
+    this.describe();
+  }
+
+  check(done) {
+    if (!done) throw new Error(this.module.UTF8ToString(this.module._page_error()));
+  }
+
+  describe() {
+    this.scene = JSON.parse(this.module.UTF8ToString(this.module._page_description()));
+    this.sizes = this.scene.bodies.map((body) => 7 + this.scene.models[body.model].frequencies.length);
+    this.frameSize = this.sizes.reduce((sum, size) => sum + size, 0);
+  }
+
+  floats(at, count) { return this.module.HEAPF32.slice(at / 4, at / 4 + count); }
+  doubles(at, count) { return this.module.HEAPF64.slice(at / 8, at / 8 + count); }
+
+  model(i) {
+    const { vertices, triangles, frequencies } = this.scene.models[i], data = (what) => this.module._page_model_data(i, what);
+    const corners = data(3) / 4;
+    return {
+      rest: this.floats(data(0), 3 * vertices),
+      normals: this.floats(data(1), 3 * vertices),
+      shapes: this.floats(data(2), 8 * vertices * frequencies.length),
+      triangles: this.module.HEAPU32.slice(corners, corners + 3 * triangles),
+      vertices,
+      modes: frequencies.length,
+    };
+  }
+
+  writeSettings(s) {
+    const methods = ['penalty', 'velocity_program', 'gap_program', 'complementary'];
+    this.module.HEAPF64.set([...s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
+      methods.indexOf(s.method)], this.settingsAt / 8);
+  }
+  setLive(s) { this.writeSettings(s); this.check(this.module._page_set_live(this.settingsAt)); }
+  restart(s) { this.writeSettings(s); this.check(this.module._page_restart(this.settingsAt)); this.describe(); }
+
+  step() { this.check(this.module._page_step()); this.check(this.module._page_keep()); }
+  steps() { return this.module._page_steps_taken(); }
+  hash() { return this.module.UTF8ToString(this.module._page_hash()); }
+  frame() { return this.floats(this.module._page_frame(), this.frameSize); }
+  numbers() {
+    const [time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, settled] =
+      this.doubles(this.module._page_numbers(), 10);
+    return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, settled };
+  }
+  jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
+
+  cast(from, along) {
+    const [body, x, y, z, distance] = this.doubles(this.module._page_cast(...from, ...along), 5);
+    return body < 0 ? null : { body, point: [x, y, z], distance };
+  }
+  grab() { return this.module._page_grab() === 1; }
+  dragTo(target) { this.module._page_drag_to(...target); }
+  letGo() { this.module._page_let_go(); }
+  hand() {
+    const a = this.doubles(this.module._page_hand(), 11);
+    return { holds: a[0] === 1, point: a.slice(1, 4), target: a.slice(4, 7), force: a.slice(7, 10), pins: a[10] };
+  }
+  pin() { this.check(this.module._page_pin()); }
+  unpin() { this.module._page_unpin(); }
+  poke(along) { this.check(this.module._page_poke(...along)); }
+  drop(model, at) { this.check(this.module._page_drop(model, ...at)); this.describe(); }
+  showMode(body, mode, amplitude) { this.check(this.module._page_show_mode(body, mode, amplitude)); }
+
+  kept() { return this.module._page_kept(); }
+  keptStep(key) { return this.module._page_kept_step(key); }
+  goTo(key) { this.check(this.module._page_go_to(key)); this.describe(); }
+
+  reconstruct(body) {
+    const count = 3 * this.scene.models[this.scene.bodies[body].model].vertices, at = this.module._malloc(4 * count);
+    this.check(this.module._page_reconstruct(body, at));
+    const positions = this.floats(at, count);
+    this.module._free(at);
+    return positions;
+  }
+}

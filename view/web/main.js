@@ -1,0 +1,194 @@
+// The page: a scene that goes on in real time, and a person who reaches into it.
+import { bytesOf, openEngine } from './engine.js';
+import { Panel } from './panel.js';
+import { Stage } from './stage.js';
+
+const MOST_STEPS_A_FRAME = 6;
+
+class App {
+  constructor(engine, stage) {
+    this.engine = engine;
+    this.stage = stage;
+    this.settings = structuredClone(engine.scene.settings);
+    this.playing = true;
+    this.speed = 1;
+    this.left = 0;      // s of real time not yet stepped
+    this.key = null;    // of the history, where one has scrubbed to it
+    this.dragged = null;
+    this.mode = null;   // that is played
+    stage.load(engine);
+    stage.frameAll(engine);
+    this.panel = new Panel(document.getElementById('panel'), this);
+    this.listen();
+    this.fit();
+    this.show();
+  }
+
+  listen() {
+    const canvas = this.stage.renderer.domElement;
+    canvas.addEventListener('pointerdown', (event) => this.press(event), { capture: true });
+    canvas.addEventListener('pointermove', (event) => this.move(event));
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => this.release());
+    addEventListener('resize', () => this.fit());
+    addEventListener('keydown', (event) => {
+      if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement) return;
+      if (event.key === ' ') event.preventDefault(), this.setPlaying(!this.playing);
+      if (event.key === '.') this.stepOnce();
+    });
+  }
+
+  fit() {
+    const panel = document.getElementById('panel').getBoundingClientRect().width;
+    this.stage.resize(innerWidth, innerHeight, innerWidth > 700 ? panel : 0);
+  }
+
+  press(event) {
+    if (event.button !== 0 || !event.isPrimary) return;
+    const { from, along } = this.stage.ray(event), hit = this.engine.cast(from, along);
+    if (!hit) return;
+    event.stopImmediatePropagation();
+    this.resume();
+    if (this.tool === 'poke') this.engine.poke(along);
+    if (this.tool === 'pin') this.engine.pin();
+    if (this.tool === 'drag' && this.engine.grab()) {
+      this.dragged = hit.point;
+      event.target.setPointerCapture(event.pointerId);
+    }
+    this.show();
+  }
+
+  move(event) {
+    if (this.dragged) this.engine.dragTo((this.dragged = this.stage.across(event, this.dragged)));
+  }
+
+  release() {
+    if (this.dragged) this.engine.letGo();
+    this.dragged = null;
+    this.show();
+  }
+
+  /** What is done to the world happens now, not in the past that one looked at. */
+  resume() {
+    this.key = null;
+    this.mode = null;
+    if (!this.dragged) this.engine.letGo();
+  }
+
+  setPlaying(playing) {
+    if (playing) this.resume();
+    this.playing = playing;
+    this.left = 0;
+    this.show();
+  }
+
+  step() {
+    const began = performance.now();
+    this.engine.step();
+    this.panel.note(this.engine.numbers(), performance.now() - began);
+  }
+
+  stepOnce() {
+    this.setPlaying(false);
+    this.resume();
+    this.step();
+    this.show();
+  }
+
+  restart() {
+    this.dragged = null;
+    this.key = this.mode = null;
+    try {
+      this.engine.restart(this.settings);
+    } catch (error) {
+      return tell(error.message);
+    }
+    this.stage.load(this.engine);
+    for (const chart of [this.panel.energy, this.panel.time, this.panel.contacts]) chart.clear();
+    this.panel.build();
+    this.show();
+  }
+
+  goTo(key) {
+    this.playing = false;
+    this.mode = null;
+    this.engine.goTo(key);
+    this.key = key;
+    this.settings.gravity = this.engine.scene.settings.gravity;
+    this.stage.syncBodies(this.engine);
+    this.show();
+  }
+
+  unpin() {
+    this.resume();
+    this.engine.unpin();
+    this.show();
+  }
+
+  drop(model) {
+    this.resume();
+    const { x, y, z } = this.stage.controls.target;
+    this.engine.drop(model, [x, y, z + 0.5 * this.stage.size]);
+    this.stage.syncBodies(this.engine);
+    this.show();
+  }
+
+  showMode(body, mode, share) {
+    this.playing = false;
+    this.mode = null;
+    this.bend(body, mode, share);
+    this.show();
+  }
+
+  bend(body, mode, share) {
+    this.engine.showMode(body, mode, share * this.engine.scene.models[this.engine.scene.bodies[body].model].visible_amplitudes[mode]);
+  }
+
+  playMode(body, mode) {
+    this.playing = false;
+    this.mode = { body, mode, began: performance.now() };
+  }
+
+  /** One frame. @param seconds since the last one */
+  frame(seconds) {
+    if (this.playing) {
+      this.left = Math.min(this.left + this.speed * seconds, MOST_STEPS_A_FRAME * this.engine.scene.settings.step);
+      for (; this.left >= this.engine.scene.settings.step; this.left -= this.engine.scene.settings.step) this.step();
+    }
+    // Modes of any frequency are seen to swing once a second.
+    if (this.mode) this.bend(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
+    this.show();
+  }
+
+  show() {
+    const hand = this.stage.place(this.engine);
+    this.panel.show(this.engine.numbers(), hand);
+    this.stage.draw();
+  }
+}
+
+function tell(text) {
+  const message = document.getElementById('message');
+  message.className = 'error';
+  message.textContent = text;
+}
+
+async function main() {
+  const { scene, files } = JSON.parse(document.getElementById('files').textContent);
+  const engine = await openEngine(bytesOf(document.getElementById('engine').textContent), files, scene);
+  document.title = `${engine.scene.name} – limber`;
+  const app = new App(engine, new Stage(document.getElementById('view')));
+  globalThis.limber = app;
+  let last = performance.now();
+  const draw = (now) => {
+    try {
+      app.frame(Math.max(0, now - last) / 1000);
+    } catch (error) {
+      return tell(error.message);
+    }
+    last = now;
+    requestAnimationFrame(draw);
+  };
+  requestAnimationFrame(draw);
+}
+
+main().catch((error) => tell(error.message));

@@ -1,0 +1,137 @@
+// The controls at the side.
+import { button, choice, element, section, slider } from './dom.js';
+import { Chart } from './charts.js';
+
+const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin']];
+const METHODS = [['complementary', 'complementary'], ['gap_program', 'gap program'], ['velocity_program', 'velocity program'], ['penalty', 'penalty']];
+
+export class Panel {
+  constructor(host, app) {
+    this.app = app;
+    this.energy = new Chart('Energy', 'J', [['motion', '#3d7ab8'], ['modes', '#d9822b'], ['all', '#1d2430']]);
+    this.time = new Chart('A step takes', 'ms', [['', '#5f9e4f']]);
+    this.contacts = new Chart('Contacts', '', [['', '#b0508c']]);
+    this.state = element('small');
+    this.joints = element('table');
+    this.host = host;
+    this.build();
+  }
+
+  build() {
+    const { app } = this, { scene } = app.engine;
+    this.scrub = slider('Time', { min: 0, max: 0, step: 1, value: 0, show: () => '' }, (key) => app.goTo(key));
+    this.tools = TOOLS.map(([name, text]) => button(text, () => this.choose(name)));
+    this.host.replaceChildren(
+      element('h1', { textContent: scene.name }),
+      this.clock(),
+      section('Hand', true, element('div', { className: 'row' }, ...this.tools, button('Let pins go', () => app.unpin())),
+        this.live('drag_frequency', 'Hand', { min: 0.5, max: 12, step: 0.1, show: (x) => `${x.toFixed(1)} Hz` }),
+        this.live('poke_speed', 'Poke', { min: 0.05, max: 5, step: 0.05, show: (x) => `${x.toFixed(2)} m/s` }),
+        ...this.drops()),
+      section('World', true, ...this.world()),
+      section('Modes', scene.joints.length === 0 && !scene.contact, ...this.modes()),
+      section('Joints', scene.joints.length > 0, this.joints),
+      section('Charts', true, this.energy.element, this.time.element, this.contacts.element, this.state),
+      section('About', false, element('small', { textContent: document.getElementById('licences').textContent })));
+    this.choose('drag');
+  }
+
+  clock() {
+    const { app } = this;
+    this.play = button('Pause', () => app.setPlaying(!app.playing));
+    return element('div', {}, element('div', { className: 'row' }, this.play, button('Step', () => app.stepOnce()),
+      button('Start again', () => app.restart())),
+      slider('Speed', { min: 0.02, max: 1, step: 0.02, value: app.speed, show: (x) => `× ${x.toFixed(2)}` }, (x) => { app.speed = x; }),
+      this.scrub);
+  }
+
+  live(name, text, options) {
+    const { app } = this;
+    return slider(text, { ...options, value: app.settings[name] }, (x) => {
+      app.settings[name] = x;
+      app.engine.setLive(app.settings);
+    });
+  }
+
+  anew(name, text, options) {
+    const { app } = this;
+    return slider(text, { ...options, value: Math.min(app.settings[name], options.max) }, (x) => { app.settings[name] = x; });
+  }
+
+  world() {
+    const { app } = this, most = Math.max(0, ...app.engine.scene.models.map((m) => m.frequencies.length));
+    if (this.mostModes === undefined) this.mostModes = most;
+    const gravity = slider('Gravity', { min: -20, max: 20, step: 0.1, value: -app.settings.gravity[2], show: (x) => `${x.toFixed(1)} m/s²` }, (x) => {
+      app.settings.gravity = [app.settings.gravity[0], app.settings.gravity[1], -x];
+      app.engine.setLive(app.settings);
+    });
+    const rates = [[1 / 30, '1/30 s'], [1 / 60, '1/60 s'], [1 / 120, '1/120 s'], [1 / 240, '1/240 s'], [1 / 1000, '1/1000 s']];
+    if (!rates.some(([h]) => Math.abs(h - app.settings.step) < 1e-9)) rates.unshift([app.settings.step, `${app.settings.step} s`]);
+    const nearest = rates.find(([h]) => Math.abs(h - app.settings.step) < 1e-9)[0];
+    return [gravity,
+      element('small', { textContent: 'From the next start:' }),
+      choice('Step', rates.map(([h, text]) => [String(h), text]), String(nearest), (h) => { app.settings.step = Number(h); }),
+      this.anew('modes', 'Modes', { min: 0, max: this.mostModes, step: 1, show: (x) => `${x}` }),
+      this.anew('damping', 'Damping', { min: 0, max: 5, step: 0.05, show: (x) => `× ${x.toFixed(2)}` }),
+      this.anew('friction', 'Friction', { min: 0, max: 1.5, step: 0.05, show: (x) => x.toFixed(2) }),
+      choice('Contact', METHODS, app.settings.method, (method) => { app.settings.method = method; }),
+      element('div', { className: 'row' }, button('Start again', () => app.restart()))];
+  }
+
+  drops() {
+    const { app } = this;
+    return [element('div', { className: 'row' }, 'Drop', ...app.engine.scene.models.map((model, i) =>
+      button(model.name, () => app.drop(i))))];
+  }
+
+  modes() {
+    const { app } = this;
+    return app.engine.scene.bodies.slice(0, 8).filter(({ model }) => app.engine.scene.models[model].frequencies.length > 0)
+      .map((body, number) => {
+        const { frequencies } = app.engine.scene.models[body.model];
+        const rows = () => frequencies.map((hz, mode) => {
+          const moved = slider(`${hz.toPrecision(4)} Hz`, { min: -1, max: 1, step: 0.01, value: 0, show: (x) => x.toFixed(2) },
+            (x) => app.showMode(number, mode, x));
+          return element('div', {}, moved, button('Play', () => app.playMode(number, mode)));
+        });
+        const list = section(body.name, false);
+        list.addEventListener('toggle', () => { if (list.open && list.children.length === 1) list.append(...rows()); });
+        return list;
+      });
+  }
+
+  choose(tool) {
+    this.app.tool = tool;
+    TOOLS.forEach(([name], i) => this.tools[i].setAttribute('aria-pressed', String(name === tool)));
+  }
+
+  /** After steps, and when something was set. */
+  show(numbers, hand) {
+    const { app } = this, range = this.scrub.querySelector('input');
+    this.play.textContent = app.playing ? 'Pause' : 'Play';
+    range.max = app.engine.kept() - 1;
+    range.value = app.key ?? range.max;
+    this.scrub.querySelector('output').textContent = `${numbers.time.toFixed(2)} s`;
+    for (const chart of [this.energy, this.time, this.contacts]) chart.draw();
+    const force = Math.hypot(...hand.force);
+    this.state.textContent = (hand.holds ? `hand pulls ${force.toPrecision(3)} N; ` : '') +
+      `${app.engine.scene.bodies.length} bodies, ${numbers.asleep} asleep, ${hand.pins} pins, state ${app.engine.hash()}` +
+      (numbers.settled ? '' : '; some contacts not settled');
+    this.showJoints();
+  }
+
+  note(numbers, milliseconds) {
+    this.energy.add([numbers.rigid, numbers.modal + numbers.elastic, numbers.rigid + numbers.modal + numbers.elastic + numbers.potential]);
+    this.time.add([milliseconds]);
+    this.contacts.add([numbers.contacts]);
+  }
+
+  showJoints() {
+    const { joints } = this.app.engine.scene, frames = this.app.engine.jointFrames();
+    const text = (x) => (x === null ? '∞' : x.toFixed(2));
+    this.joints.replaceChildren(...joints.map((joint, j) => element('tr', {},
+      element('td', { textContent: `${joint.a || 'world'} – ${joint.b}` }), element('td', { textContent: joint.type }),
+      element('td', { textContent: joint.limits.map(([low, high], i) =>
+        `${frames[9 * j + 6 + i].toFixed(2)} in [${low === null ? '−∞' : text(low)}, ${text(high)}]`).join('; ') }))));
+  }
+}

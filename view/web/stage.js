@@ -1,0 +1,167 @@
+// What is seen: camera, light, bodies, shapes that stand still, axes of joints, the hand.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { SurfaceBody, SurfaceModel } from './surface.js';
+
+const UP = new THREE.Vector3(0, 0, 1);
+
+export class Stage {
+  constructor(canvas) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.shadowMap.enabled = true;
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color(0xe9ecf1);
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.01, 1000);
+    this.camera.up.copy(UP);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f99, 1.6));
+    this.sun = new THREE.DirectionalLight(0xffffff, 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.bias = -0.0015;
+    this.scene.add(this.sun, this.sun.target);
+    this.still = new THREE.Group();
+    this.moving = new THREE.Group();
+    this.scene.add(this.still, this.moving);
+    this.joints = this.lines(0x1b1f27);
+    this.hand = this.lines(0xc4302b);
+    this.models = [];
+    this.bodies = [];
+    this.caster = new THREE.Raycaster();
+  }
+
+  lines(color) {
+    const made = new THREE.LineSegments(new THREE.BufferGeometry(),
+      new THREE.LineBasicMaterial({ color, depthTest: false, transparent: true }));
+    made.renderOrder = 1;
+    made.frustumCulled = false;
+    this.scene.add(made);
+    return made;
+  }
+
+  /** Models and shapes anew; bodies by syncBodies(). */
+  load(engine) {
+    for (const body of this.bodies) this.moving.remove(body.mesh), body.dispose();
+    for (const model of this.models) model.dispose();
+    this.bodies = [];
+    this.models = engine.scene.models.map((_, i) => new SurfaceModel(engine.model(i)));
+    for (const child of [...this.still.children]) {
+      this.still.remove(child);
+      child.geometry.dispose();
+      child.material.dispose();
+    }
+    for (const shape of engine.scene.statics) this.still.add(standing(shape));
+    this.syncBodies(engine);
+  }
+
+  syncBodies(engine) {
+    const wanted = engine.scene.bodies;
+    while (this.bodies.length > wanted.length) {
+      const body = this.bodies.pop();
+      this.moving.remove(body.mesh);
+      body.dispose();
+    }
+    for (let i = this.bodies.length; i < wanted.length; ++i) {
+      this.bodies.push(new SurfaceBody(this.models[wanted[i].model], i));
+      this.moving.add(this.bodies[i].mesh);
+    }
+  }
+
+  place(engine) {
+    const frame = engine.frame();
+    let at = 0;
+    this.bodies.forEach((body, i) => {
+      body.set(frame.subarray(at, at + engine.sizes[i]));
+      at += engine.sizes[i];
+    });
+    this.drawJoints(engine);
+    const hand = engine.hand();
+    setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
+    return hand;
+  }
+
+  drawJoints(engine) {
+    const frames = engine.jointFrames(), ends = [], half = 0.06 * this.size;
+    for (let j = 0; j < frames.length; j += 9) {
+      const [x, y, z, ax, ay, az] = frames.subarray(j, j + 6);
+      ends.push(x - half * ax, y - half * ay, z - half * az, x + half * ax, y + half * ay, z + half * az);
+    }
+    setLines(this.joints, ends);
+  }
+
+  /** Looks at all bodies as they are. */
+  frameAll(engine) {
+    const box = new THREE.Box3(), point = new THREE.Vector3();
+    engine.scene.bodies.forEach((_, i) => {
+      const positions = engine.reconstruct(i);
+      for (let k = 0; k < positions.length; k += 3) box.expandByPoint(point.fromArray(positions, k));
+    });
+    for (const shape of engine.scene.statics)
+      if (!shape.ground) for (let k = 0; k < shape.points.length; k += 3) box.expandByPoint(point.fromArray(shape.points, k));
+    const middle = box.getCenter(new THREE.Vector3());
+    this.size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
+    if (engine.scene.statics.some((shape) => shape.ground)) middle.z *= 0.6;
+    this.controls.target.copy(middle);
+    this.camera.position.copy(middle).addScaledVector(new THREE.Vector3(0.35, -1, 0.45).normalize(), 1.5 * this.size);
+    this.camera.near = 0.01 * this.size;
+    this.camera.far = 60 * this.size;
+    this.sun.position.copy(middle).addScaledVector(new THREE.Vector3(0.4, -0.5, 1).normalize(), 2 * this.size);
+    this.sun.target.position.copy(middle);
+    Object.assign(this.sun.shadow.camera,
+      { left: -this.size, right: this.size, top: this.size, bottom: -this.size, near: 0.1 * this.size, far: 5 * this.size });
+    this.sun.shadow.camera.updateProjectionMatrix();
+    this.sun.shadow.normalBias = 0.004 * this.size;
+    this.controls.update();
+  }
+
+  /** @return {from, along} in the world, of a pointer event */
+  ray(event) {
+    const box = this.renderer.domElement.getBoundingClientRect();
+    const at = new THREE.Vector2((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
+    this.camera.updateMatrixWorld();
+    this.caster.setFromCamera(at, this.camera);
+    return { from: this.caster.ray.origin.toArray(), along: this.caster.ray.direction.toArray() };
+  }
+
+  /** Where the pointer is in the plane through a point across the line of sight. */
+  across(event, point) {
+    const normal = this.camera.getWorldDirection(new THREE.Vector3());
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, new THREE.Vector3(...point));
+    this.ray(event);
+    return this.caster.ray.intersectPlane(plane, new THREE.Vector3())?.toArray() ?? point;
+  }
+
+  resize(width, height, panel) {
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    // The scene is in the middle of what the panel leaves free.
+    this.camera.setViewOffset(width, height, panel / 2, 0, width, height);
+    this.camera.updateProjectionMatrix();
+  }
+
+  draw() {
+    this.controls.update();
+    this.renderer.render(this.scene, this.camera);
+  }
+}
+
+function setLines(lines, ends) {
+  lines.geometry.dispose();
+  lines.geometry = new THREE.BufferGeometry();
+  lines.geometry.setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
+  lines.visible = ends.length > 0;
+}
+
+function standing({ points, triangles, ground }) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
+  geometry.setIndex(triangles);
+  const flat = geometry.toNonIndexed();
+  geometry.dispose();
+  flat.computeVertexNormals();
+  const mesh = new THREE.Mesh(flat, new THREE.MeshStandardMaterial({ color: ground ? 0xdfe3ea : 0xa9b1bd, roughness: 0.9, side: THREE.DoubleSide }));
+  mesh.receiveShadow = true;
+  mesh.castShadow = !ground;
+  return mesh;
+}
