@@ -104,6 +104,7 @@ Json body_report(const ModalModel& model) {
       {"volume_block",
        d.volume_block ? Json{{"nodes", d.volume_block->rest.size()}, {"tets", d.volume_block->tets.size()}} : Json()},
       {"residual_compliance", residual_report(d)},
+      {"skin", d.skin ? Json{{"handles", d.skin->handles}} : Json()},
       {"memory_bytes", shape_bytes(d)},
       {"modes", modes}};
 }
@@ -141,6 +142,7 @@ std::string surfaces_text(const ModalModelData& d) {
         fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
   if (const auto& r = d.residual_compliance)
     text += fmt::format("  residual        {}, of {} vertices\n", to_string(r->form()), r->vertices());
+  if (d.skin) text += fmt::format("  skin            {} handles\n", d.skin->handles);
   return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
 }
 

@@ -36,7 +36,7 @@ struct Arguments {
   std::string mass = "lumped";
   std::vector<double> rayleigh;
   std::string damping_ratio;
-  std::string render_surface, collision_surface;
+  std::string render_surface, collision_surface, skin;
   TetrahedralisationOptions tets;
   SceneLimits limits;
   std::string load = "sudden";
@@ -136,6 +136,9 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
       ->type_name("MB")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  app.add_flag("--skin{auto}", a.skin,
+               "also bake a modal skin, which bends far without swelling; --skin=HANDLES with so many handles, else "
+               "as many as it needs, 8 to 24");
   app.add_flag("--volume", a.volume_block,
                "also bake all nodes, so that any initial deformation can be given to the runtime");
 }
@@ -182,6 +185,16 @@ ResidualOptions residual_of(const Arguments& a) {
   return residual;
 }
 
+SkinOptions skin_of(const std::string& text) {
+  if (text.empty()) return {};
+  SkinOptions skin{.make = true};
+  if (text == "auto") return skin;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%d%c", &skin.handles, &rest) != 1 || skin.handles < 1)
+    throw InvalidArgument("--skin=" + text + ": expected a number of handles, such as --skin=12, or --skin alone");
+  return skin;
+}
+
 LoadKind load_of(const std::string& text) {
   return text == "static" ? LoadKind::kStatic : text == "resonant" ? LoadKind::kResonant : LoadKind::kSudden;
 }
@@ -201,6 +214,7 @@ BakeOptions options_of(const Arguments& a) {
   if ((a.limits.max_force > 0.0) != (a.limits.min_displacement > 0.0))
     throw InvalidArgument("--max-force and --min-displacement go together: one of them is missing");
   o.residual = residual_of(a);
+  o.skin = skin_of(a.skin);
   o.collision_triangles = a.collision_triangles;
   o.volume_block = a.volume_block;
   o.validate();
@@ -317,8 +331,11 @@ std::string options_line(const CLI::App& app) {
         o->get_name() == "--output")
       continue;
     const bool is_flag = o->get_items_expected_max() == 0;
-    for (const std::string& value : o->results())
-      line += (line.empty() ? "" : " ") + o->get_name() + (is_flag ? "" : " " + fs::path(value).filename().string());
+    for (const std::string& value : o->results()) {
+      line += (line.empty() ? "" : " ") + o->get_name();
+      if (!is_flag) line += " " + fs::path(value).filename().string();
+      if (is_flag && value != "true") line += "=" + value;
+    }
   }
   return line;
 }

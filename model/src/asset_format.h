@@ -18,6 +18,7 @@ static_assert(std::endian::native == std::endian::little,
 
 inline constexpr char kExtension[] = "LIMBER_modal";
 inline constexpr int kFormatVersion = 1;
+inline constexpr int kSkinVersion = 1;
 inline constexpr std::string_view kHashPrefix = "sha256:";
 
 /// The content hash: provenance, then the numbers of every body, then the whole BIN chunk. It does not depend on how
@@ -57,6 +58,11 @@ class ContentHash {
     if (body.residual_compliance) {
       add(to_string(body.residual_compliance->form()));
       add(static_cast<std::uint64_t>(body.residual_compliance->vertices()));
+    }
+    if (body.skin) {
+      add(std::string_view("skin"));
+      add(static_cast<std::uint64_t>(kSkinVersion));
+      add(static_cast<std::uint64_t>(body.skin->handles));
     }
   }
 

@@ -169,6 +169,7 @@ class BodyReader {
     if (block_.has("collision")) read_collision_surface();
     if (block_.has("volume_block")) read_volume();
     if (block_.has("residual_compliance")) read_residual();
+    if (block_.has("skin")) read_skin();
     block_.finish();
     for (const char* unread : {"weights", "extras"}) (void)mesh_.has(unread);
     mesh_.finish();
@@ -287,6 +288,35 @@ class BodyReader {
     std::memcpy(residual.values().data(), bytes.data(), bytes.size());
     block.finish();
     data_.residual_compliance = std::move(residual);
+  }
+
+  void read_skin() {
+    const JsonObject block(block_.at("skin"), block_.where("skin"));
+    const std::int64_t version = block.integer("version", 1, kMaxCount);
+    if (version != asset_format::kSkinVersion)
+      throw InputError(block.where("version") + ": is " + std::to_string(version) + ", this limber reads version " +
+                       std::to_string(asset_format::kSkinVersion));
+    ModalSkin skin;
+    skin.handles = static_cast<Index>(block.integer("handles", 1, ModalSkin::kMaxHandles));
+    skin.modes = static_cast<Index>(modes_);
+    const auto n = static_cast<std::size_t>(skin.handles);
+    const auto read = [&]<class T>(const char* key, std::size_t count, std::vector<T>& items) {
+      if (count > 0) items = items_of<T>(pieces_.raw(block, key, sizeof(T) * count));
+    };
+    read("rest", n, skin.rest);
+    read("rotations", 3 * n * modes_, skin.rotations);
+    read("arms", 3 * n * n, skin.arms);
+    read("shifts", 3 * n * n * modes_, skin.shifts);
+    read("render", data_.render.rest.size(), skin.render);
+    read("collision", data_.collision ? data_.collision->rest.size() : 0, skin.collision);
+    read("volume", data_.volume_block ? data_.volume_block->rest.size() : 0, skin.volume);
+    if (data_.motion == FrameMotion::kFree) {
+      read("gauge_weights", 4 * n, skin.gauge.weights);
+      read("gauge_rest", 12 * n, skin.gauge.rest);
+      read("gauge_shapes", 12 * n * modes_, skin.gauge.shapes);
+    }
+    block.finish();
+    data_.skin = std::move(skin);
   }
 
   std::string_view vectors(const JsonObject& attributes, const std::string& key, std::size_t vertices) {

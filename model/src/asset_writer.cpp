@@ -86,6 +86,26 @@ json residual_block(GlbBuilder& glb, const ResidualCompliance& residual) {
   return block;
 }
 
+json skin_block(GlbBuilder& glb, const ModalSkin& skin) {
+  json block = {{"version", asset_format::kSkinVersion}, {"handles", skin.handles}};
+  const auto add = [&](const char* key, const auto& items) {
+    if (!items.empty()) block[key] = add_raw(glb, items);
+  };
+  std::vector<double> rest;
+  for (const Vec3& r : skin.rest) rest.insert(rest.end(), {r.x(), r.y(), r.z()});
+  add("rest", rest);
+  add("rotations", skin.rotations);
+  add("arms", skin.arms);
+  add("shifts", skin.shifts);
+  add("render", skin.render);
+  add("collision", skin.collision);
+  add("volume", skin.volume);
+  add("gauge_weights", skin.gauge.weights);
+  add("gauge_rest", skin.gauge.rest);
+  add("gauge_shapes", skin.gauge.shapes);
+  return block;
+}
+
 /// The LIMBER_modal block of a mesh, but for the parts that lie in the binary chunk.
 json body_block(const ModalModelData& body) {
   json block = {{"motion", to_string(body.motion)},
@@ -141,6 +161,7 @@ void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHas
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
   if (body.residual_compliance) block["residual_compliance"] = residual_block(glb, *body.residual_compliance);
+  if (body.skin) block["skin"] = skin_block(glb, *body.skin);
   mesh.extras = extras_for_people(model);
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
   // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.

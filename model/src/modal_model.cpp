@@ -37,6 +37,7 @@ class Checker {
     if (d_.collision) check_surface(*d_.collision, "collision");
     if (d_.volume_block) check_volume(*d_.volume_block);
     if (d_.residual_compliance) check_residual(*d_.residual_compliance);
+    if (d_.skin) check_skin(*d_.skin);
   }
 
  private:
@@ -210,6 +211,53 @@ class Checker {
     if (principal.x() < -kShapeError * std::abs(principal.z()))
       refuse(at("residual_compliance", static_cast<std::size_t>(vertex)),
              "has the principal compliance " + shown(principal.x()) + " m/N", "0 or more");
+  }
+
+  void check_skin(const ModalSkin& skin) const {
+    if (skin.handles < 1 || skin.handles > ModalSkin::kMaxHandles)
+      refuse("skin.handles", "is " + std::to_string(skin.handles), "1 to " + std::to_string(ModalSkin::kMaxHandles));
+    const auto n = static_cast<std::size_t>(skin.handles);
+    count(static_cast<std::size_t>(skin.modes), modes_, "skin.modes", "mode");
+    count(skin.rest.size(), n, "skin.rest", "handle");
+    count(skin.rotations.size(), 3 * n * modes_, "skin.rotations", "handle, axis and mode");
+    count(skin.arms.size(), 3 * n * n, "skin.arms", "pair of handles and axis");
+    count(skin.shifts.size(), 3 * n * n * modes_, "skin.shifts", "pair of handles, axis and mode");
+    for (const Vec3& r : skin.rest)
+      if (!r.allFinite()) refuse("skin.rest", "holds a number that is not finite", "finite numbers");
+    for (const auto* numbers : {&skin.rotations, &skin.arms, &skin.shifts}) check_finite<float>(*numbers, "skin");
+    check_influences(skin.render, d_.render.rest.size(), skin, "skin.render");
+    check_influences(skin.collision, d_.collision ? d_.collision->rest.size() : 0, skin, "skin.collision");
+    check_influences(skin.volume, d_.volume_block ? d_.volume_block->rest.size() : 0, skin, "skin.volume");
+    const std::size_t gauged = d_.motion == FrameMotion::kFree ? n : 0;
+    count(skin.gauge.weights.size(), 4 * gauged, "skin.gauge.weights", "handle of a free body, four each");
+    count(skin.gauge.rest.size(), 12 * gauged, "skin.gauge.rest", "handle of a free body, twelve each");
+    count(skin.gauge.shapes.size(), 12 * gauged * modes_, "skin.gauge.shapes", "handle and mode, twelve each");
+    for (const auto* numbers : {&skin.gauge.weights, &skin.gauge.rest, &skin.gauge.shapes})
+      check_finite<double>(*numbers, "skin.gauge");
+  }
+
+  template <class T>
+  void check_finite(std::span<const T> numbers, const std::string& field) const {
+    for (const T x : numbers)
+      if (!std::isfinite(x)) refuse(field, "holds a number that is not finite", "finite numbers");
+  }
+
+  void check_influences(const std::vector<SkinInfluences>& all, std::size_t vertices, const ModalSkin& skin,
+                        const std::string& field) const {
+    count(all.size(), vertices, field, "vertex");
+    for (std::size_t v = 0; v < all.size(); ++v) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < SkinInfluences::kMost; ++i) {
+        const auto weight = static_cast<double>(all[v].weight[i]);
+        if (!(weight >= 0.0 && weight <= 1.0 && std::remainder(weight, SkinInfluences::kUnit) == 0.0))
+          refuse(at(field, v), "has the weight " + shown(weight), "a multiple of 2^-20 in [0, 1]");
+        if (all[v].handle[i] >= skin.handles)
+          refuse(at(field, v), "names handle " + std::to_string(all[v].handle[i]),
+                 "0 to " + std::to_string(skin.handles - 1));
+        sum += weight;
+      }
+      if (sum != 1.0) refuse(at(field, v), "has weights of sum " + shown(sum), "1");
+    }
   }
 
   /// Radius of gyration about the origin, m: ∫ρ|x|² = tr(I)/2.

@@ -74,6 +74,21 @@ void expect_same_surface(const ModalSurface& a, const ModalSurface& b) {
       ASSERT_EQ(a.basis.shape(v, i), b.basis.shape(v, i)) << v << ", mode " << i;
 }
 
+void expect_same_skin(const ModalSkin& a, const ModalSkin& b) {
+  EXPECT_EQ(a.handles, b.handles);
+  EXPECT_EQ(a.modes, b.modes);
+  EXPECT_EQ(a.rest, b.rest);
+  EXPECT_EQ(a.rotations, b.rotations);
+  EXPECT_EQ(a.arms, b.arms);
+  EXPECT_EQ(a.shifts, b.shifts);
+  EXPECT_EQ(a.render, b.render);
+  EXPECT_EQ(a.collision, b.collision);
+  EXPECT_EQ(a.volume, b.volume);
+  EXPECT_EQ(a.gauge.weights, b.gauge.weights);
+  EXPECT_EQ(a.gauge.rest, b.gauge.rest);
+  EXPECT_EQ(a.gauge.shapes, b.gauge.shapes);
+}
+
 void expect_same_body(const ModalModelData& a, const ModalModelData& b) {
   EXPECT_EQ(a.name, b.name);
   EXPECT_EQ(a.motion, b.motion);
@@ -95,6 +110,8 @@ void expect_same_body(const ModalModelData& a, const ModalModelData& b) {
     EXPECT_EQ(a.residual_compliance->form(), b.residual_compliance->form());
     EXPECT_TRUE(std::ranges::equal(a.residual_compliance->values(), b.residual_compliance->values()));
   }
+  ASSERT_EQ(a.skin.has_value(), b.skin.has_value());
+  if (a.skin) expect_same_skin(*a.skin, *b.skin);
   ASSERT_EQ(a.volume_block.has_value(), b.volume_block.has_value());
   if (!a.volume_block) return;
   EXPECT_EQ(a.volume_block->rest, b.volume_block->rest);
@@ -320,6 +337,19 @@ TEST(AssetReader, EveryNumberThatTheRuntimeUsesIsUnderTheHash) {
               HasSubstr("content_hash"));
 }
 
+TEST(AssetReader, SkinsAreChecked) {
+  const std::string place = "\"test.glb\".meshes[2].extensions.LIMBER_modal.skin";
+  const auto change = [](const char* field, const json& value) {
+    return reading(with_document([&](json& d) { block_of(d, 2)["skin"][field] = value; }));
+  };
+  EXPECT_THAT(change("version", 2), HasSubstr(place + ".version: is 2, this limber reads version 1"));
+  EXPECT_THAT(change("handles", 0), HasSubstr(place + ".handles: is 0"));
+  EXPECT_THAT(change("handles", 256), HasSubstr(place + ".handles: is 256"));
+  EXPECT_THAT(change("handles", 5), HasSubstr(place + ".rest"));
+  EXPECT_THAT(change("knees", 1), HasSubstr("knees"));
+  EXPECT_NE(reading(with_document([](json& d) { block_of(d, 2).erase("skin"); })), "accepted");
+}
+
 TEST(AssetReader, WrongCountsAndTypesNameTheirPlace) {
   const auto change = [](const char* field, const json& value) {
     return reading(with_document([&](json& d) { block_of(d, 1)[field] = value; }));
@@ -365,7 +395,7 @@ TEST(AssetReader, PiecesInAnotherOrderAreRefused) {
               HasSubstr("there are 6 morph targets, expected one per mode, 7"));
   EXPECT_THAT(reading(with_document([](json& d) { d["meshes"][0]["primitives"][0]["indices"] = 999999; })),
               HasSubstr("another accessor"));
-  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"].erase(1); })), HasSubstr("of which its bodies use"));
+  EXPECT_THAT(reading(with_document([](json& d) { d["meshes"].erase(2); })), HasSubstr("of which its bodies use"));
 }
 
 TEST(AssetReader, NumbersThatAreWrongUnderARightHashAreRefused) {

@@ -73,6 +73,34 @@ inline ModalModelData box(const std::string& name, Index modes, Index subdivisio
   return d;
 }
 
+/// Handles in a row along x that turn about z as the modes bend, for all vertices of the model's surfaces.
+inline ModalSkin skin_of(const ModalModelData& d, Index handles) {
+  const auto n = static_cast<std::size_t>(handles), k = d.eigenvalues.size();
+  ModalSkin skin{.handles = handles, .modes = static_cast<Index>(k)};
+  for (Index h = 0; h < handles; ++h) skin.rest.emplace_back((h + 0.5) / handles - 0.5, 0.01 * h, 0.0);
+  const auto wave = [](std::size_t i) { return static_cast<float>(std::sin(0.7 * static_cast<double>(i) + 1.0)); };
+  for (std::size_t i = 0; i < 3 * n * k; ++i) skin.rotations.push_back(0.3f * wave(i));
+  for (std::size_t i = 0; i < 3 * n * n; ++i) skin.arms.push_back(0.1f * wave(2 * i));
+  for (std::size_t i = 0; i < 3 * n * n * k; ++i) skin.shifts.push_back(0.01f * wave(3 * i));
+  const auto hang = [&](Index vertices) {
+    std::vector<SkinInfluences> all;
+    for (Index v = 0; v < vertices; ++v) {
+      std::vector<double> weights;
+      for (Index h = 0; h < handles; ++h) weights.push_back(1.0 + std::sin(0.3 * v + 1.1 * h));
+      all.push_back(skin_influences(weights));
+    }
+    return all;
+  };
+  skin.render = hang(d.render.vertices());
+  if (d.collision) skin.collision = hang(d.collision->vertices());
+  if (d.volume_block) skin.volume = hang(static_cast<Index>(d.volume_block->rest.size()));
+  if (d.motion != FrameMotion::kFree) return skin;
+  skin.gauge.weights.assign(4 * n, 0.25);
+  skin.gauge.rest.assign(12 * n, 0.5);
+  skin.gauge.shapes.assign(12 * n * k, 0.125);
+  return skin;
+}
+
 /// The same with a collision surface and a volume block (one tet) besides, fixed along a line.
 inline ModalModelData full_box(const std::string& name, Index modes) {
   ModalModelData d = box(name, modes);
@@ -105,9 +133,15 @@ inline std::shared_ptr<const ModalModel> model(ModalModelData data) {
   return std::make_shared<const ModalModel>(std::move(data));
 }
 
-/// Two bodies, one with every optional part.
+inline ModalModelData with_skin(ModalModelData d, Index handles) {
+  d.skin = skin_of(d, handles);
+  return d;
+}
+
+/// Three bodies, one with every optional part and two with a skin.
 inline Asset asset() {
-  return {.bodies = {model(box("bar", 7)), model(full_box("hinged bar", 5))},
+  return {.bodies = {model(box("bar", 7)), model(with_skin(full_box("hinged bar", 5), 3)),
+                     model(with_skin(box("reed", 4), 6))},
           .provenance = {.tool = "limber-precompute 0.1.0",
                          .input = "bar.msh",
                          .input_hash = std::string(64, 'a'),

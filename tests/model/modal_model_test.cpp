@@ -52,6 +52,43 @@ TEST(ModalModel, TouchesWithItsRenderSurfaceUnlessItHasAnother) {
   EXPECT_NE(&full.collision(), &full.render());
 }
 
+TEST(ModalModel, SkinFitsItsBody) {
+  const auto said = [](const std::function<void(ModalSkin&)>& change) {
+    return said_of([&](D& d) { change(*d.skin); }, example::with_skin(example::box("b", 3), 4));
+  };
+  EXPECT_EQ(said([](ModalSkin&) {}), "accepted");
+  EXPECT_EQ(said_of([](D&) {}, example::with_skin(example::full_box("b", 3), 4)), "accepted");
+  EXPECT_THAT(said([](ModalSkin& s) { s.handles = 0; }), HasSubstr("skin.handles is 0, expected 1 to 255"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.modes = 2; }), HasSubstr("skin.modes"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.rotations.pop_back(); }), HasSubstr("skin.rotations has 35 entries"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.shifts[5] = static_cast<float>(kNan); }), HasSubstr("not finite"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.render.pop_back(); }), HasSubstr("skin.render"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.collision = s.render; }), HasSubstr("skin.collision"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.render[2].handle[1] = 4; }), HasSubstr("skin.render[2] names handle 4"));
+  EXPECT_THAT(said([](ModalSkin& s) {
+                s.render[2].weight = {0.5f, 0.25f, 0.0f, 0.0f};
+              }),
+              HasSubstr("has weights of sum 0.75, expected 1"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.render[2].weight = {1.5f, -0.5f, 0.0f, 0.0f}; }), HasSubstr("weight"));
+  EXPECT_THAT(said([](ModalSkin& s) {
+                s.render[2].weight = {0.7f, 0.3f, 0.0f, 0.0f};
+              }),
+              HasSubstr("multiple of 2^-20"));
+  EXPECT_THAT(said([](ModalSkin& s) { s.gauge = {}; }), HasSubstr("skin.gauge"));  // of a free body
+}
+
+TEST(SkinInfluences, AreTheFourLargestLessTheFifth) {
+  const SkinInfluences at = skin_influences(std::vector<double>{0.1, 0.4, 0.2, 0.05, 0.3, 0.1});
+  EXPECT_EQ(at.handle, (std::array<std::uint8_t, 4>{1, 4, 2, 0}));
+  EXPECT_NEAR(at.weight[0], 0.5f, 1e-6f);  // (0.4 − 0.1)/0.6
+  EXPECT_EQ(at.weight[3], 0.0f);
+  EXPECT_EQ(at.weight[0] + at.weight[1] + at.weight[2], 1.0f);
+  EXPECT_EQ(skin_influences(std::vector<double>{0.0, 0.0, 3.0}).weight[0], 1.0f);
+  EXPECT_EQ(skin_influences(std::vector<double>(6, 1.0)).weight[3], 0.25f);  // alike: the first four
+  EXPECT_THROW(skin_influences(std::vector<double>{0.0, -1.0}), InvalidArgument);
+  EXPECT_THROW(skin_influences({}), InvalidArgument);
+}
+
 TEST(ModalModel, NameIsPrintableText) {
   EXPECT_THAT(said_of([](D& d) { d.name = ""; }), HasSubstr("name is empty"));
   EXPECT_THAT(said_of([](D& d) { d.name = "a\nb"; }), HasSubstr("control character"));

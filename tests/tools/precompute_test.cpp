@@ -239,6 +239,35 @@ TEST_F(Precompute, TooSmallAndTooFastModesAreDroppedWithTheirReason) {
   EXPECT_EQ(kept["kept"].size(), kept["frequencies_hz"].size());
 }
 
+TEST_F(Precompute, SkinIsBakedOnDemandAndTold) {
+  write_gmsh(folder / "bar.msh", testing::tet_box(12, 2, 2, {0.6, 0.1, 0.1}));
+  const std::vector<std::string> held = {"bar.msh", "--material",           "nylon", "--modes", "6",
+                                         "--fix",   "box:-1,-1,-1,1e-6,1,1"};
+  const auto with = [&](const char* option) {
+    std::vector<std::string> arguments = held;
+    if (*option) arguments.emplace_back(option);
+    return report(arguments)["bodies"][0]["skin"];
+  };
+  EXPECT_TRUE(with("").is_null());
+  EXPECT_FALSE(read_asset(folder / "asset.glb").bodies[0]->data().skin);
+  const Json three = with("--skin=3");
+  EXPECT_EQ(three["handles"], 4);  // the ground beside them
+  EXPECT_EQ(three["ground"], true);
+  EXPECT_EQ(three["modes"].size(), 3u);
+  ASSERT_TRUE(read_asset(folder / "asset.glb").bodies[0]->data().skin);
+  EXPECT_EQ(read_asset(folder / "asset.glb").bodies[0]->data().skin->handles, 4);
+  EXPECT_THAT(read_asset(folder / "asset.glb").provenance.options, HasSubstr("--skin=3"));
+  EXPECT_LT(with("--skin")["spread"].get<double>(), three["spread"].get<double>());
+}
+
+TEST_F(Precompute, BodiesThatTurnAboutAPointGetNoSkin) {
+  write_gmsh(folder / "cube.msh", testing::tet_box(2, 1.0));
+  const Json r = report({"cube.msh", "--material", "nylon", "--modes", "3", "--fix", "nodes:0", "--skin"});
+  EXPECT_TRUE(r["bodies"][0]["skin"].is_null());
+  ASSERT_EQ(r["warnings"].size(), 1u);
+  EXPECT_THAT(r["warnings"][0].get<std::string>(), HasSubstr("turns about a point or a line"));
+}
+
 // Wrong input -------------------------------------------------------------------------------------------------------
 
 TEST_F(Precompute, EveryBrokenMeshGivesOneLineAndNoOutput) {
@@ -316,6 +345,9 @@ TEST_F(Precompute, WrongUseIsToldWithExitCodeTwo) {
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--rayleigh", "1,-1"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--mass", "heavy"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--scale", "0"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--skin=0"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--skin=few"},
+      {"cube.msh", "-o", "a.glb", "--material", "steel", "--skin=255"},
       {"cube.msh", "-o", "a.glb", "--material", "steel", "--unknown"},
   };
   for (const auto& arguments : wrong) {

@@ -25,6 +25,7 @@ function contentHash(document, binary) {
     optional(body.collision, 'vertices', 'triangles');
     optional(body.volume_block, 'nodes', 'tets');
     if (body.residual_compliance) text(body.residual_compliance.form), u64(body.residual_compliance.vertices);
+    if (body.skin) text('skin'), [body.skin.version, body.skin.handles].forEach(u64);
   }
   return `sha256:${hash.update(binary).digest('hex')}`;
 }

@@ -10,6 +10,7 @@
 #include "fem/mass_properties.h"
 #include "limber/core/error.h"
 #include "limber/model/embedding.h"
+#include "skin/bake_skin.h"
 
 namespace limber {
 namespace {
@@ -319,6 +320,36 @@ void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, con
   r.seconds = a.seconds;
 }
 
+std::size_t bytes_of(const ModalSkin& skin) {
+  return sizeof(Vec3) * skin.rest.size() +
+         sizeof(float) * (skin.rotations.size() + skin.arms.size() + skin.shifts.size()) +
+         sizeof(SkinInfluences) * (skin.render.size() + skin.collision.size() + skin.volume.size()) +
+         sizeof(double) * (skin.gauge.weights.size() + skin.gauge.rest.size() + skin.gauge.shapes.size());
+}
+
+std::optional<ModalSkin> modal_skin(const ModalAnalysis& a, std::span<const Index> kept, const BodyInput& in,
+                                    std::span<const Material> materials, const BodySurfaces& surfaces,
+                                    const BakeOptions& options, const Vec3& origin, SkinReport& report,
+                                    Warnings& warnings) {
+  if (!options.skin.make) return std::nullopt;
+  if (kept.empty() || a.motion == FrameMotion::kPoint || a.motion == FrameMotion::kLine) {
+    warnings.push_back("skin: body \"" + in.name + "\" gets none, as it " +
+                       (kept.empty() ? "has no modes" : "turns about a point or a line"));
+    return std::nullopt;
+  }
+  const auto start = Clock::now();
+  const TetMesh& mesh = in.part.mesh;
+  const auto body = internal::skin_body(a, kept, mesh, materials, in.fixed, options.analysis, origin);
+  internal::NodalSkin nodal = internal::bake_skin(body, options.skin, report);
+  nodal.skin.render = internal::surface_influences(nodal, mesh, surfaces.render.embedding);
+  if (surfaces.collision)
+    nodal.skin.collision = internal::surface_influences(nodal, mesh, surfaces.collision->embedding);
+  if (options.volume_block) nodal.skin.volume = nodal.nodes;
+  report.bytes = bytes_of(nodal.skin);
+  report.seconds = seconds_since(start);
+  return std::move(nodal.skin);
+}
+
 std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const Material> materials,
                                             const BakeOptions& options, BodyReport& report, Warnings& warnings,
                                             Jobs& jobs) {
@@ -354,10 +385,11 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   if (surfaces.collision) data.collision = modal_surface(*surfaces.collision, a, mesh, kept, data.origin_in_input);
   if (options.volume_block) data.volume_block = modal_volume(a, mesh, kept, data.origin_in_input);
   data.residual_compliance = std::move(residual);
+  data.skin = modal_skin(a, kept, in, materials, surfaces, options, data.origin_in_input, report.skin, warnings);
   auto model = std::make_shared<const ModalModel>(std::move(data));
   report.render = surfaces.render.report();
   report.collision = surfaces.touching().report();
-  report.seconds_embed += seconds_since(store_start);
+  report.seconds_embed += seconds_since(store_start) - report.skin.seconds;
   return model;
 }
 
@@ -425,12 +457,19 @@ void ResidualOptions::validate() const {
                           ", expected 0 or more");
 }
 
+void SkinOptions::validate() const {
+  if (handles < 0 || handles >= ModalSkin::kMaxHandles)
+    throw InvalidArgument("SkinOptions::handles is " + std::to_string(handles) + ", expected 0 to " +
+                          std::to_string(ModalSkin::kMaxHandles - 1));
+}
+
 void BakeOptions::validate() const {
   if (materials.empty()) throw InvalidArgument("bake: no material is given");
   damping.validate();
   analysis.validate();
   limits.validate();
   residual.validate();
+  skin.validate();
   if (collision_triangles < 0)
     throw InvalidArgument("BakeOptions::collision_triangles is " + std::to_string(collision_triangles) +
                           ", expected 0 or more");

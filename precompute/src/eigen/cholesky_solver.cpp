@@ -41,12 +41,12 @@ cholmod_sparse view(const SparseMatrix& A) {
 
 }  // namespace
 
-std::vector<Index> order_nodes(const SparseMatrix& K) {
-  idx_t nodes = K.size / 3;
+std::vector<Index> order_nodes(const SparseMatrix& K, Index block) {
+  idx_t nodes = K.size / block;
   std::vector<idx_t> start{0}, neighbour;
   for (Index i = 0; i < nodes; ++i) {
-    for (Index e = K.column_start[3 * i]; e < K.column_start[3 * i + 1]; e += 3)
-      if (K.row[e] != 3 * i) neighbour.push_back(K.row[e] / 3);
+    for (Index e = K.column_start[block * i]; e < K.column_start[block * i + 1]; e += block)
+      if (K.row[e] != block * i) neighbour.push_back(K.row[e] / block);
     start.push_back(static_cast<idx_t>(neighbour.size()));
   }
   std::vector<idx_t> order(nodes), place(nodes);

@@ -11,10 +11,10 @@
 
 namespace limber::internal {
 
-/// Nested dissection (METIS) of the graph of nodes behind a 3n × 3n matrix made of 3 × 3 blocks.
+/// Nested dissection (METIS) of the graph of nodes behind a matrix made of square blocks, 3 × 3 unless said.
 /// Ordering nodes instead of degrees of freedom takes a ninth of the edges and gives no more fill.
 /// @return the nodes in order of elimination
-std::vector<Index> order_nodes(const SparseMatrix& K);
+std::vector<Index> order_nodes(const SparseMatrix& K, Index block = 3);
 
 class CholeskySolver {
  public:

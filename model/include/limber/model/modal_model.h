@@ -17,6 +17,7 @@
 
 #include "limber/core/types.h"
 #include "limber/model/modal_basis.h"
+#include "limber/model/modal_skin.h"
 #include "limber/model/residual_compliance.h"
 #include "limber/model/vertex_rows.h"
 
@@ -77,6 +78,8 @@ struct ModalModelData {
   std::optional<ModalVolume> volume_block;
   /// Optional: of the collision surface's vertices (of the render surface's where that is what touches).
   std::optional<ResidualCompliance> residual_compliance;
+  /// Optional: what shows large bends without swelling.
+  std::optional<ModalSkin> skin;
 };
 
 /// How far a surface's vertices lie from the body origin and how far a mode can take them.

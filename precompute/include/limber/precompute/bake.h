@@ -6,6 +6,7 @@
 /// What `limber-precompute` does after reading its files; call it directly to bake inside another tool.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -71,6 +72,17 @@ struct ResidualOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
+/// A modal skin, the map that bends far (limber/model/modal_skin.h): of free bodies and of those held at three points
+/// or more; bodies that turn about a point or a line get none.
+struct SkinOptions {
+  bool make = false;
+  /// Handles, the ground not among them; 0: the fewest of 8, 12, … 24 with which no node turns by more than 13° apart
+  /// from its handles in the mean, when each of the lowest three modes by itself has the energy that turns the softest
+  /// by 120° (free bodies, whose ends turn to both sides: 60°). Where even 24 do not suffice, 24.
+  Index handles = 0;
+  void validate() const;  ///< @throws InvalidArgument naming the field
+};
+
 struct BakeOptions {
   MaterialTable materials = {};          ///< by region; "*" is the rest
   std::vector<NodeSelector> fixed = {};  ///< their union is held
@@ -78,6 +90,7 @@ struct BakeOptions {
   ModalAnalysisOptions analysis = {};
   SceneLimits limits = {};
   ResidualOptions residual = {};
+  SkinOptions skin = {};
   /// Most triangles of the collision surface, by edge collapse; 0: as it is.
   Index collision_triangles = 0;
   bool volume_block = false;  ///< bake all nodes, so that any initial deformation can be given to the runtime
@@ -95,6 +108,22 @@ struct ResidualReport {
   Index modes = 0;                                 ///< joined the basis; among the kept, not among frequencies_hz
   std::optional<ResidualCompliance::Form> form{};  ///< of the stored compliance; none: not asked for
   Index vertices = 0;
+  std::size_t bytes = 0;
+  double seconds = 0.0;
+};
+
+/// What was made of SkinOptions.
+struct SkinReport {
+  static constexpr std::array<double, 4> kDegrees{30.0, 60.0, 90.0, 120.0};
+  /// A mode by itself, turned so far that some node turns by kDegrees[i].
+  struct Mode {
+    Index mode = 0;                                ///< of the body's
+    std::array<double, kDegrees.size()> energy{};  ///< elastic energy of the shape over the mode's ½ λ z²
+  };
+  Index handles = 0;        ///< 0: none was made
+  bool ground = false;      ///< the last handle holds the fixed nodes
+  double spread = 0.0;      ///< rad, the largest: what SkinOptions::handles bounds
+  std::vector<Mode> modes;  ///< the lowest three that turn anything
   std::size_t bytes = 0;
   double seconds = 0.0;
 };
@@ -119,6 +148,7 @@ struct BodyReport {
   Index collision_triangles = 0;
   double collision_error = 0.0;  ///< what leaving out triangles moved the collision surface by, estimated, m
   ResidualReport residual;
+  SkinReport skin;
   ModalAnalysis::Seconds seconds;
   double seconds_embed = 0.0;
 };
