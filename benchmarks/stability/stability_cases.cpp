@@ -55,7 +55,9 @@ const std::vector<Axis>& axes() {
        [](StabilityCase& c, double x) { c.pull = x; },
        [](StabilityScene s) { return s == StabilityScene::kHandle; }},
       {"far_away", {0.0, 1e4, 1e7}, [](StabilityCase& c, double x) { c.far_away = x; }},
-      {"recovery_speed", {0.0, ContactOptions{}.recovery_speed}, [](StabilityCase& c, double x) { c.recovery_speed = x; },
+      {"recovery_speed",
+       {0.0, ContactOptions{}.recovery_speed},
+       [](StabilityCase& c, double x) { c.recovery_speed = x; },
        has_contact},
   };
   return kAxes;
@@ -72,7 +74,7 @@ const char* name(StabilityScene scene) {
 }
 
 const char* name(StabilityFault fault) {
-  constexpr std::array<const char*, kStabilityFaults> kNames{"not finite", "energy", "passed", "overlap",
+  constexpr std::array<const char*, kStabilityFaults> kNames{"not finite", "energy",   "passed",   "overlap",
                                                              "off target", "momentum", "unsettled"};
   return kNames[static_cast<std::size_t>(fault)];
 }
@@ -86,8 +88,7 @@ unsigned faults(const StabilityCase& at, const StabilityResult& r) {
     if (at_fault) bits |= 1u << static_cast<unsigned>(fault);
   };
   judge(StabilityFault::kNotFinite, !r.finite);
-  judge(StabilityFault::kEnergy,
-        !recovers && (r.total_rise > kRise || r.node_total_rise > kRise + 2.0 * r.spin_bound));
+  judge(StabilityFault::kEnergy, !recovers && (r.total_rise > kRise || r.node_total_rise > kRise + 2.0 * r.spin_bound));
   judge(StabilityFault::kPassed, r.passed);
   judge(StabilityFault::kOverlap, r.rest_overlap > kMostOverlap);
   judge(StabilityFault::kOffTarget, r.off_target > kOff + digits);
@@ -172,7 +173,8 @@ std::vector<StabilityCase> extreme_cases(int random) {
     for (int i = 0; i < random; ++i) {
       cases.push_back(usual);
       for (const Axis& axis : axes())
-        if (const auto drawn = generator(); axis.in(scene)) axis.set(cases.back(), axis.levels[drawn % axis.levels.size()]);
+        if (const auto drawn = generator(); axis.in(scene))
+          axis.set(cases.back(), axis.levels[drawn % axis.levels.size()]);
     }
   }
   return cases;

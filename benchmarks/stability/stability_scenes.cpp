@@ -65,9 +65,8 @@ TetMesh bar_mesh(const StabilityCase& at) {
 
 /// @param weight times the density, and the stiffness with it, so that the frequencies stay
 Material bar_material(const StabilityCase& at, double weight) {
-  return {.youngs_modulus = weight * at.youngs_modulus,
-          .poisson_ratio = at.poisson_ratio,
-          .density = weight * at.density};
+  return {
+      .youngs_modulus = weight * at.youngs_modulus, .poisson_ratio = at.poisson_ratio, .density = weight * at.density};
 }
 
 std::shared_ptr<const ModalModel> baked_bar(const StabilityCase& at, double weight) {

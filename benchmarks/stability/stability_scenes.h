@@ -1,6 +1,6 @@
 /// @file stability_scenes.h
-/// Baked bars that fly, fall, pile up, are held, torn at and joined, over all that could make them gain energy, explode,
-/// sink in or drift. What `limber-benchmark stability`, its tests and the energy tests run.
+/// Baked bars that fly, fall, pile up, are held, torn at and joined, over all that could make them gain energy,
+/// explode, sink in or drift. What `limber-benchmark stability`, its tests and the energy tests run.
 #pragma once
 
 #include <functional>
@@ -26,21 +26,21 @@ struct StabilityCase {
   StabilityScene scene = StabilityScene::kGround;
   double youngs_modulus = 1e6;  ///< Pa
   double poisson_ratio = 0.3;
-  double density = 1000.0;     ///< kg/m³
-  double size = 1.0;           ///< of bars of 0.3 × 0.1 × 0.1 m
-  double sliver_angle = 0.0;   ///< smallest dihedral angle of flat tetrahedra in the mesh, degrees; 0: none are
-  bool one_tet = false;        ///< a single tetrahedron in place of the bar
-  double step = 1.0 / 60.0;    ///< s
-  bool varying_step = false;   ///< each step its own, from a tenth of `step` to all of it
-  double damping_ratio = 0.0;  ///< of the first mode; more of the higher ones
-  int modes = 20;              ///< at most; kAllModes: as many as the mesh has
-  double mass_ratio = 1.0;     ///< kPile, kChain
-  double friction = 0.5;       ///< kGround, kPile
-  double gravity = 1.0;        ///< times the standard one
-  double speed = 0.0;          ///< downwards at first, m/s; kGround
-  double spin = 0.0;           ///< at first, rad/s; kFlight
-  double pull = 0.0;           ///< by how many sizes the hand pulls within ten steps before it lets go; kHandle
-  double far_away = 0.0;       ///< distance of the scene from the origin, m
+  double density = 1000.0;      ///< kg/m³
+  double size = 1.0;            ///< of bars of 0.3 × 0.1 × 0.1 m
+  double sliver_angle = 0.0;    ///< smallest dihedral angle of flat tetrahedra in the mesh, degrees; 0: none are
+  bool one_tet = false;         ///< a single tetrahedron in place of the bar
+  double step = 1.0 / 60.0;     ///< s
+  bool varying_step = false;    ///< each step its own, from a tenth of `step` to all of it
+  double damping_ratio = 0.0;   ///< of the first mode; more of the higher ones
+  int modes = 20;               ///< at most; kAllModes: as many as the mesh has
+  double mass_ratio = 1.0;      ///< kPile, kChain
+  double friction = 0.5;        ///< kGround, kPile
+  double gravity = 1.0;         ///< times the standard one
+  double speed = 0.0;           ///< downwards at first, m/s; kGround
+  double spin = 0.0;            ///< at first, rad/s; kFlight
+  double pull = 0.0;            ///< by how many sizes the hand pulls within ten steps before it lets go; kHandle
+  double far_away = 0.0;        ///< distance of the scene from the origin, m
   double recovery_speed = 0.0;  ///< m/s; 0: nothing does work on bodies that overlap
 };
 inline constexpr int kAllModes = 1000;
@@ -58,27 +58,27 @@ struct StabilityResult {
   double strain_difference = 0.0;  ///< largest difference of the elastic energies
 
   bool finite = true;
-  double overlap = 0.0;        ///< deepest vertex below the ground, over the bar's length
-  double rest_overlap = 0.0;   ///< the same at the last step
-  bool passed = false;         ///< some body was wholly below the ground
-  double off_target = 0.0;     ///< of the held point or the joints, over the bar's length
-  double momentum_error = 0.0;  ///< of the mass centre's parabola and of the angular momentum, relative; kFlight
+  double overlap = 0.0;          ///< deepest vertex below the ground, over the bar's length
+  double rest_overlap = 0.0;     ///< the same at the last step
+  bool passed = false;           ///< some body was wholly below the ground
+  double off_target = 0.0;       ///< of the held point or the joints, over the bar's length
+  double momentum_error = 0.0;   ///< of the mass centre's parabola and of the angular momentum, relative; kFlight
   int steps = 0, unsettled = 0;  ///< steps; those in which some island did not come to its targets
 };
 
 /// Runs a case. @throws InputError if the bake does not take the material or the mesh
 StabilityResult run(const StabilityCase& at, int steps);
 
-/// What a case must not do. Energies may rise by round-off alone, and by what changes of inertia the nodes' energy knows
-/// of; where something recovers from overlap, by the work of that, which is not judged.
+/// What a case must not do. Energies may rise by round-off alone, and by what changes of inertia the nodes' energy
+/// knows of; where something recovers from overlap, by the work of that, which is not judged.
 enum class StabilityFault {
   kNotFinite,
-  kEnergy,      ///< more than was put in, by World::energy or by the nodes: by 1e-6 of its scale
-  kPassed,      ///< wholly below the ground
-  kOverlap,     ///< deeper in the ground at the end than kMostOverlap of the length
-  kOffTarget,   ///< held points and joints: more than 1e-6 of the length, or rad, beside what the place's digits allow
-  kMomentum,    ///< more than 1e-9 beside the same
-  kUnsettled,   ///< more than a hundredth of the steps
+  kEnergy,     ///< more than was put in, by World::energy or by the nodes: by 1e-6 of its scale
+  kPassed,     ///< wholly below the ground
+  kOverlap,    ///< deeper in the ground at the end than kMostOverlap of the length
+  kOffTarget,  ///< held points and joints: more than 1e-6 of the length, or rad, beside what the place's digits allow
+  kMomentum,   ///< more than 1e-9 beside the same
+  kUnsettled,  ///< more than a hundredth of the steps
 };
 inline constexpr int kStabilityFaults = 7;
 inline constexpr double kMostOverlap = 0.05;

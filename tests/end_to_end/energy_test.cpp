@@ -1,5 +1,5 @@
-// No energy from nowhere: a part of the grid of stability_scenes.h, by World::energy and by the nodes of the meshes. All
-// of it: `limber-benchmark stability --grid energy`.
+// No energy from nowhere: a part of the grid of stability_scenes.h, by World::energy and by the nodes of the meshes.
+// All of it: `limber-benchmark stability --grid energy`.
 #include <gtest/gtest.h>
 
 #include <utility>
@@ -66,12 +66,12 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EnergyOfBars,
 // not settle. The impulses it ends with are refused then.
 TEST(EnergyOfBars, OfImpulsesThatDidNotComeTogetherIsRefused) {
   const StabilityResult r = run({.scene = StabilityScene::kChain,
-                              .youngs_modulus = 100.0,
-                              .poisson_ratio = 0.499,
-                              .step = 0.1,
-                              .damping_ratio = 2.0,
-                              .mass_ratio = 1e4},
-                             20);
+                                 .youngs_modulus = 100.0,
+                                 .poisson_ratio = 0.499,
+                                 .step = 0.1,
+                                 .damping_ratio = 2.0,
+                                 .mass_ratio = 1e4},
+                                20);
   expect_no_energy_from_nowhere(r, kRise);
 }
 
@@ -79,9 +79,9 @@ TEST(EnergyOfBars, OfImpulsesThatDidNotComeTogetherIsRefused) {
 // motion left there to take. It begins such a step more slowly, and stays where it is held.
 TEST(EnergyOfBars, AHeldOneIsNeverLetGoWhereItTurnsRound) {
   for (const int modes : {0, 8}) {
-    const StabilityResult r =
-        run({.scene = StabilityScene::kHandle, .youngs_modulus = 1e8, .poisson_ratio = 0.499, .step = 0.1, .modes = modes},
-            200);
+    const StabilityResult r = run(
+        {.scene = StabilityScene::kHandle, .youngs_modulus = 1e8, .poisson_ratio = 0.499, .step = 0.1, .modes = modes},
+        200);
     EXPECT_EQ(r.unsettled, 0) << modes;
     expect_no_energy_from_nowhere(r, kRise);
   }

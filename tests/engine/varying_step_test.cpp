@@ -15,7 +15,8 @@ TEST(VaryingStep, FreeFlightComesToWhereOneLongStepDoes) {
   BodyId bodies[2];
   int i = 0;
   for (World* world : {&varying, &once}) {
-    bodies[i] = world->add_body(damped_box(8, 3.0), {.velocity = {1.0, -2.0, 3.0}, .angular_velocity = {4.0, 1.0, -2.0}});
+    bodies[i] =
+        world->add_body(damped_box(8, 3.0), {.velocity = {1.0, -2.0, 3.0}, .angular_velocity = {4.0, 1.0, -2.0}});
     world->apply_impulse(bodies[i++], kMarked, {0.1, 0.3, -0.2});
   }
   std::mt19937 random(5);

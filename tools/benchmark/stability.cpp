@@ -75,10 +75,11 @@ std::string csv_of(const std::vector<CaseRow>& rows) {
     csv += testing::name(row.at.scene);
     for (const auto& [column, value] : testing::coordinates(row.at)) csv += fmt::format(",{:g}", value);
     const StabilityResult r = row.seen.value_or(StabilityResult{});
-    csv += fmt::format(",{},{},{},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{},{:.3g},{:.3g}\n",
-                       verdict(row), r.steps, r.unsettled, r.worst_rise, r.total_rise, r.node_worst_rise,
-                       r.node_total_rise, r.spin_bound, r.spin_excess, r.strain_difference, r.removed, r.overlap,
-                       r.rest_overlap, r.passed ? 1 : 0, r.off_target, r.momentum_error);
+    csv += fmt::format(
+        ",{},{},{},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{},{:.3g},{:.3g}\n",
+        verdict(row), r.steps, r.unsettled, r.worst_rise, r.total_rise, r.node_worst_rise, r.node_total_rise,
+        r.spin_bound, r.spin_excess, r.strain_difference, r.removed, r.overlap, r.rest_overlap, r.passed ? 1 : 0,
+        r.off_target, r.momentum_error);
   }
   return csv;
 }
@@ -135,7 +136,8 @@ std::string svg_of(const std::vector<CaseRow>& rows) {
   for (const auto& [level, at] : moduli) labels_x += fmt::format("{}'{:.0e}' {}", at > 0 ? "," : "", level, at);
   for (const auto& [level, at] : steps) labels_y += fmt::format("{}'{:.2g}' {}", at > 0 ? "," : "", level, at);
   commands = fmt::format(
-      "set datafile separator ','\nset xtics ({})\nset ytics ({})\nset xlabel \"Young's modulus, Pa\"\nset ylabel 'step, s'\n"
+      "set datafile separator ','\nset xtics ({})\nset ytics ({})\nset xlabel \"Young's modulus, Pa\"\nset ylabel "
+      "'step, s'\n"
       "set title 'share of cases at fault, %; at fault / all'\nset cbrange [0:100]\n"
       "set palette defined (0 '#f7fbff', 10 '#fdd0a2', 100 '#a50f15')\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\n"
       "plot 'data.csv' using 1:2:3 with image notitle, '' using 1:2:4 with labels font ',10' notitle",
@@ -184,9 +186,10 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
 }
 
 void declare(CLI::App& app, StabilityArguments& a) {
-  app.add_option("--grid", a.grid,
-                 "extremes: every level of every axis by itself, and random cases of all of them; energy: a full grid of "
-                 "stiffness, step, damping, modes and weights, without recovery")
+  app.add_option(
+         "--grid", a.grid,
+         "extremes: every level of every axis by itself, and random cases of all of them; energy: a full grid of "
+         "stiffness, step, damping, modes and weights, without recovery")
       ->type_name("NAME")
       ->check(CLI::IsMember({"extremes", "energy"}))
       ->capture_default_str();
@@ -202,7 +205,8 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  app.add_flag("--simplify", a.simplify, "tell for each case at fault the simplest one found that shares a fault with it");
+  app.add_flag("--simplify", a.simplify,
+               "tell for each case at fault the simplest one found that shares a fault with it");
   app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
   app.add_option("--plot", a.plot, "plot the share of faults over stiffness and step (needs gnuplot)")
       ->type_name("FILE.svg");
@@ -212,7 +216,8 @@ void declare(CLI::App& app, StabilityArguments& a) {
 
 std::function<void(Program&)> add_stability(CLI::App& programs) {
   const auto arguments = std::make_shared<StabilityArguments>();
-  CLI::App* app = programs.add_subcommand("stability", "baked bars driven to the ends of every axis, each with a verdict");
+  CLI::App* app =
+      programs.add_subcommand("stability", "baked bars driven to the ends of every axis, each with a verdict");
   declare(*app, *arguments);
   return [arguments, app](Program& program) {
     if (app->parsed()) benchmark_stability(program, *arguments);

@@ -259,7 +259,8 @@ void declare_step(CLI::App& app, StepArguments& a) {
 
 std::function<void(Program&)> add_step(CLI::App& programs) {
   const auto arguments = std::make_shared<StepArguments>();
-  CLI::App* app = programs.add_subcommand("step", "free flight: one step, and reconstruction, per body, mode and vertex");
+  CLI::App* app =
+      programs.add_subcommand("step", "free flight: one step, and reconstruction, per body, mode and vertex");
   declare_step(*app, *arguments);
   return [arguments, app](Program& program) {
     if (app->parsed()) benchmark_step(program, *arguments);
@@ -267,4 +268,3 @@ std::function<void(Program&)> add_step(CLI::App& programs) {
 }
 
 }  // namespace limber::tools
-

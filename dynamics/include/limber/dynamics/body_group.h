@@ -53,7 +53,8 @@ class BodyGroup {
   const FrameConstants& frame_constants() const { return constants_; }
   double step_length() const { return whole_.length(); }
   /// Changes the length of the steps to come. Modes that pass the Nyquist rate of the new step go on from where they
-  /// are: what held them in the last step is taken for their static displacement. No impulse may be waiting for its time in the next one. Allocates nothing.
+  /// are: what held them in the last step is taken for their static displacement. No impulse may be waiting for its
+  /// time in the next one. Allocates nothing.
   /// @throws InvalidArgument if step is not in (0, 1e100]
   void set_step_length(double step);
   const ModalStep& modal_step() const { return whole_; }
@@ -223,7 +224,8 @@ class BodyGroup {
     /// `occupied` and `constrained` are others' business.
     template <class Self>
     static auto state_fields(Self& s) {
-      return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.held, s.delayed);
+      return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.held,
+                      s.delayed);
     }
   };
 
