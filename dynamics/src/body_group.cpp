@@ -63,8 +63,8 @@ void BodyGroup::set_step_length(double step) {
     if (occupied(slot)) split_static_answer(slot);
 }
 
-/// A mode that now answers as an oscillator goes on from where it is; one that was an oscillator swings about its static
-/// displacement under what held it in the last step.
+/// A mode that now answers as an oscillator goes on from where it is; one that was an oscillator swings about its
+/// static displacement under what held it in the last step.
 void BodyGroup::split_static_answer(Index slot) {
   Body& b = body(slot);
   const std::span<double> answer = static_amplitudes_.modes(slot);

@@ -337,9 +337,9 @@ class World {
 
   // Rollback ---------------------------------------------------------------------------------------------------------
   /// Replaces `state` by all that coming steps depend on: bodies, loads that wait, handles, joints and their actuation,
-  /// what contacts remember, who sleeps, gravity, the step, contact options, time; and the last two states for drawing. A world
-  /// that is restored goes on as it did then, bit for bit, with the same calls. Allocates nothing where `state` has
-  /// room, as after saving a world like this before.
+  /// what contacts remember, who sleeps, gravity, the step, contact options, time; and the last two states for drawing.
+  /// A world that is restored goes on as it did then, bit for bit, with the same calls. Allocates nothing where `state`
+  /// has room, as after saving a world like this before.
   ///
   /// The bytes are for worlds with the same bodies in builds of the same version of limber and machines of the same
   /// byte order: keep them in memory or send them to another player, but do not store them for later versions.
