@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "assembly_baking.h"
 #include "limber/core/error.h"
 #include "limber/core/version.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
@@ -44,6 +45,10 @@ struct Arguments {
   double scale = 1.0;
   int blas_threads = 1;
   bool volume_block = false, no_certify = false, list_materials = false;
+  AssemblyOptions assembly;
+  bool auto_joints = false;
+  std::string components = "connectivity";
+  std::string scene;
 };
 
 void declare_material_options(CLI::App& app, Arguments& a) {
@@ -141,6 +146,25 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
                "as many as it needs, 8 to 24");
   app.add_flag("--volume", a.volume_block,
                "also bake all nodes, so that any initial deformation can be given to the runtime");
+}
+
+void declare_assembly_options(CLI::App& app, Arguments& a) {
+  app.add_option("--joints", a.assembly.joints_file,
+                 "the mesh is an assembly: a body for each component, joined as this file of limber-joints says; "
+                 "materials are named by components")
+      ->type_name("JOINTS.json");
+  app.add_flag("--auto-joints", a.auto_joints, "the same, with joints and limits found in the geometry");
+  app.add_option("--components", a.components, "what makes a component: shared vertices, or names of groups")
+      ->check(CLI::IsMember({"connectivity", "groups", "materials"}))
+      ->capture_default_str();
+  app.add_option("--scene", a.scene, "of an assembly: the scene in which it stands and moves by its joints")
+      ->type_name("SCENE.json");
+  app.add_option("--rigid", a.assembly.rigid, "component that does not bend, or '*' for all; repeatable")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  app.add_option("--ground", a.assembly.ground, "component that stands still in the scene; default: the first")
+      ->type_name("NAME");
+  app.add_flag("--no-ground", a.assembly.free, "no component stands still in the scene");
 }
 
 // Meaning -----------------------------------------------------------------------------------------------------------
@@ -366,10 +390,53 @@ std::string stage_line(const nlohmann::ordered_json& seconds) {
   return line + fmt::format(" peak memory {:.0f} MB\n", 1e-6 * peak_memory_bytes());
 }
 
+/// What goes with an assembly alone.
+void check_assembly(const Arguments& a) {
+  if (a.auto_joints && !a.assembly.joints_file.empty())
+    throw InvalidArgument("the joints are given twice: by --joints and by --auto-joints");
+  const bool is_one = a.auto_joints || !a.assembly.joints_file.empty();
+  const bool asks = !a.scene.empty() || !a.assembly.rigid.empty() || !a.assembly.ground.empty() || a.assembly.free;
+  if (asks && !is_one)
+    throw InvalidArgument(
+        "--scene, --rigid, --ground and --no-ground are for assemblies: give --joints or --auto-joints");
+  if (is_one && !(a.fixes.empty() && a.render_surface.empty() && a.collision_surface.empty()))
+    throw InvalidArgument("--fix, --render-surface and --collision-surface are for single bodies, not for assemblies");
+  if (a.assembly.free && !a.assembly.ground.empty())
+    throw InvalidArgument("--ground and --no-ground exclude each other");
+}
+
+void precompute_assembly(Program& program, const Arguments& a, const BakeOptions& options) {
+  AssemblyOptions assembly = a.assembly;
+  assembly.scale = a.scale;
+  assembly.tets = a.tets;
+  assembly.components = a.components == "groups"      ? ComponentRule::kGroups
+                        : a.components == "materials" ? ComponentRule::kMaterials
+                                                      : ComponentRule::kConnectivity;
+  program.add_input(a.mesh);
+  TbbJobs jobs;
+  BakedAssembly baked = bake_assembly(program, a.mesh, assembly, options, jobs);
+  baked.asset.provenance = provenance_of(program, a, program.options());
+  const std::string bytes = asset_bytes(baked.asset);
+  program.write_file(a.output, bytes);
+  add_bake(program.report(), baked.bodies);
+  program.report()["joints"] = nlohmann::ordered_json::parse(joints_text(baked.joints))["joints"];
+  program.report()["asset_bytes"] = bytes.size();
+  for (const auto& body : baked.asset.bodies)
+    program.print(fmt::format("{:<24} {:>10.4g} kg  {:>3} modes\n", body->name(), body->data().mass, body->modes()));
+  program.print(fmt::format("{}: {} bodies, {} joints, {:.2f} MB\n", a.output, baked.asset.bodies.size(),
+                            baked.joints.joints.size(), 1e-6 * static_cast<double>(bytes.size())));
+  if (a.scene.empty()) return;
+  const fs::path folder = fs::absolute(a.scene).parent_path();
+  program.write_file(a.scene,
+                     assembly_scene(baked, assembly, fs::absolute(a.output).lexically_relative(folder).string()));
+}
+
 void precompute(Program& program, const Arguments& a) {
   if (a.list_materials) return print_materials(program);
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
+  check_assembly(a);
   const BakeOptions options = options_of(a);
+  if (a.auto_joints || !a.assembly.joints_file.empty()) return precompute_assembly(program, a, options);
   nlohmann::ordered_json seconds;
   Stopwatch stopwatch(seconds);
 
@@ -414,5 +481,6 @@ int main(int argc, char** argv) {
   declare_material_options(program.options(), arguments);
   declare_mode_options(program.options(), arguments);
   declare_geometry_options(program.options(), arguments);
+  declare_assembly_options(program.options(), arguments);
   return program.run(argc, argv, [&] { precompute(program, arguments); });
 }

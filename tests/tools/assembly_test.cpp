@@ -1,0 +1,140 @@
+// limber-precompute on assemblies, as a user runs it: a drawn lamp becomes a machine that moves by its joints.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "limber/core/file.h"
+#include "limber/model/asset.h"
+#include "limber/scene/scene_player.h"
+#include "run_program.h"
+
+namespace limber {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ProgramResult;
+
+class AssemblyProgram : public ::testing::Test {
+ protected:
+  AssemblyProgram() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(::testing::TempDir()) / (std::string("limber_assembly_") + test->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    EXPECT_EQ(testing::run_program("make_assembly", {"lamp", "--out", "lamp.obj"}, folder_).exit_code, 0);
+  }
+  ~AssemblyProgram() override { fs::remove_all(folder_); }
+
+  ProgramResult precompute(std::vector<std::string> more) const {
+    std::vector<std::string> arguments{"lamp.obj",        "--components", "groups", "--modes", "4",
+                                       "--damping-ratio", "0.03@50,500",  "-o",     "lamp.glb"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return testing::run_program("limber-precompute", arguments, folder_);
+  }
+  void bake(const std::vector<std::string>& more) const {
+    const ProgramResult result = precompute(more);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  double mass(const std::string& part) const {
+    for (const auto& body : read_asset(folder_ / "lamp.glb").bodies)
+      if (body->name() == part) return body->data().mass;
+    return 0.0;
+  }
+  nlohmann::json scene() const { return nlohmann::json::parse(read_file(folder_ / "lamp.json")); }
+
+  fs::path folder_;
+};
+
+/// How far a coordinate is beyond what a revolute joint allows.
+double beyond(const SceneJoint& joint, const JointView& at) {
+  if (joint.spec.type != JointType::kRevolute) return 0.0;
+  return std::max(
+      {joint.spec.limits.rotation.low - at.position[0], at.position[0] - joint.spec.limits.rotation.high, 0.0});
+}
+
+/// From triangles to a machine: flexible parts fall in their joints for ten seconds.
+TEST_F(AssemblyProgram, ALampSwingsByTheJointsFoundInIt) {
+  bake({"--auto-joints", "--material", "nylon", "--scene", "lamp.json"});
+  const Scene scene = read_scene(folder_ / "lamp.json");
+  const SceneModels models = load_models(scene);
+  ASSERT_EQ(scene.bodies.size(), 5u);
+  ASSERT_EQ(scene.joints.size(), 5u) << "three hinges, a ball, and the base on the ground";
+  for (const auto& model : models.of_body) EXPECT_EQ(model->modes(), 4);
+  ScenePlayer player(scene, models, scene.steps);
+  const World& world = player.world();
+  const auto energy = [&] {
+    double sum = 0.0;
+    for (const BodyId body : player.bodies()) sum += world.energy(body).total();
+    return sum;
+  };
+  const double start = energy();
+  double drift = 0.0, passed = 0.0, highest = start, swing = 0.0;
+  for (int step = 0; step < 600; ++step) {
+    player.step();
+    ASSERT_TRUE(world.constraint_report().solved) << "step " << step;
+    highest = std::max(highest, energy());
+    for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+      const JointView at = world.joint(player.joints()[j]);
+      drift = std::max(drift, at.distance_error);
+      passed = std::max(passed, beyond(scene.joints[j], at));
+      if (at.coordinates == 1) swing = std::max(swing, std::abs(at.position[0]));
+    }
+  }
+  constexpr double kSize = 0.5;  // m, of the lamp, about
+  EXPECT_LT(drift, 1e-9 * kSize);
+  EXPECT_LT(passed, 1e-9);
+  EXPECT_LE(highest, start + 1e-9 * std::abs(start));
+  EXPECT_GT(swing, 0.3) << "it moves";
+}
+
+TEST_F(AssemblyProgram, TheTrueJointsOfAFileAreTaken) {
+  bake({"--joints", "lamp.joints.json", "--material", "nylon", "--rigid", "*", "--scene", "lamp.json"});
+  const auto told = nlohmann::json::parse(read_file(folder_ / "lamp.joints.json"));
+  const auto made = scene();
+  ASSERT_EQ(made.at("joints").size(), told.at("joints").size() + 1) << "and the ground's";
+  for (std::size_t i = 0; i < told.at("joints").size(); ++i) {
+    const auto &a = told["joints"][i], &b = made["joints"][i + 1];
+    for (const char* key : {"type", "origin"}) EXPECT_EQ(a.at(key), b.at(key));
+    EXPECT_EQ(told["components"][a["a"].get<std::size_t>()]["name"], b["a"]);
+    EXPECT_EQ(told["components"][a["b"].get<std::size_t>()]["name"], b["b"]);
+  }
+  for (const auto& body : read_asset(folder_ / "lamp.glb").bodies) EXPECT_EQ(body->modes(), 0) << body->name();
+}
+
+TEST_F(AssemblyProgram, MaterialsAreNamedByComponentsAndScaleIsOfLengths) {
+  bake({"--joints", "lamp.joints.json", "--material", "nylon", "--rigid", "*"});
+  const double shade = mass("shade"), base = mass("base");
+  write_file(folder_ / "m.json", R"({"shade": "steel", "*": "nylon"})");
+  bake({"--joints", "lamp.joints.json", "--materials", "m.json", "--rigid", "*", "--scale", "2", "--scene",
+        "lamp.json"});
+  constexpr double kSteel = 7850.0, kNylon = 1140.0;  // kg/m³, of the presets
+  constexpr double kRounding = 1e-6;                  // cells are placed by the same steps at twice the size
+  EXPECT_NEAR(mass("base"), 8.0 * base, kRounding * 8.0 * base);
+  EXPECT_NEAR(mass("shade"), 8.0 * shade * kSteel / kNylon, 0.01 * 8.0 * shade * kSteel / kNylon);
+  const auto told = nlohmann::json::parse(read_file(folder_ / "lamp.joints.json"));
+  const auto made = scene();
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_DOUBLE_EQ(made["joints"][1]["origin"][i].get<double>(), 2.0 * told["joints"][0]["origin"][i].get<double>());
+}
+
+TEST_F(AssemblyProgram, WhatIsWrongIsOneLineAndNothingIsWritten) {
+  const auto refused = [&](const std::vector<std::string>& arguments, int code, const std::string& holds) {
+    const ProgramResult r = precompute(arguments);
+    EXPECT_EQ(r.exit_code, code) << r.err;
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_THAT(r.err, HasSubstr(holds));
+    EXPECT_FALSE(fs::exists(folder_ / "lamp.glb"));
+  };
+  refused({"--auto-joints", "--joints", "lamp.joints.json", "--material", "nylon"}, 2, "twice");
+  refused({"--scene", "lamp.json", "--material", "nylon"}, 2, "--auto-joints");
+  refused({"--joints", "none.json", "--material", "nylon"}, 1, "none.json");
+  refused({"--joints", "lamp.joints.json", "--material", "nylon", "--rigid", "wing"}, 2, "wing");
+  refused({"--joints", "lamp.joints.json", "--material", "nylon", "--ground", "wing"}, 2, "wing");
+}
+
+}  // namespace
+}  // namespace limber

@@ -1,0 +1,40 @@
+/// @file assembly_baking.h
+/// limber-precompute on an assembly: every component a body, and the joints between them as a scene.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "limber/articulation/joints_file.h"
+#include "limber/precompute/bake.h"
+#include "limber/precompute/tetrahedralise.h"
+#include "program.h"
+
+namespace limber::tools {
+
+struct AssemblyOptions {
+  ComponentRule components = ComponentRule::kConnectivity;
+  std::string joints_file{};         ///< empty: the joints are detected
+  std::vector<std::string> rigid{};  ///< components without modes; "*": all
+  std::string ground{};              ///< component that stands still; empty: the first
+  bool free = false;                 ///< none stands still
+  double scale = 1.0;                ///< metres per unit of the file
+  TetrahedralisationOptions tets{};
+};
+
+struct BakedAssembly {
+  Asset asset;  ///< a body per component, of its name
+  std::vector<BodyReport> bodies;
+  JointsFile joints;                ///< lengths in the file's unit
+  std::vector<double> patch_radii;  ///< m, of each joint
+};
+
+/// @param bake its materials are named by components; "*" is the rest
+BakedAssembly bake_assembly(Program& program, const std::string& path, const AssemblyOptions& options,
+                            const BakeOptions& bake, Jobs& jobs);
+
+/// A scene in which the machine stands as drawn, z up, and moves by its joints under gravity.
+/// @param asset file name, relative to the scene's folder
+std::string assembly_scene(const BakedAssembly& baked, const AssemblyOptions& options, const std::string& asset);
+
+}  // namespace limber::tools
