@@ -11,10 +11,12 @@
 #include "limber/articulation/joints_file.h"
 #include "limber/core/error.h"
 #include "limber/mesh/write_mesh.h"
+#include "limber/mesh_assimp/read_motion_clip.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/model/morph_targets.h"
 #include "limber/posing/handles_file.h"
 #include "limber/posing/pose_recording.h"
+#include "limber/posing/retarget.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -23,7 +25,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Arguments {
-  std::string model, joints, handles, output, obj;
+  std::string model, joints, handles, clip, mapping, output, obj;
   double scale = 1.0;
   PosingOptions options;
 };
@@ -34,8 +36,11 @@ void declare(CLI::App& options, Arguments& a) {
       ->type_name("JOINTS.json")
       ->required();
   options.add_option("--handles", a.handles, "what is pinned, soft and pulled, frame by frame")
-      ->type_name("HANDLES.json")
-      ->required();
+      ->type_name("HANDLES.json");
+  options.add_option("--clip", a.clip, "recorded motion that drives the model instead, with --mapping")
+      ->type_name("FILE.bvh");
+  options.add_option("--mapping", a.mapping, "which points of the model ride on which joints of the clip")
+      ->type_name("MAPPING.json");
   options.add_option("-o,--output", a.output, "write the poses as an animation for any glTF viewer")
       ->type_name("FILE.glb");
   options.add_option("--obj", a.obj, "write the surface of each frame: STEM_0000.obj, STEM_0001.obj, ...")
@@ -77,17 +82,33 @@ Json json_of(const PoseResult& r, double time) {
           {"limit_violation", r.limit_violation}};
 }
 
+/// What is pulled, and the file that errors about it name.
+struct Pulls {
+  HandlesFile handles;
+  std::string name;
+};
+
+std::string in_quotes(const std::string& path) { return "\"" + std::filesystem::path(path).filename().string() + "\""; }
+
+Pulls read_pulls(const Arguments& a) {
+  if (a.clip.empty() != a.mapping.empty() || a.clip.empty() == a.handles.empty())
+    throw InvalidArgument("expected either --handles or both --clip and --mapping; see --help");
+  if (!a.handles.empty()) return {read_handles(a.handles), in_quotes(a.handles)};
+  const std::string name = in_quotes(a.mapping);
+  const MappingFile mapping = read_mapping(a.mapping);
+  return {retarget(read_motion_clip(a.clip), mapping, name), name};
+}
+
 void pose(Program& program, const Arguments& a) {
   if (a.output.empty() && a.obj.empty())
     throw InvalidArgument("nothing to do: one of --output and --obj is needed; see --help");
-  for (const std::string& file : {a.model, a.joints, a.handles}) program.add_input(file);
+  for (const std::string& file : {a.model, a.joints, a.handles, a.clip, a.mapping})
+    if (!file.empty()) program.add_input(file);
   program.progress().stage("reading");
-  const std::string joints_name = "\"" + std::filesystem::path(a.joints).filename().string() + "\"",
-                    handles_name = "\"" + std::filesystem::path(a.handles).filename().string() + "\"";
+  const auto [handles, handles_name] = read_pulls(a);
   const GroupedSurface surface = read_any_grouped_surface(a.model, program.warnings());
   const JointsFile joints = read_joints(a.joints);
-  const HandlesFile handles = read_handles(a.handles);
-  PosingSession session(jointed_model(surface, joints, joints_name), a.options);
+  PosingSession session(jointed_model(surface, joints, in_quotes(a.joints)), a.options);
   const std::vector<PoseHandle> ids = apply_handles(handles, handles_name, session);
 
   PoseRecording recording(session, a.scale);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "limber/core/error.h"
+#include "limber/mesh_assimp/read_motion_clip.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "same_mesh.h"
 #include "sample_meshes.h"
@@ -34,6 +35,55 @@ void write_gltf(const Folder& folder) {
                   {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}],
     "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}],
     "buffers": [{"uri": "cube.bin", "byteLength": 168}]})");
+}
+
+/// Two bones; the second turns about z by 90 degrees in the second frame, when the first has moved.
+const char* const kBvh = R"(HIERARCHY
+ROOT hips
+{
+  OFFSET 1 2 3
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT arm
+  {
+    OFFSET 10 0 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 5 0 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.25
+1 2 3 0 0 0 0 0 0
+4 2 3 0 0 0 90 0 0
+)";
+
+TEST(MotionClip, HasJointsWhereTheirAnglesPutThem) {
+  const Folder folder;
+  const MotionClip clip = read_motion_clip(folder.write("clip.bvh", kBvh));
+  ASSERT_EQ(clip.joints.size(), 3u);
+  EXPECT_EQ(clip.joints[1].name, "arm");
+  EXPECT_EQ(clip.joints[2].parent, 1);
+  EXPECT_LT((clip.joints[2].rest.p - Vec3(16, 2, 3)).norm(), 1e-5);
+  ASSERT_EQ(clip.times, (std::vector<double>{0.0, 0.25}));
+  EXPECT_LT((clip.poses[0][2].p - Vec3(16, 2, 3)).norm(), 1e-5);
+  EXPECT_LT((clip.poses[1][1].p - Vec3(14, 2, 3)).norm(), 1e-5);
+  EXPECT_LT((clip.poses[1][2].p - Vec3(14, 7, 3)).norm(), 1e-5);
+}
+
+TEST(MotionClip, CutAnywhereItIsRefusedInOneLine) {
+  const Folder folder;
+  const std::string whole = kBvh;
+  for (std::size_t length = 1; length < whole.size() - 6; length += 7) try {
+      read_motion_clip(folder.write("cut.bvh", whole.substr(0, length)));
+      ADD_FAILURE() << "taken: " << length << " of " << whole.size();
+    } catch (const InputError& e) {
+      EXPECT_THAT(e.what(), HasSubstr("cut.bvh"));
+      EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+    }
+  EXPECT_THROW(read_motion_clip(folder.write("cube.off", off(cube_surface()))), InputError);
 }
 
 TEST(AssimpReader, GivesTheSameSurfaceFromOff) {

@@ -95,6 +95,17 @@ TEST_F(PoseProgram, ThePenaltyFormPosesTheSameDrag) {
   EXPECT_EQ(run(handles_, {"-o", "drag.glb", "--penalty"}).exit_code, 0);
 }
 
+TEST_F(PoseProgram, AClipNeedsAMappingAndTakesThePlaceOfHandles) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"-o", "drag.glb", "--clip", "a.bvh"},
+                                               {"-o", "drag.glb", "--mapping", "a.json"},
+                                               {"-o", "drag.glb", "--clip", "a.bvh", "--mapping", "a.json"}}) {
+    const ProgramResult r = run(handles_, more);
+    EXPECT_NE(r.exit_code, 0);
+    EXPECT_THAT(r.err, HasSubstr("either --handles or both --clip and --mapping"));
+    EXPECT_FALSE(fs::exists(folder_ / "drag.glb"));
+  }
+}
+
 TEST_F(PoseProgram, WrongFilesAreToldInOneLineAndLeaveNothing) {
   Json wrong = handles_;
   wrong["handles"]["hand"]["part"] = "leaves";

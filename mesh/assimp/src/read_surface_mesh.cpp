@@ -1,30 +1,17 @@
 #include "limber/mesh_assimp/read_surface_mesh.h"
 
-#include <assimp/config.h>
 #include <assimp/postprocess.h>
-#include <assimp/scene.h>
 
-#include <algorithm>
-#include <assimp/Importer.hpp>
-#include <exception>
 #include <unordered_map>
 
+#include "assimp_scene.h"
 #include "limber/core/error.h"
-#include "limber/core/file.h"
 
 namespace limber {
 namespace {
 
-std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }, ' ');
-  return text;
-}
-
-std::string shown_path(const std::filesystem::path& path) {
-  std::string name = one_line(path.string());
-  return name.insert(0, 1, '"') + '"';
-}
+using internal::quoted_path;
+using internal::read_scene;
 
 /// A file as Assimp gives it: neither welded nor validated.
 struct RawSurface {
@@ -91,22 +78,10 @@ class Collector {
 };
 
 RawSurface read_raw(const std::filesystem::path& path, const std::string& name, Warnings& warnings) {
-  read_file(path);  // for its clear errors: missing, a directory, unreadable, empty
-
   Assimp::Importer importer;
-  // Without it a file of bones alone would come back as little diamonds around each bone.
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
-  const aiScene* scene = nullptr;
-  try {
-    scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
-  } catch (const std::exception& e) {
-    throw InputError(name + ": Assimp cannot read it: " + one_line(e.what()));
-  }
-  if (scene == nullptr || scene->mRootNode == nullptr)
-    throw InputError(name + ": Assimp cannot read it: " + one_line(importer.GetErrorString()));
-
-  Collector collector(*scene, name);
-  collector.add(*scene->mRootNode, aiMatrix4x4t<double>());
+  const aiScene& scene = read_scene(importer, path, aiProcess_Triangulate);
+  Collector collector(scene, name);
+  collector.add(*scene.mRootNode, aiMatrix4x4t<double>());
   if (collector.points_and_lines > 0)
     warnings.push_back(name + ": " + std::to_string(collector.points_and_lines) +
                        " points and lines are no surface and have been left out");
@@ -140,7 +115,7 @@ void weld_nodes(SurfaceMesh& surface, const std::vector<std::size_t>& node_ends)
 }  // namespace
 
 SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings) {
-  const std::string name = shown_path(path);
+  const std::string name = quoted_path(path);
   SurfaceMesh surface = read_raw(path, name, warnings).grouped.surface;
   weld(surface);
   validate(surface, name, warnings);
@@ -149,7 +124,7 @@ SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, War
 
 GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings) {
   if (is_known_mesh_format(path)) return read_grouped_surface(path, warnings);
-  const std::string name = shown_path(path);
+  const std::string name = quoted_path(path);
   RawSurface read = read_raw(path, name, warnings);
   weld_nodes(read.grouped.surface, read.node_ends);
   validate(read.grouped, name, warnings);

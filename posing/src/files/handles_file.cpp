@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "files/part_division.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
-#include "limber/internal/strict_json.h"
 
 namespace limber {
 namespace {
@@ -78,19 +78,25 @@ HandlesFile::Frame read_frame(const Json& value, const std::string& where, const
 
 }  // namespace
 
+PartDivision internal::read_division(const JsonObject& file) {
+  PartDivision out;
+  if (file.has("pinned"))
+    file.for_each("pinned", [&](const Json& value, const std::string& where) {
+      if (!value.is_string()) refuse(where, JsonObject::shown(value), "a part's name");
+      out.pinned.push_back(value.get<std::string>());
+    });
+  if (file.has("parts"))
+    JsonObject(file.at("parts"), file.where("parts")).for_each_member([&](const std::string& part, const Json& value) {
+      out.parts.emplace_back(part, read_part(value, file.where("parts") + "." + part));
+    });
+  return out;
+}
+
 HandlesFile parse_handles(std::string_view text, const std::string& name) {
   const Json root = internal::parse_json(text, name);
   const JsonObject o(root, name);
   HandlesFile out;
-  if (o.has("pinned"))
-    o.for_each("pinned", [&](const Json& value, const std::string& where) {
-      if (!value.is_string()) refuse(where, JsonObject::shown(value), "a part's name");
-      out.pinned.push_back(value.get<std::string>());
-    });
-  if (o.has("parts"))
-    JsonObject(o.at("parts"), o.where("parts")).for_each_member([&](const std::string& part, const Json& value) {
-      out.parts.emplace_back(part, read_part(value, o.where("parts") + "." + part));
-    });
+  out.division = internal::read_division(o);
   JsonObject(o.at("handles"), o.where("handles")).for_each_member([&](const std::string& handle, const Json& value) {
     out.handles.push_back(read_handle(handle, value, o.where("handles") + "." + handle));
   });
@@ -118,9 +124,10 @@ std::vector<PoseHandle> apply_handles(const HandlesFile& file, const std::string
     }
   };
   const JointedModel& model = session.model();
-  for (const auto& entry : file.parts)
+  for (const auto& entry : file.division.parts)
     at("parts." + entry.first, [&] { session.set_part(model.part_named(entry.first), entry.second); });
-  for (const std::string& part : file.pinned) at("pinned", [&] { session.set_pinned(model.part_named(part), true); });
+  for (const std::string& part : file.division.pinned)
+    at("pinned", [&] { session.set_pinned(model.part_named(part), true); });
   std::vector<PoseHandle> out;
   for (const HandlesFile::Handle& h : file.handles)
     out.push_back(at("handles." + h.name, [&] { return session.add_handle(model.part_named(h.part), h.point); }));

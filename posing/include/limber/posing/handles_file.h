@@ -13,6 +13,12 @@
 
 namespace limber {
 
+/// What of a model stays, and what bends.
+struct PartDivision {
+  std::vector<std::string> pinned{};
+  std::vector<std::pair<std::string, PartOptions>> parts{};
+};
+
 struct HandlesFile {
   struct Handle {
     std::string name{}, part{};
@@ -22,8 +28,7 @@ struct HandlesFile {
     double time = 0.0;                                    ///< s; ascending from frame to frame
     std::vector<std::pair<std::size_t, Vec3>> targets{};  ///< of handles, by number; the others' stay
   };
-  std::vector<std::string> pinned{};
-  std::vector<std::pair<std::string, PartOptions>> parts{};
+  PartDivision division{};
   std::vector<Handle> handles{};
   std::vector<Frame> frames{};  ///< at least one
 };
