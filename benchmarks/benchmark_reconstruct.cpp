@@ -98,6 +98,52 @@ void many_instances(benchmark::State& state) {
   state.counters["of_peak"] = operations / peak_float_operations_per_second() / seconds;
 }
 
+/// Handles in stripes along x that turn as the modes say; each vertex hangs on the two or three that are near.
+ModalSkin striped_skin(const ModalSurface& surface, Index handles) {
+  const auto n = static_cast<std::size_t>(handles), k = static_cast<std::size_t>(surface.basis.modes());
+  ModalSkin skin;
+  skin.handles = handles, skin.modes = surface.basis.modes();
+  for (Index h = 0; h < handles; ++h) skin.rest.emplace_back((h + 0.5) / handles, 0.5, 0.0);
+  skin.rotations.assign(3 * n * k, 0.1f);
+  skin.arms.assign(3 * n * n, 0.01f);
+  skin.shifts.assign(3 * n * n * k, 0.001f);
+  std::vector<double> weights(n);
+  for (const Vec3f& r : surface.rest) {
+    for (std::size_t h = 0; h < n; ++h)
+      weights[h] = std::max(0.0, 1.5 - handles * std::abs(static_cast<double>(r.x()) - skin.rest[h].x()));
+    skin.render.push_back(skin_influences(weights));
+  }
+  return skin;
+}
+
+/// range(0) modes, range(1) handles: a body with a skin, and how many times that is one without.
+void skinned(benchmark::State& state) {
+  const ModalSurface surface = sheet(static_cast<Index>(state.range(0)));
+  const ModalSkin skin = striped_skin(surface, static_cast<Index>(state.range(1)));
+  const SkinTiles influences(skin.render);
+  Instances plain(surface.basis.modes(), 1), bent(surface.basis.modes(), 1);
+  SkinPose pose(skin);
+  pose.set(bent.amplitudes);
+  bent.targets[0].skin = &pose;
+  LeastTime linear, skinned, handles, derivative;
+  constexpr int kRepeats = 20;
+  const auto measure = [](LeastTime& time, const auto& work) {
+    time.measure([&] {
+      for (int r = 0; r < kRepeats; ++r) work();
+    });
+  };
+  for (auto _ : state) {
+    measure(linear, [&] { reconstruct(surface, plain.targets); });
+    measure(skinned, [&] { reconstruct(surface, influences, bent.targets); });
+    measure(handles, [&] { pose.set(bent.amplitudes); });
+    measure(derivative, [&] { pose.differentiate(); });
+  }
+  state.counters["ns"] = 1e9 * skinned.seconds() / (kRepeats * kVertices);
+  state.counters["of_linear"] = skinned.seconds() / linear.seconds();
+  state.counters["handles_us"] = 1e6 * handles.seconds() / kRepeats;
+  state.counters["derivative_us"] = 1e6 * derivative.seconds() / kRepeats;
+}
+
 void normals(benchmark::State& state) {
   const ModalSurface surface = sheet(8);
   Instances instances(8, 1);
@@ -115,6 +161,7 @@ void normals(benchmark::State& state) {
 BENCHMARK(one_body_hot)->ArgName("modes")->Arg(8)->Arg(20)->Arg(32)->Arg(64);
 BENCHMARK(one_body_cold)->ArgName("modes")->Arg(8)->Arg(20)->Arg(32)->Arg(64);
 BENCHMARK(many_instances)->ArgNames({"modes", "instances"})->ArgsProduct({{8, 20, 32, 64}, {8, 64, 1000}});
+BENCHMARK(skinned)->ArgNames({"modes", "handles"})->ArgsProduct({{8, 20, 40}, {12, 24}});
 BENCHMARK(normals);
 
 }  // namespace

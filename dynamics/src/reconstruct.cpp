@@ -18,6 +18,7 @@ using internal::normalize_vectors;
 using internal::reconstruct_tiles;
 
 static_assert(ModalBasis::kTile == int{kTileVertices});
+static_assert(SkinPose::kNumbers == internal::kHandleNumbers);
 static_assert(sizeof(Vec3f) == 3 * sizeof(float), "rest positions are read as plain floats");
 
 /// Amplitudes of one block, single precision, on the stack: with more modes a block holds fewer instances.
@@ -34,17 +35,20 @@ InstanceOutput instance_output(const ReconstructionTarget& target) {
   }
   out.displacement = target.displacement;
   out.positions = target.positions;
+  out.handles = target.skin ? target.skin->numbers().data() : nullptr;
   return out;
 }
 
 /// The work in pieces: (range of tiles) × (block of instances), blocks of one range one after another.
 struct Pieces {
   const ModalSurface& surface;
+  const SkinTiles* influences;  // null: no target has a skin
   std::span<const ReconstructionTarget> targets;
   std::size_t tiles, modes, tiles_per_range, instances_per_block;
 
-  Pieces(const ModalSurface& s, std::span<const ReconstructionTarget> t)
+  Pieces(const ModalSurface& s, const SkinTiles* skin, std::span<const ReconstructionTarget> t)
       : surface(s),
+        influences(skin),
         targets(t),
         tiles(static_cast<std::size_t>(s.basis.tiles())),
         modes(static_cast<std::size_t>(s.basis.modes())),
@@ -69,6 +73,8 @@ struct Pieces {
       for (std::size_t m = 0; m < modes; ++m) amplitudes[m * n + i] = static_cast<float>(members[i].amplitudes[m]);
     }
     const std::size_t first_tile = range * tiles_per_range;
+    internal::TileInfluences hang{};
+    if (influences) hang = {influences->starts(), influences->handle_of_entry(), influences->weights()};
     reconstruct_tiles({.basis = surface.basis.tile(0),
                        .rest = surface.rest.front().data(),
                        .vertices = surface.rest.size(),
@@ -77,7 +83,8 @@ struct Pieces {
                        .last_tile = std::min(first_tile + tiles_per_range, tiles),
                        .amplitudes = amplitudes.data(),
                        .outputs = outputs.data(),
-                       .instances = n});
+                       .instances = n,
+                       .influences = hang});
   }
 };
 
@@ -89,7 +96,21 @@ void check_triangles(std::span<const Triangle> triangles, std::size_t vertices) 
                               ", expected 0 to " + std::to_string(vertices) + " exclusive");
 }
 
-void check(const ModalSurface& surface, std::span<const ReconstructionTarget> targets) {
+void check_skin(const ModalSurface& surface, const SkinTiles* influences, const ReconstructionTarget& target,
+                std::size_t i) {
+  if (!influences)
+    throw InvalidArgument("reconstruct: target " + std::to_string(i) +
+                          " has a skin, expected none or the influences of the surface");
+  if (influences->vertices() != surface.vertices())
+    throw InvalidArgument("reconstruct: influences of " + std::to_string(influences->vertices()) + " vertices for " +
+                          std::to_string(surface.vertices()) + ", expected as many");
+  if (influences->handles() > target.skin->skin().handles)
+    throw InvalidArgument("reconstruct: target " + std::to_string(i) + " has " +
+                          std::to_string(target.skin->skin().handles) + " handles, its surface hangs on " +
+                          std::to_string(influences->handles()));
+}
+
+void check(const ModalSurface& surface, const SkinTiles* influences, std::span<const ReconstructionTarget> targets) {
   if (surface.basis.vertices() != surface.vertices())
     throw InvalidArgument("reconstruct: the basis has " + std::to_string(surface.basis.vertices()) +
                           " vertices and the rest shape " + std::to_string(surface.vertices()) + ", expected as many");
@@ -102,6 +123,7 @@ void check(const ModalSurface& surface, std::span<const ReconstructionTarget> ta
       throw InvalidArgument("reconstruct: target " + std::to_string(i) + " has no array for positions");
     if (targets[i].amplitudes == nullptr && surface.basis.modes() > 0)
       throw InvalidArgument("reconstruct: target " + std::to_string(i) + " has no amplitudes");
+    if (targets[i].skin) check_skin(surface, influences, targets[i], i);
     normals |= targets[i].normals != nullptr;
   }
   if (normals) check_triangles(surface.triangles, surface.rest.size());
@@ -136,17 +158,27 @@ struct Normals {
   }
 };
 
-}  // namespace
-
-void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets, Jobs& jobs) {
-  check(surface, targets);
+void reconstruct_any(const ModalSurface& surface, const SkinTiles* influences,
+                     std::span<const ReconstructionTarget> targets, Jobs& jobs) {
+  check(surface, influences, targets);
   if (surface.rest.empty() || targets.empty()) return;
   // By reference: a std::function of the structs themselves would allocate.
-  const Pieces pieces(surface, targets);
+  const Pieces pieces(surface, influences, targets);
   jobs.parallel_for(pieces.count(), 1, std::cref(pieces));
   const bool normals = std::any_of(targets.begin(), targets.end(), [](const auto& t) { return t.normals != nullptr; });
   const Normals every{surface, targets};
   if (normals) jobs.parallel_for(targets.size(), 1, std::cref(every));
+}
+
+}  // namespace
+
+void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets, Jobs& jobs) {
+  reconstruct_any(surface, nullptr, targets, jobs);
+}
+
+void reconstruct(const ModalSurface& surface, const SkinTiles& influences,
+                 std::span<const ReconstructionTarget> targets, Jobs& jobs) {
+  reconstruct_any(surface, &influences, targets, jobs);
 }
 
 void vertex_normals(std::span<const Triangle> triangles, std::span<const float> positions, std::span<float> normals) {

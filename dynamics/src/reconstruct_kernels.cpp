@@ -47,14 +47,48 @@ HWY_INLINE HWY_ATTR Points LoadPoints(const TileRange& range, const float* of, s
   return p;
 }
 
-// Rest positions, moved by the modes' sum u and what an instance adds to it.
+// a × b + c.
+HWY_INLINE HWY_ATTR Points CrossAdd(const Points& a, const Points& b, const Points& c) {
+  return {hn::MulAdd(a.y, b.z, hn::NegMulAdd(a.z, b.y, c.x)), hn::MulAdd(a.z, b.x, hn::NegMulAdd(a.x, b.z, c.y)),
+          hn::MulAdd(a.x, b.y, hn::NegMulAdd(a.y, b.x, c.z))};
+}
+
+HWY_INLINE HWY_ATTR Points Added(const Points& a, const Points& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
+// Where the handles take vertices at rest that the modes move by u: their numbers are blended first, then applied.
+HWY_INLINE HWY_ATTR Points Skinned(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
+                                   const Points& rest, const Points& u) {
+  const Floats d;
+  const std::size_t tile = vertex / kTileVertices, lane = vertex % kTileVertices;
+  Vector blend[kHandleNumbers];
+  for (Vector& b : blend) b = hn::Zero(d);
+  const TileInfluences& in = range.influences;
+  for (std::uint32_t e = in.starts[tile]; e < in.starts[tile + 1]; ++e) {
+    const Vector weight = hn::Load(d, in.weights + e * kTileVertices + lane);
+    const float* handle = out.handles + kHandleNumbers * in.handle[e];
+    for (std::size_t i = 0; i < kHandleNumbers; ++i) blend[i] = hn::MulAdd(weight, hn::Set(d, handle[i]), blend[i]);
+  }
+  const Points shift{blend[9], blend[10], blend[11]}, angle{blend[12], blend[13], blend[14]},
+      drift{blend[15], blend[16], blend[17]};
+  const Points shown = CrossAdd(angle, rest, drift);  // what the handles show of u
+  const Points y{hn::Add(rest.x, hn::Sub(u.x, shown.x)), hn::Add(rest.y, hn::Sub(u.y, shown.y)),
+                 hn::Add(rest.z, hn::Sub(u.z, shown.z))};
+  const auto row = [&](const Vector* r, Vector t)
+                       HWY_ATTR { return hn::MulAdd(r[0], y.x, hn::MulAdd(r[1], y.y, hn::MulAdd(r[2], y.z, t))); };
+  return Added(y, {row(blend, shift.x), row(blend + 3, shift.y), row(blend + 6, shift.z)});
+}
+
+// Rest positions, moved by the modes' sum u, by what an instance adds to it, and by its handles.
 HWY_INLINE HWY_ATTR Points Displaced(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
                                      const Points& rest, Points u) {
   if (HWY_UNLIKELY(out.displacement != nullptr)) {
     const Points more = LoadPoints(range, out.displacement, vertex);
-    u = {hn::Add(u.x, more.x), hn::Add(u.y, more.y), hn::Add(u.z, more.z)};
+    u = Added(u, more);
   }
-  return {hn::Add(rest.x, u.x), hn::Add(rest.y, u.y), hn::Add(rest.z, u.z)};
+  if (HWY_UNLIKELY(out.handles != nullptr)) return Skinned(range, out, vertex, rest, u);
+  return Added(rest, u);
 }
 
 // Stores kLanes points as x y z x y z … in three vectors. Component c of point e belongs to lane (3e + c) mod kLanes of

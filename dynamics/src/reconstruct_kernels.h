@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace limber::internal {
 
@@ -16,6 +17,17 @@ struct InstanceOutput {
   /// xyz per vertex, of vertex 0: added to the rest positions, in the body's frame; null: nothing
   const float* displacement;
   float* positions;  ///< xyz per vertex, of vertex 0
+  /// kHandleNumbers per handle of a modal skin: rows of R − 1, t, Θz, e (limber/model/skin_pose.h); null: no skin
+  const float* handles;
+};
+
+inline constexpr std::size_t kHandleNumbers = 18;
+
+/// Which handles the vertices of a tile hang on (limber/dynamics/skin_tiles.h).
+struct TileInfluences {
+  const std::uint32_t* starts;  ///< of the entries of each tile, and their end
+  const std::uint8_t* handle;   ///< of an entry
+  const float* weights;         ///< kTileVertices per entry, 64-byte aligned
 };
 
 /// Vertices [16·first_tile, min(16·last_tile, vertices)) of up to kBlockInstances instances of one surface.
@@ -25,7 +37,8 @@ struct TileRange {
   std::size_t vertices, modes, first_tile, last_tile;
   const float* amplitudes;  ///< `[mode][instance]`
   const InstanceOutput* outputs;
-  std::size_t instances;  ///< 1 … kBlockInstances
+  std::size_t instances;      ///< 1 … kBlockInstances
+  TileInfluences influences;  ///< where an instance has handles
 };
 
 /// Each vertex gets the same operations in the same order whatever shares its block, so the same bits.

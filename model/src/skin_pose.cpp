@@ -85,6 +85,7 @@ double dot(const float* a, std::span<const double> z) {
 SkinPose::SkinPose(const ModalSkin& skin) : skin_(&skin), out_of_frame_(Mat3::Identity()), stretch_(Mat3::Identity()) {
   const auto n = static_cast<std::size_t>(skin.handles), k = static_cast<std::size_t>(skin.modes);
   handles_.resize(n);
+  numbers_.resize(kNumbers * n);
   reach_.resize(n * n, Vec3::Zero());
   moments_ = skin.gauge.rest;
   turn_rates_.resize(3 * n * k);
@@ -109,6 +110,17 @@ std::size_t SkinPose::row(Index handle, int axis) const {
 void SkinPose::set(std::span<const double> z) {
   place_handles(z);
   if (skin_->has_gauge()) find_frame(z), stay_in_frame();
+  write_numbers();
+}
+
+void SkinPose::write_numbers() {
+  float* to = numbers_.data();
+  for (const Handle& handle : handles_) {
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) *to++ = static_cast<float>(handle.turn(row, column));
+    for (const Vec3* v : {&handle.shift, &handle.angle, &handle.drift})
+      for (int axis = 0; axis < 3; ++axis) *to++ = static_cast<float>((*v)[axis]);
+  }
 }
 
 void SkinPose::place_handles(std::span<const double> z) {

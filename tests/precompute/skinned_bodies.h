@@ -116,9 +116,9 @@ inline TetMesh fork_piece() {
              [](const Vec3& c) { return c.x() < 2.5 || c.y() < 0.75 || c.y() > 1.5; });
 }
 
-/// A thin plate rolled up over 100° about the y axis.
-inline TetMesh curled_plate() {
-  TetMesh mesh = tet_box(24, 10, 2, {5.0, 2.0, 0.2});
+/// A thin plate rolled up over 100° about the y axis, from the plane x = 0 on.
+inline TetMesh curled_plate(int nx, int ny, int nz) {
+  TetMesh mesh = tet_box(nx, ny, nz, {5.0, 2.0, 0.2});
   const double radius = 5.0 / (100.0 * kDegree);
   for (Vec3& x : mesh.nodes) {
     const double angle = x.x() / radius, r = radius - x.z();

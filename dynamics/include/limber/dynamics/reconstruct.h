@@ -2,6 +2,7 @@
 /// Deformed vertices from amplitudes, on demand, into the caller's arrays.
 ///
 ///   p_i = R (rest_i + Σ_m z_m shape_i,m + d_i) + t                  i: vertex; d: what the modes do not show, if any
+///   p_i = R x_i(z) + t                                                with a modal skin: see skin_pose.h, d_i is turned
 ///
 /// The product is one stream over the basis for a block of up to eight instances; the rigid transform is fused into the
 /// store. Single precision throughout; pass poses relative to an origin near the viewer (a float near 10⁶ m has 6 cm
@@ -12,7 +13,9 @@
 
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/dynamics/skin_tiles.h"
 #include "limber/model/modal_basis.h"
+#include "limber/model/skin_pose.h"
 
 namespace limber {
 
@@ -23,6 +26,7 @@ struct ReconstructionTarget {
   float* positions = nullptr;          ///< out: 3V, xyz per vertex; m
   float* normals = nullptr;  ///< out, optional: 3V unit normals of the deformed surface, area-weighted; null: none
   const float* displacement = nullptr;  ///< d, 3V, xyz per vertex, body frame, m; null: none
+  const SkinPose* skin = nullptr;       ///< its handles at these amplitudes; null: drawn by its modes alone
 };
 
 /// Writes the vertices (and normals) of every target; arrays of different targets must not overlap. Does not allocate
@@ -32,9 +36,16 @@ struct ReconstructionTarget {
 /// Σ|z_m||shape_m| + |d|) + 2u|t| of the rigid motion. The displacement is summed by itself and the rest position added
 /// last.
 /// @throws InvalidArgument if a required pointer is null, basis and rest shape differ in their vertices, the basis has
-/// more than 8192 modes, or normals are asked for and a triangle names a vertex that is not there.
+/// more than 8192 modes, a target has a skin, or normals are asked for and a triangle names a vertex that is not there.
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets,
                  Jobs& jobs = serial_jobs());
+
+/// The same for targets of which some or all have a skin; the others get the bits that they get without. The error of a
+/// vertex with a skin is at most 64u of the size of every term: rest, Σ|z_m||shape_m|, d, t_h, e_h, |Θ_h z||rest|.
+/// @param influences of the surface. @throws InvalidArgument also if they are not one per vertex, or name a handle that
+/// a skin has not
+void reconstruct(const ModalSurface& surface, const SkinTiles& influences,
+                 std::span<const ReconstructionTarget> targets, Jobs& jobs = serial_jobs());
 
 /// Area-weighted unit vertex normals of triangles over 3V positions; (0, 0, 1) where the triangles of a vertex have no
 /// area (in all, under 1e-19 m²). Does not allocate. @throws InvalidArgument if the arrays differ in size or a triangle

@@ -34,6 +34,9 @@ class SkinPose {
   /// @param z k amplitudes, kg^½·m
   void set(std::span<const double> z);
   std::span<const Handle> handles() const { return handles_; }
+  /// The same in single precision for reconstruct(): per handle the rows of R_h − 1, t_h, Θ_h z, e_h.
+  static constexpr std::size_t kNumbers = 18;
+  std::span<const float> numbers() const { return numbers_; }
   /// Largest |Θ_h z|, rad: how far the body is bent.
   double largest_angle() const;
 
@@ -53,6 +56,7 @@ class SkinPose {
   void place_handles(std::span<const double> z);
   void find_frame(std::span<const double> z);
   void stay_in_frame();
+  void write_numbers();
   void differentiate_places();
   void differentiate_frame();
   Vec3 undeformed_part(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
@@ -60,6 +64,7 @@ class SkinPose {
 
   const ModalSkin* skin_;
   std::vector<Handle> handles_;
+  std::vector<float> numbers_;
   std::vector<Vec3> reach_;           // a_lh + D_lh z, [l][h]
   std::vector<double> moments_;       // S_h + Σ z Z_h, [handle][12]
   Mat3 out_of_frame_, stretch_;       // Q and P of Σ m x rᵀ = Q P
