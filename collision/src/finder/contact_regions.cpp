@@ -46,14 +46,15 @@ void RegionFinder::find(const ContactClusters& clusters, const std::array<Region
                         ContactRegions& regions) {
   weigh(clusters, sides);
   const std::span<const ContactPoint> all = clusters.all();
-  auto part = parts_.begin();
+  std::size_t part = 0;
   for (Index kept = 0; kept < static_cast<Index>(all.size()); ++kept) {
     if (!clusters.kept(kept)) continue;
-    const auto first = part;
-    while (part != parts_.end() && part->kept == kept) ++part;
+    const std::size_t first = part;
+    while (part < parts_.size() && parts_[part].kept == kept) ++part;
+    const std::span<const Part> own = std::span(parts_).subspan(first, part - first);
     regions.counts.push_back({0, 0});
     for (std::size_t side = 0; side < 2; ++side)
-      if (sides[side].surface != nullptr) spread(all, {first, part}, *sides[side].surface, side, regions);
+      if (sides[side].surface != nullptr) spread(all, own, *sides[side].surface, side, regions);
   }
 }
 

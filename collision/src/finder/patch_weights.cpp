@@ -85,7 +85,7 @@ const std::vector<PatchWeights::Weight>& PatchWeights::find(PlanePoint p) {
   double triangles = 1.0;
   for (std::size_t r = 0; r < kept_.size(); ++r) {
     const std::array<double, 3> of_r = barycentric(t, kept_[r]);
-    if (std::ranges::find(t, r) != t.end() || outside_circle(t, of_r, r) > kOnCircle * size_ * size_) continue;
+    if (std::find(t.begin(), t.end(), r) != t.end() || outside_circle(t, of_r, r) > kOnCircle * size_ * size_) continue;
     std::size_t leaves = 3;
     const Triple next = swap_in(r, of_r, leaves);
     add(next, barycentric(next, p));
@@ -118,7 +118,7 @@ PatchWeights::Triple PatchWeights::first_triangle(const PlanePoint& p) const {
     if (!(doubled_area(hull_[0], hull_[i], hull_[i + 1]) > kFlat * size_ * size_)) continue;
     const Triple t{at(0), at(i), at(i + 1)};
     const std::array<double, 3> phi = barycentric(t, p);
-    if (const double least = std::ranges::min(phi); least > most) most = least, best = t;
+    if (const double least = std::min({phi[0], phi[1], phi[2]}); least > most) most = least, best = t;
   }
   return best;
 }
@@ -142,7 +142,7 @@ double PatchWeights::outside_circle(const Triple& t, const std::array<double, 3>
 void PatchWeights::add(const Triple& t, const std::array<double, 3>& values) {
   for (std::size_t i = 0; i < 3; ++i) {
     if (!(values[i] > kOnEdge)) continue;
-    const auto known = std::ranges::find(weights_, t[i], &Weight::kept);
+    const auto known = std::find_if(weights_.begin(), weights_.end(), [&](const Weight& w) { return w.kept == t[i]; });
     if (known != weights_.end())
       known->value += values[i];
     else
