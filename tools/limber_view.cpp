@@ -19,13 +19,14 @@ namespace limber::tools {
 namespace {
 
 struct Arguments {
-  std::string input, page;
+  std::string input, page, up = "z";
 };
 
-PageContent content_of(const std::filesystem::path& input) {
+PageContent content_of(const Arguments& arguments) {
+  const std::filesystem::path input = arguments.input;
   const std::string extension = input.extension().string();
   if (extension == ".json") return page_of_scene(input);
-  if (extension == ".glb") return page_of_asset(input);
+  if (extension == ".glb") return page_of_asset(input, arguments.up == "y" ? UpAxis::kY : UpAxis::kZ);
   throw InputError(fmt::format("{}: expected a scene (.json) or an asset (.glb); bake meshes with limber-precompute",
                                input.string()));
 }
@@ -49,7 +50,7 @@ bool opened(const std::string& page) {
 
 void view(Program& program, const Arguments& arguments) {
   program.add_input(arguments.input);
-  const PageContent content = content_of(arguments.input);
+  const PageContent content = content_of(arguments);
   const std::string page = page_with(empty_page(), content);
   program.report()["files"] = content.files.size();
   program.report()["bytes"] = page.size();
@@ -77,5 +78,9 @@ int main(int argc, char** argv) {
   program.options()
       .add_option("-o,--output", arguments.page, "page to write; without it a temporary one is opened")
       ->type_name("FILE.html");
+  program.options()
+      .add_option("--up", arguments.up, "of an asset: the axis of its mesh that points up")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str();
   return program.run(argc, argv, [&] { limber::tools::view(program, arguments); });
 }

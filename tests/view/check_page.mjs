@@ -98,6 +98,14 @@ async function isDragged(page) {
   check(!(await page.evaluate(() => globalThis.limber.engine.hand().holds)), 'it is let go');
 }
 
+async function isSaved(page) {
+  const before = await hash(page);
+  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('#panel button:has-text("Save GLB")').click()]);
+  const bytes = readFileSync(await file.path());
+  check(bytes.subarray(0, 4).toString() === 'glTF' && bytes.readUInt32LE(8) === bytes.length, 'what happened is saved as a GLB');
+  check((await hash(page)) === before, 'saving changes nothing');
+}
+
 async function goesBack(page) {
   await page.evaluate(() => globalThis.limber.restart());
   await page.evaluate(() => globalThis.limber.setPlaying(false));
@@ -195,6 +203,7 @@ try {
   if (wrong.length === 0) {
     await isDragged(page);
     await goesBack(page);
+    await isSaved(page);
     if (picture !== undefined) {
       await page.evaluate(() => globalThis.limber.restart());
       await page.evaluate(() => globalThis.limber.setPlaying(false));

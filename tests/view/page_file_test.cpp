@@ -74,6 +74,19 @@ TEST(PageFile, AnAssetFallsOnTheGround) {
   EXPECT_GT(scene.bodies[1].placement.pose.p.x() - scene.bodies[0].placement.pose.p.x(), testing::kBlockLength);
 }
 
+TEST(PageFile, AnAssetDrawnWithYUpStandsUpright) {
+  const Folder folder("page_file_up");
+  ModalModelData data = testing::block_data(1);
+  for (Vec3f& p : data.render.rest) p.y() *= 3.0f;
+  write_asset(folder.path / "b.glb", {.bodies = {std::make_shared<const ModalModel>(std::move(data))}});
+  const PageContent content = page_of_asset(folder.path / "b.glb", UpAxis::kY);
+  write_file(folder.path / "asset.glb", content.files[0].bytes);
+  write_file(folder.path / "s.json", content.files[1].bytes);
+  const BodyPlacement placed = read_scene(folder.path / "s.json").bodies[0].placement;
+  EXPECT_NEAR((placed.pose.q * Vec3::UnitY() - Vec3::UnitZ()).norm(), 0.0, 1e-12);
+  EXPECT_NEAR(placed.pose.p.z(), 1.5 + 1.5, 1e-6) << "its lowest point half its height above the ground";
+}
+
 TEST(PageFile, WhatIsWrongIsToldBeforeThereIsAPage) {
   const Folder folder("page_file_wrong");
   write_file(folder.path / "b.glb", "no asset");

@@ -10,6 +10,7 @@
 #include "block_model.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/scene/recording.h"
 #include "limber/scene/run.h"
 
 namespace limber {
@@ -141,6 +142,30 @@ TEST_F(PageWorldTest, GoingBackAndForthGivesTheSameHashes) {
   step(page, 1);
   EXPECT_EQ(page.kept(), 28) << "what came after belongs to another future";
   EXPECT_EQ(page.state_hash(), hashes[27]);
+}
+
+/// Of a run that nobody touched it is the file that simulate writes.
+TEST_F(PageWorldTest, ARecordingIsThatOfTheRun) {
+  PageWorld page(scene());
+  step(page, 30);
+  const std::uint64_t before = page.state_hash();
+  const std::string glb = page.recording();
+  EXPECT_EQ(page.state_hash(), before);
+  const Scene told = read_scene(scene());
+  const RunResult run = run_scene(told, load_models(told), {.steps = 30, .key_rate = 1e6});
+  EXPECT_EQ(glb, make_recording(run.trajectory).glb);
+}
+
+TEST_F(PageWorldTest, BodiesDroppedOnTheWayAreInTheRecording) {
+  PageWorld page(scene());
+  step(page, 5);
+  page.drop(0, {0, 0, 4});
+  step(page, 5);
+  page.go_to(3);
+  const std::string glb = page.recording();
+  EXPECT_EQ(page.steps_taken(), 3);
+  EXPECT_EQ(page.frame().size(), 2u * (7 + kModes)) << "the third body is not there yet";
+  EXPECT_NE(glb.find("dropped[0]"), glb.npos);
 }
 
 TEST_F(PageWorldTest, PokesPushPinsHoldAndGravityTurns) {

@@ -146,6 +146,12 @@ EMSCRIPTEN_KEEPALIVE int page_go_to(int key) {
   return guarded([&] { page->go_to(key); });
 }
 
+// A GLB of what was kept: how many bytes, 0 where it fails; page_text() has them until the next text.
+EMSCRIPTEN_KEEPALIVE double page_record() {
+  return guarded([] { text = page->recording(); }) != 0 ? static_cast<double>(text.size()) : 0.0;
+}
+EMSCRIPTEN_KEEPALIVE const char* page_text() { return text.data(); }
+
 // Surface by the engine itself, for comparison with what is drawn: 3 V floats of body `body` into `positions`.
 EMSCRIPTEN_KEEPALIVE int page_reconstruct(int body, float* positions) {
   return guarded([&] { page->reconstruct(body, positions); });

@@ -67,11 +67,14 @@ struct Extent {
   double low = 0.0;  // the least z
 };
 
-Extent extent_of(const ModalModel& model) {
+/// In the scene's axes.
+Extent extent_of(const ModalModel& model, UpAxis up) {
   Vec3 most = Vec3::Constant(-1e300), least = Vec3::Constant(1e300);
-  for (const Vec3f& p : model.render().rest) {
-    most = most.cwiseMax(p.cast<double>());
-    least = least.cwiseMin(p.cast<double>());
+  for (const Vec3f& at_rest : model.render().rest) {
+    Vec3 p = at_rest.cast<double>();
+    if (up == UpAxis::kY) p = {p.x(), -p.z(), p.y()};
+    most = most.cwiseMax(p);
+    least = least.cwiseMin(p);
   }
   return {most - least, least.z()};
 }
@@ -95,7 +98,7 @@ PageContent page_of_scene(const std::filesystem::path& path) {
   return content;
 }
 
-PageContent page_of_asset(const std::filesystem::path& path) {
+PageContent page_of_asset(const std::filesystem::path& path, UpAxis up) {
   constexpr double kGap = 0.25;  // of a body's size, between two
   constexpr double kDrop = 0.5;  // of its height
   const Asset asset = read_asset(path);
@@ -104,7 +107,7 @@ PageContent page_of_asset(const std::filesystem::path& path) {
   bool falls = false;
   for (std::size_t part = 0; part < asset.bodies.size(); ++part) {
     const ModalModel& model = *asset.bodies[part];
-    const auto [size, low] = extent_of(model);
+    const auto [size, low] = extent_of(model, up);
     if (part > 0) x += (0.5 + kGap) * size.x();
     const bool free = model.data().motion == FrameMotion::kFree;
     falls = falls || free;
@@ -112,6 +115,7 @@ PageContent page_of_asset(const std::filesystem::path& path) {
                                {"asset", "asset"},
                                {"part", part},
                                {"position", {x, 0.0, free ? kDrop * size.z() - low : 0.0}}});
+    if (up == UpAxis::kY) scene["bodies"].back()["orientation"] = {{"axis", {1, 0, 0}}, {"degrees", 90}};
     x += 0.5 * size.x();
   }
   if (falls) {

@@ -9,10 +9,12 @@
 
 #include "description.h"
 #include "limber/core/error.h"
+#include "limber/scene/recording.h"
 #include "limber/scene/scene_player.h"
 #include "limber/scene/surface_ray.h"
 #include "page_history.h"
 #include "page_model.h"
+#include "page_tracks.h"
 
 namespace limber {
 namespace {
@@ -49,6 +51,10 @@ struct PageWorld::Impl {
   World& world() { return player->world(); }
   const World& world() const { return player->world(); }
   BodyId id(int body) const { return bodies[static_cast<std::size_t>(body)].id; }
+  std::size_t dropped() const {
+    return static_cast<std::size_t>(
+        std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
+  }
   void add_dropped(std::size_t count);
   void forget_removed();
 
@@ -261,9 +267,7 @@ void PageWorld::drop(int model, const Vec3& position) {
   if (model < 0 || static_cast<std::size_t>(model) >= m.kinds.size())
     throw InvalidArgument("PageWorld::drop: model " + std::to_string(model) + ", expected 0 to " +
                           std::to_string(m.kinds.size() - 1));
-  const auto dropped = static_cast<std::size_t>(
-      std::count_if(m.bodies.begin(), m.bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
-  m.drops.resize(dropped);  // those of a future that will not be
+  m.drops.resize(m.dropped());  // those of a future that will not be
   m.drops.push_back(model);
   m.add_dropped(m.drops.size());
   m.world().set_pose(m.bodies.back().id, {{}, position});
@@ -271,9 +275,7 @@ void PageWorld::drop(int model, const Vec3& position) {
 
 /// Until there are `count` of them. Ids are given in the same order again.
 void PageWorld::Impl::add_dropped(std::size_t count) {
-  auto there = static_cast<std::size_t>(
-      std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
-  for (; there < count; ++there) {
+  for (std::size_t there = dropped(); there < count; ++there) {
     const int kind = drops[there];
     bodies.push_back({world().add_body(kinds[static_cast<std::size_t>(kind)]), kind,
                       "dropped[" + std::to_string(there) + "]", true});
@@ -298,9 +300,7 @@ void PageWorld::show_mode(int body, Index mode, double amplitude) {
 
 void PageWorld::keep() {
   Impl& m = *impl_;
-  const auto dropped =
-      std::count_if(m.bodies.begin(), m.bodies.end(), [](const internal::PageBody& b) { return b.dropped; });
-  m.history.keep(*m.player, m.hands, static_cast<std::size_t>(dropped));
+  m.history.keep(*m.player, m.hands, m.dropped());
 }
 
 int PageWorld::kept() const { return impl_->history.size(); }
@@ -314,6 +314,33 @@ void PageWorld::go_to(int key) {
   m.forget_removed();
   m.hands = at.hands;
   m.settings.gravity = m.world().options().gravity;
+}
+
+std::string PageWorld::recording() {
+  Impl& m = *impl_;
+  std::vector<std::byte> here;
+  m.player->save_state(here);
+  const internal::Hands hands = m.hands;
+  const Vec3 gravity = m.settings.gravity;
+  const std::vector<internal::PageBody> bodies_here = m.bodies;
+  const std::size_t dropped_here = m.dropped();
+  Trajectory all;
+  all.scene = m.scene.name;
+  all.step = all.key_interval = m.scene.step;
+  for (std::size_t i = 0; i < m.scene.statics.size(); ++i)
+    all.statics.push_back({m.scene.statics[i].name, m.models.shape_of_static[i], m.scene.statics[i].pose});
+  for (int key = kept() - 1; key >= 0; --key) {  // backwards: all bodies are there at first
+    go_to(key);
+    all.times.insert(all.times.begin(), static_cast<double>(kept_step(key)) * m.scene.step);
+    internal::record_key(m.world(), m.bodies, m.kinds, all.bodies);
+  }
+  for (BodyTrack& track : all.bodies) internal::turn_round(track);
+  m.add_dropped(dropped_here);
+  m.player->restore_state(here);
+  m.bodies = bodies_here;
+  m.hands = hands;
+  m.settings.gravity = gravity;
+  return make_recording(all).glb;
 }
 
 }  // namespace limber

@@ -101,6 +101,14 @@ class Engine {
   keptStep(key) { return this.module._page_kept_step(key); }
   goTo(key) { this.check(this.module._page_go_to(key)); this.describe(); }
 
+  /** @return the bytes of an animated GLB */
+  recording() {
+    const size = this.module._page_record();
+    this.check(size > 0);
+    const at = this.module._page_text();
+    return this.module.HEAPU8.slice(at, at + size);
+  }
+
   reconstruct(body) {
     const count = 3 * this.scene.models[this.scene.bodies[body].model].vertices, at = this.module._malloc(4 * count);
     this.check(this.module._page_reconstruct(body, at));

@@ -1,5 +1,6 @@
 // The page: a scene that goes on in real time, and a person who reaches into it.
 import { bytesOf, openEngine } from './engine.js';
+import { element } from './dom.js';
 import { Panel } from './panel.js';
 import { Stage } from './stage.js';
 
@@ -116,6 +117,19 @@ class App {
     this.settings.gravity = this.engine.scene.settings.gravity;
     this.stage.syncBodies(this.engine);
     this.show();
+  }
+
+  /** A file of what was kept, to the browser's downloads. */
+  save() {
+    let bytes;
+    try {
+      bytes = this.engine.recording();
+    } catch (error) {
+      return tell(error.message);
+    }
+    const address = URL.createObjectURL(new Blob([bytes], { type: 'model/gltf-binary' }));
+    element('a', { href: address, download: `${this.engine.scene.name}.glb` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 10000);
   }
 
   unpin() {

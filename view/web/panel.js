@@ -40,7 +40,7 @@ export class Panel {
     const { app } = this;
     this.play = button('Pause', () => app.setPlaying(!app.playing));
     return element('div', {}, element('div', { className: 'row' }, this.play, button('Step', () => app.stepOnce()),
-      button('Start again', () => app.restart())),
+      button('Start again', () => app.restart()), button('Save GLB', () => app.save())),
       slider('Speed', { min: 0.02, max: 1, step: 0.02, value: app.speed, show: (x) => `× ${x.toFixed(2)}` }, (x) => { app.speed = x; }),
       this.scrub);
   }
@@ -92,7 +92,7 @@ export class Panel {
         const rows = () => frequencies.map((hz, mode) => {
           const moved = slider(`${hz.toPrecision(4)} Hz`, { min: -1, max: 1, step: 0.01, value: 0, show: (x) => x.toFixed(2) },
             (x) => app.showMode(number, mode, x));
-          return element('div', {}, moved, button('Play', () => app.playMode(number, mode)));
+          return element('div', { className: 'mode' }, moved, button('Play', () => app.playMode(number, mode)));
         });
         const list = section(body.name, false);
         list.addEventListener('toggle', () => { if (list.open && list.children.length === 1) list.append(...rows()); });

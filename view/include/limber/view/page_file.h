@@ -27,9 +27,12 @@ struct PageContent {
 /// @throws InputError as read_scene() and load_models()
 PageContent page_of_scene(const std::filesystem::path& scene);
 
+/// Which axis of an asset's bodies points up.
+enum class UpAxis { kY, kZ };
+
 /// A scene made for an asset: its bodies side by side, free ones fall on the ground from half their size.
 /// @throws InputError as read_asset()
-PageContent page_of_asset(const std::filesystem::path& asset);
+PageContent page_of_asset(const std::filesystem::path& asset, UpAxis up = UpAxis::kZ);
 
 /// @param empty the page without a scene, which limber-view has inside
 /// @throws InvalidArgument where `empty` has no place for files

@@ -109,6 +109,9 @@ class PageWorld {
   std::int64_t kept_step(int key) const;
   /// Back, or forth again, to a kept state, to the bit: a hand that held something then holds it again.
   void go_to(int key);
+  /// What the kept states show, from the first to the last, as an animated GLB (limber/scene/recording.h). A body that
+  /// was dropped on the way waits at its place. The world stays where it is.
+  std::string recording();
 
  private:
   struct Impl;
