@@ -62,22 +62,25 @@ HWY_INLINE HWY_ATTR Points Skinned(const TileRange& range, const InstanceOutput&
                                    const Points& rest, const Points& u) {
   const Floats d;
   const std::size_t tile = vertex / kTileVertices, lane = vertex % kTileVertices;
-  Vector blend[kHandleNumbers];
-  for (Vector& b : blend) b = hn::Zero(d);
+  // Two halves, as compilers unroll loops of up to sixteen rounds, and only then keep sums in registers.
+  constexpr std::size_t kHalf = kHandleNumbers / 2;
+  Vector turn[kHalf], moves[kHalf];
+  for (std::size_t i = 0; i < kHalf; ++i) turn[i] = moves[i] = hn::Zero(d);
   const TileInfluences& in = range.influences;
   for (std::uint32_t e = in.starts[tile]; e < in.starts[tile + 1]; ++e) {
     const Vector weight = hn::Load(d, in.weights + e * kTileVertices + lane);
     const float* handle = out.handles + kHandleNumbers * in.handle[e];
-    for (std::size_t i = 0; i < kHandleNumbers; ++i) blend[i] = hn::MulAdd(weight, hn::Set(d, handle[i]), blend[i]);
+    for (std::size_t i = 0; i < kHalf; ++i) turn[i] = hn::MulAdd(weight, hn::Set(d, handle[i]), turn[i]);
+    for (std::size_t i = 0; i < kHalf; ++i) moves[i] = hn::MulAdd(weight, hn::Set(d, handle[kHalf + i]), moves[i]);
   }
-  const Points shift{blend[9], blend[10], blend[11]}, angle{blend[12], blend[13], blend[14]},
-      drift{blend[15], blend[16], blend[17]};
+  const Points shift{moves[0], moves[1], moves[2]}, angle{moves[3], moves[4], moves[5]},
+      drift{moves[6], moves[7], moves[8]};
   const Points shown = CrossAdd(angle, rest, drift);  // what the handles show of u
   const Points y{hn::Add(rest.x, hn::Sub(u.x, shown.x)), hn::Add(rest.y, hn::Sub(u.y, shown.y)),
                  hn::Add(rest.z, hn::Sub(u.z, shown.z))};
   const auto row = [&](const Vector* r, Vector t)
                        HWY_ATTR { return hn::MulAdd(r[0], y.x, hn::MulAdd(r[1], y.y, hn::MulAdd(r[2], y.z, t))); };
-  return Added(y, {row(blend, shift.x), row(blend + 3, shift.y), row(blend + 6, shift.z)});
+  return Added(y, {row(turn, shift.x), row(turn + 3, shift.y), row(turn + 6, shift.z)});
 }
 
 // Rest positions, moved by the modes' sum u, by what an instance adds to it, and by its handles.

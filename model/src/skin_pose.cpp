@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "limber/core/exact_math.h"
+#include "skin_kernels.h"
 
 namespace limber {
 namespace {
@@ -46,38 +47,11 @@ Mat3 nearest_rotation(const Mat3& A) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
 }
 
-/// Three rows, axis after axis, of so many numbers.
+/// Three rows of k numbers: out += m in.
 template <class T>
-struct Rows {
-  T *x, *y, *z;
-  Rows(T* first, std::size_t count) : x(first), y(first + count), z(first + 2 * count) {}
-};
-
-/// out += m in.
-template <class T>
-void add_product(const Mat3& m, const Rows<const T>& in, const Rows<double>& out, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const double a = in.x[i], b = in.y[i], c = in.z[i];
-    out.x[i] += m(0, 0) * a + m(0, 1) * b + m(0, 2) * c;
-    out.y[i] += m(1, 0) * a + m(1, 1) * b + m(1, 2) * c;
-    out.z[i] += m(2, 0) * a + m(2, 1) * b + m(2, 2) * c;
-  }
-}
-
-/// out += vᵀ in.
-template <class T>
-void add_row(const Vec3& v, const Rows<const T>& in, double* out, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) out[i] += v.x() * in.x[i] + v.y() * in.y[i] + v.z() * in.z[i];
-}
-
-/// Eight sums side by side, so that a compiler may use vectors and the order is the same for all of them.
-double dot(const float* a, std::span<const double> z) {
-  double sum[8] = {};
-  std::size_t i = 0;
-  for (; i + 8 <= z.size(); i += 8)
-    for (std::size_t j = 0; j < 8; ++j) sum[j] += static_cast<double>(a[i + j]) * z[i + j];
-  for (std::size_t j = 0; i < z.size(); ++i, ++j) sum[j] += static_cast<double>(a[i]) * z[i];
-  return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+void add_product(const Mat3& m, const T* in, std::size_t k, double* out) {
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = m;
+  internal::add_product(rows.data(), in, k, out);
 }
 
 }  // namespace
@@ -92,13 +66,12 @@ SkinPose::SkinPose(const ModalSkin& skin) : skin_(&skin), out_of_frame_(Mat3::Id
   shift_rates_.resize(3 * n * k);
   drift_shapes_.resize(3 * n * k);
   for (Index h = 0; h < skin.handles; ++h) {
-    const Rows<double> drift(drift_shapes_.data() + row(h, 0), k);
+    double* drift = drift_shapes_.data() + row(h, 0);
     for (Index l = 0; l < skin.handles; ++l) {
-      add_product<float>(Mat3::Identity(), {skin.shift_row(l, h, 0), k}, drift, k);
-      add_product<float>(-cross_matrix(skin.arm(l, h)), {skin.rotation_row(l, 0), k}, drift, k);
+      add_product(Mat3::Identity(), skin.shift_row(l, h, 0), k, drift);
+      add_product(-cross_matrix(skin.arm(l, h)), skin.rotation_row(l, 0), k, drift);
     }
-    const Vec3& rest = skin.rest[static_cast<std::size_t>(h)];
-    add_product<float>(cross_matrix(rest), {skin.rotation_row(h, 0), k}, drift, k);
+    add_product(cross_matrix(skin.rest[static_cast<std::size_t>(h)]), skin.rotation_row(h, 0), k, drift);
   }
 }
 
@@ -125,27 +98,24 @@ void SkinPose::write_numbers() {
 
 void SkinPose::place_handles(std::span<const double> z) {
   const ModalSkin& s = *skin_;
-  for (Index h = 0; h < s.handles; ++h) {
-    Handle& handle = handles_[static_cast<std::size_t>(h)];
-    for (int axis = 0; axis < 3; ++axis) handle.angle[axis] = dot(s.rotation_row(h, axis), z);
+  const auto n = handles_.size();
+  internal::rows_times(s.rotations.data(), 3 * n, z.size(), z.data(), reach_.data()->data());
+  for (std::size_t h = 0; h < n; ++h) {
+    Handle& handle = handles_[h];
+    handle.angle = reach_[h];
     handle.turn = turn_of(handle.angle);
+    handle.shift = -(handle.turn * s.rest[h]);
+    handle.drift = -handle.angle.cross(s.rest[h]);
   }
-  for (Index h = 0; h < s.handles; ++h) {
-    Handle& handle = handles_[static_cast<std::size_t>(h)];
-    const Vec3& rest = s.rest[static_cast<std::size_t>(h)];
-    handle.shift = -(handle.turn * rest);
-    handle.drift = -handle.angle.cross(rest);
-    for (Index l = 0; l < s.handles; ++l) {
-      const Handle& other = handles_[static_cast<std::size_t>(l)];
-      const Vec3 arm = s.arm(l, h);
-      Vec3 stretch;
-      for (int axis = 0; axis < 3; ++axis) stretch[axis] = dot(s.shift_row(l, h, axis), z);
-      const Vec3 reach = arm + stretch;
-      handle.shift += other.turn * reach + stretch;
-      handle.drift += other.angle.cross(arm) + stretch;
-      reach_[static_cast<std::size_t>(l * s.handles + h)] = reach;
+  internal::rows_times(s.shifts.data(), 3 * n * n, z.size(), z.data(), reach_.data()->data());
+  for (std::size_t l = 0; l < n; ++l)
+    for (std::size_t h = 0; h < n; ++h) {
+      const Vec3 arm = s.arm(static_cast<Index>(l), static_cast<Index>(h)), stretch = reach_[l * n + h];
+      Vec3& reach = reach_[l * n + h];
+      reach = arm + stretch;
+      handles_[h].shift += handles_[l].turn * reach + stretch;
+      handles_[h].drift += handles_[l].angle.cross(arm) + stretch;
     }
-  }
 }
 
 /// c, Q and P. Sums what differs from rest, so that a body at rest stays where it is.
@@ -225,10 +195,11 @@ Vec3 SkinPose::add_rows(const SkinInfluences& at, const Vec3& rest, const Vec3& 
     const Index h = at.handle[i];
     const Handle& handle = handles_[static_cast<std::size_t>(h)];
     const Vec3 carried = y + handle.turn * y;
-    add_row<double>(weight * f, {shift_rates_.data() + row(h, 0), k}, g.data(), k);
-    add_row<double>(weight * carried.cross(f), {turn_rates_.data() + row(h, 0), k}, g.data(), k);
-    add_row<double>(-weight * turned, {drift_shapes_.data() + row(h, 0), k}, g.data(), k);
-    add_row<float>(-weight * rest.cross(turned), {skin_->rotation_row(h, 0), k}, g.data(), k);
+    const Vec3 along[] = {weight * f, weight * carried.cross(f), -weight * turned, -weight * rest.cross(turned)};
+    internal::add_row(along[0].data(), shift_rates_.data() + row(h, 0), k, g.data());
+    internal::add_row(along[1].data(), turn_rates_.data() + row(h, 0), k, g.data());
+    internal::add_row(along[2].data(), drift_shapes_.data() + row(h, 0), k, g.data());
+    internal::add_row(along[3].data(), skin_->rotation_row(h, 0), k, g.data());
   }
   return turned;
 }
@@ -249,17 +220,15 @@ void SkinPose::differentiate_places() {
   for (Index l = 0; l < s.handles; ++l) {
     const Handle& handle = handles_[static_cast<std::size_t>(l)];
     const Mat3 R = Mat3::Identity() + handle.turn;
-    add_product<float>(R * right_jacobian(handle.angle), {s.rotation_row(l, 0), k}, {turn_rates_.data() + row(l, 0), k},
-                       k);
+    double* turn = turn_rates_.data() + row(l, 0);
+    add_product(R * right_jacobian(handle.angle), s.rotation_row(l, 0), k, turn);
     for (Index h = 0; h < s.handles; ++h) {
       const Vec3 arm = R * reach_[static_cast<std::size_t>(l * s.handles + h)];
-      const Rows<double> out(shift_rates_.data() + row(h, 0), k);
-      add_product<float>(R, {s.shift_row(l, h, 0), k}, out, k);
-      add_product<double>(-cross_matrix(arm), {turn_rates_.data() + row(l, 0), k}, out, k);
+      double* shift = shift_rates_.data() + row(h, 0);
+      add_product(R, s.shift_row(l, h, 0), k, shift);
+      add_product(-cross_matrix(arm), turn, k, shift);
     }
-    const Vec3& rest = s.rest[static_cast<std::size_t>(l)];
-    add_product<double>(cross_matrix(R * rest), {turn_rates_.data() + row(l, 0), k},
-                        {shift_rates_.data() + row(l, 0), k}, k);
+    add_product(cross_matrix(R * s.rest[static_cast<std::size_t>(l)]), turn, k, shift_rates_.data() + row(l, 0));
   }
 }
 

@@ -186,6 +186,48 @@ TEST(SkinnedReconstruct, InfluencesThatDoNotFitAreRefused) {
   EXPECT_THROW(reconstruct(s.surface, SkinTiles(s.skin.render), few.targets), InvalidArgument);
 }
 
+/// fᵀJ at a vertex.
+std::vector<double> row_of(const SkinnedSurface& s, SkinPose& pose, Index v, std::span<const double> z, const Vec3& f) {
+  const auto at = static_cast<std::size_t>(v);
+  Vec3 linear = Vec3::Zero();
+  for (std::size_t m = 0; m < z.size(); ++m)
+    linear += z[m] * s.surface.basis.shape(v, static_cast<Index>(m)).cast<double>();
+  pose.set(z);
+  pose.differentiate();
+  std::vector<double> g(z.size(), 0.0);
+  const Vec3 rest = s.surface.rest[at].cast<double>();
+  const Vec3 by_modes = pose.add_rows(s.skin.render[at], rest, linear, f, g);
+  for (std::size_t m = 0; m < z.size(); ++m)
+    g[m] += by_modes.dot(s.surface.basis.shape(v, static_cast<Index>(m)).cast<double>());
+  return g;
+}
+
+TEST(SkinPoseKernels, DerivativeIsRightAndTheSameOnEveryInstructionSet) {
+  for (const Index modes : {1, 3, 4, 8, 13, 23}) {
+    const SkinnedSurface s(6, modes, 7);
+    SkinPose pose(s.skin);
+    std::vector<double> z;
+    for (Index m = 0; m < modes; ++m) z.push_back(0.3 * std::sin(1.0 + 2.0 * m));
+    const Vec3 f(0.5, -0.3, 0.8);
+    std::vector<std::vector<double>> rows;
+    for_each_instruction_set([&](std::int64_t target) {
+      SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ": " << modes << " modes");
+      const std::vector<double> row = row_of(s, pose, 1, z, f);
+      if (has_fused_multiply_add(target)) rows.push_back(row);
+      for (std::size_t m = 0; m < z.size(); ++m) {
+        constexpr double kStep = 1e-5;
+        std::vector<double> above = z, below = z;
+        above[m] += kStep, below[m] -= kStep;
+        pose.set(above);
+        const Vec3 high = s.position(pose, 1, above);
+        pose.set(below);
+        EXPECT_NEAR(row[m], f.dot(high - s.position(pose, 1, below)) / (2.0 * kStep), 1e-8);
+      }
+    });
+    for (const auto& row : rows) EXPECT_EQ(row, rows.front());
+  }
+}
+
 TEST(SkinTiles, HoldEachVertexWeightOnce) {
   const SkinnedSurface s(37, 2, 8);
   const SkinTiles tiles(s.skin.render);
