@@ -81,7 +81,7 @@ const char* name(StabilityFault fault) {
 
 unsigned faults(const StabilityCase& at, const StabilityResult& r) {
   constexpr double kRise = 1e-6, kOff = 1e-6, kMomentum = 1e-9, kUnsettled = 0.01;
-  const double digits = 16.0 * kEpsilon * at.far_away / at.size;  // of a place, in parts of a bar
+  const double rounding = kEpsilon * at.far_away / at.size, digits = 16.0 * rounding;  // of a place, in parts of a bar
   const bool recovers = has_contact(at.scene) && at.recovery_speed > 0.0;
   unsigned bits = 0;
   const auto judge = [&](StabilityFault fault, bool at_fault) {
@@ -92,7 +92,7 @@ unsigned faults(const StabilityCase& at, const StabilityResult& r) {
   judge(StabilityFault::kPassed, r.passed);
   judge(StabilityFault::kOverlap, r.rest_overlap > kMostOverlap);
   judge(StabilityFault::kOffTarget, r.off_target > kOff + digits);
-  judge(StabilityFault::kMomentum, r.momentum_error > kMomentum + digits);
+  judge(StabilityFault::kMomentum, r.momentum_error > kMomentum + digits + r.steps * rounding);  // each step rounds it
   judge(StabilityFault::kUnsettled, r.unsettled > kUnsettled * r.steps);
   return bits;
 }

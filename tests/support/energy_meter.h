@@ -71,7 +71,9 @@ class EnergyMeter {
     NodeEnergy energy;
     energy.kinetic = 0.5 * velocity.dot(M_ * velocity);
     energy.strain = 0.5 * u.dot(K_ * u);
-    energy.potential = -(q_BW * gravity).dot(sum_of(M_ * (place + uniform(q_BW * body.pose.p))));
+    // The place of the body by itself: turned into body axes it would lose digits far from the origin.
+    const double mass = sum_of(M_ * uniform(Vec3::UnitX())).x();
+    energy.potential = -(q_BW * gravity).dot(sum_of(M_ * place)) - mass * gravity.dot(body.pose.p);
     const double turn = omega.norm() * z.norm();
     energy.spin_bound = turn * (std::sqrt(turning.dot(M_ * turning)) + 0.5 * turn + rates.norm());
     return energy;
