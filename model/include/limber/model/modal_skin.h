@@ -7,8 +7,9 @@
 ///   x_v(z) = Σ_h β_vh [p_h + R_h (r_v − r_h + Ũ_v z)]                     a vertex; four handles, β ≥ 0, Σ_h β_vh = 1
 ///   Ũ_v z  = U_v z − Σ_h β_vh [P_h z + (Θ_h z) × (r_v − r_h)],  P_h z = Σ_l [D_lh z + (Θ_l z) × a_lh]
 ///
-/// The last line makes x(z) = r + U z + O(z²) for any handles and weights; x(0) = r to the bit. A handle with Θ, a and
-/// D zero is the ground: what hangs on it alone does not move. Derivation: docs/derivations/modal-skin.md.
+/// The last line makes x(z) = r + U z + O(z²) for any handles and weights; x(0) = r to the bit, but for the round-off
+/// of a free body's frame. A handle with Θ, a and D zero is the ground: what hangs on it alone does not move.
+/// Derivation: docs/derivations/modal-skin.md.
 #pragma once
 
 #include <array>
