@@ -35,6 +35,7 @@ struct ContactSet::Impl {
   ContactOptions options;
   std::vector<PreparedContact> contacts;
   std::vector<VertexShare> regions;                // of their sides
+  std::vector<double> shapes;                      // of these
   std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
@@ -54,8 +55,9 @@ struct ContactSet::Impl {
   double lasted(Index a, Index b) const;
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
-  void reserve_regions(std::span<const ContactPoint> points);
+  void reserve_regions(const BodyStates& states, std::span<const ContactPoint> points);
   void add_region(PreparedSide& side, const ContactSide& found);
+  void spread_shapes(PreparedSide& side);
 };
 
 const ContactMemory* ContactSet::Impl::find(std::uint64_t id) const {
@@ -92,12 +94,16 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
 }
 
 /// So that spans of them stay where they are.
-void ContactSet::Impl::reserve_regions(std::span<const ContactPoint> points) {
-  std::size_t most = 0;
+void ContactSet::Impl::reserve_regions(const BodyStates& states, std::span<const ContactPoint> points) {
+  std::size_t most = 0, most_shapes = 0;
   for (const ContactPoint& point : points)
-    most += std::max<std::size_t>(3, point.a.region.size()) + std::max<std::size_t>(3, point.b.region.size());
-  regions.clear();
-  regions.reserve(most);
+    for (const ContactSide* side : {&point.a, &point.b}) {
+      most += std::max<std::size_t>(3, side->region.size());
+      if (!side->region.empty() && !states.is_static(side->body))
+        most_shapes += 3 * static_cast<std::size_t>(states.body(side->body).group->model().modes());
+    }
+  regions.clear(), shapes.clear();
+  regions.reserve(most), shapes.reserve(most_shapes);
 }
 
 /// The vertices that a contact's force is spread over, its point's own where it stands for no others.
@@ -109,6 +115,24 @@ void ContactSet::Impl::add_region(PreparedSide& side, const ContactSide& found) 
   for (std::size_t c = 0; c < 3 && found.region.empty(); ++c)
     if (side.at.weight[c] != 0.0) regions.push_back({.vertex = corners[c], .share = side.at.weight[c]});
   side.region = std::span(regions).subspan(first);
+  if (!found.region.empty()) spread_shapes(side);
+}
+
+/// The modes' part of a contact, too, is that of its region.
+void ContactSet::Impl::spread_shapes(PreparedSide& side) {
+  const auto k = static_cast<std::size_t>(side.model->modes());
+  const std::size_t first = shapes.size();
+  shapes.resize(first + 3 * k, 0.0);
+  side.shapes = std::span(shapes).subspan(first);
+  for (const VertexShare& s : side.region)
+    for (std::size_t axis = 0; axis < 3 && k > 0; ++axis) {
+      const float* row = side.model->collision_rows().row(s.vertex, static_cast<int>(axis));
+      for (std::size_t i = 0; i < k; ++i) shapes[first + axis * k + i] += s.share * static_cast<double>(row[i]);
+    }
+  const ModalSurface& surface = side.model->collision();
+  const Triangle& corners = surface.triangles[static_cast<std::size_t>(side.at.triangle)];
+  for (std::size_t c = 0; c < 3; ++c)
+    side.rest += side.at.weight[c] * surface.rest[static_cast<std::size_t>(corners[c])].cast<double>();
 }
 
 ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -129,7 +153,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
   s.give_energy.resize(bodies);
   s.dents.reserve(bodies);
-  s.reserve_regions(points);
+  s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
   s.pairs_used = s.rolling_used = 0;

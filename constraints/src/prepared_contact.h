@@ -26,32 +26,52 @@ struct PreparedSide {
   const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
   SurfacePoint at{};
   std::span<const VertexShare> region{};  // of its residual compliance; none where it has none
+  std::span<const double> shapes{};       // of the modes, the region's mean, 3 × k; none: those of the point
+  Vec3 rest = Vec3::Zero();               // with shapes: the point at rest, body frame
   Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
   /// Where the body touches.
   Vec3 position(const BodyStates& states, StepTime when) const {
-    const Vec3 p = model != nullptr ? deformed_point(*model, at, states.amplitudes(body, when)) : rigid_point;
-    return states.pose(body, when) * p + rim;
+    return states.pose(body, when) * place(states.amplitudes(body, when)) + rim;
   }
   /// How far what is there has come beyond that by rolling, by the end of the step.
   Vec3 rolled(const BodyStates& states) const { return turn_of_step(states, body).cross(rim); }
   Vec3 velocity(const BodyStates& states, StepTime when) const {
     const RigidTransform& X = states.pose(body, when);
     Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
-    if (model != nullptr) v += X.q * displacement(*model, at, states.rates(body, when));
+    if (model != nullptr) v += X.q * deformation(states.rates(body, when));
     return v;
+  }
+  /// Body frame. @param z amplitudes
+  Vec3 place(std::span<const double> z) const {
+    if (model == nullptr) return rigid_point;
+    return shapes.empty() ? deformed_point(*model, at, z) : Vec3(rest + deformation(z));
+  }
+  /// U z; with rates its velocity.
+  Vec3 deformation(std::span<const double> z) const {
+    if (shapes.empty()) return displacement(*model, at, z);
+    Vec3 u = Vec3::Zero();
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::size_t i = 0; i < z.size(); ++i) u[static_cast<Index>(axis)] += shapes[axis * z.size() + i] * z[i];
+    return u;
+  }
+  /// g += Uᵀ f. @param f body frame
+  void add_load(const Vec3& f, std::span<double> g) const {
+    if (shapes.empty()) return add_modal_force(*model, at, f, g);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::size_t i = 0; i < g.size(); ++i) g[i] += shapes[axis * g.size() + i] * f[static_cast<Index>(axis)];
   }
   /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R U ż,
   /// [H03] equation 20.
   PointMotion motion(const BodyStates& states) const {
     const RigidTransform& X = states.pose(body, StepTime::kStart);
     const Vec3 omega = states.angular_velocity(body, StepTime::kStart),
-               place = position(states, StepTime::kStart) - rim;
-    const Vec3 turning = omega.cross(place - X.p);
+               centre = position(states, StepTime::kStart) - rim;
+    const Vec3 turning = omega.cross(centre - X.p);
     Vec3 deforming = Vec3::Zero();
-    if (model != nullptr) deforming = X.q * displacement(*model, at, states.rates(body, StepTime::kStart));
-    return {place, states.velocity(body, StepTime::kStart) + turning + deforming,
+    if (model != nullptr) deforming = X.q * deformation(states.rates(body, StepTime::kStart));
+    return {centre, states.velocity(body, StepTime::kStart) + turning + deforming,
             omega.cross(turning) + 2.0 * omega.cross(deforming)};
   }
 };
@@ -102,7 +122,7 @@ inline RowSide point_row(const BodyStates& states, StepTime when, const Prepared
   const RigidTransform& X = states.pose(side.body, when);
   if (side.model != nullptr) {
     modal.assign(static_cast<std::size_t>(side.model->modes()), 0.0);
-    add_modal_force(*side.model, side.at, X.q.conjugate() * n, modal);
+    side.add_load(X.q.conjugate() * n, modal);
   }
   return {side.body, n, (end - X.p).cross(n), modal};
 }
@@ -120,10 +140,9 @@ struct Passage {
       return;
     }
     motion->evaluate(time, state);
-    const Vec3 p = side.model != nullptr ? deformed_point(*side.model, side.at, state.amplitudes) : side.rigid_point;
-    place = state.pose * p + side.rim;
+    place = state.pose * side.place(state.amplitudes) + side.rim;
     velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
-    if (side.model != nullptr) velocity += state.pose.q * displacement(*side.model, side.at, state.rates);
+    if (side.model != nullptr) velocity += state.pose.q * side.deformation(state.rates);
   }
 };
 

@@ -75,7 +75,7 @@ Vec3 mean(const std::vector<ContactPoint>& contacts) {
 std::vector<ContactPoint> reduced(std::vector<ContactPoint> contacts, const ContactClusterOptions& options = {},
                                   double radius = kInfinity, std::span<const std::uint64_t> previous = {}) {
   ContactClusters clusters(options);
-  clusters.reduce(contacts, 0, radius, previous);
+  clusters.reduce(contacts, 0, {.length = radius}, previous);
   return contacts;
 }
 
@@ -243,6 +243,23 @@ TEST(ContactClusters, WhatLiesBetweenCornersIsCoveredToTheSpacing) {
   for (const ContactPoint& c : contacts) EXPECT_LE(distance(c, half), 1.1 * kSpacing + kRoundOff);
 }
 
+TEST(ContactClusters, ASpacingMayBeAShareOfThePatch) {
+  for (const double size : {0.1, 1.0, 10.0}) {
+    std::vector<ContactPoint> contacts;
+    for (int i = 0; i < 441; ++i) contacts.push_back(contact(contacts.size(), size * Vec3(i % 21, i / 21, 0.0)));
+    const auto all = contacts;
+    ContactClusters clusters;
+    clusters.reduce(contacts, 0, {.share = 0.3}, {});
+    EXPECT_GT(contacts.size(), 4u);
+    EXPECT_LE(contacts.size(), 9u);
+    for (const ContactPoint& c : all) {
+      double least = kInfinity;
+      for (const ContactPoint& k : contacts) least = std::min(least, (c.position - k.position).norm());
+      EXPECT_LE(least, 0.3 * std::sqrt(2.0) * 20.0 * size);
+    }
+  }
+}
+
 TEST(ContactClusters, ContactsInOnePlaceOrOnOneLineAreThinnedToItsEnds) {
   std::vector<ContactPoint> contacts;
   for (std::uint64_t i = 0; i < 30; ++i) contacts.push_back(contact(i, Vec3::Ones()));
@@ -284,7 +301,7 @@ TEST(ContactClusters, ContactsBeforeTheFirstAreLeftAlone) {
   const auto count = contacts.size();
   contacts.insert(contacts.end(), contacts.begin(), contacts.begin() + static_cast<std::ptrdiff_t>(count));
   ContactClusters clusters;
-  clusters.reduce(contacts, count, kInfinity, {});
+  clusters.reduce(contacts, count, {}, {});
   EXPECT_EQ(contacts.size(), count + 4);
 }
 
@@ -295,7 +312,7 @@ TEST(ContactClusters, AWarmReductionAllocatesNothing) {
   std::vector<ContactPoint> contacts;
   const auto reduce = [&] {
     contacts.assign(all.begin(), all.end());
-    clusters.reduce(contacts, 0, 0.5, previous);
+    clusters.reduce(contacts, 0, {.length = 0.5}, previous);
   };
   reduce();
   const long before = testing::allocations();
@@ -306,10 +323,10 @@ TEST(ContactClusters, AWarmReductionAllocatesNothing) {
 /// Σ_r φ_r = 1, Σ_r φ_r x_r = x, φ > 0, over what is kept of several shapes, with and without contacts in the middle.
 TEST(ContactClusters, WeightsSumToOneAndReproduceLinearFields) {
   for (const Region& region : kRegions)
-    for (const double spacing : {kInfinity, 0.7}) {
+    for (const double spacing : {kInfinity, 0.3}) {
       auto contacts = samples(region.inside, 0.125);
       ContactClusters clusters;
-      clusters.reduce(contacts, 0, spacing, {}, true);
+      clusters.reduce(contacts, 0, {.share = spacing}, {}, true);
       const std::span<const ContactPoint> all = clusters.all();
       std::vector<double> sum(all.size());
       std::vector<Vec3> mean(all.size(), Vec3::Zero());
@@ -333,7 +350,7 @@ TEST(ContactClusters, WeightsSumToOneAndReproduceLinearFields) {
 TEST(ContactClusters, WeightsOfASquareAreThoseOfItsSymmetry) {
   auto contacts = samples(kRegions[0].inside, 0.25);
   ContactClusters clusters;
-  clusters.reduce(contacts, 0, kInfinity, {}, true);
+  clusters.reduce(contacts, 0, {}, {}, true);
   ASSERT_EQ(contacts.size(), 4u);
   std::vector<double> part(clusters.all().size());
   for (const ContactWeight& w : clusters.weights()) part[static_cast<std::size_t>(w.kept)] += w.weight;
@@ -345,7 +362,7 @@ TEST(ContactClusters, WhatIsFartherIsNotPressedWithWhatIsKept) {
   auto contacts = samples(kRegions[0].inside, 0.25);
   for (ContactPoint& c : contacts) c.gap = 0.1 * (1.0 + c.position.x());  // 0 to 0.2 of an extent of 2.8: a tilted face
   ContactClusters clusters;
-  clusters.reduce(contacts, 0, kInfinity, {}, true);
+  clusters.reduce(contacts, 0, {}, {}, true);
   for (const ContactWeight& w : clusters.weights()) {
     const double farther =
         clusters.all()[static_cast<std::size_t>(w.contact)].gap - clusters.all()[static_cast<std::size_t>(w.kept)].gap;

@@ -479,6 +479,7 @@ TEST(ContactFinder, WrongBodiesAreRefused) {
   EXPECT_THROW(finder.exclude_pair(2, 2, true), InvalidArgument);
   EXPECT_THROW(finder.exclude_pair(2, 3, true), InvalidArgument);
   EXPECT_THROW(ContactFinder({.spacing = 0.0}), InvalidArgument);
+  EXPECT_THROW(ContactFinder({.region_spacing = -1.0}), InvalidArgument);
   EXPECT_THROW(ContactFinder({.clusters = {.max_points = -1}}), InvalidArgument);
 }
 

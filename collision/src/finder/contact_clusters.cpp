@@ -67,7 +67,8 @@ struct ContactClusters::Impl {
   double deep_gap = 0.0;  ///< contacts with gaps up to here are deep
   std::vector<PlanePoint> place, points, hull, all_corners, kept, old, trial, trial_hull;
 
-  double spacing = 0.0;
+  ContactSpacing wanted;
+  double spacing = 0.0;  ///< of the patch under way, m
 
   bool weigh = false;
   std::vector<ContactPoint> all;
@@ -185,6 +186,7 @@ void ContactClusters::Impl::choose() {
   largest_polygon(all_corners, static_cast<int>(kMostCorners), hull);  // thins the corners
 
   const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
+  spacing = std::isinf(wanted.share) ? wanted.length : std::min(wanted.length, wanted.share * diameter(all_corners));
   const auto deepest =
       std::min_element(place.begin(), place.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
   deep_gap = gap(*deepest) + options.depth_tolerance * diameter(all_corners);
@@ -231,7 +233,7 @@ ContactClusters::~ContactClusters() = default;
 ContactClusters::ContactClusters(ContactClusters&&) noexcept = default;
 ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = default;
 
-void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
+void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, const ContactSpacing& spacing,
                              std::span<const std::uint64_t> previous, bool weigh) {
   Impl& m = *impl_;
   m.weigh = weigh;
@@ -243,7 +245,7 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
   m.keep.assign(m.contacts.size(), 1);
   if (weigh) m.all.assign(m.contacts.begin(), m.contacts.end());
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
-  m.spacing = spacing;
+  m.wanted = spacing;
   m.find_patches();
   m.keep.assign(m.contacts.size(), 0);
   for (std::size_t patch = 0; patch < m.leaders.size(); ++patch) {

@@ -43,8 +43,10 @@ void check_length(const char* name, double length) {
 
 void ContactFinderOptions::validate() const {
   clusters.validate();
-  if (!(spacing > 0.0))
-    throw InvalidArgument("ContactFinderOptions: spacing is " + std::to_string(spacing) + ", expected above 0");
+  for (const auto& [name, value] : {std::pair("spacing", spacing), std::pair("region_spacing", region_spacing)})
+    if (!(value > 0.0))
+      throw InvalidArgument("ContactFinderOptions: " + std::string(name) + " is " + std::to_string(value) +
+                            ", expected above 0");
 }
 
 void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
@@ -69,10 +71,11 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   return result;
 }
 
-double ContactFinder::Impl::spacing(const BodyPair& pair) const {
+ContactSpacing ContactFinder::Impl::spacing(const BodyPair& pair, bool by_regions) const {
   const FoundBody &a = at(pair.a), &b = at(pair.b);
-  if (a.modes() == 0 && b.modes() == 0) return std::numeric_limits<double>::infinity();
-  return options.spacing * std::min(a.diagonal, b.diagonal);
+  if (a.modes() == 0 && b.modes() == 0) return {};
+  if (by_regions) return {.share = options.region_spacing};
+  return {.length = options.spacing * std::min(a.diagonal, b.diagonal)};
 }
 
 std::span<const std::uint64_t> ContactFinder::Impl::kept_last_time(const BodyPair& pair) const {
@@ -103,7 +106,7 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Fou
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
   const bool yields = sides[0].surface != nullptr || sides[1].surface != nullptr;
-  worker.clusters.reduce(contacts, first, spacing(pair), kept_last_time(pair), yields);
+  worker.clusters.reduce(contacts, first, spacing(pair, yields), kept_last_time(pair), yields);
   if (yields) worker.regions.find(worker.clusters, sides, into.regions);
   into.regions.counts.reserve(contacts.capacity());
   into.regions.counts.resize(contacts.size(), {0, 0});

@@ -83,7 +83,7 @@ struct ContactFinder::Impl {
   void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
   internal::RegionSide region_side(Index body) const;
   CollisionBody collision_body(Index body, internal::Worker& worker) const;
-  double spacing(const BodyPair& pair) const;
+  ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
   void keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids);

@@ -21,6 +21,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -35,6 +36,13 @@ struct ContactClusterOptions {
   double depth_tolerance = 1e-3;   ///< of the patch's extent; ≥ 0
   double hysteresis = 0.9;         ///< in [0, 1]; 1: last time's only where nothing is better
   void validate() const;           ///< @throws InvalidArgument naming the field and its value
+};
+
+/// Seen along a patch's normal, none of its contacts that is left out is farther than this (by a tenth more where those
+/// of last time are kept) from one that is kept: the lesser of both. Infinity: corners alone.
+struct ContactSpacing {
+  double length = std::numeric_limits<double>::infinity();  ///< m, > 0
+  double share = std::numeric_limits<double>::infinity();   ///< of the patch's extent, > 0
 };
 
 /// What a contact that is kept stands for: its share φ of another one's force.
@@ -54,11 +62,9 @@ class ContactClusters {
 
   /// Thins contacts[first …], all of one pair of bodies, and leaves them ascending in id. The outcome does not depend
   /// on their order before.
-  /// @param spacing m: seen along its normal, no contact of a patch that is left out is farther than this (by a tenth
-  ///   more where those of last time are kept) from one that is kept; > 0, infinity: corners alone
   /// @param previous ids that were kept for this pair last time, ascending
   /// @param weigh whether all() and weights() are wanted
-  void reduce(std::vector<ContactPoint>& contacts, std::size_t first, double spacing,
+  void reduce(std::vector<ContactPoint>& contacts, std::size_t first, const ContactSpacing& spacing,
               std::span<const std::uint64_t> previous, bool weigh = false);
 
   /// What reduce() was given last, ascending in id, and which contacts of it were kept.

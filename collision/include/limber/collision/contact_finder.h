@@ -35,6 +35,9 @@ struct ContactFinderOptions {
   /// smaller body's diagonal at rest; > 0. Smaller ones follow a bent surface more closely, with more contacts. Two
   /// rigid bodies keep the corners of each patch alone.
   double spacing = 0.125;
+  /// In its place where one of the two has a residual compliance, so that contacts stand for regions: a share of the
+  /// patch's extent; > 0. A flat face needs few contacts then, and a small patch keeps its own.
+  double region_spacing = 0.3;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 

@@ -12,9 +12,10 @@
 ///
 ///   G_rs = Σ_vw w_r(v) G_vw w_s(w),
 ///
-/// symmetric and positive semidefinite, for all contacts of a body among each other; frame and modes feel the force at
-/// the point. The residual displacement is a state of the body: what its last step pressed its vertices with, in its
-/// own frame (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
+/// symmetric and positive semidefinite, for all contacts of a body among each other. Of the modes, too, it sees the
+/// mean Σ_v w_r(v) U_v, so that all of the body answers to one load; the frame feels the force at the point. The
+/// residual displacement is a state of the body: what its last step pressed its vertices with, in its own frame
+/// (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
 /// *Contact compliance* (`give`): by rules other than the complementary one with its cone, contacts of bodies that flex
 /// yield by 3e-3 of what a force moves the reduced mass of the two within a step, 1e-4 beside a residual compliance. It

@@ -91,7 +91,7 @@ struct ContactSide {
   /// normal.
   double radius = 0.0;
   /// Of a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
-  /// force is spread over; shares sum to 1. The force has its torque at the point nevertheless. None: it acts at the
+  /// force is spread over; shares sum to 1. The frame feels it at the point nevertheless. None: it acts at the
   /// point alone. Kept by the source until its next query of all bodies; of a query of some bodies until its next
   /// query.
   std::span<const VertexShare> region{};
