@@ -12,6 +12,23 @@ const RigidTransform& BodyStates::pose(Index body, StepTime when) const {
   return when == StepTime::kStart ? b.group->frame(b.slot).pose() : b.group->predicted_frame(b.slot).pose();
 }
 
+Vec3 BodyStates::origin(Index body, StepTime when) const {
+  if (when != StepTime::kMiddle) return pose(body, when).p;
+  return 0.5 * (pose(body, StepTime::kStart).p + pose(body, StepTime::kEnd).p);
+}
+
+Mat3 BodyStates::rotation(Index body, StepTime when) const {
+  if (when != StepTime::kMiddle) return to_matrix(pose(body, when).q);
+  return to_matrix(pose(body, StepTime::kStart).q) +
+         0.5 * cross_matrix(turn(body)) * to_matrix(pose(body, StepTime::kStart).q);
+}
+
+Vec3 BodyStates::turn(Index body) const {
+  if (is_static(body)) return Vec3::Zero();
+  const Quaternion q = pose(body, StepTime::kEnd).q * pose(body, StepTime::kStart).q.conjugate();
+  return 2.0 / q.w * q.vector();
+}
+
 std::span<const double> BodyStates::amplitudes(Index body, StepTime when) const {
   if (is_static(body)) return {};
   const ConstrainedBody& b = this->body(body);

@@ -38,25 +38,31 @@ void HandleOptions::validate() const {
 }
 
 Handle::Handle(MaterialFrame point, const Vec3& start, const HandleOptions& options)
-    : point_(std::move(point)), options_(options), now_(start), next_{.position = start} {
+    : point_(std::move(point)), options_(options), now_(start), then_(start), next_{.position = start} {
   options_.validate();
   if (options_.directions.empty()) options_.directions = all_directions();
 }
 
 void Handle::set_target(const HandleTarget& target) { next_ = target; }
 
+/// The target goes to where it is wanted at an even speed.
+void Handle::begin_part(double length, double left, double whole) {
+  step_ = length, left_ = left, whole_ = whole;
+  then_ = length == left ? next_.position : Vec3(now_ + length / left * (next_.position - now_));
+}
+
 void Handle::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
-  step_ = step;
   const Vec3 p = point_.position(states, when);
-  const Vec3& target = when == StepTime::kStart ? now_ : next_.position;
-  const double length = (p - states.pose(point_.body(), when).p).norm() + p.norm();
+  const Vec3& target = when == StepTime::kStart ? now_ : then_;
+  const double length = (p - states.origin(point_.body(), when)).norm() + p.norm();
   for (std::size_t i = 0; i < options_.directions.size(); ++i) {
     const Vec3& n = options_.directions[i];
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
                .tolerance = kHandleTolerance * length + std::numeric_limits<double>::min()};
-    law.agent_displacement = n.dot(next_.position - target);
+    law.agent_displacement = n.dot(then_ - target);
+    law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {
       const double implicit = step * options_.stiffness + options_.damping;
       law.compliance = 1.0 / implicit;
@@ -73,8 +79,19 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
 }
 
 void Handle::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
-  const Vec3 off = point_.position(states, when) - (when == StepTime::kStart ? now_ : next_.position);
+  const Vec3 off = point_.position(states, when) - (when == StepTime::kStart ? now_ : then_);
   for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = options_.directions[i].dot(off);
+}
+
+void Handle::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                                  ForceDerivative& sum) const {
+  Vec3 impulse = Vec3::Zero();
+  for (std::size_t i = 0; i < impulses.size(); ++i) impulse += impulses[i] * options_.directions[i];
+  const Index body = point_.body();
+  const Vec3 arm = point_.position(states, StepTime::kEnd) - states.origin(body, StepTime::kEnd);
+  sum.add_bending(body, impulse, point_.displacements());
+  sum.add(body, ForceDerivative::Of::kMoment, body, ForceDerivative::By::kTurn,
+          0.5 * cross_matrix(impulse) * cross_matrix(arm));
 }
 
 void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
@@ -84,11 +101,11 @@ void Handle::accept(const BodyStates& states, std::span<const double> impulses) 
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     last_force_[i] = impulses[i] / step_;
     force_ += last_force_[i] * options_.directions[i];
-    off += options_.directions[i].dot(p - next_.position) * options_.directions[i];
+    off += options_.directions[i].dot(p - then_) * options_.directions[i];
   }
   error_ = off.norm();
-  now_ = next_.position;
-  next_.position += step_ * next_.velocity;
+  now_ = then_;
+  if (step_ == left_) next_.position += whole_ * next_.velocity;
 }
 
 }  // namespace limber

@@ -194,6 +194,16 @@ JointConstraint::Direction JointConstraint::coordinate_direction(const Placement
 
 // Gaps and their derivatives ------------------------------------------------------------------------------------------
 
+/// x_b or z_b along that of a: an axis of a that it is to be normal to, with the sign that makes the row a rotation.
+/// And for rows that lock a turn the two products that make half the skew part of R_aᵀR_b, which is 0 where the turn
+/// is.
+std::array<JointConstraint::TurnAxes, 2> JointConstraint::turn_axes(const RowPlan& row) {
+  if (row.measure == Measure::kTurnOfX) return {row.axis == 1 ? TurnAxes{2, 0, -1.0} : TurnAxes{1, 0, 1.0}, {}};
+  if (row.measure == Measure::kTurnOfZ) return {row.axis == 0 ? TurnAxes{1, 2, -1.0} : TurnAxes{0, 2, 1.0}, {}};
+  const int j = (row.axis + 1) % 3, k = (row.axis + 2) % 3;
+  return {TurnAxes{k, j, 0.5}, TurnAxes{j, k, -0.5}};
+}
+
 double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
   switch (row.measure) {
     case Measure::kTranslation:
@@ -201,9 +211,10 @@ double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
     case Measure::kScrew:
       return at.d.x() - spec_.pitch * unwrapped(at, 0);
     case Measure::kTurnOfX:
-      return row.axis == 1 ? -at.R_a.col(2).dot(at.R_b.col(0)) : at.R_a.col(1).dot(at.R_b.col(0));
-    case Measure::kTurnOfZ:
-      return row.axis == 0 ? -at.R_a.col(1).dot(at.R_b.col(2)) : at.R_a.col(0).dot(at.R_b.col(2));
+    case Measure::kTurnOfZ: {
+      const TurnAxes turn = turn_axes(row)[0];
+      return turn.sign * at.R_a.col(turn.of_a).dot(at.R_b.col(turn.of_b));
+    }
     case Measure::kTurn:
       return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
     case Measure::kLimit:
@@ -230,11 +241,15 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
     case Measure::kScrew:
       return {.linear = a(0), .angular = -spec_.pitch * a(0)};
     case Measure::kTurnOfX:
-      return {.angular = row.axis == 1 ? a(2).cross(b(0)) : b(0).cross(a(1))};
-    case Measure::kTurnOfZ:
-      return {.angular = row.axis == 0 ? a(1).cross(b(2)) : b(2).cross(a(0))};
-    case Measure::kTurn:
-      return {.angular = a(row.axis)};
+    case Measure::kTurnOfZ: {
+      const TurnAxes turn = turn_axes(row)[0];
+      return {.angular = turn.sign * b(turn.of_b).cross(a(turn.of_a))};
+    }
+    case Measure::kTurn: {
+      // d (2 vec q) = w ω + ω × vec q, in the axes of a
+      const Quaternion q = normalized(quaternion_from_matrix(at.R_a.transpose() * at.R_b));
+      return {.angular = at.R_a * (q.w * Vec3::Unit(row.axis) + q.vector().cross(Vec3::Unit(row.axis)))};
+    }
     case Measure::kLimit: {
       Direction d = coordinate_direction(at, row.axis);
       d.linear *= row.sign, d.angular *= row.sign;
@@ -250,6 +265,26 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
       return coordinate_direction(at, row.axis);
   }
   return {};
+}
+
+/// In the middle of the step an angle φ about an axis that both parts share changes by its direction times the relative
+/// turn up to a factor: with Cayley vectors α of a and ρ of b against a, along the axis, |ρ| = 2 tan ½Δφ,
+///   τ_b − τ_a = (1 + ¼α²)/(1 − ¼α·ρ) (1 − ½[α])⁻¹ρ,      (1 − ½[α])⁻¹ × the axis at the start = its mean
+JointConstraint::Direction JointConstraint::mean_direction(const BodyStates& states, const Placement& at,
+                                                           const RowPlan& row) const {
+  Direction mean = direction(at, row);
+  const bool coordinate = row.measure == Measure::kLimit || row.measure >= Measure::kMotor;
+  const bool turns = row.measure == Measure::kScrew || (coordinate && is_angle(row.axis));
+  if (!turns || spec_.type == JointType::kBall) return mean;
+  const int angle = row.measure == Measure::kScrew ? 0 : row.axis;
+  const Placement start = place(states, StepTime::kStart), end = place(states, StepTime::kEnd);
+  const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
+  const Vec3 axis = start.R_a.col(axis_of(angle)), mean_axis = at.R_a.col(axis_of(angle));
+  const Vec3 turn = a_.turn(states);
+  const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
+  mean.angular *=
+      ratio * (1.0 - 0.5 * tangent * turn.dot(axis)) / ((1.0 + 0.25 * turn.squaredNorm()) * mean_axis.squaredNorm());
+  return mean;
 }
 
 // Rows of one step ----------------------------------------------------------------------------------------------------
@@ -289,15 +324,57 @@ RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
   const bool motor = plan.measure == Measure::kMotor;
   law.upper = step_ * (motor ? act.motor_max_force : act.friction);
   law.lower = -law.upper;
-  law.agent_displacement = motor ? step_ * act.motor_velocity : 0.0;
+  law.end_rate = motor ? act.motor_velocity : 0.0;
+  law.agent_displacement = step_ * law.end_rate;
   law.offset = gap + law.agent_displacement;
   law.last_force = motor ? motor_force_[coordinate] : friction_force_[coordinate];
   return law;
 }
 
+/// Of axes and distances: exact for any step, in its middle too.
+bool JointConstraint::add_straight(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
+                                   const RowLaw& law, ConstraintRows& rows) {
+  const bool coordinate = plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor;
+  RowSide of_a, of_b;
+  const bool turn = plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ ||
+                    (plan.measure == Measure::kTurn && when == StepTime::kMiddle);
+  if (turn) {
+    std::vector<double>& other = modal_turn_;
+    const auto add_pair = [&](const MaterialFrame& part, int axis, const Vec3& u, double sign, RowSide& side,
+                              std::vector<double>& modal) {
+      const RowSide row = part.axis_row(states, when, axis, u, sign, other);
+      side.body = row.body, side.angular += row.angular;
+      modal.resize(other.size());
+      for (std::size_t i = 0; i < other.size(); ++i) modal[i] += other[i];
+      side.modal = modal;
+    };
+    modal_a_.clear(), modal_b_.clear();
+    for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {
+      if (sign == 0.0) continue;
+      add_pair(a_, axis_a, at.R_b.col(axis_b), sign, of_a, modal_a_);
+      add_pair(b_, axis_b, at.R_a.col(axis_a), sign, of_b, modal_b_);
+    }
+  } else if (plan.measure == Measure::kTranslation || (coordinate && !is_angle(plan.axis))) {
+    const int axis = coordinate ? axis_of(plan.axis) : plan.axis;
+    const double sign = plan.measure == Measure::kLimit ? plan.sign : 1.0;
+    const Vec3 n = at.R_a.col(axis);
+    of_b = b_.point_row(states, when, at.o_b, n, sign, modal_b_);
+    of_a = a_.axis_row(states, when, axis, at.o_b - at.o_a, sign, modal_turn_);
+    const RowSide point = a_.point_row(states, when, at.o_a, n, -sign, modal_a_);
+    of_a.linear = point.linear, of_a.angular += point.angular;
+    for (std::size_t i = 0; i < modal_turn_.size(); ++i) modal_a_[i] += modal_turn_[i];
+    of_a.modal = modal_a_;
+  } else {
+    return false;
+  }
+  rows.add(of_b, of_a, law);
+  return true;
+}
+
 void JointConstraint::add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
                           const RowLaw& law, ConstraintRows& rows) {
-  const Direction along = direction(at, plan);
+  if (add_straight(states, when, at, plan, law, rows)) return;
+  const Direction along = when == StepTime::kMiddle ? mean_direction(states, at, plan) : direction(at, plan);
   const auto side = [&](const MaterialFrame& part, double sign, std::vector<double>& modal) {
     RowSide row = part.point_row(states, when, at.o_b, along.linear, sign, modal);
     if (part.body() >= 0 && !along.angular.isZero(0.0)) {
@@ -321,7 +398,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
     axes_at_start_ = at.R_a;
   }
   const auto arm = [&](const MaterialFrame& part) {
-    return part.body() < 0 ? 0.0 : (at.o_b - states.pose(part.body(), when).p).norm();
+    return part.body() < 0 ? 0.0 : (at.o_b - states.origin(part.body(), when)).norm();
   };
   const double length = std::max(arm(a_), arm(b_)) + at.o_b.norm() + std::numeric_limits<double>::min();
   for (const RowPlan& plan : rows_) {
@@ -332,6 +409,52 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
     RowLaw law = law_of(plan, gap(at, plan), tolerance);
     law.tolerance = tolerance;
     add(states, when, at, plan, law, rows);
+  }
+}
+
+void JointConstraint::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                                           ForceDerivative& sum) const {
+  using Of = ForceDerivative::Of;
+  using By = ForceDerivative::By;
+  const Placement end = place(states, StepTime::kEnd), mean = place(states, StepTime::kMiddle);
+  // On b, by the mean rows; as the rows of the end would have it; and how the couple follows the turns of a and b.
+  Vec3 force = Vec3::Zero(), force_end = Vec3::Zero();
+  Mat3 by_a = Mat3::Zero(), by_b = Mat3::Zero();
+  for (std::size_t i = 0; i < impulses.size(); ++i) {
+    const RowPlan& plan = rows_[i];
+    const double p = impulses[i];
+    if (p == 0.0) continue;
+    const Direction along = direction(mean, plan), there = direction(end, plan);
+    force += p * along.linear, force_end += p * there.linear;
+    if (along.angular.isZero(0.0)) continue;
+    if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ || plan.measure == Measure::kTurn) {
+      for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {  // the couple on b is b × a
+        by_a -= 0.5 * sign * p * cross_matrix(mean.R_b.col(axis_b)) * cross_matrix(end.R_a.col(axis_a));
+        by_b += 0.5 * sign * p * cross_matrix(mean.R_a.col(axis_a)) * cross_matrix(end.R_b.col(axis_b));
+      }
+    } else {
+      by_a -= 0.5 * p * cross_matrix(there.angular);
+    }
+  }
+  const Index a = a_.body(), b = b_.body();
+  if (b >= 0) sum.add_bending(b, force, b_.displacements());
+  if (a >= 0) sum.add_bending(a, -force, a_.displacements());
+  const Mat3 F = cross_matrix(force), F_end = cross_matrix(force_end);
+  if (b >= 0) {
+    const Vec3 to_b = mean.o_b - states.origin(b, StepTime::kMiddle), arm = end.o_b - states.origin(b, StepTime::kEnd);
+    sum.add(b, Of::kMoment, b, By::kTurn, 0.5 * F * cross_matrix(arm) + by_b);
+    if (a >= 0) {
+      sum.add(b, Of::kForce, a, By::kTurn, -0.5 * F_end);
+      sum.add(b, Of::kMoment, a, By::kTurn, -0.5 * cross_matrix(to_b) * F_end + by_a);
+      sum.add(a, Of::kMoment, b, By::kTurn, -0.5 * F * cross_matrix(arm) - by_b);
+      sum.add(a, Of::kMoment, b, By::kShift, 0.5 * F);
+    }
+  }
+  if (a >= 0) {
+    const Vec3 to_b = mean.o_b - states.origin(a, StepTime::kMiddle);
+    sum.add(a, Of::kForce, a, By::kTurn, 0.5 * F_end);
+    sum.add(a, Of::kMoment, a, By::kTurn, 0.5 * cross_matrix(to_b) * F_end - by_a);
+    sum.add(a, Of::kMoment, a, By::kShift, -0.5 * F);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "limber/constraints/material_frame.h"
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <limits>
 
 #include "limber/core/error.h"
@@ -21,6 +22,16 @@ Mat3 pseudo_inverse(const Mat3& inertia) {
     if (eigen.eigenvalues()[i] > kThinPatch * eigen.eigenvalues()[2])
       inverse += eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose() / eigen.eigenvalues()[i];
   return inverse;
+}
+
+/// J_l of rotations: exp(r + dr) = exp(J_l dr) exp(r), with c = (1 − cos θ)/θ² and s = (θ − sin θ)/θ³.
+Mat3 turn_of_rotation_vector(const Vec3& r) {
+  constexpr double kSmall = 1e-2;  // where what is left out of the series is 1e-18
+  const double angle = r.norm(), y = angle * angle;
+  const double c = angle < kSmall ? 0.5 - y / 24.0 + y * y / 720.0 : (1.0 - std::cos(angle)) / y;
+  const double s = angle < kSmall ? 1.0 / 6.0 - y / 120.0 + y * y / 5040.0 : (angle - std::sin(angle)) / (angle * y);
+  const Mat3 K = cross_matrix(r);
+  return Mat3::Identity() + c * K + s * K * K;
 }
 
 }  // namespace
@@ -76,10 +87,12 @@ Vec3 MaterialFrame::turn(std::span<const double> z) const {
 }
 
 Vec3 MaterialFrame::position(const BodyStates& states, StepTime when) const {
+  if (when == StepTime::kMiddle) return 0.5 * (position(states, StepTime::kStart) + position(states, StepTime::kEnd));
   return states.pose(body_, when) * (rest_.origin + displace(states.amplitudes(body_, when)));
 }
 
 Mat3 MaterialFrame::axes(const BodyStates& states, StepTime when) const {
+  if (when == StepTime::kMiddle) return 0.5 * (axes(states, StepTime::kStart) + axes(states, StepTime::kEnd));
   Quaternion q_WB = states.pose(body_, when).q;
   if (!rotation_.empty()) q_WB = q_WB * quaternion_from_rotation_vector(turn(states.amplitudes(body_, when)));
   return to_matrix(q_WB) * rest_.axes;
@@ -97,25 +110,68 @@ Vec3 MaterialFrame::angular_velocity(const BodyStates& states, StepTime when) co
   return states.angular_velocity(body_, when) + states.pose(body_, when).q * turn(states.rates(body_, when));
 }
 
+Vec3 MaterialFrame::turn(const BodyStates& states) const {
+  if (rotation_.empty()) return states.turn(body_);
+  const Vec3 bent = turn(states.amplitudes(body_, StepTime::kEnd)) - turn(states.amplitudes(body_, StepTime::kStart));
+  return states.turn(body_) + states.rotation(body_, StepTime::kMiddle) * bent;
+}
+
 RowSide MaterialFrame::point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
                                  std::vector<double>& modal) const {
   modal.clear();
   if (body_ < 0) return {};
-  const RigidTransform& X = states.pose(body_, when);
-  const Vec3 arm = p - X.p;
-  const Vec3 n_B = scale * (X.q.conjugate() * n);
+  const Mat3 R_BW = states.rotation(body_, when).transpose();
+  const Vec3 arm = p - states.origin(body_, when);
+  const Vec3 n_B = scale * (R_BW * n);
   Vec3 twist_B = Vec3::Zero();  // how a turn of the patch moves a point off its origin
-  if (!rotation_.empty()) twist_B = (X.q.conjugate() * (p - position(states, when))).cross(n_B);
+  if (!rotation_.empty()) twist_B = scale * (R_BW * (p - position(states, when)).cross(n));
   for (std::size_t i = 0; i < displacement_.size(); ++i)
     modal.push_back(displacement_[i].dot(n_B) + (rotation_.empty() ? 0.0 : rotation_[i].dot(twist_B)));
   return {body_, scale * n, scale * arm.cross(n), modal};
+}
+
+/// In the middle the frame's turn in the body is that by the Cayley vector ε between its two ends. J_l Θ Δz is ε to
+/// third order; what is missing is made up for along Δz.
+RowSide MaterialFrame::axis_row(const BodyStates& states, StepTime when, int axis, const Vec3& u, double scale,
+                                std::vector<double>& modal) const {
+  modal.clear();
+  if (body_ < 0) return {};
+  const RowSide row{body_, Vec3::Zero(), scale * axes(states, when).col(axis).cross(u), {}};
+  if (rotation_.empty()) return row;
+  const Vec3 e = rest_.axes.col(axis), u_B = scale * (states.rotation(body_, when).transpose() * u);
+  const auto turned = [&](StepTime at) { return quaternion_from_rotation_vector(turn(states.amplitudes(body_, at))); };
+  if (when != StepTime::kMiddle) {
+    const Vec3 a_B = turning(states, when).transpose() * (turned(when) * e).cross(u_B);
+    for (const Vec3& turn : rotation_) modal.push_back(turn.dot(a_B));
+    return {row.body, row.linear, row.angular, modal};
+  }
+  const std::span<const double> z0 = states.amplitudes(body_, StepTime::kStart),
+                                z1 = states.amplitudes(body_, StepTime::kEnd);
+  const Quaternion start = turned(StepTime::kStart), end = turned(StepTime::kEnd), between = end * start.conjugate();
+  const Vec3 a_B = (0.5 * (start * e + end * e)).cross(u_B);
+  double square = 0.0;
+  for (std::size_t i = 0; i < z0.size(); ++i) square += (z1[i] - z0[i]) * (z1[i] - z0[i]);
+  const Vec3 about = turning(states, when).transpose() * a_B;
+  const double missing = 2.0 / between.w * between.vector().dot(a_B) - (turn(z1) - turn(z0)).dot(about);
+  const double share = square > 0.0 ? missing / square : 0.0;
+  for (std::size_t i = 0; i < rotation_.size(); ++i) modal.push_back(rotation_[i].dot(about) + share * (z1[i] - z0[i]));
+  return {row.body, row.linear, row.angular, modal};
+}
+
+/// What the frame turns by in the body per unit of Θ dz.
+Mat3 MaterialFrame::turning(const BodyStates& states, StepTime when) const {
+  if (when == StepTime::kMiddle)
+    return turn_of_rotation_vector(
+        0.5 * (turn(states.amplitudes(body_, StepTime::kStart)) + turn(states.amplitudes(body_, StepTime::kEnd))));
+  return turn_of_rotation_vector(turn(states.amplitudes(body_, when)));
 }
 
 RowSide MaterialFrame::angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale,
                                    std::vector<double>& modal) const {
   modal.clear();
   if (body_ < 0) return {};
-  const Vec3 a_B = scale * (states.pose(body_, when).q.conjugate() * a);
+  if (rotation_.empty()) return {body_, Vec3::Zero(), scale * a, {}};
+  const Vec3 a_B = scale * (turning(states, when).transpose() * (states.rotation(body_, when).transpose() * a));
   for (const Vec3& turn : rotation_) modal.push_back(turn.dot(a_B));
   return {body_, Vec3::Zero(), scale * a, modal};
 }

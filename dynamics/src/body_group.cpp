@@ -213,6 +213,28 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
 }
 
+void BodyGroup::predict(Index slot, const RigidFrame& end, std::span<const double> modal, const ModalStep& step) {
+  Prediction& p = predictions_[static_cast<std::size_t>(slot)];
+  p.frame = end;
+  predicted_amplitudes_.copy_from(amplitudes_, slot);
+  predicted_rates_.copy_from(rates_, slot);
+  predicted_forces_.copy_from(forces_, slot);
+  const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
+  const bool constrained = add_modal_load(modal, modes.forces, step);
+  if (body(slot).modes_static) leave_static_answer(slot, modes.z);
+  advance_modes(slot, modes, body(slot).modes_loaded || constrained, step);
+  p.modes_static = constrained && answer_statically(slot, modal, step);
+}
+
+void BodyGroup::predict_rest(Index slot, const RigidFrame& end) {
+  Prediction& p = predictions_[static_cast<std::size_t>(slot)];
+  p.frame = end;
+  p.modes_static = body(slot).modes_static;
+  predicted_amplitudes_.copy_from(amplitudes_, slot);
+  predicted_rates_.copy_from(rates_, slot);
+  predicted_static_.copy_from(static_amplitudes_, slot);
+}
+
 void BodyGroup::commit(Index slot, bool begins, bool ends) {
   Body& b = body(slot);
   const Prediction& p = predictions_[static_cast<std::size_t>(slot)];

@@ -58,6 +58,12 @@ void RigidFrame::set_velocity(const FrameConstants& c, const Vec3& velocity, con
   disturbed_ = true;
 }
 
+void RigidFrame::set_motion(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_momentum) {
+  set_pose(X_WB);
+  velocity_ = parent_.velocity = velocity;
+  momentum_ = angular_momentum;
+}
+
 void RigidFrame::set_parent(const KinematicFrame& at_step_end) {
   parent_was_set_ = true;
   next_parent_ = at_step_end;

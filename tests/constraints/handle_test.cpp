@@ -92,8 +92,8 @@ TEST(Handle, FixedHandsGiveNoEnergy) {
 }
 
 /// The force is the spring's and the damper's at the step's end, F = −k e − c (e − e₀)/h. Spring and weight are all
-/// that acts but the energy guard, which slows the body by impulses that no handle tells: so the spring's impulse is
-/// the momentum to what these are (8e-5 of the weight's; a regression guard).
+/// that acts but what a spring that is stiff over the step takes of the velocity at its end, which is no part of that
+/// force: so the spring's impulse is the momentum to what these are (3.6e-4 of the weight's; a regression guard).
 TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
   for (const double k : {10.0, 1e3, 1e6, 1e12}) {
     const double c = 0.05 * k;
@@ -102,7 +102,7 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
     Handle& spring = island.hold(0, kMarked, {.stiffness = k, .damping = c});
     const double weight = island.model->data().mass * kGravity;
     constexpr int kSteps = 6000;
-    constexpr double kGuardImpulses = 2e-4;
+    constexpr double kEndImpulses = 5e-4;
     Vec3 impulse = Vec3::Zero(), error = Vec3::Zero();
     double worst = 0.0;
     for (int i = 0; i < kSteps; ++i) {
@@ -114,7 +114,7 @@ TEST(Handle, MouseSpringIsStableForEveryStiffnessAndCarriesTheWeight) {
       ASSERT_LT(island.group.frame(0).velocity().norm(), 10.0) << k;
     }
     const Vec3 expected = island.linear_momentum() + Vec3(0.0, 0.0, kSteps * kFrame * weight);
-    EXPECT_LT((impulse - expected).norm(), kGuardImpulses * expected.norm()) << k;
+    EXPECT_LT((impulse - expected).norm(), kEndImpulses * expected.norm()) << k;
     // What the solver leaves of a gap counts by the stiffness it meets.
     EXPECT_LT(worst, 1e-6 * weight + (k + c / kFrame) * 1e-10 * kSampleSize) << k;
   }

@@ -108,8 +108,7 @@ TEST(Constraints, ChainOfFlexibleLinksHangsTogetherAndGainsNothing) {
   }
 }
 
-// Beyond a radian a step the rows of the step's start are no guide to its end, and no step would settle by them: their
-// true derivatives lead there.
+// Beyond a radian a step the rows of the step's start are no guide to its end.
 TEST(Constraints, StepsSettleWhereLinksTurnByMoreThanARadianInEach) {
   constexpr int kSteps = 120;
   World world;
@@ -126,7 +125,7 @@ TEST(Constraints, StepsSettleWhereLinksTurnByMoreThanARadianInEach) {
   EXPECT_EQ(unsettled, 0);
 }
 
-// What cannot come together by impulses at a step's start can by those at the starts of its parts.
+// Impulses in the middle of a step bring together what those at its start cannot, without shorter steps.
 TEST(Constraints, ChainsThatWhipHangTogether) {
   int cuts = 0;
   for (const auto& [links, step] : {std::pair(3, 0.1), std::pair(8, 1.0 / 60.0)}) {
@@ -149,7 +148,7 @@ TEST(Constraints, ChainsThatWhipHangTogether) {
       for (const JointId joint : joints) EXPECT_LT(world.joint(joint).distance_error, kExact);
     }
   }
-  EXPECT_GT(cuts, 0);
+  EXPECT_EQ(cuts, 0);
 }
 
 TEST(Constraints, IslandsAreWhatConstraintsTieTogether) {

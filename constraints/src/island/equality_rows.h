@@ -11,8 +11,8 @@ namespace limber::internal {
 
 class EqualityRows {
  public:
-  /// @param J rows × degrees of freedom. @param metric D
-  void factor(const IslandStep& step, std::span<const double> J, std::span<const double> metric);
+  /// @param J rows × degrees of freedom. @param metric D. @param compliance by row
+  void factor(std::span<const double> J, std::span<const double> metric, std::span<const double> compliance);
   /// @param r by row; the impulses on return
   SolveStatus solve(std::span<double> r) { return least_squares_.solve(r, r); }
 

@@ -11,12 +11,25 @@ IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
   step.begin(part);
   energy.begin(step);
   IslandReport done;
+  if (step.mean) {
+    foresee_mean(done);
+    return done;
+  }
   if (step.holds_contact_forces()) touch.solve(step, reaction, done.programs);
   reaction.find(step, StepTime::kStart);
   done.status = step.convex ? rounds.solve(step, done) : newton.solve(step, done);
   if (part.options.watch != nullptr) step.trace(motions);
   act_at_end();
   return done;
+}
+
+/// Of free bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the
+/// oddest rows; then they stay, and are slower.
+void IslandSolver::Impl::foresee_mean(IslandReport& done) {
+  done.status = mean.solve(step, done, true);
+  if (done.status == SolveStatus::kSolved || !step.part.last_resort) return;
+  if (mean.solve(step, done, false) != SolveStatus::kSolved) mean.stay(step);
+  done.attempts[StepAttempt::kRefused] = 1;
 }
 
 /// The frames' second half of what holds them, and of what strikes them.
@@ -34,6 +47,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(StepPart part) {
   constexpr int kSlowings = 3;
   const ContactRule& rule = part.options.contact;
   IslandReport done = foresee(part);
+  if (step.mean && done.status != SolveStatus::kSolved && !part.last_resort) return done;
   if (!part.options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = energy.close(step, done);

@@ -101,7 +101,8 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
     damped += group->predicted_dissipation(slot);
     if (carried(*group, slot)) return {};
   }
-  const double work = agent_work(step) + load_work(step);
+  damped += step.end_modal_gain;  // which is no damping
+  const double work = agent_work(step) + load_work(step) + step.end_work;
   const double gain = after - before_ - work + step.part.options.energy_surplus;
   // Of what there was, never of what came out: that may be any number where the rows did not come together.
   const double at_hand = scale_ + std::max(0.0, work);
@@ -109,10 +110,11 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
   const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
-  if (excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
+  if (!step.mean && excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
   const CommonMotion common = common_motion(step, StepTime::kEnd);
   const double removed = remove_relative_energy(step.bodies, common, excess, excess < patience ? kLargestChange : 1.0);
   const double left = excess - removed;
+  if (step.mean) return {removed, 0.0, std::clamp(left, 0.0, patience)};
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
 }
 

@@ -11,6 +11,7 @@
 #include "held_reaction.h"
 #include "island_energy.h"
 #include "island_step.h"
+#include "mean_newton.h"
 #include "row_newton.h"
 #include "touch_program.h"
 
@@ -28,6 +29,7 @@ struct IslandSolver::Impl {
   internal::TouchProgram touch;
   internal::ConvexRounds rounds;
   internal::RowNewton newton;
+  internal::MeanNewton mean;
   internal::IslandEnergy energy;
   std::vector<ExactMotion> motions;    // of the members, where a step may be cut or is watched
   std::vector<double> slip, impulses;  // by row
@@ -42,6 +44,7 @@ struct IslandSolver::Impl {
   // A part.
   IslandReport foresee(const internal::StepPart& part);
   IslandReport foresee_guarded(internal::StepPart part);
+  void foresee_mean(IslandReport& done);
   void act_at_end();
   void refuse_impulses(IslandReport& report);
 

@@ -38,8 +38,12 @@ IslandSolver& IslandSolver::operator=(IslandSolver&&) noexcept = default;
 IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                                 std::span<Constraint* const> constraints, const IslandOptions& options) {
   IslandReport report{.bodies = static_cast<int>(members.size())};
-  const StepPart whole{
-      .table = table, .members = members, .constraints = constraints, .options = options, .whole_step = options.step};
+  const StepPart whole{.table = table,
+                       .members = members,
+                       .constraints = constraints,
+                       .options = options,
+                       .whole_step = options.step,
+                       .left = options.step};
   if (options.watch != nullptr)
     impl_->take_watched(whole, report);
   else if (may_divide(whole))
@@ -74,7 +78,7 @@ void IslandSolver::Impl::take_cut(StepPart part, IslandReport& report) {
   const bool may_cut = allows_cuts(part);
   for (double left = part.whole_step;; left -= part.options.step, part.begins = false) {
     const bool cuts = may_cut && report.attempts.cuts() < kMostCuts;
-    part.options.step = left;
+    part.options.step = part.left = left;
     const double time = cuts ? next_cut(part) : left;
     if (is_part(time, left, part.whole_step)) part.options.step = time;
     part.ends = part.options.step == left;
@@ -97,7 +101,9 @@ void IslandSolver::Impl::take_divided(StepPart part, IslandReport& report) {
   for (;;) {
     if (gives_up || left < 1.5 * length) length = left;  // the last one, whatever has been rounded
     part.options.step = length;
+    part.left = left;
     part.ends = length == left;
+    part.last_resort = gives_up;
     IslandReport done = foresee_guarded(part);
     if (done.status == SolveStatus::kIterationLimit && !gives_up) {
       gives_up = length < 1.5 * kShortest * part.whole_step;
@@ -134,7 +140,7 @@ void IslandSolver::Impl::commit(const StepPart& part, const IslandReport& done, 
   impulses.resize(step.size());
   slip.assign(step.size(), 0.0);
   for (std::size_t i = 0; i < step.size(); ++i)
-    impulses[i] = step.f[i] + step.length() * step.reaction[i] + step.touch_impulse[i];
+    impulses[i] = step.f[i] + step.length() * step.reaction[i] + step.touch_impulse[i] + step.end_impulse[i];
   if (step.convex) rounds.write_slip(step, slip);
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(step.first_row[i]);

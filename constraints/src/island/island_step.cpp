@@ -40,13 +40,16 @@ void IslandStep::begin(const StepPart& of) {
   first_row.clear();
   const BodyStates states(part.table);
   for (Constraint* constraint : part.constraints) {
+    constraint->begin_part(length(), part.left, part.whole_step);
     first_row.push_back(rows.size());
     constraint->add_rows(states, StepTime::kStart, length(), rows);
   }
   first_row.push_back(rows.size());
   const auto m = static_cast<std::size_t>(rows.size());
   start_gap.resize(m), gap.resize(m);
-  for (std::vector<double>* impulses : {&f, &reaction, &end_reaction, &touch_impulse}) impulses->assign(m, 0.0);
+  for (std::vector<double>* impulses : {&f, &reaction, &end_reaction, &touch_impulse, &end_impulse})
+    impulses->assign(m, 0.0);
+  end_work = end_modal_gain = 0.0;
   find_kind();
   begin_early();
   measure(StepTime::kStart, start_gap);
@@ -64,7 +67,15 @@ bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
 void IslandStep::find_kind() {
   contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
   convex = rule().is_convex() && any_law([](const RowLaw& law) { return law.contact; });
+  mean = part.options.watch == nullptr && rows.flexibility().empty() && are_free() &&
+         !any_law([](const RowLaw& law) { return law.contact || law.friction > 0.0 || law.radius > 0.0; });
   theta = contacts_alone && any_law([](const RowLaw& law) { return law.strikes; }) ? 0.5 : 1.0;
+}
+
+bool IslandStep::are_free() const {
+  for (Index local = 0; local < bodies.count(); ++local)
+    if (bodies.body(local).group->frame_constants().motion != FrameMotion::kFree) return false;
+  return true;
 }
 
 /// Bodies that something pressed on in the last step.
@@ -147,11 +158,15 @@ void IslandStep::trace(std::vector<ExactMotion>& motions) const {
   }
 }
 
+void IslandStep::linearise(StepTime when, ConstraintRows& to) const {
+  to.clear();
+  const BodyStates states(part.table);
+  for (Constraint* constraint : part.constraints) constraint->add_rows(states, when, length(), to);
+}
+
 void IslandStep::linearise_end() {
   bodies.place(StepTime::kEnd);
-  end_rows.clear();
-  const BodyStates states(part.table);
-  for (Constraint* constraint : part.constraints) constraint->add_rows(states, StepTime::kEnd, length(), end_rows);
+  linearise(StepTime::kEnd, end_rows);
 }
 
 void IslandStep::load_end() {

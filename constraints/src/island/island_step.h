@@ -32,7 +32,9 @@ struct StepPart {
   std::span<Constraint* const> constraints;
   IslandOptions options;    ///< with the part's own length
   double whole_step = 0.0;  ///< s
+  double left = 0.0;        ///< s, of the step, from where the part begins
   bool begins = true, ends = true;
+  bool last_resort = false;                      ///< shorter parts were not found either
   double slowed = 0.0;                           ///< the part of `relative` that is taken from the frames at the start
   std::span<const FrameMomentum> relative = {};  ///< by member
 };
@@ -58,15 +60,19 @@ struct IslandLoads {
 struct IslandStep {
   StepPart part;
   IslandBodies bodies;
-  ConstraintRows rows, end_rows;  // linearised at the start, and at the predicted end
-  std::vector<Index> first_row;   // per constraint, and the end
-  bool convex = false;            // contacts are among the rows, by a rule for the convex problem
-  bool contacts_alone = false;    // among the rows
-  double theta = 1.0;             // the part of f that frames get at the start; the rest at the end
+  ConstraintRows rows, end_rows, mean_rows;  // linearised at the start, at the predicted end and in the middle
+  std::vector<Index> first_row;              // per constraint, and the end
+  bool convex = false;                       // contacts are among the rows, by a rule for the convex problem
+  bool contacts_alone = false;               // among the rows
+  bool mean = false;   // free bodies on joints and the like: impulses act in the middle of the step
+  double theta = 1.0;  // the part of f that frames get at the start; the rest at the end
   std::vector<double> start_gap, gap;
   std::vector<double> f;                       // N·s, beside the reactions
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
   std::vector<double> touch_impulse;           // N·s, before the step
+  std::vector<double> end_impulse;             // N·s, after it
+  double end_work = 0.0;                       // J, of these where rows are driven
+  double end_modal_gain = 0.0;                 // J, what they give the modes
   IslandLoads loads;
 
   /// Linearises the rows. All impulses are zero.
@@ -84,8 +90,10 @@ struct IslandStep {
   void predict_under_loads();
   /// How the bodies get to where they were predicted last. @param motions by body
   void trace(std::vector<ExactMotion>& motions) const;
-  /// Linearises the rows at the predicted end.
+  /// Linearises the rows elsewhere than at the start.
+  void linearise(StepTime when, ConstraintRows& to) const;
   void linearise_end();
+  void measure(StepTime when, std::vector<double>& into) const;
   /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
   void load_end();
 
@@ -103,9 +111,9 @@ struct IslandStep {
  private:
   Vec3 held_gravity(Index local) const;
   void find_kind();
+  bool are_free() const;
   void begin_early();
   void set_modal_steps();
-  void measure(StepTime when, std::vector<double>& into) const;
 };
 
 template <class Action>

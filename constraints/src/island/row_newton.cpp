@@ -56,7 +56,12 @@ void RowNewton::factor(const IslandStep& step) {
   if (bounded_.any_bounds())
     bounded_.assemble(step, J_, metric_);
   else
-    equalities_.factor(step, J_, metric_);
+    factor_equalities(step);
+}
+
+void RowNewton::factor_equalities(const IslandStep& step) {
+  for (std::size_t i = 0; i < step.size(); ++i) b_[i] = step.law(i).compliance;
+  equalities_.factor(J_, metric_, b_);
 }
 
 /// One step from F, to next_; change_ is what it makes of the gaps.

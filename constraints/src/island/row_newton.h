@@ -19,6 +19,7 @@ class RowNewton {
   SolveStatus solve(IslandStep& step, IslandReport& report);
 
  private:
+  void factor_equalities(const IslandStep& step);
   void factor(const IslandStep& step);
   SolveStatus iterate(IslandStep& step, IslandReport& report);
   SolveStatus improve(const IslandStep& step);

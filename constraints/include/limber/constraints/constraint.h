@@ -11,12 +11,28 @@
 
 namespace limber {
 
+/// [v], the matrix of v × .
+inline Mat3 cross_matrix(const Vec3& v) {
+  Mat3 m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
 /// Read access to the bodies' places. Body −1 is the world: at the origin, without modes.
+///
+/// The middle of a step is the mean of its two ends, for points and directions in the world. With R₁ = cay(τ) R₀ a
+/// point at s in the body, s₀ and s₁ at the two ends, goes by exactly
+///   Δ(p + R s) = Δp + τ × ½(R₀s₀ + R₁s₁) + R' Δs,      R' = (1 + ½[τ]) R₀      (docs/derivations/constraints.md)
+/// so that rotation() is R' there.
 class BodyStates {
  public:
   explicit BodyStates(std::span<const ConstrainedBody> table) : table_(table) {}
 
-  const RigidTransform& pose(Index body, StepTime when) const;
+  const RigidTransform& pose(Index body, StepTime when) const;  ///< at one of the step's ends
+  Vec3 origin(Index body, StepTime when) const;                 ///< world, m
+  Mat3 rotation(Index body, StepTime when) const;               ///< R_WB, or R' in the middle
+  /// The Cayley vector τ of the body's turn over the step, rad where it is small: R₁ = cay(τ) R₀, |τ| = 2 tan(angle/2).
+  Vec3 turn(Index body) const;
   std::span<const double> amplitudes(Index body, StepTime when) const;
   Vec3 velocity(Index body, StepTime when) const;          ///< of the body origin, world, m/s
   Vec3 angular_velocity(Index body, StepTime when) const;  ///< world, rad/s
@@ -45,8 +61,22 @@ class MotionWatch {
   virtual double clear_until(const FreeMotions& motions, double length) = 0;
 };
 
-/// Rows with one owner, who knows their true gaps. In every step the solver calls add_rows() at its start, gaps() after
-/// each prediction, add_rows() at its end for the rows' answer to gravity there, and accept() with what was found. None
+/// How what rows exert on one body changes with where another one, or it itself, ends a step. World axes; shifts are of
+/// the origin, m, turns small rotations of the body at the step's end, rad.
+class ForceDerivative {
+ public:
+  enum class Of { kForce, kMoment };
+  enum class By { kShift, kTurn };
+  virtual ~ForceDerivative() = default;
+  /// Adds ∂(impulse or moment on `body`)/∂(shift or turn of `moved`). Bodies that are not of the island do not count.
+  virtual void add(Index body, Of of, Index moved, By by, const Mat3& value) = 0;
+  /// An impulse acts at a point of the body that its modes move: where it acts, and what the modes get of it, changes
+  /// as the body bends and turns. @param shapes of the point, body axes, one per mode
+  virtual void add_bending(Index body, const Vec3& impulse, std::span<const Vec3> shapes) = 0;
+};
+
+/// Rows with one owner, who knows their true gaps. In every step the solver calls begin_part() and add_rows() at its
+/// start, gaps() after each prediction, add_rows() at its end and in its middle, and accept() with what was found. None
 /// of them may allocate once warm, or throw.
 class Constraint {
  public:
@@ -54,11 +84,18 @@ class Constraint {
 
   /// The two bodies (−1: the world) that the rows touch: they end in one island.
   virtual std::array<Index, 2> bodies() const = 0;
-  /// Appends the rows, linearised at the step's start or at its predicted end: as many, in the same order.
+  /// What follows, up to accept(), is a part of a step. @param left of it from here, s. @param whole the step, s
+  virtual void begin_part(double /*length*/, double /*left*/, double /*whole*/) {}
+  /// Appends the rows, linearised at the step's start, at its predicted end or in the middle, where J (Δp, τ, Δz) is
+  /// to be what the gap changes by over the step, so that forces do the work that they are to do: as many, in the same
+  /// order.
   virtual void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) = 0;
   /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
   /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
+  /// Derivatives of what the rows' impulses do to the bodies by the rows of the step's middle: Newton's method gets
+  /// along without where forces are small. @param impulses of the rows
+  virtual void add_force_derivative(const BodyStates&, std::span<const double> /*impulses*/, ForceDerivative&) const {}
   /// J̇v of the rows at the step's start, in their order: what the gaps' rates change by while the bodies keep their
   /// velocities. For [H03]'s acceleration program (contact_method.h), which sees contacts alone. @param bias as many
   /// numbers
@@ -66,8 +103,8 @@ class Constraint {
   /// Whether it is contact: an island of nothing else may have its step cut where bodies strike and let go. Each part
   /// is then a step for the functions here.
   virtual bool is_contact() const { return false; }
-  /// Whether islands of nothing but such constraints may have a step that does not settle taken in shorter parts, each
-  /// a step for the functions here.
+  /// Whether islands of free bodies and nothing but such constraints may have a step that does not settle taken in
+  /// shorter parts, each a step for the functions here.
   virtual bool may_be_divided() const { return false; }
   /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
   virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }

@@ -22,8 +22,8 @@
 
 namespace limber {
 
-/// Which state of the bodies is meant: before the step, or as last predicted.
-enum class StepTime { kStart, kEnd };
+/// Which state of the bodies is meant: before the step, as last predicted, or the mean of both (BodyStates).
+enum class StepTime { kStart, kEnd, kMiddle };
 
 /// One body's part of a row.
 struct RowSide {
@@ -49,6 +49,9 @@ struct RowLaw {
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
   double agent_displacement = 0.0;
+  /// What the gap is to change by per second at the step's end, where the row has been met: 0, but for prescribed
+  /// motion.
+  double end_rate = 0.0;
   /// Of the spring in the row, force per unit gap from 0: its energy ½ stiffness gap² counts with that of the bodies.
   double stiffness = 0.0;
   /// μ of a contact's normal row, bounds (0, ∞): the next two rows are its tangents, and their impulses stay in the

@@ -47,6 +47,10 @@ class Handle final : public Constraint {
   double error() const { return error_; }
 
   std::array<Index, 2> bodies() const override { return {point_.body(), -1}; }
+  bool may_be_divided() const override { return true; }
+  void begin_part(double length, double left, double whole) override;
+  void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                            ForceDerivative& sum) const override;
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
@@ -61,9 +65,9 @@ class Handle final : public Constraint {
 
   MaterialFrame point_;
   HandleOptions options_;
-  Vec3 now_;  // the target at the start of the step
+  Vec3 now_, then_;  // the target at the start and at the end of the step's part at hand
   HandleTarget next_;
-  double step_ = 0.0, error_ = 0.0;
+  double step_ = 0.0, left_ = 0.0, whole_ = 0.0, error_ = 0.0;  // of the part; of the step
   Vec3 force_ = Vec3::Zero();
   std::array<double, 3> last_force_{};
   std::vector<double> modal_;

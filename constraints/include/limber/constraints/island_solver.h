@@ -1,17 +1,23 @@
 /// @file limber/constraints/island_solver.h
 /// One step of the bodies that constraints tie together: all rows of all kinds in one problem.
 ///
-///   A Δf + gap(f) − offset + compliance f = w,    w ⊥ bounds and cones,    A = J diag(Δt M⁻¹, H/Δt) Jᵀ          (1)
+///   gap(f) − offset + compliance f = w,    w ⊥ bounds and cones                                                (1)
 ///
-/// f are the rows' impulses, N·s; gap(f) the true gaps at the step's end, m or rad, of the bodies predicted exactly
-/// under f. J and A are those of the step's start. A step
-///   1. linearises the rows (Constraint::add_rows),
-///   2. finds the constraint forces under gravity and held forces; they act on the frames half at the step's start and
+/// f are the rows' impulses, N·s; gap(f) the true gaps at the step's end, m or rad. Joints, limits, handles and the
+/// like on free bodies act in the middle of the step: their rows are such that a gap changes by exactly J̄ (d, τ, Δz),
+/// d, τ and Δz the displacement, Cayley vector and change of amplitudes of each body over the step, so that f does
+/// exactly the work f · (gap − gap₀)/Δt. Newton's method finds where bodies end and f together. Velocities are then
+/// brought in line with the rows at the end, which takes a little energy; where joints alone act it is given back. The
+/// rotation of such a body is of second order in the step; bodies without constraints rotate exactly.
+///
+/// Islands with contacts, bodies that are fixed at a point or line or carried, and watched parts of steps
+///   1. linearise the rows at the step's start (Constraint::add_rows),
+///   2. find the constraint forces under gravity and held forces; they act on the frames half at the step's start and
 ///      half at its end, so that what rests has no velocity,
-///   3. predicts, measures gaps and solves (1) for Δf until gaps change by less than their tolerance,
-///   4. guards the energy: where it would rise by more than the work of what drives the island, relative motion is
-///      slowed, or impulses are reduced; where joints alone have lost energy to the method it is given back,
-///   5. commits the prediction and tells the constraints their impulses (Constraint::accept).
+///   3. predict bodies exactly under f, measure gaps and solve for Δf until gaps change by less than their tolerance,
+///   4. guard the energy: where it would rise by more than the work of what drives the island, relative motion is
+///      slowed, or impulses are reduced.
+/// Then the prediction is committed and the constraints are told their impulses (Constraint::accept).
 ///
 /// Islands with contacts solve 3 in rounds of a convex problem, in which every row yields a little less in each: the
 /// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in
@@ -22,7 +28,9 @@
 /// keeps the best impulses found, or the motion found where there are none, and its status is kIterationLimit.
 ///
 /// A step is taken in parts where impacts begin and end, if asked for (Constraint::next_cut, RowLaw::lets_go_within;
-/// four times at most), and in halves down to 64ths where free bodies hang on joints alone and it does not settle.
+/// four times at most), and in halves down to 64ths where joints and handles alone act on free bodies and it does not
+/// settle. If that does not help, bodies turn and shift as the rows ask but do not bend in the rest of the step; if
+/// that is not found either they stay where they are, and lose half their velocity.
 ///
 /// Free islands keep their linear and angular momentum. Not guarded: bodies whose parents move. Methods:
 /// docs/contact-solvers.md. Equations and what is guaranteed: docs/derivations/constraints.md.

@@ -70,6 +70,8 @@ class JointConstraint final : public Constraint {
   std::array<Index, 2> bodies() const override { return {a_.body(), b_.body()}; }
   bool may_be_divided() const override { return true; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
+  void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                            ForceDerivative& sum) const override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
 
@@ -102,12 +104,19 @@ class JointConstraint final : public Constraint {
     Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
   };
 
+  struct TurnAxes {
+    int of_a = 0, of_b = 0;
+    double sign = 0.0;
+  };
+
+  static std::array<TurnAxes, 2> turn_axes(const RowPlan& row);
   Placement place(const BodyStates& states, StepTime when) const;
   double raw_coordinate(const Placement& at, int i) const;
   double unwrapped(const Placement& at, int i) const;
   Direction coordinate_direction(const Placement& at, int i) const;
   double gap(const Placement& at, const RowPlan& row) const;
   Direction direction(const Placement& at, const RowPlan& row) const;
+  Direction mean_direction(const BodyStates& states, const Placement& at, const RowPlan& row) const;
   bool is_angle(int coordinate) const;
   int axis_of(int coordinate) const;
   void plan_locked_rows();
@@ -116,6 +125,8 @@ class JointConstraint final : public Constraint {
   void plan_actuation();
   void add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan, const RowLaw& law,
            ConstraintRows& rows);
+  bool add_straight(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
+                    const RowLaw& law, ConstraintRows& rows);
   RowLaw law_of(const RowPlan& plan, double gap, double tolerance) const;
   RowLaw actuation_law(const RowPlan& plan, double gap) const;
 

@@ -33,6 +33,8 @@ class MaterialFrame {
   MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body);
 
   Index body() const { return body_; }
+  /// D, of the origin, one column per mode; none where modes do not show.
+  std::span<const Vec3> displacements() const { return displacement_; }
 
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
   Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
@@ -40,10 +42,16 @@ class MaterialFrame {
   /// Angular velocity of the frame, deformation included (to first order), world, rad/s.
   Vec3 angular_velocity(const BodyStates& states, StepTime when) const;
 
+  /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
+  Vec3 turn(const BodyStates& states) const;
+
   /// Row of the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world. @param scale of the whole row. @param modal room for k numbers; the result refers to it
   RowSide point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
                     std::vector<double>& modal) const;
+  /// Row of what u · (an axis of the frame) changes by, u held: angular axis × u. @param axis 0 to 2. @param u world
+  RowSide axis_row(const BodyStates& states, StepTime when, int axis, const Vec3& u, double scale,
+                   std::vector<double>& modal) const;
   /// Row of the angular velocity along a.
   RowSide angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale,
                       std::vector<double>& modal) const;
@@ -55,6 +63,7 @@ class MaterialFrame {
     return std::tie(s.body_, s.rest_.origin, s.rest_.axes, s.displacement_, s.rotation_);
   }
 
+  Mat3 turning(const BodyStates& states, StepTime when) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
 

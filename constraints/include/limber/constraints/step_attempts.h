@@ -15,7 +15,7 @@ enum class StepAttempt {
   kSlowed,           ///< relative motion was taken at its start: a swing would have ended too high
   kCutAtFirstTouch,  ///< where fast bodies come to what they would have passed (docs/contact.md)
   kHeldAtTouch,      ///< and stay for the rest of the step
-  kRefused,          ///< parts of all impulses were given up: the step is unsettled
+  kRefused,          ///< impulses or bending were given up: the step is unsettled
 };
 /// How many parts of steps were taken so.
 class StepAttempts {

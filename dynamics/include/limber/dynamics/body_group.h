@@ -132,6 +132,11 @@ class BodyGroup {
   /// The same for a step of the length of `modes`, in which they answer as it says: part of a step that is cut.
   /// Impulses with a delay are not to be waiting then, nor a parent's new place.
   void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load, const ModalStep& modes);
+  /// The same for a free body whose frame's end is found by whoever solves its constraints; its modes go through the
+  /// step as above. @param end the frame there. @param modal as ConstraintLoad::modal
+  void predict(Index slot, const RigidFrame& end, std::span<const double> modal, const ModalStep& modes);
+  /// A step in which the modes do not move: as the body is, but for the frame.
+  void predict_rest(Index slot, const RigidFrame& end);
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
   std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }

@@ -96,6 +96,10 @@ class RigidFrame {
   /// The parent now.
   const KinematicFrame& parent() const { return parent_; }
 
+  /// Of a free body (kFree): all of its motion, by momentum. @param angular_momentum about the body origin, world,
+  /// kg·m²/s
+  void set_motion(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_momentum);
+
   /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. What the fixing takes up has no
   /// effect.
   void apply_impulse(const FrameConstants& c, const Vec3& impulse, const Vec3& moment);

@@ -1,0 +1,317 @@
+#include "mean_motion.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+Vec3 part(const Vector& v, Index local, int which) { return v.segment<3>(6 * local + 3 * which); }
+
+/// What a change of τ turns the body by at the end.
+Mat3 end_turn(const Vec3& turn) {
+  return (Mat3::Identity() + 0.5 * cross_matrix(turn)) / (1.0 + 0.25 * turn.squaredNorm());
+}
+
+/// τ of free flight: (1 + ½[τ]) I τ = Δt L.
+Vec3 free_turn(const Mat3& inertia, const Vec3& momentum, double length) {
+  constexpr int kMost = 30;
+  Vec3 turn = length * inertia.inverse() * momentum;
+  // What is far from a sphere and turns fast is approached from the side of no turn.
+  if (turn.norm() > 1.0) turn /= turn.norm();
+  for (int i = 0; i < kMost; ++i) {
+    const Vec3 spin = inertia * turn;
+    const Vec3 residual = spin + 0.5 * turn.cross(spin) - length * momentum;
+    const Mat3 slope = inertia + 0.5 * (cross_matrix(turn) * inertia - cross_matrix(spin));
+    Vec3 change = slope.inverse() * residual;
+    const double size = change.norm(), most = 1.0 + 0.5 * turn.norm();
+    if (!(size > 1e-15 * (1.0 + turn.norm()))) break;
+    if (size > most) change *= most / size;
+    turn -= change;
+  }
+  return turn;
+}
+
+}  // namespace
+
+void MeanMotion::begin(IslandStep& step, bool bends) {
+  const double h = step.length();
+  bodies_.clear();
+  length_ = h, bends_ = bends;
+  Index modes = 0;
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const ConstrainedBody& at = step.bodies.body(local);
+    const FrameConstants& c = at.group->frame_constants();
+    const RigidFrame& frame = at.group->frame(at.slot);
+    const Mat3 R = to_matrix(frame.pose().q);
+    Body body{.momentum = frame.angular_momentum(c),
+              .torque = h * at.group->held_torque(at.slot),
+              .inertia = R * c.inertia * R.transpose(),
+              .easy = R * c.inertia.inverse() * R.transpose(),
+              .mass = c.mass,
+              .size = std::sqrt(c.inertia.trace() / c.mass),
+              .first_mode = modes,
+              .modes = step.bodies.response(local).modes};
+    body.flight =
+        h * frame.velocity() + 0.5 * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
+    body.shift = body.flight;
+    body.turn = free_turn(body.inertia, body.momentum, h);
+    modes += body.modes;
+    bodies_.push_back(body);
+  }
+  response_.setZero(modes), load_.setZero(modes);
+  if (!bends) return;
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const std::span<const double> response = step.bodies.response(local).position_modes;
+    std::ranges::copy(response, response_.data() + b.first_mode);
+  }
+}
+
+Quaternion MeanMotion::attitude(const IslandStep& step, Index local) const {
+  const Vec3 half = 0.5 * bodies_[static_cast<std::size_t>(local)].turn;
+  const ConstrainedBody& at = step.bodies.body(local);
+  return normalized(normalized(Quaternion{1.0, half.x(), half.y(), half.z()}) * at.group->frame(at.slot).pose().q);
+}
+
+void MeanMotion::predict(IslandStep& step, Index local, const RigidFrame& end) {
+  const Body& b = bodies_[static_cast<std::size_t>(local)];
+  const ConstrainedBody& at = step.bodies.body(local);
+  if (bends_)
+    at.group->predict(at.slot, end, {load_.data() + b.first_mode, static_cast<std::size_t>(b.modes)},
+                      step.bodies.modal_step(local));
+  else
+    at.group->predict_rest(at.slot, end);
+}
+
+void MeanMotion::place(IslandStep& step) {
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const ConstrainedBody& at = step.bodies.body(local);
+    RigidFrame end = at.group->frame(at.slot);
+    end.set_pose({attitude(step, local), end.pose().p + b.shift});
+    predict(step, local, end);
+  }
+  step.measure(StepTime::kEnd, step.gap);
+  step.linearise(StepTime::kEnd, step.end_rows);
+  step.linearise(StepTime::kMiddle, step.mean_rows);
+}
+
+void MeanMotion::find_residual(const IslandStep& step, std::span<const double> impulses, Vector& residual,
+                               Vector& modal) const {
+  const double h = step.length();
+  residual.resize(6 * count());
+  modal = load_;
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const Vec3 spin = b.inertia * b.turn / h;
+    residual.segment<3>(6 * local) = b.mass / h * (b.shift - b.flight);
+    residual.segment<3>(6 * local + 3) =
+        spin + 0.5 * b.turn.cross(spin) - b.momentum - 0.5 * b.torque + 0.25 * b.turn.cross(b.torque);
+  }
+  for (Index i = 0; i < step.mean_rows.size(); ++i) {
+    const double p = impulses[static_cast<std::size_t>(i)];
+    if (p == 0.0) continue;
+    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides) {
+      const Index local = step.bodies.local(side.body);
+      if (local < 0) continue;
+      const Body& b = bodies_[static_cast<std::size_t>(local)];
+      residual.segment<3>(6 * local) -= 0.5 * p * side.linear;
+      residual.segment<3>(6 * local + 3) -= 0.5 * p * (side.angular - 0.5 * b.turn.cross(side.angular));
+      const std::span<const double> shapes = step.mean_rows.modal(side);
+      for (std::size_t k = 0; k < shapes.size(); ++k) modal[b.first_mode + static_cast<Index>(k)] -= p * shapes[k];
+    }
+  }
+}
+
+void MeanMotion::find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K) {
+  struct Sum final : ForceDerivative {
+    const IslandStep& step;
+    MeanMotion& motion;
+    const std::vector<Body>& bodies;
+    Matrix& K;
+    Sum(const IslandStep& s, MeanMotion& m, Matrix& k) : step(s), motion(m), bodies(m.bodies_), K(k) {}
+    void add_bending(Index body, const Vec3& impulse, std::span<const Vec3> shapes) override {
+      const Index i = step.bodies.local(body);
+      if (i < 0 || shapes.empty()) return;
+      const Body& b = bodies[static_cast<std::size_t>(i)];
+      const ConstrainedBody& at = step.bodies.body(i);
+      const Mat3 f = cross_matrix(impulse);
+      const Mat3 by_place = 0.25 * (Mat3::Identity() - 0.5 * cross_matrix(b.turn)) * f *
+                            to_matrix(at.group->predicted_frame(at.slot).pose().q);
+      const Mat3 by_turn = -0.5 * f * to_matrix(at.group->frame(at.slot).pose().q);
+      for (std::size_t k = 0; k < shapes.size(); ++k) {
+        motion.bend_.col(b.first_mode + static_cast<Index>(k)) += by_place * shapes[k];
+        motion.turned_.col(b.first_mode + static_cast<Index>(k)) += by_turn * shapes[k];
+      }
+    }
+    void add(Index body, Of of, Index moved, By by, const Mat3& value) override {
+      const Index i = step.bodies.local(body), j = step.bodies.local(moved);
+      if (i < 0 || j < 0) return;
+      Mat3 d = -0.5 * value;
+      if (of == Of::kMoment) d = (Mat3::Identity() - 0.5 * cross_matrix(bodies[static_cast<std::size_t>(i)].turn)) * d;
+      if (by == By::kTurn) d = d * end_turn(bodies[static_cast<std::size_t>(j)].turn);
+      K.block<3, 3>(6 * i + (of == Of::kMoment ? 3 : 0), 6 * j + (by == By::kTurn ? 3 : 0)) += d;
+    }
+  };
+  const double h = step.length();
+  K.setZero(6 * count(), 6 * count());
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    K.block<3, 3>(6 * local, 6 * local) = b.mass / h * Mat3::Identity();
+    K.block<3, 3>(6 * local + 3, 6 * local + 3) =
+        (b.inertia + 0.5 * (cross_matrix(b.turn) * b.inertia - cross_matrix(b.inertia * b.turn))) / h -
+        0.25 * cross_matrix(b.torque);
+  }
+  for (Index i = 0; i < step.mean_rows.size(); ++i)
+    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides)
+      if (const Index local = step.bodies.local(side.body); local >= 0)
+        K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
+            0.25 * impulses[static_cast<std::size_t>(i)] * cross_matrix(side.angular);
+  bend_.setZero(3, load_.size()), turned_.setZero(3, load_.size());
+  Sum sum(step, *this, K);
+  const BodyStates states(step.part.table);
+  for (std::size_t i = 0; i < step.part.constraints.size(); ++i) {
+    const auto begin = static_cast<std::size_t>(step.first_row[i]),
+               end = static_cast<std::size_t>(step.first_row[i + 1]);
+    step.part.constraints[i]->add_force_derivative(states, impulses.subspan(begin, end - begin), sum);
+  }
+}
+
+void MeanMotion::condense(const Matrix& modal_force, const Matrix& modal_gap, const Vector& modal_residual, Matrix& K,
+                          Matrix& F, Matrix& E, Vector& residual) const {
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.modes == 0) continue;
+    const Index turn = 6 * local + 3;
+    const auto H = response_.segment(b.first_mode, b.modes).asDiagonal();
+    const Eigen::Matrix<double, 3, Eigen::Dynamic> bent = bend_.middleCols(b.first_mode, b.modes) * H;
+    const auto turned = turned_.middleCols(b.first_mode, b.modes).transpose();
+    K.block<3, 3>(turn, turn) += bent * turned;
+    F.middleRows<3>(turn) -= bent * modal_force.middleRows(b.first_mode, b.modes);
+    E.middleCols<3>(turn) += modal_gap.middleCols(b.first_mode, b.modes) * H * turned;
+    residual.segment<3>(turn) -= bent * modal_residual.segment(b.first_mode, b.modes);
+  }
+}
+
+void MeanMotion::add_turned(const Vector& change, Vector& load) const {
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    load.segment(b.first_mode, b.modes) +=
+        turned_.middleCols(b.first_mode, b.modes).transpose() * part(change, local, 1);
+  }
+}
+
+void MeanMotion::find_forces(const IslandStep& step, Matrix& F, Matrix& modal) const {
+  const Index m = step.mean_rows.size();
+  F.setZero(6 * count(), m);
+  modal.setZero(load_.size(), m);
+  for (Index i = 0; i < m; ++i)
+    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides) {
+      const Index local = step.bodies.local(side.body);
+      if (local < 0) continue;
+      const Body& b = bodies_[static_cast<std::size_t>(local)];
+      F.block<3, 1>(6 * local, i) += 0.5 * side.linear;
+      F.block<3, 1>(6 * local + 3, i) += 0.5 * (side.angular - 0.5 * b.turn.cross(side.angular));
+      const std::span<const double> shapes = step.mean_rows.modal(side);
+      for (std::size_t k = 0; k < shapes.size(); ++k) modal(b.first_mode + static_cast<Index>(k), i) += shapes[k];
+    }
+}
+
+void MeanMotion::find_gap_derivative(const IslandStep& step, Matrix& E, Matrix& modal) const {
+  const Index m = step.end_rows.size();
+  E.setZero(m, 6 * count());
+  modal.setZero(m, load_.size());
+  for (Index i = 0; i < m; ++i)
+    for (const ConstraintRows::Side& side : step.end_rows.row(i).sides) {
+      const Index local = step.bodies.local(side.body);
+      if (local < 0) continue;
+      const Body& b = bodies_[static_cast<std::size_t>(local)];
+      E.block<1, 3>(i, 6 * local) += side.linear.transpose();
+      E.block<1, 3>(i, 6 * local + 3) += side.angular.transpose() * end_turn(b.turn);
+      const std::span<const double> shapes = step.end_rows.modal(side);
+      for (std::size_t k = 0; k < shapes.size(); ++k) modal(i, b.first_mode + static_cast<Index>(k)) += shapes[k];
+    }
+}
+
+void MeanMotion::find_mobility(const Matrix& E, const Matrix& F, Vector& mobility) const {
+  mobility.setZero(E.rows());
+  for (Eigen::Index i = 0; i < E.rows(); ++i)
+    for (Index local = 0; local < count(); ++local) {
+      const Body& b = bodies_[static_cast<std::size_t>(local)];
+      const Vec3 turned = E.block<1, 3>(i, 6 * local + 3).transpose(), moment = F.block<3, 1>(6 * local + 3, i);
+      mobility[i] += length_ * (F.block<3, 1>(6 * local, i).squaredNorm() * 2.0 / b.mass +
+                                std::sqrt(turned.dot(b.easy * turned) * moment.dot(b.easy * moment)));
+    }
+}
+
+double MeanMotion::force_to_inertia(const Matrix& K) const {
+  double largest = 0.0;
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const Mat3 turning = K.block<3, 3>(6 * local + 3, 6 * local + 3) - b.inertia / length_;
+    largest = std::max(largest, length_ * (b.easy * turning).norm());
+  }
+  return largest;
+}
+
+void MeanMotion::move(const Vector& change, const Vector& load, double how_much) {
+  for (Index local = 0; local < count(); ++local) {
+    Body& b = bodies_[static_cast<std::size_t>(local)];
+    b.shift += how_much * part(change, local, 0);
+    b.turn += how_much * part(change, local, 1);
+  }
+  load_ += how_much * load;
+}
+
+double MeanMotion::size_of(const Vector& change) const {
+  constexpr double kTolerance = 1e-11;  // rad, and of a length
+  double largest = 0.0;
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const double turn = (end_turn(b.turn) * part(change, local, 1)).norm();
+    const double shift = part(change, local, 0).norm() / (b.size + b.shift.norm());
+    largest = std::isfinite(turn + shift) ? std::max({largest, turn, shift}) : kUnbounded;
+  }
+  return largest / kTolerance;
+}
+
+double MeanMotion::part_of(const Vector& change) const {
+  double whole = 1.0;
+  for (Index local = 0; local < count(); ++local) {
+    const double turn = part(change, local, 1).norm(),
+                 most = 1.0 + 0.5 * bodies_[static_cast<std::size_t>(local)].turn.norm();
+    if (turn > most) whole = std::min(whole, most / turn);
+  }
+  return whole;
+}
+
+void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
+  const double h = step.length();
+  impulse_.assign(bodies_.size(), Vec3::Zero()), moment_.assign(bodies_.size(), Vec3::Zero());
+  for (Index i = 0; i < step.mean_rows.size(); ++i)
+    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides)
+      if (const Index local = step.bodies.local(side.body); local >= 0) {
+        impulse_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.linear;
+        moment_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.angular;
+      }
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    const ConstrainedBody& at = step.bodies.body(local);
+    RigidFrame end = at.group->frame(at.slot);
+    const Vec3 velocity = end.velocity() + h * step.part.options.gravity +
+                          (impulse_[static_cast<std::size_t>(local)] + h * at.group->held_force(at.slot)) / b.mass;
+    end.set_motion({attitude(step, local), end.pose().p + b.shift}, velocity,
+                   b.momentum + moment_[static_cast<std::size_t>(local)] + b.torque);
+    predict(step, local, end);
+  }
+}
+
+double MeanMotion::torque_work(const IslandStep& step) const {
+  double work = 0.0;
+  for (const Body& b : bodies_) work += b.torque.dot(b.turn) / step.length();
+  return work;
+}
+
+}  // namespace limber::internal

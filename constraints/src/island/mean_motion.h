@@ -1,0 +1,84 @@
+// How free bodies go through a step under impulses that act in its middle: an energy–momentum step (Simo and Wong
+// 1991).
+//
+//   displacement d, Cayley vector τ, R₁ = cay(τ) R₀; p, l: impulses and moments of the rows of the middle, f, t: held
+//   m (d/Δt − v₀) = ½ (p + Δt m g + Δt f)
+//   (1 + ½[τ]) I τ/Δt = L₀ + ½ (1 − ½[τ]) (l + Δt t)          I at the start, world axes
+//   v₁ = v₀ + Δt g + (p + Δt f)/m,    L₁ = L₀ + l + Δt t
+//
+// The kinetic energy changes by exactly (p·d + l·τ)/Δt and what is held. Modes take the impulses as a force held.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "island_step.h"
+
+namespace limber::internal {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Vector = Eigen::VectorXd;
+
+class MeanMotion {
+ public:
+  /// Free flight: no impulses, modes free. @param bends whether modes move at all in this step
+  void begin(IslandStep& step, bool bends);
+  Index count() const { return static_cast<Index>(bodies_.size()); }
+
+  /// Predicts the bodies where they are in this step, measures the gaps there, and linearises the rows at the end and
+  /// in the middle.
+  void place(IslandStep& step);
+  /// What impulses leave of the equations above, six numbers a body, N·s and N·m·s; and of the modal loads.
+  /// @param impulses by row
+  void find_residual(const IslandStep& step, std::span<const double> impulses, Vector& residual, Vector& modal) const;
+  /// Its derivative by (d, τ) of all bodies; and how moments follow bending, modal loads turning, by body: bend and
+  /// turned, 3 × modes.
+  void find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K);
+  /// What modes that follow make of the matrices of Newton's step.
+  void condense(const Matrix& modal_force, const Matrix& modal_gap, const Vector& modal_residual, Matrix& K, Matrix& F,
+                Matrix& E, Vector& residual) const;
+  /// Adds to the modal loads what turning makes of them.
+  void add_turned(const Vector& change, Vector& load) const;
+  /// The same by the impulses, less the sign: 6 × rows; and the modal loads' by these, modes × rows.
+  void find_forces(const IslandStep& step, Matrix& F, Matrix& modal) const;
+  /// Of the gaps by (d, τ), rows × 6, and by the amplitudes, rows × modes.
+  void find_gap_derivative(const IslandStep& step, Matrix& E, Matrix& modal) const;
+  /// Of each row, what an impulse moves its own gap by through the frames, where they bear no forces, > 0.
+  void find_mobility(const Matrix& E, const Matrix& F, Vector& mobility) const;
+  /// How much larger the parts of K by forces are than those by inertia.
+  double force_to_inertia(const Matrix& K) const;
+  /// What a unit of modal load makes of the amplitudes.
+  const Vector& modal_response() const { return response_; }
+  /// @param change of (d, τ) by body. @param load of all modes
+  void move(const Vector& change, const Vector& load, double part);
+  /// Largest of what the change is to the places, by the tolerances of these.
+  double size_of(const Vector& change) const;
+  /// The part of a change that turns no body by more than a radian or so.
+  double part_of(const Vector& change) const;
+  /// Predicts the end, velocities and all. @param impulses by row
+  void finish(IslandStep& step, std::span<const double> impulses);
+  /// Work of held torques, exactly, J.
+  double torque_work(const IslandStep& step) const;
+
+ private:
+  struct Body {
+    Vec3 shift = Vec3::Zero(), turn = Vec3::Zero();            // d, τ
+    Vec3 flight = Vec3::Zero();                                // d without impulses
+    Vec3 momentum = Vec3::Zero(), torque = Vec3::Zero();       // L₀, Δt t
+    Mat3 inertia = Mat3::Identity(), easy = Mat3::Identity();  // and its inverse
+    double mass = 0.0, size = 0.0;
+    Index first_mode = 0, modes = 0;
+  };
+  Quaternion attitude(const IslandStep& step, Index local) const;
+  void predict(IslandStep& step, Index local, const RigidFrame& end);
+
+  std::vector<Body> bodies_;
+  double length_ = 0.0;
+  bool bends_ = true;
+  std::vector<Vec3> impulse_, moment_;  // of the rows, by body
+  Vector response_, load_;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> bend_, turned_;  // by mode: ∂r_τ/∂z, and of its load by τ
+};
+
+}  // namespace limber::internal
