@@ -16,6 +16,7 @@
 #include "limber/model/morph_targets.h"
 #include "limber/posing/handles_file.h"
 #include "limber/posing/pose_recording.h"
+#include "limber/posing/posed_model.h"
 #include "limber/posing/retarget.h"
 #include "program.h"
 
@@ -25,7 +26,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Arguments {
-  std::string model, joints, handles, clip, mapping, output, obj;
+  std::string model, joints, handles, clip, mapping, output, obj, rest;
   double scale = 1.0;
   PosingOptions options;
 };
@@ -44,6 +45,8 @@ void declare(CLI::App& options, Arguments& a) {
   options.add_option("-o,--output", a.output, "write the poses as an animation for any glTF viewer")
       ->type_name("FILE.glb");
   options.add_option("--obj", a.obj, "write the surface of each frame: STEM_0000.obj, STEM_0001.obj, ...")
+      ->type_name("STEM");
+  options.add_option("--rest", a.rest, "write the last pose as a model to bake: STEM.obj and STEM.joints.json")
       ->type_name("STEM");
   options.add_option("--scale", a.scale, "metres per unit of the model, for the GLB")
       ->type_name("M")
@@ -100,8 +103,8 @@ Pulls read_pulls(const Arguments& a) {
 }
 
 void pose(Program& program, const Arguments& a) {
-  if (a.output.empty() && a.obj.empty())
-    throw InvalidArgument("nothing to do: one of --output and --obj is needed; see --help");
+  if (a.output.empty() && a.obj.empty() && a.rest.empty())
+    throw InvalidArgument("nothing to do: one of --output, --obj and --rest is needed; see --help");
   for (const std::string& file : {a.model, a.joints, a.handles, a.clip, a.mapping})
     if (!file.empty()) program.add_input(file);
   program.progress().stage("reading");
@@ -141,6 +144,11 @@ void pose(Program& program, const Arguments& a) {
     program.progress().fraction(static_cast<double>(f + 1) / static_cast<double>(handles.frames.size()));
   }
   if (!a.output.empty()) program.write_file(a.output, recording.glb());
+  if (!a.rest.empty()) {
+    const JointedModel rest = posed_model(session, program.warnings());
+    program.write_file(a.rest + ".obj", obj_text(rest.surface));
+    program.write_file(a.rest + ".joints.json", joints_text(joints_file(rest)));
+  }
   if (recording.most_targets() > static_cast<std::size_t>(kMaxMorphTargets))
     program.warnings().push_back(
         fmt::format("A part that bends has {} morph targets, one a frame, but many viewers hold at most {}.",

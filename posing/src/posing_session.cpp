@@ -279,13 +279,23 @@ PosedJoint PosingSession::joint(Index joint) const {
   impl_->require(joint, impl_->now.joints.size(), "joint");
   const PoseStructure& s = impl_->now.built->structure;
   PosedJoint out;
+  const ModelJoint& told = impl_->now.joints[static_cast<std::size_t>(joint)];
+  const Vec3& origin = told.joint.frame.origin;
+  Index a = impl_->body_at(told.a, origin),
+        b = impl_->body_at(told.b, origin);  // of joints that hold nothing: one body
   for (std::size_t j = 0; j < s.joints.size(); ++j) {
     if (s.joints[j].model_joint != joint) continue;
+    a = s.joints[j].a, b = s.joints[j].b;
     out.coordinates = joint_coordinates(s, s.joints[j], impl_->now.pose.bodies, impl_->now.pose.turns[j]);
     JointRows rows;
     append_joint_rows(s, s.joints[j], impl_->now.pose.bodies, impl_->now.pose.turns[j], rows);
     for (const Row& r : rows.constraints) out.error = std::max(out.error, std::abs(r.value));
   }
+  const RigidTransform &X_a = impl_->now.pose.bodies[static_cast<std::size_t>(a)],
+                       &X_b = impl_->now.pose.bodies[static_cast<std::size_t>(b)];
+  out.frame = {X_b * Vec3(origin - s.bodies[static_cast<std::size_t>(b)].centre),
+               to_matrix(X_a.q) * told.joint.frame.axes};
+  out.turn = rotation_vector(X_a.q.conjugate() * X_b.q).norm();
   return out;
 }
 

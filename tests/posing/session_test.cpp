@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "limber/core/error.h"
+#include "limber/posing/posed_model.h"
 #include "posed_models.h"
 
 namespace limber {
@@ -133,6 +134,75 @@ TEST_F(Lamp, WhatIsNotThereIsRefusedAndChangesNothing) {
   ASSERT_TRUE(session_.undo());
   ASSERT_TRUE(session_.undo());
   EXPECT_FALSE(session_.undo());  // the pin and the handle were all
+}
+
+// The same machine, told from another pose: the same places are reached, and the same limits.
+TEST(PosedModel, GoesOnFromWhereItStands) {
+  for (const char* name : {"lamp", "drawer", "screw", "telescope", "sliding plate", "door"}) {
+    JointedModel model = rigid_assembly(name);
+    const auto last = static_cast<Index>(model.parts.size()) - 1;
+    const double size = size_of(model);
+    PosingSession first(model);
+    first.set_pinned(0, true);
+    const Vec3 grip = furthest_point(model, last, furthest_point(model, 0, Vec3::Zero()));
+    const PoseHandle hand = first.add_handle(last, grip);
+    first.move_handle(hand, grip + 0.05 * size * Vec3(0.3, 0.5, -0.8));
+    ASSERT_EQ(first.solve().status, PoseResult::Status::kConverged) << name;
+
+    Warnings warnings;
+    const JointedModel posed = posed_model(first, warnings);
+    EXPECT_LT(largest_distance(posed.surface.vertices, vertices_of(first)), 1e-15);
+    PosingSession second(posed);
+    second.set_pinned(0, true);
+    const PoseHandle again = second.add_handle(last, first.handle_point(hand));
+    const Vec3 far = grip + 3.0 * size * Vec3(-0.2, 0.4, 0.5);
+    first.move_handle(hand, far);
+    second.move_handle(again, far);
+    first.solve();
+    second.solve();
+    for (std::size_t j = 0; j < posed.joints.size(); ++j) {
+      const PosedJoint p = second.joint(static_cast<Index>(j));
+      EXPECT_LT(p.error, 1e-9) << name;
+      const Interval& limit = posed.joints[j].joint.limits.translation[0];
+      if (posed.joints[j].joint.type == JointType::kPrismatic) {
+        EXPECT_LT(std::max(limit.low - p.coordinates[0], p.coordinates[0] - limit.high), 1e-9);
+        // In the model's first frame it has gone as far as the first session's.
+        EXPECT_NEAR((p.frame.origin - first.joint(static_cast<Index>(j)).frame.origin).norm(), 0.0, 1e-6 * size)
+            << name;
+      }
+    }
+    const JointsFile file = joints_file(posed);
+    EXPECT_EQ(joints_text(parse_joints(joints_text(file), name)), joints_text(file));
+    GroupedSurface surface;
+    surface.surface = posed.surface;
+    surface.face_of.resize(posed.surface.triangles.size());
+    std::iota(surface.face_of.begin(), surface.face_of.end(), 0);
+    const JointedModel read = jointed_model(surface, file, name);
+    for (std::size_t p = 0; p < read.parts.size(); ++p) EXPECT_EQ(read.parts[p].triangles, posed.parts[p].triangles);
+  }
+}
+
+TEST(PosedModel, ABallThatHasTurnedSaysThatItsLimitsAreLeftOpen) {
+  PosingSession session(rigid_assembly("lamp"));
+  const Index shade = session.model().part_named("shade");
+  session.set_pinned(0, true);
+  for (std::size_t j = 0; j < session.model().joints.size(); ++j) {
+    JointSpec spec = session.model().joints[j].joint;
+    if (spec.type == JointType::kBall) spec.limits.cone = 1.0, session.set_joint(static_cast<Index>(j), spec);
+  }
+  const Vec3 tip = furthest_point(session.model(), shade, Vec3(-1, -2, -3));
+  const PoseHandle hand = session.add_handle(shade, tip);
+  Warnings none, some;
+  posed_model(session, none);
+  EXPECT_TRUE(none.empty());
+  session.move_handle(hand, tip + Vec3(0.02, 0.04, 0.01));
+  session.solve();
+  const JointedModel posed = posed_model(session, some);
+  EXPECT_EQ(some.size(), 1u);
+  for (const ModelJoint& joint : posed.joints)
+    if (joint.joint.type == JointType::kBall) {
+      EXPECT_EQ(joint.joint.limits, JointLimits{});
+    }
 }
 
 TEST(Skin, NothingBleedsAcrossAJoint) {

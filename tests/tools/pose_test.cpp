@@ -85,6 +85,27 @@ TEST_F(PoseProgram, WritesEachFrame) {
   EXPECT_EQ(read_file(folder_ / "drag.glb").substr(0, 4), "glTF");
 }
 
+TEST_F(PoseProgram, TheLastPoseIsAModelThatCanBePosedAgain) {
+  ASSERT_EQ(run(handles_, {"--rest", "open"}).exit_code, 0);
+  Json still = handles_;
+  still["handles"]["hand"]["point"] = list(grip_ + Vec3(0.1, 0.1, 0.0));
+  still["frames"] = {{{"targets", Json::object()}}};
+  write_file(folder_ / "handles.json", still.dump());
+  const ProgramResult r = testing::run_program(
+      "limber-pose",
+      {"open.obj", "--joints", "open.joints.json", "--handles", "handles.json", "--obj", "again", "--report", "r.json"},
+      folder_);
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  Warnings warnings;
+  const SurfaceMesh open = read_surface_mesh(folder_ / "open.obj", warnings),
+                    again = read_surface_mesh(folder_ / "again_0000.obj", warnings);
+  ASSERT_EQ(open.vertices.size(), again.vertices.size());
+  double apart = 0.0;
+  for (std::size_t v = 0; v < open.vertices.size(); ++v)
+    apart = std::max(apart, (open.vertices[v] - again.vertices[v]).norm());
+  EXPECT_LT(apart, 1e-12);
+}
+
 TEST_F(PoseProgram, EqualRunsGiveEqualBytes) {
   ASSERT_EQ(run(handles_, {"-o", "1.glb"}).exit_code, 0);
   ASSERT_EQ(run(handles_, {"-o", "2.glb"}).exit_code, 0);

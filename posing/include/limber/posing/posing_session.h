@@ -48,6 +48,8 @@ struct PosedCell {
 struct PosedJoint {
   std::vector<double> coordinates{};  ///< rad, length; empty for fixed
   double error = 0.0;                 ///< how far the joint is from holding: rad, of the model's diagonal
+  JointFrame frame{};                 ///< where it stands: the origin with b, the axes with a
+  double turn = 0.0;                  ///< of b relative to a since rest, 0 … π rad
 };
 
 class PosingSession {
