@@ -121,23 +121,24 @@ void MeanNewton::find_damping(const IslandStep& step) {
 }
 
 /// ΔQ with which the rows, linear about here, meet their law: those strictly within their bounds by equality, in the
-/// sense of least squares with rows scaled alike; the others at their bounds.
+/// sense of least squares with rows scaled alike; the others at their bounds. All rows go over at a time that want to,
+/// and where that does not end one at a time, the first: that does (Júdice and Pires 1994, Murty 1974).
 void MeanNewton::answer(const IslandStep& step) {
-  constexpr int kTrials = 12;
+  constexpr int kTogether = 4, kTrials = 100;
   impulse_change_.setZero(open_.size());
   then_ = open_;
   for (int trial = 0; trial < kTrials; ++trial) {
-    if (!find_active(step) && trial > 0) return;
-    meet_active();
+    if (!find_active(step, trial >= kTogether) && trial > 0) return;
+    meet_active(step);
     then_ = open_;
     then_.noalias() += A_ * impulse_change_;
   }
 }
 
 /// Which rows with bounds are within them. @return whether that has changed
-bool MeanNewton::find_active(const IslandStep& step) {
+bool MeanNewton::find_active(const IslandStep& step, bool one) {
   bool changed = false;
-  for (Eigen::Index i = 0; i < open_.size(); ++i) {
+  for (Eigen::Index i = 0; i < open_.size() && !(one && changed); ++i) {
     const RowLaw& law = law_of(step, i);
     if (is_equality(law)) continue;
     const auto row = static_cast<std::size_t>(i);
@@ -150,7 +151,10 @@ bool MeanNewton::find_active(const IslandStep& step) {
   return changed;
 }
 
-void MeanNewton::meet_active() {
+/// Rows with bounds that ask for what no motion gives, as a motor against its stop, push against each other until one
+/// comes to its bound: each yields a little to what it exerts.
+void MeanNewton::meet_active(const IslandStep& step) {
+  constexpr double kYields = 1e-2;  // of what an impulse moves its own row by; the next iteration makes up for it
   const Eigen::Index m = open_.size();
   reduced_.setIdentity(m, m);
   right_.setZero(m);
@@ -162,6 +166,7 @@ void MeanNewton::meet_active() {
         reduced_(i, j) = scale_[i] * A_(i, j) * scale_[j];
       else
         right_[i] -= scale_[i] * A_(i, j) * impulse_change_[j];
+    if (!is_equality(law_of(step, i))) reduced_(i, i) += kYields;
   }
   rows_.solve(numbers(reduced_), damping_, numbers(right_));
   for (Eigen::Index i = 0; i < m; ++i)

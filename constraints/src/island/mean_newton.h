@@ -27,8 +27,8 @@ class MeanNewton {
   void reduce(const IslandStep& step);
   void find_damping(const IslandStep& step);
   void answer(const IslandStep& step);
-  bool find_active(const IslandStep& step);
-  void meet_active();
+  bool find_active(const IslandStep& step, bool one);
+  void meet_active(const IslandStep& step);
 
   MeanMotion motion_;
   std::vector<double> impulses_;
