@@ -223,12 +223,14 @@ void BodyGroup::predict(Index slot, const RigidFrame& end, std::span<const doubl
   const bool constrained = add_modal_load(modal, modes.forces, step);
   if (body(slot).modes_static) leave_static_answer(slot, modes.z);
   advance_modes(slot, modes, body(slot).modes_loaded || constrained, step);
+  p.held = constrained;
   p.modes_static = constrained && answer_statically(slot, modal, step);
 }
 
 void BodyGroup::predict_rest(Index slot, const RigidFrame& end) {
   Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   p.frame = end;
+  p.held = false;
   p.modes_static = body(slot).modes_static;
   predicted_amplitudes_.copy_from(amplitudes_, slot);
   predicted_rates_.copy_from(rates_, slot);

@@ -125,11 +125,12 @@ void MeanNewton::find_damping(const IslandStep& step) {
 /// and where that does not end one at a time, the first: that does (Júdice and Pires 1994, Murty 1974).
 void MeanNewton::answer(const IslandStep& step) {
   constexpr int kTogether = 4, kTrials = 100;
+  constexpr double kYields = 1e-6, kYieldsMore = 1e-2;
   impulse_change_.setZero(open_.size());
   then_ = open_;
   for (int trial = 0; trial < kTrials; ++trial) {
     if (!find_active(step, trial >= kTogether) && trial > 0) return;
-    meet_active(step);
+    meet_active(step, trial < kTogether ? kYields : kYieldsMore);
     then_ = open_;
     then_.noalias() += A_ * impulse_change_;
   }
@@ -152,9 +153,11 @@ bool MeanNewton::find_active(const IslandStep& step, bool one) {
 }
 
 /// Rows with bounds that ask for what no motion gives, as a motor against its stop, push against each other until one
-/// comes to its bound: each yields a little to what it exerts.
-void MeanNewton::meet_active(const IslandStep& step) {
-  constexpr double kYields = 1e-2;  // of what an impulse moves its own row by; the next iteration makes up for it
+/// comes to its bound: each yields a little to what it exerts. Where two are all but the same, as limits of a ball
+/// joint that meet, their part of A can have a negative determinant, as forces are those of the step's middle and gaps
+/// those of its end: then they yield by more, and the next iteration makes up for it. @param yields of what an impulse
+/// moves its own row by
+void MeanNewton::meet_active(const IslandStep& step, double yields) {
   const Eigen::Index m = open_.size();
   reduced_.setIdentity(m, m);
   right_.setZero(m);
@@ -166,7 +169,7 @@ void MeanNewton::meet_active(const IslandStep& step) {
         reduced_(i, j) = scale_[i] * A_(i, j) * scale_[j];
       else
         right_[i] -= scale_[i] * A_(i, j) * impulse_change_[j];
-    if (!is_equality(law_of(step, i))) reduced_(i, i) += kYields;
+    if (!is_equality(law_of(step, i))) reduced_(i, i) += yields;
   }
   rows_.solve(numbers(reduced_), damping_, numbers(right_));
   for (Eigen::Index i = 0; i < m; ++i)

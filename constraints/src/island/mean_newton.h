@@ -28,7 +28,7 @@ class MeanNewton {
   void find_damping(const IslandStep& step);
   void answer(const IslandStep& step);
   bool find_active(const IslandStep& step, bool one);
-  void meet_active(const IslandStep& step);
+  void meet_active(const IslandStep& step, double yields);
 
   MeanMotion motion_;
   std::vector<double> impulses_;
