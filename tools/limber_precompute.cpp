@@ -162,8 +162,10 @@ void declare_assembly_options(CLI::App& app, Arguments& a) {
   app.add_option("--rigid", a.assembly.rigid, "component that does not bend, or '*' for all; repeatable")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_option("--ground", a.assembly.ground, "component that stands still in the scene; default: the first")
-      ->type_name("NAME");
+  app.add_option("--ground", a.assembly.ground,
+                 "component that stands still in the scene; repeatable; default: the first")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
   app.add_flag("--no-ground", a.assembly.free, "no component stands still in the scene");
 }
 

@@ -144,7 +144,8 @@ Json joints(const std::vector<JointReport>& reports) {
                    {"force", first(j.view.force)},
                    {"lock_force", vector(j.view.lock_force)},
                    {"largest_distance_error", j.largest_distance_error},
-                   {"largest_angle_error", j.largest_angle_error}});
+                   {"largest_angle_error", j.largest_angle_error},
+                   {"largest_limit_excess", j.largest_limit_excess}});
   }
   return all;
 }

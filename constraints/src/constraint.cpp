@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "limber/core/cross_matrix.h"
+
 namespace limber {
 
 const RigidTransform& BodyStates::pose(Index body, StepTime when) const {
@@ -33,6 +35,11 @@ std::span<const double> BodyStates::amplitudes(Index body, StepTime when) const 
   if (is_static(body)) return {};
   const ConstrainedBody& b = this->body(body);
   return when == StepTime::kStart ? b.group->amplitudes(b.slot) : b.group->predicted_amplitudes(b.slot);
+}
+
+BodyShape BodyStates::shape(Index body, StepTime when) const {
+  const ConstrainedBody& b = this->body(body);
+  return when == StepTime::kStart ? b.group->shape(b.slot) : b.group->predicted_shape(b.slot);
 }
 
 std::span<const double> BodyStates::rates(Index body, StepTime when) const {

@@ -37,6 +37,7 @@ struct ContactSet::Impl {
   std::vector<VertexShare> regions;                // of their sides
   std::vector<double> shapes;                      // of these
   std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
+  std::vector<ContactMemory> resting_memory;       // by id, those of bodies that sleep
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
   std::vector<std::unique_ptr<PairContacts>> pairs;
@@ -44,13 +45,17 @@ struct ContactSet::Impl {
   std::size_t pairs_used = 0, rolling_used = 0;
   std::vector<Constraint*> constraints;
   std::vector<ContactEvent> events, last_events;
-  std::vector<ContactEvent> resting, last_resting;  // the last of bodies that sleep
+  std::vector<ContactEvent> resting;  // the last of bodies that sleep
   ContactDents dents;
-  std::vector<double> give_energy;  // by body
+  std::vector<double> give_energy, resting_energy;  // by body: of `memory` and of `resting_memory`
+  std::vector<Index> touched;                       // scratch of finish()
 
-  void remember(std::span<const char> asleep);
+  void tell_pressing();
+  void tell_ended(std::span<const char> asleep, bool some_woke);
+  void remember(std::span<const char> asleep, bool some_woke);
   void remember_rolling(std::span<const char> asleep);
-  void find_give_energy();
+  static void add_energy(std::vector<double>& energy, std::span<const ContactMemory> of);
+  void find_energies();
   const ContactMemory* find(std::uint64_t id) const;
   double lasted(Index a, Index b) const;
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
@@ -61,9 +66,12 @@ struct ContactSet::Impl {
 };
 
 const ContactMemory* ContactSet::Impl::find(std::uint64_t id) const {
-  const auto found = std::lower_bound(memory.begin(), memory.end(), id,
-                                      [](const ContactMemory& m, std::uint64_t i) { return m.id < i; });
-  return found != memory.end() && found->id == id ? &*found : nullptr;
+  for (const std::vector<ContactMemory>* known : {&memory, &resting_memory}) {
+    const auto found = std::lower_bound(known->begin(), known->end(), id,
+                                        [](const ContactMemory& m, std::uint64_t i) { return m.id < i; });
+    if (found != known->end() && found->id == id) return &*found;
+  }
+  return nullptr;
 }
 
 double ContactSet::Impl::lasted(Index a, Index b) const {
@@ -129,10 +137,6 @@ void ContactSet::Impl::spread_shapes(PreparedSide& side) {
       const float* row = side.model->collision_rows().row(s.vertex, static_cast<int>(axis));
       for (std::size_t i = 0; i < k; ++i) shapes[first + axis * k + i] += s.share * static_cast<double>(row[i]);
     }
-  const ModalSurface& surface = side.model->collision();
-  const Triangle& corners = surface.triangles[static_cast<std::size_t>(side.at.triangle)];
-  for (std::size_t c = 0; c < 3; ++c)
-    side.rest += side.at.weight[c] * surface.rest[static_cast<std::size_t>(corners[c])].cast<double>();
 }
 
 ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -151,7 +155,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   std::size_t bodies = s.give_energy.size();
   for (const ContactPoint& point : points)
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
-  s.give_energy.resize(bodies);
+  s.give_energy.resize(bodies), s.resting_energy.resize(bodies);
   s.dents.reserve(bodies);
   s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
@@ -204,38 +208,57 @@ bool rests(std::span<const char> asleep, Index a, Index b) {
 
 }  // namespace
 
-void ContactSet::finish(std::span<const char> asleep) {
-  Impl& s = *impl_;
-  std::swap(s.events, s.last_events);
-  std::swap(s.resting, s.last_resting);
-  s.events.clear();
-  s.resting.clear();
-  for (const PreparedContact& contact : s.contacts) {
+void ContactSet::Impl::tell_pressing() {
+  std::swap(events, last_events);
+  events.clear();
+  touched.clear();
+  for (const PreparedContact& contact : contacts) {
+    touched.insert(touched.end(), {contact.a.body, contact.b.body});
     if (contact.impulse.isZero(0.0)) continue;
-    s.events.push_back({.id = contact.id,
-                        .a = contact.a.body,
-                        .b = contact.b.body,
-                        .phase = s.find(contact.id) != nullptr ? ContactPhase::kLasting : ContactPhase::kBegun,
-                        .position = contact.start_position,
-                        .normal = contact.axes.col(0),
-                        .impulse = contact.impulse});
+    events.push_back({.id = contact.id,
+                      .a = contact.a.body,
+                      .b = contact.b.body,
+                      .phase = find(contact.id) != nullptr ? ContactPhase::kLasting : ContactPhase::kBegun,
+                      .position = contact.start_position,
+                      .normal = contact.axes.col(0),
+                      .impulse = contact.impulse});
   }
-  std::sort(s.events.begin(), s.events.end(), by_id);
-  const std::size_t pressed = s.events.size();
-  for (const std::vector<ContactEvent>* earlier : {&s.last_events, &s.last_resting})
-    for (const ContactEvent& last : *earlier) {
-      const auto end = s.events.begin() + static_cast<std::ptrdiff_t>(pressed);
-      if (last.phase == ContactPhase::kEnded || std::binary_search(s.events.begin(), end, last, by_id)) continue;
-      if (rests(asleep, last.a, last.b)) {
-        s.resting.push_back(last);
-        continue;
-      }
-      s.events.push_back(last);
-      s.events.back().phase = ContactPhase::kEnded;
-      s.events.back().impulse = Vec3::Zero();
-    }
-  s.remember(asleep);
-  s.dents.finish(asleep);
+  std::sort(events.begin(), events.end(), by_id);
+}
+
+/// What pressed before, and does not now, unless bodies have fallen asleep with it.
+void ContactSet::Impl::tell_ended(std::span<const char> asleep, bool some_woke) {
+  const std::size_t pressed = events.size();
+  const auto presses = [&](const ContactEvent& last) {
+    return std::binary_search(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(pressed), last, by_id);
+  };
+  const auto end = [&](const ContactEvent& last) {
+    events.push_back(last);
+    events.back().phase = ContactPhase::kEnded;
+    events.back().impulse = Vec3::Zero();
+  };
+  if (some_woke)
+    std::erase_if(resting, [&](const ContactEvent& last) {
+      if (presses(last)) return true;
+      if (rests(asleep, last.a, last.b)) return false;
+      end(last);
+      return true;
+    });
+  for (const ContactEvent& last : last_events) {
+    if (last.phase == ContactPhase::kEnded || presses(last)) continue;
+    if (rests(asleep, last.a, last.b))
+      resting.push_back(last);
+    else
+      end(last);
+  }
+}
+
+void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
+  Impl& s = *impl_;
+  s.tell_pressing();
+  s.tell_ended(asleep, some_woke);
+  s.remember(asleep, some_woke);
+  s.dents.finish(asleep, s.touched);
   std::erase_if(s.strikes, [&](const StrikeMemory& m) { return !rests(asleep, m.a, m.b); });
   for (std::size_t i = 0; i < s.pairs_used; ++i)
     if (const double lasted = s.pairs[i]->lasted(); lasted > 0.0) {
@@ -247,7 +270,12 @@ void ContactSet::finish(std::span<const char> asleep) {
 }
 
 /// The forces of this step, and those under which bodies fell asleep.
-void ContactSet::Impl::remember(std::span<const char> asleep) {
+void ContactSet::Impl::remember(std::span<const char> asleep, bool some_woke) {
+  const auto clear_energy = [](std::vector<double>& energy, std::span<const ContactMemory> of) {
+    for (const ContactMemory& m : of)
+      if (m.yielding >= 0) energy[static_cast<std::size_t>(m.yielding)] = 0.0;
+  };
+  clear_energy(give_energy, memory);
   std::swap(memory, last_memory);
   memory.clear();
   for (const PreparedContact& contact : contacts)
@@ -259,17 +287,24 @@ void ContactSet::Impl::remember(std::span<const char> asleep) {
                         .give = contact.give,
                         .slip = contact.slip,
                         .yielding = contact.yielding});
-  for (const ContactMemory& last : last_memory)
-    if (rests(asleep, last.a, last.b)) memory.push_back(last);
   std::sort(memory.begin(), memory.end(), by_id);
+  const std::size_t rested = resting_memory.size();
+  for (const ContactMemory& last : last_memory)
+    if (rests(asleep, last.a, last.b)) resting_memory.push_back(last);
+  if (some_woke || resting_memory.size() > rested) {
+    clear_energy(resting_energy, resting_memory);
+    std::erase_if(resting_memory, [&](const ContactMemory& m) { return !rests(asleep, m.a, m.b); });
+    std::sort(resting_memory.begin(), resting_memory.end(), by_id);
+    add_energy(resting_energy, resting_memory);
+  }
+  add_energy(give_energy, memory);
   remember_rolling(asleep);
-  find_give_energy();
 }
 
-void ContactSet::Impl::find_give_energy() {
-  std::ranges::fill(give_energy, 0.0);
-  for (const ContactMemory& m : memory)
-    if (m.give > 0.0) give_energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
+/// ½ give F² of each, to the body that yields.
+void ContactSet::Impl::add_energy(std::vector<double>& energy, std::span<const ContactMemory> of) {
+  for (const ContactMemory& m : of)
+    if (m.give > 0.0) energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
 }
 
 void ContactSet::Impl::remember_rolling(std::span<const char> asleep) {
@@ -285,6 +320,7 @@ const ContactOptions& ContactSet::options() const { return impl_->options; }
 
 std::span<const ContactEvent> ContactSet::events() const { return impl_->events; }
 std::span<const ContactMemory> ContactSet::memory() const { return impl_->memory; }
+std::span<const ContactMemory> ContactSet::resting() const { return impl_->resting_memory; }
 std::span<const StrikeMemory> ContactSet::strikes() const { return impl_->strikes; }
 std::span<const RollingMemory> ContactSet::rolling() const { return impl_->rolling_memory; }
 
@@ -292,26 +328,34 @@ void ContactSet::clear() {
   impl_->contacts.clear();
   impl_->constraints.clear();
   impl_->memory.clear();
+  impl_->resting_memory.clear();
   impl_->strikes.clear();
   impl_->rolling_memory.clear();
   impl_->events.clear();
   impl_->resting.clear();
   impl_->dents.clear();
   impl_->give_energy.clear();
+  impl_->resting_energy.clear();
 }
 
 void ContactSet::save_state(StateWriter& state) const {
   const Impl& s = *impl_;
-  state(s.options, s.memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
+  state(s.options, s.memory, s.resting_memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
+}
+
+void ContactSet::Impl::find_energies() {
+  for (std::vector<double>* energy : {&give_energy, &resting_energy}) energy->assign(dents.bodies(), 0.0);
+  add_energy(give_energy, memory);
+  add_energy(resting_energy, resting_memory);
 }
 
 void ContactSet::restore_state(StateReader& state) {
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
-  state(s.options, s.memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
-  s.give_energy.resize(s.dents.bodies());
-  s.find_give_energy();
+  state(s.options, s.memory, s.resting_memory, s.strikes, s.rolling_memory, s.events, s.resting, s.dents);
+  s.dents.list_loaded();
+  s.find_energies();
 }
 
 void ContactSet::forget(Index body) { impl_->dents.forget(body); }
@@ -320,7 +364,8 @@ std::span<const DentLoad> ContactSet::dent_loads(Index body) const { return impl
 
 double ContactSet::dent_energy(const BodyStates& states, Index body) const {
   const auto i = static_cast<std::size_t>(body);
-  return impl_->dents.energy(states, body) + (i < impl_->give_energy.size() ? impl_->give_energy[i] : 0.0);
+  const bool known = i < impl_->give_energy.size();
+  return impl_->dents.energy(states, body) + (known ? impl_->give_energy[i] + impl_->resting_energy[i] : 0.0);
 }
 
 }  // namespace limber

@@ -28,6 +28,7 @@ std::size_t VertexNumbers::operator()(Index vertex) {
 
 void ContactDents::reserve(std::size_t bodies) {
   if (bodies_.size() < bodies) bodies_.resize(bodies);
+  loaded_.reserve(bodies_.size());
 }
 
 bool ContactDents::yields(const BodyStates& states, Index body) {
@@ -40,7 +41,7 @@ Vec3 ContactDents::displacement(const BodyStates& states, Index body, Region reg
   const ResidualCompliance& compliance = compliance_of(states, body);
   Vec3 u = Vec3::Zero();
   for (const VertexShare& s : region) u += s.share * displacement_in_body(compliance, b.loads, s.vertex);
-  return states.pose(body, StepTime::kStart).q * u;
+  return u;
 }
 
 void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
@@ -95,20 +96,36 @@ void ContactDents::press(Index body, Region region, const Vec3& force) {
   }
 }
 
-void ContactDents::finish(std::span<const char> asleep) {
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    Body& b = bodies_[i];
-    const bool sleeps = i < asleep.size() && asleep[i] != 0;
+void ContactDents::finish(std::span<const char> asleep, std::span<const Index> touched) {
+  stirred_.assign(loaded_.begin(), loaded_.end());
+  stirred_.insert(stirred_.end(), touched.begin(), touched.end());
+  std::ranges::sort(stirred_);
+  stirred_.erase(std::unique(stirred_.begin(), stirred_.end()), stirred_.end());
+  loaded_.clear();
+  for (const Index body : stirred_) {
+    if (static_cast<std::size_t>(body) >= bodies_.size()) continue;
+    Body& b = at(body);
+    const bool sleeps = static_cast<std::size_t>(body) < asleep.size() && asleep[static_cast<std::size_t>(body)] != 0;
     if (!b.pressed && !sleeps) b.loads.clear(), b.of_loads.clear();
     b.pressed = b.gathers = false;
+    if (!b.loads.empty()) loaded_.push_back(body);
   }
+}
+
+void ContactDents::list_loaded() {
+  loaded_.clear();
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    if (!bodies_[i].loads.empty()) loaded_.push_back(static_cast<Index>(i));
 }
 
 void ContactDents::forget(Index body) {
   if (static_cast<std::size_t>(body) < bodies_.size()) at(body) = {};
 }
 
-void ContactDents::clear() { bodies_.clear(); }
+void ContactDents::clear() {
+  bodies_.clear();
+  loaded_.clear();
+}
 
 std::span<const DentLoad> ContactDents::loads(Index body) const {
   if (static_cast<std::size_t>(body) >= bodies_.size()) return {};

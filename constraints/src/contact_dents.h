@@ -1,6 +1,7 @@
 // What contact forces press into bodies beyond their kept modes (residual_compliance.h), from step to step.
 //
-// A body remembers what contacts pressed its vertices v with in its last step, f_v, in its own frame:
+// A body remembers what contacts pressed its vertices v with in its last step, f_v, in its own frame, and where it
+// bends by a modal skin turned back to the rest shape by how it is turned there:
 //
 //   u_v = Σ_w G_vw f_w,     energy ½ Σ_v f_v · u_v
 //
@@ -54,7 +55,7 @@ class ContactDents {
   /// Whether a body has a residual compliance at all. @pre it is in the table
   static bool yields(const BodyStates& states, Index body);
 
-  /// Mean displacement of a region by the forces remembered, world.
+  /// Mean displacement of a region by the forces remembered, axes of the rest shape.
   Vec3 displacement(const BodyStates& states, Index body, Region region);
   /// Adds a side's rows: they yield to each other and to all those that the body has already in this part of a step;
   /// with the body's first, what it has stored.
@@ -63,7 +64,10 @@ class ContactDents {
   void press(Index body, Region region, const Vec3& force);
 
   /// After a step: bodies that nothing has pressed let go of what they had. @param asleep by body: keep theirs
-  void finish(std::span<const char> asleep);
+  /// @param touched bodies that had contacts in the step, in any order; others are left alone but for their loads
+  void finish(std::span<const char> asleep, std::span<const Index> touched);
+  /// After the state was restored.
+  void list_loaded();
   void forget(Index body);
   void clear();
 
@@ -98,6 +102,8 @@ class ContactDents {
   static void find_answers(const ResidualCompliance& compliance, Region region, Body& b);
 
   std::vector<Body> bodies_;
+  std::vector<Index> loaded_;   // those with loads, ascending
+  std::vector<Index> stirred_;  // scratch of finish()
 };
 
 }  // namespace limber

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -54,13 +55,13 @@ void Handle::begin_part(double length, double left, double whole) {
 void Handle::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
   const Vec3 p = point_.position(states, when);
   const Vec3& target = when == StepTime::kStart ? now_ : then_;
-  const double length = (p - states.origin(point_.body(), when)).norm() + p.norm();
+  const double arm = (p - states.origin(point_.body(), when)).norm();
   for (std::size_t i = 0; i < options_.directions.size(); ++i) {
     const Vec3& n = options_.directions[i];
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
-               .tolerance = kHandleTolerance * length + std::numeric_limits<double>::min()};
+               .tolerance = distance_tolerance(kHandleTolerance, arm, p)};
     law.agent_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {
@@ -89,7 +90,7 @@ void Handle::add_force_derivative(const BodyStates& states, std::span<const doub
   for (std::size_t i = 0; i < impulses.size(); ++i) impulse += impulses[i] * options_.directions[i];
   const Index body = point_.body();
   const Vec3 arm = point_.position(states, StepTime::kEnd) - states.origin(body, StepTime::kEnd);
-  sum.add_bending(body, impulse, point_.displacements());
+  sum.add_bending(body, impulse, point_.displacements(states, shapes_));
   sum.add(body, ForceDerivative::Of::kMoment, body, ForceDerivative::By::kTurn,
           0.5 * cross_matrix(impulse) * cross_matrix(arm));
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -400,12 +401,12 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   const auto arm = [&](const MaterialFrame& part) {
     return part.body() < 0 ? 0.0 : (at.o_b - states.origin(part.body(), when)).norm();
   };
-  const double length = std::max(arm(a_), arm(b_)) + at.o_b.norm() + std::numeric_limits<double>::min();
+  const double digits = distance_tolerance(kJointTolerance, std::max(arm(a_), arm(b_)), at.o_b);
   for (const RowPlan& plan : rows_) {
     const bool distance =
         plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
         ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) && !is_angle(plan.axis));
-    const double tolerance = distance ? kJointTolerance * length : kJointTolerance;
+    const double tolerance = distance ? digits : kJointTolerance;
     RowLaw law = law_of(plan, gap(at, plan), tolerance);
     law.tolerance = tolerance;
     add(states, when, at, plan, law, rows);
@@ -437,8 +438,8 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
     }
   }
   const Index a = a_.body(), b = b_.body();
-  if (b >= 0) sum.add_bending(b, force, b_.displacements());
-  if (a >= 0) sum.add_bending(a, -force, a_.displacements());
+  if (b >= 0) sum.add_bending(b, force, b_.displacements(states, shapes_));
+  if (a >= 0) sum.add_bending(a, -force, a_.displacements(states, shapes_));
   const Mat3 F = cross_matrix(force), F_end = cross_matrix(force_end);
   if (b >= 0) {
     const Vec3 to_b = mean.o_b - states.origin(b, StepTime::kMiddle), arm = end.o_b - states.origin(b, StepTime::kEnd);

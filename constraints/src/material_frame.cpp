@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -24,6 +25,27 @@ Mat3 pseudo_inverse(const Mat3& inertia) {
   return inverse;
 }
 
+/// Of all points of a patch, in the mean.
+SkinInfluences mean_influences(const ModalModel& model, std::span<const SurfacePoint> patch) {
+  std::vector<double> weights(static_cast<std::size_t>(model.data().skin->handles), 0.0);
+  for (const SurfacePoint& at : patch) {
+    const ModalSurface& s = at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
+    const Triangle& corners = s.triangles[static_cast<std::size_t>(at.triangle)];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const SkinInfluences& of = skin_influences(model, at.surface)[static_cast<std::size_t>(corners[c])];
+      for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
+        weights[of.handle[i]] += at.weight[c] * static_cast<double>(of.weight[i]);
+    }
+  }
+  return skin_influences(weights);
+}
+
+Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
+  Vec3 u = Vec3::Zero();
+  for (std::size_t i = 0; i < shapes.size(); ++i) u += z[i] * shapes[i];
+  return u;
+}
+
 /// J_l of rotations: exp(r + dr) = exp(J_l dr) exp(r), with c = (1 − cos θ)/θ² and s = (θ − sin θ)/θ³.
 Mat3 turn_of_rotation_vector(const Vec3& r) {
   constexpr double kSmall = 1e-2;  // where what is left out of the series is 1e-18
@@ -40,14 +62,22 @@ MaterialFrame::MaterialFrame(const JointFrame& in_world) : rest_(in_world) {}
 
 MaterialFrame::MaterialFrame(Index body, const JointFrame& in_body) : body_(body), rest_(in_body) {}
 
-MaterialFrame::MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at) : body_(body) {
+MaterialFrame::MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at, bool skinned) : body_(body) {
   validate(model, at);
   rest_.origin = rest_point(model, at);
   for (Index i = 0; i < model.modes(); ++i) displacement_.push_back(shape_at(model, at, i));
+  for (std::size_t c = 0; skinned && c < 3; ++c) {
+    if (at.weight[c] == 0.0) continue;
+    SurfacePoint corner{.surface = at.surface, .triangle = at.triangle, .weight = {0.0, 0.0, 0.0}};
+    corner.weight[c] = 1.0;
+    Anchor anchor{mean_influences(model, {&corner, 1}), rest_point(model, corner), at.weight[c]};
+    for (Index i = 0; i < model.modes(); ++i) anchor.shapes.push_back(shape_at(model, corner, i));
+    anchors_.push_back(std::move(anchor));
+  }
 }
 
 MaterialFrame::MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch,
-                             const JointFrame& in_body)
+                             const JointFrame& in_body, bool skinned)
     : body_(body), rest_(in_body) {
   if (patch.empty()) throw InvalidArgument("MaterialFrame: the patch of \"" + model.name() + "\" has no points");
   const double weight = 1.0 / static_cast<double>(patch.size());
@@ -72,12 +102,43 @@ MaterialFrame::MaterialFrame(Index body, const ModalModel& model, std::span<cons
     rotation_.push_back(inverse * moment);
     displacement_.push_back(displacement + rotation_.back().cross(in_body.origin - mean));
   }
+  if (skinned) anchors_.push_back({mean_influences(model, patch), in_body.origin, 1.0, displacement_});
 }
 
-Vec3 MaterialFrame::displace(std::span<const double> z) const {
-  Vec3 u = Vec3::Zero();
-  for (std::size_t i = 0; i < displacement_.size(); ++i) u += z[i] * displacement_[i];
-  return u;
+Vec3 MaterialFrame::displace(std::span<const double> z) const { return times(displacement_, z); }
+
+/// Of the origin, body frame.
+Vec3 MaterialFrame::place(const BodyShape& shape) const {
+  Vec3 p = Vec3::Zero();
+  for (const Anchor& a : anchors_)
+    p += a.share * shape.handles().position(a.influences, a.rest, times(a.shapes, shape.amplitudes()));
+  return p;
+}
+
+/// g += Jᵀ f of the origin.
+void MaterialFrame::add_rows(const BodyShape& shape, const Vec3& f_B, std::span<double> g) const {
+  for (const Anchor& a : anchors_) {
+    const Vec3 turned =
+        shape.differentiated().add_rows(a.influences, a.rest, times(a.shapes, shape.amplitudes()), a.share * f_B, g);
+    for (std::size_t i = 0; i < g.size(); ++i) g[i] += a.shapes[i].dot(turned);
+  }
+}
+
+void MaterialFrame::add_rows(const BodyStates& states, StepTime when, const Vec3& f_B, std::span<double> g) const {
+  if (when != StepTime::kMiddle) return add_rows(states.shape(body_, when), f_B, g);
+  for (const auto& [shape, weight] : states.shapes_between(body_)) add_rows(shape, weight * f_B, g);
+}
+
+std::span<const Vec3> MaterialFrame::displacements(const BodyStates& states, std::vector<Vec3>& room) const {
+  if (anchors_.empty()) return displacement_;
+  std::vector<double> row(displacement_.size());
+  room.assign(displacement_.size(), Vec3::Zero());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::fill(row.begin(), row.end(), 0.0);
+    add_rows(states, StepTime::kEnd, Vec3::Unit(axis), row);
+    for (std::size_t i = 0; i < row.size(); ++i) room[i][axis] = row[i];
+  }
+  return room;
 }
 
 Vec3 MaterialFrame::turn(std::span<const double> z) const {
@@ -88,6 +149,7 @@ Vec3 MaterialFrame::turn(std::span<const double> z) const {
 
 Vec3 MaterialFrame::position(const BodyStates& states, StepTime when) const {
   if (when == StepTime::kMiddle) return 0.5 * (position(states, StepTime::kStart) + position(states, StepTime::kEnd));
+  if (!anchors_.empty()) return states.pose(body_, when) * place(states.shape(body_, when));
   return states.pose(body_, when) * (rest_.origin + displace(states.amplitudes(body_, when)));
 }
 
@@ -101,8 +163,16 @@ Mat3 MaterialFrame::axes(const BodyStates& states, StepTime when) const {
 Vec3 MaterialFrame::velocity(const BodyStates& states, StepTime when) const {
   if (body_ < 0) return Vec3::Zero();
   const RigidTransform& X = states.pose(body_, when);
+  const std::span<const double> rates = states.rates(body_, when);
+  Vec3 bending = Vec3::Zero();
+  for (const Anchor& a : anchors_) {
+    const BodyShape shape = states.shape(body_, when);
+    bending += a.share * shape.differentiated().velocity(a.influences, a.rest, times(a.shapes, shape.amplitudes()),
+                                                         times(a.shapes, rates), rates);
+  }
+  if (anchors_.empty()) bending = displace(rates);
   return states.velocity(body_, when) + states.angular_velocity(body_, when).cross(position(states, when) - X.p) +
-         X.q * displace(states.rates(body_, when));
+         X.q * bending;
 }
 
 Vec3 MaterialFrame::angular_velocity(const BodyStates& states, StepTime when) const {
@@ -126,7 +196,9 @@ RowSide MaterialFrame::point_row(const BodyStates& states, StepTime when, const 
   Vec3 twist_B = Vec3::Zero();  // how a turn of the patch moves a point off its origin
   if (!rotation_.empty()) twist_B = scale * (R_BW * (p - position(states, when)).cross(n));
   for (std::size_t i = 0; i < displacement_.size(); ++i)
-    modal.push_back(displacement_[i].dot(n_B) + (rotation_.empty() ? 0.0 : rotation_[i].dot(twist_B)));
+    modal.push_back((anchors_.empty() ? displacement_[i].dot(n_B) : 0.0) +
+                    (rotation_.empty() ? 0.0 : rotation_[i].dot(twist_B)));
+  if (!anchors_.empty()) add_rows(states, when, n_B, modal);
   return {body_, scale * n, scale * arm.cross(n), modal};
 }
 

@@ -43,12 +43,18 @@ bool has_face(const PreparedSide& side) {
   return !is_round(side) && (side.model == nullptr || std::ranges::count(side.at.weight, 0.0) == 0);
 }
 
+/// Where a side touches, at a step's end or in its middle.
+Vec3 place(const BodyStates& states, StepTime when, const PreparedSide& side) {
+  if (when != StepTime::kMiddle) return side.position(states, when);
+  return 0.5 * (side.position(states, StepTime::kStart) + side.position(states, StepTime::kEnd));
+}
+
 /// How closely a gap can be met: by the arms of its points a and b, and their place.
 double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
                      const Vec3& b) {
   double arms = 0.0;
-  if (!states.is_static(contact.a.body)) arms += (a - states.pose(contact.a.body, when).p).norm();
-  if (!states.is_static(contact.b.body)) arms += (b - states.pose(contact.b.body, when).p).norm();
+  if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
+  if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
   return distance_tolerance(kRelativeTolerance, arms, a);
 }
 
@@ -136,7 +142,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     for (std::size_t side = 0; side < 2; ++side)
       if (yields_[side])
         dents_->press(body(contact, side), region(contact, side),
-                      turn_[side].conjugate() * (sign(side) * contact.last_force));
+                      side_of(contact, side).turned_back(turn_[side].conjugate() * (sign(side) * contact.last_force)));
   }
   lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
 }
@@ -147,6 +153,10 @@ void PairContacts::begin(const BodyStates& states) {
   strikes_ = strikes(states);
   for (std::size_t side = 0; side < 2; ++side)
     if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
+  for (PreparedContact& contact : contacts_)
+    for (PreparedSide* side : {&contact.a, &contact.b})
+      if (side->skin != nullptr)
+        side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
   const PreparedContact& first = contacts_.front();
   const ContactRule& rule = options_->rule;
   const bool by_gaps =
@@ -157,7 +167,11 @@ void PairContacts::begin(const BodyStates& states) {
   for (PreparedContact& contact : contacts_) {
     Vec3 dent = Vec3::Zero();
     for (std::size_t side = 0; side < 2; ++side)
-      if (yields_[side]) dent += sign(side) * dents_->displacement(states, body(contact, side), region(contact, side));
+      if (yields_[side])
+        dent +=
+            sign(side) *
+            (turn_[side] *
+             side_of(contact, side).turned(dents_->displacement(states, body(contact, side), region(contact, side))));
     contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
   }
   caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
@@ -185,7 +199,7 @@ Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const Prepare
 }
 
 std::span<const VertexShare> PairContacts::region(const PreparedContact& contact, std::size_t side) {
-  return (side == 0 ? contact.a : contact.b).region;
+  return side_of(contact, side).region;
 }
 
 double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
@@ -247,7 +261,8 @@ void PairContacts::add_flexibility(const BodyStates& states, Index first, Constr
     const Mat3 R = to_matrix(turn_[side]);
     Index row = first;
     for (const PreparedContact& contact : contacts_) {
-      const Mat3 axes = sign(side) * (R.transpose() * contact.axes);
+      Mat3 axes = sign(side) * (R.transpose() * contact.axes);
+      for (Index axis = 0; axis < 3; ++axis) axes.col(axis) = side_of(contact, side).turned_back(axes.col(axis));
       dents_->add_rows(states, body(contact, side), {region(contact, side), axes, row, row_count(contact)}, rows);
       row += row_count(contact);
     }
@@ -256,7 +271,7 @@ void PairContacts::add_flexibility(const BodyStates& states, Index first, Constr
 
 void PairContacts::add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact,
                                ConstraintRows& rows) {
-  const Vec3 a = contact.a.position(states, when), b = contact.b.position(states, when);
+  const Vec3 a = place(states, when, contact.a), b = place(states, when, contact.b);
   const Vec3 end = point_of_action(contact, a, b);
   const double tolerance = gap_tolerance(states, when, contact, a, b);
   for (Index axis = 0; axis < row_count(contact); ++axis) {

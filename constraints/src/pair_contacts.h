@@ -46,10 +46,11 @@ class PairContacts final : public Constraint {
   static Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact);
 
   /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
-  static std::span<const VertexShare> region(const PreparedContact& contact, std::size_t side);
-  static Index body(const PreparedContact& contact, std::size_t side) {
-    return (side == 0 ? contact.a : contact.b).body;
+  static const PreparedSide& side_of(const PreparedContact& contact, std::size_t side) {
+    return side == 0 ? contact.a : contact.b;
   }
+  static std::span<const VertexShare> region(const PreparedContact& contact, std::size_t side);
+  static Index body(const PreparedContact& contact, std::size_t side) { return side_of(contact, side).body; }
   static double sign(std::size_t side) { return side == 0 ? 1.0 : -1.0; }
 
   /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.

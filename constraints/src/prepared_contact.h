@@ -9,9 +9,9 @@
 
 #include "contact_geometry.h"
 #include "limber/constraints/constraint.h"
+#include "limber/dynamics/body_shape.h"
 #include "limber/dynamics/contact_source.h"
 #include "limber/dynamics/exact_motion.h"
-#include "limber/dynamics/surface_point.h"
 
 namespace limber {
 
@@ -27,11 +27,19 @@ struct PreparedSide {
   SurfacePoint at{};
   std::span<const VertexShare> region{};  // of its residual compliance; none where it has none
   std::span<const double> shapes{};       // of the modes, the region's mean, 3 × k; none: those of the point
-  Vec3 rest = Vec3::Zero();               // with shapes: the point at rest, body frame
+  SkinMemory* skin = nullptr;             // null: the body bends by its modes alone
+  Mat3 turn = Mat3::Identity();           // with a skin: of what it yields beyond its modes, at the step's start
   Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
-  /// Where the body touches.
+  /// @pre with a model
+  BodyShape shape(std::span<const double> z) const { return {*model, z, skin}; }
+
+  /// What the body yields beyond its modes, in its own axes, from that of the rest shape; and the other way, a force.
+  Vec3 turned(const Vec3& u) const { return skin == nullptr ? u : Vec3(turn * u); }
+  Vec3 turned_back(const Vec3& f) const { return skin == nullptr ? f : Vec3(turn.transpose() * f); }
+
+  /// Where the body touches, at one of the step's ends.
   Vec3 position(const BodyStates& states, StepTime when) const {
     return states.pose(body, when) * place(states.amplitudes(body, when)) + rim;
   }
@@ -40,39 +48,27 @@ struct PreparedSide {
   Vec3 velocity(const BodyStates& states, StepTime when) const {
     const RigidTransform& X = states.pose(body, when);
     Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
-    if (model != nullptr) v += X.q * deformation(states.rates(body, when));
+    if (model != nullptr) v += X.q * deforming(states.amplitudes(body, when), states.rates(body, when));
     return v;
   }
   /// Body frame. @param z amplitudes
-  Vec3 place(std::span<const double> z) const {
-    if (model == nullptr) return rigid_point;
-    return shapes.empty() ? deformed_point(*model, at, z) : Vec3(rest + deformation(z));
+  Vec3 place(std::span<const double> z) const { return model == nullptr ? rigid_point : shape(z).position(at, shapes); }
+  /// Its velocity by the rates ż.
+  Vec3 deforming(std::span<const double> z, std::span<const double> rates) const {
+    return shape(z).velocity(at, rates, shapes);
   }
-  /// U z; with rates its velocity.
-  Vec3 deformation(std::span<const double> z) const {
-    if (shapes.empty()) return displacement(*model, at, z);
-    Vec3 u = Vec3::Zero();
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      for (std::size_t i = 0; i < z.size(); ++i) u[static_cast<Index>(axis)] += shapes[axis * z.size() + i] * z[i];
-    return u;
-  }
-  /// g += Uᵀ f. @param f body frame
-  void add_load(const Vec3& f, std::span<double> g) const {
-    if (shapes.empty()) return add_modal_force(*model, at, f, g);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      for (std::size_t i = 0; i < g.size(); ++i) g[i] += shapes[axis * g.size() + i] * f[static_cast<Index>(axis)];
-  }
-  /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R U ż,
-  /// [H03] equation 20.
+  /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R J ż,
+  /// [H03] equation 20; what J itself changes by is left out.
   PointMotion motion(const BodyStates& states) const {
     const RigidTransform& X = states.pose(body, StepTime::kStart);
     const Vec3 omega = states.angular_velocity(body, StepTime::kStart),
                centre = position(states, StepTime::kStart) - rim;
     const Vec3 turning = omega.cross(centre - X.p);
-    Vec3 deforming = Vec3::Zero();
-    if (model != nullptr) deforming = X.q * deformation(states.rates(body, StepTime::kStart));
-    return {centre, states.velocity(body, StepTime::kStart) + turning + deforming,
-            omega.cross(turning) + 2.0 * omega.cross(deforming)};
+    Vec3 bending = Vec3::Zero();
+    if (model != nullptr)
+      bending = X.q * deforming(states.amplitudes(body, StepTime::kStart), states.rates(body, StepTime::kStart));
+    return {centre, states.velocity(body, StepTime::kStart) + turning + bending,
+            omega.cross(turning) + 2.0 * omega.cross(bending)};
   }
 };
 
@@ -101,6 +97,7 @@ inline PreparedSide make_side(const BodyStates& states, const ContactSide& side,
   if (side.triangle < 0 || states.is_static(side.body)) return made;
   made.model = &states.body(side.body).group->model();
   made.at = {.surface = SurfacePoint::Surface::kCollision, .triangle = side.triangle, .weight = side.weight};
+  made.skin = states.body(side.body).group->skin(states.body(side.body).slot);
   return made;
 }
 
@@ -114,17 +111,27 @@ inline bool yields(const PreparedSide& side) {
   return side.model != nullptr && side.model->data().residual_compliance.has_value();
 }
 
-/// Row of the velocity of a side's point along n, its arm ending at `end`, which both sides share.
+/// Row of the velocity of a side's point along n, its arm ending at `end`, which both sides share. In the middle of a
+/// step a body with a skin gets what moves the point as the modes go through it (BodyShape, BodyStates).
 inline RowSide point_row(const BodyStates& states, StepTime when, const PreparedSide& side, const Vec3& end,
                          const Vec3& n, std::vector<double>& modal) {
   modal.clear();
   if (states.is_static(side.body)) return {};
-  const RigidTransform& X = states.pose(side.body, when);
-  if (side.model != nullptr) {
-    modal.assign(static_cast<std::size_t>(side.model->modes()), 0.0);
-    side.add_load(X.q.conjugate() * n, modal);
+  const RowSide row{side.body, n, (end - states.origin(side.body, when)).cross(n), {}};
+  if (side.model == nullptr) return row;
+  modal.assign(static_cast<std::size_t>(side.model->modes()), 0.0);
+  if (when == StepTime::kMiddle) {
+    const Vec3 n_B = states.rotation(side.body, when).transpose() * n;
+    if (side.skin == nullptr)
+      side.shape({}).add_force(side.at, n_B, modal, side.shapes);
+    else
+      for (const auto& [shape, weight] : states.shapes_between(side.body))
+        shape.add_force(side.at, weight * n_B, modal, side.shapes);
+  } else {
+    const Vec3 n_B = states.pose(side.body, when).q.conjugate() * n;
+    side.shape(states.amplitudes(side.body, when)).add_force(side.at, n_B, modal, side.shapes);
   }
-  return {side.body, n, (end - X.p).cross(n), modal};
+  return {row.body, row.linear, row.angular, modal};
 }
 
 /// The place and velocity of a side's point at some time, from its body's free motion.
@@ -142,7 +149,7 @@ struct Passage {
     motion->evaluate(time, state);
     place = state.pose * side.place(state.amplitudes) + side.rim;
     velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
-    if (side.model != nullptr) velocity += state.pose.q * side.deformation(state.rates);
+    if (side.model != nullptr) velocity += state.pose.q * side.deforming(state.amplitudes, state.rates);
   }
 };
 

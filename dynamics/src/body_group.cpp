@@ -76,15 +76,18 @@ void BodyGroup::split_static_answer(Index slot) {
   }
 }
 
-Index BodyGroup::add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity) {
+Index BodyGroup::add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity, bool skinned) {
   const Body body{.frame = RigidFrame(constants_, X_WB, velocity, angular_velocity), .previous_pose = X_WB};
+  std::unique_ptr<Skin> skin = skinned ? std::make_unique<Skin>(*model_->data().skin) : nullptr;
   if (!vacant_.empty()) {
     const Index slot = vacant_.back();
     vacant_.pop_back();
     bodies_[static_cast<std::size_t>(slot)] = body;
+    skins_[static_cast<std::size_t>(slot)] = std::move(skin);
     return slot;
   }
   bodies_.push_back(body);
+  skins_.push_back(std::move(skin));
   predictions_.push_back({.frame = body.frame});
   for (ModeRows* rows : mode_rows()) rows->resize(bodies_.size());
   vacant_.reserve(bodies_.size());  // so that remove() cannot fail
@@ -121,32 +124,51 @@ void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, s
 void BodyGroup::set_parent(Index slot, const KinematicFrame& at_step_end) { body(slot).frame.set_parent(at_step_end); }
 
 Vec3 BodyGroup::position(Index slot, const SurfacePoint& at) const {
-  return frame(slot).pose() * deformed_point(*model_, at, amplitudes(slot));
+  return frame(slot).pose() * shape(slot).position(at);
 }
 
 Vec3 BodyGroup::velocity(Index slot, const SurfacePoint& at) const {
   const RigidFrame& f = frame(slot);
-  const Vec3 arm = f.pose().q * deformed_point(*model_, at, amplitudes(slot));
-  return f.velocity() + f.angular_velocity(constants_).cross(arm) + f.pose().q * displacement(*model_, at, rates(slot));
+  const Vec3 arm = f.pose().q * shape(slot).position(at);
+  return f.velocity() + f.angular_velocity(constants_).cross(arm) + f.pose().q * shape(slot).velocity(at, rates(slot));
 }
 
 void BodyGroup::apply_force(Index slot, const SurfacePoint& at, const Vec3& newtons) {
   Body& b = body(slot);
   const Quaternion& q_WB = b.frame.pose().q;
   b.force += newtons;
-  b.torque += (q_WB * deformed_point(*model_, at, amplitudes(slot))).cross(newtons);
-  add_modal_force(*model_, at, q_WB.conjugate() * newtons, forces_.modes(slot));
+  b.torque += (q_WB * shape(slot).position(at)).cross(newtons);
+  shape(slot).add_force(at, q_WB.conjugate() * newtons, forces_.modes(slot));
   b.modes_loaded = true;
 }
 
 void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& newton_seconds, double delay) {
   Body& b = body(slot);
   const Quaternion q_WB = b.frame.pose().q;
-  b.frame.apply_impulse(constants_, newton_seconds,
-                        (q_WB * deformed_point(*model_, at, amplitudes(slot))).cross(newton_seconds));
+  b.frame.apply_impulse(constants_, newton_seconds, (q_WB * shape(slot).position(at)).cross(newton_seconds));
   const Vec3 impulse_B = q_WB.conjugate() * newton_seconds;
-  if (delay == 0.0) return add_modal_force(*model_, at, impulse_B, rates_.modes(slot));
-  if (whole_.table().modes() > 0) b.delayed.push_back({at, impulse_B, delay});
+  if (delay == 0.0) return shape(slot).add_force(at, impulse_B, rates_.modes(slot));
+  if (whole_.table().modes() == 0) return;
+  b.delayed.push_back({at, impulse_B, delay});
+  if (!skinned(slot)) return;
+  b.delayed.back().modal.assign(amplitudes(slot).size(), 0.0);
+  shape(slot).add_force(at, impulse_B, b.delayed.back().modal);
+}
+
+SkinMemory* BodyGroup::skin(Index slot) const {
+  const std::unique_ptr<Skin>& skin = skins_[static_cast<std::size_t>(slot)];
+  return skin ? &skin->memory : nullptr;
+}
+
+std::array<ShapeBetween, kShapesBetween> BodyGroup::shapes_between(Index slot) const {
+  const std::span<const double> z0 = amplitudes(slot), z1 = predicted_amplitudes(slot);
+  const auto at = [&](std::size_t place) -> ShapeBetween {
+    std::vector<double>& z = skins_[static_cast<std::size_t>(slot)]->between[place];
+    z.resize(z0.size());
+    for (std::size_t i = 0; i < z.size(); ++i) z[i] = z0[i] + kPartsBetween[place] * (z1[i] - z0[i]);
+    return {shape_at(slot, z), kWeightsBetween[place]};
+  };
+  return {at(0), at(1), at(2)};
 }
 
 void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
@@ -210,19 +232,21 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   advance_modes(slot, modes, b.modes_loaded || constrained || !couplings_.empty(), step);
   p.held = constrained;
   p.modes_static = constrained && answer_statically(slot, load.modal, step);
-  p.frame.end_step(constants_, frame_load, first_moment_of(predicted_amplitudes(slot)), h);
+  p.frame.end_step(constants_, frame_load, predicted_first_moment(slot), h);
 }
 
-void BodyGroup::predict(Index slot, const RigidFrame& end, std::span<const double> modal, const ModalStep& step) {
+void BodyGroup::predict(Index slot, const RigidFrame& end, const FrameExcitation& excitation,
+                        std::span<const double> modal, const ModalStep& step) {
   Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   p.frame = end;
   predicted_amplitudes_.copy_from(amplitudes_, slot);
   predicted_rates_.copy_from(rates_, slot);
   predicted_forces_.copy_from(forces_, slot);
   const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
+  if (!couplings_.empty()) excite_modes(modes.forces, excitation);
   const bool constrained = add_modal_load(modal, modes.forces, step);
   if (body(slot).modes_static) leave_static_answer(slot, modes.z);
-  advance_modes(slot, modes, body(slot).modes_loaded || constrained, step);
+  advance_modes(slot, modes, body(slot).modes_loaded || constrained || !couplings_.empty(), step);
   p.held = constrained;
   p.modes_static = constrained && answer_statically(slot, modal, step);
 }
@@ -283,12 +307,17 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded, 
   const ModalModelData& data = model_->data();
   for (const DelayedImpulse& impulse : body(slot).delayed)
     for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
-      const double j = shape_at(*model_, impulse.at, static_cast<Index>(i)).dot(impulse.impulse_B);
+      const double j = modal_impulse(impulse, i);
       const Mode mode{data.eigenvalues[i], data.decays[i]};
       const ModeState change = impulse_response(mode, step.length() - impulse.time, j);
       modes.z[i] += change.z;
       modes.rates[i] += change.zdot;
     }
+}
+
+double BodyGroup::modal_impulse(const DelayedImpulse& impulse, std::size_t mode) const {
+  if (!impulse.modal.empty()) return impulse.modal[mode];
+  return limber::shape_at(*model_, impulse.at, static_cast<Index>(mode)).dot(impulse.impulse_B);
 }
 
 /// @param answers of the modes to the load's impulse, where it has one
@@ -308,7 +337,10 @@ void BodyGroup::predict_motion(Index slot, const Vec3& gravity, double h, const 
   if (!couplings_.empty()) excite_modes(motion.forces().data(), excitation);
   if (b.modes_static) motion.release(static_amplitudes(slot));
   for (const DelayedImpulse& impulse : b.delayed)
-    add_modal_force(*model_, impulse.at, impulse.impulse_B, motion.add_impulse(impulse.time));
+    if (const std::span<double> j = motion.add_impulse(impulse.time); impulse.modal.empty())
+      add_modal_force(*model_, impulse.at, impulse.impulse_B, j);
+    else
+      std::ranges::copy(impulse.modal, j.begin());
   frame.end_step(constants_, load, first_moment_at_end(motion), h, &motion.path());
 }
 
@@ -427,6 +459,8 @@ void BodyGroup::restore_state(Index slot, StateReader& state) {
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }
+
+Vec3 BodyGroup::predicted_first_moment(Index slot) const { return first_moment_of(predicted_amplitudes(slot)); }
 
 Vec3 BodyGroup::first_moment_of(std::span<const double> z) const {
   Vec3 s = constants_.mass * constants_.center_of_mass;

@@ -117,6 +117,10 @@ double ExactMotion::reach(double distance, std::span<const double> shape) const 
   return path_.bounds(0.0, step()).travel + sway(arm, shape);
 }
 
+void ExactMotion::changes(std::span<double> change) const {
+  for (std::size_t i = 0; i < z_.size(); ++i) change[i] = bound(i, mode_at(i, 0.0), 0.0, step()).change + released(i);
+}
+
 double ExactMotion::sway(double arm, std::span<const double> shape) const {
   double flexing = 0.0;
   for (std::size_t i = 0; i < z_.size(); ++i)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -56,6 +57,9 @@ struct Pieces {
             1, kRangeBytes / (sizeof(float) * 3 * kTileVertices * std::max<std::size_t>(1, modes)))),
         instances_per_block(std::min(kBlockInstances, kAmplitudeFloats / std::max<std::size_t>(1, modes))) {}
 
+  std::size_t drawn_modes(const ReconstructionTarget& target) const {
+    return target.modes < 0 ? modes : static_cast<std::size_t>(target.modes);
+  }
   std::size_t blocks() const { return (targets.size() + instances_per_block - 1) / instances_per_block; }
   std::size_t count() const { return (tiles + tiles_per_range - 1) / tiles_per_range * blocks(); }
 
@@ -68,9 +72,13 @@ struct Pieces {
     const std::size_t n = std::min(instances_per_block, members.size());
     alignas(64) std::array<float, kAmplitudeFloats> amplitudes;  // [mode][instance]; only what is used is written
     std::array<InstanceOutput, kBlockInstances> outputs;
+    std::size_t summed = 0;
+    for (std::size_t i = 0; i < n; ++i) summed = std::max(summed, drawn_modes(members[i]));
     for (std::size_t i = 0; i < n; ++i) {
       outputs[i] = instance_output(members[i]);
-      for (std::size_t m = 0; m < modes; ++m) amplitudes[m * n + i] = static_cast<float>(members[i].amplitudes[m]);
+      const std::size_t own = drawn_modes(members[i]);
+      for (std::size_t m = 0; m < summed; ++m)
+        amplitudes[m * n + i] = m < own ? static_cast<float>(members[i].amplitudes[m]) : 0.0f;
     }
     const std::size_t first_tile = range * tiles_per_range;
     internal::TileInfluences hang{};
@@ -78,9 +86,10 @@ struct Pieces {
     reconstruct_tiles({.basis = surface.basis.tile(0),
                        .rest = surface.rest.front().data(),
                        .vertices = surface.rest.size(),
-                       .modes = modes,
+                       .stored_modes = modes,
                        .first_tile = first_tile,
                        .last_tile = std::min(first_tile + tiles_per_range, tiles),
+                       .modes = summed,
                        .amplitudes = amplitudes.data(),
                        .outputs = outputs.data(),
                        .instances = n,
@@ -123,6 +132,10 @@ void check(const ModalSurface& surface, const SkinTiles* influences, std::span<c
       throw InvalidArgument("reconstruct: target " + std::to_string(i) + " has no array for positions");
     if (targets[i].amplitudes == nullptr && surface.basis.modes() > 0)
       throw InvalidArgument("reconstruct: target " + std::to_string(i) + " has no amplitudes");
+    if (targets[i].modes > surface.basis.modes())
+      throw InvalidArgument("reconstruct: target " + std::to_string(i) + " asks for " +
+                            std::to_string(targets[i].modes) + " modes, expected at most " +
+                            std::to_string(surface.basis.modes()));
     if (targets[i].skin) check_skin(surface, influences, targets[i], i);
     normals |= targets[i].normals != nullptr;
   }
@@ -171,6 +184,16 @@ void reconstruct_any(const ModalSurface& surface, const SkinTiles* influences,
 }
 
 }  // namespace
+
+Index drawn_modes(const SurfaceExtent& extent, std::span<const double> z, double tolerance) {
+  double rest = 0.0;  // what the modes from k on show at most
+  std::size_t k = z.size();
+  for (; k > 0; --k) {
+    rest += std::abs(z[k - 1]) * extent.shape[k - 1];
+    if (rest > tolerance) break;
+  }
+  return static_cast<Index>(k);
+}
 
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets, Jobs& jobs) {
   reconstruct_any(surface, nullptr, targets, jobs);

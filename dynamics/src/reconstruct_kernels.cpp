@@ -160,7 +160,7 @@ HWY_INLINE HWY_ATTR void ManyInstances(const TileRange& range, std::size_t tile,
   const Floats d;
   Vector u[3 * N];
   for (std::size_t i = 0; i < 3 * N; ++i) u[i] = hn::Zero(d);
-  const float* shape = range.basis + tile * range.modes * 3 * kTileVertices + lane;
+  const float* shape = range.basis + tile * range.stored_modes * 3 * kTileVertices + lane;
   const float* amplitude = range.amplitudes + first;
   for (std::size_t m = 0; m < range.modes; ++m, shape += 3 * kTileVertices, amplitude += range.instances) {
     const Vector x = hn::Load(d, shape), y = hn::Load(d, shape + kTileVertices),
@@ -188,7 +188,7 @@ HWY_INLINE HWY_ATTR void OneInstance(const TileRange& range, std::size_t tile, s
   constexpr std::size_t kParts = kTileVertices / kLanes;
   Vector u[3 * kParts];
   for (std::size_t i = 0; i < 3 * kParts; ++i) u[i] = hn::Zero(d);
-  const float* shape = range.basis + tile * range.modes * 3 * kTileVertices;
+  const float* shape = range.basis + tile * range.stored_modes * 3 * kTileVertices;
   const float* amplitude = range.amplitudes + instance;
   for (std::size_t m = 0; m < range.modes; ++m, shape += 3 * kTileVertices, amplitude += range.instances) {
     for (std::size_t line = 0; line < 3 * kTileVertices; line += kLine) hwy::Prefetch(shape + kPrefetch + line);

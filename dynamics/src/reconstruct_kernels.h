@@ -34,7 +34,8 @@ struct TileInfluences {
 struct TileRange {
   const float* basis;  ///< `[tile][mode][x16|y16|z16]`, 64-byte aligned, of tile 0
   const float* rest;   ///< xyz per vertex, of vertex 0
-  std::size_t vertices, modes, first_tile, last_tile;
+  std::size_t vertices, stored_modes, first_tile, last_tile;
+  std::size_t modes;        ///< those that are summed: the first so many
   const float* amplitudes;  ///< `[mode][instance]`
   const InstanceOutput* outputs;
   std::size_t instances;      ///< 1 … kBlockInstances

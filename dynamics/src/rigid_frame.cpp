@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "limber/core/cross_matrix.h"
 
 namespace limber {
 namespace {
@@ -18,9 +21,7 @@ double swing_per_field(const ModalModelData& body) {
   const Vec3 s = body.mass * body.center_of_mass, e = body.line_axis;
   if (body.motion == FrameMotion::kLine) return e.cross(s).norm() / e.dot(body.inertia * e);
   if (body.motion != FrameMotion::kPoint) return 0.0;
-  Mat3 cross;
-  cross << 0.0, -s.z(), s.y(), s.z(), 0.0, -s.x(), -s.y(), s.x(), 0.0;
-  return (body.inertia.inverse() * cross).norm();
+  return (body.inertia.inverse() * cross_matrix(s)).norm();
 }
 
 }  // namespace
@@ -62,6 +63,22 @@ void RigidFrame::set_motion(const RigidTransform& X_WB, const Vec3& velocity, co
   set_pose(X_WB);
   velocity_ = parent_.velocity = velocity;
   momentum_ = angular_momentum;
+}
+
+void RigidFrame::set_turn(const FrameConstants& c, const Quaternion& q_WB, const Vec3& angular_momentum) {
+  disturbed_ = true;
+  if (c.motion == FrameMotion::kPoint) {
+    pose_.q = q_WB;
+    momentum_ = angular_momentum;
+    return;
+  }
+  const Quaternion turn = parent_.pose.q.conjugate() * q_WB;
+  const double angle = 2.0 * std::atan2(c.line_axis.dot(turn.vector()), turn.w);
+  angle_ += std::remainder(angle - angle_, 2.0 * std::numbers::pi);
+  pose_.q = normalized(parent_.pose.q * quaternion_from_rotation_vector(angle_ * c.line_axis));
+  const Quaternion q_BW = pose_.q.conjugate();
+  const Vec3 own = q_BW * angular_momentum - c.inertia * (q_BW * parent_.angular_velocity);
+  angle_rate_ = c.line_axis.dot(own) / c.line_axis.dot(c.inertia * c.line_axis);
 }
 
 void RigidFrame::set_parent(const KinematicFrame& at_step_end) {

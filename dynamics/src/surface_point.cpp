@@ -12,6 +12,11 @@ using internal::add_rows;
 using internal::rows_times;
 using internal::SurfaceRows;
 
+/// Whether the rows of a vertex lie together.
+bool has_rows(const ModalModel& model, const SurfacePoint& at) {
+  return at.surface == SurfacePoint::Surface::kCollision && model.data().touchable;
+}
+
 const ModalSurface& surface_of(const ModalModel& model, const SurfacePoint& at) {
   return at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
 }
@@ -54,7 +59,7 @@ Vec3 shape_at(const ModalModel& model, const SurfacePoint& at, Index mode) {
 }
 
 Vec3 displacement(const ModalModel& model, const SurfacePoint& at, std::span<const double> z) {
-  if (at.surface == SurfacePoint::Surface::kCollision) {
+  if (has_rows(model, at)) {
     double sum[3];
     rows_times(rows_at(model, at, Vec3::Ones()), z.size(), z.data(), sum);
     return {sum[0], sum[1], sum[2]};
@@ -74,7 +79,7 @@ Vec3 deformed_point(const ModalModel& model, const SurfacePoint& at, std::span<c
 }
 
 void add_modal_force(const ModalModel& model, const SurfacePoint& at, const Vec3& f_B, std::span<double> g) {
-  if (at.surface == SurfacePoint::Surface::kCollision) return add_rows(rows_at(model, at, f_B), g.size(), g.data());
+  if (has_rows(model, at)) return add_rows(rows_at(model, at, f_B), g.size(), g.data());
   for (std::size_t i = 0; i < g.size(); ++i) g[i] += shape_at(model, at, static_cast<Index>(i)).dot(f_B);
 }
 

@@ -142,7 +142,7 @@ void ConstraintStage::set_contacts(std::span<Constraint* const> contacts) {
   contacts_.assign(contacts.begin(), contacts.end());
 }
 
-void ConstraintStage::find_islands() {
+void ConstraintStage::find_islands(std::span<const Index> awake) {
   if (!stale_) return;
   stale_ = false;
   release_bodies();
@@ -163,7 +163,7 @@ void ConstraintStage::find_islands() {
     if (acts(a) && acts(b)) sets_.join(a, b);
   }
   number_islands();
-  list_members();
+  list_members(awake);
   list_constraints();
   set_constrained(members_, true);
   if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
@@ -188,9 +188,8 @@ void ConstraintStage::number_islands() {
 }
 
 /// Members of every island, ascending, one island after the other: counted, then filled in.
-void ConstraintStage::list_members() {
-  const auto bodies = static_cast<Index>(table_.size());
-  for (Index body = 0; body < bodies; ++body) {
+void ConstraintStage::list_members(std::span<const Index> awake) {
+  for (const Index body : awake) {
     if (!acts(body)) continue;
     Index& island = island_of_[static_cast<std::size_t>(body)];
     island = island_of_[static_cast<std::size_t>(sets_.root(body))];  // a root comes before the others
@@ -202,7 +201,7 @@ void ConstraintStage::list_members() {
     count += std::exchange(island.members, 0);
   }
   members_.resize(count);
-  for (Index body = 0; body < bodies; ++body) {
+  for (const Index body : awake) {
     if (!acts(body) || island_of_[static_cast<std::size_t>(body)] < 0) continue;
     Island& island = islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(body)])];
     members_[island.first_member + island.members++] = body;
@@ -267,26 +266,33 @@ void ConstraintStage::end_together(std::span<const Index> members) {
   }
 }
 
-void ConstraintStage::step(Jobs& jobs, const IslandOptions& options) {
+void ConstraintStage::foresee(Jobs& jobs, const IslandOptions& options) {
   if (islands_.empty()) return;
   options_ = options;
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island) step_island(island, options_);
+    for (std::size_t island = begin; island < end; ++island) foresee_island(island);
   });
 }
 
-void ConstraintStage::step_island(std::size_t island, const IslandOptions& options) {
+void ConstraintStage::foresee_island(std::size_t island) {
   const Island& at = islands_[island];
-  const std::span<const Index> members = std::span(members_).subspan(at.first_member, at.members);
-  IslandOptions own = options;
+  const std::span<const Index> members = members_of(at);
+  IslandOptions own = options_;
   own.undisturbed =
       std::ranges::none_of(members, [&](Index body) { return disturbed_[static_cast<std::size_t>(body)] != 0; });
   own.energy_surplus = surplus_of(members);
-  IslandReport& report = reports_[island];
-  report =
-      solvers_[island].step(table_, members, std::span(constraints_).subspan(at.first_constraint, at.constraints), own);
-  have_stepped(members, report);
+  solvers_[island].foresee(table_, members, std::span(constraints_).subspan(at.first_constraint, at.constraints), own);
+}
+
+void ConstraintStage::finish(Jobs& jobs) {
+  if (islands_.empty()) return;
+  jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t island = begin; island < end; ++island) {
+      reports_[island] = solvers_[island].finish();
+      have_stepped(members_of(islands_[island]), reports_[island]);
+    }
+  });
 }
 
 double ConstraintStage::surplus_of(std::span<const Index> members) const {
@@ -305,6 +311,18 @@ void ConstraintStage::have_stepped(std::span<const Index> members, const IslandR
 IslandReport ConstraintStage::report() const {
   IslandReport sum = together_report_;
   for (const IslandReport& r : reports_) add_report(r, sum);
+  return sum;
+}
+
+StageTimes ConstraintStage::foreseen_times() const {
+  StageTimes sum;
+  for (std::size_t island = 0; island < islands_.size(); ++island) sum.add(solvers_[island].times());
+  return sum;
+}
+
+StageTimes ConstraintStage::times() const {
+  StageTimes sum;
+  for (const IslandReport& r : reports_) sum.add(r.times);
   return sum;
 }
 

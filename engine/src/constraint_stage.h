@@ -46,13 +46,17 @@ class ConstraintStage {
   /// Constraints of the coming step alone, beside the others: they stay the caller's.
   void set_contacts(std::span<Constraint* const> contacts);
   /// Islands of the bodies that constraints tie together; those bodies are left alone by BodyGroup::advance().
-  void find_islands();
-  /// Advances all islands.
-  void step(Jobs& jobs, const IslandOptions& options);
+  /// @param awake all that move and do not sleep, ascending
+  void find_islands(std::span<const Index> awake);
+  /// Finds where the step takes all islands, BodyGroup::predicted_frame() and the like; nothing moves yet.
+  void foresee(Jobs& jobs, const IslandOptions& options);
+  /// Advances them.
+  void finish(Jobs& jobs);
 
   // Bodies that take the step by themselves.
   /// They and the constraints on them are left alone by what is above. @param bodies ascending by clusters
   void hold_back(std::span<const Index> bodies);
+  bool is_held_back(Index body) const { return held_back_[static_cast<std::size_t>(body)] != 0; }
   /// All of those that were held back take part again.
   void let_go();
   /// Advances some of them, as one problem, by one part of a step. @return its length, s
@@ -69,12 +73,12 @@ class ConstraintStage {
 
   /// Sums over the islands of the last step.
   IslandReport report() const;
+  /// What its islands' threads spent on stages in foresee() and in finish(), with IslandOptions::timed.
+  StageTimes foreseen_times() const;
+  StageTimes times() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
   /// Of one island, ascending.
-  std::span<const Index> members(int island) const {
-    const Island& at = islands_[static_cast<std::size_t>(island)];
-    return std::span(members_).subspan(at.first_member, at.members);
-  }
+  std::span<const Index> members(int island) const { return members_of(islands_[static_cast<std::size_t>(island)]); }
   /// Whether a body is in an island.
   bool constrained(Index body) const { return !islands_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0; }
   double energy_surplus(Index body) const { return surplus_[static_cast<std::size_t>(body)]; }
@@ -88,9 +92,12 @@ class ConstraintStage {
   std::uint32_t place(Entry&& entry);
   Index root_of(const Constraint* constraint);
   void number_islands();
-  void list_members();
+  void list_members(std::span<const Index> awake);
   void list_constraints();
-  void step_island(std::size_t island, const IslandOptions& options);
+  void foresee_island(std::size_t island);
+  std::span<const Index> members_of(const Island& island) const {
+    return std::span(members_).subspan(island.first_member, island.members);
+  }
   void release_bodies();
   double surplus_of(std::span<const Index> members) const;
   void have_stepped(std::span<const Index> members, const IslandReport& report);

@@ -15,10 +15,22 @@ void SleepStage::add(Index body) {
   }
   rest_[i] = {};
   asleep_[i] = 0;
+  ++changes_;
+  awake_.reserve(rest_.capacity());
+}
+
+std::span<const Index> SleepStage::awake() {
+  if (listed_ == changes_) return awake_;
+  listed_ = changes_;
+  awake_.clear();
+  for (std::size_t i = 0; i < rest_.size(); ++i)
+    if (asleep_[i] == 0 && constraints_->moves(static_cast<Index>(i))) awake_.push_back(static_cast<Index>(i));
+  return awake_;
 }
 
 void SleepStage::remove(Index body) {
   wake(body);
+  ++changes_, ++wakings_;
   for (std::size_t i = 0; i < supports_.size();) {
     if (supports_[i].what == body)
       wake(supports_[i].sleeper);  // and with it this support is forgotten
@@ -30,6 +42,7 @@ void SleepStage::remove(Index body) {
 void SleepStage::wake(Index body) {
   rest_[static_cast<std::size_t>(body)].calm = 0.0;
   if (!asleep(body)) return;
+  ++changes_, ++wakings_;
   while (asleep(body)) {  // once round
     Rest& r = rest_[static_cast<std::size_t>(body)];
     asleep_[static_cast<std::size_t>(body)] = 0;
@@ -45,18 +58,19 @@ void SleepStage::wake_all() {
 }
 
 void SleepStage::update(const SleepOptions& options, double h, std::span<const ContactEvent> events) {
-  for (Rest& r : rest_) {
+  const std::span<const Index> active = awake();  // as they were before any of them falls asleep here
+  for (const Index body : active) {
+    Rest& r = rest_[static_cast<std::size_t>(body)];
     r.pushed = r.push;
     r.push = Vec3::Zero();
   }
   for (const ContactEvent& e : events) {
-    rest_[static_cast<std::size_t>(e.a)].push += e.impulse;
-    rest_[static_cast<std::size_t>(e.b)].push -= e.impulse;
+    if (constraints_->moves(e.a)) rest_[static_cast<std::size_t>(e.a)].push += e.impulse;
+    if (constraints_->moves(e.b)) rest_[static_cast<std::size_t>(e.b)].push -= e.impulse;
   }
-  for (std::size_t i = 0; i < rest_.size(); ++i) {
-    const auto body = static_cast<Index>(i);
-    if (asleep_[i] != 0 || !constraints_->moves(body)) continue;
-    rest_[i].calm = at_rest(body, options) ? rest_[i].calm + h : 0.0;
+  for (const Index body : active) {
+    double& calm = rest_[static_cast<std::size_t>(body)].calm;
+    calm = at_rest(body, options) ? calm + h : 0.0;
   }
   for (const ConstraintStage::Entry& entry : constraints_->entries())  // hands that go on by themselves
     if (entry.handle && !entry.handle->target().velocity.isZero(0.0))
@@ -66,11 +80,8 @@ void SleepStage::update(const SleepOptions& options, double h, std::span<const C
     const std::span<const Index> members = constraints_->members(island);
     if (std::all_of(members.begin(), members.end(), ready)) put_to_sleep(members);
   }
-  for (std::size_t i = 0; i < rest_.size(); ++i) {
-    const auto body = static_cast<Index>(i);
-    if (asleep_[i] == 0 && constraints_->moves(body) && !constraints_->constrained(body) && ready(body))
-      put_to_sleep({&body, 1});
-  }
+  for (const Index body : active)
+    if (!asleep(body) && !constraints_->constrained(body) && ready(body)) put_to_sleep({&body, 1});
   for (const ContactEvent& e : events) {
     if (e.phase == ContactPhase::kEnded) continue;
     if (asleep(e.a) && !constraints_->moves(e.b)) supports_.push_back({e.b, e.a});
@@ -101,12 +112,16 @@ void SleepStage::save_state(std::size_t bodies, StateWriter& state) const {
 void SleepStage::restore_state(std::size_t bodies, StateReader& state) {
   for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], rest_[i]);
   state(supports_);
+  ++changes_, ++wakings_;
 }
 
 void SleepStage::put_to_sleep(std::span<const Index> members) {
+  ++changes_;
   for (std::size_t m = 0; m < members.size(); ++m) {
+    Rest& r = rest_[static_cast<std::size_t>(members[m])];
+    r.push = r.pushed = Vec3::Zero();
     asleep_[static_cast<std::size_t>(members[m])] = 1;
-    rest_[static_cast<std::size_t>(members[m])].next = members[(m + 1) % members.size()];
+    r.next = members[(m + 1) % members.size()];
     constraints_->set_asleep(members[m], true);
   }
 }

@@ -21,6 +21,13 @@ class SleepStage {
   /// Wakes what it sleeps with and what rests on it.
   void remove(Index body);
 
+  /// Bodies that move and are awake, ascending. Made anew where one was added or removed, fell asleep or woke;
+  /// allocates nothing then.
+  std::span<const Index> awake();
+  /// Differs from what it was where awake() does; wakings() where somebody woke.
+  std::uint64_t changes() const { return changes_; }
+  std::uint64_t wakings() const { return wakings_; }
+
   bool asleep(Index body) const { return asleep_[static_cast<std::size_t>(body)] != 0; }
   /// By body.
   std::span<const char> asleep() const { return asleep_; }
@@ -65,6 +72,8 @@ class SleepStage {
   std::vector<char> asleep_;
   std::vector<Rest> rest_;
   std::vector<Support> supports_;  // static shapes that sleepers rest on
+  std::vector<Index> awake_;
+  std::uint64_t changes_ = 1, wakings_ = 1, listed_ = 0;  // the last: changes_ when awake_ was made
 };
 
 }  // namespace limber::internal

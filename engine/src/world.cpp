@@ -108,9 +108,10 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
       throw InvalidArgument("World::add_body: the shape is a half-space, expected one that ends");
   }
   const internal::ShapeExtent extent = placement.shape ? extent_of(*placement.shape) : extent_of(*model);
+  const bool skinned = placement.modal_skin && model->data().skin.has_value();
   const Index group = impl_->group_of(std::move(model));
   const Index slot = impl_->groups[static_cast<std::size_t>(group)]->add(placement.pose, placement.velocity,
-                                                                         placement.angular_velocity);
+                                                                         placement.angular_velocity, skinned);
   const BodyId id = impl_->place({.group = group,
                                   .slot = slot,
                                   .shape = placement.shape,
@@ -121,7 +122,8 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
                               {.group = &impl_->group(impl_->entries[id.index]), .slot = slot});
   impl_->sleep.add(static_cast<Index>(id.index));
   impl_->tell_source(id.index);
-  impl_->make_ranges();
+  impl_->ranges.reserve(impl_->entries.capacity());
+  impl_->awake_slots.reserve(impl_->entries.capacity());
   return id;
 }
 
@@ -137,15 +139,32 @@ Index World::Impl::group_of(std::shared_ptr<const ModalModel> model) {
     dented.resize(groups.size());
     if ((*found)->model().data().residual_compliance)
       dented[static_cast<std::size_t>(found - groups.begin())] = std::make_unique<DentedSurface>((*found)->model());
+    skins.resize(groups.size());
+    const ModalModel& known = (*found)->model();
+    skins[static_cast<std::size_t>(found - groups.begin())] =
+        known.data().skin ? std::make_unique<internal::GroupSkin>(known) : nullptr;
   }
   return static_cast<Index>(found - groups.begin());
 }
 
+/// Runs of slots whose bodies are awake.
 void World::Impl::make_ranges() {
+  if (ranges_of == sleep.changes()) return;
+  ranges_of = sleep.changes();
+  awake_slots.clear();
+  for (const Index body : sleep.awake()) {
+    const Entry& e = entries[static_cast<std::size_t>(body)];
+    awake_slots.emplace_back(e.group, e.slot);
+  }
+  std::sort(awake_slots.begin(), awake_slots.end());
   ranges.clear();
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    for (Index begin = 0; groups[g] && begin < groups[g]->slots(); begin += kBodiesPerJob)
-      ranges.push_back({static_cast<Index>(g), begin, std::min(begin + kBodiesPerJob, groups[g]->slots())});
+  for (const auto& [group, slot] : awake_slots) {
+    Range* last = ranges.empty() ? nullptr : &ranges.back();
+    if (last != nullptr && last->group == group && last->end == slot && slot - last->begin < kBodiesPerJob)
+      ++last->end;
+    else
+      ranges.push_back({group, slot, slot + 1});
+  }
 }
 
 /// Gives a body an id.
@@ -185,7 +204,7 @@ void World::remove_body(BodyId id) {
   impl_->sleep.remove(index);
   impl_->parts->forget(index);
   std::erase_if(impl_->apart, [&](const Impl::Apart& pair) { return pair.a == index || pair.b == index; });
-  if (impl_->source != nullptr) impl_->source->remove_body(index);
+  if (impl_->source != nullptr && impl_->shows(known)) impl_->source->remove_body(index);
   impl_->constraints.remove_body(index);
   impl_->contacts.forget(index);
   if (id.index < impl_->loads_before.size()) impl_->loads_before[id.index].clear();
@@ -194,8 +213,8 @@ void World::remove_body(BodyId id) {
     group.remove(known.slot);
     if (group.count() == 0) {  // lets go of the model
       impl_->dented[static_cast<std::size_t>(known.group)].reset();
+      impl_->skins[static_cast<std::size_t>(known.group)].reset();
       impl_->groups[static_cast<std::size_t>(known.group)].reset();
-      impl_->make_ranges();
     }
   }
   Impl::Entry& entry = impl_->entries[id.index];
@@ -226,6 +245,7 @@ int World::advance(double real_seconds) {
 }
 
 double World::interpolation_factor() const { return impl_->accumulator / impl_->options.step; }
+
 void World::set_step(double seconds) {
   Impl& m = *impl_;
   WorldOptions options = m.options;

@@ -13,8 +13,9 @@ HandleId World::add_handle(BodyId id, const SurfacePoint& at, const HandleOption
   const Impl::Entry& e = impl_->entry(id, "add_handle");
   const ModalModel& model = impl_->group(e).model();
   validate(model, at);
-  auto made = std::make_unique<Handle>(MaterialFrame(static_cast<Index>(id.index), model, at),
-                                       impl_->group(e).position(e.slot, at), options);
+  auto made =
+      std::make_unique<Handle>(MaterialFrame(static_cast<Index>(id.index), model, at, impl_->group(e).skinned(e.slot)),
+                               impl_->group(e).position(e.slot, at), options);
   const std::uint32_t index = impl_->constraints.add(std::move(made));
   impl_->wake_bodies_of(index);
   return {index, impl_->constraints.entries()[index].generation};
@@ -48,9 +49,10 @@ ManipulationResult World::manipulate(std::span<const BodyWish> wishes, std::span
     throw InvalidArgument("World::manipulate: places are wanted in a world of " +
                           std::to_string(impl_->options.substeps) + " substeps, expected 1; use handles");
   const auto frame = [&](BodyId id, const SurfacePoint& at) -> MaterialFrame {
-    const ModalModel& model = impl_->group(impl_->entry(id, "manipulate")).model();
+    const Impl::Entry& e = impl_->entry(id, "manipulate");
+    const ModalModel& model = impl_->group(e).model();
     validate(model, at);
-    return {static_cast<Index>(id.index), model, at};
+    return {static_cast<Index>(id.index), model, at, impl_->group(e).skinned(e.slot)};
   };
   std::vector<PointWish> wanted;
   for (const BodyWish& wish : wishes) wanted.push_back({frame(wish.body, wish.at), wish.direction, wish.wanted});
@@ -143,8 +145,7 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   impl_->source = source;
   impl_->sleep.wake_all();
   for (std::uint32_t i = 0; i < impl_->entries.size(); ++i) impl_->tell_source(i);
-  if (source == nullptr) return;
-  for (const Impl::Apart& pair : impl_->apart) source->exclude_pair(pair.a, pair.b, true);
+  for (const Impl::Apart& pair : impl_->apart) impl_->tell_apart(pair.a, pair.b, true);
 }
 
 void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) {
@@ -163,21 +164,34 @@ MaterialFrame World::Impl::joint_side(BodyId id, const JointFrame& in_world, con
   const JointFrame in_body{.origin = X_BW * in_world.origin, .axes = to_matrix(X_BW.q) * in_world.axes};
   const auto body = static_cast<Index>(id.index);
   if (model.modes() == 0) return {body, in_body};
-  if (!on.patch.empty()) return {body, model, on.patch, in_body};
-  return {body, model, patch_around(model, on.surface, in_body.origin, on.radius), in_body};
+  const bool skinned = group(e).skinned(e.slot);
+  if (!on.patch.empty()) return {body, model, on.patch, in_body, skinned};
+  return {body, model, patch_around(model, on.surface, in_body.origin, on.radius), in_body, skinned};
+}
+
+/// Whether the source knows a body: it has something to meet others with, and others to meet.
+bool World::Impl::shows(const Entry& e) const {
+  const bool meets = e.filter.self || (e.filter.layers != 0 && e.filter.mask != 0);
+  return meets && (e.shape || group(e).model().data().touchable);
 }
 
 /// Registers one body with the source.
 void World::Impl::tell_source(std::uint32_t index) {
   Entry& e = entries[index];
-  if (source == nullptr || !e.alive) return;
+  if (source == nullptr || !e.alive || !shows(e)) return;
   BodyGeometry geometry;
   if (e.shape)
     geometry.shape = e.shape;
   else
-    geometry.model = group(e).shared_model();
+    geometry.model = group(e).shared_model(), geometry.skin = group(e).skinned(e.slot);
   source->add_body(static_cast<Index>(index), geometry, e.filter);
   e.placed = false;
+  states_of = 0;
+}
+
+void World::Impl::tell_apart(Index a, Index b, bool are_apart) {
+  const auto shown = [&](Index body) { return shows(entries[static_cast<std::size_t>(body)]); };
+  if (source != nullptr && shown(a) && shown(b)) source->exclude_pair(a, b, are_apart);
 }
 
 bool World::Impl::are_apart(Index a, Index b) const {
@@ -185,7 +199,7 @@ bool World::Impl::are_apart(Index a, Index b) const {
 }
 
 void World::Impl::keep_apart(Index a, Index b, std::uint32_t joint) {
-  if (source != nullptr && !are_apart(a, b)) source->exclude_pair(a, b, true);
+  if (!are_apart(a, b)) tell_apart(a, b, true);
   apart.push_back({a, b, joint});
 }
 
@@ -195,7 +209,7 @@ void World::Impl::let_meet(std::uint32_t joint) {
   if (found == apart.end()) return;
   const Apart pair = *found;
   apart.erase(found);
-  if (source != nullptr && !are_apart(pair.a, pair.b)) source->exclude_pair(pair.a, pair.b, false);
+  if (!are_apart(pair.a, pair.b)) tell_apart(pair.a, pair.b, false);
 }
 
 void World::Impl::wake_bodies_of(std::uint32_t constraint) {

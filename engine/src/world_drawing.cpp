@@ -27,6 +27,22 @@ void World::Impl::interpolate(BodyId id, double s, Real* amplitudes) const {
     amplitudes[i] = static_cast<Real>(s == 1.0 ? newest[i] : previous[i] + s * (newest[i] - previous[i]));
 }
 
+/// Between the last two states, of which either may bend more.
+Index World::Impl::modes_to_draw(const Entry& e, double tolerance, double s) const {
+  if (tolerance == 0.0 || group(e).skinned(e.slot)) return group(e).model().modes();  // the bound is of modes alone
+  const SurfaceExtent& extent = group(e).model().render_extent();
+  const Index newest = drawn_modes(extent, group(e).amplitudes(e.slot), tolerance);
+  if (s == 1.0) return newest;
+  return std::max(newest, drawn_modes(extent, group(e).previous_amplitudes(e.slot), tolerance));
+}
+
+/// The handles of a body's skin at amplitudes that are to be drawn; null: it has none.
+const SkinPose* World::Impl::skin_at(BodyId id, const double* z) const {
+  const Entry& e = entries[id.index];
+  SkinMemory* skin = group(e).skin(e.slot);
+  return skin == nullptr ? nullptr : &skin->at({z, static_cast<std::size_t>(group(e).model().modes())});
+}
+
 /// For drawing between this state and the next.
 void World::Impl::keep_dents() {
   if (std::ranges::none_of(dented, [](const auto& surface) { return surface != nullptr; })) return;
@@ -55,14 +71,17 @@ void World::Impl::prepare_drawing(std::span<const DrawTarget> targets, double s)
     const std::size_t numbers = 3 * static_cast<std::size_t>(group(e).model().render().vertices());
     require_count(targets[i].positions.size(), numbers, "reconstruct", "positions");
     if (!targets[i].normals.empty()) require_count(targets[i].normals.size(), numbers, "reconstruct", "normals");
-    drawn.push_back({e.group, i});
+    if (!(targets[i].tolerance >= 0.0))
+      throw InvalidArgument("World::reconstruct: tolerance is " + std::to_string(targets[i].tolerance) +
+                            " m, expected at least 0");
+    drawn.push_back({e.group, modes_to_draw(e, targets[i].tolerance, s), i});
     amplitudes += static_cast<std::size_t>(group(e).model().modes());
     if (is_dented(targets[i].id, s)) dents += numbers;
   }
   if (drawn_amplitudes.size() < amplitudes) drawn_amplitudes.resize(amplitudes);
   if (drawn_dents.size() < dents) drawn_dents.resize(dents);
   std::sort(drawn.begin(), drawn.end(), [](const Drawn& a, const Drawn& b) {
-    return a.group != b.group ? a.group < b.group : a.target < b.target;
+    return std::tie(a.group, a.modes, a.target) < std::tie(b.group, b.modes, b.target);
   });
 }
 
@@ -70,6 +89,7 @@ void World::reconstruct(std::span<const DrawTarget> targets, double interpolatio
   require_fraction(interpolation, "reconstruct");
   require_finite(origin, "reconstruct", "origin");
   Impl& m = *impl_;
+  StageClock clock(m.stage_times);
   m.prepare_drawing(targets, interpolation);
   m.reconstruction.clear();
   double* amplitudes = m.drawn_amplitudes.data();
@@ -82,7 +102,9 @@ void World::reconstruct(std::span<const DrawTarget> targets, double interpolatio
     m.reconstruction.push_back({.X_OB = X_OB,
                                 .amplitudes = amplitudes,
                                 .positions = target.positions.data(),
-                                .normals = target.normals.empty() ? nullptr : target.normals.data()});
+                                .normals = target.normals.empty() ? nullptr : target.normals.data(),
+                                .modes = d.modes,
+                                .skin = m.skin_at(target.id, amplitudes)});
     amplitudes += model(target.id).modes();
     if (!m.is_dented(target.id, interpolation)) continue;
     m.dented[static_cast<std::size_t>(d.group)]->displacements(
@@ -94,9 +116,18 @@ void World::reconstruct(std::span<const DrawTarget> targets, double interpolatio
   const auto& drawn = impl_->drawn;
   for (std::size_t begin = 0, end = 0; begin < drawn.size(); begin = end) {
     while (end < drawn.size() && drawn[end].group == drawn[begin].group) ++end;
-    limber::reconstruct(impl_->groups[static_cast<std::size_t>(drawn[begin].group)]->model().render(),
-                        std::span(impl_->reconstruction).subspan(begin, end - begin), *impl_->jobs);
+    const ModalModel& model = impl_->groups[static_cast<std::size_t>(drawn[begin].group)]->model();
+    const std::span<const ReconstructionTarget> of_model = std::span(m.reconstruction).subspan(begin, end - begin);
+    if (model.data().skin)
+      limber::reconstruct(model.render(), m.skins[static_cast<std::size_t>(drawn[begin].group)]->tiles(), of_model,
+                          *m.jobs);
+    else
+      limber::reconstruct(model.render(), of_model, *m.jobs);
   }
+  if (!clock.runs()) return;
+  std::int64_t vertices = 0;
+  for (const DrawTarget& target : targets) vertices += static_cast<std::int64_t>(target.positions.size() / 3);
+  clock.lap(Stage::kReconstruct, vertices);
 }
 
 void World::reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation,
@@ -130,6 +161,26 @@ void World::interpolated_weights(BodyId id, double interpolation, std::span<floa
   impl_->interpolate(id, interpolation, weights.data());
   for (std::size_t i = 0; i < weights.size(); ++i)
     weights[i] = static_cast<float>(static_cast<double>(weights[i]) / scales[i]);
+}
+
+bool World::has_modal_skin(BodyId id) const {
+  const Impl::Entry& e = impl_->entry(id, "has_modal_skin");
+  return impl_->group(e).skinned(e.slot);
+}
+
+void World::interpolated_handles(BodyId id, double interpolation, std::span<float> numbers) const {
+  const Impl::Entry& e = impl_->entry(id, "interpolated_handles");
+  require_fraction(interpolation, "interpolated_handles");
+  SkinMemory* skin = impl_->group(e).skin(e.slot);
+  if (skin == nullptr)
+    throw InvalidArgument("World::interpolated_handles: body " + std::to_string(id.index) + " has no modal skin");
+  const ModalModel& model = impl_->group(e).model();
+  require_count(numbers.size(), SkinPose::kNumbers * static_cast<std::size_t>(model.data().skin->handles),
+                "interpolated_handles", "numbers");
+  std::vector<double>& z = impl_->drawn_amplitudes;
+  if (z.size() < static_cast<std::size_t>(model.modes())) z.resize(static_cast<std::size_t>(model.modes()));
+  impl_->interpolate(id, interpolation, z.data());
+  std::ranges::copy(impl_->skin_at(id, z.data())->numbers(), numbers.begin());
 }
 
 }  // namespace limber

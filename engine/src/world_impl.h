@@ -2,6 +2,7 @@
 //
 //   world.cpp              bodies, time and loads
 //   world_step.cpp         a step, contacts on the way to the islands
+//   world_reach.cpp        how far contacts are looked for
 //   world_passing.cpp      bodies that come farther than contacts are looked for
 //   world_constraints.cpp  handles, joints, the source of contacts
 //   world_state.cpp        what can be read and set of bodies, and the hash of all of it
@@ -15,6 +16,7 @@
 
 #include "constraint_stage.h"
 #include "dented_surface.h"
+#include "group_skin.h"
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/exact_motion.h"
@@ -49,6 +51,7 @@ struct World::Impl {
     double friction = -1.0;          // negative: that of the contact options
     internal::ShapeExtent extent{};  // of what moves
     bool placed = false;             // of a static one: the source has seen where it stands
+    bool held = false;               // in an island in the last step, or its last part
   };
   /// Two bodies that do not meet as long as some joint between them stands.
   struct Apart {
@@ -72,8 +75,13 @@ struct World::Impl {
   std::vector<std::uint32_t> vacant_entries;
   std::vector<std::unique_ptr<BodyGroup>> groups;                // null where the last body of a model was removed
   std::vector<std::unique_ptr<internal::DentedSurface>> dented;  // by group; null where nothing dents its bodies
-  std::vector<Range> ranges;                                     // covers all slots of all groups
-  internal::ConstraintStage constraints;                         // bodies by their entries' indices
+  std::vector<std::unique_ptr<internal::GroupSkin>> skins;       // by group; null where the model has none
+  std::vector<Range> ranges;                                     // covers the bodies that are awake
+  std::vector<std::pair<Index, Index>> awake_slots;              // scratch of make_ranges(): group and slot
+  std::uint64_t ranges_of = 0, states_of = 0, contacts_of = 0;   // SleepStage::changes(), the last: wakings()
+  int tellings_left = 0;         // of all states, sleepers and statics too: as they come to stand, and as they stay
+  bool contacts_waited = false;  // those of fast bodies were remembered like those of sleepers
+  internal::ConstraintStage constraints;  // bodies by their entries' indices
   internal::SleepStage sleep{constraints};
   std::optional<internal::StepParts> parts{};
   std::vector<Apart> apart, apart_then;  // the second: scratch of restore_state()
@@ -82,8 +90,12 @@ struct World::Impl {
   std::vector<ContactPoint> touching;
   std::function<bool(const ContactPoint&)> contact_acts;
   ContactOptions contact_options;
-  std::vector<BodyState> states;                    // by entries' indices, for the source
-  std::vector<double> friction;                     // the same
+  std::vector<BodyState> states;  // by entries' indices, for the source
+  std::vector<double> friction;   // the same
+  std::vector<BodyState> ends;    // the same, as foreseen
+  std::vector<Index> members;     // of islands, ascending
+  std::vector<ContactPoint> found_at_end;
+  std::vector<double> ways;                         // the same: how far contacts are to be looked for at least, m
   std::vector<std::vector<DentLoad>> loads_before;  // what dented each entry before the last step
   double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
@@ -92,6 +104,8 @@ struct World::Impl {
   ProgramReport programs;
   std::vector<ExactMotion> motions;
   internal::PassingBodies passing;
+  StageTimes* stage_times = nullptr;
+  StageClock clock;  // of the step at hand
   std::size_t alive = 0;
   std::uint64_t steps = 0, steps_before = 0;  // taken; those before the step's length was last set
   double time_before = 0.0;                   // s, of these
@@ -99,6 +113,7 @@ struct World::Impl {
   // Scratch of drawing, kept so that it is not allocated again.
   struct Drawn {
     Index group;
+    Index modes;
     std::size_t target;
   };
   std::vector<Drawn> drawn;
@@ -141,6 +156,8 @@ struct World::Impl {
 
   BodyId place(Entry&& made);
   void tell_source(std::uint32_t index);
+  bool shows(const Entry& e) const;
+  void tell_apart(Index a, Index b, bool are_apart);
   bool are_apart(Index a, Index b) const;
   void keep_apart(Index a, Index b, std::uint32_t joint);
   void let_meet(std::uint32_t joint);
@@ -150,10 +167,23 @@ struct World::Impl {
   std::vector<BodyId> check_structure(StateReader& state) const;
   void restore_motion(StateReader& state);
   void wake_bodies_of(std::uint32_t constraint);
-  void write_states();
+  bool write_states();
+  void write_all_states();
+  bool some_woke();
   void write_state(Index body, double length);
   bool can_wait(Index body) const;
   void find_contacts();
+  void expect_reach(Index body);
+  double foreseen_way(Index body) const;
+  bool find_farther();
+  Vec3 place_at_start(ContactSide& side, const Vec3& inwards) const;
+  bool find_at_end();
+  bool list_ends(double least);
+  void foresee();
+  void ask_source();
+  void advance_free();
+  template <class F>
+  std::int64_t count_awake(F&& counts);
   bool find_passing();
   void list_fast();
   void find_first_touches();
@@ -175,6 +205,8 @@ struct World::Impl {
   bool is_dented(BodyId id, double s) const;
   template <class Real>
   void interpolate(BodyId id, double s, Real* amplitudes) const;
+  Index modes_to_draw(const Entry& e, double tolerance, double s) const;
+  const SkinPose* skin_at(BodyId id, const double* z) const;
   void prepare_drawing(std::span<const DrawTarget> targets, double s);
 };
 

@@ -31,10 +31,10 @@ bool World::Impl::find_passing() {
 
 void World::Impl::list_fast() {
   passing.fast.clear();
-  for (std::size_t i = 0; i < entries.size(); ++i)
-    if (entries[i].alive && entries[i].group >= 0 && !states[i].asleep &&
-        states[i].reach > PassingBodies::kSlow * states[i].look_ahead)
-      passing.fast.push_back(static_cast<Index>(i));
+  for (const Index body : sleep.awake()) {
+    const BodyState& state = states[static_cast<std::size_t>(body)];
+    if (state.reach > PassingBodies::kSlow * state.look_ahead) passing.fast.push_back(body);
+  }
 }
 
 /// Of the fast, while all others stand still.
@@ -183,7 +183,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
     PassingWatch watch(*source, states, found, p);
     step.watch = &watch;
     const double taken = constraints.step_together(members, contacts.constraints(), step);
-    contacts.finish(p.rests);
+    contacts.finish(p.rests, true);
     parts->add_events(part, contacts.events());
     for (const Index member : members) write_state(member, 0.0);
     const Impact* touch = watch.touch();

@@ -130,7 +130,7 @@ std::vector<BodyId> World::Impl::check_structure(StateReader& state) const {
 
 void World::Impl::save_motion(StateWriter& state) const {
   state(static_cast<std::uint64_t>(entries.size()));
-  for (const Entry& e : entries) state(e.generation, e.placed);
+  for (const Entry& e : entries) state(e.generation, e.placed, e.held);
   state(options.step, vacant_entries, steps, steps_before, time_before, accumulator, dropped, options.gravity);
   for (const Entry& e : entries)
     if (e.alive && e.group >= 0) group(e).save_state(e.slot, state);
@@ -148,7 +148,7 @@ void World::Impl::restore_motion(StateReader& state) {
   std::uint64_t count = 0;
   state(count);
   entries.resize(static_cast<std::size_t>(count));
-  for (Entry& e : entries) state(e.generation, e.placed);
+  for (Entry& e : entries) state(e.generation, e.placed, e.held);
   if (const auto step = state.read<double>(); step != options.step) set_length(step);
   state(vacant_entries, steps, steps_before, time_before, accumulator, dropped, options.gravity);
   for (const Entry& e : entries)
@@ -166,8 +166,7 @@ void World::Impl::restore_motion(StateReader& state) {
 void World::Impl::set_apart(std::span<const Apart> pairs) {
   if (std::ranges::equal(apart, pairs)) return;
   const auto tell = [&](bool excluded) {
-    for (const Apart& pair : apart)
-      if (source != nullptr) source->exclude_pair(pair.a, pair.b, excluded);
+    for (const Apart& pair : apart) tell_apart(pair.a, pair.b, excluded);
   };
   tell(false);
   apart.assign(pairs.begin(), pairs.end());

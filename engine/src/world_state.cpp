@@ -142,8 +142,9 @@ Vec3 World::dent(BodyId id, const SurfacePoint& at) const {
   validate(group.model(), at);
   const DentedSurface* dented = impl_->dented[static_cast<std::size_t>(e.group)].get();
   if (dented == nullptr) return Vec3::Zero();
-  return group.frame(e.slot).pose().q *
-         dented->displacement(impl_->contacts.dent_loads(static_cast<Index>(id.index)), at);
+  Vec3 dent = dented->displacement(impl_->contacts.dent_loads(static_cast<Index>(id.index)), at);
+  if (group.skinned(e.slot)) dent = group.shape(e.slot).turn(at) * dent;
+  return group.frame(e.slot).pose().q * dent;
 }
 
 std::uint64_t World::state_hash() const {
@@ -171,12 +172,13 @@ std::uint64_t World::state_hash() const {
     for (int i = 0; e.joint && i < e.joint->coordinates(); ++i)
       hash.add(e.joint->coordinate(i, impl_->constraints.states()));
   }
-  for (const ContactMemory& contact : impl_->contacts.memory()) {
-    hash.add(contact.id);
-    hash.add(contact.force);
-    hash.add(contact.give);
-    hash.add(contact.slip);
-  }
+  for (const std::span<const ContactMemory> known : {impl_->contacts.memory(), impl_->contacts.resting()})
+    for (const ContactMemory& contact : known) {
+      hash.add(contact.id);
+      hash.add(contact.force);
+      hash.add(contact.give);
+      hash.add(contact.slip);
+    }
   for (const RollingMemory& rolling : impl_->contacts.rolling()) hash.add(rolling.moment);
   for (const StrikeMemory& strike : impl_->contacts.strikes()) hash.add(strike.since);
   for (std::size_t body = 0; body < impl_->entries.size(); ++body)

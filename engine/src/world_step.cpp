@@ -10,6 +10,7 @@ void World::step() {
   m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = 0;
   m.attempts = {};
   m.programs = {};
+  m.clock = StageClock(m.stage_times);
   m.keep_dents();
   if (m.source != nullptr) m.parts->begin_events();
   for (int part = 0; part < m.parts->count(); ++part) {
@@ -26,25 +27,92 @@ void World::step() {
   if (m.source != nullptr) m.parts->end_events();
   if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
   ++m.steps;
+  m.clock.lap(Stage::kBookkeeping, 1);
 }
+
+void World::set_stage_times(StageTimes* times) { impl_->stage_times = times; }
 
 void World::Impl::advance_part(int part) {
   for (const auto& group : groups)
     if (group) group->set_within_step(part > 0);
   parts->begin(part);
-  find_contacts();
-  constraints.hold_back(passing.members);
-  constraints.find_islands();
+  clock.lap(Stage::kBookkeeping);
+  foresee();
+  make_ranges();
+  advance_free();
+  constraints.finish(*jobs);
+  for (const Index body : sleep.awake()) entries[static_cast<std::size_t>(body)].held = constraints.constrained(body);
+  if (clock.runs()) clock.lap(constraints.times(), Stage::kSolve);
+  if (source == nullptr) return;
+  const bool woke = some_woke();
+  contacts.finish(passing.any() ? passing.rests : sleep.asleep(), woke);
+  parts->add_events(part, contacts.events());
+  clock.lap(Stage::kBookkeeping);
+  if (!passing.any()) return;
+  const auto waiting = static_cast<std::int64_t>(passing.members.size());
+  advance_passing(part);
+  clock.lap(Stage::kFastBodies, waiting);
+}
+
+/// Bodies that are awake, and are as `counts` asks for.
+template <class F>
+std::int64_t World::Impl::count_awake(F&& counts) {
+  std::int64_t count = 0;
+  for (const Index body : sleep.awake())
+    if (counts(body)) ++count;
+  return count;
+}
+
+/// Bodies that nothing constrains.
+void World::Impl::advance_free() {
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
   jobs->parallel_for(ranges.size(), 1, [this](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r)
       groups[static_cast<std::size_t>(ranges[r].group)]->advance(ranges[r].begin, ranges[r].end, options.gravity);
   });
-  constraints.step(*jobs, {.step = parts->length(), .gravity = options.gravity, .contact = contacts.options().rule});
-  if (source == nullptr) return;
-  contacts.finish(passing.any() ? passing.rests : sleep.asleep());
-  parts->add_events(part, contacts.events());
-  if (passing.any()) advance_passing(part);
+  if (!clock.runs()) return;
+  const std::int64_t constrained = count_awake([&](Index body) { return constraints.constrained(body); }) +
+                                   static_cast<std::int64_t>(passing.members.size());
+  clock.lap(Stage::kAdvance, count_awake([](Index) { return true; }) - constrained);
+}
+
+/// What touches in the states as they are.
+void World::Impl::ask_source() {
+  const bool told_all = write_states();
+  if (clock.runs()) clock.lap(Stage::kLookAhead, count_awake([](Index) { return true; }));
+  StageTimes theirs;
+  source->find_contacts({.states = states,
+                         .awake = told_all ? std::span<const Index>() : sleep.awake(),
+                         .times = clock.runs() ? &theirs : nullptr},
+                        touching, *jobs);
+  clock.lap(theirs, Stage::kNarrowPhase);
+}
+
+/// What touches, what that makes islands of, and where these end. Contacts are looked for anew where bodies come
+/// farther than expected, three times at most: each time at least twice as far.
+void World::Impl::foresee() {
+  constexpr int kMostLooks = 3;
+  ways.assign(entries.size(), 0.0);
+  find_contacts();
+  for (int look = 0;; ++look) {
+    constraints.hold_back(passing.members);
+    constraints.find_islands(sleep.awake());
+    clock.lap(Stage::kRows);
+    constraints.foresee(*jobs, {.step = parts->length(),
+                                .gravity = options.gravity,
+                                .contact = contacts.options().rule,
+                                .timed = clock.runs()});
+    if (clock.runs()) clock.lap(constraints.foreseen_times(), Stage::kSolve);
+    if (source == nullptr || look == kMostLooks) break;
+    if (find_farther())
+      constraints.let_go();
+    else if (find_at_end())
+      constraints.set_contacts(contacts.constraints());
+    else
+      break;
+    ++attempts[StepAttempt::kLookedFarther];
+  }
+  clock.lap(Stage::kLookAhead);
 }
 
 /// What touches, or may within the step, as rows for the islands.
@@ -52,13 +120,10 @@ void World::Impl::find_contacts() {
   if (source == nullptr) return;
   passing.farther.clear();
   do {
-    write_states();
-    source->find_contacts({.states = states}, touching, *jobs);
+    ask_source();
     if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
   } while (wake_what_is_touched() || find_passing());
-  friction.resize(entries.size());
-  for (std::size_t i = 0; i < entries.size(); ++i)
-    friction[i] = entries[i].friction >= 0.0 ? entries[i].friction : contact_options.friction;
+  clock.lap(Stage::kFastBodies);
   if (!passing.any()) {
     set_contacts(touching);
   } else {
@@ -73,7 +138,35 @@ void World::Impl::set_contacts(std::span<const ContactPoint> found) {
 }
 
 /// For the source: where bodies are, and how far they may come within the step.
-void World::Impl::write_states() {
+/// @return whether those of bodies that sleep, too
+bool World::Impl::write_states() {
+  if (states_of != sleep.changes()) tellings_left = 2;
+  states_of = sleep.changes();
+  if (tellings_left > 0) {
+    --tellings_left;
+    write_all_states();
+    return true;
+  }
+  for (const Index body : sleep.awake())
+    if (shows(entries[static_cast<std::size_t>(body)])) {
+      write_state(body, parts->length());
+      expect_reach(body);
+    }
+  return false;
+}
+
+/// Whether a body whose contacts were remembered as those of a sleeper takes part again.
+bool World::Impl::some_woke() {
+  const bool woke = contacts_of != sleep.wakings() || contacts_waited || passing.any();
+  contacts_of = sleep.wakings();
+  contacts_waited = passing.any();
+  return woke;
+}
+
+void World::Impl::write_all_states() {
+  friction.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    friction[i] = entries[i].friction >= 0.0 ? entries[i].friction : contact_options.friction;
   states.resize(entries.size());
   motions.resize(entries.size());
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -83,7 +176,12 @@ void World::Impl::write_states() {
       states[i] = {.pose = e.pose, .asleep = std::exchange(e.placed, true)};
       continue;
     }
+    if (!shows(e)) {
+      states[i] = {};
+      continue;
+    }
     write_state(static_cast<Index>(i), parts->length());
+    expect_reach(static_cast<Index>(i));
   }
 }
 
@@ -102,7 +200,12 @@ void World::Impl::write_state(Index body, double length) {
   states[i].displacement = length * frame.velocity();
   states[i].rotation = length * frame.angular_velocity(bodies.frame_constants());
   const SurfaceExtent& extent = bodies.model().collision_extent();
-  states[i].reach = e.shape ? motions[i].reach(e.extent.radius, {}) : motions[i].reach(extent.radius, extent.shape);
+  if (e.shape)
+    states[i].reach = motions[i].reach(e.extent.radius, {});
+  else if (bodies.skinned(e.slot))
+    states[i].reach = skins[static_cast<std::size_t>(e.group)]->reach(bodies.shape(e.slot), motions[i]);
+  else
+    states[i].reach = motions[i].reach(extent.radius, extent.shape);
   if (!passing.looks_farther(body) && can_wait(body)) states[i].look_ahead = e.extent.thickness;
 }
 

@@ -4,6 +4,6 @@
 
 namespace limber::internal {
 
-inline constexpr int kFloat = 5126, kUint32 = 5125;
+inline constexpr int kFloat = 5126, kUint32 = 5125, kUint8 = 5121;
 
 }  // namespace limber::internal

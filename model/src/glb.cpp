@@ -111,7 +111,15 @@ struct GlbBuilder::Impl {
   std::set<std::string> extensions_used;
   std::vector<Numbers> numbers;           // per accessor
   std::vector<std::size_t> mesh_targets;  // per mesh
-  std::vector<bool> has_parent;           // per node
+  json skins = json::array();
+  struct Influences {
+    int joints, weights;  // accessors
+    std::size_t count;
+    int largest;  // joint
+  };
+  std::vector<Influences> influences;
+  std::vector<int> mesh_joints;  // per mesh, how many it takes
+  std::vector<bool> has_parent;  // per node
 
   int add_view(const void* data, std::size_t size, int target) {
     json view = {{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", size}};
@@ -186,6 +194,13 @@ struct GlbBuilder::Impl {
       if (!numbers[static_cast<std::size_t>(mesh.normal)].unit) refuse(where + ".normal: a normal is not of length 1");
       out["attributes"]["NORMAL"] = mesh.normal;
     }
+    if (mesh.influences >= 0) {
+      if (static_cast<std::size_t>(mesh.influences) >= influences.size()) refuse(where + ".influences do not exist");
+      const Influences& of = influences[static_cast<std::size_t>(mesh.influences)];
+      if (of.count != vertices) refuse(where + ".influences: not one per vertex");
+      out["attributes"]["JOINTS_0"] = of.joints;
+      out["attributes"]["WEIGHTS_0"] = of.weights;
+    }
     if (mesh.material >= 0) {
       check_index(mesh.material, materials, where + ".material");
       out["material"] = mesh.material;
@@ -223,6 +238,37 @@ GlbBuilder& GlbBuilder::operator=(GlbBuilder&&) noexcept = default;
 
 int GlbBuilder::add_vertex_vectors(std::span<const float> xyz) {
   return impl_->add_floats(xyz, 3, Use::kVertexVectors, "VEC3", kVertexBuffer);
+}
+
+int GlbBuilder::add_influences(std::span<const SkinInfluences> influences) {
+  Impl::Influences made{.joints = 0, .weights = 0, .count = influences.size(), .largest = 0};
+  std::vector<std::uint8_t> joints;
+  std::vector<float> weights;
+  for (const SkinInfluences& of : influences)
+    for (std::size_t i = 0; i < SkinInfluences::kMost; ++i) {
+      weights.push_back(of.weight[i]);
+      joints.push_back(of.weight[i] > 0.0f ? of.handle[i] : std::uint8_t{0});
+      made.largest = std::max(made.largest, int{joints.back()});
+    }
+  made.weights = impl_->add_floats(weights, SkinInfluences::kMost, Use::kWeights, "VEC4", kVertexBuffer);
+  const int view = impl_->add_view(joints.data(), joints.size(), kVertexBuffer);
+  impl_->accessors.push_back(
+      {{"bufferView", view}, {"componentType", internal::kUint8}, {"count", influences.size()}, {"type", "VEC4"}});
+  impl_->numbers.push_back({Use::kWeights, influences.size(), 0, false});
+  made.joints = static_cast<int>(impl_->numbers.size()) - 1;
+  impl_->influences.push_back(made);
+  return static_cast<int>(impl_->influences.size()) - 1;
+}
+
+int GlbBuilder::add_skin(std::span<const int> joints) {
+  if (joints.empty()) refuse("skin: there are no joints, expected at least one");
+  json out = {{"joints", json::array()}};
+  for (const int joint : joints) {
+    impl_->check_index(joint, impl_->nodes, "skin: node");
+    out["joints"].push_back(joint);
+  }
+  impl_->skins.push_back(std::move(out));
+  return static_cast<int>(impl_->skins.size()) - 1;
 }
 
 int GlbBuilder::add_triangles(std::span<const Triangle> triangles) {
@@ -307,6 +353,8 @@ int GlbBuilder::add_mesh(const GlbMesh& mesh) {
   }
   impl_->meshes.push_back(std::move(out));
   impl_->mesh_targets.push_back(mesh.targets.size());
+  impl_->mesh_joints.push_back(
+      mesh.influences >= 0 ? impl_->influences[static_cast<std::size_t>(mesh.influences)].largest : -1);
   return static_cast<int>(impl_->meshes.size()) - 1;
 }
 
@@ -317,6 +365,13 @@ int GlbBuilder::add_node(const GlbNode& node) {
   if (node.mesh >= 0) {
     impl_->check_index(node.mesh, impl_->meshes, where + ".mesh");
     out["mesh"] = node.mesh;
+  }
+  if (node.skin >= 0) {
+    impl_->check_index(node.skin, impl_->skins, where + ".skin");
+    const int most = node.mesh >= 0 ? impl_->mesh_joints[static_cast<std::size_t>(node.mesh)] : -1;
+    if (most < 0 || most >= static_cast<int>(impl_->skins[static_cast<std::size_t>(node.skin)]["joints"].size()))
+      refuse(where + ".skin: its mesh has no influences, or hangs on a joint that the skin has not");
+    out["skin"] = node.skin;
   }
   for (const int child : node.children) {
     impl_->check_index(child, impl_->nodes, where + ".children: node");
@@ -394,6 +449,7 @@ json GlbBuilder::Impl::document() const {
   };
   put("nodes", nodes);
   put("meshes", meshes);
+  put("skins", skins);
   put("materials", materials);
   put("animations", animations);
   put("accessors", accessors);

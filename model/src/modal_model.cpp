@@ -306,8 +306,9 @@ ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   (void)to_string(data_.motion);
   Checker(data_).check();
   if (data_.mode_scales.empty()) data_.mode_scales = visible_scales(data_.render);
-  collision_rows_ = VertexRows(collision().basis);
+  if (data_.touchable) collision_rows_ = VertexRows(collision().basis);
   collision_extent_ = extent(collision());
+  if (data_.collision) render_extent_ = extent(data_.render);
 }
 
 double ModalModel::frequency_hz(Index mode) const {

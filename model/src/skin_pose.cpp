@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/exact_math.h"
 #include "skin_kernels.h"
 
@@ -11,12 +12,6 @@ namespace limber {
 namespace {
 
 using Moments = Eigen::Matrix<double, 3, 4>;
-
-Mat3 cross_matrix(const Vec3& w) {
-  Mat3 m;
-  m << 0.0, -w.z(), w.y(), w.z(), 0.0, -w.x(), -w.y(), w.x(), 0.0;
-  return m;
-}
 
 /// exp[w]× − 1, exact to round-off of itself for any |w|.
 Mat3 turn_of(const Vec3& w) {
@@ -47,6 +42,15 @@ Mat3 nearest_rotation(const Mat3& A) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
 }
 
+/// Three rows of k numbers, times k numbers.
+template <class T>
+Vec3 product(const T* rows, std::span<const double> z) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < z.size(); ++i) sum[static_cast<Index>(axis)] += rows[axis * z.size() + i] * z[i];
+  return sum;
+}
+
 /// Three rows of k numbers: out += m in.
 template <class T>
 void add_product(const Mat3& m, const T* in, std::size_t k, double* out) {
@@ -56,15 +60,20 @@ void add_product(const Mat3& m, const T* in, std::size_t k, double* out) {
 
 }  // namespace
 
-SkinPose::SkinPose(const ModalSkin& skin) : skin_(&skin), out_of_frame_(Mat3::Identity()), stretch_(Mat3::Identity()) {
+SkinPose::SkinPose(const ModalSkin& skin) { bind(skin); }
+
+void SkinPose::bind(const ModalSkin& skin) {
+  skin_ = &skin;
+  out_of_frame_ = stretch_ = Mat3::Identity();
+  centre_ = Vec3::Zero();
   const auto n = static_cast<std::size_t>(skin.handles), k = static_cast<std::size_t>(skin.modes);
-  handles_.resize(n);
+  handles_.assign(n, {});
   numbers_.resize(kNumbers * n);
   reach_.resize(n * n, Vec3::Zero());
   moments_ = skin.gauge.rest;
   turn_rates_.resize(3 * n * k);
   shift_rates_.resize(3 * n * k);
-  drift_shapes_.resize(3 * n * k);
+  drift_shapes_.assign(3 * n * k, 0.0);
   for (Index h = 0; h < skin.handles; ++h) {
     double* drift = drift_shapes_.data() + row(h, 0);
     for (Index l = 0; l < skin.handles; ++l) {
@@ -202,6 +211,38 @@ Vec3 SkinPose::add_rows(const SkinInfluences& at, const Vec3& rest, const Vec3& 
     internal::add_row(along[3].data(), skin_->rotation_row(h, 0), k, g.data());
   }
   return turned;
+}
+
+Vec3 SkinPose::velocity(const SkinInfluences& at, const Vec3& rest, const Vec3& linear, const Vec3& linear_rate,
+                        std::span<const double> rates) const {
+  const Vec3 y = undeformed_part(at, rest, linear);
+  Vec3 y_rate = linear_rate, moved = Vec3::Zero();
+  Mat3 turned = Mat3::Identity();
+  for (std::size_t i = 0; i < SkinInfluences::kMost; ++i) {
+    const auto weight = static_cast<double>(at.weight[i]);
+    if (weight == 0.0) continue;
+    const Index h = at.handle[i];
+    const Handle& handle = handles_[static_cast<std::size_t>(h)];
+    const Vec3 angle_rate = product(skin_->rotation_row(h, 0), rates);
+    y_rate -= weight * (product(drift_shapes_.data() + row(h, 0), rates) + angle_rate.cross(rest));
+    turned += weight * handle.turn;
+    moved += weight * (product(shift_rates_.data() + row(h, 0), rates) +
+                       product(turn_rates_.data() + row(h, 0), rates).cross(y + handle.turn * y));
+  }
+  return turned * y_rate + moved;
+}
+
+SkinPose::Rate SkinPose::rate(Index handle, Index mode) const {
+  const auto number = [&](const std::vector<double>& rows, int axis) {
+    return rows[row(handle, axis) + static_cast<std::size_t>(mode)];
+  };
+  return {{number(turn_rates_, 0), number(turn_rates_, 1), number(turn_rates_, 2)},
+          {number(shift_rates_, 0), number(shift_rates_, 1), number(shift_rates_, 2)}};
+}
+
+double SkinPose::frame_stiffness() const {
+  const Mat3 symmetric = 0.5 * (stretch_ + stretch_.transpose());
+  return (symmetric.trace() * Mat3::Identity() - symmetric).selfadjointView<Eigen::Lower>().eigenvalues()[0];
 }
 
 // Derivative --------------------------------------------------------------------------------------------------------

@@ -175,6 +175,15 @@ bool BlockFactor::factor() {
   return true;
 }
 
+double BlockFactor::work() const {
+  double sum = 0.0;
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const double width = static_cast<double>(columns_[c].width), length = static_cast<double>(columns_[c].stride);
+    sum += 0.5 * width * length * length;
+  }
+  return sum;
+}
+
 void BlockFactor::times_inverse_pivot(const Column& column, const double* x, double* out) const {
   const double* inverse = upper_.data() + column.offset;
   for (std::size_t i = 0; i < column.width; ++i) {
@@ -196,15 +205,18 @@ void BlockFactor::reduce(double* x) {
   }
 }
 
-void BlockFactor::expand(double* x) {
+void BlockFactor::expand(double* x, std::size_t count) {
   double *y = row_.need(2 * padded(widest_)), *part = y + padded(widest_);
   for (std::size_t c = eliminated_; c-- > 0;) {
     const Column& column = columns_[c];
-    double* own = x + first_[column.node];
-    std::fill_n(y, column.width, 0.0);
-    spread_blocks(y, blocks_.data() + column.first_entry, column.entries, upper_.data(), x);
-    times_inverse_pivot(column, y, part);
-    for (std::size_t q = 0; q < column.width; ++q) own[q] -= part[q];
+    for (std::size_t k = 0; k < count; ++k) {
+      double* all = x + k * size_;
+      double* own = all + first_[column.node];
+      std::fill_n(y, column.width, 0.0);
+      spread_blocks(y, blocks_.data() + column.first_entry, column.entries, upper_.data(), all);
+      times_inverse_pivot(column, y, part);
+      for (std::size_t q = 0; q < column.width; ++q) own[q] -= part[q];
+    }
   }
 }
 

@@ -32,6 +32,8 @@ std::size_t ConvexContactSolver::add_side(std::size_t node) {
 }
 
 void ConvexContactSolver::end_structure() {
+  // The order of elimination tells in the last bits: it comes from this problem and from none before it.
+  factor_widths_.clear(), factor_pairs_.clear();
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
   for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }

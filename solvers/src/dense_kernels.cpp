@@ -311,23 +311,36 @@ HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count,
     for (std::size_t j = 0; j < b->width; j += kLanes) {
       Vector sum = hn::Load(d, x + b->column + j);
       for (std::size_t r = 0; r < b->rows; ++r)
-        sum = hn::MulAdd(hn::Set(d, y[b->row + r]), hn::Load(d, G + b->values + r * b->stride + j), sum);
+        sum = hn::MulAdd(hn::Set(d, y[r]), hn::Load(d, G + b->values + r * b->stride + j), sum);
       hn::Store(sum, d, x + b->column + j);
     }
 }
 
-HWY_ATTR void SpreadBlocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+// Rows [r, r + kRows) of spread_blocks(): their sums stay in registers over all blocks.
+template <std::size_t kRows>
+HWY_INLINE HWY_ATTR void SpreadRows(double* y, const RowBlock* blocks, std::size_t count, const double* G,
+                                    const double* x, std::size_t r) {
   const Doubles d;
-  for (const RowBlock* b = blocks; b != blocks + count; ++b)
-    for (std::size_t r = 0; r < b->rows; ++r) {
-      const double *row = G + b->values + r * b->stride, *from = x + b->column;
-      Vector sum[kVectors];
-      for (std::size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
-      for (std::size_t j = 0; j < b->width; j += kPad)
-        for (std::size_t v = 0; v < kVectors; ++v)
-          sum[v] = hn::MulAdd(hn::Load(d, from + j + v * kLanes), hn::Load(d, row + j + v * kLanes), sum[v]);
-      y[b->row + r] += SumOfBlock(sum);
-    }
+  Vector sum[kRows][kVectors];
+  for (std::size_t k = 0; k < kRows; ++k)
+    for (std::size_t v = 0; v < kVectors; ++v) sum[k][v] = hn::Zero(d);
+  for (const RowBlock* b = blocks; b != blocks + count; ++b) {
+    const double* row = G + b->values + r * b->stride;
+    for (std::size_t j = 0; j < b->width; j += kPad)
+      for (std::size_t v = 0; v < kVectors; ++v) {
+        const Vector from = hn::Load(d, x + b->column + j + v * kLanes);
+        for (std::size_t k = 0; k < kRows; ++k)
+          sum[k][v] = hn::MulAdd(from, hn::Load(d, row + k * b->stride + j + v * kLanes), sum[k][v]);
+      }
+  }
+  for (std::size_t k = 0; k < kRows; ++k) y[r + k] += SumOfBlock(sum[k]);
+}
+
+HWY_ATTR void SpreadBlocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {
+  const std::size_t rows = count == 0 ? 0 : blocks->rows;
+  std::size_t r = 0;
+  for (; r + kRunRows <= rows; r += kRunRows) SpreadRows<kRunRows>(y, blocks, count, G, x, r);
+  for (; r < rows; ++r) SpreadRows<1>(y, blocks, count, G, x, r);
 }
 
 }  // namespace limber::internal::HWY_NAMESPACE

@@ -53,10 +53,10 @@ void multiply_block(MatrixView out, MatrixView A, MatrixView X, std::size_t n, s
 void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t rows, std::size_t n, const RowRun* runs,
                    std::size_t count);
 
-/// x += Gᵀ y, block after block.
+/// x += Gᵀ y, block after block; all blocks are of the same rows.
 void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y);
 
-/// y += G x, block after block.
+/// y += G x over blocks of the same rows.
 void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x);
 
 /// (x, y) ← (c x + s y, c y − s x)

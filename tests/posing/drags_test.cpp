@@ -34,6 +34,15 @@ struct Dragged {
     handle = session.add_handle(last, grip);
   }
 
+  /// Nothing stays but by what the test adds.
+  explicit Dragged(JointedModel model)
+      : session(std::move(model)),
+        size(size_of(session.model())),
+        last(static_cast<Index>(session.model().parts.size()) - 1) {
+    grip = furthest_point(session.model(), last, furthest_point(session.model(), 0, Vec3(10, 0, 0)));
+    handle = session.add_handle(last, grip);
+  }
+
   PoseResult drag_to(const Vec3& target) {
     session.move_handle(handle, target);
     return session.solve();
@@ -186,6 +195,71 @@ TEST(Drags, ASoftBodyPulledOutOfReachSettles) {
       }
       EXPECT_LT(first.energy - energy, 2e-5 * energy) << cell << " " << far;
     }
+}
+
+JointSpec ball_at(const Vec3& origin, double cone) {
+  JointSpec out;
+  out.type = JointType::kBall;
+  out.frame.origin = origin;
+  out.limits.cone = cone;
+  return out;
+}
+
+/// [X09]'s snake: beads that touch nothing, joined by balls that the user has placed.
+JointedModel snake() {
+  JointedModel model = rigid_assembly("snake");
+  const auto middle = [&](std::size_t part) {
+    Eigen::AlignedBox3d box;
+    for (const Index t : model.parts[part].triangles)
+      for (const Index v : model.surface.triangles[static_cast<std::size_t>(t)])
+        box.extend(model.surface.vertices[static_cast<std::size_t>(v)]);
+    return Vec3(box.center());
+  };
+  model.joints.clear();
+  for (std::size_t i = 0; i + 1 < model.parts.size(); ++i) {
+    const JointSpec joint = ball_at(0.5 * (middle(i) + middle(i + 1)), 0.6);
+    model.joints.push_back({static_cast<Index>(i), static_cast<Index>(i + 1), joint, {}});
+  }
+  return model;
+}
+
+/// A bar cut in two by a joint, its parts one piece of material.
+JointedModel bar_with_a_virtual_joint() {
+  JointedModel model = single_part(bar_surface(1.0, 0.16, 24));
+  model.parts = {{"lower", {}}, {"upper", {}}};
+  for (std::size_t t = 0; t < model.surface.triangles.size(); ++t) {
+    double x = 0.0;
+    for (const Index v : model.surface.triangles[t]) x += model.surface.vertices[static_cast<std::size_t>(v)].x() / 3.0;
+    model.parts[x < 0.5 ? 0 : 1].triangles.push_back(static_cast<Index>(t));
+  }
+  model.joints.push_back({0, 1, ball_at(Vec3(0.5, 0, 0), 0.8), {}});
+  return model;
+}
+
+/// Once round in small steps, out of reach and in again, then ten sizes away at once, and back.
+void expect_whole_on_a_long_drag(Dragged& d) {
+  for (int i = 0; i <= 60; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 60.0, far = 0.6 * (1.0 - std::cos(angle));
+    expect_whole(d, d.drag_to(d.grip + far * d.size * Vec3(-0.4, std::cos(2.0 * angle), std::sin(2.0 * angle))));
+  }
+  expect_whole(d, d.drag_to(d.grip + 10.0 * d.size * Vec3(-0.5, 0.8, 0.3)));
+  const PoseResult back = d.drag_to(d.grip);
+  expect_whole(d, back);
+  EXPECT_LT(back.handle_error, 1e-6 * d.size) << "back where it was";
+}
+
+TEST(Drags, ASnakeHoldsTogetherHoweverLongItIsDragged) {
+  Dragged d(snake());
+  d.session.set_pinned(0, true);
+  expect_whole_on_a_long_drag(d);
+}
+
+TEST(Drags, ASoftBodyWithAVirtualJointDoesToo) {
+  Dragged d(bar_with_a_virtual_joint());
+  for (const Index p : {0, 1}) d.session.set_part(p, {.cells = Subdivision::kUniform, .cell_size = 0.055});
+  for (const Vec3& way : {Vec3(-9, 1, 1), Vec3(-9, -1, 1), Vec3(-9, 1, -1), Vec3(-9, -1, -1)})
+    d.session.add_handle(0, furthest_point(d.session.model(), 0, -way));
+  expect_whole_on_a_long_drag(d);
 }
 
 TEST(Drags, WhatAPinnedPartSeparatesFromTheHandlesStays) {

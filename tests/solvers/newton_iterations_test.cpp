@@ -1,12 +1,10 @@
-// What Newton's method with one Jacobian is made faster and safer by, and the form that finds its Jacobians by
-// differences, against answers in closed form.
+// What Newton's method with one Jacobian is made faster and safer by, against answers in closed form.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "limber/solvers/difference_newton.h"
 #include "limber/solvers/secant_iteration.h"
 
 namespace limber::internal {
@@ -52,26 +50,6 @@ TEST(SecantIteration, KeepsTheBestOfWhatItHasSeen) {
     }
   }
   EXPECT_EQ(secants.best(), 0.5);
-}
-
-/// w_i(f) = c_i (f_i³ + f_i) − b_i: at its bound or where w is zero.
-TEST(DifferenceNewton, MeetsEachRowsInterval) {
-  constexpr std::size_t n = 4;
-  const std::vector<double> b{10.0, -10.0, 0.3, 1e3}, lower{-1e9, 0.0, 0.0, -1e9}, upper{1e9, 1e9, 1e9, 5.0};
-  const std::vector<double> slope(n, 4.0), tolerance(n, 1e-10);
-  std::vector<double> f(n, 0.0);
-  DifferenceNewton newton;
-  const double left = newton.solve(
-      {.slope = slope, .tolerance = tolerance, .lower = lower, .upper = upper},
-      [&](std::span<const double> at, std::span<double> w) {
-        for (std::size_t i = 0; i < n; ++i) w[i] = at[i] * at[i] * at[i] + at[i] - b[i];
-      },
-      f);
-  EXPECT_LE(left, 1.0);
-  EXPECT_NEAR(f[0], 2.0, 1e-9);                       // 8 + 2 = 10
-  EXPECT_EQ(f[1], 0.0);                               // w = 10 there
-  EXPECT_NEAR(f[2] * f[2] * f[2] + f[2], 0.3, 1e-9);  // within its bounds
-  EXPECT_EQ(f[3], 5.0);                               // w = 130 − 1000 there
 }
 
 }  // namespace

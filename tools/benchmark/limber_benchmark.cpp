@@ -4,11 +4,8 @@
 #include <functional>
 #include <vector>
 
+#include "benchmarks.h"
 #include "program.h"
-#include "step.h"
-#if LIMBER_HAS_PRECOMPUTE
-#include "stability.h"
-#endif
 
 int main(int argc, char** argv) {
   using namespace limber::tools;
@@ -17,6 +14,7 @@ int main(int argc, char** argv) {
   std::vector<std::function<void(Program&)>> benchmarks{add_step(program.options())};
 #if LIMBER_HAS_PRECOMPUTE
   benchmarks.push_back(add_stability(program.options()));
+  benchmarks.push_back(add_error(program.options()));
 #endif
   return program.run(argc, argv, [&] {
     for (const auto& run_if_asked_for : benchmarks) run_if_asked_for(program);

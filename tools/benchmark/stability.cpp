@@ -1,4 +1,4 @@
-#include "stability.h"
+#include "benchmarks.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@ using limber::testing::StabilityResult;
 using Json = nlohmann::ordered_json;
 
 struct StabilityArguments {
-  std::string grid = "extremes", csv, plot;
+  std::string grid = "extremes", scene, csv, plot;
   int random = 360, steps = 120, every = 1;
   bool simplify = false;
 };
@@ -140,7 +140,7 @@ std::string svg_of(const std::vector<CaseRow>& rows) {
       "'step, s'\n"
       "set title 'share of cases at fault, %; at fault / all'\nset cbrange [0:100]\n"
       "set palette defined (0 '#f7fbff', 10 '#fdd0a2', 100 '#a50f15')\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\n"
-      "plot 'data.csv' using 1:2:3 with image notitle, '' using 1:2:4 with labels font ',10' notitle",
+      "plot 'data.csv' using 1:2:3 with image pixels notitle, '' using 1:2:4 with labels font ',10' notitle",
       labels_x, labels_y, static_cast<double>(moduli.size()) - 0.5, static_cast<double>(steps.size()) - 0.5);
   return svg_by_gnuplot({820, 520}, data, commands);
 }
@@ -151,6 +151,7 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   std::vector<CaseRow> rows;
   std::map<std::string, SceneTally> tallies;
   for (std::size_t i = 0; i < grid.size(); i += static_cast<std::size_t>(a.every)) {
+    if (!a.scene.empty() && a.scene != testing::name(grid[i].scene)) continue;
     program.progress().stage(testing::text(grid[i]));
     rows.push_back(try_case(grid[i], a.steps));
     tallies[testing::name(grid[i].scene)].add(rows.back());
@@ -193,6 +194,9 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("NAME")
       ->check(CLI::IsMember({"extremes", "energy"}))
       ->capture_default_str();
+  app.add_option("--scene", a.scene, "this scene alone: flight, ground, pile, handle or chain")
+      ->type_name("NAME")
+      ->check(CLI::IsMember({"flight", "ground", "pile", "handle", "chain"}));
   app.add_option("--random", a.random, "random cases of each scene, for --grid extremes")
       ->type_name("N")
       ->check(CLI::Range(0, 1'000'000))

@@ -1,4 +1,4 @@
-#include "step.h"
+#include "benchmarks.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -88,6 +88,29 @@ BakeResult bake_part(Program& program, const Component& part, const AssemblyOpti
   }
 }
 
+std::vector<std::string> grounded(const JointsFile& joints, const AssemblyOptions& options) {
+  if (options.free) return {};
+  return options.ground.empty() ? std::vector{joints.components.front().name} : options.ground;
+}
+
+/// Components that no chain of joints ties to one that stands still.
+std::vector<std::string> fallers(const JointsFile& joints, const std::vector<std::string>& ground) {
+  std::vector<bool> stands;
+  for (const auto& part : joints.components) stands.push_back(std::ranges::find(ground, part.name) != ground.end());
+  for (bool more = true; more;) {
+    more = false;
+    for (const JointRecord& joint : joints.joints) {
+      const auto a = static_cast<std::size_t>(joint.a), b = static_cast<std::size_t>(joint.b);
+      if (stands[a] == stands[b]) continue;
+      stands[a] = stands[b] = more = true;
+    }
+  }
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < stands.size(); ++i)
+    if (!stands[i]) names.push_back(joints.components[i].name);
+  return names;
+}
+
 void scale_all(Json& numbers, double factor) {
   if (numbers.is_number()) numbers = factor * numbers.get<double>();
   if (numbers.is_array())
@@ -111,7 +134,7 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
                                                     : take(program, surface, options.components, options.joints_file);
   for (const std::string& name : options.rigid)
     if (name != "*") component_named(joined.assembly, name);
-  if (!options.ground.empty()) component_named(joined.assembly, options.ground);
+  for (const std::string& name : options.ground) component_named(joined.assembly, name);
   BakedAssembly baked{.asset = {}, .bodies = {}, .joints = joined.joints, .patch_radii = {}};
   baked.joints.components.clear();  // in the assembly's order
   for (const Component& part : joined.assembly.components)
@@ -128,21 +151,25 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
     baked.patch_radii.push_back(options.scale *
                                 (known > 0.0 ? known : kPatch * std::min(diagonal(joint.a), diagonal(joint.b))));
   }
+  if (!options.free)
+    for (const std::string& name : fallers(baked.joints, grounded(baked.joints, options)))
+      program.warnings().push_back("component \"" + name +
+                                   "\" hangs on nothing that stands still and falls; --ground holds more of them");
   return baked;
 }
 
 std::string assembly_scene(const BakedAssembly& baked, const AssemblyOptions& options, const std::string& asset) {
   Json scene = {{"step", 1.0 / 60.0}, {"duration", 60}, {"assets", {{"machine", asset}}}};
   scene["joints"] = Json::array();
-  const std::string ground = options.ground.empty() ? baked.joints.components.front().name : options.ground;
+  const std::vector<std::string> ground = grounded(baked.joints, options);
   for (const auto& body : baked.asset.bodies) {
     const Vec3& p = body->data().origin_in_input;
     const Json place = {p.x(), p.y(), p.z()};
     scene["bodies"].push_back(
         {{"name", body->name()}, {"asset", "machine"}, {"part", body->name()}, {"position", place}});
-    if (options.free || body->name() != ground) continue;
+    if (std::ranges::find(ground, body->name()) == ground.end()) continue;
     // By all of its surface.
-    scene["joints"].push_back({{"b", ground},
+    scene["joints"].push_back({{"b", body->name()},
                                {"type", "fixed"},
                                {"origin", place},
                                {"axis", nullptr},

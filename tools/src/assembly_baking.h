@@ -14,11 +14,11 @@ namespace limber::tools {
 
 struct AssemblyOptions {
   ComponentRule components = ComponentRule::kConnectivity;
-  std::string joints_file{};         ///< empty: the joints are detected
-  std::vector<std::string> rigid{};  ///< components without modes; "*": all
-  std::string ground{};              ///< component that stands still; empty: the first
-  bool free = false;                 ///< none stands still
-  double scale = 1.0;                ///< metres per unit of the file
+  std::string joints_file{};          ///< empty: the joints are detected
+  std::vector<std::string> rigid{};   ///< components without modes; "*": all
+  std::vector<std::string> ground{};  ///< components that stand still; none: the first
+  bool free = false;                  ///< none stands still
+  double scale = 1.0;                 ///< metres per unit of the file
   TetrahedralisationOptions tets{};
 };
 

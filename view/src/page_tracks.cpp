@@ -32,6 +32,7 @@ void record_key(const World& world, std::span<const PageBody> bodies,
     tracks.emplace_back();
     tracks.back().name = bodies[i].name;
     tracks.back().model = kinds[static_cast<std::size_t>(bodies[i].model)];
+    tracks.back().modal_skin = world.has_modal_skin(bodies[i].id);
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const BodyView view = world.body(bodies[i].id);

@@ -95,6 +95,7 @@ void PageWorld::Impl::start() {
     model = kinds[static_cast<std::size_t>(found->second)];
     kind_of_body.push_back(found->second);
   }
+  for (SceneBody& body : scene.bodies) body.placement.modal_skin = false;  // as the page draws them
   player.emplace(scene, models, kForever);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
@@ -277,7 +278,7 @@ void PageWorld::drop(int model, const Vec3& position) {
 void PageWorld::Impl::add_dropped(std::size_t count) {
   for (std::size_t there = dropped(); there < count; ++there) {
     const int kind = drops[there];
-    bodies.push_back({world().add_body(kinds[static_cast<std::size_t>(kind)]), kind,
+    bodies.push_back({world().add_body(kinds[static_cast<std::size_t>(kind)], {.modal_skin = false}), kind,
                       "dropped[" + std::to_string(there) + "]", true});
   }
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "limber/core/cross_matrix.h"
 #include "tuning.h"
 
 namespace limber::internal {
@@ -51,12 +52,6 @@ MotionSpace::Spectrum symmetric_spectrum(const SmallMatrix& A) {
 }
 
 }  // namespace
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 out;
-  out << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return out;
-}
 
 Motion rotation_about(const Vec3& axis, const Vec3& through) {
   Motion out;

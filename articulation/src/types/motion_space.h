@@ -67,6 +67,5 @@ class MotionSpace {
 
 Motion rotation_about(const Vec3& axis, const Vec3& through);
 Motion translation_along(const Vec3& direction);
-Mat3 cross_matrix(const Vec3& v);
 
 }  // namespace limber::internal

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
 #include "number_text.h"
 #include "tuning.h"
@@ -18,7 +19,6 @@
 namespace limber {
 namespace {
 
-using internal::cross_matrix;
 using internal::Motion;
 using internal::Motions;
 using internal::MotionSpace;

@@ -216,7 +216,7 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
                           ", expected a free index of at least 0");
   FoundBody fresh{.present = true};
   if (geometry.model) {
-    fresh.modal = m.geometries.get(geometry.model);
+    fresh.modal = m.geometries.get(geometry.model, geometry.skin);
     fresh.diagonal = 2.0 * fresh.modal->surface->rest_bounds().half_extents().norm();
   } else {
     fresh.rigid = m.geometries.get(geometry.shape);
@@ -262,12 +262,16 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   m.states = query.states;
   m.motions = {};
   m.some = query.bodies;
+  m.awake = query.awake;
   m.margin = query.margin;
   m.origin = query.origin;
+  StageClock clock(query.times);
   m.find_near_pairs(jobs);
   m.merge_self_pairs();
+  clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
   m.find_in_pairs(jobs);
   m.gather(contacts);
+  clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
 }
 
 void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) {
@@ -277,6 +281,7 @@ void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& 
   m.states = query.states;
   m.motions = query.motions;
   m.some = query.bodies;
+  m.awake = {};
   m.step = query.step;
   m.margin = query.margin;
   m.find_near_pairs(jobs);

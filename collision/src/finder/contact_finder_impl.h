@@ -28,6 +28,7 @@ struct ContactFinder::Impl {
   std::span<const BodyState> states;
   std::span<const ExactMotion* const> motions;  ///< none where contacts are asked for
   std::span<const Index> some;                  ///< the bodies that are asked for; none: all
+  std::span<const Index> awake;                 ///< ContactQuery::awake
   double farthest_beyond = 0.0;                 ///< by how much a reach exceeds that of features
   double step = 0.0, margin = 0.0;
   Vec3 origin = Vec3::Zero();

@@ -39,7 +39,7 @@ struct Worker {
   SurfacePool pool;
   DeformedSurface root;  ///< for boxes of whole bodies
   TimeOfImpact time_of_impact;
-  std::vector<double> amplitudes;
+  std::vector<double> amplitudes, shape;
 };
 
 /// Lends workers to threads.

@@ -11,8 +11,8 @@
 namespace limber::internal {
 
 struct ModalGeometry {
-  explicit ModalGeometry(const std::shared_ptr<const ModalModel>& model)
-      : surface(std::make_shared<const CollisionSurface>(model)) {
+  ModalGeometry(const std::shared_ptr<const ModalModel>& model, bool skin)
+      : surface(std::make_shared<const CollisionSurface>(model, CollisionSurfaceOptions{.skin = skin})) {
     if (model->data().volume_block) volume.emplace(model);
   }
   std::shared_ptr<const CollisionSurface> surface;
@@ -22,8 +22,9 @@ struct ModalGeometry {
 /// Lives as long as a body has it.
 class GeometryCache {
  public:
-  std::shared_ptr<const ModalGeometry> get(const std::shared_ptr<const ModalModel>& model) {
-    return find(modal_, model.get(), [&] { return std::make_shared<const ModalGeometry>(model); });
+  std::shared_ptr<const ModalGeometry> get(const std::shared_ptr<const ModalModel>& model, bool skin) {
+    return find(skin ? skinned_ : modal_, model.get(),
+                [&] { return std::make_shared<const ModalGeometry>(model, skin); });
   }
   /// The entry keeps the shape alive, so that its address is not another's.
   std::shared_ptr<const RigidGeometry> get(const std::shared_ptr<const Shape>& shape) {
@@ -50,7 +51,7 @@ class GeometryCache {
     return value;
   }
 
-  std::unordered_map<const ModalModel*, std::weak_ptr<const ModalGeometry>> modal_;
+  std::unordered_map<const ModalModel*, std::weak_ptr<const ModalGeometry>> modal_, skinned_;
   std::unordered_map<const Shape*, std::weak_ptr<const RigidGeometry>> rigid_;
 };
 

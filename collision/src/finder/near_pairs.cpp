@@ -55,9 +55,10 @@ bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
 /// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
 void ContactFinder::Impl::check_and_list() {
   to_place.clear();
-  for (std::size_t i = 0; some.empty() && i < bodies.size(); ++i)
+  const std::span<const Index> known = some.empty() ? awake : some;
+  for (std::size_t i = 0; known.empty() && i < bodies.size(); ++i)
     if (bodies[i].present) check_place(static_cast<Index>(i));
-  for (const Index index : some)
+  for (const Index index : known)
     if (contains(index)) check_place(index);
 }
 
@@ -116,7 +117,12 @@ Aabb ContactFinder::Impl::swept_box(Index index, Worker& worker) const {
   worker.amplitudes.resize(static_cast<std::size_t>(body.modes()));
   motion(index)->at(0.0, pose, worker.amplitudes);
   bind_state(worker.root, index, body, worker.amplitudes);
-  return swept(worker.root.bounds(0), body.modal->surface->model()->collision_extent().shape, *motion(index));
+  if (!body.modal->surface->skin())
+    return swept(worker.root.bounds(0), body.modal->surface->model()->collision_extent().shape, *motion(index));
+  worker.shape.resize(worker.amplitudes.size());
+  motion(index)->changes(worker.amplitudes);
+  worker.root.skin_extent(worker.amplitudes, worker.shape);
+  return swept(worker.root.bounds(0), worker.shape, *motion(index));
 }
 
 void ContactFinder::Impl::place() {

@@ -88,7 +88,8 @@ class Side {
     double arm = radius_, bent_rate = 0.0, bent = 0.0, whole = 0.0;
     flexing_speed_ = 0.0;
     rates_.assign(state_.rates.size(), 0.0);
-    for (std::size_t i = 0; i < bounds_.modes.size(); ++i) {
+    if (surface_ && surface_->skin()) arm = bend(whole);
+    for (std::size_t i = 0; i < bounds_.modes.size() && !(surface_ && surface_->skin()); ++i) {
       const ModeBound& mode = bounds_.modes[i];
       const double shape = surface_->largest_shape(static_cast<Index>(i));
       arm += shape * mode.size;
@@ -174,6 +175,15 @@ class Side {
   }
 
  private:
+  /// What a surface with a skin can do in the time looked ahead, as a whole. @return how far its vertices can be
+  double bend(double& whole) {
+    change_.resize(bounds_.modes.size()), shape_rates_.resize(bounds_.modes.size());
+    for (std::size_t i = 0; i < change_.size(); ++i) change_[i] = motion_ ? bounds_.modes[i].change : 0.0;
+    const double far = shape_.skin_extent(change_, shape_rates_);
+    for (std::size_t i = 0; i < change_.size(); ++i) whole += shape_rates_[i] * change_[i];
+    return far + whole;
+  }
+
   double surface_radius() const {
     const auto& model = surface_->model();
     return model ? model->collision_extent().radius : farthest(surface_->rest_bounds());
@@ -206,6 +216,7 @@ class Side {
   DeformedSurface shape_;
   DeformedSurface flow_;  // the surface after a second of the rates as they are now: its vertices tell their velocities
   std::vector<double> rates_;
+  std::vector<double> change_, shape_rates_;  // with a skin
   bool bound_ = false;
 
   Mat3 rotation_ = Mat3::Identity();

@@ -47,13 +47,22 @@ std::pair<std::vector<Index>, std::vector<Index>> lists(std::vector<std::pair<In
 CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, const CollisionSurfaceOptions& options)
     : model_(std::move(model)) {
   if (!model_) throw InvalidArgument("CollisionSurface: the model is null, expected one");
+  if (!model_->data().touchable)
+    throw InvalidArgument("CollisionSurface: \"" + model_->name() + "\" is not touchable, expected a model that is");
   modes_ = model_->modes();
   const ModalSurface& surface = model_->collision();
   for (const Vec3f& r : surface.rest) rest_.push_back(r.cast<double>());
+  if (options.skin && !model_->data().skin)
+    throw InvalidArgument("CollisionSurface: model \"" + model_->name() + "\" has no modal skin, expected one");
+  skinned_ = options.skin && modes_ > 0;
+  if (skinned_) find_undeformed_rows();
   for (Index m = 0; m < modes_; ++m) {
     double largest = 0.0;
-    for (Index v = 0; v < surface.vertices(); ++v)
-      largest = std::max(largest, surface.basis.shape(v, m).cast<double>().norm());
+    for (Index v = 0; v < surface.vertices(); ++v) {
+      const auto u = [&](int axis) { return static_cast<double>(bounded_row(v, axis)[m]); };
+      largest =
+          std::max(largest, skinned_ ? Vec3(u(0), u(1), u(2)).norm() : surface.basis.shape(v, m).cast<double>().norm());
+    }
     largest_shape_.push_back(largest * (1.0 + 1e-15));
     scale_.push_back(largest > 0.0 ? std::exp2(std::ceil(std::log2(largest))) : 1.0);
   }
@@ -65,6 +74,29 @@ CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, cons
     }
   for (const double lambda : model_->data().eigenvalues) weights_.push_back(lambda > 0.0 ? lambda : positive);
   build(surface.triangles, options);
+}
+
+/// Ũ of every vertex, from what the skin makes of unit amplitudes; and what else it takes to bend by it.
+void CollisionSurface::find_undeformed_rows() {
+  const ModalSurface& surface = model_->collision();
+  const auto k = static_cast<std::size_t>(modes_);
+  undeformed_.resize(3 * k * rest_.size());
+  extent_.emplace(*model_);
+  tiles_ = SkinTiles(skin_influences(*model_, SurfacePoint::Surface::kCollision));
+  SkinPose pose(extent_->bare());
+  std::vector<double> unit(k, 0.0);
+  for (std::size_t m = 0; m < k; ++m) {
+    unit[m] = 1.0;
+    pose.set(unit);
+    for (std::size_t v = 0; v < rest_.size(); ++v) {
+      const auto at = static_cast<Index>(v);
+      const Vec3 u = surface.basis.shape(at, static_cast<Index>(m)).cast<double>();
+      const Vec3 own = pose.undeformed_part(influences(at), rest_[v], u) - rest_[v];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        undeformed_[(3 * v + axis) * k + m] = static_cast<float>(own[static_cast<Index>(axis)]);
+    }
+    unit[m] = 0.0;
+  }
 }
 
 CollisionSurface::CollisionSurface(const TriangleMesh& mesh, const CollisionSurfaceOptions& options)

@@ -1,6 +1,7 @@
 // What a DeformedSurface keeps, for the files that walk its tree box by box.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "hierarchy/bounds_kernels.h"
@@ -26,6 +27,11 @@ struct DeformedSurface::Scratch {
   AlignedArray<float> amplitudes, magnitudes;
   float norm = 0.0f;
   double farthest = 0.0;
+  // With a skin.
+  std::optional<SkinPose> pose{}, bare{};
+  double flexed = 0.0;   ///< no |Ũ z| is larger, m
+  double carried = 0.0;  ///< size of what handles add to a vertex, for round-off, m
+  std::vector<double> rates{};
   long boxes_before_refit = 0;   ///< kAutomatic: so many, then refit
   std::vector<float> positions;  ///< of a refit: xyz, and one float more
 };

@@ -80,7 +80,9 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
   s.norm = static_cast<float>(norm * (1.0 + 4.0 * kUnitRoundOff));
   s.farthest = sums.farthest;
   std::fill(std::copy(z.begin(), z.end(), s.z.data()), s.z.data() + surface->stride_, 0.0);
-  if (surface_ != surface) surface_ = surface;
+  const bool same_surface = surface_ == surface;
+  if (!same_surface) surface_ = surface;
+  set_skin(z, same_surface);
   counters_ = {};
   begin_state();
 
@@ -104,6 +106,33 @@ void DeformedSurface::reserve(const CollisionSurface& surface) {
     s.magnitudes = AlignedArray<float>(surface.stride_);
     s.z = AlignedArray<double>(surface.stride_);
   }
+}
+
+/// The handles, and how far they take a vertex: Σ β [(R_h − 1) r + t_h + R_h Ũ z].
+void DeformedSurface::set_skin(std::span<const double> z, bool same_surface) {
+  const ModalSkin* skin = surface_->skin();
+  if (skin == nullptr) return;
+  Scratch& s = *scratch_;
+  if (!s.pose)
+    s.pose.emplace(*skin), s.bare.emplace(surface_->extent_->bare());
+  else if (!same_surface || &s.pose->skin() != skin)
+    s.pose->bind(*skin), s.bare->bind(surface_->extent_->bare());
+  s.rates.resize(z.size());
+  s.pose->set(z);
+  s.flexed = s.farthest;
+  s.farthest = s.carried = 0.0;
+  const double radius = surface_->rest_radius_;
+  for (const SkinPose::Handle& handle : s.pose->handles()) {
+    s.farthest = std::max(s.farthest, handle.turn.norm() * radius + handle.shift.norm() + s.flexed);
+    s.carried =
+        std::max(s.carried, handle.shift.norm() + 2.0 * handle.drift.norm() + 2.0 * handle.angle.norm() * radius);
+  }
+}
+
+const SkinPose* DeformedSurface::skin() const { return surface_->skin() ? &*scratch_->pose : nullptr; }
+
+double DeformedSurface::skin_extent(std::span<const double> change, std::span<double> shape) {
+  return surface_->extent_->find(*scratch_->pose, *scratch_->bare, amplitudes(), change, shape, scratch_->rates);
 }
 
 /// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
@@ -133,7 +162,27 @@ void DeformedSurface::make_box(Index node) {
     make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->stride_},
                surface_->constants_.data() + first * kNodeConstants,
                surface_->coefficients_.data() + first * 6 * surface_->stride_, count, s.stamp, boxes);
+  if (surface_->skin() && boxes->stamp == s.stamp && counters_.refits == 0)
+    for (std::size_t i = 0; i < count; ++i) carry_box(static_cast<Index>(first + i));
   counters_.boxes += static_cast<long>(count);
+}
+
+/// From the box of r + Ũ z, whose rows are rounded to single precision, to that of the vertices.
+void DeformedSurface::carry_box(Index node) {
+  Scratch& s = *scratch_;
+  NodeBox& box = s.boxes[static_cast<std::size_t>(node)];
+  const Vec3 low(box.low[0], box.low[1], box.low[2]), high(box.high[0], box.high[1], box.high[2]);
+  const Vec3 center = 0.5 * (low + high), half = 0.5 * (high - low);
+  Aabb all;
+  for (const std::uint8_t h : surface_->node_handles(static_cast<std::size_t>(node))) {
+    const SkinPose::Handle& handle = s.pose->handles()[h];
+    const Mat3 R = Mat3::Identity() + handle.turn;
+    const Vec3 c = R * center + handle.shift, reach = R.cwiseAbs() * half;
+    all.include(Aabb{c - reach, c + reach});
+  }
+  const double size = surface_->rest_radius_ + s.flexed + s.carried;
+  const Vec3 rounding = Vec3::Constant(8.0 * kUnitRoundOff * size);
+  store(all.low - rounding, all.high + rounding, s.stamp, box);
 }
 
 /// Of the triangles of a leaf, from their vertices; their union takes the place of the leaf's own box, which is wider.
@@ -162,7 +211,10 @@ const Vec3& DeformedSurface::vertex(Index v) {
   const VertexRows& rows = surface_->model()->collision_rows();
   double u[3];
   make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->stride_, u);
-  vertex.p += Vec3(u[0], u[1], u[2]);
+  if (surface_->skin())
+    vertex.p = s.pose->position(surface_->influences(v), vertex.p, {u[0], u[1], u[2]});
+  else
+    vertex.p += Vec3(u[0], u[1], u[2]);
   return vertex.p;
 }
 
@@ -175,11 +227,16 @@ void DeformedSurface::refit() {
   if (surface_->modes() == 0 || counters_.refits > 0) return;
   ++counters_.refits;
   Scratch& s = *scratch_;
-  const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data()};
-  reconstruct(surface_->model()->collision(), std::span(&target, 1));
+  const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data(), .skin = skin()};
+  if (surface_->skin())
+    reconstruct(surface_->model()->collision(), surface_->tiles_, std::span(&target, 1));
+  else
+    reconstruct(surface_->model()->collision(), std::span(&target, 1));
   // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
-  const double terms = surface_->modes() + 24.0;
-  const double pad = kUnitRoundOff * (terms * s.farthest + 24.0 * surface_->rest_radius_) + internal::kBoxUnderflow;
+  const double terms = surface_->modes() + 24.0, flexed = surface_->skin() ? s.flexed + s.carried : s.farthest;
+  const double pad = kUnitRoundOff * (terms * flexed + 24.0 * surface_->rest_radius_ +
+                                      (surface_->skin() ? 64.0 * (flexed + surface_->rest_radius_) : 0.0)) +
+                     internal::kBoxUnderflow;
   refit_boxes(surface_->vertex_tree_.data(), surface_->vertex_tree_.size(), surface_->leaf_vertices_.data(),
               s.positions.data(), static_cast<float>(pad), s.stamp | Scratch::kRefitted, s.boxes.data());
 }

@@ -107,7 +107,16 @@ void CollisionSurface::build_bounds() {
       for (const Index v : triangle(t))
         if (std::exchange(seen[static_cast<std::size_t>(v)], n) != n) below.push_back(v);
     for (int axis = 0; axis < 3; ++axis) bound_node(n, axis, below);
+    if (!skinned_) continue;
+    node_handles_start_.push_back(node_handles_.size());
+    std::array<bool, ModalSkin::kMaxHandles + 1> named{};
+    for (const Index v : below)
+      for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
+        if (influences(v).weight[i] > 0.0f) named[influences(v).handle[i]] = true;
+    for (std::size_t h = 0; h < named.size(); ++h)
+      if (named[h]) node_handles_.push_back(static_cast<std::uint8_t>(h));
   }
+  node_handles_start_.push_back(node_handles_.size());
 }
 
 /// c, h, C and d are the middles and half ranges of the vertices' rest positions and of their rows; e is the largest
@@ -128,7 +137,7 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
 
   std::vector<float> low(k, std::numeric_limits<float>::infinity()), high(k, -std::numeric_limits<float>::infinity());
   for (const Index v : below) {
-    const float* u = row(v, axis);
+    const float* u = bounded_row(v, axis);
     for (std::size_t i = 0; i < k; ++i) low[i] = std::min(low[i], u[i]), high[i] = std::max(high[i], u[i]);
   }
   for (std::size_t i = 0; i < k; ++i) {
@@ -142,7 +151,7 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
     underflow += kUnderflow * 4.0;  // of terms that are at most about the scale's
   }
   for (const Index v : below) {
-    const float* u = row(v, axis);
+    const float* u = bounded_row(v, axis);
     double sum = 0.0;
     for (std::size_t i = 0; i < k; ++i) {
       const double difference = static_cast<double>(u[i]) - middle[i];

@@ -214,7 +214,8 @@ std::array<OverlapRule*, 2> NarrowPhase::Impl::rules(const CollisionBody& a, con
   } else if (options.overlap == OverlapMethod::kTetOverlap && a.volume != nullptr && b.volume != nullptr) {
     const auto overlapping = [&](std::size_t i) {
       const RestVolume::Impl& volume = *body[i]->volume->impl_;
-      return TetOverlap::Body{&volume.volume(), volume.boundary, body[i]->surface->amplitudes(), X_PB[i]};
+      return TetOverlap::Body{&volume.volume(), volume.boundary, body[i]->surface->amplitudes(),
+                              body[i]->surface->skin(), X_PB[i]};
     };
     tet_overlap.bind(overlapping(0), overlapping(1), surface[0].tolerance());
     for (std::size_t i = 0; i < 2; ++i) {

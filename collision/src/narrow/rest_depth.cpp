@@ -32,8 +32,15 @@ void RestDepthRule::bind(const RestDepth& rest, DeformedSurface& deformed, const
   rest_is_bound_ = false;
 }
 
-Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node) {
-  Vec3 p = volume.rest[static_cast<std::size_t>(node)];
+Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, const SkinPose* skin, Index node) {
+  const auto n = static_cast<std::size_t>(node);
+  if (skin != nullptr) {
+    Vec3 u = Vec3::Zero();
+    for (std::size_t i = 0; i < z.size(); ++i)
+      u += z[i] * volume.basis.shape(node, static_cast<Index>(i)).cast<double>();
+    return skin->position(skin->skin().volume[n], volume.rest[n], u);
+  }
+  Vec3 p = volume.rest[n];
   for (std::size_t i = 0; i < z.size(); ++i) p += z[i] * volume.basis.shape(node, static_cast<Index>(i)).cast<double>();
   return p;
 }
@@ -52,7 +59,7 @@ bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& 
     for (std::size_t i = 0; i < 4; ++i) {
       const Index node = volume.tets[static_cast<std::size_t>(tet)][i];
       at_rest[i] = volume.rest[static_cast<std::size_t>(node)],
-      now[i] = deformed_node(volume, deformed_->amplitudes(), node);
+      now[i] = deformed_node(volume, deformed_->amplitudes(), deformed_->skin(), node);
     }
     const Mat3 inverse = edges(at_rest).inverse();
     place.F = edges(now) * inverse;

@@ -7,12 +7,14 @@
 
 #include "limber/mesh/tet_locator.h"
 #include "limber/model/modal_model.h"
+#include "limber/model/skin_pose.h"
 #include "narrow/surface_contacts.h"
 
 namespace limber::internal {
 
-// A node of the volume in one state: rest + Σ z_i w_i, body frame.
-Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, Index node);
+// A node of the volume in one state, body frame: rest + Σ z_i w_i, or where the skin has it.
+// @param skin at z; null: none
+Vec3 deformed_node(const ModalVolume& volume, std::span<const double> z, const SkinPose* skin, Index node);
 
 // What does not change: the model, and which tetrahedron of its rest shape holds a point.
 class RestDepth {

@@ -119,7 +119,7 @@ Aabb TetOverlap::deform(int of) {
   nodes.resize(body.volume->rest.size());
   Aabb box;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    nodes[i] = body.X_PB * deformed_node(*body.volume, body.amplitudes, static_cast<Index>(i));
+    nodes[i] = body.X_PB * deformed_node(*body.volume, body.amplitudes, body.skin, static_cast<Index>(i));
     box.include(nodes[i]);
   }
   return box;

@@ -8,6 +8,7 @@
 #include "limber/collision/aabb.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/model/modal_model.h"
+#include "limber/model/skin_pose.h"
 #include "narrow/surface_contacts.h"
 
 namespace limber::internal {
@@ -23,6 +24,7 @@ class TetOverlap {
     const ModalVolume* volume = nullptr;
     std::span<const Triangle> boundary{};
     std::span<const double> amplitudes{};
+    const SkinPose* skin = nullptr;
     RigidTransform X_PB{};  // pose in the pair's frame
   };
   // O(1): the overlap is computed when a normal is asked for first. All is used until the next bind().

@@ -75,12 +75,6 @@ SolveStatus BoundedRows::solve_bounded(const IslandStep& step, std::span<const d
     lower_[i] = law.lower, upper_[i] = law.upper;
     gap_before_[i] = step.start_gap[at] - law.offset;
   }
-  if (contacts() == 0 && step.rule().method != ContactMethod::kGapProgram)
-    return qp_
-        .solve(
-            ContactQp{.size = static_cast<int>(n), .A = A_bounded_, .b = b_bounded_, .lower = lower_, .upper = upper_},
-            F_bounded_)
-        .status;
   return programs_.solve({.cones = contacts(),
                           .A = A_bounded_,
                           .b = b_bounded_,

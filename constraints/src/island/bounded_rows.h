@@ -1,12 +1,11 @@
-// Rows with bounds beside rows without, of islands without contacts or whose contacts [H03]'s rules solve for: the
-// latter are eliminated, the former are a small quadratic program or [H03]'s linear ones.
+// Rows with bounds beside rows without, of islands whose contacts [H03]'s rules solve for: the latter are eliminated,
+// the former are [H03]'s programs.
 #pragma once
 
 #include <span>
 #include <vector>
 
 #include "island_step.h"
-#include "limber/solvers/contact_qp.h"
 #include "limber/solvers/hauser/contact_program.h"
 #include "limber/solvers/least_squares.h"
 
@@ -18,7 +17,6 @@ class BoundedRows {
   void sort(const IslandStep& step);
   /// All rows in that order.
   std::span<const Index> order() const { return order_; }
-  bool any_bounds() const { return first_bounded_ < order_.size(); }
   int contacts() const { return static_cast<int>(friction_.size()); }
 
   /// A = J D Jᵀ with the rows' compliance and flexibility. @param J rows × degrees of freedom. @param metric D
@@ -38,7 +36,6 @@ class BoundedRows {
   std::vector<double> A_bounded_, b_bounded_;  // reduced to rows with bounds
   std::vector<double> lower_, upper_, gap_before_, F_bounded_, F_equal_;
   EqualityElimination elimination_;
-  ContactQpSolver qp_;
   ContactProgramSolver programs_;
 };
 

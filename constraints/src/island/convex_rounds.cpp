@@ -37,6 +37,7 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   for (report.iterations = 1;; ++report.iterations) {
     take_impulses(step);
     step.predict();
+    if (step.follow_bending()) fill_rows(step), contacts_.set_motion();
     const Distance left = find_starts(step, report.iterations == 1);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
@@ -96,12 +97,12 @@ void ConvexRounds::place_units(const IslandStep& step) {
   contacts_.end_structure();
 }
 
-/// J D^½, and what rows yield at first, before the columns of what the bodies do.
-void ConvexRounds::fill_units(const IslandStep& step) {
+/// J D^½ before the columns of what the bodies yield.
+void ConvexRounds::fill_rows(const IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
-  root_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
-  bodies.write_position_metric(step.length(), step.theta, root_);
-  for (double& weight : root_) weight = std::sqrt(weight);
+  fill_values(step, [&](const ConstraintRows::Side&, Index local, std::size_t, double* to) {
+    std::fill_n(to, static_cast<std::size_t>(bodies.response(local).size()), 0.0);
+  });
   fill_values(step, [&](const ConstraintRows::Side& side, Index local, std::size_t, double* to) {
     const BodyResponse& r = bodies.response(local);
     one_row_.assign(static_cast<std::size_t>(r.size()), 0.0);
@@ -109,6 +110,15 @@ void ConvexRounds::fill_units(const IslandStep& step) {
     const double* root = root_.data() + bodies.first(local);
     for (std::size_t k = 0; k < one_row_.size(); ++k) to[k] += one_row_[k] * root[k];
   });
+}
+
+/// The rows, what they yield at first, and the columns of what the bodies do.
+void ConvexRounds::fill_units(const IslandStep& step) {
+  const IslandBodies& bodies = step.bodies;
+  root_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
+  bodies.write_position_metric(step.length(), step.theta, root_);
+  for (double& weight : root_) weight = std::sqrt(weight);
+  fill_rows(step);
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const RowLaw& law = step.law(units_[u].first);
     const Vec3 response = contacts_.response(u);

@@ -35,6 +35,7 @@ class ConvexRounds {
 
   void place_units(const IslandStep& step);
   void fill_units(const IslandStep& step);
+  void fill_rows(const IslandStep& step);
   template <class Write>
   void fill_values(const IslandStep& step, Write&& write);
   void begin_units(const IslandStep& step);

@@ -8,7 +8,9 @@ using internal::StepPart;
 
 /// What becomes of the members by the end, all but the energy.
 IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
+  clock.lap(Stage::kSolve);
   step.begin(part);
+  clock.lap(Stage::kRows, step.rows.size());
   energy.begin(step);
   IslandReport done;
   if (step.mean) {
@@ -23,7 +25,7 @@ IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
   return done;
 }
 
-/// Of free bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the
+/// Of bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the
 /// oddest rows; then they stay, and are slower.
 void IslandSolver::Impl::foresee_mean(IslandReport& done) {
   done.status = mean.solve(step, done, true);

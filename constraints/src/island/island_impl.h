@@ -23,6 +23,16 @@ inline bool is_part(double time, double left, double whole_step) {
   return time > kShortest * whole_step && left - time > kShortest * whole_step;
 }
 
+/// How far a step has come.
+struct StepInParts {
+  internal::StepPart part;  // foreseen and not yet taken
+  IslandReport done;        // what is to be told of it
+  IslandReport report;      // of the parts taken
+  double left = 0.0;        // s, with the part
+  double length = 0.0;      // s, of a part, where the step is divided
+  bool may_cut = false, divides = false, gives_up = false;
+};
+
 struct IslandSolver::Impl {
   internal::IslandStep step;  // the part at hand
   internal::HeldReaction reaction;
@@ -33,11 +43,16 @@ struct IslandSolver::Impl {
   internal::IslandEnergy energy;
   std::vector<ExactMotion> motions;    // of the members, where a step may be cut or is watched
   std::vector<double> slip, impulses;  // by row
+  StepInParts parts;                   // the step at hand
+  StageTimes times;                    // of the step at hand
+  StageClock clock;
 
   // The step in parts.
   void take_watched(internal::StepPart part, IslandReport& report);
-  void take_cut(internal::StepPart part, IslandReport& report);
-  void take_divided(internal::StepPart part, IslandReport& report);
+  void begin_times(bool timed);
+  void foresee_next();
+  void foresee_cut();
+  void foresee_divided();
   double next_cut(const internal::StepPart& part);
   void commit(const internal::StepPart& part, const IslandReport& done, IslandReport& report);
 

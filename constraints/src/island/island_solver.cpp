@@ -9,23 +9,39 @@ namespace {
 
 using internal::StepPart;
 
-/// Bodies that the rows, gravity and held forces move, and nothing else.
-bool are_free(const StepPart& part) {
+/// Whether nothing is to come part way into the step, or at its end.
+bool has_no_dates(const StepPart& part) {
   return std::ranges::all_of(part.members, [&](Index member) {
     const auto& [group, slot, pose] = part.table[static_cast<std::size_t>(member)];
-    return group->frame_constants().motion == FrameMotion::kFree && !group->has_delayed_impulse(slot);
+    return !group->frame(slot).has_next_parent() && !group->has_delayed_impulse(slot);
   });
 }
 
 /// Whether a step may be cut where bodies strike: free ones that nothing but contacts acts on.
 bool allows_cuts(const StepPart& part) {
-  return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->is_contact(); }) && are_free(part);
+  return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->is_contact(); }) &&
+         std::ranges::all_of(part.members,
+                             [&](Index member) {
+                               const ConstrainedBody& body = part.table[static_cast<std::size_t>(member)];
+                               return body.group->frame_constants().motion == FrameMotion::kFree;
+                             }) &&
+         has_no_dates(part);
 }
 
-/// Whether a step may be taken in parts where it does not settle: free bodies that joints alone act on.
+/// Whether a step may be taken in parts where it does not settle.
 bool may_divide(const StepPart& part) {
   return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->may_be_divided(); }) &&
-         are_free(part);
+         has_no_dates(part);
+}
+
+StepPart whole_step(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                    std::span<Constraint* const> constraints, const IslandOptions& options) {
+  return {.table = table,
+          .members = members,
+          .constraints = constraints,
+          .options = options,
+          .whole_step = options.step,
+          .left = options.step};
 }
 
 }  // namespace
@@ -37,21 +53,59 @@ IslandSolver& IslandSolver::operator=(IslandSolver&&) noexcept = default;
 
 IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                                 std::span<Constraint* const> constraints, const IslandOptions& options) {
+  if (options.watch == nullptr) {
+    foresee(table, members, constraints, options);
+    const StageTimes foreseen = impl_->times;
+    IslandReport report = finish();
+    report.times.add(foreseen);
+    return report;
+  }
   IslandReport report{.bodies = static_cast<int>(members.size())};
-  const StepPart whole{.table = table,
-                       .members = members,
-                       .constraints = constraints,
-                       .options = options,
-                       .whole_step = options.step,
-                       .left = options.step};
-  if (options.watch != nullptr)
-    impl_->take_watched(whole, report);
-  else if (may_divide(whole))
-    impl_->take_divided(whole, report);
-  else
-    impl_->take_cut(whole, report);
+  impl_->begin_times(options.timed);
+  impl_->take_watched(whole_step(table, members, constraints, options), report);
+  impl_->clock.lap(Stage::kSolve);
+  report.times = impl_->times;
   return report;
 }
+
+void IslandSolver::foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                           std::span<Constraint* const> constraints, const IslandOptions& options) {
+  StepInParts& at = impl_->parts;
+  at.part = whole_step(table, members, constraints, options);
+  at.report = {.bodies = static_cast<int>(members.size())};
+  at.left = at.length = options.step;
+  at.may_cut = allows_cuts(at.part);
+  at.divides = may_divide(at.part);
+  at.gives_up = false;
+  impl_->begin_times(options.timed);
+  impl_->foresee_next();
+  impl_->clock.lap(Stage::kSolve);
+}
+
+const StageTimes& IslandSolver::times() const { return impl_->times; }
+
+IslandReport IslandSolver::finish() {
+  StepInParts& at = impl_->parts;
+  impl_->begin_times(at.part.options.timed);
+  for (;;) {
+    impl_->commit(at.part, at.done, at.report);
+    if (at.part.ends) break;
+    at.part.options.energy_surplus = at.report.energy_surplus;
+    at.part.begins = false;
+    at.left -= at.part.options.step;
+    impl_->foresee_next();
+  }
+  impl_->clock.lap(Stage::kSolve);
+  at.report.times = impl_->times;
+  return at.report;
+}
+
+void IslandSolver::Impl::begin_times(bool timed) {
+  times = {};
+  clock = StageClock(timed ? &times : nullptr);
+}
+
+void IslandSolver::Impl::foresee_next() { parts.divides ? foresee_divided() : foresee_cut(); }
 
 /// One part, as long as the watch lets it be. A shorter one is another motion, which the watch is shown in its turn.
 void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
@@ -72,51 +126,38 @@ void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
   commit(part, done, report);
 }
 
-/// A step, in parts where impacts begin or let go.
-void IslandSolver::Impl::take_cut(StepPart part, IslandReport& report) {
+/// What is left, or up to where an impact begins or lets go.
+void IslandSolver::Impl::foresee_cut() {
   constexpr int kMostCuts = 4;
-  const bool may_cut = allows_cuts(part);
-  for (double left = part.whole_step;; left -= part.options.step, part.begins = false) {
-    const bool cuts = may_cut && report.attempts.cuts() < kMostCuts;
-    part.options.step = part.left = left;
-    const double time = cuts ? next_cut(part) : left;
-    if (is_part(time, left, part.whole_step)) part.options.step = time;
-    part.ends = part.options.step == left;
-    IslandReport done = foresee_guarded(part);
-    done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
-    if (cuts) end_at_release(part, done);
-    commit(part, done, report);
-    if (part.ends) return;
-    part.options.energy_surplus = report.energy_surplus;
-  }
+  StepPart& part = parts.part;
+  part.last_resort = true;
+  const bool cuts = parts.may_cut && parts.report.attempts.cuts() < kMostCuts;
+  part.options.step = part.left = parts.left;
+  const double time = cuts ? next_cut(part) : parts.left;
+  if (is_part(time, parts.left, part.whole_step)) part.options.step = time;
+  part.ends = part.options.step == parts.left;
+  parts.done = foresee_guarded(part);
+  parts.done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
+  if (cuts) end_at_release(part, parts.done);
 }
 
-/// A step, in halves, quarters and so on of it from where the rows do not come together: impulses at a step's start
-/// bring joints together at its end only where bodies turn by less than a radian or so in between. Where the shortest
-/// part does not settle either, what is left is taken as it comes.
-void IslandSolver::Impl::take_divided(StepPart part, IslandReport& report) {
+/// What is left, in halves, quarters and so on of the step from where the rows do not come together: impulses at a
+/// step's start bring joints together at its end only where bodies turn by less than a radian or so in between. Where
+/// the shortest part does not settle either, what is left is taken as it comes.
+void IslandSolver::Impl::foresee_divided() {
   constexpr double kShortest = 1.0 / 64.0;  // of the step
-  double left = part.whole_step, length = part.whole_step;
-  bool gives_up = false;
-  for (;;) {
-    if (gives_up || left < 1.5 * length) length = left;  // the last one, whatever has been rounded
-    part.options.step = length;
-    part.left = left;
-    part.ends = length == left;
-    part.last_resort = gives_up;
-    IslandReport done = foresee_guarded(part);
-    if (done.status == SolveStatus::kIterationLimit && !gives_up) {
-      gives_up = length < 1.5 * kShortest * part.whole_step;
-      length *= 0.5;
-      continue;
-    }
-    done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
-    commit(part, done, report);
-    if (part.ends) return;
-    part.options.energy_surplus = report.energy_surplus;
-    left -= length;
-    part.begins = false;
+  StepPart& part = parts.part;
+  for (;; parts.length *= 0.5) {
+    if (parts.gives_up || parts.left < 1.5 * parts.length) parts.length = parts.left;  // the last, however rounded
+    part.options.step = parts.length;
+    part.left = parts.left;
+    part.ends = parts.length == parts.left;
+    part.last_resort = parts.gives_up;
+    parts.done = foresee_guarded(part);
+    if (parts.done.status != SolveStatus::kIterationLimit || parts.gives_up) break;
+    parts.gives_up = parts.length < 1.5 * kShortest * part.whole_step;
   }
+  parts.done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
 }
 
 /// The first time at which a constraint wants the step cut; all of the part where none does.
@@ -134,6 +175,7 @@ double IslandSolver::Impl::next_cut(const StepPart& part) {
 
 /// What has been foreseen happens.
 void IslandSolver::Impl::commit(const StepPart& part, const IslandReport& done, IslandReport& report) {
+  clock.lap(Stage::kSolve, step.rows.size());
   const BodyStates states(part.table);
   for (Index local = 0; local < step.bodies.count(); ++local)
     step.bodies.body(local).group->commit(step.bodies.body(local).slot, part.begins, part.ends);
@@ -157,6 +199,7 @@ void IslandSolver::Impl::commit(const StepPart& part, const IslandReport& done, 
   report.change = std::max(report.change, done.change);
   report.energy_removed += done.energy_removed;
   report.energy_surplus = done.energy_surplus;
+  clock.lap(Stage::kCommit, step.bodies.count());
 }
 
 }  // namespace limber

@@ -66,16 +66,13 @@ bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
 /// Forces are truly held, θ = ½, while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
 void IslandStep::find_kind() {
   contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
-  convex = rule().is_convex() && any_law([](const RowLaw& law) { return law.contact; });
-  mean = part.options.watch == nullptr && rows.flexibility().empty() && are_free() &&
-         !any_law([](const RowLaw& law) { return law.contact || law.friction > 0.0 || law.radius > 0.0; });
-  theta = contacts_alone && any_law([](const RowLaw& law) { return law.strikes; }) ? 0.5 : 1.0;
-}
-
-bool IslandStep::are_free() const {
+  const bool contacts = any_law([](const RowLaw& law) { return law.contact || law.radius > 0.0; });
+  mean = part.options.watch == nullptr && !contacts;
+  convex = !mean && (rule().is_convex() || !contacts);
+  skinned = false;
   for (Index local = 0; local < bodies.count(); ++local)
-    if (bodies.body(local).group->frame_constants().motion != FrameMotion::kFree) return false;
-  return true;
+    skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);
+  theta = contacts_alone && any_law([](const RowLaw& law) { return law.strikes; }) ? 0.5 : 1.0;
 }
 
 /// Bodies that something pressed on in the last step.
@@ -167,6 +164,17 @@ void IslandStep::linearise(StepTime when, ConstraintRows& to) const {
 void IslandStep::linearise_end() {
   bodies.place(StepTime::kEnd);
   linearise(StepTime::kEnd, end_rows);
+}
+
+bool IslandStep::follow_bending() {
+  if (!skinned) return false;
+  linearise(StepTime::kMiddle, mean_rows);
+  for (Index i = 0; i < rows.size(); ++i)
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Index local = bodies.local(rows.row(i).sides[side].body);
+      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot)) rows.take_modal(mean_rows, i, side);
+    }
+  return true;
 }
 
 void IslandStep::load_end() {

@@ -62,9 +62,10 @@ struct IslandStep {
   IslandBodies bodies;
   ConstraintRows rows, end_rows, mean_rows;  // linearised at the start, at the predicted end and in the middle
   std::vector<Index> first_row;              // per constraint, and the end
-  bool convex = false;                       // contacts are among the rows, by a rule for the convex problem
+  bool convex = false;                       // in rounds: with contacts by a rule for that, or watched
   bool contacts_alone = false;               // among the rows
-  bool mean = false;   // free bodies on joints and the like: impulses act in the middle of the step
+  bool skinned = false;                      // some bodies bend by their modal skins
+  bool mean = false;   // joints and the like without contacts: impulses act in the middle of the step
   double theta = 1.0;  // the part of f that frames get at the start; the rest at the end
   std::vector<double> start_gap, gap;
   std::vector<double> f;                       // N·s, beside the reactions
@@ -93,6 +94,9 @@ struct IslandStep {
   /// Linearises the rows elsewhere than at the start.
   void linearise(StepTime when, ConstraintRows& to) const;
   void linearise_end();
+  /// Bodies with a skin: their modes get of the impulses what moves the rows' points on the way to where the bodies
+  /// were predicted last, so that the impulses do the work that the gaps tell. @return whether there are any
+  bool follow_bending();
   void measure(StepTime when, std::vector<double>& into) const;
   /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
   void load_end();
@@ -111,7 +115,6 @@ struct IslandStep {
  private:
   Vec3 held_gravity(Index local) const;
   void find_kind();
-  bool are_free() const;
   void begin_early();
   void set_modal_steps();
 };

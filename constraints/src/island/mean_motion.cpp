@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limber/core/cross_matrix.h"
+
 namespace limber::internal {
 namespace {
 
@@ -33,11 +35,25 @@ Vec3 free_turn(const Mat3& inertia, const Vec3& momentum, double length) {
   return turn;
 }
 
+/// Of three rows, what a projection leaves.
+template <class Rows>
+void keep(const Mat3& projection, Rows&& rows) {
+  for (Eigen::Index j = 0; j < rows.cols(); ++j) rows.col(j) = (projection * Vec3(rows.col(j))).eval();
+}
+
+/// By what holds the body to its line: m in (1 + ½[τ]) I τ/Δt = L₀ + ½(1 − ½[τ])(L₁ − L₀ + m), across the line.
+Vec3 parent_moment(const Mat3& inertia, const Mat3& loose, const Vec3& turn, const Vec3& before, const Vec3& after,
+                   double length) {
+  const Vec3 spin = inertia * turn / length, left = 2.0 * (spin + 0.5 * turn.cross(spin) - before);
+  const Vec3 moment = (Mat3::Identity() - 0.5 * cross_matrix(turn)).inverse() * left - (after - before);
+  return moment - loose * moment;
+}
+
 }  // namespace
 
 void MeanMotion::begin(IslandStep& step, bool bends) {
   const double h = step.length();
-  bodies_.clear();
+  bodies_.clear(), carried_.clear();
   length_ = h, bends_ = bends;
   Index modes = 0;
   for (Index local = 0; local < step.bodies.count(); ++local) {
@@ -51,12 +67,14 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
               .easy = R * c.inertia.inverse() * R.transpose(),
               .mass = c.mass,
               .size = std::sqrt(c.inertia.trace() / c.mass),
+              .far = distance_tolerance(0.0, 0.0, frame.pose().p),
               .first_mode = modes,
               .modes = step.bodies.response(local).modes};
     body.flight =
         h * frame.velocity() + 0.5 * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
+    if (c.motion != FrameMotion::kKinematic) body.turn = free_turn(body.inertia, body.momentum, h);
+    if (c.motion != FrameMotion::kFree) begin_carried(step, local, body);
     body.shift = body.flight;
-    body.turn = free_turn(body.inertia, body.momentum, h);
     modes += body.modes;
     bodies_.push_back(body);
   }
@@ -69,29 +87,113 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
   }
 }
 
+void MeanMotion::begin_carried(const IslandStep& step, Index local, Body& body) {
+  const ConstrainedBody& at = step.bodies.body(local);
+  const FrameConstants& c = at.group->frame_constants();
+  const RigidFrame& start = at.group->frame(at.slot);
+  const bool turns = c.motion != FrameMotion::kKinematic;
+  Carried carried(start);
+  carried.torque = body.torque;
+  carried.excitation = carried.end.begin_step(c, {.gravity = turns ? Vec3::Zero() : step.part.options.gravity},
+                                              at.group->first_moment(at.slot), length_);
+  const KinematicFrame& parent = carried.end.parent();
+  body.flight = carried.end.pose().p - start.pose().p;
+  body.carried = static_cast<Index>(carried_.size());
+  if (turns) {
+    carried.field = length_ * (step.part.options.gravity - parent.acceleration);
+  } else {
+    const Quaternion turn = carried.end.pose().q * start.pose().q.conjugate();
+    body.turn = 2.0 / turn.w * turn.vector();
+    body.loose = body.kept = body.easy = Mat3::Zero();
+  }
+  carried.turn = parent.pose.q * start.parent().pose.q.conjugate();
+  if (c.motion == FrameMotion::kLine) {
+    const Vec3 line = start.pose().q * c.line_axis;
+    carried.line = carried.turn * line;
+    carried.angle = length_ * line.dot(start.angular_velocity(c) - start.parent().angular_velocity);
+  }
+  carried_.push_back(carried);
+  if (c.motion == FrameMotion::kLine) turn_about_line(body);
+}
+
+/// (1 + ½[τ])⁻¹(1 + ¼τ²) = 1 + ¼ττᵀ − ½[τ] takes what turns the body at the end to a change of τ.
+void MeanMotion::turn_about_line(Body& body) {
+  Carried& carried = carried_[static_cast<std::size_t>(body.carried)];
+  const Vec3 half = 0.5 * carried.angle * carried.line;
+  const Quaternion turn = Quaternion{1.0, half.x(), half.y(), half.z()} * carried.turn;
+  const Vec3& line = carried.line;
+  body.turn = 2.0 / turn.w * turn.vector();
+  carried.tangent = (line + 0.25 * body.turn * body.turn.dot(line) - 0.5 * body.turn.cross(line)) /
+                    (1.0 + 0.25 * carried.angle * carried.angle);
+  const Vec3 along = carried.tangent.normalized();
+  body.loose = along * along.transpose();
+  // What holds the body to its line is across it: so much of ½(1 − ½[τ]) m is not to count.
+  body.kept = along * (along + 0.25 * body.turn * body.turn.dot(along) - 0.5 * body.turn.cross(along)).transpose() /
+              (1.0 + 0.25 * body.turn.squaredNorm());
+  body.easy = body.loose / along.dot(body.inertia * along);
+}
+
 Quaternion MeanMotion::attitude(const IslandStep& step, Index local) const {
   const Vec3 half = 0.5 * bodies_[static_cast<std::size_t>(local)].turn;
   const ConstrainedBody& at = step.bodies.body(local);
   return normalized(normalized(Quaternion{1.0, half.x(), half.y(), half.z()}) * at.group->frame(at.slot).pose().q);
 }
 
+/// The body's frame where it is at the end. Of one with fixed nodes, its momentum with it.
+RigidFrame MeanMotion::end_of(IslandStep& step, Index local, const Vec3& angular_momentum) const {
+  const Body& b = bodies_[static_cast<std::size_t>(local)];
+  const ConstrainedBody& at = step.bodies.body(local);
+  const FrameConstants& c = at.group->frame_constants();
+  if (c.motion == FrameMotion::kFree) {
+    RigidFrame end = at.group->frame(at.slot);
+    end.set_pose({attitude(step, local), end.pose().p + b.shift});
+    return end;
+  }
+  RigidFrame end = carried_[static_cast<std::size_t>(b.carried)].end;
+  if (c.motion != FrameMotion::kKinematic) end.set_turn(c, attitude(step, local), angular_momentum);
+  return end;
+}
+
+/// What the modes feel of a frame that its parent carries: the field as it does its work on them, and of a body on a
+/// line that a turning parent carries the mean of both ends, at its mean rate.
+FrameExcitation MeanMotion::excitation_of(const IslandStep& step, Index local, const RigidFrame& end) const {
+  const Body& b = bodies_[static_cast<std::size_t>(local)];
+  const Carried& carried = carried_[static_cast<std::size_t>(b.carried)];
+  const ConstrainedBody& at = step.bodies.body(local);
+  const FrameConstants& c = at.group->frame_constants();
+  const RigidFrame& start = at.group->frame(at.slot);
+  FrameExcitation excitation = carried.excitation;
+  if (c.motion == FrameMotion::kKinematic) return excitation;
+  const Quaternion q0 = start.pose().q.conjugate(), q1 = end.pose().q.conjugate();
+  excitation.field = q0 * Vec3((carried.field - 0.5 * b.turn.cross(carried.field)) / length_);
+  if (c.motion == FrameMotion::kPoint) return excitation;
+  const Vec3 omega0 = q0 * start.parent().angular_velocity, omega1 = q1 * end.parent().angular_velocity;
+  const Vec3& alpha = end.parent().angular_acceleration;
+  const double rate = 2.0 * std::atan(0.5 * carried.angle) / length_;
+  excitation.angular_acceleration = 0.5 * (q0 * alpha + q1 * alpha + (omega0 + omega1).cross(rate * c.line_axis));
+  excitation.spin = 0.5 * (omega0 * omega0.transpose() + omega1 * omega1.transpose());
+  return excitation;
+}
+
 void MeanMotion::predict(IslandStep& step, Index local, const RigidFrame& end) {
   const Body& b = bodies_[static_cast<std::size_t>(local)];
   const ConstrainedBody& at = step.bodies.body(local);
-  if (bends_)
-    at.group->predict(at.slot, end, {load_.data() + b.first_mode, static_cast<std::size_t>(b.modes)},
-                      step.bodies.modal_step(local));
-  else
-    at.group->predict_rest(at.slot, end);
+  if (!bends_) return at.group->predict_rest(at.slot, end);
+  const FrameExcitation excitation = b.carried < 0 ? FrameExcitation{} : excitation_of(step, local, end);
+  at.group->predict(at.slot, end, excitation, {load_.data() + b.first_mode, static_cast<std::size_t>(b.modes)},
+                    step.bodies.modal_step(local));
 }
 
 void MeanMotion::place(IslandStep& step) {
   for (Index local = 0; local < count(); ++local) {
-    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    Body& b = bodies_[static_cast<std::size_t>(local)];
+    predict(step, local, end_of(step, local, b.momentum));
+    if (b.carried < 0) continue;
     const ConstrainedBody& at = step.bodies.body(local);
-    RigidFrame end = at.group->frame(at.slot);
-    end.set_pose({attitude(step, local), end.pose().p + b.shift});
-    predict(step, local, end);
+    const Carried& carried = carried_[static_cast<std::size_t>(b.carried)];
+    const Vec3 mass_moment = at.group->frame(at.slot).pose().q * at.group->first_moment(at.slot) +
+                             at.group->predicted_frame(at.slot).pose().q * at.group->predicted_first_moment(at.slot);
+    b.torque = carried.torque + 0.5 * mass_moment.cross(carried.field);
   }
   step.measure(StepTime::kEnd, step.gap);
   step.linearise(StepTime::kEnd, step.end_rows);
@@ -122,6 +224,12 @@ void MeanMotion::find_residual(const IslandStep& step, std::span<const double> i
       const std::span<const double> shapes = step.mean_rows.modal(side);
       for (std::size_t k = 0; k < shapes.size(); ++k) modal[b.first_mode + static_cast<Index>(k)] -= p * shapes[k];
     }
+  }
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.carried < 0) continue;
+    residual.segment<3>(6 * local).setZero();
+    residual.segment<3>(6 * local + 3) = b.kept * part(residual, local, 1);
   }
 }
 
@@ -169,13 +277,47 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
       if (const Index local = step.bodies.local(side.body); local >= 0)
         K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
             0.25 * impulses[static_cast<std::size_t>(i)] * cross_matrix(side.angular);
-  bend_.setZero(3, load_.size()), turned_.setZero(3, load_.size());
+  bend_.setZero(3, load_.size()), turned_.setZero(3, load_.size()), swung_.setZero(3, load_.size());
   Sum sum(step, *this, K);
   const BodyStates states(step.part.table);
   for (std::size_t i = 0; i < step.part.constraints.size(); ++i) {
     const auto begin = static_cast<std::size_t>(step.first_row[i]),
                end = static_cast<std::size_t>(step.first_row[i + 1]);
     step.part.constraints[i]->add_force_derivative(states, impulses.subspan(begin, end - begin), sum);
+  }
+  for (Index local = 0; local < count(); ++local)
+    if (bodies_[static_cast<std::size_t>(local)].carried >= 0) find_field_derivative(step, local, K);
+  hold_carried(K);
+}
+
+/// Of the moment that the field exerts, by turning and bending, and of what the modes get of it by turning.
+void MeanMotion::find_field_derivative(const IslandStep& step, Index local, Matrix& K) {
+  const Body& b = bodies_[static_cast<std::size_t>(local)];
+  const auto& [group, slot, pose] = step.bodies.body(local);
+  const Mat3 field = cross_matrix(carried_[static_cast<std::size_t>(b.carried)].field),
+             start = to_matrix(group->frame(slot).pose().q), end = to_matrix(group->predicted_frame(slot).pose().q),
+             by_place = 0.25 * (Mat3::Identity() - 0.5 * cross_matrix(b.turn)) * field;
+  K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
+      by_place * cross_matrix(end * group->predicted_first_moment(slot)) * end_turn(b.turn);
+  if (!bends_) return;
+  const PropagatorTable& table = step.bodies.modal_step(local).table();
+  for (Index k = 0; k < b.modes; ++k) {
+    const Vec3& p = group->model().data().participation[static_cast<std::size_t>(k)];
+    bend_.col(b.first_mode + k) += by_place * (end * p);
+    swung_.col(b.first_mode + k) -= 0.5 * table.at(k).z_g / length_ * (field * (start * p));
+  }
+}
+
+/// What parents hold does not change: of the equations of bodies with fixed nodes those of free turns are left.
+void MeanMotion::hold_carried(Matrix& K) {
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.carried < 0) continue;
+    K.middleRows<3>(6 * local).setZero();
+    K.block<3, 3>(6 * local, 6 * local) = b.mass / length_ * Mat3::Identity();
+    keep(b.kept, K.middleRows<3>(6 * local + 3));
+    K.block<3, 3>(6 * local + 3, 6 * local + 3) += b.inertia.trace() / length_ * (Mat3::Identity() - b.loose);
+    keep(b.kept, bend_.middleCols(b.first_mode, b.modes));
   }
 }
 
@@ -185,13 +327,14 @@ void MeanMotion::condense(const Matrix& modal_force, const Matrix& modal_gap, co
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     if (b.modes == 0) continue;
     const Index turn = 6 * local + 3;
-    const auto H = response_.segment(b.first_mode, b.modes).asDiagonal();
-    const Eigen::Matrix<double, 3, Eigen::Dynamic> bent = bend_.middleCols(b.first_mode, b.modes) * H;
-    const auto turned = turned_.middleCols(b.first_mode, b.modes).transpose();
-    K.block<3, 3>(turn, turn) += bent * turned;
-    F.middleRows<3>(turn) -= bent * modal_force.middleRows(b.first_mode, b.modes);
-    E.middleCols<3>(turn) += modal_gap.middleCols(b.first_mode, b.modes) * H * turned;
-    residual.segment<3>(turn) -= bent * modal_residual.segment(b.first_mode, b.modes);
+    for (Index k = b.first_mode; k < b.first_mode + b.modes; ++k) {
+      const Vec3 bend = bend_.col(k), bent = response_[k] * bend,
+                 turned = response_[k] * turned_.col(k) + swung_.col(k);
+      K.block<3, 3>(turn, turn) += bend * turned.transpose();
+      F.middleRows<3>(turn).noalias() -= bent * modal_force.row(k);
+      E.middleCols<3>(turn).noalias() += modal_gap.col(k) * turned.transpose();
+      residual.segment<3>(turn) -= bent * modal_residual[k];
+    }
   }
 }
 
@@ -217,6 +360,12 @@ void MeanMotion::find_forces(const IslandStep& step, Matrix& F, Matrix& modal) c
       const std::span<const double> shapes = step.mean_rows.modal(side);
       for (std::size_t k = 0; k < shapes.size(); ++k) modal(b.first_mode + static_cast<Index>(k), i) += shapes[k];
     }
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.carried < 0) continue;
+    F.middleRows<3>(6 * local).setZero();
+    keep(b.kept, F.middleRows<3>(6 * local + 3));
+  }
 }
 
 void MeanMotion::find_gap_derivative(const IslandStep& step, Matrix& E, Matrix& modal) const {
@@ -259,6 +408,12 @@ double MeanMotion::force_to_inertia(const Matrix& K) const {
 void MeanMotion::move(const Vector& change, const Vector& load, double how_much) {
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.carried >= 0 && !carried_[static_cast<std::size_t>(b.carried)].line.isZero(0.0)) {
+      Carried& carried = carried_[static_cast<std::size_t>(b.carried)];
+      carried.angle += how_much * part(change, local, 1).dot(carried.tangent) / carried.tangent.squaredNorm();
+      turn_about_line(b);
+      continue;
+    }
     b.shift += how_much * part(change, local, 0);
     b.turn += how_much * part(change, local, 1);
   }
@@ -272,9 +427,10 @@ double MeanMotion::size_of(const Vector& change) const {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const double turn = (end_turn(b.turn) * part(change, local, 1)).norm();
     const double shift = part(change, local, 0).norm() / (b.size + b.shift.norm());
-    largest = std::isfinite(turn + shift) ? std::max({largest, turn, shift}) : kUnbounded;
+    const double tolerance = kTolerance + b.far / b.size;
+    largest = std::isfinite(turn + shift) ? std::max(largest, std::max(turn, shift) / tolerance) : kUnbounded;
   }
-  return largest / kTolerance;
+  return largest;
 }
 
 double MeanMotion::part_of(const Vector& change) const {
@@ -299,19 +455,41 @@ void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const ConstrainedBody& at = step.bodies.body(local);
+    Vec3 momentum = b.momentum + moment_[static_cast<std::size_t>(local)] + b.torque;
+    if (b.carried >= 0) {
+      momentum += parent_moment(b.inertia, b.loose, b.turn, b.momentum, momentum, h);
+      predict(step, local, end_of(step, local, momentum));
+      continue;
+    }
     RigidFrame end = at.group->frame(at.slot);
     const Vec3 velocity = end.velocity() + h * step.part.options.gravity +
                           (impulse_[static_cast<std::size_t>(local)] + h * at.group->held_force(at.slot)) / b.mass;
-    end.set_motion({attitude(step, local), end.pose().p + b.shift}, velocity,
-                   b.momentum + moment_[static_cast<std::size_t>(local)] + b.torque);
+    end.set_motion({attitude(step, local), end.pose().p + b.shift}, velocity, momentum);
     predict(step, local, end);
   }
 }
 
-double MeanMotion::torque_work(const IslandStep& step) const {
-  double work = 0.0;
-  for (const Body& b : bodies_) work += b.torque.dot(b.turn) / step.length();
-  return work;
+void MeanMotion::stay(IslandStep& step) {
+  begin(step, false);
+  for (Index local = 0; local < count(); ++local) {
+    Body& b = bodies_[static_cast<std::size_t>(local)];
+    const ConstrainedBody& at = step.bodies.body(local);
+    const FrameConstants& c = at.group->frame_constants();
+    if (b.carried < 0) {
+      RigidFrame frame = at.group->frame(at.slot);
+      frame.set_velocity(c, 0.5 * frame.velocity(), 0.5 * frame.angular_velocity(c));
+      predict(step, local, frame);
+      continue;
+    }
+    Carried& carried = carried_[static_cast<std::size_t>(b.carried)];
+    if (c.motion == FrameMotion::kPoint) b.turn = Vec3::Zero();
+    if (c.motion == FrameMotion::kLine) {
+      carried.angle = 0.0;
+      turn_about_line(b);
+    }
+    predict(step, local, end_of(step, local, 0.5 * b.momentum));
+  }
+  step.measure(StepTime::kEnd, step.gap);
 }
 
 }  // namespace limber::internal

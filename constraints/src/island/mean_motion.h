@@ -1,5 +1,4 @@
-// How free bodies go through a step under impulses that act in its middle: an energy–momentum step (Simo and Wong
-// 1991).
+// How bodies go through a step under impulses that act in its middle: an energy–momentum step (Simo and Wong 1991).
 //
 //   displacement d, Cayley vector τ, R₁ = cay(τ) R₀; p, l: impulses and moments of the rows of the middle, f, t: held
 //   m (d/Δt − v₀) = ½ (p + Δt m g + Δt f)
@@ -7,6 +6,11 @@
 //   v₁ = v₀ + Δt g + (p + Δt f)/m,    L₁ = L₀ + l + Δt t
 //
 // The kinetic energy changes by exactly (p·d + l·τ)/Δt and what is held. Modes take the impulses as a force held.
+//
+// The origin of a body with fixed nodes goes where its parent takes it. In the parent's field g − a the mass moment s
+// is one more point at which a given force acts: the moment about the origin is ½(R₀s₀ + R₁s₁) × (g − a), that on the
+// modes R' of the field, and their work that of the field exactly. A body on a line turns about the line alone: τ keeps
+// to a curve, and of the moments the part along its tangent counts.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +26,7 @@ using Vector = Eigen::VectorXd;
 
 class MeanMotion {
  public:
-  /// Free flight: no impulses, modes free. @param bends whether modes move at all in this step
+  /// The step without impulses, modes free. @param bends whether modes move at all in this step
   void begin(IslandStep& step, bool bends);
   Index count() const { return static_cast<Index>(bodies_.size()); }
 
@@ -58,8 +62,8 @@ class MeanMotion {
   double part_of(const Vector& change) const;
   /// Predicts the end, velocities and all. @param impulses by row
   void finish(IslandStep& step, std::span<const double> impulses);
-  /// Work of held torques, exactly, J.
-  double torque_work(const IslandStep& step) const;
+  /// Nothing moves but what is slower for it, and what parents carry.
+  void stay(IslandStep& step);
 
  private:
   struct Body {
@@ -67,18 +71,40 @@ class MeanMotion {
     Vec3 flight = Vec3::Zero();                                // d without impulses
     Vec3 momentum = Vec3::Zero(), torque = Vec3::Zero();       // L₀, Δt t
     Mat3 inertia = Mat3::Identity(), easy = Mat3::Identity();  // and its inverse
-    double mass = 0.0, size = 0.0;
+    Mat3 kept = Mat3::Identity();                              // what of the moments' equation counts, a projection
+    Mat3 loose = Mat3::Identity();                             // the turns that it is free to, a projection
+    double mass = 0.0, size = 0.0, far = 0.0;                  // of gyration; round-off of its place, m
     Index first_mode = 0, modes = 0;
+    Index carried = -1;
+  };
+  struct Carried {  // of a body with fixed nodes
+    explicit Carried(const RigidFrame& frame) : end(frame) {}
+    RigidFrame end;               // its parent there
+    FrameExcitation excitation;   // of one that does not turn by itself
+    Vec3 torque = Vec3::Zero();   // Δt t, what is given
+    Vec3 field = Vec3::Zero();    // Δt (g − a) where it turns by itself
+    Quaternion turn;              // the parent's
+    Vec3 line = Vec3::Zero();     // at the end, world
+    Vec3 tangent = Vec3::Zero();  // ∂τ/∂x, R₁ = cay(x line) turn R₀
+    double angle = 0.0;           // x
   };
   Quaternion attitude(const IslandStep& step, Index local) const;
+  void begin_carried(const IslandStep& step, Index local, Body& body);
+  void turn_about_line(Body& body);
+  RigidFrame end_of(IslandStep& step, Index local, const Vec3& angular_momentum) const;
+  FrameExcitation excitation_of(const IslandStep& step, Index local, const RigidFrame& end) const;
   void predict(IslandStep& step, Index local, const RigidFrame& end);
+  void find_field_derivative(const IslandStep& step, Index local, Matrix& K);
+  void hold_carried(Matrix& K);
 
   std::vector<Body> bodies_;
+  std::vector<Carried> carried_;
   double length_ = 0.0;
   bool bends_ = true;
   std::vector<Vec3> impulse_, moment_;  // of the rows, by body
   Vector response_, load_;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> bend_, turned_;  // by mode: ∂r_τ/∂z, and of its load by τ
+  // By mode: ∂r_τ/∂z, and of its load and, by what is no load, its amplitude by τ.
+  Eigen::Matrix<double, 3, Eigen::Dynamic> bend_, turned_, swung_;
 };
 
 }  // namespace limber::internal

@@ -22,16 +22,17 @@ SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends
     motion_.place(step);
     report.change = improve(step);
     if (!std::isfinite(report.change)) break;
-    if (report.change <= 1.0) {
-      std::ranges::copy(impulses_, step.f.begin());
-      motion_.finish(step, impulses_);
-      velocities_.meet_rows(step, active_);
-      return SolveStatus::kSolved;
-    }
     const double part = motion_.part_of(motion_change_);
     motion_.move(motion_change_, load_change_, part);
     for (std::size_t i = 0; i < impulses_.size(); ++i)
       impulses_[i] += part * impulse_change_[static_cast<Eigen::Index>(i)];
+    if (report.change > 1.0) continue;
+    // What is left of the equations is of second order in this last change.
+    motion_.place(step);
+    std::ranges::copy(impulses_, step.f.begin());
+    motion_.finish(step, impulses_);
+    velocities_.meet_rows(step, active_);
+    return SolveStatus::kSolved;
   }
   return SolveStatus::kIterationLimit;
 }
@@ -174,18 +175,6 @@ void MeanNewton::meet_active(const IslandStep& step, double yields) {
   rows_.solve(numbers(reduced_), damping_, numbers(right_));
   for (Eigen::Index i = 0; i < m; ++i)
     if (active_[static_cast<std::size_t>(i)] != 0) impulse_change_[i] = scale_[i] * right_[i];
-}
-
-void MeanNewton::stay(IslandStep& step) {
-  std::ranges::fill(step.f, 0.0);
-  for (Index local = 0; local < step.bodies.count(); ++local) {
-    const ConstrainedBody& at = step.bodies.body(local);
-    const FrameConstants& c = at.group->frame_constants();
-    RigidFrame frame = at.group->frame(at.slot);
-    frame.set_velocity(c, 0.5 * frame.velocity(), 0.5 * frame.angular_velocity(c));
-    at.group->predict_rest(at.slot, frame);
-  }
-  step.measure(StepTime::kEnd, step.gap);
 }
 
 }  // namespace limber::internal

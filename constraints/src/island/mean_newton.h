@@ -18,7 +18,7 @@ class MeanNewton {
   /// @param bends whether modes move in this step
   SolveStatus solve(IslandStep& step, IslandReport& report, bool bends);
   /// Nothing moves but what is slower for it: for the part of a step whose motion was not found.
-  void stay(IslandStep& step);
+  void stay(IslandStep& step) { motion_.stay(step); }
 
  private:
   double improve(const IslandStep& step);

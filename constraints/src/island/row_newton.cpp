@@ -19,7 +19,7 @@ SolveStatus RowNewton::solve(IslandStep& step, IslandReport& report) {
 }
 
 SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
-  constexpr int kIterationsUnsettled = 6, kIterationsOfStart = 30;
+  constexpr int kIterationsUnsettled = 6;
   const int allowed = step.part.options.max_iterations;
   factor(step);
   F_.resize(step.size());
@@ -28,13 +28,12 @@ SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
   secants_.begin(F_.size());
   for (report.iterations = 1;; ++report.iterations) {
     take(step, F_);
+    if (step.follow_bending()) factor(step);
     const SolveStatus status = improve(step);
     report.change = largest_change(step);
     if (report.change <= 1.0) return status;
     // Rows that are not solved for give other impulses every time.
     const int most = status == SolveStatus::kIterationLimit ? std::min(kIterationsUnsettled, allowed) : allowed;
-    if (report.iterations > std::min(most, kIterationsOfStart) && can_differentiate(step))
-      return differentiate(step, report);
     if (report.iterations > most) return take_best(step, report);
     for (std::size_t i = 0; i < F_.size(); ++i) {
       next_[i] -= F_[i];
@@ -53,32 +52,16 @@ void RowNewton::factor(const IslandStep& step) {
   step.bodies.write_jacobian(step.rows, J_);
   step.bodies.write_position_metric(step.length(), step.theta, metric_);
   bounded_.sort(step);
-  if (bounded_.any_bounds())
-    bounded_.assemble(step, J_, metric_);
-  else
-    factor_equalities(step);
-}
-
-void RowNewton::factor_equalities(const IslandStep& step) {
-  for (std::size_t i = 0; i < step.size(); ++i) b_[i] = step.law(i).compliance;
-  equalities_.factor(J_, metric_, b_);
+  bounded_.assemble(step, J_, metric_);
 }
 
 /// One step from F, to next_; change_ is what it makes of the gaps.
 SolveStatus RowNewton::improve(const IslandStep& step) {
   programs_ = {};
-  SolveStatus status = SolveStatus::kSolved;
   next_ = F_;
-  if (bounded_.any_bounds()) {
-    respond(F_, b_);
-    for (std::size_t i = 0; i < F_.size(); ++i) b_[i] = step.gap[i] - step.law(i).offset - b_[i];
-    status = bounded_.solve(step, b_, next_, programs_);
-  } else if (!F_.empty()) {
-    for (std::size_t i = 0; i < F_.size(); ++i)
-      b_[i] = step.law(i).offset - step.gap[i] - step.law(i).compliance * F_[i];
-    status = equalities_.solve(b_);
-    for (std::size_t i = 0; i < F_.size(); ++i) next_[i] += b_[i];
-  }
+  respond(F_, b_);
+  for (std::size_t i = 0; i < F_.size(); ++i) b_[i] = step.gap[i] - step.law(i).offset - b_[i];
+  const SolveStatus status = bounded_.solve(step, b_, next_, programs_);
   for (std::size_t i = 0; i < F_.size(); ++i) b_[i] = next_[i] - F_[i];
   respond(b_, change_);
   return status;
@@ -115,43 +98,6 @@ SolveStatus RowNewton::take_best(IslandStep& step, IslandReport& report) {
     take(step, F_);
   }
   return SolveStatus::kIterationLimit;
-}
-
-/// Whether the island is small enough, and its rows have an interval each.
-bool RowNewton::can_differentiate(const IslandStep& step) const {
-  constexpr std::size_t kMostRows = 96;
-  return step.size() <= kMostRows && bounded_.contacts() == 0 && step.rows.flexibility().empty() &&
-         step.rule().method != ContactMethod::kGapProgram;
-}
-
-/// From the best impulses seen, with the rows' true derivatives.
-SolveStatus RowNewton::differentiate(IslandStep& step, IslandReport& report) {
-  const std::size_t m = step.size(), n = metric_.size();
-  take_best(step, report);
-  for (std::vector<double>* v : {&slope_, &tolerance_, &lower_, &upper_}) v->resize(m);
-  for (std::size_t i = 0; i < m; ++i) {
-    const RowLaw& law = step.law(i);
-    slope_[i] = law.compliance;
-    for (std::size_t j = 0; j < n; ++j) slope_[i] += metric_[j] * J_[i * n + j] * J_[i * n + j];
-    tolerance_[i] = law.tolerance, lower_[i] = law.lower, upper_[i] = law.upper;
-  }
-  struct Context {
-    RowNewton& self;
-    IslandStep& step;
-    IslandReport& report;
-  } context{*this, step, report};
-  // One captured pointer fits in std::function's own storage, so this allocates nothing.
-  const auto evaluate = [&context](std::span<const double> whole, std::span<double> w) {
-    context.self.take(context.step, whole);
-    ++context.report.iterations;
-    for (std::size_t i = 0; i < w.size(); ++i) {
-      const RowLaw& law = context.step.law(i);
-      w[i] = context.step.gap[i] - law.offset + law.compliance * whole[i];
-    }
-  };
-  report.change =
-      differences_.solve({.slope = slope_, .tolerance = tolerance_, .lower = lower_, .upper = upper_}, evaluate, F_);
-  return report.change <= 1.0 ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
 }
 
 }  // namespace limber::internal

@@ -1,14 +1,12 @@
-// Newton's method for the impulses of islands without contacts, or with contacts by [H03]'s rules: A ΔF + gap(F) = …
-// within the rows' bounds, with the Jacobian of the step's start for all iterations.
+// Newton's method for the impulses of islands with contacts by [H03]'s rules: A ΔF + gap(F) = … within the rows'
+// bounds, with the Jacobian of the step's start for all iterations.
 #pragma once
 
 #include <span>
 #include <vector>
 
 #include "bounded_rows.h"
-#include "equality_rows.h"
 #include "island_step.h"
-#include "limber/solvers/difference_newton.h"
 #include "limber/solvers/secant_iteration.h"
 
 namespace limber::internal {
@@ -19,7 +17,6 @@ class RowNewton {
   SolveStatus solve(IslandStep& step, IslandReport& report);
 
  private:
-  void factor_equalities(const IslandStep& step);
   void factor(const IslandStep& step);
   SolveStatus iterate(IslandStep& step, IslandReport& report);
   SolveStatus improve(const IslandStep& step);
@@ -27,17 +24,12 @@ class RowNewton {
   double largest_change(const IslandStep& step) const;
   void take(IslandStep& step, std::span<const double> whole);
   SolveStatus take_best(IslandStep& step, IslandReport& report);
-  bool can_differentiate(const IslandStep& step) const;
-  SolveStatus differentiate(IslandStep& step, IslandReport& report);
 
   std::vector<double> F_, next_, change_;  // N·s, whole, by row; the next ones, and what they make of the gaps
   std::vector<double> J_, metric_, x_, b_;
   BoundedRows bounded_;
-  EqualityRows equalities_;
   ProgramReport programs_;  // of the last iteration
   SecantIteration secants_;
-  DifferenceNewton differences_;
-  std::vector<double> slope_, tolerance_, lower_, upper_;  // of the rows, for the latter
 };
 
 }  // namespace limber::internal

@@ -3,19 +3,22 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/solvers/block_factor.h"
 
 namespace limber::internal {
 namespace {
 
+constexpr double kSweepWork = 40.0;  // multiply-adds of factor() in the time that a step takes per number of the factor
+
 /// The part of a link's matrix between its bodies, rows b and columns a. @param turn R_bᵀ R_a
 TwistMatrix cross_block(const StrainLink& link, const Mat3& turn) {
-  const Mat3 sa = skew(link.arm_a), sb = skew(link.arm_b);
+  const Mat3 sa = cross_matrix(link.arm_a), sb = cross_matrix(link.arm_b);
   TwistMatrix out;
   Mat3 rotation = -link.weight * sb * turn * sa;
   for (int k = 0; k < 3; ++k) {
-    const Mat3 l = skew(link.spread.col(k));
+    const Mat3 l = cross_matrix(link.spread.col(k));
     rotation -= l * turn * l;
   }
   out.topLeftCorner<3, 3>() = -rotation;
@@ -28,7 +31,7 @@ TwistMatrix cross_block(const StrainLink& link, const Mat3& turn) {
 }  // namespace
 
 TwistMatrix own_block(double weight, const Vec3& arm, const Mat3& spread) {
-  const Mat3 s = skew(arm), second = spread * spread.transpose();
+  const Mat3 s = cross_matrix(arm), second = spread * spread.transpose();
   TwistMatrix out;
   out.topLeftCorner<3, 3>() = -weight * s * s + second.trace() * Mat3::Identity() - second;
   out.topRightCorner<3, 3>() = weight * s;
@@ -50,6 +53,7 @@ struct ElasticSystem::Block {
   std::vector<BlockFactor::Block> own{};                       // per body
   std::vector<std::pair<BlockFactor::Block, bool>> between{};  // per link; whether its rows are a's
   AlignedBuffer vector{};                                      // between the sweeps
+  AlignedBuffer followers{};  // per twist of the interface, one after another: what it does to all
 
   void scatter(const VectorX& f) {
     double* x = vector.need(factor.size());
@@ -189,6 +193,16 @@ void ElasticSystem::take_interface(Block& block, MatrixX& S) const {
     }
 }
 
+/// One pass through the factor for all of them, so that following takes none later.
+void ElasticSystem::find_followers(Block& block) const {
+  const std::size_t size = block.factor.size(), count = 6 * block.interface.size();
+  double* x = block.followers.need(count * size);
+  std::fill_n(x, count * size, 0.0);
+  for (std::size_t i = 0; i < count; ++i)
+    x[i * size + block.factor.first(static_cast<std::size_t>(block.interface[i / 6])) + i % 6] = 1.0;
+  block.factor.expand(x, count);
+}
+
 bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added,
                            const std::vector<PairTerm>& between) {
   MatrixX S = MatrixX::Zero(interface_dofs_, interface_dofs_);
@@ -196,6 +210,7 @@ bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector
     assemble(block, rotations, added);
     if (!block.factor.factor()) return false;
     take_interface(block, S);
+    find_followers(block);
   }
   for (const PairTerm& term : between) {
     const std::array<Index, 2> at{interface_dof(term.a), interface_dof(term.b)};
@@ -208,6 +223,13 @@ bool ElasticSystem::factor(const std::vector<Mat3>& rotations, const std::vector
   if (llt.info() != Eigen::Success) return false;
   inverse_ = llt.solve(MatrixX::Identity(S.rows(), S.cols()));
   return true;
+}
+
+double ElasticSystem::factor_cost() const {
+  double work = 0.0, numbers = 0.0;
+  for (const Block& block : blocks_)
+    work += block.factor.work(), numbers += static_cast<double>(block.factor.numbers());
+  return work / (kSweepWork * std::max(numbers, 1.0));
 }
 
 void ElasticSystem::reduce(const VectorX& f, VectorX& interface) {
@@ -236,9 +258,17 @@ void ElasticSystem::expand(const VectorX& interface, VectorX& u) {
   }
 }
 
-void ElasticSystem::follow(const VectorX& interface, VectorX& u) {
-  for (Block& block : blocks_) std::fill_n(block.vector.need(block.factor.size()), block.factor.size(), 0.0);
-  expand(interface, u);
+void ElasticSystem::follow(const VectorX& interface, VectorX& u) const {
+  u.resize(dofs_);
+  for (const Block& block : blocks_) {
+    const auto size = static_cast<Eigen::Index>(block.factor.size()),
+               count = static_cast<Eigen::Index>(6 * block.interface.size());
+    const VectorX x = Eigen::Map<const MatrixX>(block.followers.data(), size, count) *
+                      interface.segment(block.interface_first, count);
+    for (std::size_t i = 0; i < block.bodies.size(); ++i)
+      u.segment<6>(block.first + 6 * static_cast<Index>(i)) =
+          x.segment<6>(static_cast<Eigen::Index>(block.factor.first(i)));
+  }
 }
 
 /// Jᵀ f at the interface.

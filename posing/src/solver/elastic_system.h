@@ -46,12 +46,15 @@ class ElasticSystem {
   bool factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added,
               const std::vector<PairTerm>& between);
 
+  /// What factor() costs, in steps that only sweep.
+  double factor_cost() const;
+
   /// The first sweep of H⁻¹ f. @param interface out: S⁻¹ of what is left of f there
   void reduce(const VectorX& f, VectorX& interface);
   /// The second, for any twists of the interface. @param u out: of all bodies
   void expand(const VectorX& interface, VectorX& u);
   /// The same without forces on other bodies: what the interface's twists do to all.
-  void follow(const VectorX& interface, VectorX& u);
+  void follow(const VectorX& interface, VectorX& u) const;
 
   // Twists of the interface: six per body that is in it and not pinned.
   Index interface_dofs() const { return interface_dofs_; }
@@ -70,6 +73,7 @@ class ElasticSystem {
   void number(Block& block, const std::vector<bool>& interface);
   void place(Block& block) const;
   void take_interface(Block& block, MatrixX& S) const;
+  void find_followers(Block& block) const;
   void add_force(const Row& row, double f, VectorX& interface) const;
   void assemble(Block& block, const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added) const;
 

@@ -21,11 +21,11 @@ constexpr int kRestorations = 12;     // Newton steps to put a pose back onto it
 constexpr double kArmijo = 1e-4;      // of the decrease that the quadratic model promises
 // Levenberg–Marquardt damping, in units of the loads' own moments: what second derivatives that are left out amount to.
 constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLeastDamping = 1e-5, kLargestDamping = 1e6;
-constexpr int kAnew = -1;  // age of a matrix that is to be made
-// A step that promises less than this part of the one before converges as well with the matrix there is: made for an
-// earlier pose, and in the bodies' own frames little changed since.
-constexpr double kContraction = 0.3;
-constexpr double kGauge = 1e-12;  // prefers no turn where handles leave it open
+constexpr int kAnew = -1;               // age of a matrix that is to be made
+constexpr double kNewtonSteps = 2.0;    // that a pose takes with a matrix just made
+constexpr int kShortenings = 2;         // of a step by a matrix that was made for an earlier pose
+constexpr double kLeastEnergy = 1e-12;  // of a step's decrease: what later ones are not worth
+constexpr double kGauge = 1e-12;        // prefers no turn where handles leave it open
 
 std::vector<bool> interface_bodies(const PoseStructure& structure) {
   std::vector<bool> out(structure.bodies.size(), false);
@@ -186,14 +186,15 @@ double PoseSolver::reach(const VectorX& step) const {
 }
 
 /// Newton's method on joints and the limits that are passed, by the least motion in the metric of H. Only the interface
-/// counts for that; the other bodies follow at the end. @return whether they hold
-bool PoseSolver::make_feasible(Pose& pose) {
+/// counts for that; the other bodies follow at the end. @param correction out: of all bodies. @return whether they hold
+bool PoseSolver::make_feasible(Pose& pose, VectorX& correction) {
   VectorX lambda, gone = VectorX::Zero(system_.interface_dofs());
+  correction = VectorX::Zero(system_.dofs());
   for (int i = 0; i <= kRestorations; ++i) {
     const Feasibility now = feasibility(*structure_, pose);
     if (!(std::isfinite(now.joints) && std::isfinite(now.limits))) return false;
     if (now.joints <= kFeasible && now.limits <= kSlack) {
-      if (i > 0) bring_along(gone, pose);
+      if (i > 0) bring_along(gone, correction, pose);
       return true;
     }
     if (i == kRestorations) break;
@@ -214,13 +215,12 @@ bool PoseSolver::make_feasible(Pose& pose) {
   return false;
 }
 
-/// What bodies off the interface do when those on it have moved.
-void PoseSolver::bring_along(const VectorX& interface, Pose& pose) {
-  VectorX step;
-  system_.follow(interface, step);
+/// What bodies off the interface do when those on it have moved. @param all out: how all have
+void PoseSolver::bring_along(const VectorX& interface, VectorX& all, Pose& pose) {
+  system_.follow(interface, all);
   for (std::size_t b = 0; b < pose.bodies.size(); ++b)
     if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0 && system_.interface_dof(static_cast<Index>(b)) < 0)
-      pose.bodies[b] = moved(pose.bodies[b], step.segment<6>(d));
+      pose.bodies[b] = moved(pose.bodies[b], all.segment<6>(d));
 }
 
 /// The matrix. All second derivatives of energy and joints make steps Newton's; joints' own rows are added as stiff
@@ -292,45 +292,109 @@ std::vector<PairTerm> PoseSolver::joint_terms(const Pose& pose, const Linearised
   return out;
 }
 
-/// One iteration: a step is taken if the energy falls, else the next is damped more.
-PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
+/// Where a step goes, before it is tried.
+struct PoseSolver::Direction {
+  VectorX residual{};  // gradient + Jᵀλ
+  VectorX plain{};     // the step by the matrix alone
+  VectorX step{};      // with what earlier steps tell
+  std::vector<bool> held{};
+};
+
+/// Newton's step with limits, by the matrix that is there.
+PoseSolver::Direction PoseSolver::direction(const Pose& pose, const Linearised& at) {
   const std::vector<Mat3> R = rotations_of(pose.bodies);
-  const Linearised at = linearise(pose);
   const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
-  if (factor_.age < 0) make_matrix(pose, acting, at, R);
+  if (factor_.age < 0) {
+    make_matrix(pose, acting, at, R);
+    pairs_.clear();
+    last_.moved.resize(0);
+  }
   ++factor_.age;
-  VectorX gradient = VectorX::Zero(system_.dofs());
+  Direction out{.residual = VectorX::Zero(system_.dofs())};
   for (std::size_t b = 0; b < acting.gradient.size(); ++b)
-    if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0) gradient.segment<6>(d) = acting.gradient[b];
-  VectorX interface, u;
-  system_.reduce(-gradient, interface);
+    if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0) out.residual.segment<6>(d) = acting.gradient[b];
+  VectorX interface;
+  system_.reduce(-out.residual, interface);
   if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
     multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
   solve_bounded(system_.compliance(at.rows), at.values() + system_.apply(at.rows, interface), at.pushes, multipliers_);
   system_.subtract_response(at.rows, multipliers_, interface);
-  system_.expand(interface, u);
+  system_.expand(interface, out.plain);
+  for (std::size_t i = 0; i < at.rows.size(); ++i) {
+    const Row& row = at.rows[i];
+    const double l = multipliers_[static_cast<Eigen::Index>(i)];
+    out.held.push_back(!at.pushes[i] || l > 0.0);
+    for (const auto& [body, J] : {std::pair(row.a, &row.J_a), std::pair(row.b, &row.J_b)})
+      if (const Index d = system_.dof(body); d >= 0) out.residual.segment<6>(d) += l * *J;
+  }
+  learn(out);
+  out.step = out.plain;
+  pairs_.correct(out.residual, out.step);
+  return out;
+}
 
+/// What the step before tells of the second derivative along the rows that are held: motions along them are all that
+/// pairs say something of.
+void PoseSolver::learn(const Direction& now) {
+  if (now.held != last_.held) {
+    pairs_.clear();
+  } else if (last_.moved.size() > 0) {
+    pairs_.add(last_.moved, now.residual - last_.residual, last_.plain - now.plain);
+  }
+  last_ = {.moved = {}, .residual = now.residual, .plain = now.plain, .held = now.held};
+}
+
+/// A pose some part of a step away, joints and limits met, and what the quadratic model promises of it.
+struct PoseSolver::Trial {
+  Pose pose{};
+  VectorX moved{};
+  double part = 1.0, promised = 0.0, energy = std::numeric_limits<double>::infinity();
+};
+
+PoseSolver::Trial PoseSolver::try_step(const Pose& pose, const Direction& way, double part) {
+  Trial out{.pose = advanced(pose, way.step, part), .moved = part * way.step, .part = part};
+  out.promised = part * (1.0 - 0.5 * part) * std::max(0.0, -way.residual.dot(way.step));
+  VectorX correction;
+  if (!make_feasible(out.pose, correction) || !all_finite(out.pose)) return out;
+  out.moved += correction;
+  out.energy = energy(out.pose);
+  return out;
+}
+
+/// Whether the steps that are left, at the rate of the last, take longer than a new matrix and Newton's few.
+bool PoseSolver::matrix_pays(double promised, double value) const {
+  if (promised >= factor_.promised) return true;
+  const double left = std::log(promised / std::max(options_.energy_tolerance * value, kLeastEnergy * promised)) /
+                      std::log(factor_.promised / promised);
+  return left > kNewtonSteps + system_.factor_cost();
+}
+
+/// One iteration: a step is taken if the energy falls. One that a matrix of an earlier pose makes too long is shortened
+/// to where the parabola through what is known has its least; else the next is damped more.
+PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
+  const Linearised at = linearise(pose);
+  const Direction way = direction(pose, at);
   double turn = 0.0;
-  for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, u.segment<3>(d).norm());
-  const double part = std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn));
-  // uᵀHu, as Hu = −g − Jᵀλ
-  const double square = -gradient.dot(u) - multipliers_.dot(system_.apply(at.rows, interface));
-  const double promised = part * (1.0 - 0.5 * part) * std::max(0.0, square);
-  Step out{.moved = part * reach(u), .outcome = Step::Outcome::kRejected};
-  Pose trial = advanced(pose, u, part);
-  const double lower =
-      make_feasible(trial) && all_finite(trial) ? energy(trial) : std::numeric_limits<double>::infinity();
+  for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, way.step.segment<3>(d).norm());
+  Trial trial = try_step(pose, way, std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn)));
+  Step out{.moved = trial.part * reach(way.step), .outcome = Step::Outcome::kRejected};
   const bool last =
-      out.moved <= options_.tolerance || promised <= options_.energy_tolerance * value + at.worth(multipliers_);
-  if (lower <= value - kArmijo * promised || (last && lower <= value)) {
-    if (damping_ > 0.0 && lower <= value - 0.5 * promised) {
+      out.moved <= options_.tolerance || trial.promised <= options_.energy_tolerance * value + at.worth(multipliers_);
+  const auto falls = [&] { return trial.energy <= value - kArmijo * trial.promised; };
+  for (int i = 0; i < kShortenings && !last && factor_.age > 0 && !falls() && std::isfinite(trial.energy); ++i) {
+    const double slope = -way.residual.dot(way.step) * trial.part, gain = value - trial.energy;
+    trial = try_step(pose, way, trial.part * 0.5 * slope / (slope - gain));
+  }
+  if (falls() || (last && trial.energy <= value)) {
+    if (damping_ > 0.0 && trial.energy <= value - 0.5 * trial.promised) {
       damping_ = damping_ > kLeastDamping ? damping_ / kDampingFactor : 0.0;
       factor_.age = kAnew;
     }
-    if (!last && promised > kContraction * factor_.promised) factor_.age = kAnew;
-    factor_.promised = promised;
-    pose = std::move(trial);
-    value = lower;
+    if (!last && matrix_pays(trial.promised, value)) factor_.age = kAnew;
+    factor_.promised = trial.promised;
+    last_.moved = std::move(trial.moved);
+    pose = std::move(trial.pose);
+    value = trial.energy;
     out.outcome = Step::Outcome::kTaken;
   } else if (!last) {
     if (factor_.age == 0) damping_ = std::max(kDampingFactor * damping_, kFirstDamping);
@@ -358,12 +422,14 @@ PoseResult PoseSolver::solve(Pose& pose) {
   if (damping_ > 0.0) factor_.age = kAnew;
   damping_ = 0.0;
   factor_.promised = std::numeric_limits<double>::infinity();
+  last_.moved.resize(0);
   if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
     // What handles resist must not count: joints come first, however far the handles are dragged off by it.
     system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()), {});
     factor_.age = kAnew;
   }
-  if (!make_feasible(trial)) return tell(Status::kInfeasible, pose);
+  VectorX correction;
+  if (!make_feasible(trial, correction)) return tell(Status::kInfeasible, pose);
   start_with_rigid_motion(trial);
   double value = energy(trial);
   Status status = Status::kIterationLimit;

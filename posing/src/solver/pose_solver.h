@@ -6,6 +6,7 @@
 #include "limber/posing/posing_options.h"
 #include "solver/bounded_system.h"
 #include "solver/pose_energy.h"
+#include "solver/secant_pairs.h"
 
 namespace limber::internal {
 
@@ -26,8 +27,8 @@ Feasibility feasibility(const PoseStructure& structure, const Pose& pose);
 /// Each iteration linearises joints and limits and takes the energy's quadratic model (ElasticSystem; with the turning
 /// stiffness of all loads, so that it is Newton's but for negative curvature). The step follows from a dense problem in
 /// the multipliers of joints and limits alone; the trial pose is put back onto the joints and taken if
-/// its energy is lower; else the next step is damped more. Poses between are feasible too. The matrix is made
-/// once a call, and anew where steps do not shrink fast enough with it.
+/// its energy is lower; else the step is shortened, or the next damped more. Poses between are feasible too. The matrix
+/// is kept from call to call, with what steps since have told of it, and made anew where that saves time.
 class PoseSolver {
  public:
   /// The structure must outlive the solver.
@@ -46,8 +47,8 @@ class PoseSolver {
     enum class Outcome { kTaken, kRejected, kLast } outcome = Outcome::kTaken;
   };
   void start_with_rigid_motion(Pose& pose) const;
-  bool make_feasible(Pose& pose);
-  void bring_along(const VectorX& interface, Pose& pose);
+  bool make_feasible(Pose& pose, VectorX& correction);
+  void bring_along(const VectorX& interface, VectorX& all, Pose& pose);
   void tell_turns(Pose& pose) const;
   Linearised linearise(const Pose& pose) const;
   void make_matrix(const Pose& pose, const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R);
@@ -59,6 +60,12 @@ class PoseSolver {
   std::vector<TwistMatrix> handle_stiffness() const;
   std::vector<PairTerm> joint_terms(const Pose& pose, const Linearised& at) const;
   double energy(const Pose& pose) const;
+  struct Direction;
+  Direction direction(const Pose& pose, const Linearised& at);
+  void learn(const Direction& now);
+  struct Trial;
+  Trial try_step(const Pose& pose, const Direction& way, double part);
+  bool matrix_pays(double promised, double value) const;
   Step step(Pose& pose, double& value);
   Pose advanced(const Pose& pose, const VectorX& step, double part) const;
   double reach(const VectorX& step) const;
@@ -74,6 +81,11 @@ class PoseSolver {
     int age = -1;           // steps that the matrix has been used for; −1: it is to be made anew
     double promised = 0.0;  // decrease by the step before
   } factor_;
+  SecantPairs pairs_;  // since the matrix was made, of steps along the rows that are held now
+  struct {
+    VectorX moved{}, residual{}, plain{};  // moved: empty if the next step is no continuation of it
+    std::vector<bool> held{};              // rows
+  } last_;
 };
 
 }  // namespace limber::internal

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "limber/core/cross_matrix.h"
+
 namespace limber::internal {
 namespace {
 
@@ -177,12 +179,6 @@ class RowWriter {
 
 }  // namespace
 
-Mat3 skew(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 Mat3 turning_stiffness(const Mat3& moment) {
   return 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity();
 }
@@ -200,13 +196,13 @@ PairMatrix joint_curvature(const PoseStructure& structure, const BodyJoint& join
   PairMatrix out = PairMatrix::Zero();
   out.block<3, 3>(0, 0) = turning_stiffness(reach * force.transpose() + at.turn * D.transpose());
   out.block<3, 3>(6, 6) = turning_stiffness(at.arm_b * force_b.transpose() + D.transpose() * at.turn);
-  const Mat3 F = skew(force);
+  const Mat3 F = cross_matrix(force);
   out.block<3, 3>(0, 3) = -F;
   out.block<3, 3>(0, 9) = F * at.turn;
-  out.block<3, 3>(0, 6) = -F * at.turn * skew(at.arm_b);
+  out.block<3, 3>(0, 6) = -F * at.turn * cross_matrix(at.arm_b);
   for (int i = 0; i < 3; ++i)  // −D : [a] T [b]
     for (int j = 0; j < 3; ++j)
-      out(i, 6 + j) -= D.cwiseProduct(skew(Vec3::Unit(i)) * at.turn * skew(Vec3::Unit(j))).sum();
+      out(i, 6 + j) -= D.cwiseProduct(cross_matrix(Vec3::Unit(i)) * at.turn * cross_matrix(Vec3::Unit(j))).sum();
   out.block<9, 3>(3, 0) = out.block<3, 9>(0, 3).transpose();
   return out;
 }

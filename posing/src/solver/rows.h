@@ -15,9 +15,6 @@ namespace limber::internal {
 
 using Twist = Eigen::Matrix<double, 6, 1>;  // ω, v
 
-/// a ×
-Mat3 skew(const Vec3& a);
-
 /// What a turn adds to the second derivative of an energy of points y = p + R s with gradients e:
 ///   Σ ½ (s eᵀ + e sᵀ) − (s·e) 1, the curvature of the points' arcs: negative where what is turned is pressed.
 Mat3 turning_stiffness(const Mat3& moment);

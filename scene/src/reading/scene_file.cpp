@@ -129,6 +129,7 @@ void read_body(const Json& value, const std::string& where, const std::filesyste
   body.placement = {.pose = read_pose(o),
                     .velocity = o.vec3("velocity", Vec3::Zero()),
                     .angular_velocity = o.vec3("angular_velocity", Vec3::Zero())};
+  body.placement.modal_skin = o.boolean("modal_skin", true);
   read_touch(o, scene, folder, body);
   body.movement = read_movement(o, true);
   if (body.movement.index() != 0 && (o.has("velocity") || o.has("angular_velocity")))

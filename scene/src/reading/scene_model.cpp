@@ -42,6 +42,32 @@ std::vector<T> pick(const std::vector<T>& all, std::span<const Index> kept) {
   return out;
 }
 
+/// Rows of `all` modes, of each those kept.
+std::vector<float> pick_columns(const std::vector<float>& rows, std::size_t all, std::span<const Index> kept) {
+  std::vector<float> out;
+  for (std::size_t first = 0; first < rows.size(); first += all)
+    for (const Index i : kept) out.push_back(rows[first + static_cast<std::size_t>(i)]);
+  return out;
+}
+
+/// Without what belongs to the volume block.
+ModalSkin pick(const ModalSkin& skin, std::span<const Index> kept) {
+  const auto all = static_cast<std::size_t>(skin.modes);
+  ModalSkin out = skin;
+  out.modes = static_cast<Index>(kept.size());
+  out.rotations = pick_columns(skin.rotations, all, kept);
+  out.shifts = pick_columns(skin.shifts, all, kept);
+  out.volume.clear();
+  out.gauge.shapes.clear();
+  constexpr std::size_t kNumbers = 12;  // a mode's, of a handle
+  for (std::size_t first = 0; first < skin.gauge.shapes.size(); first += kNumbers * all)
+    for (const Index i : kept) {
+      const double* numbers = skin.gauge.shapes.data() + first + kNumbers * static_cast<std::size_t>(i);
+      out.gauge.shapes.insert(out.gauge.shapes.end(), numbers, numbers + kNumbers);
+    }
+  return out;
+}
+
 /// Loads act on the render surface, contacts on the collision surface.
 std::vector<ModeStrength> strengths(const ModalModel& model) {
   std::vector<ModeStrength> out;
@@ -160,6 +186,7 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   lean.moments = pick(all.moments, kept);
   lean.render = pick(all.render, kept);
   if (all.collision) lean.collision = pick(*all.collision, kept);
+  if (all.skin && !kept.empty()) lean.skin = pick(*all.skin, kept);
   if (all.residual_compliance) lean.residual_compliance = with_statics_of_dropped(model, kept);
   return std::make_shared<const ModalModel>(std::move(lean));
 }

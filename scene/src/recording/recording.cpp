@@ -10,6 +10,7 @@
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
 #include "limber/model/pose_keys.h"
+#include "limber/model/skin_pose.h"
 #include "limber/scene/shape_surface.h"
 
 namespace limber {
@@ -31,9 +32,10 @@ double diagonal(const ModalSurface& surface) {
   return (high - low).cast<double>().norm();
 }
 
-/// All bodies of one model.
+/// All bodies of one model that bend in the same way.
 struct Cast {
   std::shared_ptr<const ModalModel> model;
+  bool modal_skin = false;
   std::vector<std::size_t> bodies;  // of the trajectory
   RecordedModel record;
   int mesh = -1;
@@ -43,9 +45,11 @@ std::vector<Cast> group_by_model(const Trajectory& trajectory) {
   std::vector<Cast> casts;
   for (std::size_t b = 0; b < trajectory.bodies.size(); ++b) {
     const auto& model = trajectory.bodies[b].model;
-    auto found = std::find_if(casts.begin(), casts.end(), [&](const Cast& c) { return c.model == model; });
+    const bool skin = trajectory.bodies[b].modal_skin;
+    auto found = std::find_if(casts.begin(), casts.end(),
+                              [&](const Cast& c) { return c.model == model && c.modal_skin == skin; });
     if (found == casts.end()) {
-      casts.push_back({.model = model, .bodies = {}, .record = {}});
+      casts.push_back({.model = model, .modal_skin = skin, .bodies = {}, .record = {}});
       found = casts.end() - 1;
     }
     found->bodies.push_back(b);
@@ -138,8 +142,30 @@ MorphedSurface unsigned_targets(const ModalSurface& surface, const RecordedModel
   return s;
 }
 
+/// A surface with Ũ in place of U: what its joints turn and carry.
+ModalSurface undeformed(const ModalModel& model) {
+  const ModalSurface& shown = model.render();
+  ModalSurface surface{shown.rest, shown.triangles, ModalBasis(shown.vertices(), model.modes())};
+  const ModalSkin& skin = *model.data().skin;
+  SkinPose pose(skin);
+  std::vector<double> unit(static_cast<std::size_t>(model.modes()), 0.0);
+  for (Index m = 0; m < model.modes(); ++m) {
+    unit[static_cast<std::size_t>(m)] = 1.0;
+    pose.set(unit);
+    for (Index v = 0; v < surface.vertices(); ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      const Vec3 r = surface.rest[at].cast<double>(), u = shown.basis.shape(v, m).cast<double>();
+      surface.basis.set(v, m, (pose.undeformed_part(skin.render[at], r, u) - r).cast<float>());
+    }
+    unit[static_cast<std::size_t>(m)] = 0.0;
+  }
+  return surface;
+}
+
 int add_mesh(GlbBuilder& glb, const Cast& cast, std::size_t number, const RecordingOptions& options) {
-  const ModalSurface& surface = cast.model->render();
+  ModalSurface carried;  // by joints
+  if (cast.modal_skin) carried = undeformed(*cast.model);
+  const ModalSurface& surface = cast.modal_skin ? carried : cast.model->render();
   const MorphedSurface s =
       options.unsigned_weights ? unsigned_targets(surface, cast.record) : signed_targets(surface, cast.record);
   GlbMesh mesh{.name = cast.model->name()};
@@ -150,6 +176,7 @@ int add_mesh(GlbBuilder& glb, const Cast& cast, std::size_t number, const Record
   mesh.position = glb.add_vertex_vectors(s.position);
   mesh.normal = glb.add_vertex_vectors(s.normal);
   mesh.triangles = glb.add_triangles(surface.triangles);
+  if (cast.modal_skin) mesh.influences = glb.add_influences(cast.model->data().skin->render);
   for (std::size_t i = 0; i < s.target_position.size(); ++i) {
     const Index mode = cast.record.recorded[i];
     GlbMorphTarget target{.name = mode_target_name(mode, cast.model->modes(), cast.model->frequency_hz(mode))};
@@ -211,6 +238,30 @@ std::vector<float> weights(const BodyTrack& body, const RecordedModel& record, b
     }
   }
   return out;
+}
+
+/// Where the handles of a body are in its frame, key by key: a node each, which the skin's joints are.
+struct Joints {
+  std::vector<int> nodes;
+  std::vector<std::vector<RigidTransform>> poses;  // by handle
+};
+
+Joints add_joints(GlbBuilder& glb, const BodyTrack& body) {
+  SkinPose pose(*body.model->data().skin);
+  Joints joints;
+  joints.poses.resize(pose.handles().size());
+  for (std::size_t key = 0; key < body.poses.size(); ++key) {
+    pose.set(body.amplitudes_at(key));
+    for (std::size_t h = 0; h < joints.poses.size(); ++h) {
+      const SkinPose::Handle& handle = pose.handles()[h];
+      joints.poses[h].push_back({normalized(quaternion_from_matrix(Mat3::Identity() + handle.turn)), handle.shift});
+    }
+  }
+  for (std::size_t h = 0; h < joints.poses.size(); ++h)
+    joints.nodes.push_back(glb.add_node({.name = body.name + " handle " + std::to_string(h),
+                                         .translation = joints.poses[h].front().p,
+                                         .rotation = joints.poses[h].front().q}));
+  return joints;
 }
 
 std::vector<float> shown_times(const Trajectory& trajectory, double slow_motion) {
@@ -311,17 +362,30 @@ Recording make_recording(const Trajectory& trajectory, const RecordingOptions& o
     cast.mesh = add_mesh(glb, cast, c, options);
     for (const std::size_t b : cast.bodies) {
       const BodyTrack& body = trajectory.bodies[b];
+      const auto add = [&](int node, GlbPath path, const std::vector<float>& values) {
+        animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
+      };
+      Joints joints;
+      if (cast.modal_skin) joints = add_joints(glb, body);
       const int node = glb.add_node({.name = body.name,
-                                     .mesh = cast.mesh,
+                                     .mesh = cast.modal_skin ? -1 : cast.mesh,
+                                     .children = joints.nodes,
                                      .translation = body.poses.front().p,
                                      .rotation = normalized(body.poses.front().q)});
       nodes.push_back(node);
-      const auto add = [&](GlbPath path, const std::vector<float>& values) {
-        animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
-      };
-      add(GlbPath::kTranslation, translation_keys(body.poses));
-      add(GlbPath::kRotation, rotation_keys(body.poses));
-      if (!cast.record.recorded.empty()) add(GlbPath::kWeights, weights(body, cast.record, options.unsigned_weights));
+      add(node, GlbPath::kTranslation, translation_keys(body.poses));
+      add(node, GlbPath::kRotation, rotation_keys(body.poses));
+      for (std::size_t h = 0; h < joints.nodes.size(); ++h) {
+        add(joints.nodes[h], GlbPath::kTranslation, translation_keys(joints.poses[h]));
+        add(joints.nodes[h], GlbPath::kRotation, rotation_keys(joints.poses[h]));
+      }
+      // Where a skinned mesh is told by its joints alone; viewers want its node at the root.
+      const int shown =
+          cast.modal_skin
+              ? glb.add_node({.name = body.name + " surface", .mesh = cast.mesh, .skin = glb.add_skin(joints.nodes)})
+              : node;
+      if (!cast.record.recorded.empty())
+        add(shown, GlbPath::kWeights, weights(body, cast.record, options.unsigned_weights));
     }
     warn_of_fast_modes(trajectory, cast.record, recording.warnings);
     warn_of_many_targets(cast.record, recording.warnings);

@@ -13,6 +13,32 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+double beyond(const Interval& range, double x) { return std::max({range.low - x, x - range.high, 0.0}); }
+
+/// @param q coordinates as in joint_constraint.h
+double limit_excess(const JointSpec& joint, const std::array<double, 3>& q) {
+  const JointLimits& limits = joint.limits;
+  switch (joint.type) {
+    case JointType::kRevolute:
+      return beyond(limits.rotation, q[0]);
+    case JointType::kCylindrical:
+      return std::max(beyond(limits.rotation, q[0]), beyond(limits.translation[0], q[1]));
+    case JointType::kPrismatic:
+      return beyond(limits.translation[0], q[0]);
+    case JointType::kPlanar:
+      return std::max(
+          {beyond(limits.translation[0], q[0]), beyond(limits.translation[1], q[1]), beyond(limits.rotation, q[2])});
+    case JointType::kBall: {
+      double most = std::acos(std::clamp(std::cos(q[1]) * std::cos(q[2]), -1.0, 1.0)) - limits.cone;
+      for (std::size_t i = 0; i < 3; ++i) most = std::max(most, beyond(limits.euler[i], q[i]));
+      return std::max(most, 0.0);
+    }
+    case JointType::kFixed:
+      break;
+  }
+  return 0.0;
+}
+
 class Run {
  public:
   Run(const Scene& scene, const SceneModels& models, const RunOptions& options)
@@ -73,6 +99,7 @@ class Run {
       BodyTrack track;
       track.name = scene_.bodies[i].name;
       track.model = models_.of_body[i];
+      track.modal_skin = world_.has_modal_skin(ids_[i]);
       bytes += keys * (sizeof(RigidTransform) + sizeof(Vec3) + sizeof(BodyEnergy) + 16.0 * track.model->modes());
       t.bodies.push_back(std::move(track));
     }
@@ -88,6 +115,8 @@ class Run {
       report.view = world_.joint(player_.joints()[i]);
       report.largest_distance_error = std::max(report.largest_distance_error, report.view.distance_error);
       report.largest_angle_error = std::max(report.largest_angle_error, report.view.angle_error);
+      report.largest_limit_excess =
+          std::max(report.largest_limit_excess, limit_excess(scene_.joints[i].spec, report.view.position));
     }
   }
 

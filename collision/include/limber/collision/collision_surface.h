@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,9 @@
 #include "limber/collision/tree_node.h"
 #include "limber/core/aligned_array.h"
 #include "limber/core/types.h"
+#include "limber/dynamics/body_shape.h"
+#include "limber/dynamics/skin_extent.h"
+#include "limber/dynamics/skin_tiles.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
 
@@ -33,16 +37,19 @@ struct SurfaceEdge {
 
 struct CollisionSurfaceOptions {
   int leaf_triangles = 4;  ///< most triangles of a leaf, 1 to 64
+  bool skin = false;       ///< the body bends by its model's modal skin
 };
 
 /// Immutable, checked, shared through std::shared_ptr<const CollisionSurface>.
 ///
-/// A vertex of the body is at p_BP = r + Σ_i z_i u_i(r), r in double, u in float as the asset stores it; all else that
-/// collision/ says about a deformed body is meant to the last bits of that. Vertices at equal places with equal shapes
-/// (a seam of a render surface) are one: canonical_vertex() is the lowest of them, and triangles name that one only.
+/// A vertex of the body is at p_BP = r + Σ_i z_i u_i(r), r in double, u in float as the asset stores it, or where its
+/// modal skin has it (skin_pose.h); all else that collision/ says about a deformed body is meant to the last bits of
+/// that. Vertices at equal places with equal shapes (a seam of a render surface) are one: canonical_vertex() is the
+/// lowest of them, and triangles name that one only.
 class CollisionSurface {
  public:
-  /// The model's collision surface, k modes.
+  /// The model's collision surface, k modes. @throws InvalidArgument also for a model that is not touchable, and for a
+  /// skin that the model has not
   explicit CollisionSurface(std::shared_ptr<const ModalModel> model, const CollisionSurfaceOptions& options = {});
   /// Rigid surfaces: no modes. @throws InvalidArgument what validate(Shape) throws, or where the options are out of
   /// range or a coordinate is beyond 1e30 m; the same above.
@@ -52,6 +59,12 @@ class CollisionSurface {
 
   /// Null for a rigid surface.
   const std::shared_ptr<const ModalModel>& model() const { return model_; }
+  /// Null for one that bends by its modes alone.
+  const ModalSkin* skin() const { return skinned_ ? &*model_->data().skin : nullptr; }
+  const SkinInfluences& influences(Index vertex) const {
+    return skin_influences(*model_, SurfacePoint::Surface::kCollision)[static_cast<std::size_t>(vertex)];
+  }
+  const SkinExtent* skin_extent() const { return extent_ ? &*extent_ : nullptr; }
   Index modes() const { return modes_; }
   Index vertices() const { return static_cast<Index>(rest_.size()); }
   Index triangles() const { return static_cast<Index>(triangles_.size()); }
@@ -62,7 +75,8 @@ class CollisionSurface {
   const float* row(Index vertex, int axis) const {
     return modes_ > 0 ? model_->collision_rows().row(vertex, axis) : nullptr;
   }
-  /// Largest |u_i| of any vertex, rounded up, kg^−½: no vertex moves by more than Σ_i |z_i| of these.
+  /// Largest |u_i| of any vertex, rounded up, kg^−½: no vertex moves by more than Σ_i |z_i| of these. With a skin
+  /// largest |Ũ_i|: what moves vertices beside their handles.
   double largest_shape(Index mode) const { return largest_shape_[static_cast<std::size_t>(mode)]; }
 
   // -- Topology ------------------------------------------------------------------------------------------------------
@@ -127,9 +141,20 @@ class CollisionSurface {
   void list_leaf_vertices();
   void build_bounds();
   void bound_node(std::size_t n, int axis, std::span<const Index> below);
+  void find_undeformed_rows();
+  const float* bounded_row(Index vertex, int axis) const {
+    return skinned_ ? undeformed_.data() + (3 * static_cast<std::size_t>(vertex) + static_cast<std::size_t>(axis)) *
+                                               static_cast<std::size_t>(modes_)
+                    : row(vertex, axis);
+  }
+  std::span<const std::uint8_t> node_handles(std::size_t n) const {
+    return std::span(node_handles_)
+        .subspan(node_handles_start_[n], node_handles_start_[n + 1] - node_handles_start_[n]);
+  }
 
   std::shared_ptr<const ModalModel> model_;
   Index modes_ = 0;
+  bool skinned_ = false;
   std::vector<Vec3> rest_;
   Aabb rest_bounds_;
   double rest_radius_ = 0.0;  ///< largest distance of a vertex from the origin, m
@@ -147,7 +172,15 @@ class CollisionSurface {
   std::vector<Index> leaf_vertices_;   ///< distinct vertices of each leaf
   std::vector<TreeNode> vertex_tree_;  ///< the same nodes; a leaf's range is of leaf_vertices_
 
-  // Bounds of a node as a function of the amplitudes, see docs/collision.md:
+  // With a skin.
+  std::vector<float> undeformed_;  ///< Ũ, [vertex][axis][mode]
+  SkinTiles tiles_;
+  std::optional<SkinExtent> extent_;
+  std::vector<std::uint8_t> node_handles_;  ///< that the vertices below a node hang on
+  std::vector<std::size_t> node_handles_start_;
+
+  // Bounds of a node as a function of the amplitudes, see docs/collision.md; with a skin those of r + Ũ z, for the
+  // node's handles to turn and carry:
   //   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
   // rounded so that the box, evaluated in single precision, encloses the vertices evaluated in double.
   std::vector<double> weights_;    ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive

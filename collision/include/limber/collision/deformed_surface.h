@@ -5,6 +5,10 @@
 ///   body.bind(surface, z);                 // O(k)
 ///   const Aabb box = body.bounds(0);       // of the whole body, from the amplitudes alone
 ///   const Vec3& p = body.vertex(17);       // r + U z, of this vertex only
+///
+/// Where the surface bends by a modal skin a vertex is where the skin has it, and a box is that of r + Ũ z, turned and
+/// carried by each handle that a vertex below hangs on: weights are no less than 0 and sum to 1, so that every vertex
+/// is within the box of all of these.
 #pragma once
 
 #include <array>
@@ -51,10 +55,15 @@ class DeformedSurface {
 
   const CollisionSurface& surface() const { return *surface_; }
   std::span<const double> amplitudes() const;
+  /// The handles in this state; null for a surface without a skin.
+  const SkinPose* skin() const;
+  /// How far vertices may come while amplitudes change: SkinExtent::find(). @pre with a skin
+  double skin_extent(std::span<const double> change, std::span<double> shape);
 
   /// Encloses all triangles below a node, in whichever precision vertex() has. @pre bound; node exists
   Aabb bounds(Index node);
-  /// r + Σ z_i u_i, in double. @pre bound; the vertex exists. The reference holds until the next bind().
+  /// r + Σ z_i u_i, or by the skin, in double. @pre bound; the vertex exists. The reference holds until the next
+  /// bind().
   const Vec3& vertex(Index v);
   /// Corners of a triangle.
   std::array<Vec3, 3> triangle(Index t);
@@ -71,6 +80,8 @@ class DeformedSurface {
   void begin_state();
   void make_box(Index node);
   void make_triangle_boxes(Index leaf);
+  void carry_box(Index node);
+  void set_skin(std::span<const double> z, bool same_surface);
 
   std::shared_ptr<const CollisionSurface> surface_;
   std::unique_ptr<Scratch> scratch_;

@@ -11,13 +11,6 @@
 
 namespace limber {
 
-/// [v], the matrix of v × .
-inline Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 /// Read access to the bodies' places. Body −1 is the world: at the origin, without modes.
 ///
 /// The middle of a step is the mean of its two ends, for points and directions in the world. With R₁ = cay(τ) R₀ a
@@ -33,10 +26,18 @@ class BodyStates {
   Mat3 rotation(Index body, StepTime when) const;               ///< R_WB, or R' in the middle
   /// The Cayley vector τ of the body's turn over the step, rad where it is small: R₁ = cay(τ) R₀, |τ| = 2 tan(angle/2).
   Vec3 turn(Index body) const;
-  std::span<const double> amplitudes(Index body, StepTime when) const;
-  Vec3 velocity(Index body, StepTime when) const;          ///< of the body origin, world, m/s
-  Vec3 angular_velocity(Index body, StepTime when) const;  ///< world, rad/s
+  std::span<const double> amplitudes(Index body, StepTime when) const;  ///< at one of the step's ends
+  Vec3 velocity(Index body, StepTime when) const;                       ///< of the body origin, world, m/s
+  Vec3 angular_velocity(Index body, StepTime when) const;               ///< world, rad/s
   std::span<const double> rates(Index body, StepTime when) const;
+  /// Where the body's points are, at one of the step's ends. @pre not static, here and in the next two
+  BodyShape shape(Index body, StepTime when) const;
+  /// Whether it bends by a modal skin.
+  bool skinned(Index body) const { return this->body(body).group->skinned(this->body(body).slot); }
+  /// For means over the step. @pre skinned
+  std::array<ShapeBetween, kShapesBetween> shapes_between(Index body) const {
+    return this->body(body).group->shapes_between(this->body(body).slot);
+  }
   bool is_static(Index body) const { return body < 0 || this->body(body).group == nullptr; }
   const ConstrainedBody& body(Index body) const { return table_[static_cast<std::size_t>(body)]; }
 

@@ -181,11 +181,15 @@ class ContactSet {
   /// Books what the step did: after the islands' steps, before the next update().
   /// @param asleep by body: whether it sleeps. Its contacts were not given to update(): they are remembered as they
   /// were, and told neither as lasting nor as ended
-  void finish(std::span<const char> asleep = {});
+  /// @param some_woke whether a body that slept at the last call does not any more; where none did, those that sleep
+  /// cost nothing
+  void finish(std::span<const char> asleep = {}, bool some_woke = true);
   /// Contacts that press, or have ceased to, in the last step, ordered by id.
   std::span<const ContactEvent> events() const;
   /// Contacts that pressed in the last step, ordered by id.
   std::span<const ContactMemory> memory() const;
+  /// Those under which bodies fell asleep, ordered by id.
+  std::span<const ContactMemory> resting() const;
   /// Impacts under way, ordered by (a, b).
   std::span<const StrikeMemory> strikes() const;
   /// Pairs that resisted rolling in the last step, ordered by (a, b).

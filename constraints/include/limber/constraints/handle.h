@@ -71,6 +71,7 @@ class Handle final : public Constraint {
   Vec3 force_ = Vec3::Zero();
   std::array<double, 3> last_force_{};
   std::vector<double> modal_;
+  mutable std::vector<Vec3> shapes_;  // scratch of add_force_derivative()
 };
 
 }  // namespace limber

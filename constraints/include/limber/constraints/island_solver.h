@@ -42,6 +42,7 @@
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
 #include "limber/constraints/step_attempts.h"
+#include "limber/core/stage_times.h"
 #include "limber/solvers/solve_status.h"
 
 namespace limber {
@@ -55,6 +56,7 @@ struct IslandOptions {
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
   /// are the same: what joints alone lose to the method is then given back.
   bool undisturbed = false;
+  bool timed = false;  ///< fill IslandReport::times
   /// J: the energy error carried over from the last step, IslandReport::energy_surplus; at most 1e-7 of the energies
   /// at hand, of bodies that had no motion to take it from.
   double energy_surplus = 0.0;
@@ -78,6 +80,7 @@ struct IslandReport {
                                 ///< how far the impulses are from the rows' law
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
+  StageTimes times{};           ///< kRows, kSolve and kCommit, with IslandOptions::timed
 };
 
 /// The solver and its memory, which grows to the largest island seen; after that a step allocates nothing. One thread
@@ -89,10 +92,20 @@ class IslandSolver {
   IslandSolver(IslandSolver&&) noexcept;
   IslandSolver& operator=(IslandSolver&&) noexcept;
 
-  /// Advances the members by one step.
+  /// Advances the members by one step: foresee() and finish().
   /// @param table the bodies that rows name. @param members indices into it, ascending: every body the rows touch
   IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                     std::span<Constraint* const> constraints, const IslandOptions& options);
+
+  /// Finds where the step, or the first of its parts, takes the members (BodyGroup::predicted_frame() and the like).
+  /// They stay where they are; another call in place of finish() forgets this one. Arguments as for step(); they are
+  /// to last until finish(). @pre no watch
+  void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
+               std::span<Constraint* const> constraints, const IslandOptions& options);
+  /// What foresee() took, with IslandOptions::timed; finish() tells of itself.
+  const StageTimes& times() const;
+  /// Moves them there, and through the parts that are left. @pre foresee()
+  IslandReport finish();
 
  private:
   struct Impl;

@@ -143,6 +143,7 @@ class JointConstraint final : public Constraint {
   double step_ = 0.0;
   Mat3 axes_at_start_ = Mat3::Identity();
   std::vector<double> modal_a_, modal_b_, modal_turn_;
+  mutable std::vector<Vec3> shapes_;  // scratch of add_force_derivative()
 };
 
 }  // namespace limber

@@ -7,6 +7,10 @@
 /// displacement and the rotation that fits the displacements u_v best in the least-squares sense, linear in z:
 ///   D = Σ w_v U_v,    Θ = I_P⁻¹ Σ w_v [r_v − r̄]ₓ U_v,    I_P = Σ w_v (|x|²1 − x xᵀ),  x = r_v − r̄
 /// Θ is zero about directions in which the patch has no extent. A frame placed off the patch moves rigidly with it.
+///
+/// On a body that bends by its modal skin the origin is carried by the skin (skin_pose.h): one point of the surface by
+/// the corners of its triangle, a patch's frame by the handles that the patch hangs on in the mean, so that it is at r
+/// + D z to first order. Its axes turn by exp([Θ z]ₓ) all the same.
 #pragma once
 
 #include <memory>
@@ -26,15 +30,18 @@ class MaterialFrame {
   explicit MaterialFrame(const JointFrame& in_world);
   /// Moves with the body frame alone, whatever the modes do. @param in_body origin and axes, body frame, rest shape
   MaterialFrame(Index body, const JointFrame& in_body);
-  /// One point of the surface; axes of the body frame.
-  MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at);
+  /// One point of the surface; axes of the body frame. @param skinned the body bends by its model's skin, here and
+  /// below
+  MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at, bool skinned = false);
   /// A patch: equal weights for all points. @param in_body where the frame sits in the rest shape
   /// @throws InvalidArgument if `patch` is empty or a point of it is not valid
-  MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body);
+  MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body,
+                bool skinned = false);
 
   Index body() const { return body_; }
-  /// D, of the origin, one column per mode; none where modes do not show.
-  std::span<const Vec3> displacements() const { return displacement_; }
+  /// What the origin moves by with each mode, as bent at the predicted end of the step, body axes; none where modes do
+  /// not show. @param room for what is not kept; the result may refer to it
+  std::span<const Vec3> displacements(const BodyStates& states, std::vector<Vec3>& room) const;
 
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
   Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
@@ -60,16 +67,33 @@ class MaterialFrame {
   friend struct StateFields;
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.body_, s.rest_.origin, s.rest_.axes, s.displacement_, s.rotation_);
+    return std::tie(s.body_, s.rest_.origin, s.rest_.axes, s.displacement_, s.rotation_, s.anchors_);
   }
+
+  /// What hangs on the handles of a skin and is moved by its modes: a share of the origin.
+  struct Anchor {
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.influences.weight, s.influences.handle, s.rest, s.share, s.shapes);
+    }
+
+    SkinInfluences influences{};
+    Vec3 rest = Vec3::Zero();
+    double share = 1.0;
+    std::vector<Vec3> shapes{};  // one per mode
+  };
 
   Mat3 turning(const BodyStates& states, StepTime when) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
+  Vec3 place(const BodyShape& shape) const;
+  void add_rows(const BodyShape& shape, const Vec3& f_B, std::span<double> g) const;
+  void add_rows(const BodyStates& states, StepTime when, const Vec3& f_B, std::span<double> g) const;
 
   Index body_ = -1;
   JointFrame rest_;
   std::vector<Vec3> displacement_, rotation_;  // D, Θ, one column per mode; empty: none
+  std::vector<Anchor> anchors_;                // where the body has a skin; else none
 };
 
 /// All vertices of a surface within a radius of a point, as a patch; the nearest vertex if there is none.

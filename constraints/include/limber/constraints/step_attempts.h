@@ -15,6 +15,7 @@ enum class StepAttempt {
   kSlowed,           ///< relative motion was taken at its start: a swing would have ended too high
   kCutAtFirstTouch,  ///< where fast bodies come to what they would have passed (docs/contact.md)
   kHeldAtTouch,      ///< and stay for the rest of the step
+  kLookedFarther,    ///< contacts were found anew: bodies came farther than they had been looked for
   kRefused,          ///< impulses or bending were given up: the step is unsettled
 };
 /// How many parts of steps were taken so.
@@ -32,7 +33,7 @@ class StepAttempts {
   }
 
  private:
-  std::array<int, 7> counts_{};
+  std::array<int, 8> counts_{};
 };
 
 }  // namespace limber

@@ -16,6 +16,7 @@
 
 #include "limber/core/state_archive.h"
 #include "limber/dynamics/body_energy.h"
+#include "limber/dynamics/body_shape.h"
 #include "limber/dynamics/modal_step.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
@@ -60,7 +61,8 @@ class BodyGroup {
   const ModalStep& modal_step() const { return whole_; }
 
   // Bodies. Adding may allocate; a vacant slot is used first. The new body is at rest shape.
-  Index add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity);
+  /// @param skinned whether it bends by its modal skin. @pre not so for a model that has none
+  Index add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity, bool skinned = false);
   void remove(Index slot);
   Index slots() const { return static_cast<Index>(bodies_.size()); }
   Index count() const { return slots() - static_cast<Index>(vacant_.size()); }
@@ -80,6 +82,17 @@ class BodyGroup {
     return bodies_[static_cast<std::size_t>(slot)].previous_pose;
   }
   std::span<const double> previous_amplitudes(Index slot) const { return previous_amplitudes_.modes(slot); }
+
+  // Where points of the surface are and how they move with the amplitudes, now, at the predicted end of the step, and
+  // at any amplitudes. Views of what the slot holds.
+  bool skinned(Index slot) const { return skin(slot) != nullptr; }
+  BodyShape shape(Index slot) const { return shape_at(slot, amplitudes(slot)); }
+  BodyShape predicted_shape(Index slot) const { return shape_at(slot, predicted_amplitudes(slot)); }
+  BodyShape shape_at(Index slot, std::span<const double> z) const { return {*model_, z, skin(slot)}; }
+  /// For means over the way between the two. @pre skinned
+  std::array<ShapeBetween, kShapesBetween> shapes_between(Index slot) const;
+  /// What a body with a skin remembers of its last shapes; null: none.
+  SkinMemory* skin(Index slot) const;
 
   // Points of the surface, deformed.
   Vec3 position(Index slot, const SurfacePoint& at) const;  ///< world, m
@@ -132,9 +145,11 @@ class BodyGroup {
   /// The same for a step of the length of `modes`, in which they answer as it says: part of a step that is cut.
   /// Impulses with a delay are not to be waiting then, nor a parent's new place.
   void predict(Index slot, const Vec3& gravity, const ConstraintLoad& load, const ModalStep& modes);
-  /// The same for a free body whose frame's end is found by whoever solves its constraints; its modes go through the
-  /// step as above. @param end the frame there. @param modal as ConstraintLoad::modal
-  void predict(Index slot, const RigidFrame& end, std::span<const double> modal, const ModalStep& modes);
+  /// The same for a body whose frame's end is found by whoever solves its constraints; its modes go through the step as
+  /// above. @param end the frame there. @param excitation what the modes feel of it. @param modal as
+  /// ConstraintLoad::modal
+  void predict(Index slot, const RigidFrame& end, const FrameExcitation& excitation, std::span<const double> modal,
+               const ModalStep& modes);
   /// A step in which the modes do not move: as the body is, but for the frame.
   void predict_rest(Index slot, const RigidFrame& end);
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
@@ -180,8 +195,16 @@ class BodyGroup {
 
   /// First mass moment about the body origin, deformed: m c + Σ z_i p_i, body axes, kg·m.
   Vec3 first_moment(Index slot) const;
+  Vec3 predicted_first_moment(Index slot) const;
 
  private:
+  /// Of a body with a skin. Not state: all of it follows from amplitudes.
+  struct Skin {
+    explicit Skin(const ModalSkin& of) : memory(of) {}
+    SkinMemory memory;
+    std::array<std::vector<double>, kShapesBetween> between;  // amplitudes
+  };
+
   /// One row of padded, 64-byte aligned modes per slot.
   class ModeRows {
    public:
@@ -205,12 +228,13 @@ class BodyGroup {
 
   struct DelayedImpulse {
     SurfacePoint at;
-    Vec3 impulse_B;  // N·s
-    double time;     // s into the next step
+    Vec3 impulse_B;               // N·s
+    double time;                  // s into the next step
+    std::vector<double> modal{};  // Jᵀ impulse_B, of a body with a skin
 
     template <class Self>
     static auto state_fields(Self& s) {
-      return std::tie(s.at, s.impulse_B, s.time);
+      return std::tie(s.at, s.impulse_B, s.time, s.modal);
     }
   };
 
@@ -261,6 +285,7 @@ class BodyGroup {
   bool answer_statically(Index slot, std::span<const double> modal, const ModalStep& step);
   void clear_loads(Index slot);
   void clear_modes(Index slot);
+  double modal_impulse(const DelayedImpulse& impulse, std::size_t mode) const;
   BodyEnergy energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
                        std::span<const double> answer, const Vec3& gravity) const;
   Vec3 first_moment_of(std::span<const double> z) const;
@@ -282,6 +307,7 @@ class BodyGroup {
   std::vector<Coupling> couplings_;  // empty for free bodies
 
   std::vector<Body> bodies_;
+  std::vector<std::unique_ptr<Skin>> skins_;  // by slot
   std::vector<Index> vacant_;
   bool within_step_ = false;
   ModeRows amplitudes_, rates_, previous_amplitudes_;

@@ -13,6 +13,7 @@
 
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/core/stage_times.h"
 #include "limber/core/state_archive.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
@@ -25,6 +26,7 @@ class ExactMotion;
 struct BodyGeometry {
   std::shared_ptr<const ModalModel> model{};  ///< its collision surface, which deforms with the amplitudes
   std::shared_ptr<const Shape> shape{};       ///< a rigid shape, in the body frame
+  bool skin = false;                          ///< the surface bends by the model's modal skin
 };
 
 /// Two bodies meet only if each one's layers have a bit in common with the other's mask.
@@ -60,6 +62,10 @@ struct ContactQuery {
   /// Ascending; none: all. Otherwise only pairs of these bodies are looked at, among each other and with those that do
   /// not move; all else is as it was in the last query.
   std::span<const Index> bodies{};
+  /// Ascending; none: not known. Otherwise all others are as they were in the last query, which they slept in: what a
+  /// source may pass over without a look.
+  std::span<const Index> awake{};
+  StageTimes* times = nullptr;  ///< a source may add what it spends on its stages; null: nobody asks
 };
 
 struct ImpactQuery {

@@ -63,6 +63,9 @@ class ExactMotion {
   /// the frame moved straight on. @param arm |r + U z| ≤ arm at the start, m
   double sway(double arm, std::span<const double> shape) const;
 
+  /// By how much each amplitude may differ from its value at the start, within the step. @param change modes() numbers
+  void changes(std::span<double> change) const;
+
   // For those who make one by hand: the frame first, then its modes, then the impulses on them.
   FramePath& path() { return path_; }
   /// @param lambda, decay as in Mode; kept by reference. @param z, rates at the step's start; as many of each

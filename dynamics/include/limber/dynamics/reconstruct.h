@@ -15,6 +15,7 @@
 #include "limber/core/rigid_transform.h"
 #include "limber/dynamics/skin_tiles.h"
 #include "limber/model/modal_basis.h"
+#include "limber/model/modal_model.h"
 #include "limber/model/skin_pose.h"
 
 namespace limber {
@@ -26,8 +27,15 @@ struct ReconstructionTarget {
   float* positions = nullptr;          ///< out: 3V, xyz per vertex; m
   float* normals = nullptr;  ///< out, optional: 3V unit normals of the deformed surface, area-weighted; null: none
   const float* displacement = nullptr;  ///< d, 3V, xyz per vertex, body frame, m; null: none
-  const SkinPose* skin = nullptr;       ///< its handles at these amplitudes; null: drawn by its modes alone
+  Index modes = -1;  ///< the first so many are summed, ≤ k; negative: all. For bodies far away (drawn_modes())
+  const SkinPose* skin = nullptr;  ///< its handles at these amplitudes; null: drawn by its modes alone
 };
+
+/// How many of the first modes are to be drawn so that no vertex is off by more than a tolerance: the fewest for which
+/// Σ |z_i| max|shape_i| over the others is at most that. The sets are nested, so that a body that is drawn by more or
+/// fewer modes from one frame to the next jumps by no more than the larger of the two tolerances.
+/// @param extent of the render surface, as long as z. @param tolerance m, ≥ 0; 0: all whose amplitude is not zero
+Index drawn_modes(const SurfaceExtent& extent, std::span<const double> z, double tolerance);
 
 /// Writes the vertices (and normals) of every target; arrays of different targets must not overlap. Does not allocate
 /// but in what `jobs` does. The result has the same bits however targets are grouped and whatever `jobs` does.

@@ -93,12 +93,19 @@ class RigidFrame {
   /// Where the parent is at the end of the coming step. Without a new one it goes on at its velocity and angular
   /// velocity.
   void set_parent(const KinematicFrame& at_step_end);
+  /// Whether it has been told where the parent is then.
+  bool has_next_parent() const { return parent_was_set_; }
   /// The parent now.
   const KinematicFrame& parent() const { return parent_; }
 
   /// Of a free body (kFree): all of its motion, by momentum. @param angular_momentum about the body origin, world,
   /// kg·m²/s
   void set_motion(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_momentum);
+
+  /// Of a body whose origin its parent carries (kPoint, kLine): how it turns, the parent staying where it is.
+  /// @param q_WB kLine: a turn about the line as the parent carries it. @param angular_momentum as above; kLine: its
+  /// part along the line counts
+  void set_turn(const FrameConstants& c, const Quaternion& q_WB, const Vec3& angular_momentum);
 
   /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. What the fixing takes up has no
   /// effect.

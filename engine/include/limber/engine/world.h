@@ -37,6 +37,7 @@
 #include "limber/constraints/step_attempts.h"
 #include "limber/core/jobs.h"
 #include "limber/core/rigid_transform.h"
+#include "limber/core/stage_times.h"
 #include "limber/dynamics/body_energy.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
@@ -106,6 +107,9 @@ struct BodyPlacement {
   /// What others meet in place of the model's collision surface: it moves with the frame and does not deform, and
   /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.
   std::shared_ptr<const Shape> shape{};
+  /// Whether the body bends by the modal skin of its model (docs/large-bends.md), where it has one: drawn, held, joined
+  /// and pushed there. False, or no skin: by its modes alone.
+  bool modal_skin = true;
 };
 
 /// How a joint sits on a deforming body: on a patch of its surface, whose mean displacement and rotation it follows.
@@ -174,6 +178,10 @@ struct DrawTarget {
   BodyId id;
   std::span<float> positions;  ///< 3V floats of the render surface
   std::span<float> normals{};  ///< empty, or 3V floats
+  /// m, ≥ 0: modes that together move no vertex by more than this are not drawn, so that a body that is far away is
+  /// drawn by few (visible_displacement() of mode_selection.h). More or fewer from frame to frame show as a jump of no
+  /// more than this; normals go by the vertices.
+  double tolerance = 0.0;
 };
 
 class World {
@@ -270,10 +278,16 @@ class World {
 
   ConstraintReport constraint_report() const;
 
+  /// What steps and reconstruct() spend on their stages from here on is added to `times`, which outlives the world or
+  /// the next call; null, the default: no clock is read. The stages of a step sum to it; what many threads do at once
+  /// is the wall clock's time split in the proportions of what they spent.
+  void set_stage_times(StageTimes* times);
+
   // Contacts ---------------------------------------------------------------------------------------------------------
-  /// Who finds the contacts, such as ContactFinder of collision/: without one, bodies pass through each other. Its
-  /// bodies are those of the world, numbered by BodyId::index; it must outlive the world and holds none at first. Null:
-  /// none.
+  /// Who finds the contacts, such as ContactFinder of collision/: without one, bodies pass through each other. It is
+  /// not told of bodies that meet nothing: those in no layer or with an empty mask, and those without a shape whose
+  /// model is not touchable. Its bodies are those of the world, numbered by BodyId::index; it must outlive the world
+  /// and holds none at first. Null: none.
   void set_contact_source(ContactSource* source, const ContactOptions& options = {});
   /// Asked of every contact found, before it acts: false leaves it out of the step. From the thread that calls step();
   /// empty: all act.
@@ -322,11 +336,18 @@ class World {
   /// For a caller that deforms on its GPU: pose and modes between the last two states. The rotation between them is the
   /// shortest one: a body that turns by more than half a turn in a step is better drawn at its states.
   RigidTransform interpolated_pose(BodyId id, double interpolation) const;
-  /// z, kg^½·m, one per mode: vertex v is rest_v + Σ z_i shape_i,v, with the shapes of ModalModel::render().
+  /// z, kg^½·m, one per mode: vertex v is rest_v + Σ z_i shape_i,v, with the shapes of ModalModel::render(), unless the
+  /// body bends by its modal skin.
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
   /// z_i/s_i, one per mode: weights of the morph targets of the asset (docs/formats/asset.md), as a glTF viewer takes
-  /// them. Base and targets, weighted and moved by the pose, are what reconstruct() draws, but for dents.
+  /// them. Base and targets, weighted and moved by the pose, are what reconstruct() draws, but for dents and of bodies
+  /// without a modal skin.
   void interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const;
+  /// Whether the body bends by its model's modal skin.
+  bool has_modal_skin(BodyId id) const;
+  /// Its handles, 18 numbers each (SkinPose::numbers), for the formula of limber/model/skin_pose.h.
+  /// @throws InvalidArgument for a body without a skin
+  void interpolated_handles(BodyId id, double interpolation, std::span<float> numbers) const;
 
   /// Hash of the whole state, for determinism checks: two worlds with the same calls behind them have the same, for any
   /// Jobs. It covers what the next step depends on: time, poses, momenta, amplitudes and rates, targets of handles,

@@ -27,6 +27,7 @@
 
 #include "limber/core/quaternion.h"
 #include "limber/core/types.h"
+#include "limber/model/modal_skin.h"
 
 namespace limber {
 
@@ -49,10 +50,11 @@ struct GlbMorphTarget {
 /// A triangle mesh of one primitive.
 struct GlbMesh {
   std::string name{};
-  int position = -1;   ///< from add_vertex_vectors()
-  int normal = -1;     ///< the same, unit vectors; -1: viewers shade flat
-  int triangles = -1;  ///< from add_triangles()
-  int material = -1;   ///< from add_material()
+  int position = -1;    ///< from add_vertex_vectors()
+  int normal = -1;      ///< the same, unit vectors; -1: viewers shade flat
+  int triangles = -1;   ///< from add_triangles()
+  int influences = -1;  ///< from add_influences(), one per vertex; −1: the mesh hangs on no joints
+  int material = -1;    ///< from add_material()
   std::vector<GlbMorphTarget> targets{};
   std::vector<float> weights{};  ///< at rest, one per target; empty: zeros
   std::string extras{};          ///< a JSON object as text, or empty; may not hold targetNames
@@ -62,7 +64,9 @@ struct GlbMesh {
 /// A node of the scene graph: the transform of its content into its parent, scaled first, then turned, then moved.
 struct GlbNode {
   std::string name{};
-  int mesh = -1;                         ///< from add_mesh()
+  int mesh = -1;  ///< from add_mesh()
+  int skin =
+      -1;  ///< from add_skin(), for a mesh with influences, which is then where its joints are, not where the node is
   std::vector<int> children{};           ///< from add_node(); a node has one parent at most
   std::optional<Vec3> translation{};     ///< m
   std::optional<Quaternion> rotation{};  ///< unit
@@ -104,6 +108,8 @@ class GlbBuilder {
   int add_vertex_vectors(std::span<const float> xyz);
   /// @param triangles at least one; indices ≥ 0, compared with the vertex count in add_mesh()
   int add_triangles(std::span<const Triangle> triangles);
+  /// What each vertex of a mesh hangs on: JOINTS_0 and WEIGHTS_0. @param influences at least one
+  int add_influences(std::span<const SkinInfluences> influences);
   /// Key times of an animation, s. @param seconds at least one; the first ≥ 0, strictly ascending
   int add_times(std::span<const float> seconds);
   /// Key values of an animation: all of the first key, then all of the second, ….
@@ -118,6 +124,8 @@ class GlbBuilder {
   int add_material(const GlbMaterial& material);
   int add_mesh(const GlbMesh& mesh);
   int add_node(const GlbNode& node);
+  /// Joint h is where node joints[h] takes the mesh as it is: no inverse bind matrices. @param joints from add_node()
+  int add_skin(std::span<const int> joints);
   int add_animation(const GlbAnimation& animation);
 
   /// An extension of the file as a whole. @param name such as "LIMBER_modal". @param json an object as text

@@ -80,6 +80,9 @@ struct ModalModelData {
   std::optional<ResidualCompliance> residual_compliance;
   /// Optional: what shows large bends without swelling.
   std::optional<ModalSkin> skin;
+  /// Whether contacts may act on the collision surface. False, of a body that meets nothing (no part of an asset file):
+  /// the vertex rows are not made; World tells no contact source of it but for a shape in its place.
+  bool touchable = true;
 };
 
 /// How far a surface's vertices lie from the body origin and how far a mode can take them.
@@ -99,10 +102,11 @@ class ModalModel {
   Index modes() const { return static_cast<Index>(data_.eigenvalues.size()); }
   const ModalSurface& render() const { return data_.render; }
   const ModalSurface& collision() const { return data_.collision ? *data_.collision : data_.render; }
-  /// The basis of collision() once more, vertex by vertex.
+  /// The basis of collision() once more, vertex by vertex; of no vertices where nothing touches it.
   const VertexRows& collision_rows() const { return collision_rows_; }
 
   const SurfaceExtent& collision_extent() const { return collision_extent_; }
+  const SurfaceExtent& render_extent() const { return data_.collision ? render_extent_ : collision_extent_; }
 
   /// Undamped frequency of a mode, √λ/2π, Hz.
   double frequency_hz(Index mode) const;
@@ -110,7 +114,7 @@ class ModalModel {
  private:
   ModalModelData data_;
   VertexRows collision_rows_;
-  SurfaceExtent collision_extent_;
+  SurfaceExtent collision_extent_, render_extent_;  // the second: where it is another surface
 };
 
 }  // namespace limber

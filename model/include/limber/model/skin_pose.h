@@ -29,6 +29,8 @@ class SkinPose {
 
   /// @param skin checked (ModalModel does); must outlive the pose
   explicit SkinPose(const ModalSkin& skin);
+  /// As if made anew; allocates only for a skin larger than any before.
+  void bind(const ModalSkin& skin);
 
   const ModalSkin& skin() const { return *skin_; }
   /// @param z k amplitudes, kg^½·m
@@ -42,15 +44,28 @@ class SkinPose {
 
   /// Where a point of the surface is, body frame, m. @param rest r_v @param linear U_v z, m
   Vec3 position(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
+  /// r_v + Ũ_v z, m: what the handles turn and carry.
+  Vec3 undeformed_part(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
   /// R̄ = Σ_h β_vh R_h: what turns small displacements at the point, such as a residual one.
   Mat3 turn(const SkinInfluences& at) const;
 
   /// Makes ready what the derivative needs at the amplitudes last set. Call before add_rows().
   void differentiate();
+  /// dR_h/dz_i Rᵀ = [turn]×, shift = dt_h/dz_i. @pre differentiate()
+  struct Rate {
+    Vec3 turn, shift;
+  };
+  Rate rate(Index handle, Index mode) const;
+  /// Of a free body, how firmly Eckart's condition holds its frame: the least eigenvalue of (tr P) 1 − P, Σ m x rᵀ/m =
+  /// Q P, m².
+  double frame_stiffness() const;
   /// g += J_vᵀ f but for the part that goes by U: the caller adds U_vᵀ f̄ with the force f̄ that is returned.
   /// @param f body axes @param g k numbers
   Vec3 add_rows(const SkinInfluences& at, const Vec3& rest, const Vec3& linear, const Vec3& f,
                 std::span<double> g) const;
+  /// J_v ż, body frame, m/s. @pre differentiate(). @param linear_rate U_v ż. @param rates ż
+  Vec3 velocity(const SkinInfluences& at, const Vec3& rest, const Vec3& linear, const Vec3& linear_rate,
+                std::span<const double> rates) const;
 
  private:
   void place_handles(std::span<const double> z);
@@ -59,7 +74,6 @@ class SkinPose {
   void write_numbers();
   void differentiate_places();
   void differentiate_frame();
-  Vec3 undeformed_part(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
   std::size_t row(Index handle, int axis) const;
 
   const ModalSkin* skin_;

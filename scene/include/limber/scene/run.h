@@ -38,6 +38,7 @@ struct BodyTrack {
   std::vector<double> amplitudes;        ///< z, kg^½·m; k per key
   std::vector<double> rates;             ///< ż, kg^½·m/s; k per key
   std::vector<BodyEnergy> energies;      ///< J
+  bool modal_skin = false;               ///< bends by its model's modal skin
 
   std::span<const double> amplitudes_at(std::size_t key) const;
   std::span<const double> rates_at(std::size_t key) const;
@@ -78,6 +79,7 @@ struct JointReport {
   std::string a, b;
   JointView view;                                                  ///< as of the last step
   double largest_distance_error = 0.0, largest_angle_error = 0.0;  ///< at the end of a step; m, rad
+  double largest_limit_excess = 0.0;  ///< how far a coordinate was beyond its limits at the end of a step, m or rad
 };
 
 /// What the constraints of all steps came to.

@@ -40,6 +40,10 @@ class BlockFactor {
   /// @return false where a pivot is not positive
   bool factor();
 
+  /// Multiply-adds of factor(), and numbers of the factor: what solve() reads twice.
+  double work() const;
+  std::size_t numbers() const { return numbers_; }
+
   /// Where a node's numbers begin in vectors; each node's part is padded.
   std::size_t first(std::size_t node) const { return first_[node]; }
   std::size_t size() const { return size_; }
@@ -48,7 +52,9 @@ class BlockFactor {
   /// The two halves of it. Between them x holds the right-hand side of the Schur complement at kept nodes, and is given
   /// its solution there.
   void reduce(double* x);
-  void expand(double* x);
+  void expand(double* x) { expand(x, 1); }
+  /// Of several, size() apart.
+  void expand(double* x, std::size_t count);
 
  private:
   struct Column {  // one node, in the order of elimination

@@ -16,10 +16,10 @@ struct MatrixView {
   double* row(std::size_t i) const { return values + i * stride; }
 };
 
-/// A few rows of a sparse matrix where they are not zero: rows from `row` and columns from `column` on, in numbers from
-/// `values` on, `stride` apart from row to row. Width and stride padded.
+/// A few rows of a sparse matrix where they are not zero, in columns from `column` on: numbers from `values` on,
+/// `stride` apart from row to row. Width and stride padded.
 struct RowBlock {
-  std::size_t row = 0, rows = 0, column = 0, width = 0, values = 0, stride = 0;
+  std::size_t rows = 0, column = 0, width = 0, values = 0, stride = 0;
 };
 
 /// Numbers of one row that go to adjacent places in another; counts padded.

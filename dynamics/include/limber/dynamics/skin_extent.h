@@ -1,0 +1,60 @@
+/// @file limber/dynamics/skin_extent.h
+/// How far a surface that bends by a modal skin can move while its amplitudes change by so much: what SurfaceExtent is
+/// to surfaces that bend by their modes alone.
+///
+///   x = p_h + R_h (y − r_h) of each handle h of a vertex, y = r + Ũ z;   |∂_i x| ≤ |t'_hi + Ω_hi × R_h c| + |Ω_hi| ρ + |Ũ_i| now,
+///   |∂_ij x| ≤ Σ_l [3/2 |Θ_li||Θ_lj||a_lh + D_lh z| + |Θ_li||D_lhj| + |Θ_lj||D_lhi|]
+///              + 3/2 |Θ_hi||Θ_hj||y − r_h| + |Θ_hi||Ũ_j| + |Θ_hj||Ũ_i|
+/// c and ρ a ball about the vertices of the handle. A vertex moves by at most the most of its handles, as weights are
+/// no less than 0 and sum to 1. Of free bodies the mean of all points and Eckart's rotation are added, the second by
+/// how firmly its condition holds the frame. Derivation: docs/derivations/modal-skin.md.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/dynamics/surface_point.h"
+#include "limber/model/skin_pose.h"
+
+namespace limber {
+
+/// Of the collision surface of one model. Immutable.
+class SkinExtent {
+ public:
+  /// @pre the model has a skin, and outlives this
+  explicit SkinExtent(const ModalModel& model);
+
+  /// The skin without what keeps a free body in its frame.
+  const ModalSkin& bare() const { return bare_; }
+
+  /// Bounds over all amplitudes ζ with |ζ_i − z_i| ≤ change_i.
+  /// @param pose at z. @param bare of bare(); scratch, as is `rates`. @param change ≥ 0
+  /// @param shape out: no vertex moves by more than Σ shape_i change_i
+  /// @return no vertex is farther from the body origin now, m
+  double find(const SkinPose& pose, SkinPose& bare, std::span<const double> z, std::span<const double> change,
+              std::span<double> shape, std::span<double> rates) const;
+
+ private:
+  /// The vertices that hang on a handle.
+  struct Ball {
+    Vec3 center = Vec3::Zero();  // of the rest shape
+    double radius = 0.0;         // about it
+    double reach = 0.0;          // about the handle
+    bool used = false;
+  };
+  double turn(Index h, std::size_t mode) const { return turns_[static_cast<std::size_t>(h) * k_ + mode]; }
+  double shift(Index l, Index h, std::size_t mode) const {
+    return shifts_[static_cast<std::size_t>(l * bare_.handles + h) * k_ + mode];
+  }
+  double farthest(const SkinPose& pose, double flexed) const;
+  void keep_in_frame(double firmness, double far, std::span<const double> change, std::span<double> shape) const;
+
+  ModalSkin bare_;
+  std::size_t k_ = 0;
+  std::vector<Ball> balls_;             // by handle
+  std::vector<double> turns_, shifts_;  // |Θ_hi|; |D_lhi|
+  std::vector<double> flexing_;         // the largest |Ũ_i|
+  double mean_radius_ = 0.0;            // √(Σ m |r|²/m)
+};
+
+}  // namespace limber

@@ -1,0 +1,41 @@
+// What a World needs of a modal skin beside the bodies that have it.
+#pragma once
+
+#include <vector>
+
+#include "limber/dynamics/body_shape.h"
+#include "limber/dynamics/exact_motion.h"
+#include "limber/dynamics/skin_extent.h"
+#include "limber/dynamics/skin_tiles.h"
+
+namespace limber::internal {
+
+/// Of one model. One thread at a time.
+class GroupSkin {
+ public:
+  /// @pre the model has a skin, and outlives this
+  explicit GroupSkin(const ModalModel& model)
+      : tiles_(model.data().skin->render),
+        extent_(model),
+        bare_(extent_.bare()),
+        change_(static_cast<std::size_t>(model.modes())),
+        shape_(change_.size()),
+        rates_(change_.size()) {}
+
+  const SkinTiles& tiles() const { return tiles_; }
+
+  /// BodyState::reach of a body: how far any of its points may come within its motion, m.
+  double reach(const BodyShape& now, const ExactMotion& motion) {
+    motion.changes(change_);
+    const double far = extent_.find(now.handles(), bare_, now.amplitudes(), change_, shape_, rates_);
+    return motion.path().bounds(0.0, motion.step()).travel + motion.sway(far, shape_);
+  }
+
+ private:
+  SkinTiles tiles_;
+  SkinExtent extent_;
+  SkinPose bare_;
+  std::vector<double> change_, shape_, rates_;
+};
+
+}  // namespace limber::internal

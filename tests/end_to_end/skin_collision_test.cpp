@@ -1,0 +1,145 @@
+// Surfaces that bend by a modal skin: boxes and bounds that hold, and contacts that give no energy.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "limber/collision/contact_finder.h"
+#include "limber/collision/deformed_surface.h"
+#include "limber/dynamics/body_shape.h"
+#include "limber/dynamics/skin_extent.h"
+#include "skinned_bar.h"
+
+namespace limber::testing {
+namespace {
+
+/// Amplitudes at random whose handles turn by up to so much.
+std::vector<double> random_bend(const ModalModel& model, double angle, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  std::vector<double> z;
+  for (const double lambda : model.data().eigenvalues) z.push_back(normal(random) / std::sqrt(lambda));
+  SkinPose pose(*model.data().skin);
+  pose.set(z);
+  for (double& x : z) x *= angle / pose.largest_angle();
+  return z;
+}
+
+std::shared_ptr<const CollisionSurface> surface_of(const std::shared_ptr<const ModalModel>& model) {
+  return std::make_shared<const CollisionSurface>(model, CollisionSurfaceOptions{.skin = true});
+}
+
+TEST(SkinnedSurfaces, BoxesEncloseAllVerticesAtAnyBend) {
+  std::mt19937 random(7);
+  for (const bool held : {true, false}) {
+    const auto model = bar({.held = held});
+    const auto surface = surface_of(model);
+    DeformedSurface body, refitted;
+    for (int trial = 0; trial < 40; ++trial) {
+      const double angle = trial < 20 ? 1.0 : 0.5 * (trial - 19);
+      const std::vector<double> z = random_bend(*model, angle, random);
+      body.bind(surface, z);
+      refitted.bind(surface, z, BoundsChoice::kRefit);
+      for (Index n = 0; n < static_cast<Index>(surface->nodes().size()); ++n) {
+        const Aabb box = body.bounds(n), tight = refitted.bounds(n);
+        for (const Index t : surface->node_triangles(n))
+          for (const Vec3& x : body.triangle(t)) {
+            EXPECT_TRUE(((x - box.low).array() >= 0.0).all() && ((box.high - x).array() >= 0.0).all());
+            EXPECT_TRUE(((x - tight.low).array() >= 0.0).all() && ((tight.high - x).array() >= 0.0).all());
+          }
+      }
+    }
+  }
+}
+
+TEST(SkinnedSurfaces, VerticesAreWherePointsOfTheBodyAre) {
+  const auto model = bar();
+  const auto surface = surface_of(model);
+  const std::vector<double> z = bent(*model, 2.0);
+  DeformedSurface body;
+  body.bind(surface, z);
+  SkinMemory memory(*model->data().skin);
+  const BodyShape shape(*model, z, &memory);
+  for (Index t = 0; t < surface->triangles(); ++t) {
+    const SurfacePoint at{.triangle = t, .weight = {0.2, 0.3, 0.5}};
+    const auto [a, b, c] = body.triangle(t);
+    EXPECT_LT((shape.position(at) - (0.2 * a + 0.3 * b + 0.5 * c)).norm(), 1e-12 * kLength);
+  }
+}
+
+TEST(SkinnedSurfaces, NoVertexMovesFartherThanTheBoundSays) {
+  std::mt19937 random(11);
+  for (const bool held : {true, false}) {
+    const auto model = bar({.held = held});
+    const auto surface = surface_of(model);
+    DeformedSurface now, later;
+    constexpr int kTrials = 60;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      const std::vector<double> z = random_bend(*model, 0.1 * (trial % 20), random),
+                                to = random_bend(*model, 0.02 + 0.02 * (trial % 5), random);
+      std::vector<double> change(z.size()), shape(z.size()), there(z.size());
+      for (std::size_t i = 0; i < z.size(); ++i) there[i] = z[i] + to[i], change[i] = std::abs(to[i]);
+      now.bind(surface, z);
+      later.bind(surface, there);
+      const double far = now.skin_extent(change, shape);
+      double bound = 0.0, moved = 0.0, farthest = 0.0;
+      for (std::size_t i = 0; i < z.size(); ++i) bound += shape[i] * change[i];
+      for (Index v = 0; v < surface->vertices(); ++v) {
+        moved = std::max(moved, (later.vertex(v) - now.vertex(v)).norm());
+        farthest = std::max(farthest, now.vertex(v).norm());
+      }
+      EXPECT_LE(moved, bound);
+      EXPECT_LE(farthest, far);
+    }
+  }
+}
+
+struct Release {
+  double largest_gain = 0.0, deepest = 0.0;  // of the energy at the start; of the length
+  bool pressed = false;
+};
+
+/// A bar bent up and let go, to fall back on a plane under it, without damping and friction.
+Release release_on_a_plane(double degrees, double steps_a_period) {
+  const auto model = bar();
+  ContactFinder finder;
+  World world({.step = kPeriod / steps_a_period, .gravity = Vec3::Zero()});
+  world.set_contact_source(&finder, {.friction = 0.0});
+  const Vec3 origin = model->data().origin_in_input;
+  world.add_static(std::make_shared<Shape>(HalfSpace{}), {.p = Vec3(0.0, 0.0, -0.05) - Vec3(0.0, 0.0, origin.z())});
+  const BodyId id = world.add_body(model);
+  std::vector<double> z = bent(*model, degrees * kDegree);
+  for (std::size_t i = 1; i < z.size(); ++i) z[i] = 0.0;
+  world.set_amplitudes(id, z, zeros(*model));
+  const SurfacePoint end = vertex_at(*model, {kLength, 0.75, 1.0});
+  if (world.position(id, end).z() < 0.0) {
+    for (double& x : z) x = -x;
+    world.set_amplitudes(id, z, zeros(*model));
+  }
+  const double start = world.energy(id).total();
+  Release r;
+  double last = start;
+  const double ground = -0.05 - origin.z();
+  std::vector<float> positions(3 * static_cast<std::size_t>(model->render().vertices()));
+  for (int i = 0; i < static_cast<int>(2.0 * steps_a_period); ++i) {
+    world.step();
+    const double energy = world.energy(id).total();
+    r.largest_gain = std::max(r.largest_gain, (energy - last) / start);
+    last = energy;
+    r.pressed = r.pressed || !world.contact_events().empty();
+    world.reconstruct(id, positions, {});
+    for (std::size_t v = 0; v < positions.size(); v += 3)
+      r.deepest = std::max(r.deepest, (ground - static_cast<double>(positions[v + 2])) / kLength);
+  }
+  return r;
+}
+
+/// What the guard lets wait for the next step is a part of the energies at hand, 1e-7 a step.
+TEST(SkinnedSurfaces, ABarThatFallsBackOnAPlaneGainsNoEnergyAndDoesNotSinkIn) {
+  const Release r = release_on_a_plane(60.0, 60.0);
+  EXPECT_TRUE(r.pressed);
+  EXPECT_LE(r.largest_gain, 1e-6);
+  EXPECT_LE(r.deepest, 5e-4);
+}
+
+}  // namespace
+}  // namespace limber::testing

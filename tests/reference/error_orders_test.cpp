@@ -1,0 +1,129 @@
+// What theory says of limber's errors, beside finite elements of all nodes.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "constants.h"
+#include "error_scenes.h"
+#include "limber/engine/world.h"
+#include "limber/precompute/bake.h"
+#include "tet_box.h"
+
+namespace limber {
+namespace {
+
+using namespace limber::testing;
+
+const Material kBlockRubber{.youngs_modulus = 1e6, .poisson_ratio = 0.3, .density = 1000.0};
+constexpr Eigen::Index kPokedNode = 60;  // on the block's top
+
+struct FreeBlock {
+  TetMesh mesh = tet_box(4, 4, 2, {0.2, 0.2, 0.1});
+  NodalElasticity body{mesh, kBlockRubber, ElasticLaw::kLinear};
+
+  std::shared_ptr<const ModalModel> baked(int modes, ResidualOptions residual) const {
+    BakeOptions options;
+    options.materials = {{"*", kBlockRubber}};
+    options.analysis.modes = options.limits.max_modes = modes;
+    options.analysis.mass = MassKind::kConsistent;
+    options.residual = std::move(residual);
+    Warnings warnings;
+    return bake({.name = "block", .mesh = mesh}, options, warnings).asset.bodies[0];
+  }
+  /// What all nodes give way by under unit forces at a node, in the inertia of the body: Σ w wᵀ/λ over every elastic
+  /// mode.
+  Mat3 compliance(Eigen::Index node) const {
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * body.nodes(), 3 * body.nodes());
+    for (int axis = 0; axis < 3; ++axis)
+      M(Eigen::seqN(axis, body.nodes(), 3), Eigen::seqN(axis, body.nodes(), 3)) = Eigen::MatrixXd(body.mass());
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> all(body.stiffness(body.rest()), M);
+    Mat3 sum = Mat3::Zero();
+    for (Eigen::Index i = 6; i < M.rows(); ++i) {
+      const Vec3 w = all.eigenvectors().block<3, 1>(3 * node, i);
+      sum += w * w.transpose() / all.eigenvalues()[i];
+    }
+    return sum;
+  }
+};
+
+Index vertex_of(const ModalModel& model, const Vec3& at) {
+  const auto& rest = model.collision().rest;
+  const auto found = std::find_if(rest.begin(), rest.end(), [&](const Vec3f& x) {
+    return (x.cast<double>() + model.data().origin_in_input - at).norm() < 1e-5;
+  });
+  return static_cast<Index>(found - rest.begin());
+}
+
+Mat3 shown_compliance(const ModalModel& model, Index vertex) {
+  Mat3 sum = Mat3::Zero();
+  for (Index i = 0; i < model.modes(); ++i) {
+    const Vec3 u = model.collision().basis.shape(vertex, i).cast<double>();
+    sum += u * u.transpose() / model.data().eigenvalues[static_cast<std::size_t>(i)];
+  }
+  return sum;
+}
+
+TEST(ErrorOrders, FortyModesAndTheirResidualAnswerAPokeAsAllNodesDo) {
+  const FreeBlock block;
+  const Mat3 exact = block.compliance(kPokedNode);
+  const Vec3 at = block.mesh.nodes[static_cast<std::size_t>(kPokedNode)];
+  const auto alone = block.baked(40, {});
+  const auto with = block.baked(40, {.nodes = {NodesByIndex{{static_cast<Index>(kPokedNode)}}}});
+  const double shown = shown_compliance(*alone, vertex_of(*alone, at)).trace() / exact.trace();
+  EXPECT_GT(shown, 0.25);
+  EXPECT_LT(shown, 0.75);
+  EXPECT_LE((shown_compliance(*with, vertex_of(*with, at)) - exact).norm(), 1e-4 * exact.norm());
+}
+
+TEST(ErrorOrders, TheAssetTellsWhatItsModesCapture) {
+  const FreeBlock block;
+  const Vec3 at = block.mesh.nodes[static_cast<std::size_t>(kPokedNode)];
+  const double exact = block.compliance(kPokedNode).trace();
+  double before = 0.0;
+  for (const int modes : {5, 20, 80}) {
+    const auto model = block.baked(modes, {.surface = true});
+    const Index vertex = vertex_of(*model, at);
+    const double told = static_capture(*model)[static_cast<std::size_t>(vertex)];
+    EXPECT_NEAR(told, shown_compliance(*model, vertex).trace() / exact, 1e-4);
+    EXPECT_GT(told, before);
+    before = told;
+  }
+  EXPECT_THROW(static_capture(*block.baked(5, {})), std::exception);
+}
+
+TEST(ErrorOrders, FreeMotionHasNoErrorOfTheStep) {
+  const auto model = FreeBlock().baked(20, {});
+  const double seconds = 1.0;
+  std::vector<double> z(static_cast<std::size_t>(model->modes())), rates(z.size(), 0.0);
+  for (std::size_t i = 0; i < z.size(); ++i) z[i] = 1e-3 / std::sqrt(model->data().eigenvalues[i]);
+  for (const int steps : {1, 7, 60, 1000}) {
+    World world({.step = seconds / steps});
+    const BodyId id = world.add_body(model);
+    world.set_amplitudes(id, z, rates);
+    for (int n = 0; n < steps; ++n) world.step();
+    for (std::size_t i = 0; i < z.size(); ++i) {
+      const double omega = std::sqrt(model->data().eigenvalues[i]), size = omega * z[i];
+      const double off = std::hypot(omega * (world.body(id).amplitudes[i] - z[i] * std::cos(omega * seconds)),
+                                    world.body(id).rates[i] + size * std::sin(omega * seconds));
+      EXPECT_LE(off, size * (1e-12 + 4.0 * kEpsilon * omega * seconds)) << steps << " steps, mode " << i;
+    }
+  }
+}
+
+TEST(ErrorOrders, TruncationFallsWithTheModes) {
+  const ErrorScene& poke = error_scene("poke");
+  const PlayedScene exact = play_reference(poke, ElasticLaw::kLinear, 1);
+  SceneBakery bakery;
+  double before = 1.0;
+  for (const int modes : {1, 5, 20, 80}) {
+    const double error = scene_error(poke, play(poke, {.modes = modes, .residual = false}, bakery), exact).motion.mean;
+    EXPECT_LT(error, before);
+    before = error;
+  }
+  EXPECT_LT(before, 0.005);
+}
+
+}  // namespace
+}  // namespace limber

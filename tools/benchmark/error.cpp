@@ -1,0 +1,428 @@
+// limber-benchmark error: scenes played by limber and by finite elements of all nodes, error against time.
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "benchmarks.h"
+#include "error_scenes.h"
+#include "limber/core/error.h"
+#include "limber/model/asset.h"
+#include "plot.h"
+#include "program.h"
+
+namespace limber::tools {
+namespace {
+
+using limber::testing::ElasticLaw;
+using limber::testing::ErrorScene;
+using limber::testing::ErrorSetting;
+using limber::testing::PlayedScene;
+using limber::testing::SceneError;
+using Json = nlohmann::ordered_json;
+
+constexpr double kFrame = 1.0 / 60.0;   // s: times of a frame compare steps of any length
+constexpr double kFinestRate = 1920.0;  // 1/s, of limber, where its step is to cost no error
+
+struct ErrorArguments {
+  std::vector<std::string> scenes, methods{"complementary"}, impacts{"absorbed"}, residuals{"on"}, bases{"float"};
+  std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1};
+  std::string against = "linear", target, settings, csv, plot;
+  bool split = false, capture = false;
+};
+
+/// A setting of a scene and how far it was off, in how long.
+struct ErrorRow {
+  std::string scene, method;  // the latter: all but the modes; a line of the plot
+  ErrorSetting at{};
+  SceneError error{};
+  testing::Quantiles step{};  // s
+  double frame = 0.0;         // s of the thread for 1/60 s of the scene, by the median
+  double bake = 0.0, energy_rise = 0.0, energy_loss = 0.0;
+  std::size_t bytes = 0;
+  int unsettled = 0;
+  bool on_front = false;
+};
+
+/// Plays what is asked for, the references once.
+class ErrorRuns {
+ public:
+  explicit ErrorRuns(Program& program) : program_(program) {}
+
+  const PlayedScene& reference(const ErrorScene& scene, ElasticLaw law, int mesh) {
+    const auto key = std::tuple(scene.name, law, mesh);
+    const auto known = references_.find(key);
+    if (known != references_.end()) return known->second;
+    program_.progress().stage(fmt::format("{}: all nodes of mesh {}", scene.name, mesh));
+    return references_.emplace(key, testing::play_reference(scene, law, mesh)).first->second;
+  }
+  PlayedScene play(const ErrorScene& scene, const ErrorSetting& at) {
+    program_.progress().stage(scene.name + ": " + text(at));
+    return testing::play(scene, at, bakery_);
+  }
+  testing::SceneBakery& bakery() { return bakery_; }
+
+  const PlayedScene& against(const ErrorScene& scene, const std::string& what, int mesh) {
+    if (what == "linear") return reference(scene, ElasticLaw::kLinear, mesh);
+    if (what == "neo-hookean") return reference(scene, ElasticLaw::kNeoHookean, mesh);
+    return reference(scene, ElasticLaw::kStVenantKirchhoff, what == "fine" ? 2 * mesh : mesh);
+  }
+
+ private:
+  Program& program_;
+  testing::SceneBakery bakery_;
+  std::map<std::tuple<std::string, ElasticLaw, int>, PlayedScene> references_;
+};
+
+/// A line of the plot: what differs from the defaults, but for the modes.
+std::string method_of(const ErrorSetting& at) {
+  std::string out = fmt::format("{:.0f} steps/s", 1.0 / at.step);
+  const ErrorSetting usual;
+  if (at.method != usual.method) out += ", " + at.method;
+  if (at.impact != usual.impact) out += ", " + at.impact;
+  if (at.contacts != usual.contacts)
+    out += at.contacts == 0 ? ", all contacts" : fmt::format(", {} contacts", at.contacts);
+  if (!at.residual) out += ", no residual";
+  if (at.basis != usual.basis) out += ", " + at.basis;
+  if (at.mesh != usual.mesh) out += fmt::format(", mesh {}", at.mesh);
+  return out;
+}
+
+ErrorRow run_setting(ErrorRuns& runs, const ErrorScene& scene, const ErrorSetting& at, const std::string& against) {
+  const PlayedScene played = runs.play(scene, at);
+  const testing::BakedScene& baked = runs.bakery().baked(scene, at);
+  ErrorRow row{.scene = scene.name, .method = method_of(at), .at = at};
+  row.error = scene_error(scene, played, runs.against(scene, against, at.mesh));
+  row.step = testing::quantiles(played.step_seconds);
+  row.frame = row.step.median * kFrame / at.step;
+  row.bake = baked.bake_seconds;
+  row.bytes = baked.bytes;
+  row.energy_rise = played.energy_rise, row.energy_loss = played.energy_loss;
+  row.unsettled = played.unsettled;
+  return row;
+}
+
+/// All nodes stepped by central differences at nine tenths of what is stable.
+ErrorRow run_all_nodes(ErrorRuns& runs, const ErrorScene& scene) {
+  const PlayedScene played = testing::play_reference(scene, ElasticLaw::kLinear, 1, 0.9);
+  ErrorRow row{.scene = scene.name, .method = "all nodes"};
+  row.error = scene_error(scene, played, runs.reference(scene, ElasticLaw::kLinear, 1));
+  row.step = testing::quantiles(played.step_seconds);
+  double longest = 1.0;
+  for (const auto& body : scene.bodies) longest = std::min(longest, 0.9 * testing::stable_step_of(body));
+  row.at.step = longest, row.at.modes = 0;
+  row.frame = row.step.median * kFrame / longest;
+  return row;
+}
+
+std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
+  std::vector<ErrorSetting> out;
+  for (const int mesh : a.meshes)
+    for (const std::string& basis : a.bases)
+      for (const std::string& residual : a.residuals)
+        for (const int contacts : a.contacts)
+          for (const std::string& impact : a.impacts)
+            for (const std::string& method : a.methods)
+              for (const int rate : a.rates)
+                for (const int modes : a.modes)
+                  out.push_back({.modes = modes,
+                                 .step = 1.0 / rate,
+                                 .method = method,
+                                 .impact = impact,
+                                 .contacts = contacts,
+                                 .residual = residual == "on",
+                                 .basis = basis,
+                                 .mesh = mesh});
+  return out;
+}
+
+/// Marks the rows of a scene that no other beats in both error and time.
+void mark_front(std::vector<ErrorRow>& rows) {
+  for (ErrorRow& row : rows)
+    row.on_front = std::none_of(rows.begin(), rows.end(), [&](const ErrorRow& other) {
+      return other.scene == row.scene && other.error.motion.mean <= row.error.motion.mean && other.frame <= row.frame &&
+             (other.error.motion.mean < row.error.motion.mean || other.frame < row.frame);
+    });
+}
+
+// Table ------------------------------------------------------------------------------------------------------------
+
+using Column = std::pair<const char*, double (*)(const ErrorRow&)>;
+constexpr std::array<Column, 20> kColumns{{
+    {"error", [](const ErrorRow& r) { return r.error.motion.mean; }},
+    {"error_worst", [](const ErrorRow& r) { return r.error.motion.worst; }},
+    {"error_vertex", [](const ErrorRow& r) { return r.error.motion.worst_vertex; }},
+    {"error_shape", [](const ErrorRow& r) { return r.error.motion.shape_mean; }},
+    {"error_tip", [](const ErrorRow& r) { return r.error.tip; }},
+    {"error_impulse", [](const ErrorRow& r) { return r.error.impulse; }},
+    {"error_contact_time", [](const ErrorRow& r) { return r.error.contact_time; }},
+    {"error_momentum", [](const ErrorRow& r) { return r.error.momentum; }},
+    {"energy_rise", [](const ErrorRow& r) { return r.energy_rise; }},
+    {"energy_loss", [](const ErrorRow& r) { return r.energy_loss; }},
+    {"unsettled", [](const ErrorRow& r) { return static_cast<double>(r.unsettled); }},
+    {"peak_m", [](const ErrorRow& r) { return r.error.motion.peak; }},
+    {"shape_peak_m", [](const ErrorRow& r) { return r.error.motion.shape_peak; }},
+    {"step_median_us", [](const ErrorRow& r) { return 1e6 * r.step.median; }},
+    {"step_p99_us", [](const ErrorRow& r) { return 1e6 * r.step.p99; }},
+    {"frame_us", [](const ErrorRow& r) { return 1e6 * r.frame; }},
+    {"bake_s", [](const ErrorRow& r) { return r.bake; }},
+    {"bytes", [](const ErrorRow& r) { return static_cast<double>(r.bytes); }},
+    {"steps_per_second", [](const ErrorRow& r) { return 1.0 / r.at.step; }},
+    {"pareto", [](const ErrorRow& r) { return r.on_front ? 1.0 : 0.0; }},
+}};
+
+std::string csv_of(const std::vector<ErrorRow>& rows) {
+  std::string csv = "scene,line,modes,method,impact,contacts,residual,basis,mesh";
+  for (const auto& [name, value] : kColumns) csv += fmt::format(",{}", name);
+  csv += '\n';
+  for (const ErrorRow& r : rows) {
+    csv += fmt::format("{},\"{}\",{},{},{},{},{},{},{}", r.scene, r.method, r.at.modes, r.at.method, r.at.impact,
+                       r.at.contacts, r.at.residual ? 1 : 0, r.at.basis, r.at.mesh);
+    for (const auto& [name, value] : kColumns) csv += fmt::format(",{:.6g}", value(r));
+    csv += '\n';
+  }
+  return csv;
+}
+
+Json json_of(const ErrorRow& r) {
+  Json row{{"scene", r.scene},          {"line", r.method},      {"modes", r.at.modes},
+           {"method", r.at.method},     {"impact", r.at.impact}, {"contacts", r.at.contacts},
+           {"residual", r.at.residual}, {"basis", r.at.basis},   {"mesh", r.at.mesh}};
+  for (const auto& [name, value] : kColumns) row[name] = value(r);
+  return row;
+}
+
+std::string line_of(const ErrorRow& r) {
+  const auto percent = [](double x) { return 100.0 * x; };
+  return fmt::format("{:<8} {:<34} {:>5} {:>8.3g} {:>8.3g} {:>8.3g} {:>8.3g} {:>9.1f} {:>9.1f} {:>9.1f} {:>7.2f} {}\n",
+                     r.scene, r.method, r.at.modes, percent(r.error.motion.mean), percent(r.error.motion.shape_mean),
+                     percent(r.error.tip), percent(r.error.impulse), 1e6 * r.step.median, 1e6 * r.step.p99,
+                     1e6 * r.frame, r.bake, r.on_front ? "*" : "");
+}
+constexpr const char* kHead =
+    "scene    line                               modes  error %  shape %    tip %  impulse   step us    p99 us  frame "
+    "us  bake s\n";
+
+// Plot -------------------------------------------------------------------------------------------------------------
+
+/// A field per scene, log error against log time; a line per method, the Pareto front in circles.
+std::string svg_of(const std::vector<ErrorRow>& rows) {
+  std::map<std::string, std::map<std::string, std::vector<const ErrorRow*>>> fields;
+  std::vector<std::string> order;
+  for (const ErrorRow& r : rows) {
+    if (std::find(order.begin(), order.end(), r.scene) == order.end()) order.push_back(r.scene);
+    fields[r.scene][r.method].push_back(&r);
+  }
+  std::string data, commands =
+                        "set logscale xy\nset format x '10^{%T}'\nset format y '%g'\nset grid lc rgb '#dddddd'\n"
+                        "set key bottom left font ',9' samplen 1.5 spacing 0.9\nset xlabel 'µs for 1/60 s of the "
+                        "scene'\nset ylabel 'error, % of the peak'\n";
+  const std::size_t across = order.size() == 1 ? 1 : 2, down = (order.size() + across - 1) / across;
+  commands += fmt::format("set multiplot layout {},{}\n", down, across);
+  int block = 0;
+  for (const std::string& scene : order) {
+    std::string lines;
+    for (const auto& [method, points] : fields[scene]) {
+      for (const ErrorRow* r : points) data += fmt::format("{} {}\n", 1e6 * r->frame, 100.0 * r->error.motion.mean);
+      data += "\n\n";
+      lines += fmt::format("{}'data.csv' index {} with linespoints pt 7 ps 0.4 lw 1.5 title '{}'",
+                           lines.empty() ? "" : ", ", block++, method);
+    }
+    for (const auto& [method, points] : fields[scene])
+      for (const ErrorRow* r : points)
+        if (r->on_front) data += fmt::format("{} {}\n", 1e6 * r->frame, 100.0 * r->error.motion.mean);
+    data += "\n\n";
+    lines += fmt::format(", 'data.csv' index {} with points pt 6 ps 1.1 lc rgb 'black' title 'Pareto front'", block++);
+    commands += fmt::format("set title '{}'\nplot {}\n", scene, lines);
+  }
+  commands += "unset multiplot\n";
+  return svg_by_gnuplot({static_cast<int>(480 * across), static_cast<int>(400 * down)}, data, commands);
+}
+
+// Where the error comes from -----------------------------------------------------------------------------------------
+
+/// Parts of the error of a setting, each the distance of two motions that differ in one thing.
+struct ErrorParts {
+  double step = 0.0, rule = 0.0, modes = 0.0, linear = 0.0, law = 0.0, mesh = 0.0, all = 0.0;
+};
+
+ErrorParts parts_of(ErrorRuns& runs, const ErrorScene& scene, const ErrorSetting& at) {
+  const auto apart = [&](const PlayedScene& a, const PlayedScene& b) { return scene_error(scene, a, b).motion.mean; };
+  ErrorSetting fine = at, best = at;
+  fine.step = best.step = 1.0 / kFinestRate;
+  if (scene.has_contact()) best.method = "complementary", best.impact = "held_from_touch", best.contacts = 0;
+  const PlayedScene seen = runs.play(scene, at), without_step = runs.play(scene, fine),
+                    without_rule = runs.play(scene, best);
+  const PlayedScene& linear = runs.reference(scene, ElasticLaw::kLinear, at.mesh);
+  const PlayedScene& bending = runs.reference(scene, ElasticLaw::kStVenantKirchhoff, at.mesh);
+  const PlayedScene& other = runs.reference(scene, ElasticLaw::kNeoHookean, at.mesh);
+  const PlayedScene& finer = runs.reference(scene, ElasticLaw::kStVenantKirchhoff, 2 * at.mesh);
+  return {.step = apart(seen, without_step),
+          .rule = apart(without_step, without_rule),
+          .modes = apart(without_rule, linear),
+          .linear = apart(linear, bending),
+          .law = apart(bending, other),
+          .mesh = apart(bending, finer),
+          .all = apart(seen, finer)};
+}
+
+void print_parts(Program& program, ErrorRuns& runs, const std::vector<const ErrorScene*>& scenes,
+                 const ErrorSetting& at) {
+  program.print("\nparts of the error, %, at " + text(at) +
+                "\nscene        step     rule    modes   linear      law     mesh      all\n");
+  for (const ErrorScene* scene : scenes) {
+    const ErrorParts p = parts_of(runs, *scene, at);
+    program.print(fmt::format("{:<8} {:>8.3g} {:>8.3g} {:>8.3g} {:>8.3g} {:>8.3g} {:>8.3g} {:>8.3g}\n", scene->name,
+                              100 * p.step, 100 * p.rule, 100 * p.modes, 100 * p.linear, 100 * p.law, 100 * p.mesh,
+                              100 * p.all));
+    program.report()["parts"].push_back({{"scene", scene->name},
+                                         {"step", p.step},
+                                         {"rule", p.rule},
+                                         {"modes", p.modes},
+                                         {"linear", p.linear},
+                                         {"law", p.law},
+                                         {"mesh", p.mesh},
+                                         {"all", p.all}});
+  }
+}
+
+// Settings that do ---------------------------------------------------------------------------------------------------
+
+double share_of(const std::string& text) {
+  std::size_t end = 0;
+  double value = 0.0;
+  try {
+    value = std::stod(text, &end);
+  } catch (const std::exception&) {
+    end = 0;
+  }
+  const std::string rest = text.substr(end);
+  if (end == 0 || !(value > 0.0) || (rest != "" && rest != "%"))
+    throw InvalidArgument("--target-error: \"" + text + "\", expected a share such as 0.01 or 1%");
+  return rest == "%" ? value / 100.0 : value;
+}
+
+/// What a scene file can say.
+bool is_told_by_a_scene(const ErrorSetting& at) { return at.modes > 0 && at.contacts == 4 && at.basis == "float"; }
+
+void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, const std::vector<ErrorRow>& rows) {
+  const double target = share_of(a.target);
+  const ErrorRow* best = nullptr;
+  double least = HUGE_VAL;
+  for (const ErrorRow& r : rows) {
+    if (!is_told_by_a_scene(r.at)) continue;
+    least = std::min(least, r.error.motion.mean);
+    if (r.error.motion.mean <= target && (best == nullptr || r.frame < best->frame)) best = &r;
+  }
+  if (best == nullptr)
+    throw InputError(fmt::format(
+        "--target-error {}: no setting tried comes within it, the best is {:.3g} %: give more modes or steps", a.target,
+        100.0 * least));
+  program.print(fmt::format("cheapest within {}: {}: {}; error {:.3g} %, {:.1f} us per 1/60 s\n", a.target, best->scene,
+                            text(best->at), 100.0 * best->error.motion.mean, 1e6 * best->frame));
+  program.report()["cheapest"] = json_of(*best);
+  if (a.settings.empty()) return;
+  const std::filesystem::path path(a.settings);
+  const ErrorScene& scene = testing::error_scene(best->scene);
+  const auto file_of = [&](const std::string& body) { return path.stem().string() + "-" + body + ".glb"; };
+  for (const auto& [body, asset] : runs.bakery().baked(scene, best->at).assets)
+    program.write_file((path.parent_path() / file_of(body)).string(), asset_bytes(asset));
+  program.write_file(a.settings, scene_text(scene, best->at, file_of));
+}
+
+void print_capture(Program& program, ErrorRuns& runs, const std::vector<const ErrorScene*>& scenes,
+                   const ErrorArguments& a) {
+  program.print(
+      "\nstatic compliance that the modes show at single vertices, %\nscene    body     modes    least   median\n");
+  for (const ErrorScene* scene : scenes)
+    for (const int modes : scene->has_contact() ? a.modes : std::vector<int>{})
+      for (const auto& [body, asset] : runs.bakery().baked(*scene, {.modes = modes}).assets) {
+        std::vector<double> shown = testing::static_capture(*asset.bodies[0]);
+        std::sort(shown.begin(), shown.end());
+        program.print(fmt::format("{:<8} {:<8} {:>5} {:>8.3g} {:>8.3g}\n", scene->name, body, modes,
+                                  100.0 * shown.front(), 100.0 * shown[shown.size() / 2]));
+      }
+}
+
+void benchmark_error(Program& program, const ErrorArguments& a) {
+  std::vector<const ErrorScene*> scenes;
+  for (const std::string& name : a.scenes) scenes.push_back(&testing::error_scene(name));
+  if (scenes.empty())
+    for (const ErrorScene& scene : testing::error_scenes()) scenes.push_back(&scene);
+  if (!a.settings.empty() && (scenes.size() != 1 || a.target.empty()))
+    throw InvalidArgument("-o: expected one --scene and a --target-error");
+  ErrorRuns runs(program);
+  std::vector<ErrorRow> rows;
+  program.print(kHead);
+  for (const ErrorScene* scene : scenes) {
+    for (const ErrorSetting& at : settings_of(a)) rows.push_back(run_setting(runs, *scene, at, a.against));
+    if (a.against == "linear") rows.push_back(run_all_nodes(runs, *scene));
+  }
+  mark_front(rows);
+  for (const ErrorRow& row : rows) program.print(line_of(row));
+  Json& report = program.report();
+  report["benchmark"] = "error";
+  report["against"] = a.against;
+  for (const ErrorRow& row : rows) report["rows"].push_back(json_of(row));
+  if (a.split) print_parts(program, runs, scenes, settings_of(a).back());
+  if (a.capture) print_capture(program, runs, scenes, a);
+  if (!a.csv.empty()) program.write_file(a.csv, csv_of(rows));
+  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows));
+  if (!a.target.empty()) write_settings(program, runs, a, rows);
+}
+
+void declare_axes(CLI::App& app, ErrorArguments& a) {
+  const auto list = [&](const char* name, auto& values, const char* what, const char* type) {
+    return app.add_option(name, values, what)->type_name(type)->delimiter(',')->capture_default_str();
+  };
+  list("--scene", a.scenes, "poke, drag, drop, collide, spin, lamp, squeeze, strip; default: all", "NAME,...");
+  list("--modes", a.modes, "modes kept", "K,...")->check(CLI::Range(1, 100'000));
+  list("--steps-per-second", a.rates, "a multiple of 30", "N,...")->check(CLI::Range(30, 1'000'000));
+  list("--method", a.methods, "how contact forces are found", "NAME,...")
+      ->check(CLI::IsMember({"complementary", "gap_program", "velocity_program", "penalty"}));
+  list("--impact", a.impacts, "whether impacts rebound", "NAME,...")
+      ->check(CLI::IsMember({"absorbed", "held", "held_from_touch"}));
+  list("--contacts", a.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
+  list("--residual", a.residuals, "static answers of the modes left out", "on|off,...")
+      ->check(CLI::IsMember({"on", "off"}));
+  list("--basis", a.bases, "shapes as they are, or rounded to half precision", "float|half,...")
+      ->check(CLI::IsMember({"float", "half"}));
+  list("--mesh", a.meshes, "times as many cells along each axis", "N,...")->check(CLI::Range(1, 8));
+}
+
+void declare(CLI::App& app, ErrorArguments& a) {
+  declare_axes(app, a);
+  app.add_option("--against", a.against,
+                 "all nodes with small strains in a frame that turns; nonlinear: St. Venant-Kirchhoff; fine: the same "
+                 "with twice the cells")
+      ->type_name("NAME")
+      ->check(CLI::IsMember({"linear", "nonlinear", "neo-hookean", "fine"}))
+      ->capture_default_str();
+  app.add_flag("--split", a.split,
+               "tell what the last setting's error is made of: step, contact rule, modes, linearisation, mesh");
+  app.add_flag("--capture", a.capture, "tell how much of the static compliance the modes show, from the assets alone");
+  app.add_option("--target-error", a.target, "name the cheapest setting within it, such as 1%")->type_name("SHARE");
+  app.add_option("-o,--output", a.settings, "write that setting as a scene for limber-simulate, with its assets beside")
+      ->type_name("SCENE.json");
+  app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
+  app.add_option("--plot", a.plot, "plot error against time (needs gnuplot)")->type_name("FILE.svg");
+}
+
+}  // namespace
+
+std::function<void(Program&)> add_error(CLI::App& programs) {
+  const auto arguments = std::make_shared<ErrorArguments>();
+  CLI::App* app =
+      programs.add_subcommand("error", "scenes beside finite elements of all their nodes: error against time");
+  declare(*app, *arguments);
+  return [arguments, app](Program& program) {
+    if (app->parsed()) benchmark_error(program, *arguments);
+  };
+}
+
+}  // namespace limber::tools
