@@ -9,6 +9,7 @@ void ConstraintRows::clear() {
   modal_.clear();
   flexibility_.clear();
   stored_energy_ = 0.0;
+  ++makings_;
 }
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {

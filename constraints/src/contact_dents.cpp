@@ -46,8 +46,8 @@ Vec3 ContactDents::displacement(const BodyStates& states, Index body, Region reg
 
 void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
   Body& b = at(body);
-  // A step may be done again before any force is taken: then rows are counted from the first one again.
-  if (!b.gathers || side.first <= b.rows.back().first) {
+  if (b.made_in != &rows || b.making != rows.makings()) {
+    b.made_in = &rows, b.making = rows.makings();
     b.gathers = true;
     b.rows.clear();
     b.in_regions.clear();
@@ -108,6 +108,7 @@ void ContactDents::finish(std::span<const char> asleep, std::span<const Index> t
     const bool sleeps = static_cast<std::size_t>(body) < asleep.size() && asleep[static_cast<std::size_t>(body)] != 0;
     if (!b.pressed && !sleeps) b.loads.clear(), b.of_loads.clear();
     b.pressed = b.gathers = false;
+    b.made_in = nullptr;
     if (!b.loads.empty()) loaded_.push_back(body);
   }
 }

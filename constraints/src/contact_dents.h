@@ -90,7 +90,9 @@ class ContactDents {
 
     std::vector<DentLoad> loads;
     VertexNumbers of_loads;
-    std::vector<Rows> rows;    // of the part of a step at hand
+    std::vector<Rows> rows;    // of the part of a step at hand, which may be done again, with others
+    const ConstraintRows* made_in = nullptr;
+    std::uint64_t making = 0;  // of those rows
     VertexNumbers in_regions;  // of all of these
     std::vector<Index> vertices;
     std::vector<Mat3> answer;  // of each of them to a force on one region

@@ -299,6 +299,26 @@ TEST(Contact, AWarmStepAllocatesNothingByAnyRule) {
   }
 }
 
+TEST(Contact, RowsMadeAgainAfterOthersYieldAsTheyDid) {
+  GroundedIsland island({.modes = 4, .dropped = 3}, 1e-2);
+  island.add_body({{}, {0.0, 0.0, 1.0}});
+  island.step();
+  const auto yields_at = [&](Index first) {
+    ConstraintRows rows;
+    for (const int makings : {0, 1}) {  // a step may be foreseen again, with more rows before these
+      rows.clear();
+      for (Index i = 0; i < first + 30 * makings; ++i) rows.add({}, {}, {});
+      for (Constraint* constraint : island.contacts.constraints())
+        constraint->add_rows(island.states(), StepTime::kStart, 1e-2, rows);
+    }
+    return rows.flexibility().size();
+  };
+  EXPECT_GT(yields_at(0), 0u);
+  EXPECT_EQ(yields_at(0), yields_at(5));
+  // Each pair of the eight corners' 24 rows once.
+  EXPECT_EQ(yields_at(5), 24u * 25u / 2u);
+}
+
 TEST(Contact, OptionsOutOfRangeAreRefused) {
   EXPECT_THROW(ContactSet({.friction = -0.1}), InvalidArgument);
   EXPECT_THROW(ContactSet({.recovery_speed = kUnbounded}), InvalidArgument);

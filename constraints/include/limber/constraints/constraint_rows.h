@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -99,6 +100,8 @@ class ConstraintRows {
   };
 
   void clear();
+  /// How often they have been cleared: rows made since belong together.
+  std::uint64_t makings() const { return makings_; }
   /// @return the row's index. Copies the modal parts.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
@@ -124,6 +127,7 @@ class ConstraintRows {
   std::vector<Flexibility> flexibility_;
   double stored_energy_ = 0.0;
   std::vector<double> modal_;
+  std::uint64_t makings_ = 0;
 };
 
 /// The bodies of one island with the places of their degrees of freedom among all of the island's.
