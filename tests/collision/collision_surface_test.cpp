@@ -35,13 +35,10 @@ TEST(CollisionSurface, EveryEdgeKnowsItsTrianglesAndTheyKnowTheEdge) {
                     b = s.triangle(t)[static_cast<std::size_t>((corner + 1) % 3)];
         EXPECT_EQ(edge.vertices, (std::array{std::min(a, b), std::max(a, b)}));
         ++count[static_cast<std::size_t>(s.edge_of(t, corner))];
-        if (edge.triangle_count <= 2) {
-          EXPECT_TRUE(edge.triangles[0] == t || edge.triangles[1] == t);
-          EXPECT_EQ(s.neighbour(t, corner),
-                    edge.triangle_count == 1 ? -1 : edge.triangles[edge.triangles[0] == t ? 1 : 0]);
-        } else {
-          EXPECT_EQ(s.neighbour(t, corner), -1);
-        }
+        const std::span<const Index> sharing = s.edge_triangles(s.edge_of(t, corner));
+        EXPECT_TRUE(std::find(sharing.begin(), sharing.end(), t) != sharing.end());
+        EXPECT_TRUE(std::is_sorted(sharing.begin(), sharing.end()));
+        EXPECT_EQ(s.neighbour(t, corner), sharing.size() != 2 ? -1 : sharing[sharing[0] == t ? 1 : 0]);
       }
     for (Index e = 0; e < s.edges(); ++e) EXPECT_EQ(s.edge(e).triangle_count, count[static_cast<std::size_t>(e)]);
   }

@@ -53,6 +53,44 @@ TEST(NarrowPhase, ABodyWithinAnotherIsFoundThoughNoTrianglesMeet) {
   EXPECT_EQ(contacts_of(inner, box, 0.01).size(), inner.plain().vertices.size());
 }
 
+/// Over 0 ≤ z ≤ 1 of a polygon, counter-clockwise and star-shaped from its first corner.
+SurfaceMesh prism(const std::vector<std::array<double, 2>>& polygon) {
+  SurfaceMesh mesh;
+  const auto n = static_cast<Index>(polygon.size());
+  for (const double z : {0.0, 1.0})
+    for (const auto& [x, y] : polygon) mesh.vertices.emplace_back(x, y, z);
+  for (Index i = 0; i < n; ++i) {
+    const Index j = (i + 1) % n;
+    mesh.triangles.push_back({i, j, n + j}), mesh.triangles.push_back({i, n + j, n + i});
+    if (i == 0 || j == 0) continue;
+    mesh.triangles.push_back({0, j, i}), mesh.triangles.push_back({n, n + i, n + j});
+  }
+  return mesh;
+}
+
+TEST(NarrowPhase, InsideIsInsideWherePartsOfASolidMeetInAnEdge) {
+  // Three quarters of a square and, in the fourth, a wedge that touches them along the edge in their corner: four faces
+  // meet there, and much of what is inside the three quarters is nearest to it.
+  SurfaceMesh mesh = prism({{0, 0}, {0, 1}, {-1, 1}, {-1, -1}, {1, -1}, {1, 0}});
+  shapes::append(prism({{0, 0}, {0.8, 0.6}, {0.6, 0.8}}), mesh);
+  Body solid(testing::wavy_model(mesh, 0)), probe(Shape{Sphere{1e-3}});
+  ASSERT_TRUE(solid.surface().closed());
+  solid.place({});
+  Random random(30);
+  int inside = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const double x = random.uniform(-0.4, 0.4), y = random.uniform(-0.4, 0.4);
+    if (nearest_distance(solid.plain(), {x, y, 0.5}) < 2e-3) continue;
+    const bool in_wedge = 0.75 * x < y && y < x / 0.75, is_inside = in_wedge || x < 0.0 || y < 0.0;
+    probe.place({.p = {x, y, 0.5}});
+    const auto contacts = contacts_of(solid, probe, 1e-4);
+    ASSERT_EQ(contacts.empty(), !is_inside) << x << ", " << y;
+    inside += is_inside ? 1 : 0;
+  }
+  EXPECT_GT(inside, 700);
+  EXPECT_LT(inside, 950);
+}
+
 TEST(NarrowPhase, EdgesThatCrossWithoutAVertexInsideMakeAnEdgeContact) {
   // Two bars, each with an edge foremost, crossed at a right angle and 0.01 into each other.
   const auto roof = [] { return testing::wavy_model(shapes::box(Vec3(-1, -0.1, -0.1), Vec3(1, 0.1, 0.1)), 0); };

@@ -200,18 +200,19 @@ void CollisionSurface::build_edges() {
   triangle_edges_.resize(triangles_.size());
   closed_ = true;
   for (std::size_t first = 0, last; first < half_edges.size(); first = last) {
-    SurfaceEdge edge{.vertices = half_edges[first].vertices};
+    SurfaceEdge edge{.vertices = half_edges[first].vertices,
+                     .first_triangle = static_cast<Index>(edge_triangles_.size())};
     Index reversed = 0;
     for (last = first; last < half_edges.size() && half_edges[last].vertices == edge.vertices; ++last) {
       const HalfEdge& half = half_edges[last];
       triangle_edges_[static_cast<std::size_t>(half.triangle)][static_cast<std::size_t>(half.corner)] = edges();
       const auto& [a, b, c] = triangle(half.triangle);
       if (a == b || b == c || c == a) continue;  // a needle without inside connects nothing
-      if (edge.triangle_count < 2) edge.triangles[static_cast<std::size_t>(edge.triangle_count)] = half.triangle;
+      edge_triangles_.push_back(half.triangle);
       ++edge.triangle_count;
       reversed += half.reversed ? 1 : 0;
     }
-    if (edge.triangle_count > 0 && (edge.triangle_count != 2 || reversed != 1)) closed_ = false;
+    if (edge.triangle_count != 2 * reversed) closed_ = false;
     edges_.push_back(edge);
   }
 }
@@ -234,10 +235,10 @@ void CollisionSurface::build_vertex_adjacency() {
 }
 
 Index CollisionSurface::neighbour(Index t, int corner) const {
-  const SurfaceEdge& e = edge(edge_of(t, corner));
-  if (e.triangle_count != 2) return -1;
-  if (e.triangles[0] == t) return e.triangles[1];
-  return e.triangles[1] == t ? e.triangles[0] : -1;
+  const std::span<const Index> both = edge_triangles(edge_of(t, corner));
+  if (both.size() != 2) return -1;
+  if (both[0] == t) return both[1];
+  return both[1] == t ? both[0] : -1;
 }
 
 bool CollisionSurface::adjacent(Index t, Index u) const {

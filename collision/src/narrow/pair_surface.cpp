@@ -84,8 +84,7 @@ bool PairSurface::edge_minimum(const Vec3& p, Index e, double reach, Minimum& mi
   const double length = (x1 - x0).norm();
   const double ahead0 = (p - x0).dot(x1 - x0), ahead1 = (p - x1).dot(x0 - x1);
   if (!(ahead0 > tolerance_ * length) || !(ahead1 > tolerance_ * length)) return false;
-  for (const Index t : edge.triangles) {
-    if (t < 0) continue;
+  for (const Index t : surface().edge_triangles(e)) {
     const auto c = static_cast<std::size_t>(corner_of_edge(surface(), t, e));
     if ((p - face(t).x[c]).dot(face(t).inward[c]) > tolerance_) return false;
   }
@@ -126,8 +125,7 @@ bool PairSurface::sees(Index v, const Vec3& q) {
 bool PairSurface::in_normal_cone(Index e, const Vec3& direction) {
   Vec3 sum = Vec3::Zero();
   double worst = -1.0;
-  for (const Index t : surface().edge(e).triangles) {
-    if (t < 0) continue;
+  for (const Index t : surface().edge_triangles(e)) {
     const Vec3& inward = face(t).inward[static_cast<std::size_t>(corner_of_edge(surface(), t, e))];
     sum += inward;
     worst = std::max(worst, inward.dot(direction));
@@ -151,8 +149,8 @@ bool PairSurface::behind(const FeatureSide& feature, const Vec3& n, double leani
     case Feature::Kind::kVertex:
       return in_front(index, -n, leaning);
     case Feature::Kind::kEdge:
-      for (const Index t : surface().edge(index).triangles)
-        if (t >= 0 && n.dot(face(t).inward[static_cast<std::size_t>(corner_of_edge(surface(), t, index))]) > leaning)
+      for (const Index t : surface().edge_triangles(index))
+        if (n.dot(face(t).inward[static_cast<std::size_t>(corner_of_edge(surface(), t, index))]) > leaning)
           return false;
       return std::abs(n.dot(edge_vector(index))) <= leaning * edge_vector(index).norm();
     case Feature::Kind::kFace:
@@ -169,8 +167,7 @@ double PairSurface::shortest_edge(Index v) {
 
 Vec3 PairSurface::edge_normal(Index e) {
   Vec3 sum = Vec3::Zero();
-  for (const Index t : surface().edge(e).triangles)
-    if (t >= 0) sum += face(t).normal;
+  for (const Index t : surface().edge_triangles(e)) sum += face(t).normal;
   return sum;
 }
 
@@ -205,7 +202,7 @@ FeatureSide PairSurface::at_vertex(Index v) {
 
 FeatureSide PairSurface::on_edge(Index e, double fraction, const Vec3& point) {
   const SurfaceEdge& edge = surface().edge(e);
-  FeatureSide side{feature_key(Feature::Kind::kEdge, e), edge.triangles[0], {}, point};
+  FeatureSide side{feature_key(Feature::Kind::kEdge, e), surface().edge_triangles(e).front(), {}, point};
   const Triangle& t = surface().triangle(side.triangle);
   side.weight[static_cast<std::size_t>(corner_of(t, edge.vertices[0]))] = 1.0 - fraction;
   side.weight[static_cast<std::size_t>(corner_of(t, edge.vertices[1]))] = fraction;

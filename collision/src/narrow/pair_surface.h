@@ -84,7 +84,10 @@ class PairSurface {
   bool owns_vertex(Index t, int corner) const {
     return surface().vertex_triangles(surface().triangle(t)[static_cast<std::size_t>(corner)]).front() == t;
   }
-  bool owns_edge(Index t, int corner) const { return surface().edge(surface().edge_of(t, corner)).triangles[0] == t; }
+  bool owns_edge(Index t, int corner) const {
+    const std::span<const Index> sharing = surface().edge_triangles(surface().edge_of(t, corner));
+    return !sharing.empty() && sharing.front() == t;
+  }
 
   // Local minima of the distance from p over the surface, up to `reach`, on the face t and on those of its edges and
   // vertices that it owns (`all`: on any of them); of a sided surface only those in front of which p is.
@@ -127,8 +130,7 @@ class PairSurface {
     if (kind_of(key) == Feature::Kind::kVertex) {
       for (const Index t : surface().vertex_triangles(index)) visit(t);
     } else if (kind_of(key) == Feature::Kind::kEdge) {
-      for (const Index t : surface().edge(index).triangles)
-        if (t >= 0) visit(t);
+      for (const Index t : surface().edge_triangles(index)) visit(t);
     } else {
       visit(index);
     }

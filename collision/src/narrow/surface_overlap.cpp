@@ -122,9 +122,8 @@ void SurfaceContacts::find_loops() {
   crossed_.clear();
   for (std::size_t i = 0; i < piercings_.size(); ++i) {
     const Piercing& p = piercings_[i];
-    for (const Index t : side_[p.of]->surface().edge(p.edge).triangles)
-      if (t >= 0)
-        crossed_.push_back({p.of == 0 ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+    for (const Index t : side_[p.of]->surface().edge_triangles(p.edge))
+      crossed_.push_back({p.of == 0 ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
   }
   std::sort(crossed_.begin(), crossed_.end(), [](const Crossed& a, const Crossed& b) {
     return std::tie(a.triangles, a.piercing) < std::tie(b.triangles, b.piercing);

@@ -28,8 +28,8 @@ class BoxReader;
 
 /// An undirected edge between two (canonical) vertices.
 struct SurfaceEdge {
-  std::array<Index, 2> vertices{-1, -1};   ///< ascending; equal where a triangle has two corners at one place
-  std::array<Index, 2> triangles{-1, -1};  ///< the first two that share it, ascending; −1: none
+  std::array<Index, 2> vertices{-1, -1};  ///< ascending; equal where a triangle has two corners at one place
+  Index first_triangle = 0;               ///< see CollisionSurface::edge_triangles()
   Index triangle_count = 0;  ///< 1: boundary; 2: inside a surface; more: not a manifold. 0: equal vertices
 
   bool boundary() const { return triangle_count == 1; }
@@ -85,6 +85,11 @@ class CollisionSurface {
   Index canonical_vertex(Index v) const { return canonical_[static_cast<std::size_t>(v)]; }
   Index edges() const { return static_cast<Index>(edges_.size()); }
   const SurfaceEdge& edge(Index e) const { return edges_[static_cast<std::size_t>(e)]; }
+  /// Triangles that share an edge, ascending.
+  std::span<const Index> edge_triangles(Index e) const {
+    return std::span(edge_triangles_)
+        .subspan(static_cast<std::size_t>(edge(e).first_triangle), static_cast<std::size_t>(edge(e).triangle_count));
+  }
   /// The edge from corner `corner` to the next one of a triangle.
   Index edge_of(Index t, int corner) const {
     return triangle_edges_[static_cast<std::size_t>(t)][static_cast<std::size_t>(corner)];
@@ -101,7 +106,8 @@ class CollisionSurface {
   }
   /// The lowest vertex of each part that hangs together by edges, ascending.
   std::span<const Index> component_vertices() const { return component_vertices_; }
-  /// Bounds a solid: every edge between distinct vertices lies in two triangles that run through it in opposite ways.
+  /// Bounds a solid: as many triangles run through an edge one way as the other. They are two, or more where parts of
+  /// the solid meet in an edge, as simplification may leave them.
   bool closed() const { return closed_; }
   /// Whether two triangles have a (canonical) vertex in common.
   bool adjacent(Index t, Index u) const;
@@ -162,6 +168,7 @@ class CollisionSurface {
   std::vector<Triangle> triangles_;
   std::vector<Index> canonical_;
   std::vector<SurfaceEdge> edges_;
+  std::vector<Index> edge_triangles_;
   std::vector<std::array<Index, 3>> triangle_edges_;
   std::vector<Index> vertex_triangles_, vertex_triangles_start_, vertex_neighbours_, vertex_neighbours_start_;
   std::vector<Index> component_vertices_;
