@@ -90,7 +90,7 @@ class ContactDents {
 
     std::vector<DentLoad> loads;
     VertexNumbers of_loads;
-    std::vector<Rows> rows;    // of the part of a step at hand, which may be done again, with others
+    std::vector<Rows> rows;  // of the part of a step at hand, which may be done again, with others
     const ConstraintRows* made_in = nullptr;
     std::uint64_t making = 0;  // of those rows
     VertexNumbers in_regions;  // of all of these

@@ -30,7 +30,7 @@ class BoxReader;
 struct SurfaceEdge {
   std::array<Index, 2> vertices{-1, -1};  ///< ascending; equal where a triangle has two corners at one place
   Index first_triangle = 0;               ///< see CollisionSurface::edge_triangles()
-  Index triangle_count = 0;  ///< 1: boundary; 2: inside a surface; more: not a manifold. 0: equal vertices
+  Index triangle_count = 0;               ///< 1: boundary; 2: inside a surface; more: not a manifold. 0: equal vertices
 
   bool boundary() const { return triangle_count == 1; }
 };
