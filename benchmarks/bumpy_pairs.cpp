@@ -2,12 +2,15 @@
 // one, turned at random, is dropped on it from half a metre. Prints Markdown: how deep they overlap at most and after
 // four seconds, steps that do not settle, and what a step takes. Figures: docs/reports/contact-reach.md.
 //   bumpy_pairs ASSET.glb [PAIRS [HERTZ]]     20 pairs at 60 steps a second
+//   bumpy_pairs ASSET.glb heap [BODIES]       a tower of 27, four in a layer, that falls in a heap: a line a second
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <memory>
 #include <random>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "cpu_time.h"
@@ -19,6 +22,7 @@ namespace limber::testing {
 namespace {
 
 constexpr double kSeconds = 4.0, kHeight = 0.5;
+constexpr Stage kShown[] = {Stage::kNarrowPhase, Stage::kRows, Stage::kSolve, Stage::kFastBodies};
 
 struct Outcome {
   double deepest = 0.0, at_end = 0.0;  // m, of overlap
@@ -59,13 +63,60 @@ Outcome drop(const std::shared_ptr<const ModalModel>& model, double step, std::m
   return out;
 }
 
+void heap(const std::shared_ptr<const ModalModel>& model, int bodies) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> about(-1.0, 1.0);
+  const double size = model->collision_extent().radius;
+  ContactFinder finder;
+  World world({.step = 1.0 / 60.0});
+  world.set_contact_source(&finder, {.friction = 0.5});
+  world.add_static(std::make_shared<const Shape>(HalfSpace{}));
+  for (int i = 0; i < bodies; ++i)
+    world.add_body(model,
+                   {.pose = {quaternion_from_rotation_vector({3 * about(random), 3 * about(random), 3 * about(random)}),
+                             {size * (i % 2 == 0 ? -1.0 : 1.0), size * (i / 2 % 2 == 0 ? -1.0 : 1.0),
+                              (1.5 + 2.0 * static_cast<double>(i / 4)) * size}}});
+  double overlap = 0.0;
+  world.set_contact_veto([&](const ContactPoint& contact) {
+    overlap = std::max(overlap, -contact.gap);
+    return true;
+  });
+  std::printf("| second | unsettled | found anew | contacts pressing | deepest at its end, mm | ms: mean | worst |");
+  for (const Stage stage : kShown) std::printf(" %s |", std::string(to_string(stage)).c_str());
+  std::printf("\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (int second = 0; second < 8; ++second) {
+    StageTimes times;
+    world.set_stage_times(&times);
+    double sum = 0.0, worst = 0.0;
+    int unsettled = 0, looks = 0;
+    for (int i = 0; i < 60; ++i) {
+      overlap = 0.0;
+      const double start = thread_seconds();
+      world.step();
+      const double took = 1e3 * (thread_seconds() - start);
+      sum += took, worst = std::max(worst, took);
+      unsettled += world.constraint_report().solved ? 0 : 1;
+      looks += world.constraint_report().attempts[StepAttempt::kLookedFarther];
+    }
+    std::printf("| %d | %d | %d | %zu | %.2f | %.2f | %.1f |", second + 1, unsettled, looks,
+                world.contact_events().size(), 1e3 * overlap, sum / 60.0, worst);
+    for (const Stage stage : kShown) std::printf(" %.2f |", 1e3 / 60.0 * times[stage].seconds);
+    std::printf("\n");
+    std::fflush(stdout);
+  }
+}
+
 }  // namespace
 }  // namespace limber::testing
 
 int main(int argc, char** argv) try {
   using namespace limber::testing;
-  if (argc < 2) throw std::runtime_error("usage: bumpy_pairs ASSET.glb [PAIRS [HERTZ]]");
+  if (argc < 2) throw std::runtime_error("usage: bumpy_pairs ASSET.glb [PAIRS [HERTZ] | heap [BODIES]]");
   const auto model = limber::read_asset(argv[1]).bodies.at(0);
+  if (argc > 2 && std::string_view(argv[2]) == "heap") {
+    heap(model, argc > 3 ? std::atoi(argv[3]) : 27);
+    return 0;
+  }
   const int pairs = argc > 2 ? std::atoi(argv[2]) : 20;
   const double step = 1.0 / (argc > 3 ? std::atof(argv[3]) : 60.0);
   std::mt19937 random(1);

@@ -111,10 +111,10 @@ void ExactMotion::bounds(const MotionState& from, double until, MotionBounds& bo
     bounds.modes[i] = bound(i, {from.amplitudes[i], from.rates[i]}, from.time, until);
 }
 
-double ExactMotion::reach(double distance, std::span<const double> shape) const {
+double ExactMotion::reach(double distance, std::span<const double> shape, const Vec3& displacement) const {
   double arm = distance;
   for (std::size_t i = 0; i < z_.size(); ++i) arm += shape[i] * (std::abs(z_[i]) + released(i));
-  return path_.bounds(0.0, step()).travel + sway(arm, shape);
+  return path_.travel_beside(displacement) + sway(arm, shape);
 }
 
 void ExactMotion::changes(std::span<double> change) const {

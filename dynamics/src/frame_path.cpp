@@ -115,6 +115,12 @@ Vec3 FramePath::angular_velocity(double t) const {
 
 double FramePath::smooth_until(double t) const { return end_of(part_at(t)); }
 
+/// t |v₀ − d/T + ½ a t| is largest at the end, or where t is and the rest is not.
+double FramePath::travel_beside(const Vec3& displacement) const {
+  const Vec3 start = step_ * start_.velocity - displacement;
+  return std::max(start.norm(), (start + 0.5 * step_ * step_ * acceleration_).norm());
+}
+
 FrameBounds FramePath::bounds(double t0, double t1) const {
   const double s = t1 - t0;
   const Vec3 v0 = start_.velocity + t0 * acceleration_;

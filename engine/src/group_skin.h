@@ -24,11 +24,11 @@ class GroupSkin {
 
   const SkinTiles& tiles() const { return tiles_; }
 
-  /// BodyState::reach of a body: how far any of its points may come within its motion, m.
-  double reach(const BodyShape& now, const ExactMotion& motion) {
+  /// BodyState::reach of a body: how far any of its points may come within its motion beside a displacement, m.
+  double reach(const BodyShape& now, const ExactMotion& motion, const Vec3& displacement) {
     motion.changes(change_);
     const double far = extent_.find(now.handles(), bare_, now.amplitudes(), change_, shape_, rates_);
-    return motion.path().bounds(0.0, motion.step()).travel + motion.sway(far, shape_);
+    return motion.path().travel_beside(displacement) + motion.sway(far, shape_);
   }
 
  private:

@@ -95,7 +95,15 @@ struct World::Impl {
   std::vector<BodyState> ends;    // the same, as foreseen
   std::vector<Index> members;     // of islands, ascending
   std::vector<ContactPoint> found_at_end;
-  std::vector<double> ways;                         // the same: how far contacts are to be looked for at least, m
+  struct ExpectedEnd {  // of a step; BodyState has the meaning of the members
+    RigidTransform pose{};
+    std::vector<double> amplitudes;
+    double doubt = 0.0;
+    bool foreseen = false;
+  };
+  std::vector<ExpectedEnd> expected;  // the same
+  ExpectedEnd ends_foreseen;          // scratch
+  std::vector<double> ways;  // the same: how far any point may come within the step, where it ends or before, m
   std::vector<std::vector<DentLoad>> loads_before;  // what dented each entry before the last step
   double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
@@ -173,9 +181,14 @@ struct World::Impl {
   void write_state(Index body, double length);
   bool can_wait(Index body) const;
   void find_contacts();
-  void expect_reach(Index body);
-  double foreseen_way(Index body) const;
-  bool find_farther();
+  double free_reach(Index body, const Vec3& displacement) const;
+  static void expect_to_stay(BodyState& state);
+  void expect(Index body);
+  double beside(Index body, const ExpectedEnd& end) const;
+  double difference(Index body, const Quaternion& q, std::span<const double> z, const ExpectedEnd& end) const;
+  void foreseen_end(Index body, ExpectedEnd& end) const;
+  double fall() const;
+  bool find_elsewhere();
   Vec3 place_at_start(ContactSide& side, const Vec3& inwards) const;
   bool find_at_end();
   bool list_ends(double least);

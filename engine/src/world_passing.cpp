@@ -33,7 +33,7 @@ void World::Impl::list_fast() {
   passing.fast.clear();
   for (const Index body : sleep.awake()) {
     const BodyState& state = states[static_cast<std::size_t>(body)];
-    if (state.reach > PassingBodies::kSlow * state.look_ahead) passing.fast.push_back(body);
+    if (ways[static_cast<std::size_t>(body)] > PassingBodies::kSlow * state.look_ahead) passing.fast.push_back(body);
   }
 }
 
@@ -68,17 +68,20 @@ void World::Impl::find_first_touches() {
 /// the other sees it.
 bool World::Impl::planes_last(Index a, Index b) const {
   const BodyState &x = states[static_cast<std::size_t>(a)], &y = states[static_cast<std::size_t>(b)];
-  const double turns = std::max(0.0, x.reach - x.displacement.norm()) + std::max(0.0, y.reach - y.displacement.norm());
-  return (x.displacement - y.displacement).norm() + turns <= std::min(x.look_ahead, y.look_ahead);
+  const auto beside = [&](Index body, const BodyState& s) {
+    return s.asleep || !constraints.moves(body)
+               ? 0.0
+               : std::max(0.0, ways[static_cast<std::size_t>(body)] - s.displacement.norm());
+  };
+  return (x.displacement - y.displacement).norm() + beside(a, x) + beside(b, y) <= std::min(x.look_ahead, y.look_ahead);
 }
 
 /// What touches already, and goes on faster than by its fall.
 void World::Impl::add_brisk() {
   PassingBodies& p = passing;
-  const double fall = 0.5 * options.gravity.norm() * parts->length() * parts->length();
   const auto brisk = [&](Index body) {
     const BodyState& s = states[static_cast<std::size_t>(body)];
-    return constraints.moves(body) && !s.asleep && s.reach - fall > s.look_ahead;
+    return constraints.moves(body) && !s.asleep && ways[static_cast<std::size_t>(body)] - fall() > s.look_ahead;
   };
   for (const auto& [a, b] : p.touching)
     if (brisk(a) || brisk(b)) p.touches.push_back({.a = a, .b = b});

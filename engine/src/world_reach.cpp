@@ -6,77 +6,101 @@
 #include "world_impl.h"
 
 namespace limber {
-namespace {
 
-/// How far a turn takes a point at an arm of 1.
-double chord(const Quaternion& from, const Quaternion& to) {
-  const Quaternion turn = to * from.conjugate();
-  return 2.0 * turn.vector().norm();
-}
+/// How far a body comes in a step that lets go of it. Where something held it, gravity acts at the step's start.
+double World::Impl::fall() const { return options.gravity.norm() * parts->length() * parts->length(); }
 
-}  // namespace
-
-/// How far contacts are looked for. A body that nothing held in the last step comes as far as it does by itself. What
-/// held others holds them on for the most part: a squeezed body does not spring open. So they are expected to come
-/// twice as far as their velocities take them, and as they fall; whether they do is seen in find_farther().
-void World::Impl::expect_reach(Index body) {
+/// Where a body is expected when the step ends, before anything is known of it. One that nothing held in the last step
+/// goes on by itself. What held others holds them on for the most part: a squeezed body does not spring open. So they
+/// are expected to go on with their velocities, and modes no farther than they would swing by these.
+void World::Impl::expect(Index body) {
   const auto i = static_cast<std::size_t>(body);
   const Entry& e = entries[i];
   BodyState& state = states[i];
+  ExpectedEnd& end = expected[i];
   if (state.asleep) return;
-  if (e.held) {
-    const BodyGroup& bodies = group(e);
-    const double length = parts->length();
-    double arm = e.extent.radius, way = 0.0;
-    if (!e.shape) {
-      const std::span<const double> shape = bodies.model().collision_extent().shape, z = bodies.amplitudes(e.slot),
-                                    rates = bodies.rates(e.slot);
-      for (std::size_t k = 0; k < z.size(); ++k) {
-        arm += shape[k] * std::abs(z[k]);
-        way += shape[k] * std::abs(rates[k]) * length;
-      }
-    }
-    way += state.displacement.norm() + state.rotation.norm() * arm;
-    const double fall = 0.5 * options.gravity.norm() * length * length;
-    state.reach = std::min(state.reach, 2.0 * way + fall);
-  }
-  state.reach = std::max(state.reach, ways[i]);
-}
-
-/// How far any point of a body comes by what has been foreseen, m.
-double World::Impl::foreseen_way(Index body) const {
-  const auto i = static_cast<std::size_t>(body);
-  const Entry& e = entries[i];
   const BodyGroup& bodies = group(e);
-  const SurfaceExtent& extent = bodies.model().collision_extent();
-  if (!constraints.constrained(body))
-    return e.shape ? motions[i].reach(e.extent.radius, {}) : motions[i].reach(extent.radius, extent.shape);
-  const RigidTransform &from = bodies.frame(e.slot).pose(), &to = bodies.predicted_frame(e.slot).pose();
-  double arm = e.extent.radius, flexing = 0.0;
-  if (!e.shape) {
-    const std::span<const double> z = bodies.amplitudes(e.slot), end = bodies.predicted_amplitudes(e.slot);
-    for (std::size_t k = 0; k < z.size(); ++k) {
-      arm += extent.shape[k] * std::abs(z[k]);
-      flexing += extent.shape[k] * std::abs(end[k] - z[k]);
+  ways.resize(entries.size());
+  if (!end.foreseen) {
+    const std::span<const double> z = bodies.amplitudes(e.slot), rates = bodies.rates(e.slot),
+                                  lambda = bodies.model().data().eigenvalues;
+    end.amplitudes.resize(e.shape ? 0 : z.size());
+    end.doubt = fall();
+    if (e.held) {
+      end.pose = {quaternion_from_rotation_vector(state.rotation) * state.pose.q, state.pose.p + state.displacement};
+      for (std::size_t k = 0; k < end.amplitudes.size(); ++k)
+        end.amplitudes[k] = z[k] + rates[k] * std::min(parts->length(), 1.0 / std::sqrt(lambda[k]));
+    } else {
+      motions[i].at(parts->length(), end.pose, end.amplitudes);
     }
   }
-  return (to.p - from.p).norm() + chord(from.q, to.q) * arm + flexing;
+  state.end_pose = end.pose;
+  state.end_amplitudes = end.amplitudes;
+  state.doubt = end.doubt;
+  const double by_itself = state.way();
+  if (end.foreseen) {
+    state.displacement = end.pose.p - state.pose.p;
+    state.rotation = rotation_vector(end.pose.q * state.pose.q.conjugate());
+  }
+  state.reach = (end.pose.p - state.pose.p - state.displacement).norm() + beside(body, end) + end.doubt;
+  ways[i] = end.foreseen || e.held ? std::min(by_itself, state.way()) : by_itself;
 }
 
-/// Once the step has been foreseen: looks for contacts anew where a body comes farther than they were looked for, by a
-/// blow or since something lets go of it. @return whether it did: the step is to be foreseen anew
-bool World::Impl::find_farther() {
-  bool farther = false;
+/// How far any point of a body is at most from where the way of its origin takes it, m.
+double World::Impl::beside(Index body, const ExpectedEnd& end) const {
+  const auto i = static_cast<std::size_t>(body);
+  return difference(body, states[i].pose.q, states[i].amplitudes, end);
+}
+
+double World::Impl::difference(Index body, const Quaternion& q, std::span<const double> z,
+                               const ExpectedEnd& end) const {
+  const Entry& e = entries[static_cast<std::size_t>(body)];
+  double arm = e.extent.radius, flexing = 0.0;
+  const std::span<const double> shape = group(e).model().collision_extent().shape;
+  for (std::size_t k = 0; k < end.amplitudes.size(); ++k) {
+    arm += shape[k] * std::abs(z[k]);
+    flexing += shape[k] * std::abs(end.amplitudes[k] - z[k]);
+  }
+  return 2.0 * (end.pose.q * q.conjugate()).vector().norm() * arm + flexing;
+}
+
+/// Where a constrained body ends, as foreseen.
+void World::Impl::foreseen_end(Index body, ExpectedEnd& end) const {
+  const Entry& e = entries[static_cast<std::size_t>(body)];
+  const BodyGroup& bodies = group(e);
+  end.pose = bodies.predicted_frame(e.slot).pose();
+  end.amplitudes.clear();
+  if (e.shape) return;
+  const std::span<const double> z = bodies.predicted_amplitudes(e.slot);
+  end.amplitudes.assign(z.begin(), z.end());
+}
+
+/// Once the step has been foreseen: looks for contacts anew where a body ends elsewhere than they were looked for, by a
+/// blow or since something lets go of it: along the motion foreseen then. @return whether it did: the step is to be
+/// foreseen anew
+bool World::Impl::find_elsewhere() {
+  bool elsewhere = false;
   for (const Index body : sleep.awake()) {
     const auto i = static_cast<std::size_t>(body);
     if (!shows(entries[i]) || constraints.is_held_back(body)) continue;
-    const double way = foreseen_way(body);
-    if (!(way > states[i].reach)) continue;
-    farther = farther || states[i].reach < states[i].look_ahead;
-    ways[i] = constraints.constrained(body) ? 2.0 * way : way;
+    ExpectedEnd& end = ends_foreseen;
+    if (constraints.constrained(body)) {
+      foreseen_end(body, end);
+    } else {
+      end.amplitudes.resize(expected[i].amplitudes.size());
+      motions[i].at(parts->length(), end.pose, end.amplitudes);
+    }
+    const double off =
+        (end.pose.p - expected[i].pose.p).norm() + difference(body, expected[i].pose.q, expected[i].amplitudes, end);
+    if (!(off > expected[i].doubt)) continue;
+    elsewhere = elsewhere || states[i].way() < states[i].look_ahead;
+    std::swap(expected[i].amplitudes, end.amplitudes);
+    expected[i].pose = end.pose;
+    expected[i].doubt = fall();
+    expected[i].foreseen = true;
   }
-  if (farther) find_contacts();
-  return farther;
+  if (elsewhere) find_contacts();
+  return elsewhere;
 }
 
 /// A contact's point as the step begins, of one that was found at its end. What is round touches with another point of
@@ -133,7 +157,9 @@ bool World::Impl::list_ends(double least) {
   for (const Index body : sleep.awake()) {
     if (!shows(entries[static_cast<std::size_t>(body)]) || !constraints.constrained(body)) continue;
     members.push_back(body);
-    farthest = std::max(farthest, foreseen_way(body));
+    foreseen_end(body, ends_foreseen);
+    farthest = std::max(farthest, (ends_foreseen.pose.p - states[static_cast<std::size_t>(body)].pose.p).norm() +
+                                      beside(body, ends_foreseen));
   }
   if (!(2.0 * farthest > least)) return false;
   ends = states;

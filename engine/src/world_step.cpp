@@ -92,7 +92,8 @@ void World::Impl::ask_source() {
 /// farther than expected, three times at most: each time at least twice as far.
 void World::Impl::foresee() {
   constexpr int kMostLooks = 3;
-  ways.assign(entries.size(), 0.0);
+  expected.resize(entries.size());
+  for (const Index body : sleep.awake()) expected[static_cast<std::size_t>(body)].foreseen = false;
   find_contacts();
   for (int look = 0;; ++look) {
     constraints.hold_back(passing.members);
@@ -104,7 +105,7 @@ void World::Impl::foresee() {
                                 .timed = clock.runs()});
     if (clock.runs()) clock.lap(constraints.foreseen_times(), Stage::kSolve);
     if (source == nullptr || look == kMostLooks) break;
-    if (find_farther())
+    if (find_elsewhere())
       constraints.let_go();
     else if (find_at_end())
       constraints.set_contacts(contacts.constraints());
@@ -150,7 +151,7 @@ bool World::Impl::write_states() {
   for (const Index body : sleep.awake())
     if (shows(entries[static_cast<std::size_t>(body)])) {
       write_state(body, parts->length());
-      expect_reach(body);
+      expect(body);
     }
   return false;
 }
@@ -174,6 +175,7 @@ void World::Impl::write_all_states() {
     if (!e.alive) continue;
     if (e.group < 0) {
       states[i] = {.pose = e.pose, .asleep = std::exchange(e.placed, true)};
+      expect_to_stay(states[i]);
       continue;
     }
     if (!shows(e)) {
@@ -181,8 +183,14 @@ void World::Impl::write_all_states() {
       continue;
     }
     write_state(static_cast<Index>(i), parts->length());
-    expect_reach(static_cast<Index>(i));
+    expect(static_cast<Index>(i));
   }
+}
+
+void World::Impl::expect_to_stay(BodyState& state) {
+  state.doubt = 0.0;
+  state.end_pose = state.pose;
+  state.end_amplitudes = state.amplitudes;
 }
 
 /// Of a body that moves. @param length how long it is to be looked ahead, s
@@ -193,20 +201,28 @@ void World::Impl::write_state(Index body, double length) {
   const RigidFrame& frame = bodies.frame(e.slot);
   states[i] = {.pose = frame.pose(), .asleep = sleep.asleep(body)};
   if (!e.shape) states[i].amplitudes = bodies.amplitudes(e.slot);
-  if (states[i].asleep) return;
+  if (states[i].asleep) {
+    expect_to_stay(states[i]);
+    return;
+  }
   bodies.predict_motion(e.slot, options.gravity, length, motions[i]);
   if (e.shape) motions[i].set_modes({}, {}, {}, {});
   // Without gravity: what lies on something does not fall, and what falls has a velocity.
   states[i].displacement = length * frame.velocity();
   states[i].rotation = length * frame.angular_velocity(bodies.frame_constants());
-  const SurfaceExtent& extent = bodies.model().collision_extent();
-  if (e.shape)
-    states[i].reach = motions[i].reach(e.extent.radius, {});
-  else if (bodies.skinned(e.slot))
-    states[i].reach = skins[static_cast<std::size_t>(e.group)]->reach(bodies.shape(e.slot), motions[i]);
-  else
-    states[i].reach = motions[i].reach(extent.radius, extent.shape);
+  states[i].reach = free_reach(body, states[i].displacement);
   if (!passing.looks_farther(body) && can_wait(body)) states[i].look_ahead = e.extent.thickness;
+}
+
+/// How far any point of a body may come by itself beside a displacement, m.
+double World::Impl::free_reach(Index body, const Vec3& displacement) const {
+  const auto i = static_cast<std::size_t>(body);
+  const Entry& e = entries[i];
+  if (e.shape) return motions[i].reach(e.extent.radius, {}, displacement);
+  const BodyGroup& bodies = group(e);
+  const SurfaceExtent& extent = bodies.model().collision_extent();
+  if (!bodies.skinned(e.slot)) return motions[i].reach(extent.radius, extent.shape, displacement);
+  return skins[static_cast<std::size_t>(e.group)]->reach(bodies.shape(e.slot), motions[i], displacement);
 }
 
 /// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.

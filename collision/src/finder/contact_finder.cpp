@@ -58,12 +58,19 @@ void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
 }
 
 CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
+  using Instant = internal::SurfacePool::Instant;
   const FoundBody& body = at(index);
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
-  if (!s.asleep) result.displacement = s.displacement, result.rotation = s.rotation;
+  result.displacement = s.displacement, result.rotation = s.rotation;
+  result.reach = s.reach + 0.5 * margin;
+  result.doubt = s.doubt + 0.5 * margin;
+  result.end_X_WB = s.end_pose;
   if (body.modal) {
-    result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
+    result.surface = &worker.pool.get(index, Instant::kNow, body.modal->surface, s.amplitudes, options.bounds);
+    if (std::isfinite(s.doubt))
+      result.end_surface =
+          &worker.pool.get(index, Instant::kEnd, body.modal->surface, s.end_amplitudes, BoundsChoice::kAmplitudes);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;
   } else {
     result.geometry = body.rigid.get();
@@ -100,7 +107,8 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Fou
   } else {
     const bool plane = at(pair.a).is_half_space() || at(pair.b).is_half_space();
     const BodyState &s = state(pair.a), &t = state(pair.b);
-    const double reaches = plane ? s.reach + t.reach : reach_of_features(s) + reach_of_features(t);
+    const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
+    const double reaches = plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t));
     worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);

@@ -61,7 +61,7 @@ struct ContactFinder::Impl {
   const internal::FoundBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
   const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
   /// How far contacts are looked for, where features decide.
-  static double reach_of_features(const BodyState& state) { return std::min(state.reach, state.look_ahead); }
+  static double reach_of_features(const BodyState& state) { return std::min(state.way(), state.look_ahead); }
   const ExactMotion* motion(Index body) const {
     return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
   }

@@ -29,6 +29,14 @@ void check_state(Index index, const FoundBody& body, const BodyState& state) {
     refuse(index, "displacement or rotation is not finite", "finite numbers");
   if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
     refuse(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
+  if (!(state.doubt >= 0.0)) refuse(index, "doubt is " + std::to_string(state.doubt), "a number of at least 0");
+  if (std::isfinite(state.doubt) && !(state.end_pose.p.allFinite() && std::abs(state.end_pose.q.norm() - 1.0) <= unit))
+    refuse(index, "end_pose is not finite or its quaternion not of length 1", "a pose");
+  if (std::isfinite(state.doubt) && state.end_amplitudes.size() != static_cast<std::size_t>(body.modes()))
+    refuse(index, std::to_string(state.end_amplitudes.size()) + " end_amplitudes", std::to_string(body.modes()));
+  if (std::isfinite(state.doubt) &&
+      !std::all_of(state.end_amplitudes.begin(), state.end_amplitudes.end(), [](double z) { return std::isfinite(z); }))
+    refuse(index, "end_amplitudes are not finite", "finite numbers");
   if (!(state.look_ahead >= 0.0))
     refuse(index, "look_ahead is " + std::to_string(state.look_ahead), "a number of at least 0");
   if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
@@ -49,7 +57,7 @@ void bind_state(DeformedSurface& surface, Index index, const FoundBody& body, st
 }  // namespace
 
 bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
-  return s.asleep && at(body).placed_asleep && at(body).placed_reach == s.reach;
+  return s.asleep && at(body).placed_asleep && at(body).placed_reach == s.way();
 }
 
 /// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
@@ -129,20 +137,20 @@ void ContactFinder::Impl::place() {
   farthest_beyond = 0.0;
   for (const Index index : to_place)
     if (motion(index) == nullptr)
-      farthest_beyond = std::max(farthest_beyond, state(index).reach - reach_of_features(state(index)));
+      farthest_beyond = std::max(farthest_beyond, state(index).way() - reach_of_features(state(index)));
   for (std::size_t i = 0; i < to_place.size(); ++i) {
     const Index index = to_place[i];
     FoundBody& body = at(index);
     const bool moves = motion(index) != nullptr;
     if (body.is_half_space() && !moves) {
       HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), state(index).pose);
-      half_space.offset += state(index).reach;
+      half_space.offset += state(index).way();
       broad_phase.set_half_space(index, half_space);
     } else {
       broad_phase.set_box(index, boxes[i]);
     }
     body.placed_asleep = !moves && state(index).asleep;
-    body.placed_reach = moves ? 0.0 : state(index).reach;
+    body.placed_reach = moves ? 0.0 : state(index).way();
     broad_phase.set_asleep(index, body.placed_asleep);
   }
 }

@@ -74,7 +74,7 @@ bool Within(const BoxFrames& f, const NodeBox& box_a, const NodeBox& box_b) {
   const Sides a(box_a), b(box_b);
   float from_a[3];
   for (int i = 0; i < 3; ++i) {
-    float reach = a.half[i] + f.slack;
+    float reach = a.half[i] + f.slack_a[i];
     from_a[i] = f.p[i] - a.center[i];
     for (int j = 0; j < 3; ++j) {
       from_a[i] += f.columns[j][i] * b.center[j];
@@ -83,7 +83,7 @@ bool Within(const BoxFrames& f, const NodeBox& box_a, const NodeBox& box_b) {
     if (Magnitude(from_a[i]) > reach) return false;
   }
   for (int j = 0; j < 3; ++j) {
-    float reach = b.half[j] + f.slack, along = 0.0f;
+    float reach = b.half[j] + f.slack_b[j], along = 0.0f;
     for (int i = 0; i < 3; ++i) {
       along += f.columns[j][i] * from_a[i];
       reach += Magnitude(f.columns[j][i]) * a.half[i];
@@ -203,12 +203,13 @@ HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, 
   const Four d;
   const Columns R = LoadColumns(frames.columns), Rt = LoadColumns(frames.rows);
   const Columns R_size = Magnitudes(R), Rt_size = Magnitudes(Rt);
-  const Quad slack = hn::Set(d, frames.slack), p = hn::Load(d, frames.p), zero = hn::Zero(d);
+  const Quad slack_a = hn::Load(d, frames.slack_a), slack_b = hn::Load(d, frames.slack_b);
+  const Quad p = hn::Load(d, frames.p), zero = hn::Zero(d);
   const Sides fixed = SidesOf(one);
   std::uint64_t bits = 0;
   if (many_of_b) {
-    const Quad from_fixed = hn::Sub(p, fixed.center), reach_a = hn::Add(fixed.half, slack);
-    const Quad reach_b = Product(Rt_size, fixed.half, slack);
+    const Quad from_fixed = hn::Sub(p, fixed.center), reach_a = hn::Add(fixed.half, slack_a);
+    const Quad reach_b = Product(Rt_size, fixed.half, slack_b);
     for (std::size_t i = 0; i < count; ++i) {
       const Sides b = SidesOf(many[i]);
       const Quad from_a = Product(R, b.center, from_fixed), from_b = Product(Rt, from_a, zero);
@@ -216,8 +217,8 @@ HWY_ATTR std::uint64_t BoxesWithin(const BoxFrames& frames, const NodeBox& one, 
         bits |= std::uint64_t{1} << i;
     }
   } else {
-    const Quad to_fixed = Product(R, fixed.center, p), reach_a = Product(R_size, fixed.half, slack);
-    const Quad reach_b = hn::Add(fixed.half, slack);
+    const Quad to_fixed = Product(R, fixed.center, p), reach_a = Product(R_size, fixed.half, slack_a);
+    const Quad reach_b = hn::Add(fixed.half, slack_b);
     for (std::size_t i = 0; i < count; ++i) {
       const Sides a = SidesOf(many[i]);
       const Quad from_a = hn::Sub(to_fixed, a.center), from_b = Product(Rt, from_a, zero);

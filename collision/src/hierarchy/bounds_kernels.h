@@ -62,8 +62,9 @@ void refit_boxes(const TreeNode* nodes, std::size_t count, const std::int32_t* l
 struct alignas(64) BoxFrames {
   float columns[3][4];  ///< of R_AB
   float rows[3][4];
-  float p[4];   ///< of B in A
-  float slack;  ///< margin, and what single precision may be wrong by
+  float p[4];  ///< of B in A, at the middle of its way
+  /// By axis of A and of B: margin, half the way along it, and what single precision may be wrong by.
+  float slack_a[4], slack_b[4];
 };
 
 /// Which of up to 64 boxes in a row may be within reach of one box: a bit each.

@@ -47,15 +47,20 @@ double reach_of(const NodeBox& box) {  // from the origin to its farthest point,
 }
 
 /// Error of the separating axis test in single precision: some thirty roundings of numbers up to `size`.
-BoxFrames box_frames(const RigidTransform& X_AB, double margin, double size) {
+BoxFrames box_frames(const RigidTransform& X_AB, const Vec3& way_A, double margin, double size) {
   constexpr double kErrors = 64 * 0x1p-24;
   const Mat3 R = to_matrix(X_AB.q);
   BoxFrames frames{};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) frames.columns[j][i] = frames.rows[i][j] = static_cast<float>(R(i, j));
-    frames.p[i] = static_cast<float>(X_AB.p[i]);
+    frames.p[i] = static_cast<float>(X_AB.p[i] + 0.5 * way_A[i]);
   }
-  frames.slack = static_cast<float>(margin + kErrors * (size + margin) + internal::kBoxUnderflow);
+  const double slack = margin + kErrors * (size + margin) + internal::kBoxUnderflow;
+  const Vec3 along_a = 0.5 * way_A.cwiseAbs(), along_b = 0.5 * (R.transpose() * way_A).cwiseAbs();
+  for (int i = 0; i < 3; ++i) {
+    frames.slack_a[i] = static_cast<float>(slack + along_a[i]);
+    frames.slack_b[i] = static_cast<float>(slack + along_b[i]);
+  }
   return frames;
 }
 
@@ -112,11 +117,13 @@ double distance_to_box(const Vec3& p, const Aabb& box) {
 }
 
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
-                         std::vector<TrianglePair>& pairs) {
+                         std::vector<TrianglePair>& pairs, const Vec3& way_A) {
   if (!(margin >= 0.0)) throw InvalidArgument("find_triangle_pairs: margin is negative or not a number, expected ≥ 0");
-  if (Separation(X_AB)(a.bounds(0), b.bounds(0)) > margin) return;
+  const double way = way_A.norm();
+  if (Separation(X_AB)(a.bounds(0), b.bounds(0)) > margin + way) return;
   BoxReader boxes_a(a), boxes_b(b);
-  const BoxFrames frames = box_frames(X_AB, margin, reach_of(boxes_a(0)) + reach_of(boxes_b(0)) + X_AB.p.norm());
+  const BoxFrames frames =
+      box_frames(X_AB, way_A, margin, reach_of(boxes_a(0)) + reach_of(boxes_b(0)) + X_AB.p.norm() + way);
   std::array<std::pair<Index, Index>, 2 * CollisionSurface::kMaxDepth + 4> stack;
   std::size_t count = 0;
   stack[count++] = {0, 0};

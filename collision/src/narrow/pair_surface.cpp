@@ -44,12 +44,15 @@ void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, do
   tolerance_ = tolerance, directionless_ = collision_tuning().narrow.directionless * tolerance;
   X_PS_ = X_PS, X_SP_ = X_PS.inverse();
   displacement_ = rotation_ = Vec3::Zero();
+  end_ = nullptr;
   sided_ = surface().closed() || surface().model() == nullptr;
   grow(vertices_, surface().vertices()), grow(vertex_stamp_, surface().vertices());
   grow(faces_, surface().triangles()), grow(face_stamp_, surface().triangles());
+  grow(swept_, surface().triangles()), grow(swept_stamp_, surface().triangles());
   if (++generation_ == 0) {  // after 2³² queries the old stamps would come to life again
     std::fill(vertex_stamp_.begin(), vertex_stamp_.end(), 0u);
     std::fill(face_stamp_.begin(), face_stamp_.end(), 0u);
+    std::fill(swept_stamp_.begin(), swept_stamp_.end(), 0u);
     generation_ = 1;
   }
 }
@@ -75,6 +78,19 @@ void PairSurface::make_face(Index t) {
     f.inward[c] = length > 0.0 ? Vec3(f.normal.cross(edge[c]) / length) : Vec3(Vec3::Zero());
   }
   face_stamp_[i] = generation_;
+}
+
+const Aabb& PairSurface::swept_box(Index t) {
+  const auto i = static_cast<std::size_t>(t);
+  if (swept_stamp_[i] != generation_) {
+    swept_[i] = {};
+    for (const Index v : surface().triangle(t)) {
+      swept_[i].include(vertex(v));
+      swept_[i].include(end_X_PS_ * end_->vertex(v));
+    }
+    swept_stamp_[i] = generation_;
+  }
+  return swept_[i];
 }
 
 bool PairSurface::edge_minimum(const Vec3& p, Index e, double reach, Minimum& minimum) {

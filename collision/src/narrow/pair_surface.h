@@ -121,6 +121,13 @@ class PairSurface {
   void expect_motion(const Vec3& displacement, const Vec3& rotation) {
     displacement_ = displacement, rotation_ = rotation;
   }
+  // Where the surface is expected to be when contacts are looked for again. Until the next bind().
+  void expect_end(DeformedSurface& end, const RigidTransform& X_PS) {
+    end_ = &end;
+    end_X_PS_ = X_PS;
+  }
+  // What a face passes through on the straight way there. @pre expect_end()
+  const Aabb& swept_box(Index t);
   Vec3 expected_motion(const Vec3& point) const { return displacement_ + rotation_.cross(point - X_PS_.p); }
 
   // Faces that meet at a feature, whose key is that of a vertex, an edge or a face.
@@ -178,6 +185,10 @@ class PairSurface {
   bool sided_ = false;
   double tolerance_ = 0.0, directionless_ = 0.0;
   Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
+  DeformedSurface* end_ = nullptr;
+  RigidTransform end_X_PS_{};
+  std::vector<std::uint32_t> swept_stamp_;
+  std::vector<Aabb> swept_;
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;
   std::vector<Vec3> vertices_;

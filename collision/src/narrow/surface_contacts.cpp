@@ -34,10 +34,10 @@ void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool 
   generation_ += 2;
 }
 
-void SurfaceContacts::find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, double margin,
+void SurfaceContacts::find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach,
                            OverlapRule* rule_a, OverlapRule* rule_b, std::vector<FeatureContact>& contacts) {
-  begin(a, b, margin, false, contacts);
-  find_triangle_pairs(a.deformed(), b.deformed(), X_AB, margin, pairs_);
+  begin(a, b, reach.margin, false, contacts);
+  find_pairs(X_AB, reach);
   for (const auto& [s, t] : pairs_) test_pair(s, t);
   spread_inside(0, rule_b);
   spread_inside(1, rule_a);
@@ -51,6 +51,17 @@ void SurfaceContacts::find_self(PairSurface& a, double margin, std::vector<Featu
   begin(a, a, margin, true, contacts);
   find_self_pairs(a.deformed(), margin, false, pairs_);
   for (const auto& [s, t] : pairs_) test_pair(s, t);
+}
+
+// The way counts as far as gaps go.
+void SurfaceContacts::find_pairs(const RigidTransform& X_AB, const ContactReach& reach) {
+  const double beside = std::min(reach.beside, reach.margin), way = reach.way_A.norm();
+  const double share = way > 0.0 ? std::min(1.0, (reach.margin - beside) / way) : 0.0;
+  find_triangle_pairs(side_[0]->deformed(), side_[1]->deformed(), X_AB, beside, pairs_, share * reach.way_A);
+  if (!std::isfinite(reach.doubt)) return;
+  std::erase_if(pairs_, [&](const TrianglePair& pair) {
+    return apart(side_[0]->swept_box(pair[0]), side_[1]->swept_box(pair[1]), reach.doubt);
+  });
 }
 
 void SurfaceContacts::test_pair(Index s, Index t) {

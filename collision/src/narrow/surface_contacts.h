@@ -1,6 +1,7 @@
 // Contacts of two triangulated surfaces by their features, apart or overlapping; see narrow_phase.h for what counts.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "limber/collision/tree_traversal.h"
@@ -22,12 +23,21 @@ class OverlapRule {
   virtual bool exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) = 0;
 };
 
+// How far apart two surfaces may be to have contacts, m.
+struct ContactReach {
+  double margin = 0.0;                                     // of gaps
+  double beside = 0.0;                                     // how near their boxes are to come to each other on the way
+  Vec3 way_A = Vec3::Zero();                               // of b as seen from a
+  double doubt = std::numeric_limits<double>::infinity();  // how near faces are to come to each other; finite: their
+                                                           // ends are known
+};
+
 class SurfaceContacts {
  public:
   // Appends all contacts of a and b, in the pair's frame. Both are bound with one tolerance; those found twice (two
   // vertices) are appended twice. @param X_AB frame of b's body in that of a's @param rule_a of vertices inside a;
   // null: the nearest point
-  void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, double margin, OverlapRule* rule_a,
+  void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach, OverlapRule* rule_a,
             OverlapRule* rule_b, std::vector<FeatureContact>& contacts);
   // Of a surface with itself.
   void find_self(PairSurface& a, double margin, std::vector<FeatureContact>& contacts);
@@ -59,6 +69,7 @@ class SurfaceContacts {
   };
 
   void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
+  void find_pairs(const RigidTransform& X_AB, const ContactReach& reach);
   void test_pair(Index s, Index t);
   bool planes_separate(const PairSurface::Face& s, const PairSurface::Face& t) const;
 

@@ -37,6 +37,7 @@
 /// other.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -95,8 +96,16 @@ struct CollisionBody {
   const RigidGeometry* geometry = nullptr;
   const RestVolume* volume = nullptr;  ///< optional, of the surface's model
   /// How it is expected to move before the contacts are looked for again, world: of its origin, m, and the rotation
-  /// vector, rad. Decides nothing but the normals of features that are apart and would be passed.
+  /// vector, rad. Decides the normals of features that are apart and would be passed.
   Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
+  /// How far any of its points may come beside that displacement, m, ≥ 0. Features of two surfaces whose boxes stay
+  /// farther apart than both reaches all along both displacements are no contacts. Infinite: not known.
+  double reach = std::numeric_limits<double>::infinity();
+  /// Where the surface is expected to be then, and how far any of its points may come beside the straight way there, m.
+  /// Features that this keeps apart are no contacts. Infinite: not known.
+  double doubt = std::numeric_limits<double>::infinity();
+  RigidTransform end_X_WB{};
+  DeformedSurface* end_surface = nullptr;  ///< null where geometry has the triangles
 };
 
 /// Depth and normal of a vertex that is inside another modal body.
@@ -137,7 +146,7 @@ class NarrowPhase {
   NarrowPhase(NarrowPhase&&) noexcept;
   NarrowPhase& operator=(NarrowPhase&&) noexcept;
 
-  /// All contacts of a and b with gap ≤ margin. Two half-spaces have none.
+  /// All contacts of a and b with gap ≤ margin that their motions may bring together. Two half-spaces have none.
   /// @param origin positions come out relative to it, world @pre a.index < b.index, poses finite
   void find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
                      std::vector<ContactPoint>& contacts);

@@ -21,8 +21,9 @@ using TrianglePair = std::array<Index, 2>;
 
 /// Triangles of a below and of b that may be within `margin` of each other; appended to `pairs`.
 /// @param X_AB frame of b in the frame of a  @param margin m, ≥ 0
+/// @param way_A of b, in the frame of a, straight on: within `margin` anywhere along it
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
-                         std::vector<TrianglePair>& pairs);
+                         std::vector<TrianglePair>& pairs, const Vec3& way_A = Vec3::Zero());
 
 /// Triangles of one surface, t < u without a common vertex, that may be within `margin` of each other; appended.
 /// Parts of the body that the amplitudes cannot bring so near are left out without looking at their boxes: rest

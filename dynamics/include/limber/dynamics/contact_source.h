@@ -42,17 +42,28 @@ struct CollisionFilter {
 struct BodyState {
   RigidTransform pose{};                 ///< X_WB
   std::span<const double> amplitudes{};  ///< z, k numbers; none for a rigid shape
-  /// How far any of its points may come beyond this state, m, ≥ 0: contacts up to the sum of both bodies' reaches (and
-  /// the query's margin) are found, so what a step may bring together is there before it.
+  /// How far any of its points may come until the next query beside `displacement`, m, ≥ 0:
+  ///   p(t) = p(0) + t/T displacement + e(t),   |e| ≤ reach.
+  /// Contacts of all that such motions may bring together (or within the query's margin) are found, so what a step may
+  /// bring together is there before it.
   double reach = 0.0;
-  /// How far ahead a contact is worth finding: it is a plane between features, good near them alone. Where `reach` is
+  /// How far ahead a contact is worth finding: it is a plane between features, good near them alone. Where way() is
   /// larger, contacts up to here are found in its place, but for half-spaces, which are planes for good; what comes
   /// together beyond is a matter of find_impacts(). m, ≥ 0.
   double look_ahead = std::numeric_limits<double>::infinity();
-  /// The free motion expected until the next query: of the body origin, m, and the rotation vector, rad; world. A
-  /// source may choose normals by it for what is apart but would be passed; zero: nothing moves.
+  /// The motion expected until the next query: of the body origin, m, straight on and evenly; and the rotation vector,
+  /// rad; world. Of two bodies that move on together nothing but their reaches counts. By both a source may choose
+  /// normals of what is apart but would be passed; the rotation counts for nothing else.
   Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
+  /// Where it is expected to be at the next query. Its points are expected to go there straight on and evenly, and come
+  /// no farther than `doubt` beside: features that this keeps apart need not be found. m, ≥ 0; infinite: nothing is
+  /// expected, and the other two are not read.
+  double doubt = std::numeric_limits<double>::infinity();
+  RigidTransform end_pose{};
+  std::span<const double> end_amplitudes{};  ///< as many as amplitudes
   bool asleep = false;  ///< has not moved since the last query; two that sleep are not tested with each other
+
+  double way() const { return displacement.norm() + reach; }  ///< how far any of its points may come in all, m
 };
 
 struct ContactQuery {

@@ -56,9 +56,10 @@ class ExactMotion {
   /// Bounds over [from.time, until]. O(k). @param from what evaluate() gave. @pre from.time ≤ until ≤ step
   void bounds(const MotionState& from, double until, MotionBounds& bounds) const;
 
-  /// How far any point with |r| ≤ distance, |U_i| ≤ shape_i may be from its place at the start within the step, m: with
-  /// the numbers of ModalModel::collision_extent(), BodyState::reach. O(k).
-  double reach(double distance, std::span<const double> shape) const;
+  /// How far any point with |r| ≤ distance, |U_i| ≤ shape_i may be within the step from its place at the start, moved
+  /// straight on and evenly by `displacement`, m: with the numbers of ModalModel::collision_extent(), BodyState::reach.
+  /// O(k).
+  double reach(double distance, std::span<const double> shape, const Vec3& displacement = Vec3::Zero()) const;
   /// The same without the way of the body origin: how far turning and flexing take a point from where it would be if
   /// the frame moved straight on. @param arm |r + U z| ≤ arm at the start, m
   double sway(double arm, std::span<const double> shape) const;

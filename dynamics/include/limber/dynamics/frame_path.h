@@ -58,6 +58,8 @@ class FramePath {
 
   /// @pre 0 ≤ t0 ≤ t1 ≤ step
   FrameBounds bounds(double t0, double t1) const;
+  /// ≥ sup |p(t) − p(0) − t/step displacement| over the step, m.
+  double travel_beside(const Vec3& displacement) const;
 
   // For those who record a step part by part: start_*, add_* for every part in order of time, finish.
   void start_free(const RigidMotion& origin, double step, const PrincipalInertia& inertia);
