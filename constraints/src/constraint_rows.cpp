@@ -13,14 +13,13 @@ void ConstraintRows::clear() {
 }
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {
-  Row row{.sides = {}, .law = law};
+  Row& row = rows_.emplace_back(Row{.sides = {}, .law = law});
   for (int s = 0; s < 2; ++s) {
     const RowSide& side = s == 0 ? a : b;
     if (side.body < 0) continue;
     row.sides[s] = {side.body, side.linear, side.angular, modal_.size(), side.modal.size()};
     modal_.insert(modal_.end(), side.modal.begin(), side.modal.end());
   }
-  rows_.push_back(row);
   return size() - 1;
 }
 

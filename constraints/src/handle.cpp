@@ -53,15 +53,18 @@ void Handle::begin_part(double length, double left, double whole) {
 }
 
 void Handle::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
-  const Vec3 p = point_.position(states, when);
+  const FrameInstant at = point_.at(states, when);
+  const Vec3& p = at.position;
   const Vec3& target = when == StepTime::kStart ? now_ : then_;
-  const double arm = (p - states.origin(point_.body(), when)).norm();
+  const double arm = (p - at.origin).norm();
   for (std::size_t i = 0; i < options_.directions.size(); ++i) {
     const Vec3& n = options_.directions[i];
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
-               .tolerance = distance_tolerance(kHandleTolerance, arm, p)};
+               .tolerance = distance_tolerance(kHandleTolerance, arm, p),
+               .digits = digits_of(arm + p.norm() + target.norm()),
+               .last_force = last_force_[i]};
     law.agent_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {
@@ -70,12 +73,13 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
       law.offset = options_.damping / implicit * gap;
       law.stiffness = options_.stiffness;
       law.goes_on = true;
-      law.last_force = last_force_[i];
     } else {
       law.holds = true;
       law.agent_displacement -= gap;  // the hand takes the point to where it is wanted
     }
-    rows.add(point_.point_row(states, when, p, n, 1.0, modal_), {}, law);
+    FrameMeasure velocity;
+    at.add_point(p, n, velocity);
+    rows.add(point_.side(at, velocity, modal_), {}, law);
   }
 }
 

@@ -37,6 +37,23 @@ Vec3 euler_rate(const Mat3& Q, int i) {
   return dual / determinant;
 }
 
+/// What it changes by with Q.
+Vec3 euler_rate_change(const Mat3& Q, const Mat3& dQ, int i) {
+  const double alpha = std::atan2(-Q(1, 2), Q(2, 2)), square = Q(1, 2) * Q(1, 2) + Q(2, 2) * Q(2, 2),
+               dalpha = square > 0.0 ? (Q(1, 2) * dQ(2, 2) - Q(2, 2) * dQ(1, 2)) / square : 0.0;
+  const Vec3 x = Vec3::UnitX(), y(0.0, std::cos(alpha), std::sin(alpha)), z = Q.col(2),
+             dy = dalpha * Vec3(0.0, -std::sin(alpha), std::cos(alpha)), dz = dQ.col(2);
+  const double determinant = x.dot(y.cross(z));
+  if (!(determinant > kLeastEulerDeterminant)) return Vec3::Zero();
+  const Vec3 dual = i == 0   ? y.cross(z)
+                    : i == 1 ? z.cross(x)
+                             : x.cross(y),
+             change = i == 0   ? Vec3(dy.cross(z) + y.cross(dz))
+                      : i == 1 ? dz.cross(x)
+                               : x.cross(dy);
+  return (change - dual * (x.dot(dy.cross(z) + y.cross(dz)) / determinant)) / determinant;
+}
+
 }  // namespace
 
 void JointActuation::validate() const {
@@ -156,14 +173,18 @@ bool JointConstraint::is_angle(int coordinate) const {
 
 int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
 
+JointConstraint::Placement::Placement(const Vec3& from, const Vec3& to, const Mat3& axes_a, const Mat3& axes_b)
+    : o_a(from), o_b(to), d(axes_a.transpose() * (to - from)), R_a(axes_a), R_b(axes_b) {}
+
+JointConstraint::Instant::Instant(const FrameInstant& of_a, const FrameInstant& of_b)
+    : a(of_a), b(of_b), place(a.position, b.position, a.axes, b.axes) {}
+
+JointConstraint::Instant JointConstraint::instant(const BodyStates& states, StepTime when) const {
+  return {a_.at(states, when), b_.at(states, when)};
+}
+
 JointConstraint::Placement JointConstraint::place(const BodyStates& states, StepTime when) const {
-  Placement at{.o_a = a_.position(states, when),
-               .o_b = b_.position(states, when),
-               .d = {},
-               .R_a = a_.axes(states, when),
-               .R_b = b_.axes(states, when)};
-  at.d = at.R_a.transpose() * (at.o_b - at.o_a);
-  return at;
+  return {a_.position(states, when), b_.position(states, when), a_.axes(states, when), b_.axes(states, when)};
 }
 
 double JointConstraint::raw_coordinate(const Placement& at, int i) const {
@@ -268,20 +289,37 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
   return {};
 }
 
+/// What the angular part of direction() changes by with the axes, but for rows that turn_axes() tells.
+Vec3 JointConstraint::direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a,
+                                       const Mat3& dR_b) const {
+  if (row.measure == Measure::kCone) {
+    const Vec3 normal = at.R_b.col(0).cross(at.R_a.col(0)),
+               change = dR_b.col(0).cross(at.R_a.col(0)) + at.R_b.col(0).cross(dR_a.col(0));
+    const double size = normal.norm();
+    if (!(size > 0.0)) return dR_a.col(1);
+    return (change - normal * (normal.dot(change) / (size * size))) / size;
+  }
+  if (row.measure == Measure::kScrew) return -spec_.pitch * dR_a.col(0);
+  const double sign = row.measure == Measure::kLimit ? row.sign : 1.0;
+  if (!is_angle(row.axis)) return Vec3::Zero();
+  if (spec_.type != JointType::kBall) return sign * dR_a.col(axis_of(row.axis));
+  const Mat3 Q = at.R_a.transpose() * at.R_b, dQ = dR_a.transpose() * at.R_b + at.R_a.transpose() * dR_b;
+  return sign * (dR_a * euler_rate(Q, row.axis) + at.R_a * euler_rate_change(Q, dQ, row.axis));
+}
+
 /// In the middle of the step an angle φ about an axis that both parts share changes by its direction times the relative
 /// turn up to a factor: with Cayley vectors α of a and ρ of b against a, along the axis, |ρ| = 2 tan ½Δφ,
 ///   τ_b − τ_a = (1 + ¼α²)/(1 − ¼α·ρ) (1 − ½[α])⁻¹ρ,      (1 − ½[α])⁻¹ × the axis at the start = its mean
-JointConstraint::Direction JointConstraint::mean_direction(const BodyStates& states, const Placement& at,
-                                                           const RowPlan& row) const {
+JointConstraint::Direction JointConstraint::mean_direction(const Placement& start, const Placement& end,
+                                                           const Placement& at, const RowPlan& row,
+                                                           const Vec3& turn) const {
   Direction mean = direction(at, row);
   const bool coordinate = row.measure == Measure::kLimit || row.measure >= Measure::kMotor;
   const bool turns = row.measure == Measure::kScrew || (coordinate && is_angle(row.axis));
   if (!turns || spec_.type == JointType::kBall) return mean;
   const int angle = row.measure == Measure::kScrew ? 0 : row.axis;
-  const Placement start = place(states, StepTime::kStart), end = place(states, StepTime::kEnd);
   const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
   const Vec3 axis = start.R_a.col(axis_of(angle)), mean_axis = at.R_a.col(axis_of(angle));
-  const Vec3 turn = a_.turn(states);
   const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
   mean.angular *=
       ratio * (1.0 - 0.5 * tangent * turn.dot(axis)) / ((1.0 + 0.25 * turn.squaredNorm()) * mean_axis.squaredNorm());
@@ -290,8 +328,8 @@ JointConstraint::Direction JointConstraint::mean_direction(const BodyStates& sta
 
 // Rows of one step ----------------------------------------------------------------------------------------------------
 
-RowLaw JointConstraint::law_of(const RowPlan& plan, double gap, double tolerance) const {
-  RowLaw law{.tolerance = tolerance};
+RowLaw JointConstraint::law_of(const RowPlan& plan, double gap) const {
+  RowLaw law;
   const double recovery = kLimitRecoverySpeed * step_;
   switch (plan.measure) {
     case Measure::kMotor:
@@ -332,84 +370,74 @@ RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
   return law;
 }
 
-/// Of axes and distances: exact for any step, in its middle too.
-bool JointConstraint::add_straight(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
-                                   const RowLaw& law, ConstraintRows& rows) {
+/// Of axes and distances: exact for any step, in its middle too. @return whether it is such a row
+bool JointConstraint::measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a,
+                                       FrameMeasure& of_b) const {
   const bool coordinate = plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor;
-  RowSide of_a, of_b;
-  const bool turn = plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ ||
-                    (plan.measure == Measure::kTurn && when == StepTime::kMiddle);
-  if (turn) {
-    std::vector<double>& other = modal_turn_;
-    const auto add_pair = [&](const MaterialFrame& part, int axis, const Vec3& u, double sign, RowSide& side,
-                              std::vector<double>& modal) {
-      const RowSide row = part.axis_row(states, when, axis, u, sign, other);
-      side.body = row.body, side.angular += row.angular;
-      modal.resize(other.size());
-      for (std::size_t i = 0; i < other.size(); ++i) modal[i] += other[i];
-      side.modal = modal;
-    };
-    modal_a_.clear(), modal_b_.clear();
+  if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ ||
+      (plan.measure == Measure::kTurn && at.a.when == StepTime::kMiddle)) {
     for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {
       if (sign == 0.0) continue;
-      add_pair(a_, axis_a, at.R_b.col(axis_b), sign, of_a, modal_a_);
-      add_pair(b_, axis_b, at.R_a.col(axis_a), sign, of_b, modal_b_);
+      at.a.add_axis(axis_a, sign * at.place.R_b.col(axis_b), of_a);
+      at.b.add_axis(axis_b, sign * at.place.R_a.col(axis_a), of_b);
     }
-  } else if (plan.measure == Measure::kTranslation || (coordinate && !is_angle(plan.axis))) {
-    const int axis = coordinate ? axis_of(plan.axis) : plan.axis;
-    const double sign = plan.measure == Measure::kLimit ? plan.sign : 1.0;
-    const Vec3 n = at.R_a.col(axis);
-    of_b = b_.point_row(states, when, at.o_b, n, sign, modal_b_);
-    of_a = a_.axis_row(states, when, axis, at.o_b - at.o_a, sign, modal_turn_);
-    const RowSide point = a_.point_row(states, when, at.o_a, n, -sign, modal_a_);
-    of_a.linear = point.linear, of_a.angular += point.angular;
-    for (std::size_t i = 0; i < modal_turn_.size(); ++i) modal_a_[i] += modal_turn_[i];
-    of_a.modal = modal_a_;
-  } else {
-    return false;
+    return true;
   }
-  rows.add(of_b, of_a, law);
+  if (plan.measure != Measure::kTranslation && (!coordinate || is_angle(plan.axis))) return false;
+  const int axis = coordinate ? axis_of(plan.axis) : plan.axis;
+  const double sign = plan.measure == Measure::kLimit ? plan.sign : 1.0;
+  const Vec3 n = sign * at.place.R_a.col(axis);
+  at.b.add_point(at.place.o_b, n, of_b);
+  at.a.add_axis(axis, sign * (at.place.o_b - at.place.o_a), of_a);
+  at.a.add_point(at.place.o_a, -n, of_a);
   return true;
 }
 
-void JointConstraint::add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
-                          const RowLaw& law, ConstraintRows& rows) {
-  if (add_straight(states, when, at, plan, law, rows)) return;
-  const Direction along = when == StepTime::kMiddle ? mean_direction(states, at, plan) : direction(at, plan);
-  const auto side = [&](const MaterialFrame& part, double sign, std::vector<double>& modal) {
-    RowSide row = part.point_row(states, when, at.o_b, along.linear, sign, modal);
-    if (part.body() >= 0 && !along.angular.isZero(0.0)) {
-      std::vector<double>& turn = modal_turn_;
-      const RowSide angular = part.angular_row(states, when, along.angular, sign, turn);
-      row.angular += angular.angular;
-      for (std::size_t i = 0; i < turn.size(); ++i) modal[i] += turn[i];
-    }
-    row.modal = modal;
-    return row;
-  };
-  const RowSide of_b = side(b_, 1.0, modal_b_), of_a = side(a_, -1.0, modal_a_);
-  rows.add(of_b, of_a, law);
+void JointConstraint::measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b) {
+  if (!along.linear.isZero(0.0)) {
+    at.b.add_point(at.place.o_b, along.linear, of_b);
+    at.a.add_point(at.place.o_b, -along.linear, of_a);
+  }
+  at.b.add_turn(along.angular, of_b);
+  at.a.add_turn(-along.angular, of_a);
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
-  const Placement at = place(states, when);
+  if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
+  const Instant at = instant(states, when);
   if (when == StepTime::kStart) {
     step_ = step;
     plan_actuation();
-    axes_at_start_ = at.R_a;
+    axes_at_start_ = at.place.R_a;
   }
-  const auto arm = [&](const MaterialFrame& part) {
-    return part.body() < 0 ? 0.0 : (at.o_b - states.origin(part.body(), when)).norm();
-  };
-  const double digits = distance_tolerance(kJointTolerance, std::max(arm(a_), arm(b_)), at.o_b);
-  for (const RowPlan& plan : rows_) {
+  const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.place.o_b - part.origin).norm(); };
+  const double length = std::max(arm(at.a), arm(at.b)),
+               nearest = distance_tolerance(kJointTolerance, length, at.place.o_b);
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const RowPlan& plan = rows_[i];
     const bool distance =
         plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
         ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) && !is_angle(plan.axis));
-    const double tolerance = distance ? digits : kJointTolerance;
-    RowLaw law = law_of(plan, gap(at, plan), tolerance);
-    law.tolerance = tolerance;
-    add(states, when, at, plan, law, rows);
+    const double gap = this->gap(at.place, plan);
+    RowLaw law = law_of(plan, gap);
+    law.tolerance = distance ? nearest : kJointTolerance;
+    law.digits = digits_of(distance ? length + at.place.o_b.norm() : 1.0 + std::abs(gap));
+    if (i < plan_force_.size()) law.last_force = plan_force_[i];
+    FrameMeasure of_a, of_b;
+    if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at.place, plan), of_a, of_b);
+    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_), law);
+  }
+}
+
+/// What the rows are to be met by is told at the step's start.
+void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& rows) {
+  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
+                at{a_.between(start.a, end.a), b_.between(start.b, end.b)};
+  for (const RowPlan& plan : rows_) {
+    FrameMeasure of_a, of_b;
+    if (!measure_straight(at, plan, of_a, of_b))
+      measure_along(at, mean_direction(start.place, end.place, at.place, plan, a_.turn(states)), of_a, of_b);
+    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_), {});
   }
 }
 
@@ -417,7 +445,9 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
                                            ForceDerivative& sum) const {
   using Of = ForceDerivative::Of;
   using By = ForceDerivative::By;
-  const Placement end = place(states, StepTime::kEnd), mean = place(states, StepTime::kMiddle);
+  const Placement start = place(states, StepTime::kStart), end = place(states, StepTime::kEnd),
+                  mean(0.5 * (start.o_a + end.o_a), 0.5 * (start.o_b + end.o_b), 0.5 * (start.R_a + end.R_a),
+                       0.5 * (start.R_b + end.R_b));
   // On b, by the mean rows; as the rows of the end would have it; and how the couple follows the turns of a and b.
   Vec3 force = Vec3::Zero(), force_end = Vec3::Zero();
   Mat3 by_a = Mat3::Zero(), by_b = Mat3::Zero();
@@ -434,7 +464,11 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
         by_b += 0.5 * sign * p * cross_matrix(mean.R_a.col(axis_a)) * cross_matrix(end.R_b.col(axis_b));
       }
     } else {
-      by_a -= 0.5 * p * cross_matrix(there.angular);
+      for (int k = 0; k < 3; ++k) {
+        const Mat3 turn = 0.5 * cross_matrix(Vec3::Unit(k));
+        by_a.col(k) += p * direction_change(mean, plan, turn * end.R_a, Mat3::Zero());
+        by_b.col(k) += p * direction_change(mean, plan, Mat3::Zero(), turn * end.R_b);
+      }
     }
   }
   const Index a = a_.body(), b = b_.body();
@@ -467,9 +501,11 @@ void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<do
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
   force_ = Vec3::Zero();
   coordinate_force_ = motor_force_ = drive_force_ = friction_force_ = {};
+  plan_force_.resize(plan_.size());
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const double force = impulses[i] / step_;
+    if (i < plan_force_.size()) plan_force_[i] = force;
     if (plan.measure == Measure::kTranslation) force_ += force * axes_at_start_.col(plan.axis);
     if (plan.measure == Measure::kMotor) motor_force_[static_cast<std::size_t>(plan.axis)] = force;
     if (plan.measure == Measure::kDrive) drive_force_[static_cast<std::size_t>(plan.axis)] = force;

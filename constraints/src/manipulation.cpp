@@ -69,10 +69,13 @@ Vec3 acceleration(const ConstrainedBody& body, const BodyStates& states, const M
   for (std::size_t i = 0; i < bent.size(); ++i)
     bent[i] = group.held_modal_forces(body.slot)[i] - 2.0 * data.decays[i] * group.rates(body.slot)[i] -
               data.eigenvalues[i] * group.amplitudes(body.slot)[i];
+  const FrameInstant at = point.at(states, StepTime::kStart);
   std::vector<double> modal;
   Vec3 vibrating = Vec3::Zero();  // R U z̈
   for (int axis = 0; axis < 3; ++axis) {
-    point.point_row(states, StepTime::kStart, X.p + arm, Vec3::Unit(axis), 1.0, modal);
+    FrameMeasure velocity;
+    at.add_point(at.position, Vec3::Unit(axis), velocity);
+    point.side(at, velocity, modal);
     for (std::size_t i = 0; i < modal.size(); ++i) vibrating[axis] += modal[i] * bent[i];
   }
   return gravity + group.held_force(body.slot) / c.mass + alpha.cross(arm) + omega.cross(omega.cross(arm)) +
@@ -138,9 +141,11 @@ class Manipulation {
 
  private:
   void add_row(ConstraintRows& rows, const MaterialFrame& point, const Vec3& direction) {
-    const Vec3 p = point.position(states_, StepTime::kStart);
-    scale_ = std::max(scale_, p.norm());
-    rows.add(point.point_row(states_, StepTime::kStart, p, direction, 1.0, modal_), {}, {});
+    const FrameInstant at = point.at(states_, StepTime::kStart);
+    scale_ = std::max(scale_, at.position.norm());
+    FrameMeasure velocity;
+    at.add_point(at.position, direction, velocity);
+    rows.add(point.side(at, velocity, modal_), {}, {});
   }
 
   Eigen::MatrixXd jacobian(const ConstraintRows& rows) const {

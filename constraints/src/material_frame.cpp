@@ -186,66 +186,85 @@ Vec3 MaterialFrame::turn(const BodyStates& states) const {
   return states.turn(body_) + states.rotation(body_, StepTime::kMiddle) * bent;
 }
 
-RowSide MaterialFrame::point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
-                                 std::vector<double>& modal) const {
-  modal.clear();
-  if (body_ < 0) return {};
-  const Mat3 R_BW = states.rotation(body_, when).transpose();
-  const Vec3 arm = p - states.origin(body_, when);
-  const Vec3 n_B = scale * (R_BW * n);
-  Vec3 twist_B = Vec3::Zero();  // how a turn of the patch moves a point off its origin
-  if (!rotation_.empty()) twist_B = scale * (R_BW * (p - position(states, when)).cross(n));
-  for (std::size_t i = 0; i < displacement_.size(); ++i)
-    modal.push_back((anchors_.empty() ? displacement_[i].dot(n_B) : 0.0) +
-                    (rotation_.empty() ? 0.0 : rotation_[i].dot(twist_B)));
-  if (!anchors_.empty()) add_rows(states, when, n_B, modal);
-  return {body_, scale * n, scale * arm.cross(n), modal};
+FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
+  if (when == StepTime::kMiddle) return between(at(states, StepTime::kStart), at(states, StepTime::kEnd));
+  FrameInstant at{.states = states, .when = when, .body = body_, .position = rest_.origin, .axes = rest_.axes};
+  if (body_ < 0) return at;
+  const RigidTransform& pose = states.pose(body_, when);
+  const Mat3 R = to_matrix(pose.q);
+  const std::span<const double> z = states.amplitudes(body_, when);
+  at.origin = pose.p;
+  at.R_BW = R.transpose();
+  at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
+  at.axes_B = rest_.axes;
+  if (!rotation_.empty()) {
+    at.turned = turn(z);
+    at.turning = turn_of_rotation_vector(at.turned);
+    at.axes_B = to_matrix(quaternion_from_rotation_vector(at.turned)) * rest_.axes;
+  }
+  at.axes = R * at.axes_B;
+  return at;
 }
 
-/// In the middle the frame's turn in the body is that by the Cayley vector ε between its two ends. J_l Θ Δz is ε to
-/// third order; what is missing is made up for along Δz.
-RowSide MaterialFrame::axis_row(const BodyStates& states, StepTime when, int axis, const Vec3& u, double scale,
-                                std::vector<double>& modal) const {
-  modal.clear();
-  if (body_ < 0) return {};
-  const RowSide row{body_, Vec3::Zero(), scale * axes(states, when).col(axis).cross(u), {}};
-  if (rotation_.empty()) return row;
-  const Vec3 e = rest_.axes.col(axis), u_B = scale * (states.rotation(body_, when).transpose() * u);
-  const auto turned = [&](StepTime at) { return quaternion_from_rotation_vector(turn(states.amplitudes(body_, at))); };
-  if (when != StepTime::kMiddle) {
-    const Vec3 a_B = turning(states, when).transpose() * (turned(when) * e).cross(u_B);
-    for (const Vec3& turn : rotation_) modal.push_back(turn.dot(a_B));
-    return {row.body, row.linear, row.angular, modal};
-  }
-  const std::span<const double> z0 = states.amplitudes(body_, StepTime::kStart),
-                                z1 = states.amplitudes(body_, StepTime::kEnd);
-  const Quaternion start = turned(StepTime::kStart), end = turned(StepTime::kEnd), between = end * start.conjugate();
-  const Vec3 a_B = (0.5 * (start * e + end * e)).cross(u_B);
+FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstant& end) const {
+  FrameInstant at{.states = end.states,
+                  .when = StepTime::kMiddle,
+                  .body = body_,
+                  .position = 0.5 * (start.position + end.position),
+                  .axes = 0.5 * (start.axes + end.axes),
+                  .origin = 0.5 * (start.origin + end.origin)};
+  if (body_ < 0) return at;
+  at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
+  at.axes_B = 0.5 * (start.axes_B + end.axes_B);
+  if (rotation_.empty()) return at;
+  at.turning = turn_of_rotation_vector(0.5 * (start.turned + end.turned));
+  at.turned = end.turned - start.turned;
+  const Quaternion turn =
+      quaternion_from_rotation_vector(end.turned) * quaternion_from_rotation_vector(start.turned).conjugate();
+  at.cayley = 2.0 / turn.w * turn.vector();
+  const std::span<const double> z0 = at.states.amplitudes(body_, StepTime::kStart),
+                                z1 = at.states.amplitudes(body_, StepTime::kEnd);
   double square = 0.0;
   for (std::size_t i = 0; i < z0.size(); ++i) square += (z1[i] - z0[i]) * (z1[i] - z0[i]);
-  const Vec3 about = turning(states, when).transpose() * a_B;
-  const double missing = 2.0 / between.w * between.vector().dot(a_B) - (turn(z1) - turn(z0)).dot(about);
-  const double share = square > 0.0 ? missing / square : 0.0;
-  for (std::size_t i = 0; i < rotation_.size(); ++i) modal.push_back(rotation_[i].dot(about) + share * (z1[i] - z0[i]));
-  return {row.body, row.linear, row.angular, modal};
+  at.inverse_square = square > 0.0 ? 1.0 / square : 0.0;
+  return at;
 }
 
-/// What the frame turns by in the body per unit of Θ dz.
-Mat3 MaterialFrame::turning(const BodyStates& states, StepTime when) const {
-  if (when == StepTime::kMiddle)
-    return turn_of_rotation_vector(
-        0.5 * (turn(states.amplitudes(body_, StepTime::kStart)) + turn(states.amplitudes(body_, StepTime::kEnd))));
-  return turn_of_rotation_vector(turn(states.amplitudes(body_, when)));
+void FrameInstant::add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
+  to.linear += n;
+  to.angular += (p - origin).cross(n);
+  to.shift_B += R_BW * n;
+  to.turn_B += R_BW * (p - position).cross(n);
 }
 
-RowSide MaterialFrame::angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale,
-                                   std::vector<double>& modal) const {
+/// J_l Θ Δz is ε to third order; what is missing is made up for along Δz.
+void FrameInstant::add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
+  to.angular += axes.col(axis).cross(u);
+  const Vec3 a_B = axes_B.col(axis).cross(R_BW * u), about = turning.transpose() * a_B;
+  to.turn_B += about;
+  to.along_bend += inverse_square * (cayley.dot(a_B) - turned.dot(about));
+}
+
+void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
+  to.angular += a;
+  to.turn_B += turning.transpose() * (R_BW * a);
+}
+
+RowSide MaterialFrame::side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
   modal.clear();
   if (body_ < 0) return {};
-  if (rotation_.empty()) return {body_, Vec3::Zero(), scale * a, {}};
-  const Vec3 a_B = scale * (turning(states, when).transpose() * (states.rotation(body_, when).transpose() * a));
-  for (const Vec3& turn : rotation_) modal.push_back(turn.dot(a_B));
-  return {body_, Vec3::Zero(), scale * a, modal};
+  modal.resize(displacement_.size());
+  if (anchors_.empty())
+    for (std::size_t i = 0; i < modal.size(); ++i) modal[i] = displacement_[i].dot(measure.shift_B);
+  else if (!measure.shift_B.isZero(0.0))
+    add_rows(at.states, at.when, measure.shift_B, modal);
+  for (std::size_t i = 0; i < rotation_.size(); ++i) modal[i] += rotation_[i].dot(measure.turn_B);
+  if (measure.along_bend != 0.0) {
+    const std::span<const double> z0 = at.states.amplitudes(body_, StepTime::kStart),
+                                  z1 = at.states.amplitudes(body_, StepTime::kEnd);
+    for (std::size_t i = 0; i < modal.size(); ++i) modal[i] += measure.along_bend * (z1[i] - z0[i]);
+  }
+  return {body_, measure.linear, measure.angular, modal};
 }
 
 std::vector<SurfacePoint> patch_around(const ModalModel& model, SurfacePoint::Surface surface, const Vec3& center,

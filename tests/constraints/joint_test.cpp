@@ -6,6 +6,7 @@
 
 #include "asked.h"
 #include "constants.h"
+#include "counted_new.h"
 #include "islands.h"
 #include "limber/core/error.h"
 
@@ -281,6 +282,33 @@ TEST(Joint, RestingOnALimitHasNoVelocity) {
   for (int i = 0; i < 100; ++i) island.step();
   EXPECT_LT(island.group.frame(0).velocity().norm(), 1e-12);
   EXPECT_NEAR(island.joints[0]->coordinate(0, island.states()), 0.0, 1e-12);
+}
+
+/// Of bodies that bend, on stops: the last step's forces are this step's.
+TEST(Joint, WhatRestsTakesAnIterationAtMost) {
+  Island island({.modes = 6, .lowest_hz = 40.0, .decay = 30.0}, kFrame);
+  JointSpec spec = hinge();
+  spec.limits.rotation = {-0.2, 0.0};
+  add_chain(island, 2, spec);
+  IslandReport last;
+  for (int i = 0; i < 300; ++i) last = island.step();
+  EXPECT_LE(last.iterations, 1);
+  EXPECT_LT(island.joint_error(), 1e-12);
+}
+
+TEST(Joint, AWarmStepAllocatesNothingAsStopsAreHitAndLeft) {
+  Island island({.modes = 6, .lowest_hz = 20.0, .decay = 1.0}, kFrame);
+  JointSpec spec = hinge();
+  spec.limits.rotation = {-0.5, 0.3};
+  add_chain(island, 3, spec);
+  const auto swing = [&] {
+    for (const Index body : island.members) island.group.apply_generalized_impulse(body, {}, {0.0, -30.0, 0.0}, {});
+    for (int i = 0; i < 60; ++i) island.step();
+  };
+  for (int i = 0; i < 4; ++i) swing();
+  const long before = testing::allocations();
+  swing();
+  EXPECT_EQ(testing::allocations() - before, 0);
 }
 
 TEST(Joint, MotorTurnsAtItsSpeedUpToItsTorque) {

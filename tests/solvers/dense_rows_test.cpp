@@ -51,7 +51,8 @@ TEST(DampedLeastSquares, IsWhatSingularValuesSayForAnyRank) {
         for (double& s : gains) s = s < 1e-13 * svd.singularValues()[0] ? 0.0 : s / (s * s + damping * damping);
         const Eigen::VectorXd expected = svd.matrixV() * gains.asDiagonal() * svd.matrixU().transpose() * b;
         Eigen::VectorXd x = b;
-        rows.solve(numbers(A), damping, numbers(x));
+        rows.factor(numbers(A), static_cast<std::size_t>(n), damping);
+        rows.solve(numbers(x));
         EXPECT_LT((A * (x - expected)).norm(), 1e-9 * (1.0 + expected.norm())) << n << ' ' << rank << ' ' << damping;
       }
 }

@@ -1,44 +1,63 @@
 #include "end_velocities.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace limber::internal {
 
 void EndVelocities::meet_rows(IslandStep& step, std::span<const char> active) {
   IslandBodies& bodies = step.bodies;
   bodies.place(StepTime::kEnd);
-  const auto m = step.size(), n = static_cast<std::size_t>(bodies.degrees_of_freedom());
-  J_.resize(m * n), metric_.resize(n), impulses_.assign(m, 0.0), compliance_.assign(m, 0.0);
-  bodies.write_jacobian(step.end_rows, J_);
+  metric_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
   bodies.write_velocity_metric(metric_);
-  for (std::size_t i = 0; i < m; ++i) {
-    if (choose(step, i, active[i] != 0))
-      impulses_[i] = step.law(i).end_rate - rate(step, static_cast<Index>(i));
-    else
-      std::fill_n(J_.begin() + static_cast<std::ptrdiff_t>(i * n), n, 0.0);
+  rows_.clear(), off_.clear(), compliance_.clear();
+  bool met = true;
+  for (std::size_t i = 0; i < step.size(); ++i) {
+    const RowLaw& law = step.law(i);
+    if (!is_equality(law) && (active[i] == 0 || step.f[i] == 0.0)) continue;
+    const double yields = law.compliance > 0.0 ? compliance_of(step, i) : 0.0;
+    if (yields == kUnbounded) continue;
+    const double off = law.end_rate - rate(step, static_cast<Index>(i));
+    rows_.push_back(i), off_.push_back(off), compliance_.push_back(yields);
+    met = met && step.length() * std::abs(off) <= law.digits;
   }
-  equalities_.factor(J_, metric_, compliance_);
-  equalities_.solve(impulses_);
-  give(step, impulses_);
-  for (std::size_t i = 0; i < m; ++i) {
-    step.end_work += impulses_[i] * step.law(i).end_rate;
-    if (!(step.law(i).compliance > 0.0)) step.end_impulse[i] = impulses_[i];
-  }
+  if (!met) solve(step);
 }
 
-/// Rows that hold, and springs that are stiff: with κ = Δt a/c, a what an impulse changes the rate by, c the
-/// compliance, they yield by a (1 + κ)/κ².
-bool EndVelocities::choose(const IslandStep& step, std::size_t row, bool active) {
-  const RowLaw& law = step.law(row);
-  if (!is_equality(law) && (!active || step.f[row] == 0.0)) return false;
-  if (!(law.compliance > 0.0)) return true;
+void EndVelocities::solve(IslandStep& step) {
   const std::size_t n = metric_.size();
+  J_.assign(rows_.size() * n, 0.0);
+  for (std::size_t i = 0; i < rows_.size(); ++i) write_row(step, rows_[i], std::span(J_).subspan(i * n, n));
+  equalities_.factor(J_, metric_, compliance_);
+  equalities_.solve(off_);
+  impulses_.assign(step.size(), 0.0);
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const RowLaw& law = step.law(rows_[i]);
+    impulses_[rows_[i]] = off_[i];
+    step.end_work += off_[i] * law.end_rate;
+    if (!(law.compliance > 0.0)) step.end_impulse[rows_[i]] = off_[i];
+  }
+  give(step, impulses_);
+}
+
+/// Springs that are stiff yield: with κ = Δt a/c, a what an impulse changes the rate by, c the compliance, by
+/// a (1 + κ)/κ². @return unbounded where nothing moves the row
+double EndVelocities::compliance_of(const IslandStep& step, std::size_t row) {
+  const std::size_t n = metric_.size();
+  row_.assign(n, 0.0);
+  write_row(step, row, row_);
   double moved = 0.0;
-  for (std::size_t k = 0; k < n; ++k) moved += metric_[k] * J_[row * n + k] * J_[row * n + k];
-  const double stiff = step.length() * moved / law.compliance;
-  if (!(stiff > 0.0)) return false;
-  compliance_[row] = moved * (1.0 + stiff) / (stiff * stiff);
-  return true;
+  for (std::size_t k = 0; k < n; ++k) moved += metric_[k] * row_[k] * row_[k];
+  const double stiff = step.length() * moved / step.law(row).compliance;
+  return stiff > 0.0 ? moved * (1.0 + stiff) / (stiff * stiff) : kUnbounded;
+}
+
+/// J of the end. @param J zeros, one per degree of freedom
+void EndVelocities::write_row(const IslandStep& step, std::size_t row, std::span<double> J) {
+  for (const ConstraintRows::Side& side : step.end_rows.row(static_cast<Index>(row)).sides)
+    if (const Index local = step.bodies.local(side.body); local >= 0)
+      step.bodies.response(local).add_row(side.linear, side.angular, step.end_rows.modal(side),
+                                          J.data() + step.bodies.first(local));
 }
 
 /// J of the end times the velocities there.

@@ -20,9 +20,12 @@ class EndVelocities {
  private:
   static double rate(const IslandStep& step, Index row);
   static void give(IslandStep& step, std::span<const double> impulses);
-  bool choose(const IslandStep& step, std::size_t row, bool active);
+  static void write_row(const IslandStep& step, std::size_t row, std::span<double> J);
+  double compliance_of(const IslandStep& step, std::size_t row);
+  void solve(IslandStep& step);
 
-  std::vector<double> J_, metric_, impulses_, compliance_;
+  std::vector<std::size_t> rows_;  // that hold at the end
+  std::vector<double> off_, compliance_, J_, metric_, row_, impulses_;
   EqualityRows equalities_;
 };
 

@@ -35,6 +35,8 @@ Vec3 free_turn(const Mat3& inertia, const Vec3& momentum, double length) {
   return turn;
 }
 
+constexpr double kTolerance = 1e-11;  // rad, and of a length
+
 /// Of three rows, what a projection leaves.
 template <class Rows>
 void keep(const Mat3& projection, Rows&& rows) {
@@ -72,9 +74,9 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
               .modes = step.bodies.response(local).modes};
     body.flight =
         h * frame.velocity() + 0.5 * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
-    if (c.motion != FrameMotion::kKinematic) body.turn = free_turn(body.inertia, body.momentum, h);
+    if (c.motion == FrameMotion::kPoint) body.turn = free_turn(body.inertia, body.momentum, h);
     if (c.motion != FrameMotion::kFree) begin_carried(step, local, body);
-    body.shift = body.flight;
+    body.shift = body.flight;  // and what is free turns as guess() tells
     modes += body.modes;
     bodies_.push_back(body);
   }
@@ -85,6 +87,37 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
     const std::span<const double> response = step.bodies.response(local).position_modes;
     std::ranges::copy(response, response_.data() + b.first_mode);
   }
+}
+
+void MeanMotion::guess(const IslandStep& step, std::span<const double> impulses) {
+  sum_impulses(step.rows, step.bodies, impulses);
+  for (Index local = 0; local < count(); ++local) {
+    Body& b = bodies_[static_cast<std::size_t>(local)];
+    if (b.carried >= 0) continue;
+    b.shift = b.flight + 0.5 * length_ / b.mass * impulse_[static_cast<std::size_t>(local)];
+    b.turn = free_turn(b.inertia, b.momentum + 0.5 * (moment_[static_cast<std::size_t>(local)] + b.torque), length_);
+  }
+  load_.setZero();
+  for (Index i = 0; bends_ && i < step.rows.size(); ++i)
+    for (const ConstraintRows::Side& side : step.rows.row(i).sides) {
+      const Index local = step.bodies.local(side.body);
+      if (local < 0) continue;
+      const std::span<const double> shapes = step.rows.modal(side);
+      for (std::size_t k = 0; k < shapes.size(); ++k)
+        load_[first_mode(local) + static_cast<Index>(k)] += impulses[static_cast<std::size_t>(i)] * shapes[k];
+    }
+}
+
+/// To impulse_ and moment_.
+void MeanMotion::sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies,
+                              std::span<const double> impulses) {
+  impulse_.assign(bodies_.size(), Vec3::Zero()), moment_.assign(bodies_.size(), Vec3::Zero());
+  for (Index i = 0; i < rows.size(); ++i)
+    for (const ConstraintRows::Side& side : rows.row(i).sides)
+      if (const Index local = bodies.local(side.body); local >= 0) {
+        impulse_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.linear;
+        moment_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.angular;
+      }
 }
 
 void MeanMotion::begin_carried(const IslandStep& step, Index local, Body& body) {
@@ -200,37 +233,58 @@ void MeanMotion::place(IslandStep& step) {
   step.linearise(StepTime::kMiddle, step.mean_rows);
 }
 
-void MeanMotion::find_residual(const IslandStep& step, std::span<const double> impulses, Vector& residual,
-                               Vector& modal) const {
-  const double h = step.length();
-  residual.resize(6 * count());
+void MeanMotion::take_rows(const IslandStep& step, std::vector<MeanRow>& rows) const {
+  rows.resize(static_cast<std::size_t>(step.mean_rows.size()));
+  for (Index i = 0; i < step.mean_rows.size(); ++i)
+    for (std::size_t s = 0; s < 2; ++s) {
+      const ConstraintRows::Side &middle = step.mean_rows.row(i).sides[s], &end = step.end_rows.row(i).sides[s];
+      MeanRow::Side& side = rows[static_cast<std::size_t>(i)].sides[s];
+      side.body = step.bodies.local(middle.body);
+      if (side.body < 0) continue;
+      const Body& b = bodies_[static_cast<std::size_t>(side.body)];
+      side.force << 0.5 * middle.linear, 0.5 * (middle.angular - 0.5 * b.turn.cross(middle.angular));
+      side.gap << end.linear, (end.angular - 0.5 * b.turn.cross(end.angular)) / (1.0 + 0.25 * b.turn.squaredNorm());
+      side.modal_force = step.mean_rows.modal(middle), side.modal_gap = step.end_rows.modal(end);
+      if (b.carried >= 0) side.force << Vec3::Zero(), b.kept * Vec3(side.force.tail<3>());
+    }
+}
+
+bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const double> impulses, Vector& residual,
+                               Vector& modal) {
+  residual.resize(6 * count()), terms_.resize(2 * count());
   modal = load_;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
-    const Vec3 spin = b.inertia * b.turn / h;
-    residual.segment<3>(6 * local) = b.mass / h * (b.shift - b.flight);
-    residual.segment<3>(6 * local + 3) =
-        spin + 0.5 * b.turn.cross(spin) - b.momentum - 0.5 * b.torque + 0.25 * b.turn.cross(b.torque);
+    const Vec3 spin = b.inertia * b.turn / length_,
+               turned = spin + 0.5 * b.turn.cross(spin) - 0.5 * b.torque + 0.25 * b.turn.cross(b.torque);
+    const double mass = b.carried < 0 ? b.mass / length_ : 0.0;
+    residual.segment<6>(6 * local) << mass * (b.shift - b.flight), b.kept * (turned - b.momentum);
+    terms_.segment<2>(2 * local) << mass * (b.shift.norm() + b.flight.norm()),
+        spin.norm() + b.torque.norm() + b.momentum.norm();
   }
-  for (Index i = 0; i < step.mean_rows.size(); ++i) {
-    const double p = impulses[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double p = impulses[i];
     if (p == 0.0) continue;
-    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides) {
-      const Index local = step.bodies.local(side.body);
-      if (local < 0) continue;
-      const Body& b = bodies_[static_cast<std::size_t>(local)];
-      residual.segment<3>(6 * local) -= 0.5 * p * side.linear;
-      residual.segment<3>(6 * local + 3) -= 0.5 * p * (side.angular - 0.5 * b.turn.cross(side.angular));
-      const std::span<const double> shapes = step.mean_rows.modal(side);
-      for (std::size_t k = 0; k < shapes.size(); ++k) modal[b.first_mode + static_cast<Index>(k)] -= p * shapes[k];
-    }
+    rows[i].for_sides([&](const MeanRow::Side& side) {
+      residual.segment<6>(6 * side.body) -= p * side.force;
+      terms_[2 * side.body] += std::abs(p) * side.force.head<3>().norm();
+      terms_[2 * side.body + 1] += std::abs(p) * side.force.tail<3>().norm();
+      const Index first = first_mode(side.body);
+      for (std::size_t k = 0; k < side.modal_force.size(); ++k)
+        modal[first + static_cast<Index>(k)] -= p * side.modal_force[k];
+    });
   }
+  bool met = true;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
-    if (b.carried < 0) continue;
-    residual.segment<3>(6 * local).setZero();
-    residual.segment<3>(6 * local + 3) = b.kept * part(residual, local, 1);
+    const double least = kMetTo * (kTolerance + b.far / b.size) / length_;
+    met = met &&
+          part(residual, local, 0).norm() <=
+              std::max(digits_of(terms_[2 * local]), least * b.mass * (b.size + b.shift.norm())) &&
+          (part(residual, local, 1).norm() <= digits_of(terms_[2 * local + 1]) ||
+           (b.easy * part(residual, local, 1)).norm() <= least);
   }
+  return met;
 }
 
 void MeanMotion::find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K) {
@@ -321,21 +375,47 @@ void MeanMotion::hold_carried(Matrix& K) {
   }
 }
 
-void MeanMotion::condense(const Matrix& modal_force, const Matrix& modal_gap, const Vector& modal_residual, Matrix& K,
-                          Matrix& F, Matrix& E, Vector& residual) const {
+void MeanMotion::condense(const Vector& modal_residual, Vector& residual) const {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
-    if (b.modes == 0) continue;
+    residual.segment<3>(6 * local + 3).noalias() -=
+        bend_.middleCols(b.first_mode, b.modes) * modal_residual.segment(b.first_mode, b.modes);
+  }
+}
+
+void MeanMotion::condense(Matrix& K, std::span<MeanRow> rows) {
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
     const Index turn = 6 * local + 3;
     for (Index k = b.first_mode; k < b.first_mode + b.modes; ++k) {
-      const Vec3 bend = bend_.col(k), bent = response_[k] * bend,
-                 turned = response_[k] * turned_.col(k) + swung_.col(k);
-      K.block<3, 3>(turn, turn) += bend * turned.transpose();
-      F.middleRows<3>(turn).noalias() -= bent * modal_force.row(k);
-      E.middleCols<3>(turn).noalias() += modal_gap.col(k) * turned.transpose();
-      residual.segment<3>(turn) -= bent * modal_residual[k];
+      swung_.col(k) += response_[k] * turned_.col(k);
+      const Vec3 bend = bend_.col(k);
+      K.block<3, 3>(turn, turn) += bend * swung_.col(k).transpose();
+      bend_.col(k) *= response_[k];
     }
   }
+  for (MeanRow& row : rows)
+    for (MeanRow::Side& side : row.sides) {
+      if (side.body < 0) continue;
+      const Index first = first_mode(side.body);
+      for (std::size_t k = 0; k < side.modal_force.size(); ++k) {
+        side.force.tail<3>() -= side.modal_force[k] * bend_.col(first + static_cast<Index>(k));
+        side.gap.tail<3>() += side.modal_gap[k] * swung_.col(first + static_cast<Index>(k));
+      }
+    }
+}
+
+double MeanMotion::through_modes(const MeanRow& i, const MeanRow& j) const {
+  double sum = 0.0;
+  i.for_sides([&](const MeanRow::Side& measured) {
+    j.for_sides([&](const MeanRow::Side& pushed) {
+      if (measured.body != pushed.body) return;
+      const double* response = response_.data() + first_mode(measured.body);
+      for (std::size_t k = 0; k < measured.modal_gap.size(); ++k)
+        sum += measured.modal_gap[k] * response[k] * pushed.modal_force[k];
+    });
+  });
+  return sum;
 }
 
 void MeanMotion::add_turned(const Vector& change, Vector& load) const {
@@ -346,53 +426,15 @@ void MeanMotion::add_turned(const Vector& change, Vector& load) const {
   }
 }
 
-void MeanMotion::find_forces(const IslandStep& step, Matrix& F, Matrix& modal) const {
-  const Index m = step.mean_rows.size();
-  F.setZero(6 * count(), m);
-  modal.setZero(load_.size(), m);
-  for (Index i = 0; i < m; ++i)
-    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides) {
-      const Index local = step.bodies.local(side.body);
-      if (local < 0) continue;
-      const Body& b = bodies_[static_cast<std::size_t>(local)];
-      F.block<3, 1>(6 * local, i) += 0.5 * side.linear;
-      F.block<3, 1>(6 * local + 3, i) += 0.5 * (side.angular - 0.5 * b.turn.cross(side.angular));
-      const std::span<const double> shapes = step.mean_rows.modal(side);
-      for (std::size_t k = 0; k < shapes.size(); ++k) modal(b.first_mode + static_cast<Index>(k), i) += shapes[k];
-    }
-  for (Index local = 0; local < count(); ++local) {
-    const Body& b = bodies_[static_cast<std::size_t>(local)];
-    if (b.carried < 0) continue;
-    F.middleRows<3>(6 * local).setZero();
-    keep(b.kept, F.middleRows<3>(6 * local + 3));
-  }
-}
-
-void MeanMotion::find_gap_derivative(const IslandStep& step, Matrix& E, Matrix& modal) const {
-  const Index m = step.end_rows.size();
-  E.setZero(m, 6 * count());
-  modal.setZero(m, load_.size());
-  for (Index i = 0; i < m; ++i)
-    for (const ConstraintRows::Side& side : step.end_rows.row(i).sides) {
-      const Index local = step.bodies.local(side.body);
-      if (local < 0) continue;
-      const Body& b = bodies_[static_cast<std::size_t>(local)];
-      E.block<1, 3>(i, 6 * local) += side.linear.transpose();
-      E.block<1, 3>(i, 6 * local + 3) += side.angular.transpose() * end_turn(b.turn);
-      const std::span<const double> shapes = step.end_rows.modal(side);
-      for (std::size_t k = 0; k < shapes.size(); ++k) modal(i, b.first_mode + static_cast<Index>(k)) += shapes[k];
-    }
-}
-
-void MeanMotion::find_mobility(const Matrix& E, const Matrix& F, Vector& mobility) const {
-  mobility.setZero(E.rows());
-  for (Eigen::Index i = 0; i < E.rows(); ++i)
-    for (Index local = 0; local < count(); ++local) {
-      const Body& b = bodies_[static_cast<std::size_t>(local)];
-      const Vec3 turned = E.block<1, 3>(i, 6 * local + 3).transpose(), moment = F.block<3, 1>(6 * local + 3, i);
-      mobility[i] += length_ * (F.block<3, 1>(6 * local, i).squaredNorm() * 2.0 / b.mass +
-                                std::sqrt(turned.dot(b.easy * turned) * moment.dot(b.easy * moment)));
-    }
+double MeanMotion::mobility(const MeanRow& row) const {
+  double sum = 0.0;
+  row.for_sides([&](const MeanRow::Side& side) {
+    const Body& b = bodies_[static_cast<std::size_t>(side.body)];
+    const Vec3 turned = side.gap.tail<3>(), moment = side.force.tail<3>();
+    sum += side.force.head<3>().squaredNorm() * 2.0 / b.mass +
+           std::sqrt(turned.dot(b.easy * turned) * moment.dot(b.easy * moment));
+  });
+  return length_ * sum;
 }
 
 double MeanMotion::force_to_inertia(const Matrix& K) const {
@@ -420,8 +462,21 @@ void MeanMotion::move(const Vector& change, const Vector& load, double how_much)
   load_ += how_much * load;
 }
 
+void MeanMotion::write_place(Vector& to) const {
+  to.resize(6 * count());
+  for (Index local = 0; local < count(); ++local) {
+    const Body& b = bodies_[static_cast<std::size_t>(local)];
+    to.segment<6>(6 * local) << b.shift / b.size, b.turn;
+  }
+}
+
+void MeanMotion::write_relative(const Vector& change, Eigen::Ref<Vector> to) const {
+  for (Index local = 0; local < count(); ++local)
+    to.segment<6>(6 * local) << part(change, local, 0) / bodies_[static_cast<std::size_t>(local)].size,
+        part(change, local, 1);
+}
+
 double MeanMotion::size_of(const Vector& change) const {
-  constexpr double kTolerance = 1e-11;  // rad, and of a length
   double largest = 0.0;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
@@ -445,13 +500,7 @@ double MeanMotion::part_of(const Vector& change) const {
 
 void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
   const double h = step.length();
-  impulse_.assign(bodies_.size(), Vec3::Zero()), moment_.assign(bodies_.size(), Vec3::Zero());
-  for (Index i = 0; i < step.mean_rows.size(); ++i)
-    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides)
-      if (const Index local = step.bodies.local(side.body); local >= 0) {
-        impulse_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.linear;
-        moment_[static_cast<std::size_t>(local)] += impulses[static_cast<std::size_t>(i)] * side.angular;
-      }
+  sum_impulses(step.mean_rows, step.bodies, impulses);
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const ConstrainedBody& at = step.bodies.body(local);

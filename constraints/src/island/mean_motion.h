@@ -18,11 +18,51 @@
 #include <vector>
 
 #include "island_step.h"
+#include "mean_row.h"
 
 namespace limber::internal {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
+
+/// Equations that are met to this part of their tolerances are met: gaps and impulses are to do no work to 1e-12.
+inline constexpr double kMetTo = 1e-2;
+
+inline std::span<double> numbers(Vector& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
+inline std::span<double> numbers(Matrix& m) { return {m.data(), static_cast<std::size_t>(m.size())}; }
+
+/// Of the rows that take part, whose number changes: memory that grows to the largest seen.
+class RowMatrix {
+ public:
+  Eigen::Map<Matrix> resize(Eigen::Index rows, Eigen::Index columns) {
+    rows_ = rows, columns_ = columns;
+    memory_.resize(static_cast<std::size_t>(rows * columns));
+    return view();
+  }
+  Eigen::Map<Matrix> view() { return {memory_.data(), rows_, columns_}; }
+  Eigen::Map<const Matrix> view() const { return {memory_.data(), rows_, columns_}; }
+  std::span<double> numbers() { return memory_; }
+
+ private:
+  std::vector<double> memory_;
+  Eigen::Index rows_ = 0, columns_ = 0;
+};
+class RowVector {
+ public:
+  Eigen::Map<Vector> resize(Eigen::Index size) {
+    memory_.resize(static_cast<std::size_t>(size));
+    return view();
+  }
+  Eigen::Map<Vector> view() { return {memory_.data(), size()}; }
+  Eigen::Map<const Vector> view() const { return {memory_.data(), size()}; }
+  std::span<double> numbers() { return memory_; }
+  Eigen::Index size() const { return static_cast<Eigen::Index>(memory_.size()); }
+  double& operator[](Eigen::Index i) { return memory_[static_cast<std::size_t>(i)]; }
+  double operator[](Eigen::Index i) const { return memory_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<double> memory_;
+};
 
 class MeanMotion {
  public:
@@ -30,32 +70,42 @@ class MeanMotion {
   void begin(IslandStep& step, bool bends);
   Index count() const { return static_cast<Index>(bodies_.size()); }
 
+  /// Goes to where given impulses would take free bodies if rows stayed as they are at the step's start.
+  void guess(const IslandStep& step, std::span<const double> impulses);
   /// Predicts the bodies where they are in this step, measures the gaps there, and linearises the rows at the end and
   /// in the middle.
   void place(IslandStep& step);
+  /// The rows, as they were linearised last.
+  void take_rows(const IslandStep& step, std::vector<MeanRow>& rows) const;
   /// What impulses leave of the equations above, six numbers a body, N·s and N·m·s; and of the modal loads.
   /// @param impulses by row
-  void find_residual(const IslandStep& step, std::span<const double> impulses, Vector& residual, Vector& modal) const;
+  /// @return whether the bodies' are met, to their digits or kMetTo of the tolerance of places
+  bool find_residual(std::span<const MeanRow> rows, std::span<const double> impulses, Vector& residual, Vector& modal);
   /// Its derivative by (d, τ) of all bodies; and how moments follow bending, modal loads turning, by body: bend and
   /// turned, 3 × modes.
   void find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K);
   /// What modes that follow make of the matrices of Newton's step.
-  void condense(const Matrix& modal_force, const Matrix& modal_gap, const Vector& modal_residual, Matrix& K, Matrix& F,
-                Matrix& E, Vector& residual) const;
+  void condense(Matrix& K, std::span<MeanRow> rows);
+  /// And of the residual by what is left of the modal loads: after condense(), until the next one.
+  void condense(const Vector& modal_residual, Vector& residual) const;
   /// Adds to the modal loads what turning makes of them.
   void add_turned(const Vector& change, Vector& load) const;
-  /// The same by the impulses, less the sign: 6 × rows; and the modal loads' by these, modes × rows.
-  void find_forces(const IslandStep& step, Matrix& F, Matrix& modal) const;
-  /// Of the gaps by (d, τ), rows × 6, and by the amplitudes, rows × modes.
-  void find_gap_derivative(const IslandStep& step, Matrix& E, Matrix& modal) const;
-  /// Of each row, what an impulse moves its own gap by through the frames, where they bear no forces, > 0.
-  void find_mobility(const Matrix& E, const Matrix& F, Vector& mobility) const;
+  /// What an impulse moves the row's own gap by through the frames, where they bear no forces, > 0.
+  double mobility(const MeanRow& row) const;
+  /// Gaps of row i that impulses on row j make through the modes.
+  double through_modes(const MeanRow& i, const MeanRow& j) const;
   /// How much larger the parts of K by forces are than those by inertia.
   double force_to_inertia(const Matrix& K) const;
   /// What a unit of modal load makes of the amplitudes.
   const Vector& modal_response() const { return response_; }
+  /// Where a body's modes begin among all of the island's.
+  Index first_mode(Index body) const { return bodies_[static_cast<std::size_t>(body)].first_mode; }
   /// @param change of (d, τ) by body. @param load of all modes
   void move(const Vector& change, const Vector& load, double part);
+  /// (d, τ) in parts of the bodies' sizes and in radians.
+  void write_place(Vector& to) const;
+  /// A change in parts of the bodies' sizes and in radians.
+  void write_relative(const Vector& change, Eigen::Ref<Vector> to) const;
   /// Largest of what the change is to the places, by the tolerances of these.
   double size_of(const Vector& change) const;
   /// The part of a change that turns no body by more than a radian or so.
@@ -96,6 +146,7 @@ class MeanMotion {
   void predict(IslandStep& step, Index local, const RigidFrame& end);
   void find_field_derivative(const IslandStep& step, Index local, Matrix& K);
   void hold_carried(Matrix& K);
+  void sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies, std::span<const double> impulses);
 
   std::vector<Body> bodies_;
   std::vector<Carried> carried_;
@@ -103,7 +154,9 @@ class MeanMotion {
   bool bends_ = true;
   std::vector<Vec3> impulse_, moment_;  // of the rows, by body
   Vector response_, load_;
-  // By mode: ∂r_τ/∂z, and of its load and, by what is no load, its amplitude by τ.
+  Vector terms_;  // of the equations, by size
+  // By mode: ∂r_τ/∂z, and of its load and, by what is no load, its amplitude by τ; condensed: ∂r_τ/∂load, and all of
+  // its amplitude by τ.
   Eigen::Matrix<double, 3, Eigen::Dynamic> bend_, turned_, swung_;
 };
 

@@ -6,175 +6,124 @@
 namespace limber::internal {
 namespace {
 
-std::span<double> numbers(Vector& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
-std::span<double> numbers(Matrix& m) { return {m.data(), static_cast<std::size_t>(m.size())}; }
-
-const RowLaw& law_of(const IslandStep& step, Eigen::Index row) { return step.law(static_cast<std::size_t>(row)); }
+constexpr double kLengths = 1e11;  // tolerances
+// What is left of a step by the matrix of an earlier place, or that is made anew.
+constexpr double kShrinks = 0.25;
+constexpr double kOfForces = 1.0 / 32.0;
 
 }  // namespace
 
 SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
   constexpr int kMost = 40;
-  motion_.begin(step, bends);
-  impulses_.assign(step.size(), 0.0);
-  active_.assign(step.size(), 1);
-  for (report.iterations = 1; report.iterations <= kMost; ++report.iterations) {
+  begin(step, bends);
+  for (report.iterations = 0; report.iterations < kMost;) {
     motion_.place(step);
-    report.change = improve(step);
-    if (!std::isfinite(report.change)) break;
-    const double part = motion_.part_of(motion_change_);
-    motion_.move(motion_change_, load_change_, part);
-    for (std::size_t i = 0; i < impulses_.size(); ++i)
-      impulses_[i] += part * impulse_change_[static_cast<Eigen::Index>(i)];
-    if (report.change > 1.0) continue;
+    if (problem_.measure(step, motion_, impulses_)) return finish(step);
+    ++report.iterations;
+    if (!improve(step)) break;
+    if (report.iterations == 1 && free_is_nearer()) {
+      forget_forces(step);
+      continue;
+    }
+    report.change = size();
+    move();
+    if (repeated_ || report.change > 1.0) continue;
     // What is left of the equations is of second order in this last change.
     motion_.place(step);
-    std::ranges::copy(impulses_, step.f.begin());
-    motion_.finish(step, impulses_);
-    velocities_.meet_rows(step, active_);
-    return SolveStatus::kSolved;
+    return finish(step);
   }
   return SolveStatus::kIterationLimit;
 }
 
-/// Newton's step from where things are. @return its size, by tolerances
-double MeanNewton::improve(const IslandStep& step) {
-  linearise(step);
-  stiffen(step);
-  reduce(step);
-  answer(step);
-  motion_change_ = stopped_;
-  motion_change_.noalias() += moved_ * impulse_change_;
-  right_.noalias() = at_.gap_by_motion * motion_change_;
-  double size = motion_.size_of(motion_change_);
-  impulse_change_ -= stiffness_.cwiseProduct(right_);
-  load_change_ = -at_.modes;
-  load_change_.noalias() += at_.modes_by_impulse * impulse_change_;
-  right_.noalias() += at_.gap_by_amplitude * (motion_.modal_response().cwiseProduct(load_change_));
-  motion_.add_turned(motion_change_, load_change_);
-  for (Eigen::Index i = 0; i < right_.size(); ++i)
-    size = std::max(size, std::abs(right_[i]) / law_of(step, i).tolerance);
-  return std::isfinite(right_.sum()) ? size : kUnbounded;
+void MeanNewton::move() {
+  const double part = motion_.part_of(change_.motion);
+  motion_.move(change_.motion, change_.load, part);
+  for (std::size_t i = 0; i < impulses_.size(); ++i)
+    impulses_[i] += part * change_.impulses[static_cast<Eigen::Index>(i)];
+  if (part < 1.0) secants_.clear();
 }
 
-void MeanNewton::linearise(const IslandStep& step) {
-  motion_.find_residual(step, impulses_, at_.bodies, at_.modes);
-  motion_.find_derivative(step, impulses_, at_.by_motion);
-  motion_.find_forces(step, at_.by_impulse, at_.modes_by_impulse);
-  motion_.find_gap_derivative(step, at_.gap_by_motion, at_.gap_by_amplitude);
-  motion_.condense(at_.modes_by_impulse, at_.gap_by_amplitude, at_.modes, at_.by_motion, at_.by_impulse,
-                   at_.gap_by_motion, at_.bodies);
-  weighted_.noalias() = at_.gap_by_amplitude * motion_.modal_response().asDiagonal();
-  at_.gap_through_modes.noalias() = weighted_ * at_.modes_by_impulse;
-}
-
-/// Rows without bounds stand in as springs γ for what they hold: forces that pull a body away from its place, as a
-/// pushed rod's do, would else make its matrix singular. With a the gap that an impulse on the row alone makes, γ is
-/// 1/a and more where forces are large.
-void MeanNewton::stiffen(const IslandStep& step) {
-  const Eigen::Index m = at_.gap_by_motion.rows();
-  stiffness_.setZero(m), scale_.setZero(m);
-  motion_.find_mobility(at_.gap_by_motion, at_.by_impulse, right_);
-  const double harder = 1.0 + motion_.force_to_inertia(at_.by_motion);
-  for (Eigen::Index i = 0; i < m; ++i) {
-    const double a = right_[i] + at_.gap_through_modes(i, i);
-    if (right_[i] > 0.0 && is_equality(law_of(step, i))) stiffness_[i] = harder / a;
-    if (a > 0.0) scale_[i] = 1.0 / std::sqrt(a);
+/// From where the last step's forces would take the bodies.
+void MeanNewton::begin(IslandStep& step, bool bends) {
+  motion_.begin(step, bends);
+  forget_forces(step);
+  motion_.write_place(free_);
+  for (std::size_t i = 0; i < impulses_.size(); ++i) {
+    const RowLaw& law = step.law(i);
+    impulses_[i] = std::clamp(step.length() * law.last_force, law.lower, law.upper);
+    within_[i] = impulses_[i] > law.lower && impulses_[i] < law.upper ? 1 : 0;
   }
+  motion_.guess(step, impulses_);
+  motion_.write_place(guess_);
 }
 
-/// The impulses' own problem. With E, F and K the gaps' and the bodies' derivatives, B what modes make of gaps, c the
-/// rows' compliance, ΔQ = Δf + γ E Δx and E' = (1 − B γ − c γ) E:
-///   Δx = (K + F γ E)⁻¹ (F ΔQ − r),      gaps = open + A ΔQ,      A = E' (K + F γ E)⁻¹ F + B + c
-void MeanNewton::reduce(const IslandStep& step) {
-  const Eigen::Index n = at_.by_motion.rows(), m = at_.gap_by_motion.rows();
-  weighted_.noalias() = at_.by_impulse * stiffness_.asDiagonal();
-  at_.by_motion.noalias() += weighted_ * at_.gap_by_motion;
-  moved_ = at_.by_impulse;
-  stopped_ = -at_.bodies;
-  if (!factor_.factor(numbers(at_.by_motion), static_cast<std::size_t>(n))) stopped_.setConstant(kUnbounded);
-  factor_.solve(numbers(moved_), static_cast<std::size_t>(m));
-  factor_.solve(numbers(stopped_), 1);
-  A_ = at_.gap_through_modes;
-  for (Eigen::Index i = 0; i < m; ++i) A_(i, i) += law_of(step, i).compliance;
-  weighted_.noalias() = A_ * stiffness_.asDiagonal();
-  free_gap_ = at_.gap_by_motion;
-  free_gap_.noalias() -= weighted_ * at_.gap_by_motion;
-  A_.noalias() += free_gap_ * moved_;
-  open_.resize(m);
-  for (Eigen::Index i = 0; i < m; ++i) {
-    const auto row = static_cast<std::size_t>(i);
-    open_[i] = step.gap[row] - step.law(row).offset + step.law(row).compliance * impulses_[row];
-  }
-  find_damping(step);
-  open_.noalias() += free_gap_ * stopped_;
-  open_.noalias() -= at_.gap_by_amplitude * (motion_.modal_response().cwiseProduct(at_.modes));
+/// To free flight.
+void MeanNewton::forget_forces(const IslandStep& step) {
+  linear_ = false;
+  secants_.clear();
+  impulses_.resize(step.size()), within_.resize(step.size());
+  for (std::size_t i = 0; i < impulses_.size(); ++i)
+    impulses_[i] = std::clamp(0.0, step.law(i).lower, step.law(i).upper);
+  motion_.guess(step, impulses_);
 }
 
-/// Redundant rows are so to the accuracy alone to which gaps are closed: what is smaller than these tells nothing.
-void MeanNewton::find_damping(const IslandStep& step) {
-  constexpr double kOfGaps = 1e-3, kLeast = 1e-9, kMost = 1e-2;
-  constexpr double kLengths = 1e11;  // tolerances
-  double off = 0.0;
-  for (Eigen::Index i = 0; i < open_.size(); ++i)
-    if (is_equality(law_of(step, i))) off = std::max(off, std::abs(open_[i]) / (kLengths * law_of(step, i).tolerance));
-  damping_ = std::clamp(kOfGaps * off, kLeast, kMost);
+/// Whether the last step's forces tell too little: Newton's first step from there is no small part of what forces do.
+/// Bodies that whip would be led to other motions than those that are next to free flight, which break up later.
+bool MeanNewton::free_is_nearer() const {
+  const auto first = change_.size.head(free_.size());
+  return !(first.norm() <= kOfForces * (guess_ + first - free_).norm());
 }
 
-/// ΔQ with which the rows, linear about here, meet their law: those strictly within their bounds by equality, in the
-/// sense of least squares with rows scaled alike; the others at their bounds. All rows go over at a time that want to,
-/// and where that does not end one at a time, the first: that does (Júdice and Pires 1994, Murty 1974).
-void MeanNewton::answer(const IslandStep& step) {
-  constexpr int kTogether = 4, kTrials = 100;
-  constexpr double kYields = 1e-6, kYieldsMore = 1e-2;
-  impulse_change_.setZero(open_.size());
-  then_ = open_;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    if (!find_active(step, trial >= kTogether) && trial > 0) return;
-    meet_active(step, trial < kTogether ? kYields : kYieldsMore);
-    then_ = open_;
-    then_.noalias() += A_ * impulse_change_;
-  }
+SolveStatus MeanNewton::finish(IslandStep& step) {
+  std::ranges::copy(impulses_, step.f.begin());
+  motion_.finish(step, impulses_);
+  velocities_.meet_rows(step, within_);
+  return SolveStatus::kSolved;
 }
 
-/// Which rows with bounds are within them. @return whether that has changed
-bool MeanNewton::find_active(const IslandStep& step, bool one) {
-  bool changed = false;
-  for (Eigen::Index i = 0; i < open_.size() && !(one && changed); ++i) {
-    const RowLaw& law = law_of(step, i);
-    if (is_equality(law)) continue;
-    const auto row = static_cast<std::size_t>(i);
-    const double wanted = impulses_[row] + impulse_change_[i] - then_[i] * scale_[i] * scale_[i];
-    const char within = wanted > law.lower && wanted < law.upper ? 1 : 0;
-    changed = changed || within != active_[row];
-    active_[row] = within;
-    if (within == 0) impulse_change_[i] = std::clamp(wanted, law.lower, law.upper) - impulses_[row];
-  }
-  return changed;
+/// To change_: Newton's step from where things are, by the matrix of an earlier place while that does. @return whether
+/// there is a step
+bool MeanNewton::improve(const IslandStep& step) {
+  repeated_ = linear_ && repeat(step);
+  if (repeated_) return true;
+  secants_.clear();
+  linear_ = problem_.linearise(step, motion_, impulses_);
+  if (!linear_) return false;
+  answer_.begin(step, impulses_, problem_);
+  do {
+    answer_.solve(step, impulses_, problem_, motion_);
+    take(step);
+  } while (answer_.extend(step, impulses_, problem_));
+  std::ranges::copy(answer_.within(), within_.begin());
+  secants_.remember(change_);
+  return std::isfinite(change_.size.sum());
 }
 
-/// Rows with bounds that ask for what no motion gives, as a motor against its stop, push against each other until one
-/// comes to its bound: each yields a little to what it exerts. Where two are all but the same, as limits of a ball
-/// joint that meet, their part of A can have a negative determinant, as forces are those of the step's middle and gaps
-/// those of its end: then they yield by more, and the next iteration makes up for it. @param yields of what an impulse
-/// moves its own row by
-void MeanNewton::meet_active(const IslandStep& step, double yields) {
-  const Eigen::Index m = open_.size();
-  reduced_.setIdentity(m, m);
-  right_.setZero(m);
-  for (Eigen::Index i = 0; i < m; ++i) {
-    if (active_[static_cast<std::size_t>(i)] == 0) continue;
-    right_[i] = -scale_[i] * open_[i];
-    for (Eigen::Index j = 0; j < m; ++j)
-      if (active_[static_cast<std::size_t>(j)] != 0)
-        reduced_(i, j) = scale_[i] * A_(i, j) * scale_[j];
-      else
-        right_[i] -= scale_[i] * A_(i, j) * impulse_change_[j];
-    if (!is_equality(law_of(step, i))) reduced_(i, i) += yields;
-  }
-  rows_.solve(numbers(reduced_), damping_, numbers(right_));
-  for (Eigen::Index i = 0; i < m; ++i)
-    if (active_[static_cast<std::size_t>(i)] != 0) impulse_change_[i] = scale_[i] * right_[i];
+/// The same by the matrix at hand. @return whether it will do
+bool MeanNewton::repeat(const IslandStep& step) {
+  problem_.aim(motion_);
+  const bool same = answer_.solve_again(step, impulses_, problem_, motion_);
+  take(step);
+  if (!same || answer_.extend(step, impulses_, problem_) || !secants_.correct(change_)) return false;
+  if (!(change_.size.norm() < kShrinks * secants_.size())) return false;
+  secants_.remember(change_);
+  return true;
+}
+
+void MeanNewton::take(const IslandStep& step) {
+  problem_.answer(motion_, answer_.rows(), answer_.change(), change_);
+  const Eigen::Index n = change_.motion.size();
+  const Vector& gaps = problem_.gap_change();
+  change_.size.resize(n + gaps.size());
+  motion_.write_relative(change_.motion, change_.size.head(n));
+  for (Eigen::Index i = 0; i < gaps.size(); ++i)
+    change_.size[n + i] = gaps[i] / (kLengths * step.law(static_cast<std::size_t>(i)).tolerance);
+}
+
+/// By tolerances.
+double MeanNewton::size() const {
+  const Eigen::Index gaps = change_.size.size() - change_.motion.size();
+  return std::max(motion_.size_of(change_.motion), kLengths * change_.size.tail(gaps).cwiseAbs().maxCoeff());
 }
 
 }  // namespace limber::internal

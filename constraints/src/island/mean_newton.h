@@ -1,14 +1,15 @@
 // Islands of joints, limits, handles and what else has an interval: rows whose impulses act in the middle of the step.
-// Newton's method on where the bodies end, how they turn, what their modes bear, and the impulses together. Matrices
-// are dense.
+// Newton's method on where the bodies end, how they turn, what their modes bear, and the impulses together, from where
+// the last step's forces would take them, or from free flight. What rests under these forces costs a look at the
+// equations; what moves, one matrix a step, by which steps are repeated, with what these tell of it.
 #pragma once
 
 #include <vector>
 
 #include "end_velocities.h"
-#include "limber/solvers/damped_least_squares.h"
-#include "limber/solvers/unsymmetric_factor.h"
-#include "mean_motion.h"
+#include "mean_change.h"
+#include "mean_problem.h"
+#include "row_answer.h"
 
 namespace limber::internal {
 
@@ -21,32 +22,26 @@ class MeanNewton {
   void stay(IslandStep& step) { motion_.stay(step); }
 
  private:
-  double improve(const IslandStep& step);
-  void linearise(const IslandStep& step);
-  void stiffen(const IslandStep& step);
-  void reduce(const IslandStep& step);
-  void find_damping(const IslandStep& step);
-  void answer(const IslandStep& step);
-  bool find_active(const IslandStep& step, bool one);
-  void meet_active(const IslandStep& step, double yields);
+  void begin(IslandStep& step, bool bends);
+  void forget_forces(const IslandStep& step);
+  bool free_is_nearer() const;
+  bool improve(const IslandStep& step);
+  bool repeat(const IslandStep& step);
+  void take(const IslandStep& step);
+  double size() const;
+  void move();
+  SolveStatus finish(IslandStep& step);
 
   MeanMotion motion_;
-  std::vector<double> impulses_;
-  // Of Newton's step: residuals of the bodies and their modes, their derivatives, and those of the gaps.
-  struct {
-    Vector bodies, modes;
-    Matrix by_motion, by_impulse, modes_by_impulse;  // of these
-    Matrix gap_by_motion, gap_by_amplitude, gap_through_modes;
-  } at_;
-  Vector stiffness_, scale_;  // γ, and the impulse that moves a row's gap by as much
-  // What is left of it for the impulses alone: gaps without further impulses, and what these make of them.
-  Matrix weighted_, free_gap_, moved_, A_, reduced_;
-  Vector stopped_, open_, then_, motion_change_, load_change_, impulse_change_, right_;
-  std::vector<char> active_;
-  double damping_ = 0.0;
-  UnsymmetricFactor factor_;
-  DampedLeastSquares rows_;
+  MeanProblem problem_;
+  RowAnswer answer_;
   EndVelocities velocities_;
+  std::vector<double> impulses_;
+  std::vector<char> within_;  // by row: whether its impulse is within its bounds
+  Vector free_, guess_;       // where bodies would be in free flight, and under the last step's forces
+  MeanChange change_;
+  MeanSecants secants_;                     // of the steps by one matrix
+  bool linear_ = false, repeated_ = false;  // there is a matrix; the last step was by that of an earlier place
 };
 
 }  // namespace limber::internal

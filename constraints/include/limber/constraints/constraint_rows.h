@@ -41,12 +41,13 @@ struct RowLaw {
   double lower = -kUnbounded;  ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
   double upper = kUnbounded;  ///< largest impulse
   double tolerance = 1e-12;   ///< of the gap, in its unit; > 0
+  double digits = 0.0;        ///< what of the gap is lost to the digits of what it is computed from, in its unit
   /// A static constraint: a joint, a stop, the ground. Its force under gravity and other held forces is found by
   /// itself, so that what rests has no velocity. For rows without compliance.
   bool holds = false;
-  /// The row's force persists from step to step: springs, motors, friction. `last_force` is that of the last step.
+  /// The row's force persists from step to step: springs, motors, friction.
   bool goes_on = false;
-  double last_force = 0.0;
+  double last_force = 0.0;  ///< that of the last step, from which solvers may begin
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
   double agent_displacement = 0.0;
@@ -72,11 +73,16 @@ struct RowLaw {
   bool slides = false;
 };
 
-/// RowLaw::tolerance of a distance: a part of the lengths that it depends on, and what is lost of it to the digits of
-/// its place in the world, some roundings of its coordinates.
-inline double distance_tolerance(double part, double length, const Vec3& place) {
+/// RowLaw::digits of what is computed from numbers of a size, in some roundings.
+inline double digits_of(double size) {
   constexpr double kRoundings = 16.0 * std::numeric_limits<double>::epsilon();
-  return part * length + kRoundings * place.norm() + std::numeric_limits<double>::min();
+  return kRoundings * size + std::numeric_limits<double>::min();
+}
+
+/// RowLaw::tolerance of a distance: a part of the lengths that it depends on, and what is lost of it to the digits of
+/// its place in the world.
+inline double distance_tolerance(double part, double length, const Vec3& place) {
+  return part * length + digits_of(place.norm());
 }
 
 /// The rows of one island, made anew every step in memory that is kept.

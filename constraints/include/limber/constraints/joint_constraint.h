@@ -83,14 +83,20 @@ class JointConstraint final : public Constraint {
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.a_, s.b_, s.spec_.type, s.spec_.frame.origin, s.spec_.frame.axes, s.spec_.limits, s.spec_.pitch,
-                    s.actuation_, s.last_, s.coordinate_force_, s.motor_force_, s.drive_force_, s.friction_force_,
-                    s.force_);
+                    s.actuation_, s.last_, s.plan_force_, s.coordinate_force_, s.motor_force_, s.drive_force_,
+                    s.friction_force_, s.force_);
   }
 
   /// Both frames at one instant.
   struct Placement {
+    Placement(const Vec3& from, const Vec3& to, const Mat3& axes_a, const Mat3& axes_b);
     Vec3 o_a, o_b, d;  // d in a's axes
     Mat3 R_a, R_b;
+  };
+  struct Instant {
+    Instant(const FrameInstant& of_a, const FrameInstant& of_b);
+    FrameInstant a, b;
+    Placement place;
   };
   enum class Measure { kTranslation, kTurnOfX, kTurnOfZ, kTurn, kScrew, kLimit, kCone, kMotor, kDrive, kFriction };
   struct RowPlan {
@@ -111,23 +117,25 @@ class JointConstraint final : public Constraint {
 
   static std::array<TurnAxes, 2> turn_axes(const RowPlan& row);
   Placement place(const BodyStates& states, StepTime when) const;
+  Instant instant(const BodyStates& states, StepTime when) const;
   double raw_coordinate(const Placement& at, int i) const;
   double unwrapped(const Placement& at, int i) const;
   Direction coordinate_direction(const Placement& at, int i) const;
   double gap(const Placement& at, const RowPlan& row) const;
   Direction direction(const Placement& at, const RowPlan& row) const;
-  Direction mean_direction(const BodyStates& states, const Placement& at, const RowPlan& row) const;
+  Vec3 direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
+  Direction mean_direction(const Placement& start, const Placement& end, const Placement& at, const RowPlan& row,
+                           const Vec3& turn) const;
   bool is_angle(int coordinate) const;
   int axis_of(int coordinate) const;
   void plan_locked_rows();
   void plan_limits();
   void plan_limit(int coordinate, const Interval& interval);
   void plan_actuation();
-  void add(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan, const RowLaw& law,
-           ConstraintRows& rows);
-  bool add_straight(const BodyStates& states, StepTime when, const Placement& at, const RowPlan& plan,
-                    const RowLaw& law, ConstraintRows& rows);
-  RowLaw law_of(const RowPlan& plan, double gap, double tolerance) const;
+  void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
+  bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
+  static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
+  RowLaw law_of(const RowPlan& plan, double gap) const;
   RowLaw actuation_law(const RowPlan& plan, double gap) const;
 
   MaterialFrame a_, b_;
@@ -139,10 +147,11 @@ class JointConstraint final : public Constraint {
   std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
   std::array<double, 3> coordinate_force_{};
   std::array<double, 3> motor_force_{}, drive_force_{}, friction_force_{};  // of the last step
+  std::vector<double> plan_force_;                                          // of the same, of plan_
   Vec3 force_ = Vec3::Zero();
   double step_ = 0.0;
   Mat3 axes_at_start_ = Mat3::Identity();
-  std::vector<double> modal_a_, modal_b_, modal_turn_;
+  std::vector<double> modal_a_, modal_b_;
   mutable std::vector<Vec3> shapes_;  // scratch of add_force_derivative()
 };
 

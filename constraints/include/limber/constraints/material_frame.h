@@ -24,6 +24,37 @@
 
 namespace limber {
 
+/// What one side of a row measures of a frame's motion. Parts add up.
+struct FrameMeasure {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();  ///< of the body, world, as in RowSide
+  Vec3 shift_B = Vec3::Zero(), turn_B = Vec3::Zero();  ///< of the frame's origin by D ż, of its axes by Θ ż
+  double along_bend = 0.0;                             ///< of ż along what z changes by in the step
+};
+
+/// A frame at one time of a step. In the middle of it axes are the mean of both ends, not orthonormal.
+struct FrameInstant {
+  BodyStates states;
+  StepTime when = StepTime::kStart;
+  Index body = -1;
+  Vec3 position = Vec3::Zero();  ///< of the frame's origin, world, m
+  Mat3 axes = Mat3::Identity();  ///< world
+  Vec3 origin = Vec3::Zero();    ///< of the body, world, m
+  Mat3 R_BW = Mat3::Identity();  ///< in the middle R'ᵀ (BodyStates)
+  Mat3 axes_B = Mat3::Identity();
+  Mat3 turning = Mat3::Identity();  ///< what the axes turn by in the body per unit of Θ dz
+  Vec3 turned = Vec3::Zero();       ///< Θ z; in the middle Θ Δz,
+  Vec3 cayley = Vec3::Zero();       ///< the Cayley vector of the turn that it makes in the body,
+  double inverse_square = 0.0;      ///< and 1/|Δz|², 0 where nothing bends
+
+  /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
+  /// @param p, n world
+  void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const;
+  /// Adds what u · (an axis of the frame) changes by, u held: axis × u · its turn. @param axis 0 to 2. @param u world
+  void add_axis(int axis, const Vec3& u, FrameMeasure& to) const;
+  /// Adds the angular velocity along a. @param a world
+  void add_turn(const Vec3& a, FrameMeasure& to) const;
+};
+
 class MaterialFrame {
  public:
   /// Fixed to the world.
@@ -52,16 +83,12 @@ class MaterialFrame {
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;
 
-  /// Row of the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
-  /// @param p, n world. @param scale of the whole row. @param modal room for k numbers; the result refers to it
-  RowSide point_row(const BodyStates& states, StepTime when, const Vec3& p, const Vec3& n, double scale,
-                    std::vector<double>& modal) const;
-  /// Row of what u · (an axis of the frame) changes by, u held: angular axis × u. @param axis 0 to 2. @param u world
-  RowSide axis_row(const BodyStates& states, StepTime when, int axis, const Vec3& u, double scale,
-                   std::vector<double>& modal) const;
-  /// Row of the angular velocity along a.
-  RowSide angular_row(const BodyStates& states, StepTime when, const Vec3& a, double scale,
-                      std::vector<double>& modal) const;
+  /// The frame at one time of a step, with what all rows about it share.
+  FrameInstant at(const BodyStates& states, StepTime when) const;
+  /// The middle, from both ends.
+  FrameInstant between(const FrameInstant& start, const FrameInstant& end) const;
+  /// One side of a row. @param modal room for k numbers; the result refers to it
+  RowSide side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const;
 
  private:
   friend struct StateFields;
@@ -83,7 +110,6 @@ class MaterialFrame {
     std::vector<Vec3> shapes{};  // one per mode
   };
 
-  Mat3 turning(const BodyStates& states, StepTime when) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
   Vec3 place(const BodyShape& shape) const;

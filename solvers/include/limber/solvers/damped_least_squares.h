@@ -3,18 +3,24 @@
 #pragma once
 
 #include <span>
-#include <vector>
+
+#include "limber/solvers/aligned_buffer.h"
 
 namespace limber::internal {
 
 /// Memory grows to the largest problem seen; after that nothing is allocated.
 class DampedLeastSquares {
  public:
-  /// @param A n × n, row-major. @param damping > 0. @param x b, n numbers; the answer on return
-  void solve(std::span<const double> A, double damping, std::span<double> x);
+  /// @param A n × n, row-major. @param damping > 0
+  void factor(std::span<const double> A, std::size_t n, double damping);
+  /// @param x b, n numbers; the answer on return
+  void solve(std::span<double> x);
 
  private:
-  std::vector<double> columns_, right_;  // of (A; damping 1), 2 n numbers each, and of (b; 0)
+  std::size_t n_ = 0;
+  MatrixBuffer columns_memory_, normals_memory_;
+  MatrixView columns_{}, normals_{};  // of (A; damping 1), 2 n numbers each; and of the reflections, of length √2
+  AlignedBuffer right_;
 };
 
 }  // namespace limber::internal

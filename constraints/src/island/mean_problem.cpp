@@ -1,0 +1,143 @@
+#include "mean_problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+/// Whether a row's law is met where its modes are off by what `bent` is.
+bool is_met(const RowLaw& law, double off, double bent, double impulse) {
+  const double least = std::max(law.digits, kMetTo * law.tolerance);
+  if (!(std::abs(bent) <= least)) return false;
+  if (impulse <= law.lower && off >= 0.0) return true;
+  if (impulse >= law.upper && off <= 0.0) return true;
+  return std::abs(off) <= least;
+}
+
+}  // namespace
+
+bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
+  motion.take_rows(step, now_);
+  bool met = motion.find_residual(now_, impulses, residual_, modal_residual_);
+  off_.resize(static_cast<Eigen::Index>(now_.size()));
+  for (std::size_t i = 0; i < now_.size(); ++i) {
+    const RowLaw& law = step.law(i);
+    const double off = step.gap[i] - law.offset + law.compliance * impulses[i];
+    off_[static_cast<Eigen::Index>(i)] = off;
+    met = met && is_met(law, off, bent(motion, now_[i], modal_residual_), impulses[i]);
+  }
+  return met;
+}
+
+bool MeanProblem::linearise(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
+  rows_ = now_;
+  motion.find_derivative(step, impulses, K_);
+  motion.condense(K_, rows_);
+  stiffen(step, motion);
+  const auto n = static_cast<std::size_t>(K_.rows());
+  if (!factor_.factor(numbers(K_), n)) return false;
+  aim(motion);
+  return std::isfinite(stopped_.sum());
+}
+
+void MeanProblem::aim(const MeanMotion& motion) {
+  motion.condense(modal_residual_, residual_);
+  stopped_ = -residual_;
+  factor_.solve(numbers(stopped_), 1);
+}
+
+/// Rows without bounds stand in as springs γ for what they hold: forces that pull a body away from its place, as a
+/// pushed rod's do, would else make its matrix singular. With a the gap that an impulse on the row alone makes, γ is
+/// 1/a and more where forces are large.
+void MeanProblem::stiffen(const IslandStep& step, const MeanMotion& motion) {
+  const Eigen::Index m = off_.size();
+  stiffness_.setZero(m), scale_.setZero(m);
+  const double harder = 1.0 + motion.force_to_inertia(K_);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const MeanRow& row = rows_[static_cast<std::size_t>(i)];
+    const double by_frames = motion.mobility(row), a = by_frames + motion.through_modes(row, row);
+    if (a > 0.0) scale_[i] = 1.0 / std::sqrt(a);
+    if (!(by_frames > 0.0) || !is_equality(step.law(static_cast<std::size_t>(i)))) continue;
+    stiffness_[i] = harder / a;
+    row.for_sides([&](const MeanRow::Side& pushed) {
+      row.for_sides([&](const MeanRow::Side& measured) {
+        K_.block<6, 6>(6 * pushed.body, 6 * measured.body).noalias() +=
+            stiffness_[i] * pushed.force * measured.gap.transpose();
+      });
+    });
+  }
+}
+
+/// E x of one row.
+double MeanProblem::gap_of(Index row, const Vector& x) const {
+  double sum = 0.0;
+  at(row).for_sides([&](const MeanRow::Side& side) { sum += side.gap.dot(x.segment<6>(6 * side.body)); });
+  return sum;
+}
+
+/// What modal loads make of a row's gap.
+double MeanProblem::bent(const MeanMotion& motion, const MeanRow& row, const Vector& load) {
+  double sum = 0.0;
+  row.for_sides([&](const MeanRow::Side& side) {
+    const Index first = motion.first_mode(side.body);
+    for (std::size_t k = 0; k < side.modal_gap.size(); ++k) {
+      const Index mode = first + static_cast<Index>(k);
+      sum += side.modal_gap[k] * motion.modal_response()[mode] * load[mode];
+    }
+  });
+  return sum;
+}
+
+void MeanProblem::reduce(const IslandStep& step, const MeanMotion& motion, std::span<const Index> rows, RowMatrix& to) {
+  const auto m = static_cast<Eigen::Index>(rows.size());
+  auto moved = moved_.resize(K_.rows(), m), made = made_.resize(m, m), through = through_.resize(m, m),
+       A = to.resize(m, m);
+  moved.setZero(), made.setZero();
+  for (Eigen::Index j = 0; j < m; ++j)
+    at(rows[j]).for_sides([&](const MeanRow::Side& side) { moved.block<6, 1>(6 * side.body, j) += side.force; });
+  factor_.solve(moved_.numbers(), rows.size());
+  for (Eigen::Index i = 0; i < m; ++i)
+    at(rows[i]).for_sides([&](const MeanRow::Side& side) {
+      made.row(i).noalias() += side.gap.transpose() * moved.middleRows<6>(6 * side.body);
+    });
+  for (Eigen::Index i = 0; i < m; ++i) {
+    for (Eigen::Index j = 0; j < m; ++j) through(i, j) = motion.through_modes(at(rows[i]), at(rows[j]));
+    through(i, i) += step.law(static_cast<std::size_t>(rows[i])).compliance;
+  }
+  A = made + through;
+  for (Eigen::Index i = 0; i < m; ++i)
+    for (Eigen::Index j = 0; j < m; ++j)
+      if (const double softer = through(i, j) * stiffness_[rows[j]]; softer != 0.0) A.row(i) -= softer * made.row(j);
+}
+
+void MeanProblem::find_open(const MeanMotion& motion, std::span<const Index> rows, RowVector& to) const {
+  const auto m = static_cast<Eigen::Index>(rows.size());
+  auto open = to.resize(m);
+  for (Eigen::Index i = 0; i < m; ++i)
+    open[i] = off_[rows[i]] + gap_of(rows[i], stopped_) - bent(motion, at(rows[i]), modal_residual_);
+  for (Eigen::Index j = 0; j < m; ++j) open -= stiffness_[rows[j]] * gap_of(rows[j], stopped_) * through_.view().col(j);
+}
+
+void MeanProblem::answer(const MeanMotion& motion, std::span<const Index> rows, const RowVector& change,
+                         MeanChange& to) {
+  const Eigen::Index m = off_.size();
+  to.motion = stopped_;
+  to.motion.noalias() += moved_.view() * change.view();
+  gap_change_.resize(m), to.impulses.setZero(m);
+  for (Eigen::Index i = 0; i < m; ++i) gap_change_[i] = gap_of(static_cast<Index>(i), to.motion);
+  to.load = -modal_residual_;
+  for (std::size_t j = 0; j < rows.size(); ++j) {
+    const double by = change[static_cast<Eigen::Index>(j)] - stiffness_[rows[j]] * gap_change_[rows[j]];
+    to.impulses[rows[j]] = by;
+    at(rows[j]).for_sides([&](const MeanRow::Side& side) {
+      const Index first = motion.first_mode(side.body);
+      for (std::size_t k = 0; k < side.modal_force.size(); ++k)
+        to.load[first + static_cast<Index>(k)] += by * side.modal_force[k];
+    });
+  }
+  for (Eigen::Index i = 0; i < m; ++i) gap_change_[i] += bent(motion, at(static_cast<Index>(i)), to.load);
+  motion.add_turned(to.motion, to.load);
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,51 @@
+// Newton's step of bodies under impulses in the middle of a step, from where they are: what impulses make of the gaps.
+// Modes and bodies are eliminated. With r the bodies' residual, K its derivative, F and E the rows' forces and gaps, B
+// what modes make of gaps, c the rows' compliance, γ springs that stand in for rows, ΔQ = Δf + γ E Δx:
+//   Δx = (K + F γ E)⁻¹ (F ΔQ − r),    gaps = open + A ΔQ,    A = E' (K + F γ E)⁻¹ F + B + c,  E' = (1 − B γ − c γ) E
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "limber/solvers/unsymmetric_factor.h"
+#include "mean_change.h"
+
+namespace limber::internal {
+
+class MeanProblem {
+ public:
+  /// Measures what is left of all equations where the bodies have been placed. @return whether they are met to their
+  /// digits
+  bool measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses);
+  /// After measure(): all derivatives where the bodies are. @return whether there is an answer
+  bool linearise(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses);
+  /// After measure(): the residual of the bodies by the derivatives of the last linearise().
+  void aim(const MeanMotion& motion);
+  /// A for some rows. All rows with γ must be among them.
+  void reduce(const IslandStep& step, const MeanMotion& motion, std::span<const Index> rows, RowMatrix& A);
+  /// Of the same rows, after aim().
+  void find_open(const MeanMotion& motion, std::span<const Index> rows, RowVector& open) const;
+  /// What ΔQ of these rows makes of everything. @param to but for its size
+  void answer(const MeanMotion& motion, std::span<const Index> rows, const RowVector& change, MeanChange& to);
+
+  /// gap − offset + compliance × impulse, of all rows
+  const Vector& off() const { return off_; }
+  const Vector& scale() const { return scale_; }            // of all rows, 1/√(what an impulse makes of the own gap)
+  const Vector& gap_change() const { return gap_change_; }  // of all rows, without their compliance
+
+ private:
+  void stiffen(const IslandStep& step, const MeanMotion& motion);
+  const MeanRow& at(Index row) const { return rows_[static_cast<std::size_t>(row)]; }
+  double gap_of(Index row, const Vector& x) const;
+  static double bent(const MeanMotion& motion, const MeanRow& row, const Vector& load);
+
+  std::vector<MeanRow> rows_, now_;  // where the derivatives are of, and where the bodies are
+  Vector residual_, modal_residual_, off_;
+  Vector stiffness_, scale_;  // γ, and of impulses
+  Matrix K_;
+  RowMatrix moved_, made_, through_;
+  Vector stopped_, gap_change_;
+  UnsymmetricFactor factor_;
+};
+
+}  // namespace limber::internal
