@@ -9,6 +9,7 @@ namespace limber {
 
 using internal::FoundBody;
 using internal::Worker;
+using internal::Workers;
 using internal::world_box;
 using internal::world_half_space;
 
