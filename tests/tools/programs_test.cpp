@@ -265,28 +265,34 @@ TEST_F(Programs, InspectWarnsOfWhatMaySurprise) {
   EXPECT_THAT(r.err, HasSubstr("3 boundary edges"));
 }
 
-TEST_F(Programs, BenchmarkStepTablesEveryCaseAndKeepsTheEnergy) {
-  const ProgramResult r = run("limber-benchmark", {"step", "--seconds", "0.001", "--modes", "0,8", "--bodies", "1,3",
-                                                   "--vertices", "100", "--csv", "b.csv", "--report", "b.json"});
+TEST_F(Programs, BenchmarkStepTellsWhatEachStageOfASceneCosts) {
+  const ProgramResult r =
+      run("limber-benchmark", {"step", "--scene", "scene.json", "--csv", "b.csv", "--report", "b.json"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   const std::string csv = bytes("b.csv");
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 4);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 2);
   const auto report = json("b.json");
-  const auto& rows = report.at("seconds").at("rows");
-  EXPECT_EQ(rows.size(), 4u);
-  for (const auto& row : rows) {
-    EXPECT_GT(row.at("step_median").get<double>(), 0.0);
-    EXPECT_LE(row.at("step_median"), row.at("step_p99"));
-    EXPECT_GT(row.at("positions_and_normals_per_vertex"), 0.0);
-    EXPECT_LT(row.at("energy_drift").get<double>(), 1e-9);  // exact motion: round-off only
+  ASSERT_EQ(report.at("scenes").size(), 1u);
+  EXPECT_EQ(report.at("scenes")[0].at("unsettled_steps"), 0);
+  const auto& times = report.at("seconds").at("scenes")[0];
+  EXPECT_GT(times.at("step").at("median").get<double>(), 0.0);
+  EXPECT_LE(times.at("step").at("median"), times.at("step").at("p99"));
+  EXPECT_LE(times.at("step").at("p99"), times.at("step").at("worst"));
+  EXPECT_LE(times.at("positions").at("median"), times.at("positions_and_normals").at("median"));
+  double shares = 0.0;
+  for (const auto& stage : times.at("stages")) {
+    EXPECT_GE(stage.at("per_unit").get<double>(), 0.0);
+    shares += stage.at("share").get<double>();
   }
+  EXPECT_NEAR(shares, 1.0, 1e-9);
 }
 
 TEST_F(Programs, BenchmarkRefusesWhatItCannotMeasure) {
   expect_one_line(run("limber-benchmark", {}), 2, "subcommand");
   expect_one_line(run("limber-benchmark", {"step", "--bodies", "0"}), 2, "--bodies");
   expect_one_line(run("limber-benchmark", {"step", "--mdoes", "3"}), 2, "did you mean \"--modes\"");
-  expect_one_line(run("limber-benchmark", {"step", "--asset", "missing.glb"}), 1, "missing.glb");
+  expect_one_line(run("limber-benchmark", {"step", "--scene", "missing.json"}), 1, "missing.json");
+  expect_one_line(run("limber-benchmark", {"step", "--scene", "scene.json", "--modes", "3"}), 2, "own size");
   EXPECT_EQ(files(), given_);
 }
 

@@ -1,269 +1,267 @@
-#include "benchmarks.h"
-
+// limber-benchmark step: what the steps of scenes cost, stage by stage, and how that grows.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
+#include <numeric>
 
+#include "benchmarks.h"
 #include "limber/core/error.h"
-#include "limber/engine/world.h"
-#include "limber/model/asset.h"
-#include "limber/scene/scene_model.h"
 #include "plot.h"
 #include "program.h"
+#include "scene_cost.h"
+#include "step_sweeps.h"
+#include "timed_scenes.h"
 
 namespace limber::tools {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 struct StepArguments {
-  std::string asset, csv, plot;
-  std::vector<int> bodies{1, 10, 100, 1000}, modes{0, 8, 20, 32, 40, 64};
-  int vertices = 2600;
-  double step = 1.0 / 60.0, seconds_per_row = 0.2;
+  std::vector<std::string> scenes;
+  SceneScale scale;
+  int steps = 0, threads = 1;
+  bool sweep = false, is_small = false;
+  std::string csv, plot, limits;
 };
 
-/// One measured case.
-struct StepRow {
-  Index modes = 0, bodies = 0, vertices = 0;
-  double advance_median = 0.0, advance_p99 = 0.0;  // s per step of the whole world
-  double positions = 0.0, normals = 0.0;           // s per reconstruction of all bodies; normals: positions and normals
-  double energy_drift = 0.0;                       // relative change of the energy over all timed steps; nothing damps
-};
-
-/// A tube whose surface waves: only the counts matter for the time, the shapes are bounded and smooth.
-std::shared_ptr<const ModalModel> synthetic_model(Index modes, Index vertices) {
-  constexpr Index kAround = 20;
-  const Index rings = std::max<Index>(vertices / kAround, 2);
-  ModalModelData d;
-  d.name = "tube";
-  d.mass = 1.0;
-  d.volume = std::numbers::pi * 0.01;
-  d.inertia = Vec3(0.005, 0.086, 0.086).asDiagonal();
-  d.render.basis = ModalBasis(rings * kAround, modes);
-  for (Index r = 0; r < rings; ++r)
-    for (Index a = 0; a < kAround; ++a) {
-      const double x = static_cast<double>(r) / (rings - 1) - 0.5, angle = 2.0 * std::numbers::pi * a / kAround;
-      d.render.rest.push_back(Vec3(x, 0.1 * std::cos(angle), 0.1 * std::sin(angle)).cast<float>());
-      for (Index m = 0; m < modes; ++m) {
-        const double wave = std::cos(2.0 * std::numbers::pi * (m + 1) * x);
-        d.render.basis.set(r * kAround + a, m, Vec3(0.0, wave, wave).cast<float>());
-      }
-      if (r == 0) continue;
-      const Index here = r * kAround + a, next = r * kAround + (a + 1) % kAround;
-      d.render.triangles.push_back({here - kAround, next - kAround, next});
-      d.render.triangles.push_back({here - kAround, next, here});
-    }
-  for (Index m = 0; m < modes; ++m) {
-    const double omega = 2.0 * std::numbers::pi * 10.0 * (m + 1);
-    d.eigenvalues.push_back(omega * omega);
-    d.decays.push_back(0.0);
-    d.participation.push_back(Vec3::Zero());
-    d.moments.push_back(Mat3::Zero());
+/// What the unit of a stage is called where one of it has a time.
+const char* unit_of(Stage stage) {
+  switch (stage) {
+    case Stage::kBookkeeping:
+      return "step";
+    case Stage::kLookAhead:
+    case Stage::kFastBodies:
+    case Stage::kAdvance:
+    case Stage::kCommit:
+      return "body";
+    case Stage::kBroadPhase:
+      return "near pair";
+    case Stage::kNarrowPhase:
+      return "contact";
+    case Stage::kRows:
+    case Stage::kSolve:
+      return "row";
+    case Stage::kReconstruct:
+      return "vertex";
   }
-  return std::make_shared<const ModalModel>(std::move(d));
+  return "";
 }
 
-/// Bodies in a row, all flying, spinning and ringing.
-struct Flight {
-  World world;
-  std::vector<BodyId> ids;
+constexpr Stage stage_at(std::size_t i) { return static_cast<Stage>(i); }
 
-  Flight(const std::shared_ptr<const ModalModel>& model, Index bodies, double step)
-      : world({.step = step, .gravity = Vec3::Zero()}) {
-    for (Index i = 0; i < bodies; ++i) {
-      ids.push_back(world.add_body(model, {.pose = {.q = {}, .p = Vec3(2.0 * i, 0.0, 0.0)},
-                                           .velocity = Vec3(0.0, 1.0, 3.0),
-                                           .angular_velocity = Vec3(1.0, 2.0 + 0.001 * i, 0.5)}));
-      world.apply_impulse(ids.back(), {.surface = SurfacePoint::Surface::kRender, .triangle = i % 7},
-                          Vec3(0.0, 0.1, 0.2));
-    }
-    world.step();
+double share(const SceneCost& c, Stage stage) {
+  const double all = c.stages.seconds();
+  return all > 0.0 ? c.stages[stage].seconds / all : 0.0;
+}
+
+/// Seconds a step of a stage: its share of the wall clock's time, of what steps and drawing took by the clock that
+/// their quantiles are by.
+double stage_seconds(const SceneCost& c, Stage stage) {
+  const auto sum = [](const std::vector<double>& s) { return std::accumulate(s.begin(), s.end(), 0.0); };
+  return share(c, stage) * (sum(c.step_seconds) + sum(c.draw_seconds)) / c.steps;
+}
+
+double units_per_step(const SceneCost& c, Stage stage) { return static_cast<double>(c.stages[stage].units) / c.steps; }
+
+double ns_per_unit(const SceneCost& c, Stage stage) {
+  const double units = units_per_step(c, stage);
+  return units > 0.0 ? 1e9 * stage_seconds(c, stage) / units : 0.0;
+}
+
+std::string kib_text(const std::optional<std::size_t>& bytes) {
+  return bytes ? fmt::format("{:.0f} KiB", static_cast<double>(*bytes) / 1024.0) : "unknown";
+}
+
+std::string text_of(const SceneCost& c) {
+  std::string text = fmt::format("\n{}: {} bodies, {} modes, {} vertices; {} steps of {:.4g} ms", c.scene, c.bodies,
+                                 c.modes, c.vertices, c.steps, 1e3 * c.step);
+  text += fmt::format(
+      "\n  a step  {:.1f} contacts, {:.1f} rows, {:.1f} rounds, {:.1f} Newton steps, {:.2f} allocations; {} "
+      "unsettled\n",
+      c.contacts, c.rows, c.iterations, c.newton_steps, c.allocations, c.unsettled);
+  const auto times = [](const char* what, const std::vector<double>& s, const std::string& touched) {
+    return fmt::format("  {:<8}p50 {:.4f}, p99 {:.4f}, worst {:.4f} ms; touches {}\n", what, 1e3 * quantile(s, 0.5),
+                       1e3 * quantile(s, 0.99), 1e3 * quantile(s, 1.0), touched);
+  };
+  text += times("step", c.step_seconds, kib_text(c.step_bytes));
+  if (!c.draw_seconds.empty()) text += times("draw", c.draw_seconds, kib_text(c.draw_bytes));
+  for (std::size_t i = 0; i < kStages; ++i) {
+    const Stage stage = stage_at(i);
+    if (c.stages[stage].seconds == 0.0) continue;
+    text += fmt::format("  {:<13}{:>5.1f} % {:>10.2f} us a step", to_string(stage), 100.0 * share(c, stage),
+                        1e6 * stage_seconds(c, stage));
+    const double units = units_per_step(c, stage);
+    text += units > 0.0 ? fmt::format(", {:>9.1f} x {:>9.1f} ns a {}\n", units, ns_per_unit(c, stage), unit_of(stage))
+                        : "\n";
   }
+  return text;
+}
 
-  double energy() const {
-    double sum = 0.0;
-    for (const BodyId id : ids) sum += world.energy(id).total();
-    return sum;
+Json counts_of(const SceneCost& c) {
+  return {{"scene", c.scene},
+          {"bodies", c.bodies},
+          {"modes", c.modes},
+          {"vertices", c.vertices},
+          {"step", c.step},
+          {"steps", c.steps},
+          {"contacts_per_step", c.contacts},
+          {"rows_per_step", c.rows},
+          {"rounds_per_step", c.iterations},
+          {"newton_steps_per_step", c.newton_steps},
+          {"unsettled_steps", c.unsettled},
+          {"asleep", c.asleep}};
+}
+
+Json quantiles_of(const std::vector<double>& seconds) {
+  return {{"median", quantile(seconds, 0.5)}, {"p99", quantile(seconds, 0.99)}, {"worst", quantile(seconds, 1.0)}};
+}
+
+Json times_of(const SceneCost& c) {
+  Json times{{"scene", c.scene},
+             {"step", quantiles_of(c.step_seconds)},
+             {"positions", quantiles_of(c.position_seconds)},
+             {"positions_and_normals", quantiles_of(c.draw_seconds)},
+             {"allocations_per_step", c.allocations},
+             {"bytes_touched_by_a_step", c.step_bytes ? Json(*c.step_bytes) : Json()},
+             {"bytes_touched_by_drawing", c.draw_bytes ? Json(*c.draw_bytes) : Json()},
+             {"stages", Json::array()}};
+  for (std::size_t i = 0; i < kStages; ++i)
+    times["stages"].push_back({{"stage", to_string(stage_at(i))},
+                               {"share", share(c, stage_at(i))},
+                               {"per_step", stage_seconds(c, stage_at(i))},
+                               {"units_per_step", units_per_step(c, stage_at(i))},
+                               {"unit", unit_of(stage_at(i))},
+                               {"per_unit", 1e-9 * ns_per_unit(c, stage_at(i))}});
+  return times;
+}
+
+std::string csv_head() {
+  std::string head =
+      "scene,bodies,modes,vertices,steps,contacts,rows,rounds,newton_steps,unsettled,allocations,step_bytes,draw_bytes,"
+      "step_us_p50,step_us_p99,step_us_worst,positions_us_p50,draw_us_p50";
+  for (std::size_t i = 0; i < kStages; ++i)
+    head += fmt::format(",{0}_us,{0}_ns_per_{1}", to_string(stage_at(i)), unit_of(stage_at(i)));
+  std::replace(head.begin(), head.end(), ' ', '_');
+  return head + "\n";
+}
+
+std::string csv_row(const SceneCost& c) {
+  const auto bytes = [](const std::optional<std::size_t>& b) { return b ? std::to_string(*b) : ""; };
+  std::string row = fmt::format(
+      "{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{},{:.4g},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}", c.scene,
+      c.bodies, c.modes, c.vertices, c.steps, c.contacts, c.rows, c.iterations, c.newton_steps, c.unsettled,
+      c.allocations, bytes(c.step_bytes), bytes(c.draw_bytes), 1e6 * quantile(c.step_seconds, 0.5),
+      1e6 * quantile(c.step_seconds, 0.99), 1e6 * quantile(c.step_seconds, 1.0),
+      1e6 * quantile(c.position_seconds, 0.5), 1e6 * quantile(c.draw_seconds, 0.5));
+  for (std::size_t i = 0; i < kStages; ++i)
+    row += fmt::format(",{:.4g},{:.4g}", 1e6 * stage_seconds(c, stage_at(i)), ns_per_unit(c, stage_at(i)));
+  return row + "\n";
+}
+
+/// The time of every frame (a step and a drawing) against the scene's time, beside that of a screen at 60 Hz.
+std::string frames_svg(const std::vector<SceneCost>& costs) {
+  std::string data, lines;
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    const SceneCost& c = costs[i];
+    for (std::size_t n = 0; n < c.step_seconds.size(); ++n)
+      data += fmt::format("{},{:.6g},{:.6g}\n", i, c.step * static_cast<double>(n + 1),
+                          1e3 * (c.step_seconds[n] + (n < c.draw_seconds.size() ? c.draw_seconds[n] : 0.0)));
+    lines +=
+        fmt::format(", 'data.csv' using ($1=={} ? $2 : NaN):3 with lines title '{}, {} bodies'", i, c.scene, c.bodies);
   }
-};
-
-/// Arrays for the vertices of all bodies of a flight.
-struct Drawing {
-  std::vector<float> positions, normals;
-  std::vector<DrawTarget> targets;
-
-  Drawing(const Flight& flight, bool with_normals) {
-    const std::size_t floats = 3 * static_cast<std::size_t>(flight.world.model(flight.ids.front()).render().vertices());
-    positions.resize(floats * flight.ids.size());
-    if (with_normals) normals.resize(positions.size());
-    for (std::size_t i = 0; i < flight.ids.size(); ++i) {
-      targets.push_back({.id = flight.ids[i], .positions = std::span(positions).subspan(i * floats, floats)});
-      if (with_normals) targets.back().normals = std::span(normals).subspan(i * floats, floats);
-    }
-  }
-};
-
-/// Times work() until `seconds` have passed, in batches long enough for the clock. @return seconds per call, ascending
-template <class F>
-std::vector<double> time(double seconds, F&& work) {
-  constexpr double kBatchSeconds = 20e-6;
-  constexpr std::size_t kFewest = 5;
-  work();  // warm
-  std::int64_t batch = 1;
-  const auto began = Clock::now();
-  std::vector<double> per_call;
-  while (per_call.size() < kFewest || std::chrono::duration<double>(Clock::now() - began).count() < seconds) {
-    const auto start = Clock::now();
-    for (std::int64_t i = 0; i < batch; ++i) work();
-    const double took = std::chrono::duration<double>(Clock::now() - start).count();
-    if (took < kBatchSeconds && per_call.empty())
-      batch *= 2;
-    else
-      per_call.push_back(took / static_cast<double>(batch));
-  }
-  std::sort(per_call.begin(), per_call.end());
-  return per_call;
+  return svg_by_gnuplot({900, 420}, data,
+                        "set datafile separator ','\nset xlabel 'time in the scene, s'\nset ylabel 'one frame: step, "
+                        "positions and normals, ms'\nset logscale y\nset grid\nset key outside right top\n"
+                        "plot 1000.0/60 with lines dt 2 lc 'black' title '60 frames a second'" +
+                            lines);
 }
 
-double quantile(const std::vector<double>& sorted, double q) {
-  return sorted[static_cast<std::size_t>(std::lround(q * static_cast<double>(sorted.size() - 1)))];
-}
-
-StepRow measure(const std::shared_ptr<const ModalModel>& model, Index bodies, const StepArguments& a) {
-  Flight flight(model, bodies, a.step);
-  StepRow row{.modes = model->modes(), .bodies = bodies, .vertices = model->render().vertices()};
-  const double before = flight.energy();
-  const auto steps = time(a.seconds_per_row, [&] { flight.world.step(); });
-  row.advance_median = quantile(steps, 0.5);
-  row.advance_p99 = quantile(steps, 0.99);
-  row.energy_drift = std::abs(flight.energy() - before) / std::abs(before);
-  const Drawing drawing(flight, false), with_normals(flight, true);
-  row.positions = quantile(time(a.seconds_per_row, [&] { flight.world.reconstruct(drawing.targets); }), 0.5);
-  row.normals = quantile(time(a.seconds_per_row, [&] { flight.world.reconstruct(with_normals.targets); }), 0.5);
-  return row;
-}
-
-std::vector<std::shared_ptr<const ModalModel>> models(const StepArguments& a) {
-  std::vector<std::shared_ptr<const ModalModel>> all;
-  if (!a.asset.empty()) return {read_asset(a.asset).bodies.front()};
-  for (const int k : a.modes) all.push_back(synthetic_model(k, a.vertices));
-  return all;
-}
-
-double per_body_ns(double seconds, const StepRow& r) { return 1e9 * seconds / r.bodies; }
-double per_vertex_ns(double seconds, const StepRow& r) { return per_body_ns(seconds, r) / r.vertices; }
-
-Json json_row(const StepRow& r) {
-  Json row{{"modes", r.modes},
-           {"bodies", r.bodies},
-           {"vertices", r.vertices},
-           {"step_median", r.advance_median},
-           {"step_p99", r.advance_p99},
-           {"step_per_body", r.advance_median / r.bodies},
-           {"positions_per_vertex", r.positions / r.bodies / r.vertices},
-           {"positions_and_normals_per_vertex", r.normals / r.bodies / r.vertices},
-           {"energy_drift", r.energy_drift}};
-  row["step_per_body_and_mode"] = r.modes > 0 ? Json(r.advance_median / r.bodies / r.modes) : Json();
-  return row;
-}
-
-std::string csv_of(const std::vector<StepRow>& rows) {
-  std::string csv =
-      "modes,bodies,vertices,step_us_median,step_us_p99,step_ns_per_body,positions_ns_per_vertex,"
-      "positions_and_normals_ns_per_vertex,energy_drift\n";
-  for (const StepRow& r : rows)
-    csv += fmt::format("{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.3g}\n", r.modes, r.bodies, r.vertices,
-                       1e6 * r.advance_median, 1e6 * r.advance_p99, per_body_ns(r.advance_median, r),
-                       per_vertex_ns(r.positions, r), per_vertex_ns(r.normals, r), r.energy_drift);
-  return csv;
-}
-
-/// Time per body against modes, a line per number of bodies, by gnuplot.
-std::string svg_of(const std::vector<StepRow>& rows, const std::vector<int>& bodies) {
-  std::string plot =
-      "set datafile separator ','\nset xlabel 'modes'\n"
-      "set ylabel 'one step in free flight, ns per body (median)'\nset yrange [0:*]\nset key left top\nset grid\nplot ";
-  for (std::size_t i = 0; i < bodies.size(); ++i)
-    plot += fmt::format("{}'data.csv' using ($2=={} ? $1 : NaN):6 with linespoints pt 7 title '{} bodies'",
-                        i == 0 ? "" : ", ", bodies[i], bodies[i]);
-  return svg_by_gnuplot({760, 480}, csv_of(rows), plot);
-}
-
-void check(const StepArguments& a) {
-  for (const int n : a.bodies)
-    if (n < 1 || n > 1'000'000) throw InvalidArgument(fmt::format("--bodies: is {}, expected 1 to 1000000", n));
-  for (const int k : a.modes)
-    if (k < 0 || k > 1000) throw InvalidArgument(fmt::format("--modes: is {}, expected 0 to 1000", k));
-}
-
-std::string text_of(const StepRow& r) {
-  return fmt::format("{:>6} {:>7} {:>9} {:>14.1f} {:>14.2f} {:>18.2f} {:>13.1e}\n", r.modes, r.bodies, r.vertices,
-                     per_body_ns(r.advance_median, r), per_vertex_ns(r.positions, r), per_vertex_ns(r.normals, r),
-                     r.energy_drift);
-}
-
-void benchmark_step(Program& program, const StepArguments& a) {
-  check(a);
-  program.print(fmt::format("{:>6} {:>7} {:>9} {:>14} {:>14} {:>18} {:>13}\n", "modes", "bodies", "vertices",
-                            "step ns/body", "positions ns/v", "with normals ns/v", "energy drift"));
-  if (!a.asset.empty()) program.add_input(a.asset);
-  std::vector<StepRow> rows;
-  for (const auto& model : models(a))
-    for (const int bodies : a.bodies) {
-      program.progress().stage(fmt::format("{} modes, {} bodies", model->modes(), bodies));
-      rows.push_back(measure(model, bodies, a));
-      program.print(text_of(rows.back()));
-    }
+void measure_scenes(Program& program, const StepArguments& a) {
+  const std::unique_ptr<Jobs> jobs = jobs_of(a.threads);
+  SceneSource source;
+  std::vector<SceneCost> costs;
+  std::string csv = csv_head();
   Json& report = program.report();
   report["benchmark"] = "step";
-  report["step"] = a.step;
-  report["model"] = a.asset.empty() ? "synthetic" : std::filesystem::path(a.asset).filename().string();
-  report["seconds"]["rows"] = Json::array();
-  for (const StepRow& r : rows) report["seconds"]["rows"].push_back(json_row(r));
-  if (!a.csv.empty()) program.write_file(a.csv, csv_of(rows));
-  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows, a.bodies));
+  report["threads"] = a.threads;
+  report["scenes"] = Json::array();
+  Json times = Json::array();
+  for (const std::string& name : a.scenes.empty() ? usual_scenes() : a.scenes) {
+    if (name.ends_with(".json")) program.add_input(name);
+    program.progress().stage(name);
+    costs.push_back(measure(source.scene(name, a.scale), {.steps = a.steps, .jobs = jobs.get()}));
+    program.print(text_of(costs.back()));
+    report["scenes"].push_back(counts_of(costs.back()));
+    times.push_back(times_of(costs.back()));
+    csv += csv_row(costs.back());
+  }
+  report["seconds"]["scenes"] = times;
+  if (!a.csv.empty()) program.write_file(a.csv, csv);
+  if (!a.plot.empty()) write_plot(program, a.plot, frames_svg(costs));
+}
+
+void sweep_scenes(Program& program, const StepArguments& a) {
+  SceneSource source;
+  std::vector<SweepLine> lines;
+  std::string csv = "axis,line,x,us\n";
+  program.print(fmt::format("{:<9} {:<22} {:>6}  cost in us at each\n", "against", "line", "slope"));
+  for (const Sweep& sweep : sweeps(a.is_small)) {
+    program.progress().stage(sweep.axis + ": " + sweep.scene);
+    for (SweepLine& line : run_sweep(sweep, source, a.steps)) {
+      program.print(text_of(line));
+      for (std::size_t i = 0; i < line.x.size(); ++i)
+        csv += fmt::format("{},{},{:.6g},{:.6g}\n", line.axis, line.name, line.x[i], 1e6 * line.seconds[i]);
+      program.report()["seconds"]["lines"].push_back({{"against", line.axis},
+                                                      {"line", line.name},
+                                                      {"x", line.x},
+                                                      {"per_step", line.seconds},
+                                                      {"slope", line.slope()}});
+      lines.push_back(std::move(line));
+    }
+  }
+  program.report()["benchmark"] = "step";
+  if (!a.csv.empty()) program.write_file(a.csv, csv);
+  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(lines));
 }
 
 void declare_step(CLI::App& app, StepArguments& a) {
-  app.add_option("--asset", a.asset, "model to use; default: synthetic ones")->type_name("ASSET.glb");
-  app.add_option("--modes", a.modes, "modes of the synthetic models")
-      ->type_name("K,...")
-      ->delimiter(',')
+  app.add_option("--scene", a.scenes, "scenes of the library (make_scene --list), or scene files")
+      ->type_name("NAME|FILE.json,...")
+      ->delimiter(',');
+  const auto add_size = [&](const char* option, int& value, int most, const char* what) {
+    return app.add_option(option, value, what)->type_name("N")->check(CLI::Range(1, most));
+  };
+  add_size("--bodies", a.scale.bodies, 100'000, "that move in a scene of the library; default: its own number");
+  add_size("--modes", a.scale.modes, 1000, "of each body that bends; default: the scene's own");
+  add_size("--vertices", a.scale.vertices, 1'000'000, "of each drawn surface, about; default: the mesh's own");
+  add_size("--steps", a.steps, 1'000'000, "timed at most; default: all of the scene; with --sweep 120");
+  add_size("--threads", a.threads, 1024, "that share the work; times are then by the wall clock")
       ->capture_default_str();
-  app.add_option("--bodies", a.bodies, "instances in the world")
-      ->type_name("N,...")
-      ->delimiter(',')
-      ->capture_default_str();
-  app.add_option("--vertices", a.vertices, "vertices of the synthetic models")
-      ->type_name("N")
-      ->check(CLI::Range(40, 10'000'000))
-      ->capture_default_str();
-  app.add_option("--step", a.step, "step length")->type_name("S")->check(positive_number())->capture_default_str();
-  app.add_option("--seconds", a.seconds_per_row, "time spent on each figure")
-      ->type_name("S")
-      ->check(positive_number())
-      ->capture_default_str();
+  app.add_flag("--sweep", a.sweep, "how the cost grows with bodies, modes, vertices and contacts");
   app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
-  app.add_option("--plot", a.plot, "plot step time against modes (needs gnuplot)")->type_name("FILE.svg");
+  app.add_option("--plot", a.plot,
+                 "plot the time of each frame, or with --sweep cost against size, log-log (needs gnuplot)")
+      ->type_name("FILE.svg");
 }
 
 }  // namespace
 
 std::function<void(Program&)> add_step(CLI::App& programs) {
   const auto arguments = std::make_shared<StepArguments>();
-  CLI::App* app =
-      programs.add_subcommand("step", "free flight: one step, and reconstruction, per body, mode and vertex");
+  CLI::App* app = programs.add_subcommand("step", "what the steps of scenes cost, stage by stage, and how that grows");
   declare_step(*app, *arguments);
   return [arguments, app](Program& program) {
-    if (app->parsed()) benchmark_step(program, *arguments);
+    if (!app->parsed()) return;
+    if (arguments->sweep)
+      sweep_scenes(program, *arguments);
+    else
+      measure_scenes(program, *arguments);
   };
 }
 

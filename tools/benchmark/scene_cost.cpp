@@ -1,0 +1,149 @@
+#include "scene_cost.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "counted_new.h"
+#include "cpu_time.h"
+#include "limber/scene/scene_player.h"
+#include "touched_pages.h"
+
+namespace limber::tools {
+namespace {
+
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Arrays for all that is drawn.
+struct DrawnBodies {
+  std::vector<float> positions, normals;
+  std::vector<DrawTarget> bare, lit;
+
+  explicit DrawnBodies(const ScenePlayer& player) {
+    std::size_t floats = 0;
+    for (const BodyId id : player.bodies()) floats += floats_of(player, id);
+    positions.resize(floats), normals.resize(floats);
+    std::size_t first = 0;
+    for (const BodyId id : player.bodies()) {
+      const std::size_t count = floats_of(player, id);
+      bare.push_back({.id = id, .positions = std::span(positions).subspan(first, count)});
+      lit.push_back(bare.back());
+      lit.back().normals = std::span(normals).subspan(first, count);
+      first += count;
+    }
+  }
+  static std::size_t floats_of(const ScenePlayer& player, BodyId id) {
+    return 3 * static_cast<std::size_t>(player.world().model(id).render().vertices());
+  }
+};
+
+class Measurement {
+ public:
+  Measurement(const TimedScene& timed, const CostOptions& options)
+      : timed_(timed),
+        options_(options),
+        player_(timed.scene, timed.models, timed.scene.steps, options.jobs ? *options.jobs : serial_jobs()),
+        drawn_(player_) {
+    cost_.scene = timed.name;
+    cost_.bodies = player_.bodies().size();
+    cost_.vertices = static_cast<Index>(drawn_.positions.size() / 3);
+    for (const BodyId id : player_.bodies()) cost_.modes = std::max(cost_.modes, player_.world().model(id).modes());
+    cost_.step = timed.scene.step;
+    const auto left = static_cast<int>(timed.scene.steps) - timed.settling;
+    cost_.steps = options.steps > 0 ? std::min(options.steps, left) : left;
+  }
+
+  SceneCost run() {
+    for (auto* seconds : {&cost_.step_seconds, &cost_.position_seconds, &cost_.draw_seconds})
+      seconds->reserve(static_cast<std::size_t>(cost_.steps));
+    for (int n = 0; n < timed_.settling; ++n) player_.step();
+    long before = 0;
+    for (int n = 0; n < cost_.steps; ++n) {
+      if (n == cost_.steps / 2) before = testing::allocations();
+      take_step();
+      if (options_.draw) draw();
+    }
+    cost_.allocations = static_cast<double>(testing::allocations() - before) / (cost_.steps - cost_.steps / 2);
+    const double steps = cost_.steps;
+    cost_.contacts = static_cast<double>(cost_.stages[Stage::kNarrowPhase].units) / steps;
+    cost_.rows = static_cast<double>(cost_.stages[Stage::kSolve].units) / steps;
+    cost_.iterations /= steps, cost_.newton_steps /= steps;
+    for (const BodyId id : player_.bodies()) cost_.asleep += player_.world().is_asleep(id) ? 1 : 0;
+    count_bytes();
+    return std::move(cost_);
+  }
+
+ private:
+  double now() const { return options_.jobs ? wall_seconds() : thread_seconds(); }
+
+  template <class Work>
+  void time(std::vector<double>& seconds, const Work& work) {
+    const double began = now();
+    work();
+    seconds.push_back(now() - began);
+  }
+
+  void take_step() {
+    World& world = player_.world();
+    player_.begin_step();
+    world.set_stage_times(&cost_.stages);
+    time(cost_.step_seconds, [&] { world.step(); });
+    world.set_stage_times(nullptr);
+    player_.end_step();
+    const ConstraintReport report = world.constraint_report();
+    cost_.iterations += report.iterations;
+    cost_.newton_steps += report.newton_steps;
+    cost_.unsettled += report.solved ? 0 : 1;
+  }
+
+  void draw() {
+    World& world = player_.world();
+    time(cost_.position_seconds, [&] { world.reconstruct(drawn_.bare); });
+    world.set_stage_times(&cost_.stages);
+    time(cost_.draw_seconds, [&] { world.reconstruct(drawn_.lit); });
+    world.set_stage_times(nullptr);
+  }
+
+  void count_bytes() {
+    player_.begin_step();
+    cost_.step_bytes = touched_bytes([&] { player_.world().step(); });
+    player_.end_step();
+    if (options_.draw) cost_.draw_bytes = touched_bytes([&] { player_.world().reconstruct(drawn_.lit); });
+  }
+
+  const TimedScene& timed_;
+  const CostOptions& options_;
+  ScenePlayer player_;
+  DrawnBodies drawn_;
+  SceneCost cost_;
+};
+
+}  // namespace
+
+SceneCost measure(const TimedScene& timed, const CostOptions& options) { return Measurement(timed, options).run(); }
+
+double cost_ratio(const TimedScene& first, const TimedScene& second, int steps) {
+  ScenePlayer a(first.scene, first.models, first.scene.steps), b(second.scene, second.models, second.scene.steps);
+  for (int n = 0; n < first.settling; ++n) a.step();
+  for (int n = 0; n < second.settling; ++n) b.step();
+  std::vector<double> of_a, of_b;
+  const auto take = [](ScenePlayer& player, std::vector<double>& seconds) {
+    player.begin_step();
+    const double began = thread_seconds();
+    player.world().step();
+    seconds.push_back(thread_seconds() - began);
+    player.end_step();
+  };
+  for (int n = 0; n < steps; ++n) take(a, of_a), take(b, of_b);
+  return quantile(of_a, 0.5) / quantile(of_b, 0.5);
+}
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
+}
+
+}  // namespace limber::tools
