@@ -377,6 +377,7 @@ TEST(SceneFile, AMissingFileOrAFolderIsToldByName) {
 TEST(SceneFile, EverySceneThatIsShippedIsOne) {
   int scenes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(LIMBER_SOURCE_DIR "/assets/scenes")) {
+    if (entry.path().extension() != ".json") continue;
     EXPECT_NO_THROW(read_scene(entry.path())) << entry.path();
     ++scenes;
   }
