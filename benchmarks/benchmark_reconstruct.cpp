@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cpu_time.h"
+#include "limber/dynamics/half_basis.h"
 #include "limber/dynamics/reconstruct.h"
 #include "machine_limits.h"
 
@@ -76,6 +77,29 @@ void one_body(benchmark::State& state, bool cold) {
   state.counters["ns"] = 1e9 * seconds / kVertices;
   state.counters["GB_per_s"] = 1e-9 * static_cast<double>(basis_bytes(modes)) / seconds;
   state.counters["of_read"] = static_cast<double>(basis_bytes(modes)) / limit / seconds;
+}
+/// The same cold, from bases in half precision, beside single precision in the same run.
+void one_body_half(benchmark::State& state) {
+  const Index modes = static_cast<Index>(state.range(0));
+  const std::size_t copies = 1 + kColdBytes / basis_bytes(modes);
+  std::vector<ModalSurface> surfaces;
+  std::vector<HalfBasis> halves;
+  for (std::size_t i = 0; i < copies; ++i) surfaces.push_back(sheet(modes)), halves.emplace_back(surfaces[i].basis);
+  Instances instances(modes, 1);
+  LeastTime in_half, in_single;
+  const std::size_t per_pass = std::max<std::size_t>(copies / 4, 10);
+  std::size_t next = 0, first = 0;
+  for (auto _ : state) {
+    in_half.measure([&] {
+      for (std::size_t i = 0; i < per_pass; ++i, ++next)
+        reconstruct(surfaces[next % copies], halves[next % copies], instances.targets);
+    });
+    in_single.measure([&] {
+      for (std::size_t i = 0; i < per_pass; ++i, ++first) reconstruct(surfaces[first % copies], instances.targets);
+    });
+  }
+  state.counters["ns"] = 1e9 * in_half.seconds() / static_cast<double>(per_pass) / kVertices;
+  state.counters["of_single"] = in_half.seconds() / in_single.seconds();
 }
 void one_body_hot(benchmark::State& state) { one_body(state, false); }
 void one_body_cold(benchmark::State& state) { one_body(state, true); }
@@ -160,6 +184,7 @@ void normals(benchmark::State& state) {
 
 BENCHMARK(one_body_hot)->ArgName("modes")->Arg(8)->Arg(20)->Arg(32)->Arg(64);
 BENCHMARK(one_body_cold)->ArgName("modes")->Arg(8)->Arg(20)->Arg(32)->Arg(64);
+BENCHMARK(one_body_half)->ArgName("modes")->Arg(8)->Arg(20)->Arg(32)->Arg(64);
 BENCHMARK(many_instances)->ArgNames({"modes", "instances"})->ArgsProduct({{8, 20, 32, 64}, {8, 64, 1000}});
 BENCHMARK(skinned)->ArgNames({"modes", "handles"})->ArgsProduct({{8, 20, 40}, {12, 24}});
 BENCHMARK(normals);

@@ -5,8 +5,11 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "limber/scene/manifest.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/run.h"
 #include "limber/scene/scene_file.h"
@@ -22,7 +25,7 @@ using Json = nlohmann::ordered_json;
 struct Arguments {
   std::string scene;
   std::int64_t steps = -1;
-  std::string record, energies, mode_energies, contacts;
+  std::string record, energies, mode_energies, contacts, manifest;
   double record_frame_rate = 60.0;
   RecordingOptions recording;
   bool reconstruct = false;
@@ -51,6 +54,11 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--contacts", a.contacts,
                  "write what touched in each step: time, bodies, place, normal, impulse; for scenes with contact")
       ->type_name("FILE.csv");
+  app.add_option(
+         "--manifest", a.manifest,
+         "write what the scene is played without, why, and what each of it saves in bytes and time: it is played "
+         "again with each put back")
+      ->type_name("FILE.json");
   app.add_flag("--reconstruct", a.reconstruct, "also make positions and normals at every key, to time it");
 }
 
@@ -65,7 +73,9 @@ Json energy(const BodyEnergy& e) {
 }
 
 Json manifest(const ModelManifest& m) {
-  Json dropped = Json::array();
+  Json dropped = Json::array(), left_out = Json::array();
+  for (const ModelSaving& l : m.left_out)
+    left_out.push_back({{"what", to_string(l.what)}, {"why", l.why}, {"bytes", l.bytes}});
   for (const DroppedMode& d : m.dropped)
     dropped.push_back({{"mode", d.mode}, {"reason", to_string(d.reason)}, {"value", d.value}, {"limit", d.limit}});
   return {{"asset", m.asset},
@@ -74,7 +84,8 @@ Json manifest(const ModelManifest& m) {
           {"modes_in_asset", m.modes_in_asset},
           {"modes", m.modes},
           {"dropped", dropped},
-          {"volume_block_dropped", m.volume_block_dropped},
+          {"dropped_displacement", m.dropped_displacement ? Json(*m.dropped_displacement) : Json()},
+          {"left_out", left_out},
           {"bytes_in_asset", m.bytes_in_asset},
           {"bytes", m.bytes},
           {"multiply_adds_in_asset", m.multiply_adds_in_asset},
@@ -271,16 +282,55 @@ void warn_of_unsettled(Program& program, const RunResult& r) {
       r.constraints.unsettled, r.steps));
 }
 
+/// Without what differs between equal runs, and that.
+std::pair<Json, Json> measured(const SceneManifest& m) {
+  Json out{
+      {"bytes", m.bytes},         {"bytes_with_all", m.bytes_with_all},  {"difference_with_all", m.difference_with_all},
+      {"body_steps", m.steps},    {"body_steps_asleep", m.asleep_steps}, {"unused_contact_methods", m.unused_methods},
+      {"left_out", Json::array()}};
+  Json seconds{{"step", m.seconds}, {"step_with_all", m.seconds_with_all}, {"left_out", Json::array()}};
+  for (const ManifestItem& i : m.left_out) {
+    out["left_out"].push_back({{"what", i.what},
+                               {"why", i.why},
+                               {"bytes", i.bytes},
+                               {"difference", i.difference},
+                               {"bound", i.bound ? Json(*i.bound) : Json()}});
+    seconds["left_out"].push_back({{"what", i.what}, {"saved_per_step", i.seconds}});
+  }
+  return {std::move(out), std::move(seconds)};
+}
+
+void write_manifest(Program& program, const Arguments& a, const Scene& scene, const SceneUse& use) {
+  if (a.manifest.empty()) return;
+  program.progress().stage("playing the scene with each put back that it does without");
+  std::map<std::string, Asset> assets;
+  for (const auto& [name, file] : scene.assets) assets.emplace(name, read_asset(file));
+  constexpr double kKeyRate = 10.0;  // Hz, at which positions are compared
+  const SceneManifest m = measure_manifest(scene, assets, use, {.steps = a.steps, .key_rate = kKeyRate});
+  std::string text;
+  for (const ManifestItem& i : m.left_out)
+    text += fmt::format("  without {:<19} {:>10.3f} MB, {:>9.2f} us a step, {:.1e} m elsewhere: {}\n", i.what,
+                        1e-6 * static_cast<double>(i.bytes), 1e6 * i.seconds, i.difference, i.why);
+  program.print(text);
+  auto [out, seconds] = measured(m);
+  Json whole{{"program", "limber-simulate"}, {"scene", scene.name}};
+  whole.update(out);
+  whole["models"] = program.report().at("models");
+  whole["seconds"] = std::move(seconds);
+  program.write_file(a.manifest, whole.dump(2) + "\n");
+}
+
 void simulate(Program& program, const Arguments& a) {
   const auto began = Clock::now();
   program.progress().stage("reading the scene");
   const Scene scene = read_scene(a.scene);
   program.add_input(a.scene);
   for (const auto& file : files_of(scene)) program.add_input(file);
-  const SceneModels models = load_models(scene);
+  const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
+  const SceneUse use{.drawn = !a.record.empty() || a.reconstruct, .reached_into = false};
+  const SceneModels models = load_models(scene, use);
   program.warnings() = models.warnings;
   program.progress().stage("simulating");
-  const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
   const RunResult result = run_scene(scene, models,
                                      {.steps = a.steps,
                                       .key_rate = sampled ? a.record_frame_rate * a.recording.slow_motion : 0.0,
@@ -293,6 +343,7 @@ void simulate(Program& program, const Arguments& a) {
   if (!a.energies.empty()) program.write_file(a.energies, energies_csv(result.trajectory));
   if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
   if (!a.contacts.empty()) program.write_file(a.contacts, contacts_csv(result.trajectory));
+  write_manifest(program, a, scene, use);
   warn_of_unsettled(program, result);
   program.report()["seconds"] = {
       {"total", std::chrono::duration<double>(Clock::now() - began).count()},

@@ -111,19 +111,21 @@ bool has_bunny() { return std::filesystem::exists(kBunnyFile); }
 
 Vec3 body_size(const std::string& name) { return recipes().at(name).size; }
 
-Asset bake_body(const std::string& name, int modes, int vertices) {
+Asset bake_body(const std::string& name, const BodyOptions& body) {
   const Recipe& r = recipes().at(name);
-  TetMesh mesh = mesh_of(name, r);
+  BakeInput input{.name = name, .mesh = mesh_of(name, r)};
+  input.render = drawn_surface(input.mesh, body.vertices);
+  if (body.touched_as_drawn) input.collision = input.render;
   BakeOptions options;
   options.materials = {{"*", r.material}};
-  options.analysis.modes = options.limits.max_modes = std::max(modes, 1);
-  options.damping = RayleighDamping::from_ratio(kDampingRatio, r.first_hz, r.last_hz);
+  options.materials["*"].youngs_modulus *= body.stiffness;
+  options.analysis.modes = options.limits.max_modes = std::max(body.modes, 1);
+  if (body.damped) options.damping = RayleighDamping::from_ratio(kDampingRatio, r.first_hz, r.last_hz);
+  options.volume_block = body.volume;
   if (name == "bunny") options.collision_triangles = 300;
-  BakeInput input{.name = name, .mesh = std::move(mesh)};
-  input.render = drawn_surface(input.mesh, vertices);
   Warnings warnings;
   Asset asset = bake(input, options, warnings).asset;
-  if (modes == 0) asset.bodies.front() = reduce_model(*asset.bodies.front(), {});
+  if (body.modes == 0) asset.bodies.front() = reduce_model(*asset.bodies.front(), {});
   return asset;
 }
 

@@ -264,7 +264,9 @@ Scene LibraryScene::parsed() const { return parse_scene(text, name, {}); }
 const Asset& SceneLibrary::body(const std::string& name, int modes, int vertices) {
   const auto key = std::tuple(name, modes, vertices);
   const auto known = baked_.find(key);
-  return known != baked_.end() ? known->second : baked_.emplace(key, bake_body(name, modes, vertices)).first->second;
+  return known != baked_.end()
+             ? known->second
+             : baked_.emplace(key, bake_body(name, {.modes = modes, .vertices = vertices})).first->second;
 }
 
 LibraryScene SceneLibrary::scene(std::string_view name, const SceneSize& size) {

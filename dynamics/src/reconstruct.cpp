@@ -7,6 +7,7 @@
 #include <string>
 
 #include "limber/core/error.h"
+#include "limber/dynamics/half_basis.h"
 #include "reconstruct_kernels.h"
 
 namespace limber {
@@ -44,12 +45,14 @@ InstanceOutput instance_output(const ReconstructionTarget& target) {
 struct Pieces {
   const ModalSurface& surface;
   const SkinTiles* influences;  // null: no target has a skin
+  const HalfBasis* half;        // null: single precision
   std::span<const ReconstructionTarget> targets;
   std::size_t tiles, modes, tiles_per_range, instances_per_block;
 
-  Pieces(const ModalSurface& s, const SkinTiles* skin, std::span<const ReconstructionTarget> t)
+  Pieces(const ModalSurface& s, const SkinTiles* skin, const HalfBasis* h, std::span<const ReconstructionTarget> t)
       : surface(s),
         influences(skin),
+        half(h),
         targets(t),
         tiles(static_cast<std::size_t>(s.basis.tiles())),
         modes(static_cast<std::size_t>(s.basis.modes())),
@@ -77,13 +80,16 @@ struct Pieces {
     for (std::size_t i = 0; i < n; ++i) {
       outputs[i] = instance_output(members[i]);
       const std::size_t own = drawn_modes(members[i]);
-      for (std::size_t m = 0; m < summed; ++m)
-        amplitudes[m * n + i] = m < own ? static_cast<float>(members[i].amplitudes[m]) : 0.0f;
+      for (std::size_t m = 0; m < summed; ++m) {
+        const double scale = half ? static_cast<double>(half->scales()[m]) : 1.0;
+        amplitudes[m * n + i] = m < own ? static_cast<float>(scale * members[i].amplitudes[m]) : 0.0f;
+      }
     }
     const std::size_t first_tile = range * tiles_per_range;
     internal::TileInfluences hang{};
     if (influences) hang = {influences->starts(), influences->handle_of_entry(), influences->weights()};
     reconstruct_tiles({.basis = surface.basis.tile(0),
+                       .half_basis = half ? half->tile(0) : nullptr,
                        .rest = surface.rest.front().data(),
                        .vertices = surface.rest.size(),
                        .stored_modes = modes,
@@ -171,12 +177,12 @@ struct Normals {
   }
 };
 
-void reconstruct_any(const ModalSurface& surface, const SkinTiles* influences,
+void reconstruct_any(const ModalSurface& surface, const SkinTiles* influences, const HalfBasis* half,
                      std::span<const ReconstructionTarget> targets, Jobs& jobs) {
   check(surface, influences, targets);
   if (surface.rest.empty() || targets.empty()) return;
   // By reference: a std::function of the structs themselves would allocate.
-  const Pieces pieces(surface, influences, targets);
+  const Pieces pieces(surface, influences, half, targets);
   jobs.parallel_for(pieces.count(), 1, std::cref(pieces));
   const bool normals = std::any_of(targets.begin(), targets.end(), [](const auto& t) { return t.normals != nullptr; });
   const Normals every{surface, targets};
@@ -196,12 +202,20 @@ Index drawn_modes(const SurfaceExtent& extent, std::span<const double> z, double
 }
 
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets, Jobs& jobs) {
-  reconstruct_any(surface, nullptr, targets, jobs);
+  reconstruct_any(surface, nullptr, nullptr, targets, jobs);
 }
 
 void reconstruct(const ModalSurface& surface, const SkinTiles& influences,
                  std::span<const ReconstructionTarget> targets, Jobs& jobs) {
-  reconstruct_any(surface, &influences, targets, jobs);
+  reconstruct_any(surface, &influences, nullptr, targets, jobs);
+}
+
+void reconstruct(const ModalSurface& surface, const HalfBasis& basis, std::span<const ReconstructionTarget> targets,
+                 Jobs& jobs) {
+  if (basis.vertices() != surface.vertices() || basis.modes() != surface.basis.modes())
+    throw InvalidArgument("reconstruct: the half-precision basis has " + std::to_string(basis.vertices()) +
+                          " vertices and " + std::to_string(basis.modes()) + " modes, expected those of the surface");
+  reconstruct_any(surface, nullptr, &basis, targets, jobs);
 }
 
 void vertex_normals(std::span<const Triangle> triangles, std::span<const float> positions, std::span<float> normals) {

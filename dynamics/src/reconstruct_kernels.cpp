@@ -25,12 +25,27 @@ constexpr std::size_t kLanes = hn::MaxLanes(Floats());
 // Instances at a time: three accumulators each must fit the registers beside three shape vectors and an amplitude.
 constexpr std::size_t kGroup = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3 ? 4 : 8;
 
-// The stream's distance ahead that reached the memory's read rate for one body, in floats.
-constexpr std::size_t kPrefetch = 2048 / sizeof(float);
-constexpr std::size_t kLine = 64 / sizeof(float);
+// The stream's distance ahead that reached the memory's read rate for one body.
+constexpr std::size_t kPrefetchBytes = 2048;
 
 struct Points {
   Vector x, y, z;
+};
+
+// Where shapes come from: single precision, or half, which is widened as it is read.
+struct FloatShapes {
+  using Number = float;
+  static HWY_INLINE const Number* Start(const TileRange& range) { return range.basis; }
+  static HWY_INLINE HWY_ATTR Vector Load(const Number* p) { return hn::Load(Floats(), p); }
+};
+struct HalfShapes {
+  using Number = std::uint16_t;
+  static HWY_INLINE const Number* Start(const TileRange& range) { return range.half_basis; }
+  static HWY_INLINE HWY_ATTR Vector Load(const Number* p) {
+    const hn::Rebind<hwy::float16_t, Floats> halves;
+    const hn::Rebind<std::uint16_t, Floats> words;
+    return hn::PromoteTo(Floats(), hn::BitCast(halves, hn::LoadU(words, p)));
+  }
 };
 
 // kLanes points from `vertex` on, of an array over the surface's vertices; past the last one nothing is read.
@@ -155,16 +170,16 @@ HWY_INLINE HWY_ATTR void StoreTransformed(const TileRange& range, const Instance
 
 // kLanes vertices of N instances. The displacement is summed from zero and the rest position added last: the sum then
 // rounds relative to the displacement, which is the smaller.
-template <std::size_t N>
+template <class Shapes, std::size_t N>
 HWY_INLINE HWY_ATTR void ManyInstances(const TileRange& range, std::size_t tile, std::size_t lane, std::size_t first) {
   const Floats d;
   Vector u[3 * N];
   for (std::size_t i = 0; i < 3 * N; ++i) u[i] = hn::Zero(d);
-  const float* shape = range.basis + tile * range.stored_modes * 3 * kTileVertices + lane;
+  const auto* shape = Shapes::Start(range) + tile * range.stored_modes * 3 * kTileVertices + lane;
   const float* amplitude = range.amplitudes + first;
   for (std::size_t m = 0; m < range.modes; ++m, shape += 3 * kTileVertices, amplitude += range.instances) {
-    const Vector x = hn::Load(d, shape), y = hn::Load(d, shape + kTileVertices),
-                 z = hn::Load(d, shape + 2 * kTileVertices);
+    const Vector x = Shapes::Load(shape), y = Shapes::Load(shape + kTileVertices),
+                 z = Shapes::Load(shape + 2 * kTileVertices);
     for (std::size_t i = 0; i < N; ++i) {
       const Vector a = hn::Set(d, amplitude[i]);
       u[3 * i] = hn::MulAdd(x, a, u[3 * i]);
@@ -183,17 +198,20 @@ HWY_INLINE HWY_ATTR void ManyInstances(const TileRange& range, std::size_t tile,
 }
 
 // A whole tile of one instance: bound by the stream of shapes, which is prefetched.
+template <class Shapes>
 HWY_INLINE HWY_ATTR void OneInstance(const TileRange& range, std::size_t tile, std::size_t instance) {
   const Floats d;
   constexpr std::size_t kParts = kTileVertices / kLanes;
   Vector u[3 * kParts];
   for (std::size_t i = 0; i < 3 * kParts; ++i) u[i] = hn::Zero(d);
-  const float* shape = range.basis + tile * range.stored_modes * 3 * kTileVertices;
+  constexpr std::size_t kAhead = kPrefetchBytes / sizeof(typename Shapes::Number);
+  constexpr std::size_t kLine = 64 / sizeof(typename Shapes::Number);
+  const auto* shape = Shapes::Start(range) + tile * range.stored_modes * 3 * kTileVertices;
   const float* amplitude = range.amplitudes + instance;
   for (std::size_t m = 0; m < range.modes; ++m, shape += 3 * kTileVertices, amplitude += range.instances) {
-    for (std::size_t line = 0; line < 3 * kTileVertices; line += kLine) hwy::Prefetch(shape + kPrefetch + line);
+    for (std::size_t line = 0; line < 3 * kTileVertices; line += kLine) hwy::Prefetch(shape + kAhead + line);
     const Vector a = hn::Set(d, *amplitude);
-    for (std::size_t i = 0; i < 3 * kParts; ++i) u[i] = hn::MulAdd(hn::Load(d, shape + i * kLanes), a, u[i]);
+    for (std::size_t i = 0; i < 3 * kParts; ++i) u[i] = hn::MulAdd(Shapes::Load(shape + i * kLanes), a, u[i]);
   }
   const Interleave interleave;
   for (std::size_t part = 0; part < kParts; ++part) {
@@ -207,19 +225,38 @@ HWY_INLINE HWY_ATTR void OneInstance(const TileRange& range, std::size_t tile, s
   }
 }
 
-template <std::size_t N>
+template <class Shapes, std::size_t N>
 HWY_INLINE HWY_ATTR void WholeTile(const TileRange& range, std::size_t tile, std::size_t first) {
   const std::size_t last_lane = std::min(kTileVertices, range.vertices - tile * kTileVertices);
-  for (std::size_t lane = 0; lane < last_lane; lane += kLanes) ManyInstances<N>(range, tile, lane, first);
+  for (std::size_t lane = 0; lane < last_lane; lane += kLanes) ManyInstances<Shapes, N>(range, tile, lane, first);
+}
+
+template <class Shapes>
+HWY_INLINE HWY_ATTR void AllTiles(const TileRange& range) {
+  for (std::size_t tile = range.first_tile; tile < range.last_tile; ++tile) {
+    std::size_t i = 0;
+    for (; i + kGroup <= range.instances; i += kGroup) WholeTile<Shapes, kGroup>(range, tile, i);
+    if (i + 4 <= range.instances) WholeTile<Shapes, 4>(range, tile, i), i += 4;
+    if (i + 2 <= range.instances) WholeTile<Shapes, 2>(range, tile, i), i += 2;
+    if (i < range.instances) OneInstance<Shapes>(range, tile, i);
+  }
 }
 
 HWY_ATTR void ReconstructTiles(const TileRange& range) {
-  for (std::size_t tile = range.first_tile; tile < range.last_tile; ++tile) {
-    std::size_t i = 0;
-    for (; i + kGroup <= range.instances; i += kGroup) WholeTile<kGroup>(range, tile, i);
-    if (i + 4 <= range.instances) WholeTile<4>(range, tile, i), i += 4;
-    if (i + 2 <= range.instances) WholeTile<2>(range, tile, i), i += 2;
-    if (i < range.instances) OneInstance(range, tile, i);
+  if (range.half_basis != nullptr)
+    AllTiles<HalfShapes>(range);
+  else
+    AllTiles<FloatShapes>(range);
+}
+
+HWY_ATTR void ToHalf(const float* from, std::uint16_t* to, float* back, std::size_t count) {
+  const Floats d;
+  const hn::Rebind<hwy::float16_t, Floats> halves;
+  const hn::Rebind<std::uint16_t, Floats> words;
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    const auto half = hn::DemoteTo(halves, hn::LoadU(d, from + i));
+    hn::StoreU(hn::BitCast(words, half), words, to + i);
+    hn::StoreU(hn::PromoteTo(d, half), d, back + i);
   }
 }
 
@@ -255,8 +292,13 @@ namespace limber::internal {
 
 HWY_EXPORT(ReconstructTiles);
 HWY_EXPORT(NormalizeVectors);
+HWY_EXPORT(ToHalf);
 
 void reconstruct_tiles(const TileRange& range) { HWY_DYNAMIC_DISPATCH(ReconstructTiles)(range); }
+
+void to_half(const float* from, std::uint16_t* to, float* back, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(ToHalf)(from, to, back, count);
+}
 
 void normalize_vectors(float* vectors, std::size_t count) { HWY_DYNAMIC_DISPATCH(NormalizeVectors)(vectors, count); }
 

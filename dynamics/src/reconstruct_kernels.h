@@ -32,8 +32,9 @@ struct TileInfluences {
 
 /// Vertices [16·first_tile, min(16·last_tile, vertices)) of up to kBlockInstances instances of one surface.
 struct TileRange {
-  const float* basis;  ///< `[tile][mode][x16|y16|z16]`, 64-byte aligned, of tile 0
-  const float* rest;   ///< xyz per vertex, of vertex 0
+  const float* basis;               ///< `[tile][mode][x16|y16|z16]`, 64-byte aligned, of tile 0
+  const std::uint16_t* half_basis;  ///< in its place: the same in half precision, amplitudes scaled; null: none
+  const float* rest;                ///< xyz per vertex, of vertex 0
   std::size_t vertices, stored_modes, first_tile, last_tile;
   std::size_t modes;        ///< those that are summed: the first so many
   const float* amplitudes;  ///< `[mode][instance]`
@@ -44,6 +45,9 @@ struct TileRange {
 
 /// Each vertex gets the same operations in the same order whatever shares its block, so the same bits.
 void reconstruct_tiles(const TileRange& range);
+
+/// Rounds to half precision, to nearest. @param back out: what the halves stand for @param count a multiple of 16
+void to_half(const float* from, std::uint16_t* to, float* back, std::size_t count);
 
 /// n ← n/|n| for xyz vectors in a row; (0, 0, 1) where |n|² vanishes in single precision.
 void normalize_vectors(float* vectors, std::size_t count);

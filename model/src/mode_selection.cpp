@@ -49,13 +49,6 @@ double amplification(const ModeStrength& mode, LoadKind load) {
   return zeta < std::numbers::sqrt2 / 2.0 ? 1.0 / (2.0 * zeta * std::sqrt(1.0 - zeta * zeta)) : 1.0;
 }
 
-/// m
-double largest_displacement(const ModeStrength& mode, const SceneLimits& limits) {
-  const double reach = mode.max_observable * mode.max_loadable;
-  // An undamped mode at resonance grows without bound, unless no force reaches it or nobody sees it.
-  return reach > 0.0 ? reach * limits.max_force * amplification(mode, limits.load) / mode.eigenvalue : 0.0;
-}
-
 /// Hz; 0 for an overdamped mode, which does not swing.
 double damped_frequency(const ModeStrength& mode) {
   return std::sqrt(std::max(0.0, mode.eigenvalue - mode.decay * mode.decay)) / (2.0 * std::numbers::pi);
@@ -145,6 +138,24 @@ ModeSelection select_modes(std::span<const ModeStrength> modes, const SceneLimit
     first = cluster.last;
   }
   return out;
+}
+
+double largest_displacement(const ModeStrength& mode, const SceneLimits& limits) {
+  const double reach = mode.max_observable * mode.max_loadable;
+  // An undamped mode at resonance grows without bound, unless no force reaches it or nobody sees it.
+  return reach > 0.0 ? reach * limits.max_force * amplification(mode, limits.load) / mode.eigenvalue : 0.0;
+}
+
+double visible_displacement(double distance, double field_of_view, int pixels) {
+  const auto refuse = [](const char* name, double value, const char* expected) {
+    throw InvalidArgument("visible_displacement: " + std::string(name) + " is " + shown(value) + ", expected " +
+                          expected);
+  };
+  if (!(distance > 0.0 && std::isfinite(distance))) refuse("distance", distance, "a finite number above 0 m");
+  if (!(field_of_view > 0.0 && field_of_view < std::numbers::pi))
+    refuse("field_of_view", field_of_view, "an angle between 0 and pi");
+  if (pixels < 1) refuse("pixels", pixels, "1 or more");
+  return distance * std::tan(0.5 * field_of_view) / pixels;
 }
 
 }  // namespace limber

@@ -12,6 +12,7 @@
 
 #include "instruction_sets.h"
 #include "limber/core/error.h"
+#include "limber/dynamics/half_basis.h"
 
 namespace limber {
 namespace {
@@ -274,6 +275,59 @@ TEST(VertexNormals, RejectArraysAndIndicesThatDoNotFit) {
   EXPECT_THROW(vertex_normals({}, std::span(positions).first(8), std::span(normals).first(8)), InvalidArgument);
   EXPECT_THROW(vertex_normals(std::vector<Triangle>{{0, 1, 3}}, positions, normals), InvalidArgument);
   EXPECT_THROW(vertex_normals(std::vector<Triangle>{{0, -1, 2}}, positions, normals), InvalidArgument);
+}
+
+TEST(HalfBasis, MovesVerticesByNoMoreThanItTells) {
+  for (const Index vertices : {5, 16, 100}) {
+    const ModalSurface surface = random_surface(vertices, 9);
+    const HalfBasis half(surface.basis);
+    Instances instances(surface, 11);
+    reconstruct(surface, half, instances.targets);
+    double largest_share = 0.0;
+    for (const ReconstructionTarget& target : instances.targets) {
+      double told = 0.0;
+      for (std::size_t i = 0; i < 9; ++i) told += std::abs(target.amplitudes[i]) * half.errors()[i];
+      for (Index v = 0; v < vertices; ++v) {
+        const Vec3 seen = Eigen::Map<const Vec3f>(target.positions + 3 * v).cast<double>();
+        const double off = (seen - exact_position(surface, v, target)).norm();
+        EXPECT_LE(off, told + rounding_bound(surface, v, target));
+        largest_share = std::max(largest_share, off / told);
+      }
+      for (std::size_t guard = 0; guard < Instances::kGuard; ++guard)
+        EXPECT_EQ(target.positions[3 * static_cast<std::size_t>(vertices) + guard], Instances::kUntouched);
+    }
+    EXPECT_GT(largest_share, 0.1);
+  }
+}
+
+TEST(HalfBasis, KeepsElevenDigitsOfModesOfAnySize) {
+  ModalSurface surface = random_surface(40, 3);
+  for (Index v = 0; v < 40; ++v) {
+    surface.basis.set(v, 1, 1e-9f * surface.basis.shape(v, 1));
+    surface.basis.set(v, 2, 1e7f * surface.basis.shape(v, 2));
+  }
+  const HalfBasis half(surface.basis);
+  for (Index m = 0; m < 3; ++m) {
+    double largest = 0.0;
+    for (Index v = 0; v < 40; ++v) largest = std::max(largest, static_cast<double>(surface.basis.shape(v, m).norm()));
+    EXPECT_LE(half.errors()[static_cast<std::size_t>(m)], 0x1p-11 * largest);
+    EXPECT_GT(half.errors()[static_cast<std::size_t>(m)], 0.0);
+  }
+}
+
+TEST(HalfBasis, GivesTheSameBitsHoweverTargetsAreGrouped) {
+  const ModalSurface surface = random_surface(37, 6);
+  const HalfBasis half(surface.basis);
+  Instances together(surface, 13), alone(surface, 13);
+  reconstruct(surface, half, together.targets);
+  for (const ReconstructionTarget& target : alone.targets) reconstruct(surface, half, {&target, 1});
+  EXPECT_EQ(together.positions, alone.positions);
+}
+
+TEST(HalfBasis, RefusesTheBasisOfAnotherSurface) {
+  const ModalSurface surface = random_surface(20, 4), other = random_surface(20, 5);
+  Instances instances(surface, 1);
+  EXPECT_THROW(reconstruct(surface, HalfBasis(other.basis), instances.targets), InvalidArgument);
 }
 
 }  // namespace

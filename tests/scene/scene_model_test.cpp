@@ -12,8 +12,8 @@ namespace {
 using testing::block_asset;
 
 Scene model_scene(const std::string& limits, const std::string& bodies = R"({"name": "b", "asset": "block"})") {
-  return parse_scene(R"({"step": 0.01, "steps": 1, "assets": {"block": "some/block.glb"}, "bodies": [)" + bodies + "]" +
-                         (limits.empty() ? "" : ", \"limits\": " + limits) + "}",
+  return parse_scene(R"({"step": 0.01, "steps": 1, "contact": {}, "assets": {"block": "some/block.glb"}, "bodies": [)" +
+                         bodies + "]" + (limits.empty() ? "" : ", \"limits\": " + limits) + "}",
                      "\"test.json\"", "");
 }
 
@@ -24,6 +24,19 @@ TEST(SceneModel, WithoutLimitsTheModelIsTheAssetsOwn) {
   ASSERT_EQ(models.manifest.size(), 1u);
   EXPECT_TRUE(models.manifest[0].dropped.empty());
   EXPECT_EQ(models.manifest[0].bytes, models.manifest[0].bytes_in_asset);
+}
+
+TEST(SceneModel, ACameraTellsTheSmallestDisplacementByHalfAPixel) {
+  // 90 degrees at 4 m: 8 m over 1,000 pixels.
+  const Scene scene = model_scene(R"({"max_force": 1, "camera": {"distance": 4, "degrees": 90, "height": 1000}})");
+  EXPECT_NEAR(scene.limits->min_displacement, 0.004, 1e-12);
+  EXPECT_THROW(model_scene(R"({"max_force": 1, "camera": {"distance": 4, "degrees": 180, "height": 1000}})"),
+               InputError);
+  EXPECT_THROW(model_scene(R"({"camera": {"distance": 4, "degrees": 90, "height": 1000}})"), InputError);
+  EXPECT_THROW(
+      model_scene(R"({"max_force": 1, "min_displacement": 1, "camera": {"distance": 4, "degrees": 90, "height": 1}})"),
+      InputError);
+  EXPECT_THROW(visible_displacement(0.0, 1.0, 100), InvalidArgument);
 }
 
 TEST(SceneModel, ModesFasterThanTheFramesAreLeftOutWithTheirReason) {

@@ -13,7 +13,7 @@ namespace limber::tools {
 
 class Program;
 
-/// `step`: what a step of free flight and a reconstruction take.
+/// `step`: what the steps of scenes cost, stage by stage.
 std::function<void(Program&)> add_step(CLI::App& programs);
 
 /// `stability`: cases driven to the ends of every axis, each with a verdict.
@@ -21,5 +21,8 @@ std::function<void(Program&)> add_stability(CLI::App& programs);
 
 /// `error`: scenes beside finite elements of all their nodes, error against time.
 std::function<void(Program&)> add_error(CLI::App& programs);
+
+/// `peers`: the same work in Bullet and MuJoCo.
+std::function<void(Program&)> add_peers(CLI::App& programs);
 
 }  // namespace limber::tools

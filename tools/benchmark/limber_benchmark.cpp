@@ -15,6 +15,9 @@ int main(int argc, char** argv) {
 #if LIMBER_HAS_PRECOMPUTE
   benchmarks.push_back(add_stability(program.options()));
   benchmarks.push_back(add_error(program.options()));
+#if LIMBER_HAS_BULLET || LIMBER_HAS_MUJOCO
+  benchmarks.push_back(add_peers(program.options()));
+#endif
 #endif
   return program.run(argc, argv, [&] {
     for (const auto& run_if_asked_for : benchmarks) run_if_asked_for(program);

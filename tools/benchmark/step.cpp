@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "benchmarks.h"
+#include "figures.h"
 #include "limber/core/error.h"
 #include "plot.h"
 #include "program.h"
@@ -26,7 +27,7 @@ struct StepArguments {
   std::vector<std::string> scenes;
   SceneScale scale;
   int steps = 0, threads = 1;
-  bool sweep = false, is_small = false;
+  bool sweep = false;
   std::string csv, plot, limits;
 };
 
@@ -211,7 +212,7 @@ void sweep_scenes(Program& program, const StepArguments& a) {
   std::vector<SweepLine> lines;
   std::string csv = "axis,line,x,us\n";
   program.print(fmt::format("{:<9} {:<22} {:>6}  cost in us at each\n", "against", "line", "slope"));
-  for (const Sweep& sweep : sweeps(a.is_small)) {
+  for (const Sweep& sweep : sweeps()) {
     program.progress().stage(sweep.axis + ": " + sweep.scene);
     for (SweepLine& line : run_sweep(sweep, source, a.steps)) {
       program.print(text_of(line));
@@ -230,6 +231,37 @@ void sweep_scenes(Program& program, const StepArguments& a) {
   if (!a.plot.empty()) write_plot(program, a.plot, svg_of(lines));
 }
 
+/// Small scenes whose counts do not depend on the machine, and ratios of times within this run.
+void check_small(Program& program, const StepArguments& a) {
+  constexpr int kSteps = 60;
+  const std::vector<std::pair<std::string, int>> small{{"flight", 30}, {"boxes", 20}, {"mixed", 20}, {"stack", 3},
+                                                       {"chain", 4},   {"lamp", 3},   {"drag", 1},   {"sleepers", 200}};
+  SceneSource source;
+  std::vector<Figure> figures;
+  double normals = 0.0;
+  for (const auto& [name, bodies] : small) {
+    program.progress().stage(name);
+    const SceneCost c = measure(source.scene(name, {.bodies = bodies}), {.steps = kSteps});
+    const auto add = [&, scene = name](const char* what, double value) {
+      figures.push_back({scene + "." + what, value});
+    };
+    if (c.rows > 0.0) add("rows", c.rows), add("rounds", c.iterations), add("newton_steps", c.newton_steps);
+    if (c.contacts > 0.0) add("contacts", c.contacts);
+    add("unsettled", c.unsettled);
+    add("allocations", c.allocations);
+    if (name == "flight") normals = quantile(c.draw_seconds, 0.5) / quantile(c.position_seconds, 0.5);
+  }
+  const auto ratio = [&](const std::string& scene, int many, int few) {
+    program.progress().stage("growth of " + scene);
+    return cost_ratio(source.scene(scene, {.bodies = many}), source.scene(scene, {.bodies = few}), kSteps);
+  };
+  figures.push_back({"flight.time_of_300_over_30", ratio("flight", 300, 30)});
+  figures.push_back({"chain.time_of_16_over_4", ratio("chain", 16, 4)});
+  figures.push_back({"sleepers.time_of_1000_over_100", ratio("sleepers", 1000, 100)});
+  figures.push_back({"drawing.normals_over_positions", normals});
+  hold_to_limits(program, figures, a.limits);
+}
+
 void declare_step(CLI::App& app, StepArguments& a) {
   app.add_option("--scene", a.scenes, "scenes of the library (make_scene --list), or scene files")
       ->type_name("NAME|FILE.json,...")
@@ -244,6 +276,10 @@ void declare_step(CLI::App& app, StepArguments& a) {
   add_size("--threads", a.threads, 1024, "that share the work; times are then by the wall clock")
       ->capture_default_str();
   app.add_flag("--sweep", a.sweep, "how the cost grows with bodies, modes, vertices and contacts");
+  app.add_option("--check", a.limits,
+                 "measure small scenes alone and fail where counts, or ratios of times in this run, are beyond these "
+                 "limits (benchmarks/limits_step.json)")
+      ->type_name("LIMITS.json");
   app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
   app.add_option("--plot", a.plot,
                  "plot the time of each frame, or with --sweep cost against size, log-log (needs gnuplot)")
@@ -258,7 +294,9 @@ std::function<void(Program&)> add_step(CLI::App& programs) {
   declare_step(*app, *arguments);
   return [arguments, app](Program& program) {
     if (!app->parsed()) return;
-    if (arguments->sweep)
+    if (!arguments->limits.empty())
+      check_small(program, *arguments);
+    else if (arguments->sweep)
       sweep_scenes(program, *arguments);
     else
       measure_scenes(program, *arguments);

@@ -14,8 +14,7 @@ constexpr std::array kAxes{"bodies", "modes", "vertices", "contacts"};
 
 }  // namespace
 
-std::vector<Sweep> sweeps(bool is_small) {
-  if (is_small) return {{"bodies", "flight", {10, 100}}, {"contacts", "boxes", {5, 10, 20}}};
+std::vector<Sweep> sweeps() {
   return {{"bodies", "flight", {30, 100, 300, 1000, 3000}},
           {"bodies", "boxes", {10, 30, 100, 300}},
           {"bodies", "chain", {4, 8, 16, 32}},

@@ -16,7 +16,7 @@ struct Sweep {
   std::vector<int> sizes;  ///< bodies, modes or vertices; of "contacts": bodies
   int bodies = 0;          ///< where another axis varies; 0: the scene's own
 };
-std::vector<Sweep> sweeps(bool is_small);
+std::vector<Sweep> sweeps();
 
 struct SweepLine {
   std::string axis, name;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "limber/core/error.h"
@@ -227,18 +228,33 @@ SleepOptions read_sleep(const JsonObject& o) {
   return sleep;
 }
 
+/// The smallest displacement that a picture shows.
+double read_camera(const JsonObject& o) {
+  constexpr double kHalfTurn = 180.0;
+  const double degrees = positive(o, "degrees");
+  if (degrees >= kHalfTurn) refuse(o.where("degrees"), JsonObject::shown(degrees), "less than 180");
+  const double visible = visible_displacement(positive(o, "distance"), degrees * std::numbers::pi / kHalfTurn,
+                                              static_cast<int>(o.integer("height", 1, 1'000'000)));
+  o.finish();
+  return visible;
+}
+
 SceneLimits read_limits(const JsonObject& o) {
   constexpr LoadKind kKinds[] = {LoadKind::kStatic, LoadKind::kSudden, LoadKind::kResonant};
   SceneLimits limits;
   limits.max_modes =
       static_cast<int>(o.integer("max_modes", 1, std::numeric_limits<int>::max(), std::numeric_limits<int>::max()));
   limits.max_force = non_negative(o, "max_force", 0.0);
-  limits.min_displacement = non_negative(o, "min_displacement", 0.0);
+  if (o.has("camera") && o.has("min_displacement"))
+    throw InputError(o.where() + ": has both \"camera\" and \"min_displacement\", expected one of them");
+  limits.min_displacement = o.has("camera") ? read_camera(JsonObject(o.at("camera"), o.where("camera")))
+                                            : non_negative(o, "min_displacement", 0.0);
   limits.frame_rate = non_negative(o, "frame_rate", 0.0);
   limits.load = kKinds[choice(o, "load", {"static", "sudden", "resonant"}, "sudden")];
   o.finish();
   if ((limits.max_force > 0.0) != (limits.min_displacement > 0.0))
-    throw InputError(o.where() + ": has only one of \"max_force\" and \"min_displacement\", expected both or none");
+    throw InputError(o.where() +
+                     ": has only one of \"max_force\" and \"min_displacement\" or \"camera\", expected both or none");
   return limits;
 }
 

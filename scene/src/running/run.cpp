@@ -62,6 +62,8 @@ class Run {
       player_.end_step();
       note_joints();
       note_contacts(n);
+      note_sleepers();
+      if (options_.reconstruct_every_step) reconstruct_all();
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
     }
     return finish();
@@ -140,6 +142,12 @@ class Run {
     }
   }
 
+  void note_sleepers() {
+    if (!scene_.sleep.enabled) return;
+    result_.asleep = std::count_if(ids_.begin(), ids_.end(), [&](BodyId id) { return world_.is_asleep(id); });
+    result_.asleep_steps += result_.asleep;
+  }
+
   void keep_key(std::int64_t n) {
     result_.trajectory.times.push_back(static_cast<double>(n) * scene_.step);
     for (std::size_t i = 0; i < ids_.size(); ++i) {
@@ -176,7 +184,6 @@ class Run {
     result_.strikes.assign(player_.strikes().begin(), player_.strikes().end());
     result_.forces.assign(player_.forces().begin(), player_.forces().end());
     result_.handles.assign(player_.handles().begin(), player_.handles().end());
-    result_.asleep = std::count_if(ids_.begin(), ids_.end(), [&](BodyId id) { return world_.is_asleep(id); });
     for (const BodyTrack& track : result_.trajectory.bodies) {
       result_.energy_before += track.energies.front().total();
       result_.energy_after += track.energies.back().total();

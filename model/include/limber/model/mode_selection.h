@@ -63,4 +63,15 @@ struct ModeSelection {
 /// @throws InvalidArgument naming the mode or limit and its value
 ModeSelection select_modes(std::span<const ModeStrength> modes, const SceneLimits& limits);
 
+/// m, the largest displacement that SceneLimits::max_force can make a mode show, of the kind SceneLimits::load: what
+/// select_modes() compares with min_displacement. Infinite for an undamped mode at resonance.
+/// @pre λ > 0
+double largest_displacement(const ModeStrength& mode, const SceneLimits& limits);
+
+/// m, the smallest displacement that a camera can show: half a pixel at this distance.
+/// @param distance to the nearest body, m; > 0. @param field_of_view from the picture's lower edge to its upper one,
+/// rad; in (0, π). @param pixels from edge to edge; ≥ 1
+/// @throws InvalidArgument naming the argument and its value
+double visible_displacement(double distance, double field_of_view, int pixels);
+
 }  // namespace limber

@@ -23,6 +23,7 @@ struct RunOptions {
   /// and the end always. 0: keys are kept at the start and the end only. ≥ 0.
   double key_rate = 60.0;
   bool reconstruct = false;                         ///< also reconstruct every body at every key, to time it
+  bool reconstruct_every_step = false;              ///< the same after every step
   bool keep_contacts = false;                       ///< fill Trajectory::contacts
   std::function<void(double fraction)> progress{};  ///< called now and then; may be empty
   Jobs* jobs = nullptr;                             ///< null: serial
@@ -93,8 +94,9 @@ struct ConstraintSummary {
 struct RunResult {
   Trajectory trajectory;
   std::int64_t steps = 0;
-  std::uint64_t state_hash = 0;  ///< World::state_hash() at the end
-  std::int64_t asleep = 0;       ///< bodies that sleep at the end
+  std::uint64_t state_hash = 0;   ///< World::state_hash() at the end
+  std::int64_t asleep = 0;        ///< bodies that sleep at the end
+  std::int64_t asleep_steps = 0;  ///< Σ over the steps of the bodies that sleep after it
   /// Those that acted, in the order of the scene's lists (then of the bodies).
   std::vector<LoadReport> strikes, forces;
   std::vector<HandleReport> handles;  ///< the same

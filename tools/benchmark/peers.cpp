@@ -1,0 +1,412 @@
+// limber-benchmark peers: the same work in limber, Bullet and MuJoCo, in one run.
+#include "peers.h"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "benchmarks.h"
+#include "cpu_time.h"
+#include "limber/collision/contact_finder.h"
+#include "limber/core/error.h"
+#include "limber/engine/world.h"
+#include "limber/mesh/surface_mesh.h"
+#include "program.h"
+#include "scene_bodies.h"
+#include "scene_cost.h"
+#include "scene_library.h"
+
+namespace limber::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct PeersArguments {
+  int bodies = 100, seconds = 6, modes = 20, copies = 4;
+  std::vector<int> vertices{0, 1000};
+  std::string csv;
+  bool skip_piles = false, skip_reduced = false;
+};
+
+// Piles
+// -----------------------------------------------------------------------------------------------------------------
+
+/// A pile of the library, all its bodies rigid and without rolling resistance.
+struct LibraryPile {
+  Scene scene;
+  SceneModels models;
+  RigidPile pile;
+};
+
+LibraryPile library_pile(scenes::SceneLibrary& library, const std::string& name, int bodies) {
+  const scenes::LibraryScene made = library.scene(name, {.bodies = bodies});
+  LibraryPile out{.scene = made.parsed(), .models = {}, .pile = {}};
+  out.scene.contact->rolling_friction = 0.0;
+  const auto brick = std::make_shared<const Shape>(Box{.half_extents = 0.5 * scenes::body_size("brick")});
+  for (SceneBody& body : out.scene.bodies) {
+    auto& shape = std::get<std::shared_ptr<const Shape>>(body.shape);
+    if (!shape) shape = brick;
+  }
+  out.models = make_models(out.scene, made.assets);
+  out.pile.friction = out.scene.contact->friction;
+  out.pile.step = out.scene.step;
+  out.pile.gravity = out.scene.gravity;
+  for (std::size_t i = 0; i < out.scene.bodies.size(); ++i) {
+    const ModalModelData& data = out.models.of_body[i]->data();
+    out.pile.bodies.push_back(
+        {out.models.shape_of_body[i], out.scene.bodies[i].placement.pose, data.mass, data.inertia.diagonal()});
+  }
+  for (const SceneStatic& s : out.scene.statics) {
+    const Vec3 normal = s.pose.q * Vec3(Vec3::UnitZ());
+    out.pile.planes.push_back({normal, normal.dot(s.pose.p)});
+  }
+  return out;
+}
+
+class LimberPile final : public PileEngine {
+ public:
+  explicit LimberPile(const LibraryPile& made) : world_({.step = made.scene.step, .gravity = made.scene.gravity}) {
+    world_.set_contact_source(&finder_, *made.scene.contact);
+    for (std::size_t i = 0; i < made.scene.bodies.size(); ++i) {
+      BodyPlacement placement = made.scene.bodies[i].placement;
+      placement.shape = made.models.shape_of_body[i];
+      bodies_.push_back(world_.add_body(made.models.of_body[i], placement));
+    }
+    for (std::size_t i = 0; i < made.scene.statics.size(); ++i)
+      world_.add_static(made.models.shape_of_static[i], made.scene.statics[i].pose);
+    world_.set_contact_veto([this](const ContactPoint& contact) {
+      ++seen_.contacts;
+      seen_.deepest = std::max(seen_.deepest, -contact.gap);
+      return true;
+    });
+  }
+  PileStep step() override {
+    seen_ = {};
+    const double began = thread_seconds();
+    world_.step();
+    seen_.seconds = thread_seconds() - began;
+    return seen_;
+  }
+  Vec3 place(std::size_t body) const override { return world_.body(bodies_[body]).pose.p; }
+
+ private:
+  ContactFinder finder_;
+  World world_;
+  std::vector<BodyId> bodies_;
+  PileStep seen_;
+};
+
+/// Of an engine's pile over a span of time.
+struct PileRow {
+  std::string scene, engine;
+  int from = 0, to = 0;  // s
+  double median = 0.0, p99 = 0.0, worst = 0.0, contacts = 0.0, deepest = 0.0, moved = 0.0;
+};
+
+std::vector<PileRow> run_pile(PileEngine& engine, const std::string& scene, const std::string& name,
+                              const LibraryPile& made, int seconds) {
+  constexpr double kSize = 0.3;  // m, of the bodies
+  const int steps = static_cast<int>(std::lround(1.0 / made.pile.step));
+  std::vector<PileRow> rows;
+  for (int second = 0; second < seconds; ++second) {
+    PileRow row{.scene = scene, .engine = name, .from = second, .to = second + 1};
+    std::vector<Vec3> before;
+    for (std::size_t i = 0; i < made.pile.bodies.size(); ++i) before.push_back(engine.place(i));
+    std::vector<double> times;
+    for (int n = 0; n < steps; ++n) {
+      const PileStep seen = engine.step();
+      times.push_back(seen.seconds);
+      row.contacts += static_cast<double>(seen.contacts) / steps;
+      row.deepest = std::max(row.deepest, seen.deepest / kSize);
+    }
+    for (std::size_t i = 0; i < before.size(); ++i)
+      row.moved = std::max(row.moved, (engine.place(i) - before[i]).norm());
+    row.median = quantile(times, 0.5), row.p99 = quantile(times, 0.99), row.worst = quantile(times, 1.0);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::string text_of(const PileRow& r) {
+  return fmt::format("{:<6} {:<7} {:>2}-{:<2} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.1f} {:>9.1e} {:>9.1e}\n", r.scene,
+                     r.engine, r.from, r.to, 1e3 * r.median, 1e3 * r.p99, 1e3 * r.worst, r.contacts, r.deepest,
+                     r.moved);
+}
+
+std::vector<PileRow> run_piles(Program& program, const PeersArguments& a) {
+  program.print(
+      fmt::format("{} rigid bodies that fall into a pit, sleeping off; ms a step of this thread\n", a.bodies));
+  program.print(fmt::format("{:<6} {:<7} {:>5} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "scene", "engine", "s", "p50",
+                            "p99", "worst", "contacts", "depth/size", "moved m"));
+  scenes::SceneLibrary library;
+  std::vector<PileRow> rows;
+  for (const std::string& scene : {std::string("boxes"), std::string("mixed")}) {
+    const LibraryPile made = library_pile(library, scene, a.bodies);
+    const auto play = [&](const std::string& name, std::unique_ptr<PileEngine> engine) {
+      program.progress().stage(scene + ": " + name);
+      for (const PileRow& row : run_pile(*engine, scene, name, made, a.seconds)) {
+        program.print(text_of(row));
+        rows.push_back(row);
+      }
+    };
+    play("limber", std::make_unique<LimberPile>(made));
+#if LIMBER_HAS_BULLET
+    play("Bullet", bullet_pile(made.pile));
+#endif
+#if LIMBER_HAS_MUJOCO
+    play("MuJoCo", mujoco_pile(made.pile));
+#endif
+  }
+  return rows;
+}
+
+// The reduced body
+// --------------------------------------------------------------------------------------------------------
+
+/// The bar at a resolution, with stiffness such that the highest mode is well within what explicit steps bear.
+struct Bar {
+  std::shared_ptr<const ModalModel> model;
+  ReducedBody nodes, surface;
+};
+
+/// Bullet takes modes that are orthonormal in lumped masses.
+void normalise(ReducedBody& body) {
+  for (auto& mode : body.modes) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < mode.size(); ++i) sum += body.masses[i] * mode[i].squaredNorm();
+    for (Vec3& u : mode) u /= std::sqrt(sum);
+  }
+}
+
+std::vector<std::vector<Vec3>> modes_of(const ModalBasis& basis) {
+  std::vector<std::vector<Vec3>> modes(static_cast<std::size_t>(basis.modes()));
+  for (Index m = 0; m < basis.modes(); ++m)
+    for (Index v = 0; v < basis.vertices(); ++v)
+      modes[static_cast<std::size_t>(m)].push_back(basis.shape(v, m).cast<double>());
+  return modes;
+}
+
+ReducedBody whole_of(const ModalModelData& data) {
+  const ModalVolume& volume = *data.volume_block;
+  ReducedBody body{.nodes = volume.rest,
+                   .masses = std::vector<double>(volume.rest.size(), 0.0),
+                   .triangles = {},
+                   .tets = volume.tets,
+                   .eigenvalues = data.eigenvalues,
+                   .modes = modes_of(volume.basis)};
+  TetMesh mesh{.nodes = volume.rest, .tets = volume.tets};
+  for (std::size_t e = 0; e < mesh.tets.size(); ++e)
+    for (const Index node : mesh.tets[e])
+      body.masses[static_cast<std::size_t>(node)] +=
+          0.25 * signed_volume(mesh, static_cast<Index>(e)) * data.mass / data.volume;
+  const BoundarySurface boundary = boundary_surface(mesh);
+  for (Triangle t : boundary.surface.triangles) {
+    for (Index& v : t) v = boundary.node_of[static_cast<std::size_t>(v)];
+    body.triangles.push_back(t);
+  }
+  normalise(body);
+  return body;
+}
+
+ReducedBody surface_of(const ModalModelData& data) {
+  ReducedBody body{.nodes = {},
+                   .masses = {},
+                   .triangles = data.render.triangles,
+                   .tets = {},
+                   .eigenvalues = data.eigenvalues,
+                   .modes = modes_of(data.render.basis)};
+  for (const Vec3f& p : data.render.rest) body.nodes.push_back(p.cast<double>());
+  body.masses.assign(body.nodes.size(), data.mass / static_cast<double>(body.nodes.size()));
+  normalise(body);
+  return body;
+}
+
+Bar make_bar(int modes, int vertices, double step) {
+  constexpr double kHighest = 0.5;  // ω Δt of the highest mode; Bullet explodes from 2 on
+  scenes::BodyOptions options{
+      .modes = modes, .vertices = vertices, .volume = true, .touched_as_drawn = true, .damped = false};
+  const double highest = scenes::bake_body("bar", options).bodies.front()->data().eigenvalues.back();
+  options.stiffness = std::pow(kHighest / step, 2) / highest;  // eigenvalues go with it
+  Bar bar{.model = scenes::bake_body("bar", options).bodies.front(), .nodes = {}, .surface = {}};
+  bar.nodes = whole_of(bar.model->data());
+  bar.surface = surface_of(bar.model->data());
+  return bar;
+}
+
+/// @param all_contacts as many as Bullet has; else as limber thins them by itself
+ReducedCost run_limber(const Bar& bar, const ReducedRun& run, bool all_contacts) {
+  ContactFinderOptions options;
+  if (all_contacts) options.clusters.max_points = 0;
+  ContactFinder finder(options);
+  World world({.step = run.step, .gravity = run.on_ground ? Vec3(0.0, 0.0, -9.80665) : Vec3(Vec3::Zero())});
+  if (run.on_ground) {
+    world.set_contact_source(&finder);
+    world.add_static(std::make_shared<Shape>(HalfSpace{}));
+  }
+  double low = 0.0;
+  for (const Vec3f& p : bar.model->render().rest) low = std::min(low, static_cast<double>(p.z()));
+  std::vector<double> z, rates(bar.model->data().eigenvalues.size(), 0.0);
+  for (std::size_t i = 0; i < rates.size(); ++i) z.push_back(0.002 / static_cast<double>(1 + i));
+  std::vector<BodyId> ids;
+  for (int i = 0; i < run.bodies; ++i) {
+    ids.push_back(world.add_body(bar.model, {.pose = {{}, Vec3(0.0, i, run.on_ground ? 0.002 - low : 10.0)}}));
+    world.set_amplitudes(ids.back(), z, rates);
+  }
+  // Bullet's step leaves the nodes' positions; so does this.
+  const std::size_t floats = 3 * static_cast<std::size_t>(bar.model->render().vertices());
+  std::vector<float> positions(floats * ids.size());
+  std::vector<DrawTarget> targets;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    targets.push_back({.id = ids[i], .positions = std::span(positions).subspan(i * floats, floats)});
+  std::vector<double> seconds;
+  StageTimes stages;
+  for (int n = 0; n < run.steps; ++n) {
+    if (n == run.steps / 2) world.set_stage_times(&stages);
+    const double began = thread_seconds();
+    world.step();
+    world.reconstruct(targets);
+    if (n >= run.steps / 2) seconds.push_back(thread_seconds() - began);
+  }
+  const double timed = static_cast<double>(seconds.size()) * run.bodies;
+  return {.seconds = quantile(seconds, 0.5),
+          .contacts = static_cast<double>(stages[Stage::kNarrowPhase].units) / timed,
+          .is_finite = std::isfinite(static_cast<double>(positions.front()))};
+}
+
+struct ReducedRow {
+  std::string scene, engine;
+  std::size_t nodes = 0;
+  int modes = 0, bodies = 0;
+  ReducedCost cost;
+};
+
+std::string text_of(const ReducedRow& r) {
+  return fmt::format("{:<7} {:<28} {:>6} {:>5} {:>6} {:>12.2f} {:>9.1f}{}\n", r.scene, r.engine, r.nodes, r.modes,
+                     r.bodies, 1e6 * r.cost.seconds / r.bodies, r.cost.contacts, r.cost.is_finite ? "" : " not finite");
+}
+
+std::vector<ReducedRow> run_reduced(Program& program, const PeersArguments& a) {
+  program.print(
+      fmt::format("\na bar on the same modes, positions of the surface included, highest mode at 0.5 of omega dt; us a "
+                  "step and body\n"
+                  "{:<7} {:<28} {:>6} {:>5} {:>6} {:>12} {:>9}\n",
+                  "scene", "engine", "nodes", "modes", "bodies", "us", "contacts"));
+  std::vector<ReducedRow> rows;
+  for (const int vertices : a.vertices)
+    for (const bool on_ground : {false, true})
+      for (const int bodies : {1, a.copies}) {
+        const ReducedRun run{.bodies = bodies, .steps = on_ground ? 40 : 200, .on_ground = on_ground};
+        const Bar bar = make_bar(a.modes, vertices, run.step);
+        const std::string scene = on_ground ? "ground" : "flight";
+        const auto add = [&](const std::string& engine, std::size_t nodes, const ReducedCost& cost) {
+          rows.push_back({scene, engine, nodes, static_cast<int>(bar.model->modes()), bodies, cost});
+          program.print(text_of(rows.back()));
+        };
+        program.progress().stage(scene);
+        add("limber", bar.surface.nodes.size(), run_limber(bar, run, false));
+        if (on_ground) add("limber, all contacts", bar.surface.nodes.size(), run_limber(bar, run, true));
+#if LIMBER_HAS_BULLET
+        add("Bullet, the surface alone", bar.surface.nodes.size(), run_bullet(bar.surface, run));
+        if (vertices == 0) add("Bullet, all nodes and tets", bar.nodes.nodes.size(), run_bullet(bar.nodes, run));
+#endif
+      }
+  return rows;
+}
+
+// The whole
+// ---------------------------------------------------------------------------------------------------------------
+
+/// Where a peer takes less time than limber, in words.
+std::vector<std::string> better_peers(const std::vector<PileRow>& piles, const std::vector<ReducedRow>& reduced) {
+  std::vector<std::string> out;
+  for (const PileRow& own : piles)
+    for (const PileRow& r : piles)
+      if (own.engine == "limber" && r.engine != "limber" && r.scene == own.scene && r.from == own.from &&
+          r.median < own.median)
+        out.push_back(fmt::format(
+            "{}, second {}: {} takes {:.2g} of limber's time; it overlaps by {:.1e} of the size, limber by {:.1e}",
+            r.scene, r.to, r.engine, r.median / own.median, r.deepest, own.deepest));
+  for (const ReducedRow& own : reduced)
+    for (const ReducedRow& r : reduced)
+      if (own.engine.starts_with("limber") && !r.engine.starts_with("limber") && r.scene == own.scene &&
+          r.bodies == own.bodies && r.nodes == own.nodes && r.cost.seconds < own.cost.seconds)
+        out.push_back(fmt::format("{}, {} bodies of {} nodes: {} takes {:.2g} of the time of {}", r.scene, r.bodies,
+                                  r.nodes, r.engine, r.cost.seconds / own.cost.seconds, own.engine));
+  return out;
+}
+
+void benchmark_peers(Program& program, const PeersArguments& a) {
+  const std::vector<PileRow> piles = a.skip_piles ? std::vector<PileRow>{} : run_piles(program, a);
+  const std::vector<ReducedRow> reduced = a.skip_reduced ? std::vector<ReducedRow>{} : run_reduced(program, a);
+  Json& report = program.report();
+  report["benchmark"] = "peers";
+  Json& seconds = report["seconds"];
+  seconds["piles"] = seconds["reduced_bodies"] = Json::array();
+  std::string csv = "scene,engine,from_s,bodies,nodes,modes,us_p50,us_p99,us_worst,contacts,deepest_of_size,moved_m\n";
+  for (const PileRow& r : piles) {
+    seconds["piles"].push_back({{"scene", r.scene},
+                                {"engine", r.engine},
+                                {"from", r.from},
+                                {"to", r.to},
+                                {"step_median", r.median},
+                                {"step_p99", r.p99},
+                                {"step_worst", r.worst},
+                                {"contacts", r.contacts},
+                                {"deepest_of_size", r.deepest},
+                                {"moved", r.moved}});
+    csv += fmt::format("{},{},{},{},,,{:.4g},{:.4g},{:.4g},{:.4g},{:.3g},{:.3g}\n", r.scene, r.engine, r.from, a.bodies,
+                       1e6 * r.median, 1e6 * r.p99, 1e6 * r.worst, r.contacts, r.deepest, r.moved);
+  }
+  for (const ReducedRow& r : reduced) {
+    seconds["reduced_bodies"].push_back({{"scene", r.scene},
+                                         {"engine", r.engine},
+                                         {"nodes", r.nodes},
+                                         {"modes", r.modes},
+                                         {"bodies", r.bodies},
+                                         {"step_median", r.cost.seconds},
+                                         {"contacts", r.cost.contacts},
+                                         {"finite", r.cost.is_finite}});
+    csv += fmt::format("{},\"{}\",,{},{},{},{:.4g},,,{:.4g},,\n", r.scene, r.engine, r.bodies, r.nodes, r.modes,
+                       1e6 * r.cost.seconds, r.cost.contacts);
+  }
+  const std::vector<std::string> better = better_peers(piles, reduced);
+  program.print(better.empty() ? "\nno peer is faster anywhere\n" : "\nwhere a peer is faster:\n");
+  for (const std::string& line : better) program.print("  " + line + "\n");
+  seconds["faster_peers"] = better;
+  if (!a.csv.empty()) program.write_file(a.csv, csv);
+}
+
+void declare_peers(CLI::App& app, PeersArguments& a) {
+  const auto add = [&](const char* option, int& value, int most, const char* what) {
+    app.add_option(option, value, what)->type_name("N")->check(CLI::Range(1, most))->capture_default_str();
+  };
+  add("--bodies", a.bodies, 10'000, "of the piles");
+  add("--seconds", a.seconds, 1000, "that the piles are played");
+  add("--modes", a.modes, 200, "of the reduced body");
+  add("--copies", a.copies, 10'000, "of the reduced body, beside one alone");
+  app.add_option("--vertices", a.vertices, "of the reduced body's surface, about; 0: the mesh's own")
+      ->type_name("N,...")
+      ->delimiter(',')
+      ->capture_default_str();
+  auto* no_piles = app.add_flag("--no-piles", a.skip_piles, "leave out the piles");
+  app.add_flag("--no-reduced", a.skip_reduced, "leave out the reduced body")->excludes(no_piles);
+  app.add_option("--csv", a.csv, "write the tables as one")->type_name("FILE.csv");
+}
+
+}  // namespace
+
+std::function<void(Program&)> add_peers(CLI::App& programs) {
+  const auto arguments = std::make_shared<PeersArguments>();
+  CLI::App* app =
+      programs.add_subcommand("peers", "the same work in other engines that were found when this was built");
+  declare_peers(*app, *arguments);
+  return [arguments, app](Program& program) {
+    if (app->parsed()) benchmark_peers(program, *arguments);
+  };
+}
+
+}  // namespace limber::tools
