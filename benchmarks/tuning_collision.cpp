@@ -74,6 +74,7 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(convex, reference_preference),
     LIMBER_NUMBER_BY(convex, edge_preference, rest_to_one),
     LIMBER_NUMBER(convex, least_cross),
+    LIMBER_NUMBER(convex, most_face_tests),
     LIMBER_NUMBER(convex, side_by_side),
     LIMBER_NUMBER(narrow, touching),
     LIMBER_NUMBER(narrow, flat),

@@ -17,33 +17,90 @@ double lowest(const std::vector<Vec3>& points, const Vec3& n) {
   return r;
 }
 
+struct Range {
+  double low, high;
+};
+
+Range along(const std::vector<Vec3>& points, const Vec3& axis) {
+  Range r{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const Vec3& p : points) {
+    const double x = axis.dot(p);
+    r.low = std::min(r.low, x), r.high = std::max(r.high, x);
+  }
+  return r;
+}
+
 ConvexSolid solid(const std::vector<Vec3>& points) { return {points, 0.0}; }
 
 }  // namespace
 
-void ConvexContacts::load(Side& side, const ConvexCore& core, const RigidTransform& pose) {
-  side.core = &core, side.pose = pose;
-  side.points.clear();
-  for (const Vec3& p : core.points) side.points.push_back(pose * p);
+// @param pose null: at the origin, bit for bit
+void ConvexContacts::load(Side& side, const ConvexCore& core, const RigidTransform* pose) {
+  side.core = &core, side.pose = pose != nullptr ? *pose : RigidTransform{};
+  side.points.assign(core.points.begin(), core.points.end());
+  side.edge_directions.assign(core.edge_directions.begin(), core.edge_directions.end());
+  side.normals.clear();
+  for (const ConvexFace& f : core.faces) side.normals.push_back(f.normal);
+  if (pose == nullptr) return;
+  const Mat3 R = to_matrix(pose->q);
+  for (Vec3& p : side.points) p = R * p + pose->p;
+  for (Vec3& n : side.normals) n = R * n;
+  for (Vec3& e : side.edge_directions) e = R * e;
 }
 
 void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
                           std::vector<FeatureContact>& contacts) {
-  load(side_[0], a, {}), load(side_[1], b, X_AB);
+  load(side_[0], a, nullptr), load(side_[1], b, &X_AB);
   contacts_ = &contacts, first_ = contacts.size();
+  const std::size_t face_tests = a.faces.size() * b.points.size() + b.faces.size() * a.points.size();
+  if (!a.faces.empty() && !b.faces.empty() && face_tests <= collision_tuning().convex.most_face_tests &&
+      faces_tell(margin))
+    return;
+  find_by_distance(margin);
+}
+
+// Two polytopes that touch with a face, or whose faces keep them apart: what the planes of their faces tell. Where the
+// least deep of them has a point of the other body over the face itself, no direction is better.
+// @return false: edges or corners decide; nothing has been added
+bool ConvexContacts::faces_tell(double margin) {
+  const Direction face = across_faces();
+  const double radii = side_[0].core->radius + side_[1].core->radius;
+  if (-face.depth - radii > margin) return true;
+  if (face.depth > 0.0) {
+    const Direction least = least_penetration();
+    if (least.depth < 0.0) return false;
+    touch(least, nullptr, margin);
+    return true;
+  }
+  clip_faces(face.normal, margin);
+  if (contacts_->size() > first_ && least_gap() <= -face.depth - radii + round_off()) return true;
+  contacts_->resize(first_);
+  return false;
+}
+
+void ConvexContacts::find_by_distance(double margin) {
   const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
-  const double radii = a.radius + b.radius;
-  if (!(nearest.distance - radii <= margin)) return;
+  if (!(nearest.distance - side_[0].core->radius - side_[1].core->radius <= margin)) return;
   // Cores that are apart by little more than round-off may have any normal by their nearest points.
-  const bool apart = !nearest.cores_intersect && depth_along(nearest.normal) < 0.0;
-  const Direction d = apart ? Direction{nearest.normal, -nearest.distance, nearest.a, nearest.b} : least_penetration();
+  if (nearest.cores_intersect || !(depth_along(nearest.normal) < 0.0)) {
+    touch(least_penetration(), nullptr, margin);
+    return;
+  }
+  const Deepest points{nearest.a, nearest.b};
+  touch({nearest.normal, -nearest.distance}, &points, margin);
+}
+
+// Contacts of bodies that touch along a direction. @param known the deepest points; null: they are to be found
+void ConvexContacts::touch(const Direction& d, const Deepest* known, double margin) {
+  const ConvexCore &a = *side_[0].core, &b = *side_[1].core;
   if (a.faces.empty() && b.faces.empty())
     touch_along(d.normal, margin);
   else if (a.points.size() > 1 && b.points.size() > 1)
     clip_faces(d.normal, margin);
-  if (least_gap() > -d.depth - radii + kRoundOff * (radii + d.a.norm() + d.b.norm()))
-    add({kNearestPoints, -1, {}, d.a - a.radius * d.normal}, {kNearestPoints, -1, {}, d.b + b.radius * d.normal},
-        d.normal);
+  if (least_gap() <= -d.depth - a.radius - b.radius + round_off()) return;
+  const Deepest points = known != nullptr ? *known : deepest_along(d);
+  add({kNearestPoints, -1, {}, points.a - a.radius * d.normal}, {kNearestPoints, -1, {}, points.b + b.radius * d.normal},
+      d.normal);
 }
 
 void ConvexContacts::add(const FeatureSide& a, const FeatureSide& b, const Vec3& normal) {
@@ -56,25 +113,40 @@ double ConvexContacts::least_gap() const {
   return least;
 }
 
+double ConvexContacts::round_off() const {
+  return kRoundOff * (side_[0].core->radius + side_[1].core->radius + side_[0].points.front().norm() +
+                      side_[1].points.front().norm());
+}
+
 // -- Direction of two cores that intersect ----------------------------------------------------------------------------
+
+// Of the faces of both, the one along which they overlap least.
+ConvexContacts::Direction ConvexContacts::across_faces() const {
+  Direction best;
+  for (const ConvexFace& f : side_[0].core->faces)
+    take_shallower(best, -side_[0].normal(f), side_[0].offset(f) - lowest(side_[1].points, side_[0].normal(f)), 1.0);
+  for (const ConvexFace& f : side_[1].core->faces)
+    take_shallower(best, side_[1].normal(f), side_[1].offset(f) - lowest(side_[0].points, side_[1].normal(f)), 1.0);
+  return best;
+}
 
 // The separating axis test over all faces and pairs of edges: the nearest face of the difference of the two polytopes.
 ConvexContacts::Direction ConvexContacts::least_penetration() const {
-  Direction best{Vec3::Zero(), std::numeric_limits<double>::infinity(), {}, {}};
+  Direction best = across_faces();
   const ConvexTuning& tuning = collision_tuning().convex;
-  for (int of = 0; of < 2; ++of)
-    for (const ConvexFace& f : side_[of].core->faces)
-      take_shallower(best, of == 1 ? side_[1].normal(f) : Vec3(-side_[0].normal(f)), 1.0);
-  for (const Vec3& u : side_[0].core->edge_directions)
-    for (const Vec3& w : side_[1].core->edge_directions) {
-      const Vec3 axis = (side_[0].pose.q * u).cross(side_[1].pose.q * w);
+  for (const Vec3& u : side_[0].edge_directions)
+    for (const Vec3& w : side_[1].edge_directions) {
+      const Vec3 axis = u.cross(w);
       const double length = axis.norm();
       if (length < tuning.least_cross) continue;
-      take_shallower(best, axis / length, tuning.edge_preference);
-      take_shallower(best, -axis / length, tuning.edge_preference);
+      const Range a = along(side_[0].points, axis), b = along(side_[1].points, axis);
+      take_shallower(best, axis / length, (b.high - a.low) / length, tuning.edge_preference);
+      take_shallower(best, -axis / length, (a.high - b.low) / length, tuning.edge_preference);
     }
-  if (best.normal.isZero()) take_shallower(best, across_edges(), 1.0);
-  locate_deepest(best);
+  if (!std::isfinite(best.depth)) {
+    const Vec3 across = across_edges();
+    best = {across, depth_along(across)};
+  }
   return best;
 }
 
@@ -83,28 +155,26 @@ double ConvexContacts::depth_along(const Vec3& normal) const {
   return -lowest(side_[1].points, -normal) - lowest(side_[0].points, normal);
 }
 
-void ConvexContacts::take_shallower(Direction& best, const Vec3& normal, double preference) const {
-  const double depth = depth_along(normal);
-  if (depth < (best.depth > 0.0 ? preference * best.depth : best.depth / preference))
-    best.normal = normal, best.depth = depth;
+void ConvexContacts::take_shallower(Direction& best, const Vec3& normal, double depth, double preference) {
+  if (depth < (best.depth > 0.0 ? preference * best.depth : best.depth / preference)) best = {normal, depth};
 }
 
 // For balls and capsules about one point: any direction across the axes there are.
 Vec3 ConvexContacts::across_edges() const {
   for (const Side& side : side_)
-    if (!side.core->edge_directions.empty()) return (side.pose.q * side.core->edge_directions[0]).unitOrthogonal();
+    if (!side.edge_directions.empty()) return side.edge_directions[0].unitOrthogonal();
   return Vec3::UnitZ();
 }
 
 // Moved apart along the normal, the deepest points are the nearest.
-void ConvexContacts::locate_deepest(Direction& d) const {
+ConvexContacts::Deepest ConvexContacts::deepest_along(const Direction& d) const {
   const double size = (side_[0].points[0] - side_[1].points[0]).norm() + side_[0].core->radius + side_[1].core->radius;
   const Vec3 shift = (d.depth + size) * d.normal;
   std::vector<Vec3>& moved = moved_;
   moved.clear();
   for (const Vec3& p : side_[0].points) moved.push_back(p + shift);
   const ConvexDistance apart = distance(solid(moved), solid(side_[1].points));
-  d.a = apart.a - shift, d.b = apart.b;
+  return {apart.a - shift, apart.b};
 }
 
 // -- Manifolds --------------------------------------------------------------------------------------------------------

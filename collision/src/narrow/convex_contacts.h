@@ -1,6 +1,7 @@
 // Contacts of two rigid convex shapes: one direction, and the faces that meet along it clipped against each other.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "convex/convex_core.h"
@@ -21,16 +22,20 @@ class ConvexContacts {
   struct Side {
     const ConvexCore* core = nullptr;
     RigidTransform pose{};
-    std::vector<Vec3> points{};
+    std::vector<Vec3> points{}, normals{}, edge_directions{};  // the second: of the faces
 
-    Vec3 normal(const ConvexFace& f) const { return pose.q * f.normal; }
+    const Vec3& normal(const ConvexFace& f) const {
+      return normals[static_cast<std::size_t>(&f - core->faces.data())];
+    }
     double offset(const ConvexFace& f) const { return f.offset + normal(f).dot(pose.p); }
   };
   // A direction out of b, into a, and how far the cores overlap along it; negative where they are apart.
   struct Direction {
     Vec3 normal = Vec3::Zero();
-    double depth = 0.0;
-    Vec3 a = Vec3::Zero(), b = Vec3::Zero();  // deepest points
+    double depth = std::numeric_limits<double>::infinity();
+  };
+  struct Deepest {
+    Vec3 a, b;
   };
   // A corner of the face that is clipped, with the features that made it, and the line that follows it.
   struct Corner {
@@ -39,15 +44,21 @@ class ConvexContacts {
     Index line;  // ≥ 0: edge of the incident face; < 0: −1 − edge of the reference face
   };
 
-  void load(Side& side, const ConvexCore& core, const RigidTransform& pose);
+  static void load(Side& side, const ConvexCore& core, const RigidTransform* pose);
   void add(const FeatureSide& a, const FeatureSide& b, const Vec3& normal);
   double least_gap() const;
+  double round_off() const;
 
+  bool faces_tell(double margin);
+  void find_by_distance(double margin);
+  void touch(const Direction& d, const Deepest* known, double margin);
+
+  Direction across_faces() const;
   Direction least_penetration() const;
   double depth_along(const Vec3& normal) const;
-  void take_shallower(Direction& best, const Vec3& normal, double preference) const;
+  static void take_shallower(Direction& best, const Vec3& normal, double depth, double preference);
   Vec3 across_edges() const;
-  void locate_deepest(Direction& d) const;
+  Deepest deepest_along(const Direction& d) const;
 
   void touch_along(const Vec3& normal, double margin);
   static const ConvexFace* facing(const Side& side, const Vec3& out);

@@ -247,7 +247,7 @@ void NarrowPhase::Impl::on_half_space(const CollisionBody& body, const RigidTran
                                       double margin) {
   const Vec3 normal = X_BH.q * shape.normal;
   const double offset = shape.offset + normal.dot(X_BH.p);
-  if (has_triangles(body)) {
+  if (convex(body) == nullptr) {
     bind(body, {}, kRoundOff * size(body), 0);
     half_space_contacts(surface[0], normal, offset, margin, triangles, found);
     return;
