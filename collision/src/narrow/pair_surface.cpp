@@ -254,7 +254,10 @@ PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
   branch_and_bound(
       *deformed_, [&](const Aabb& box) { return distance_to_box(p_S, box); },
       [&](Index t, double best) {
-        const SurfaceFoot foot = closest_on_triangle(p, face(t).x);
+        const TrianglePoints x = corners(t);
+        if (!(distance_to_box(p, {x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])}) < best))
+          return best;
+        const SurfaceFoot foot = closest_on_triangle(p, x);
         const double d = (p - foot.point).norm();
         if (!(d < best)) return best;
         r.triangle = t, r.foot = foot, r.distance = d;

@@ -74,6 +74,10 @@ class PairSurface {
     if (vertex_stamp_[i] != generation_) make_vertex(v);
     return vertices_[i];
   }
+  TrianglePoints corners(Index t) {
+    const Triangle& v = surface().triangle(t);
+    return {vertex(v[0]), vertex(v[1]), vertex(v[2])};
+  }
   const Face& face(Index t) {
     const auto i = static_cast<std::size_t>(t);
     if (face_stamp_[i] != generation_) make_face(t);

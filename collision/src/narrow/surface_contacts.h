@@ -58,7 +58,7 @@ class SurfaceContacts {
   };
   struct Seed {
     Index vertex;
-    double reach;  // the other surface is not farther from the vertex than this, m
+    Index near;  // a triangle of the other surface next to it; −1: none is known
   };
   struct EdgePair {
     Index e, f;   // of side 0 and 1
@@ -93,6 +93,7 @@ class SurfaceContacts {
   void find_piercings(int of, Index s, Index t);
   void find_piercing(int of, Index e, Index t);
   void spread_inside(int of, OverlapRule* rule);
+  double distance_to(int of, Index t, const Vec3& p);
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
   bool find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit);
   bool flush(int of, Index v, const FeatureSide& at);

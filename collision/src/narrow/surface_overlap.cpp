@@ -25,7 +25,7 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   double within = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
   if (within < -tolerance_) return;
-  if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], (p - mine.vertex(ends[behind])).norm()});
+  if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], t});
   // An edge that only begins or ends on the face, or meets its rim, touches it.
   if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});
 }
@@ -40,13 +40,17 @@ void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
     if (visited >= generation_) continue;
     visited = generation_;
     const Vec3& p = side_[of]->vertex(seed.vertex);
-    const PairSurface::Nearest nearest = side_[1 - of]->nearest(p, seed.reach + directionless_);
+    const double reach = seed.near < 0 ? std::numeric_limits<double>::infinity() : distance_to(1 - of, seed.near, p);
+    const PairSurface::Nearest nearest = side_[1 - of]->nearest(p, reach + directionless_);
     if (!nearest.inside) continue;
     visited = generation_ + 1;
     add_inside(of, seed.vertex, nearest, rule);
-    for (const Index w : side_[of]->surface().vertex_neighbours(seed.vertex))
-      seeds.push_back({w, nearest.distance + (side_[of]->vertex(w) - p).norm()});
+    for (const Index w : side_[of]->surface().vertex_neighbours(seed.vertex)) seeds.push_back({w, nearest.triangle});
   }
+}
+
+double SurfaceContacts::distance_to(int of, Index t, const Vec3& p) {
+  return (p - closest_on_triangle(p, side_[of]->corners(t)).point).norm();
 }
 
 void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule) {
@@ -93,7 +97,7 @@ void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
   for (const Index v : side_[of]->surface().component_vertices()) {
     if (visited_[of][static_cast<std::size_t>(v)] >= generation_) continue;
     if (!side_[1 - of]->may_hold(side_[of]->vertex(v))) continue;
-    seeds_[of].push_back({v, std::numeric_limits<double>::infinity()});
+    seeds_[of].push_back({v, -1});
     spread_inside(of, rule);
   }
 }
