@@ -1,6 +1,6 @@
 // What finding contacts costs while bodies move: scenes run in a World, every query that it asks is written down, and
-// then asked again of a fresh ContactFinder, in the same order, on one thread. Prints Markdown: µs of all queries of one
-// step, by the thread's own work, of three runs through the least for each query.
+// then asked again of a fresh ContactFinder, in the same order, on one thread. Prints Markdown: µs of all queries of
+// one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb]]     part of the names of the scenes wanted ("": all), the asset of the bunnies
 // Figures: docs/reports/collision.md.
 #include <algorithm>
@@ -251,8 +251,14 @@ int main(int argc, char** argv) try {
       "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst |\n|---|---|---|---|---|---|---|\n");
   const std::vector<std::pair<std::string, std::function<void()>>> scenes{
       {"boxes", hundred_boxes},
-      {"coarse", [] { ten_boxes("10 boxes, coarse", {3, 2, 2}); }},
-      {"fine", [] { ten_boxes("10 boxes, 8 × 6 × 4", {8, 6, 4}); }},
+      {"coarse",
+       [] {
+         ten_boxes("10 boxes, coarse", {3, 2, 2});
+       }},
+      {"fine",
+       [] {
+         ten_boxes("10 boxes, 8 × 6 × 4", {8, 6, 4});
+       }},
       {"bar", long_bar},
       {"heap", stirred_heap},
   };

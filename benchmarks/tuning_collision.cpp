@@ -88,6 +88,8 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(narrow, directionless),
     LIMBER_NUMBER(narrow, parallel_touching),
     LIMBER_NUMBER(narrow, grazing),
+    LIMBER_NUMBER(narrow, list_slack),
+    LIMBER_NUMBER(narrow, list_when),
     LIMBER_NUMBER(narrow, rest_depth_steps),
     LIMBER_NUMBER(narrow, least_stretch),
     LIMBER_NUMBER(narrow, least_patch),

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "convex/convex_polygon.h"
 #include "finder/patch_weights.h"
@@ -58,6 +59,8 @@ struct ContactClusters::Impl {
   // Of the pair under way.
   std::span<ContactPoint> contacts;
   std::span<const std::uint64_t> previous;
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  std::vector<ContactPoint> sorted;
   std::vector<Index> leaders;   ///< by patch: its first contact
   std::vector<Index> patch_of;  ///< by contact
   std::vector<Index> members;   ///< of one patch, ascending
@@ -75,6 +78,7 @@ struct ContactClusters::Impl {
   std::vector<ContactWeight> weights;
   PatchWeights patch_weights;
 
+  void sort_by_id();
   void find_patches();
   void reduce_patch();
   void weigh_patch();
@@ -82,11 +86,22 @@ struct ContactClusters::Impl {
   void choose();
   void add_corners();
   void cover();
-  bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const;
+  static bool near(const PlanePoint& p, const PlanePoint& q, double distance);
+  static bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance);
   bool previous_will_do(std::size_t corners);
   Span span_of(const std::vector<PlanePoint>& some, bool deep_only);
   bool deep(const PlanePoint& p) const { return contacts[static_cast<std::size_t>(p.item)].gap <= deep_gap; }
 };
+
+/// Contacts are large: places are sorted, and each contact is moved once.
+void ContactClusters::Impl::sort_by_id() {
+  order.clear();
+  for (std::size_t c = 0; c < contacts.size(); ++c) order.emplace_back(contacts[c].id, c);
+  std::sort(order.begin(), order.end());
+  sorted.clear();
+  for (const auto& [id, c] : order) sorted.push_back(contacts[c]);
+  std::copy(sorted.begin(), sorted.end(), contacts.begin());
+}
 
 /// In ascending id, each joins the first patch whose first contact is like it, or begins one: as long as the same ids
 /// are there, the same ones lead.
@@ -142,23 +157,27 @@ void ContactClusters::Impl::add_corners() {
   }
 }
 
-bool ContactClusters::Impl::near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) const {
-  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) {
-    const double x = p.x - q.x, y = p.y - q.y;
-    return x * x + y * y <= distance * distance;
-  });
+bool ContactClusters::Impl::near(const PlanePoint& p, const PlanePoint& q, double distance) {
+  const double x = p.x - q.x, y = p.y - q.y;
+  return x * x + y * y <= distance * distance;
+}
+
+bool ContactClusters::Impl::near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) {
+  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) { return near(p, q, distance); });
 }
 
 /// Adds what is farther than the spacing from all that are kept, the deepest first.
 void ContactClusters::Impl::cover() {
   if (std::isinf(spacing)) return;
   const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
-  for (;;) {
-    const PlanePoint* chosen = nullptr;
-    for (const PlanePoint& p : place)
-      if ((chosen == nullptr || gap(p) < gap(*chosen)) && !near_any(p, kept, spacing)) chosen = &p;
-    if (chosen == nullptr) return;
-    kept.push_back(*chosen);
+  points.clear();  // that are not covered yet
+  for (const PlanePoint& p : place)
+    if (!near_any(p, kept, spacing)) points.push_back(p);
+  while (!points.empty()) {
+    const PlanePoint chosen =
+        *std::min_element(points.begin(), points.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
+    kept.push_back(chosen);
+    std::erase_if(points, [&](const PlanePoint& p) { return near(p, chosen, spacing); });
   }
 }
 
@@ -240,8 +259,7 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
   m.weights.clear();
   m.contacts = std::span(contacts).subspan(first);
   m.previous = previous;
-  std::sort(m.contacts.begin(), m.contacts.end(),
-            [](const ContactPoint& a, const ContactPoint& b) { return a.id < b.id; });
+  m.sort_by_id();
   m.keep.assign(m.contacts.size(), 1);
   if (weigh) m.all.assign(m.contacts.begin(), m.contacts.end());
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;

@@ -10,6 +10,7 @@
 
 #include "finder/contact_regions.h"
 #include "finder/found_body.h"
+#include "finder/pair_memories.h"
 #include "limber/dynamics/exact_motion.h"
 
 namespace limber {
@@ -35,7 +36,8 @@ struct ContactFinder::Impl {
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
-  std::vector<Index> near;  ///< one body
+  internal::PairMemories memories;  ///< of pairs; they change nothing but the time
+  std::vector<Index> near;          ///< one body
   struct Found {
     std::vector<ContactPoint> contacts;
     internal::ContactRegions regions;
@@ -81,7 +83,8 @@ struct ContactFinder::Impl {
   void drop_pairs(std::span<const std::pair<Index, Index>> except);
   void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
-  void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
+  void find_in_pair(const BodyPair& pair, internal::PairMemory* memory, internal::Worker& worker, Found& into) const;
+  bool remembers(const BodyPair& pair) const;
   internal::RegionSide region_side(Index body) const;
   CollisionBody collision_body(Index body, internal::Worker& worker) const;
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;

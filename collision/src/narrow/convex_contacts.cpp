@@ -99,8 +99,8 @@ void ConvexContacts::touch(const Direction& d, const Deepest* known, double marg
     clip_faces(d.normal, margin);
   if (least_gap() <= -d.depth - a.radius - b.radius + round_off()) return;
   const Deepest points = known != nullptr ? *known : deepest_along(d);
-  add({kNearestPoints, -1, {}, points.a - a.radius * d.normal}, {kNearestPoints, -1, {}, points.b + b.radius * d.normal},
-      d.normal);
+  add({kNearestPoints, -1, {}, points.a - a.radius * d.normal},
+      {kNearestPoints, -1, {}, points.b + b.radius * d.normal}, d.normal);
 }
 
 void ConvexContacts::add(const FeatureSide& a, const FeatureSide& b, const Vec3& normal) {

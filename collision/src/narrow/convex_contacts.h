@@ -24,9 +24,7 @@ class ConvexContacts {
     RigidTransform pose{};
     std::vector<Vec3> points{}, normals{}, edge_directions{};  // the second: of the faces
 
-    const Vec3& normal(const ConvexFace& f) const {
-      return normals[static_cast<std::size_t>(&f - core->faces.data())];
-    }
+    const Vec3& normal(const ConvexFace& f) const { return normals[static_cast<std::size_t>(&f - core->faces.data())]; }
     double offset(const ConvexFace& f) const { return f.offset + normal(f).dot(pose.p); }
   };
   // A direction out of b, into a, and how far the cores overlap along it; negative where they are apart.

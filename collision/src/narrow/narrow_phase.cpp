@@ -30,6 +30,7 @@ using internal::FeatureSide;
 using internal::half_space_contacts;
 using internal::kRoundOff;
 using internal::OverlapRule;
+using internal::PairMemory;
 using internal::PairSurface;
 using internal::RestDepth;
 using internal::RestDepthRule;
@@ -129,6 +130,13 @@ struct NarrowPhase::Impl {
   TetOverlapRule tet_rule[2];
   std::vector<Index> triangles;
   std::vector<FeatureContact> found;
+  struct Place {
+    std::uint64_t id;
+    double gap;
+    std::size_t found;
+    friend auto operator<=>(const Place&, const Place&) = default;
+  };
+  std::vector<Place> order;  // of what was found, by feature pair
 
   static const HalfSpace* half_space(const CollisionBody& body) {
     return body.geometry == nullptr ? nullptr : std::get_if<HalfSpace>(&body.geometry->shape());
@@ -146,7 +154,8 @@ struct NarrowPhase::Impl {
   void bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side);
   static double size(const CollisionBody& body);
 
-  void find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin);
+  void find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin,
+            PairMemory* memory);
   void on_half_space(const CollisionBody& body, const RigidTransform& X_BH, const HalfSpace& shape, double margin);
   void against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core, double margin);
   void expect_ends(const CollisionBody& a, const CollisionBody& b);
@@ -271,8 +280,8 @@ void NarrowPhase::Impl::against_core(const CollisionBody& body, const RigidTrans
 }
 
 // In the frame of a. @pre a is not a half-space; if only one has triangles and the other is no half-space, it is a
-void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB,
-                             double margin) {
+void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin,
+                             PairMemory* memory) {
   const ConvexCore *core_a = convex(a), *core_b = convex(b);
   if (core_a != nullptr && core_b != nullptr) {
     convex_contacts.find(*core_a, *core_b, X_AB, margin, found);
@@ -291,7 +300,7 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     expect_ends(a, b);
     const Vec3 way_A = to_a * (b.displacement - a.displacement);
     surface_contacts.find(surface[0], surface[1], X_AB, {margin, a.reach + b.reach, way_A, a.doubt + b.doubt}, rule_a,
-                          rule_b, found);
+                          rule_b, memory, found);
   }
 }
 
@@ -299,18 +308,19 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
 void NarrowPhase::Impl::deliver(const CollisionBody& a, const RigidTransform& X_AF, const CollisionBody& b,
                                 const RigidTransform& X_BF, const RigidTransform& X_OF,
                                 std::vector<ContactPoint>& contacts) {
-  std::sort(found.begin(), found.end(), [](const FeatureContact& c, const FeatureContact& d) {
-    return std::pair(id_of(c), c.gap) < std::pair(id_of(d), d.gap);
-  });
-  found.erase(std::unique(found.begin(), found.end(),
-                          [](const FeatureContact& c, const FeatureContact& d) { return id_of(c) == id_of(d); }),
-              found.end());
+  order.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) order.push_back({id_of(found[i]), found[i].gap, i});
+  std::sort(order.begin(), order.end());
+  order.erase(std::unique(order.begin(), order.end(), [](const Place& c, const Place& d) { return c.id == d.id; }),
+              order.end());
   const ConvexCore *core_a = convex(a), *core_b = convex(b);
   const double radius_a = core_a != nullptr ? core_a->radius : 0.0, radius_b = core_b != nullptr ? core_b->radius : 0.0;
-  for (const FeatureContact& c : found)
+  for (const Place& place : order) {
+    const FeatureContact& c = found[place.found];
     contacts.push_back({contact_side(a, radius_a, c.a, X_AF * c.a.point),
                         contact_side(b, radius_b, c.b, X_BF * c.b.point), X_OF.q * c.normal,
-                        X_OF * (0.5 * (c.a.point + c.b.point)), c.gap, id_of(c)});
+                        X_OF * (0.5 * (c.a.point + c.b.point)), c.gap, place.id});
+  }
 }
 
 NarrowPhase::NarrowPhase(const NarrowPhaseOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -321,7 +331,7 @@ NarrowPhase::NarrowPhase(NarrowPhase&&) noexcept = default;
 NarrowPhase& NarrowPhase::operator=(NarrowPhase&&) noexcept = default;
 
 void NarrowPhase::find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
-                                std::vector<ContactPoint>& contacts) {
+                                std::vector<ContactPoint>& contacts, PairMemory* memory) {
   check(a), check(b);
   Impl& impl = *impl_;
   impl.found.clear();
@@ -332,7 +342,7 @@ void NarrowPhase::find_contacts(const CollisionBody& a, const CollisionBody& b, 
   const CollisionBody &first = exchange ? b : a, &second = exchange ? a : b;
   const Quaternion to_first = first.X_WB.q.conjugate();
   const RigidTransform X_FS{to_first * second.X_WB.q, to_first * (second.X_WB.p - first.X_WB.p)};
-  impl.find(first, second, X_FS, margin);
+  impl.find(first, second, X_FS, margin, memory);
   const RigidTransform X_SF = X_FS.inverse(), X_OF{first.X_WB.q, first.X_WB.p - origin};
   if (exchange) impl.flip();
   impl.deliver(a, exchange ? X_SF : RigidTransform{}, b, exchange ? RigidTransform{} : X_SF, X_OF, contacts);

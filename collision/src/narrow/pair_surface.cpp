@@ -248,18 +248,20 @@ bool PairSurface::on_rim(Index t, const Feature& feature) const {
   return false;
 }
 
+// Of equally near triangles the first by number, whichever boxes are at hand and in whatever order that leads there.
 PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
+  constexpr double kSurely = 1.0 - 1e-9;  // so that what is equally near is looked at
   Nearest r;
   const Vec3 p_S = X_SP_ * p;
   branch_and_bound(
-      *deformed_, [&](const Aabb& box) { return distance_to_box(p_S, box); },
+      *deformed_, [&](const Aabb& box) { return kSurely * distance_to_box(p_S, box); },
       [&](Index t, double best) {
         const TrianglePoints x = corners(t);
-        if (!(distance_to_box(p, {x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])}) < best))
-          return best;
+        const Aabb box{x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])};
+        if (!(kSurely * distance_to_box(p, box) < best)) return best;
         const SurfaceFoot foot = closest_on_triangle(p, x);
         const double d = (p - foot.point).norm();
-        if (!(d < best)) return best;
+        if (!(d < best) && !(d == best && t < r.triangle)) return best;
         r.triangle = t, r.foot = foot, r.distance = d;
         return d;
       },

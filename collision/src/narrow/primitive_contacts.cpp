@@ -38,7 +38,13 @@ void CoreContacts::find(PairSurface& surface, const RoundedCore& core, double ma
   for (const Vec3& end : core.ends) box.include(X_SP * end);
   triangles_.clear();
   find_triangles_in_box(surface.deformed(), box.grown(reach_), triangles_);
+  Aabb core_box;
+  for (const Vec3& end : core.ends) core_box.include(end);
+  core_box = core_box.grown(reach_);
   for (const Index t : triangles_) {
+    Aabb triangle_box;
+    for (const Vec3& corner : surface.corners(t)) triangle_box.include(corner);
+    if (!core_box.overlaps(triangle_box)) continue;
     for (int end = 0; end < (core.segment ? 2 : 1); ++end) end_against_face(end, t);
     for (int c = 0; c < 3; ++c) {
       if (surface.owns_vertex(t, c)) vertex_against_core(surface.surface().triangle(t)[static_cast<std::size_t>(c)]);

@@ -6,6 +6,7 @@
 
 #include "limber/collision/tree_traversal.h"
 #include "limber/core/disjoint_sets.h"
+#include "narrow/pair_memory.h"
 #include "narrow/pair_surface.h"
 #include "tuning.h"
 
@@ -30,15 +31,21 @@ struct ContactReach {
   Vec3 way_A = Vec3::Zero();                               // of b as seen from a
   double doubt = std::numeric_limits<double>::infinity();  // how near faces are to come to each other; finite: their
                                                            // ends are known
+
+  // How far points are expected to move against each other; 0: not known.
+  double expected() const { return std::isfinite(doubt) ? std::max(0.0, beside - doubt) + way_A.norm() : 0.0; }
+  // Whether boxes are looked at all around, as gaps go: of a way that is short beside what is on all sides of it there
+  // is little to save.
+  bool all_around() const { return beside >= margin || (std::isfinite(doubt) && margin <= 1.1 * beside); }
 };
 
 class SurfaceContacts {
  public:
   // Appends all contacts of a and b, in the pair's frame. Both are bound with one tolerance; those found twice (two
   // vertices) are appended twice. @param X_AB frame of b's body in that of a's @param rule_a of vertices inside a;
-  // null: the nearest point
+  // null: the nearest point @param memory of the pair; null: none is kept
   void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach, OverlapRule* rule_a,
-            OverlapRule* rule_b, std::vector<FeatureContact>& contacts);
+            OverlapRule* rule_b, PairMemory* memory, std::vector<FeatureContact>& contacts);
   // Of a surface with itself.
   void find_self(PairSurface& a, double margin, std::vector<FeatureContact>& contacts);
 
@@ -69,11 +76,14 @@ class SurfaceContacts {
   };
 
   void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
+  void test_pairs(const RigidTransform& X_AB, const ContactReach& reach, PairMemory* memory);
   void find_pairs(const RigidTransform& X_AB, const ContactReach& reach);
-  void test_pair(Index s, Index t);
-  bool planes_separate(const PairSurface::Face& s, const PairSurface::Face& t) const;
+  bool stay_apart(Index s, Index t, double doubt);
+  void list_tests(const RigidTransform& X_AB, PairMemory& memory);
+  FeatureTests tests_within(Index s, Index t, double reach, double slack);
+  void test_pair(Index s, Index t, FeatureTests tests);
 
-  void test_vertices(int of, Index s, Index t);
+  void test_vertices(int of, Index s, Index t, FeatureTests tests);
   void vertex_against_face(int of, Index v, Index t);
   void add_vertex(int of, Index v, PairSurface::Minimum minimum);
   bool rests_on_faces(int of, Index v, const PairSurface::Minimum& minimum);
@@ -81,7 +91,7 @@ class SurfaceContacts {
   Touch touch(int of, Index v, const FeatureSide& at, Index t);
   double nearness(int of, Index v, Index t);
 
-  void test_edges(Index s, Index t);
+  void test_edges(Index s, Index t, FeatureTests tests);
   EdgePair nearest_of_edges(Index e, Index f);
   void add_separated_edges(EdgePair pair);
   double shorter_edge(const EdgePair& pair);
@@ -90,7 +100,7 @@ class SurfaceContacts {
   Vec3 unhindered(int of, Index v, const PairSurface::Minimum& minimum);
   Vec3 unhindered(const EdgePair& pair);
 
-  void find_piercings(int of, Index s, Index t);
+  void find_piercings(int of, Index s, Index t, FeatureTests tests);
   void find_piercing(int of, Index e, Index t);
   void spread_inside(int of, OverlapRule* rule);
   double distance_to(int of, Index t, const Vec3& p);
@@ -115,6 +125,7 @@ class SurfaceContacts {
   bool self_ = false, overlap_ = false;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
+  std::vector<ListedTests> listed_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;
   DisjointSets loops_;

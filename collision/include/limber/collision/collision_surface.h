@@ -71,6 +71,7 @@ class CollisionSurface {
 
   const Vec3& rest(Index vertex) const { return rest_[static_cast<std::size_t>(vertex)]; }
   const Aabb& rest_bounds() const { return rest_bounds_; }
+  double rest_radius() const { return rest_radius_; }  ///< largest distance of a vertex from the origin, m
   /// modes() floats (and zeros up to VertexRows::stride()): u along a body axis per unit amplitude; null for k = 0.
   const float* row(Index vertex, int axis) const {
     return modes_ > 0 ? model_->collision_rows().row(vertex, axis) : nullptr;

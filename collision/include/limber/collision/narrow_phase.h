@@ -50,6 +50,9 @@ namespace limber {
 
 class CollisionSurface;
 class DeformedSurface;
+namespace internal {
+class PairMemory;
+}
 
 /// A rigid shape made ready to touch others. Immutable; shared by all bodies and threads.
 class RigidGeometry {
@@ -148,8 +151,9 @@ class NarrowPhase {
 
   /// All contacts of a and b with gap ≤ margin that their motions may bring together. Two half-spaces have none.
   /// @param origin positions come out relative to it, world @pre a.index < b.index, poses finite
+  /// @param memory of this pair of surfaces in earlier queries, for ContactFinder; it changes the time alone
   void find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
-                     std::vector<ContactPoint>& contacts);
+                     std::vector<ContactPoint>& contacts, internal::PairMemory* memory = nullptr);
 
   /// Where a modal body touches itself: vertex–surface and edge–edge contacts of triangles that have no vertex in
   /// common and were farther apart than the margin at rest.
