@@ -61,11 +61,11 @@ double PassingWatch::clear_until(const FreeMotions& found, double length) {
   return touch_.time;
 }
 
-/// When a body that has contacts may have turned too far.
+/// When a body may have turned too far of a pair that is not looked at, as it touches.
 double PassingWatch::first_turned(const FreeMotions& found, double length) const {
   double until = length;
-  for (const ContactPoint& contact : contacts_)
-    for (const Index body : {contact.a.body, contact.b.body}) {
+  for (const auto& [a, b] : passing_.touching)
+    for (const Index body : {a, b}) {
       const ExactMotion* motion = found.of(body);
       if (motion == nullptr || passing_.turns[static_cast<std::size_t>(body)] == 0) continue;
       const double speed = motion->path().bounds(0.0, until).angular_speed;

@@ -66,14 +66,13 @@ struct PassingBodies {
   void leave_out(std::span<const char> asleep, std::span<const ContactPoint> found);
 };
 
-/// Ends a part where a pair without a contact first touches; and where a body that has contacts has turned so far that
-/// others would come.
+/// Ends a part where a pair without a contact first touches; and where a body of a pair that touches, and is not looked
+/// at, has turned so far that others would come.
 class PassingWatch final : public MotionWatch {
  public:
-  /// @param contacts of the part, ordered by pairs
-  PassingWatch(ContactSource& source, std::span<const BodyState> states, std::span<const ContactPoint> contacts,
-               PassingBodies& passing)
-      : source_(source), states_(states), contacts_(contacts), passing_(passing), margin_(passing.margin) {}
+  /// @param passing its `touching` are those of the part
+  PassingWatch(ContactSource& source, std::span<const BodyState> states, PassingBodies& passing)
+      : source_(source), states_(states), passing_(passing), margin_(passing.margin) {}
   double clear_until(const FreeMotions& found, double length) override;
   /// What ended the last motion shown; none: nothing did.
   const Impact* touch() const { return touch_.a < 0 ? nullptr : &touch_; }
@@ -83,7 +82,6 @@ class PassingWatch final : public MotionWatch {
 
   ContactSource& source_;
   std::span<const BodyState> states_;
-  std::span<const ContactPoint> contacts_;
   PassingBodies& passing_;
   double margin_;
   Impact touch_;

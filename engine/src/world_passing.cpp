@@ -183,7 +183,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
     const std::span<const ContactPoint> found = contacts_of_cluster(members, count == 1, step.step);
     set_contacts(found);
     p.list_touching(found);
-    PassingWatch watch(*source, states, found, p);
+    PassingWatch watch(*source, states, p);
     step.watch = &watch;
     const double taken = constraints.step_together(members, contacts.constraints(), step);
     contacts.finish(p.rests, true);

@@ -136,7 +136,7 @@ TEST(Coherence, AListHoldsUntilPointsMayHaveMovedByItsSlack) {
     }
   }
   EXPECT_GT(looked, 500);
-  EXPECT_GT(listed, 50);
+  EXPECT_GT(listed, 25);
   EXPECT_GT(searched, 50);
 }
 

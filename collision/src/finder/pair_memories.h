@@ -24,6 +24,7 @@ class PairMemories {
   template <class Wants>
   void match(std::span<const BodyPair> pairs, bool all, const Wants& wants) {
     next_.clear();
+    next_.reserve(all_.size());
     of_pair_.clear();
     auto known = known_.begin();
     const auto pass = [&](const BodyPair* before) {
@@ -58,10 +59,12 @@ class PairMemories {
   };
   PairMemory* take() {
     if (free_.empty()) {
-      all_.push_back(std::make_unique<PairMemory>(*room_));
-      all_.back()->reserve(modes_);
+      for (std::size_t more = 1 + all_.size() / 4; more > 0; --more) {  // a few to spare
+        all_.push_back(std::make_unique<PairMemory>(*room_));
+        all_.back()->reserve(modes_);
+        free_.push_back(all_.back().get());
+      }
       free_.reserve(all_.capacity());
-      return all_.back().get();
     }
     PairMemory* memory = free_.back();
     free_.pop_back();

@@ -36,8 +36,11 @@ class ListRoom {
   void exchange(std::vector<ListedTests>& list, std::size_t size);
 
  private:
+  void put_back(std::size_t shelf, std::vector<ListedTests>&& list);
+
   std::mutex mutex_;
   std::array<std::vector<std::vector<ListedTests>>, 33> free_;  // by the logarithm of what they hold, rounded up
+  std::array<std::size_t, 33> made_{};
 };
 
 class PairMemory {
