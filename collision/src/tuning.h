@@ -94,9 +94,9 @@ struct NarrowTuning {
   double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. Steady.
   /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. Steady.
   double parallel_touching = 1e-4;
-  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
-  /// Part of the margin by which two surfaces may move against each other while one list of tests lasts [0.2 to 1]: more
-  /// lasts longer and holds more. Time alone.
+  double grazing = 1e-9;  ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
+  /// Part of the margin by which two surfaces may move against each other while one list of tests lasts [0.2 to 1]:
+  /// more lasts longer and holds more. Time alone.
   double list_slack = 0.5;
   /// Part of that, moved since the last query and expected until the next, up to which a list is made [0.05 to 0.5]: it
   /// is to serve some queries. Time alone.

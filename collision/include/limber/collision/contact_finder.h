@@ -26,8 +26,8 @@ namespace limber {
 struct ContactFinderOptions {
   /// How boxes within a body are made: changes the time, not the contacts.
   BoundsChoice bounds = BoundsChoice::kAutomatic;
-  /// Whether two surfaces that hardly move against each other are looked at by a list made before: changes the time, not
-  /// the contacts.
+  /// Whether two surfaces that hardly move against each other are looked at by a list made before: changes the time,
+  /// not the contacts.
   bool coherence = true;
   /// Depth and normal of overlaps. kTetOverlap costs all nodes of both volumes for each overlapping pair, and works
   /// between modal bodies with a volume block only; kRestDepth asks for one of the body that a vertex is in.
