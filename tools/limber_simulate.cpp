@@ -116,8 +116,9 @@ Json loads(const std::vector<LoadReport>& reports) {
   return all;
 }
 
-Json contact(const ContactOptions& c) {
-  return {{"method", to_string(c.rule.method)},
+Json contact(const ContactOptions& c, SceneFinder finder) {
+  return {{"finder", to_string(finder)},
+          {"method", to_string(c.rule.method)},
           {"friction_model", to_string(c.rule.friction)},
           {"guard", to_string(c.rule.guard)},
           {"friction", c.friction},
@@ -200,7 +201,7 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["forces"] = loads(result.forces);
   report["handles"] = handles(result.handles);
   report["joints"] = joints(result.joints);
-  report["contact"] = scene.contact ? contact(*scene.contact) : Json();
+  report["contact"] = scene.contact ? contact(*scene.contact, scene.finder) : Json();
   report["constraints"] = constraints(result.constraints);
   report["energy_before"] = result.energy_before;
   report["energy_after"] = result.energy_after;

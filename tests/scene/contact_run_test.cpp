@@ -63,6 +63,27 @@ TEST(ContactRun, ABlockThatFallsComesToRestOnTheGroundAndTheGroundCarriesItsWeig
   EXPECT_NEAR((carried - Vec3(0, 0, kBlockMass * kGravity * 0.02)).norm(), 0.0, tolerance);
 }
 
+TEST(ContactRun, AStackOfBlocksRestsAlikeWhoeverFindsTheContactsAndABuildWithoutFclSaysSo) {
+  const auto stack = [](const std::string& finder) {
+    const std::string contact = R"("contact": {"finder": ")" + finder + R"("},)";
+    return rigid(contact + kGround + "," + bodies(block_at("b", "[0, 0, 0.6]") + "," + block_at("c", "[0.3, 0, 1.8]")),
+                 "150");
+  };
+  const RunResult limber = play(stack("limber"));
+  std::string refused;
+  try {
+    const RunResult fcl = play(stack("fcl"));
+    // Gaps are closed to 1e-7 m at rest; along the ground each slides where its own contacts let it.
+    for (const std::string name : {"b", "c"})
+      EXPECT_NEAR(end_of(fcl, name).z(), end_of(limber, name).z(), 1e-6) << name;
+    EXPECT_EQ(fcl.constraints.unsettled, 0);
+  } catch (const InputError& e) {
+    refused = e.what();
+  }
+  if (!refused.empty()) EXPECT_THAT(refused, ::testing::HasSubstr("contact.finder: is \"fcl\", and this build"));
+  EXPECT_THROW(play(stack("ode")), InputError);
+}
+
 TEST(ContactRun, WithoutContactBodiesPassThroughEachOther) {
   const RunResult r = play(rigid(bodies(block_at("b", "[0, 0, 0.7]") + "," + block_at("c", "[0, 0, 3]"))));
   EXPECT_NEAR(end_of(r, "b").z(), 0.7 - 0.5 * kGravity * 4.0, 1e-9);

@@ -6,10 +6,12 @@
 #include <tuple>
 
 #include "finder/contact_finder_impl.h"
+#include "finder/contact_id.h"
 #include "tuning.h"
 
 namespace limber {
 
+using internal::contact_id;
 using internal::ContactRegions;
 using internal::FoundBody;
 using internal::ModalGeometry;
@@ -20,19 +22,6 @@ using internal::Worker;
 using internal::Workers;
 
 namespace {
-
-/// A bijection that spreads every bit over all (the finaliser of Steele, Lea and Flood's SplitMix, 2014).
-std::uint64_t mixed(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
-/// Different for each pair; for one pair as different as the features' own.
-std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
-  const auto key = static_cast<std::uint64_t>(pair.a) << 32 | static_cast<std::uint32_t>(pair.b);
-  return mixed(features ^ mixed(key + 0x9e3779b97f4a7c15u));
-}
 
 void check_length(const char* name, double length) {
   if (!(length >= 0.0 && std::isfinite(length)))

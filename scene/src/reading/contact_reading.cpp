@@ -24,6 +24,11 @@ std::string_view to_string(ProgramGuard guard) {
   return kWords[static_cast<std::size_t>(guard)];
 }
 
+std::string_view to_string(SceneFinder finder) {
+  constexpr std::array kWords{"limber", "fcl"};
+  return kWords[static_cast<std::size_t>(finder)];
+}
+
 std::string_view to_string(ImpactModel model) {
   constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
   return kWords[static_cast<std::size_t>(model)];
@@ -70,6 +75,14 @@ ContactRule read_rule(const JsonObject& o) {
                              rule.guard)};
 }
 
+SceneFinder read_finder(const JsonObject& o) {
+  const SceneFinder finder = choice_of(o, "finder", {SceneFinder::kLimber, SceneFinder::kFcl}, SceneFinder::kLimber);
+  if (finder == SceneFinder::kFcl && !LIMBER_HAS_FCL)
+    refuse(o.where("finder"), "\"fcl\", and this build of limber has no FCL",
+           "\"limber\", or a build where libfcl-dev is installed");
+  return finder;
+}
+
 ContactOptions read_contact_options(const JsonObject& o) {
   using enum ImpactModel;
   ContactOptions c;
@@ -89,10 +102,14 @@ ContactOptions read_contact_options(const JsonObject& o) {
 
 }  // namespace
 
-std::optional<ContactOptions> read_contact(const JsonObject& scene) {
-  if (scene.has("contact")) return read_contact_options(JsonObject(scene.at("contact"), scene.where("contact")));
-  if (scene.has("statics")) return ContactOptions{};
-  return {};
+void read_contact(const JsonObject& o, Scene& scene) {
+  if (o.has("contact")) {
+    const JsonObject contact(o.at("contact"), o.where("contact"));
+    scene.finder = read_finder(contact);
+    scene.contact = read_contact_options(contact);
+  } else if (o.has("statics")) {
+    scene.contact.emplace();
+  }
 }
 
 SceneStatic read_static(const Json& value, const std::string& where, const std::filesystem::path& folder) {

@@ -12,7 +12,7 @@
 namespace limber::internal {
 
 /// The member `contact`; without one, the defaults where there are statics, else none.
-std::optional<ContactOptions> read_contact(const JsonObject& scene);
+void read_contact(const JsonObject& o, Scene& scene);
 
 SceneStatic read_static(const nlohmann::json& value, const std::string& where, const std::filesystem::path& folder);
 

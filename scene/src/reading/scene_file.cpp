@@ -270,7 +270,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   scene.gravity = o.vec3("gravity", scene.gravity);
   read_assets(o, folder, scene);
   if (o.has("limits")) scene.limits = read_limits(JsonObject(o.at("limits"), o.where("limits")));
-  scene.contact = read_contact(o);
+  read_contact(o, scene);
   if (o.has("statics"))
     o.for_each("statics",
                [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, folder)); });

@@ -1,9 +1,13 @@
 #include "limber/scene/scene_player.h"
 
 #include <algorithm>
+#include <memory>
 #include <string>
 
 #include "limber/collision/contact_finder.h"
+#if LIMBER_HAS_FCL
+#include "limber/collision_fcl/fcl_contact_source.h"
+#endif
 #include "limber/core/error.h"
 #include "limber/core/state_archive.h"
 #include "running/frame_movement.h"
@@ -49,6 +53,15 @@ BodyPlacement start_of(const SceneBody& body) {
   return placement;
 }
 
+std::unique_ptr<ContactSource> make_finder(SceneFinder which) {
+  if (which == SceneFinder::kLimber) return std::make_unique<ContactFinder>();
+#if LIMBER_HAS_FCL
+  return std::make_unique<FclContactSource>();
+#else
+  throw InvalidArgument("ScenePlayer: finder is kFcl, and this build has no FCL, expected kLimber");
+#endif
+}
+
 }  // namespace
 
 struct ScenePlayer::Impl {
@@ -56,6 +69,7 @@ struct ScenePlayer::Impl {
       : scene(s),
         models(m),
         steps(n),
+        finder(make_finder(s.finder)),
         world({.step = s.step, .substeps = s.substeps, .gravity = s.gravity, .sleep = s.sleep}, jobs) {
     add_bodies();
     for (std::size_t i = 0; i < scene.statics.size(); ++i) {
@@ -89,7 +103,7 @@ struct ScenePlayer::Impl {
   const Scene& scene;
   const SceneModels& models;
   std::int64_t steps = 0, taken = 0;
-  ContactFinder finder;  // outlives the world
+  std::unique_ptr<ContactSource> finder;  // outlives the world
   World world;
   std::vector<BodyId> bodies, statics;
   std::vector<JointId> joints;
@@ -102,7 +116,7 @@ struct ScenePlayer::Impl {
 };
 
 void ScenePlayer::Impl::add_bodies() {
-  if (scene.contact) world.set_contact_source(&finder, *scene.contact);
+  if (scene.contact) world.set_contact_source(finder.get(), *scene.contact);
   if (models.of_body.size() != scene.bodies.size())
     throw InvalidArgument("ScenePlayer: there are " + std::to_string(models.of_body.size()) +
                           " models, expected one per body, " + std::to_string(scene.bodies.size()));

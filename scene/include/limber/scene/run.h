@@ -108,7 +108,7 @@ struct RunResult {
   std::int64_t reconstructed_vertices = 0;         ///< vertices times keys
 };
 
-/// Contacts are found by ContactFinder, where the scene has contact.
+/// Contacts are found by Scene::finder, where the scene has contact.
 /// @throws InputError naming the place in the scene file: a triangle or vertex that the surface does not have, a ray
 /// that misses, a motion for a body without fixed nodes. InvalidArgument for options.
 RunResult run_scene(const Scene& scene, const SceneModels& models, const RunOptions& options = {});

@@ -146,6 +146,13 @@ struct SceneJoint {
   std::string where{};
 };
 
+/// Who finds the contacts of a scene.
+enum class SceneFinder {
+  kLimber,  ///< ContactFinder
+  kFcl,     ///< FclContactSource, in builds with limber::collision_fcl
+};
+std::string_view to_string(SceneFinder finder);
+
 struct Scene {
   std::string name{};                                     ///< the file's name without folder and extension
   double step = 1.0 / 60.0;                               ///< s
@@ -156,6 +163,7 @@ struct Scene {
   std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
   std::optional<ContactOptions> contact{};                ///< absent: bodies pass through each other
+  SceneFinder finder = SceneFinder::kLimber;              ///< of contacts
   std::vector<SceneStatic> statics{};                     ///< none without contact
   std::vector<SceneBody> bodies{};
   std::vector<Strike> strikes{};

@@ -44,7 +44,7 @@ struct HandleReport {
 
 class ScenePlayer {
  public:
-  /// Contacts are found by ContactFinder, where the scene has contact.
+  /// Contacts are found by Scene::finder, where the scene has contact.
   /// @param scene, models outlive this
   /// @param steps after which nothing of the scene acts any more; its own number, or another
   /// @throws InputError naming the place in the scene file: a motion for a body without fixed nodes. InvalidArgument

@@ -1,0 +1,422 @@
+#include "limber/collision_fcl/fcl_contact_source.h"
+
+#include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <tuple>
+
+#include "fcl_body.h"
+#include "fcl_touches.h"
+#include "finder/contact_id.h"
+#include "finder/contact_regions.h"
+#include "finder/found_body.h"
+#include "finder/world_bounds.h"
+#include "limber/collision/time_of_impact.h"
+#include "limber/core/error.h"
+#include "limber/dynamics/exact_motion.h"
+
+namespace limber {
+
+using internal::ContactRegions;
+using internal::FclBody;
+using internal::FclPlace;
+using internal::PairIds;
+using internal::RegionSide;
+
+namespace {
+
+using Manager = fcl::DynamicAABBTreeCollisionManager<double>;
+using Object = fcl::CollisionObject<double>;
+
+[[noreturn]] void refuse(Index body, const std::string& seen, const std::string& expected) {
+  throw InvalidArgument("FclContactSource: state of body " + std::to_string(body) + ": " + seen + ", expected " +
+                        expected);
+}
+
+void check_length(const char* name, double length) {
+  if (!(length >= 0.0 && std::isfinite(length)))
+    throw InvalidArgument("FclContactSource: " + std::string(name) + " is " + std::to_string(length) +
+                          ", expected a finite number of at least 0");
+}
+
+bool finite(std::span<const double> numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double z) { return std::isfinite(z); });
+}
+
+/// How far contacts of features are looked for, as ContactFinder does.
+double reach_of_features(const BodyState& state) { return std::min(state.way(), state.look_ahead); }
+
+}  // namespace
+
+void FclContactOptions::validate() const {
+  clusters.validate();
+  for (const auto& [name, value] : {std::pair("spacing", spacing), std::pair("region_spacing", region_spacing)})
+    if (!(value > 0.0))
+      throw InvalidArgument("FclContactOptions: " + std::string(name) + " is " + std::to_string(value) +
+                            ", expected above 0");
+}
+
+struct FclContactSource::Impl {
+  struct Known {
+    std::unique_ptr<FclBody> fcl{};
+    CollisionFilter filter{};
+    std::set<Index> apart{};     ///< bodies it never meets
+    bool placed = false;         ///< the broad phase holds it
+    bool placed_asleep = false;  ///< as it lies there
+  };
+
+  explicit Impl(const FclContactOptions& o) : options(o), clusters(o.clusters) { options.validate(); }
+
+  bool contains(Index body) const {
+    return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).fcl != nullptr;
+  }
+  Known& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
+  const Known& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  Known& present(Index body, const char* function) {
+    if (!contains(body))
+      throw InvalidArgument("FclContactSource::" + std::string(function) + ": index " + std::to_string(body) +
+                            " holds no body, expected one that was added");
+    return at(body);
+  }
+  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  const ExactMotion* motion(Index body) const {
+    return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
+  }
+  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
+  template <class Visit>
+  void for_each_asked(const Visit& visit) {
+    if (some.empty())
+      for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i) {
+        if (contains(i)) visit(i);
+      }
+    else
+      for (const Index i : some)
+        if (contains(i)) visit(i);
+  }
+
+  void check(Index body) const;
+  void place_all();
+  void set_box(Index body, const Aabb& box);
+  Aabb swept_box(Index body);
+  bool may_meet(Index a, Index b) const;
+  bool planes_meet(Index plane, Index body) const;
+  void find_pairs();
+  void add_pair(Index a, Index b);
+  double reach(const BodyPair& pair) const;
+  RegionSide region_side(Index body) const;
+  ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
+  void find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts, ContactRegions& regions);
+  void keep(const std::vector<ContactPoint>& contacts);
+  MovingBody moving_body(Index body) const;
+
+  FclContactOptions options;
+  internal::GeometryCache geometries;
+  std::vector<Known> bodies;
+  Manager manager;
+  std::vector<Object*> moved;  ///< whose boxes changed
+  std::set<Index> planes;
+  ContactClusters clusters;
+  internal::RegionFinder region_finder;
+  internal::FclTouches touches;
+  TimeOfImpact time_of_impact;
+  DeformedSurface root;
+
+  // Of the query under way.
+  std::span<const BodyState> states;
+  std::span<const ExactMotion* const> motions;
+  std::span<const Index> some;
+  double margin = 0.0;
+  Vec3 origin = Vec3::Zero();
+  std::vector<BodyPair> pairs;
+  std::vector<double> amplitudes, shape;
+  ContactRegions regions_of_all, regions_of_some;
+
+  std::map<BodyPair, std::vector<std::uint64_t>> kept;  ///< ids of the last query's contacts, ascending
+};
+
+void FclContactSource::Impl::check(Index body) const {
+  if (motion(body) != nullptr) {
+    if (motion(body)->modes() != at(body).fcl->modes())
+      refuse(body, "a motion of " + std::to_string(motion(body)->modes()) + " modes",
+             std::to_string(at(body).fcl->modes()));
+    return;
+  }
+  if (static_cast<std::size_t>(body) >= states.size())
+    throw InvalidArgument("FclContactSource: " + std::to_string(states.size()) + " states, expected one for body " +
+                          std::to_string(body) + " too");
+  const BodyState& s = state(body);
+  if (!s.pose.p.allFinite() || !(std::abs(s.pose.q.norm() - 1.0) <= 1e-6))
+    refuse(body, "pose is not finite or its quaternion not of length 1", "a pose");
+  if (s.amplitudes.size() != static_cast<std::size_t>(at(body).fcl->modes()))
+    refuse(body, std::to_string(s.amplitudes.size()) + " amplitudes", std::to_string(at(body).fcl->modes()));
+  if (!finite(s.amplitudes)) refuse(body, "amplitudes are not finite", "finite numbers");
+  if (!s.displacement.allFinite()) refuse(body, "displacement is not finite", "finite numbers");
+  if (!(s.reach >= 0.0 && std::isfinite(s.reach)))
+    refuse(body, "reach is " + std::to_string(s.reach), "a finite number of at least 0");
+  if (!(s.look_ahead >= 0.0)) refuse(body, "look_ahead is " + std::to_string(s.look_ahead), "a number of at least 0");
+}
+
+void FclContactSource::Impl::set_box(Index body, const Aabb& box) {
+  Known& known = at(body);
+  known.fcl->broad().set_box(box);
+  if (known.fcl->half_space() != nullptr) return;
+  if (known.placed)
+    moved.push_back(&known.fcl->broad());
+  else
+    manager.registerObject(&known.fcl->broad());
+  known.placed = true;
+}
+
+/// Of what moves, from the states or along the motions.
+void FclContactSource::Impl::place_all() {
+  moved.clear();
+  for_each_asked([this](Index i) { check(i); });
+  for_each_asked([this](Index i) {
+    Known& known = at(i);
+    if (motion(i) != nullptr) {
+      set_box(i, swept_box(i));
+      known.placed_asleep = false;
+      return;
+    }
+    const BodyState& s = state(i);
+    if (s.asleep && known.placed_asleep) return;
+    known.fcl->place(s.pose, s.amplitudes);
+    // Half the margin on either side of a gap.
+    set_box(i, known.fcl->box().grown(reach_of_features(s) + 0.5 * margin));
+    known.placed_asleep = s.asleep;
+  });
+  manager.update(moved);
+}
+
+Aabb FclContactSource::Impl::swept_box(Index body) {
+  const FclBody& b = *at(body).fcl;
+  if (b.half_space() != nullptr) return {};
+  const ExactMotion& m = *motion(body);
+  Aabb box;
+  if (b.modal() == nullptr) {
+    box = swept(b.rigid()->bounds(), {}, m);
+  } else {
+    RigidTransform pose;
+    amplitudes.resize(static_cast<std::size_t>(b.modes()));
+    m.at(0.0, pose, amplitudes);
+    root.bind(b.modal()->surface, amplitudes);
+    shape = b.modal()->surface->model()->collision_extent().shape;
+    if (b.modal()->surface->skin() != nullptr) {
+      m.changes(amplitudes);
+      root.skin_extent(amplitudes, shape);
+    }
+    box = swept(root.bounds(0), shape, m);
+  }
+  return box.grown(0.5 * margin);
+}
+
+bool FclContactSource::Impl::may_meet(Index a, Index b) const {
+  const Known &s = at(a), &t = at(b);
+  const bool stay = motion(a) == nullptr && motion(b) == nullptr && s.placed_asleep && t.placed_asleep;
+  return (s.filter.layers & t.filter.mask) != 0 && (t.filter.layers & s.filter.mask) != 0 && !stay &&
+         !s.apart.contains(b);
+}
+
+/// By the box of the body.
+bool FclContactSource::Impl::planes_meet(Index plane, Index body) const {
+  if (motion(plane) != nullptr) return true;
+  const HalfSpace h = internal::world_half_space(*at(plane).fcl->half_space(), state(plane).pose);
+  const auto& box = at(body).fcl->broad().getAABB();
+  const Vec3 half = 0.5 * (box.max_ - box.min_);
+  const bool in_flight = motion(body) != nullptr;
+  // The box has been grown by what features are looked for; a plane is one for good.
+  const double farther = in_flight ? 0.0 : state(body).way() - reach_of_features(state(body));
+  const double beyond = margin + farther + (in_flight ? 0.0 : state(plane).way());
+  return h.normal.dot(box.center()) - h.offset - h.normal.cwiseAbs().dot(half) <= beyond;
+}
+
+void FclContactSource::Impl::add_pair(Index a, Index b) {
+  if (may_meet(a, b)) pairs.push_back({std::min(a, b), std::max(a, b)});
+}
+
+void FclContactSource::Impl::find_pairs() {
+  pairs.clear();
+  const auto visit = [](Object* s, Object* t, void* self) {
+    const Index a = static_cast<const FclPlace*>(s)->body(), b = static_cast<const FclPlace*>(t)->body();
+    if (a != b) static_cast<Impl*>(self)->add_pair(a, b);
+    return false;
+  };
+  if (some.empty())
+    manager.collide(this, visit);
+  else
+    for_each_asked([&](Index i) {
+      if (at(i).placed) manager.collide(&at(i).fcl->broad(), this, visit);
+    });
+  for (const Index plane : planes)
+    for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i)
+      if (contains(i) && at(i).placed && (asked_for(i) || asked_for(plane)) && may_meet(plane, i) &&
+          planes_meet(plane, i))
+        add_pair(plane, i);
+  std::ranges::sort(pairs);
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+}
+
+double FclContactSource::Impl::reach(const BodyPair& pair) const {
+  const BodyState &s = state(pair.a), &t = state(pair.b);
+  const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
+  const bool plane = planes.contains(pair.a) || planes.contains(pair.b);
+  return margin + (plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t)));
+}
+
+RegionSide FclContactSource::Impl::region_side(Index body) const {
+  const auto* modal = at(body).fcl->modal();
+  if (modal == nullptr || !modal->surface->model()->data().residual_compliance) return {};
+  return {modal->surface.get(), state(body).pose.q};
+}
+
+ContactSpacing FclContactSource::Impl::spacing(const BodyPair& pair, bool by_regions) const {
+  const FclBody &a = *at(pair.a).fcl, &b = *at(pair.b).fcl;
+  if (a.modes() == 0 && b.modes() == 0) return {};
+  if (by_regions) return {.share = options.region_spacing};
+  return {.length = options.spacing * std::min(a.diagonal(), b.diagonal())};
+}
+
+void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts,
+                                          ContactRegions& regions) {
+  const std::size_t first = contacts.size();
+  touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), origin, contacts);
+  for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
+  const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
+  const bool yields = sides[0].surface != nullptr || sides[1].surface != nullptr;
+  const auto known = kept.find(pair);
+  clusters.reduce(contacts, first, spacing(pair, yields),
+                  known == kept.end() ? std::span<const std::uint64_t>() : std::span(known->second), yields);
+  if (yields) region_finder.find(clusters, sides, regions);
+  regions.counts.resize(contacts.size(), {0, 0});
+}
+
+void FclContactSource::Impl::keep(const std::vector<ContactPoint>& contacts) {
+  std::erase_if(kept, [this](const auto& entry) { return asked_for(entry.first.a) || asked_for(entry.first.b); });
+  for (const ContactPoint& c : contacts) kept[{c.a.body, c.b.body}].push_back(c.id);
+}
+
+MovingBody FclContactSource::Impl::moving_body(Index body) const {
+  const FclBody& b = *at(body).fcl;
+  MovingBody result{.geometry = b.rigid(), .motion = motion(body)};
+  if (b.modal() != nullptr) result.surface = b.modal()->surface;
+  if (result.motion == nullptr) result.pose = state(body).pose, result.amplitudes = state(body).amplitudes;
+  return result;
+}
+
+FclContactSource::FclContactSource(const FclContactOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+FclContactSource::~FclContactSource() = default;
+FclContactSource::FclContactSource(FclContactSource&&) noexcept = default;
+FclContactSource& FclContactSource::operator=(FclContactSource&&) noexcept = default;
+
+void FclContactSource::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
+  Impl& m = *impl_;
+  if ((geometry.model == nullptr) == (geometry.shape == nullptr))
+    throw InvalidArgument("FclContactSource::add_body: body " + std::to_string(body) + " has " +
+                          (geometry.model ? "both a model and a shape" : "neither a model nor a shape") +
+                          ", expected one of them");
+  if (body < 0 || m.contains(body))
+    throw InvalidArgument("FclContactSource::add_body: index " + std::to_string(body) +
+                          (body < 0 ? "" : " holds a body") + ", expected a free index of at least 0");
+  Impl::Known fresh{.filter = filter};
+  if (geometry.model)
+    fresh.fcl = std::make_unique<FclBody>(body, m.geometries.get(geometry.model, geometry.skin));
+  else
+    fresh.fcl = std::make_unique<FclBody>(body, m.geometries.get(geometry.shape));
+  if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
+  if (fresh.fcl->half_space() != nullptr) m.planes.insert(body);
+  m.at(body) = std::move(fresh);
+}
+
+void FclContactSource::remove_body(Index body) {
+  Impl::Known& known = impl_->present(body, "remove_body");
+  if (known.placed) impl_->manager.unregisterObject(&known.fcl->broad());
+  for (const Index other : known.apart) impl_->at(other).apart.erase(body);
+  std::erase_if(impl_->kept, [&](const auto& entry) { return entry.first.a == body || entry.first.b == body; });
+  impl_->planes.erase(body);
+  known = {};
+}
+
+void FclContactSource::set_filter(Index body, const CollisionFilter& filter) {
+  impl_->present(body, "set_filter").filter = filter;
+}
+
+void FclContactSource::exclude_pair(Index a, Index b, bool excluded) {
+  Impl::Known &s = impl_->present(a, "exclude_pair"), &t = impl_->present(b, "exclude_pair");
+  if (a == b)
+    throw InvalidArgument("FclContactSource::exclude_pair: body " + std::to_string(a) +
+                          " and itself, expected two bodies");
+  if (excluded)
+    s.apart.insert(b), t.apart.insert(a);
+  else
+    s.apart.erase(b), t.apart.erase(a);
+}
+
+void FclContactSource::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs&) {
+  Impl& m = *impl_;
+  check_length("margin", query.margin);
+  if (!query.origin.allFinite())
+    throw InvalidArgument("FclContactSource: origin is not finite, expected finite coordinates");
+  m.states = query.states, m.motions = {}, m.some = query.bodies;
+  m.margin = query.margin, m.origin = query.origin;
+  StageClock clock(query.times);
+  m.place_all();
+  m.find_pairs();
+  clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
+  contacts.clear();
+  ContactRegions& regions = m.some.empty() ? m.regions_of_all : m.regions_of_some;
+  regions.clear();
+  for (const BodyPair& pair : m.pairs) m.find_in_pair(pair, contacts, regions);
+  regions.give_to(contacts);
+  m.keep(contacts);
+  clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
+}
+
+void FclContactSource::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs&) {
+  Impl& m = *impl_;
+  check_length("step", query.step);
+  check_length("margin", query.margin);
+  m.states = query.states, m.motions = query.motions, m.some = query.bodies;
+  m.margin = query.margin;
+  m.place_all();
+  m.find_pairs();
+  impacts.clear();
+  for (const BodyPair& pair : m.pairs) {
+    if (m.motion(pair.a) == nullptr && m.motion(pair.b) == nullptr) continue;
+    if (std::ranges::binary_search(query.except, std::pair(pair.a, pair.b))) continue;
+    using Status = ImpactTime::Status;
+    const ImpactTime t = m.time_of_impact.find(m.moving_body(pair.a), m.moving_body(pair.b), query.step, query.margin);
+    if (t.status == Status::kImpact || t.status == Status::kResting)
+      impacts.push_back({.a = pair.a, .b = pair.b, .time = t.time, .resting = t.status == Status::kResting});
+  }
+  std::sort(impacts.begin(), impacts.end(),
+            [](const Impact& i, const Impact& j) { return std::tie(i.time, i.a, i.b) < std::tie(j.time, j.a, j.b); });
+}
+
+void FclContactSource::save_state(StateWriter& state) const {
+  std::vector<PairIds> pairs;
+  std::vector<std::uint64_t> ids;
+  for (const auto& [pair, of] : impl_->kept) {
+    pairs.push_back({pair, ids.size(), of.size()});
+    ids.insert(ids.end(), of.begin(), of.end());
+  }
+  state(pairs, ids);
+}
+
+void FclContactSource::restore_state(StateReader& state) {
+  std::vector<PairIds> pairs;
+  std::vector<std::uint64_t> ids;
+  state(pairs, ids);
+  impl_->kept.clear();
+  for (const PairIds& p : pairs) {
+    const auto first = ids.begin() + static_cast<std::ptrdiff_t>(p.first);
+    impl_->kept[p.pair].assign(first, first + static_cast<std::ptrdiff_t>(p.count));
+  }
+  for (Impl::Known& known : impl_->bodies) known.placed_asleep = false;
+}
+
+}  // namespace limber
