@@ -80,7 +80,7 @@ TEST(ContactRun, AStackOfBlocksRestsAlikeWhoeverFindsTheContactsAndABuildWithout
   } catch (const InputError& e) {
     refused = e.what();
   }
-  if (!refused.empty()) EXPECT_THAT(refused, ::testing::HasSubstr("contact.finder: is \"fcl\", and this build"));
+  EXPECT_THAT(refused, ::testing::AnyOf("", ::testing::HasSubstr("contact.finder: is \"fcl\", and this build")));
   EXPECT_THROW(play(stack("ode")), InputError);
 }
 
