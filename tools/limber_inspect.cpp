@@ -165,6 +165,67 @@ std::string body_text(const ModalModel& model, std::size_t number) {
   return text;
 }
 
+std::string limits_text(const JointSpec& joint) {
+  const auto range = [](const Interval& i, const char* unit) {
+    return i.open() ? std::string() : fmt::format(", {:.4g} to {:.4g} {}", i.low, i.high, unit);
+  };
+  std::string text = range(joint.limits.rotation, "rad");
+  for (const Interval& i : joint.limits.translation) text += range(i, "m");
+  if (std::isfinite(joint.limits.cone)) text += fmt::format(", cone {:.4g} rad", joint.limits.cone);
+  for (const Interval& i : joint.limits.euler) text += range(i, "rad");
+  return text;
+}
+
+std::string body_name(const Asset& asset, Index body) {
+  return body == AssetJoint::kWorld ? "the world" : "\"" + asset.bodies[static_cast<std::size_t>(body)]->name() + "\"";
+}
+
+std::string joints_text(const Asset& asset) {
+  std::string text;
+  for (const AssetJoint& joint : asset.joints) {
+    const Vec3& at = joint.spec.frame.origin;
+    text += fmt::format("joint {} to {}: {} at ({:.4g}, {:.4g}, {:.4g}) m{}", body_name(asset, joint.a),
+                        body_name(asset, joint.b), to_string(joint.spec.type), at.x(), at.y(), at.z(),
+                        limits_text(joint.spec));
+    text += fmt::format(", patch {:.3g} m", joint.patch_radius);
+    for (const JointActuation& a : joint.coordinates)
+      text += fmt::format("{}{}{}", a.motor_max_force > 0.0 ? ", motor" : "",
+                          a.drive_stiffness > 0.0 || a.drive_damping > 0.0 ? ", drive" : "",
+                          a.friction > 0.0 ? ", friction" : "");
+    text += "\n";
+  }
+  for (const auto& [a, b] : asset.apart)
+    text += fmt::format("no contacts between {} and {}\n", body_name(asset, a), body_name(asset, b));
+  return text;
+}
+
+Json interval_report(const Interval& i) {
+  const auto end = [](double x) { return std::isfinite(x) ? Json(x) : Json(); };
+  return Json::array({end(i.low), end(i.high)});
+}
+
+void report_machine(const Asset& asset, Json& report) {
+  report["joints"] = Json::array();
+  for (const AssetJoint& joint : asset.joints) {
+    const JointLimits& l = joint.spec.limits;
+    report["joints"].push_back(
+        {{"a", joint.a == AssetJoint::kWorld ? Json() : Json(asset.bodies[static_cast<std::size_t>(joint.a)]->name())},
+         {"b", asset.bodies[static_cast<std::size_t>(joint.b)]->name()},
+         {"type", to_string(joint.spec.type)},
+         {"origin", vector(joint.spec.frame.origin)},
+         {"axis", vector(joint.spec.frame.axes.col(joint.spec.type == JointType::kPlanar ? 2 : 0))},
+         {"rotation", interval_report(l.rotation)},
+         {"translation", Json::array({interval_report(l.translation[0]), interval_report(l.translation[1])})},
+         {"cone", std::isfinite(l.cone) ? Json(l.cone) : Json()},
+         {"patch_radius", joint.patch_radius},
+         {"collide", joint.collide}});
+  }
+  report["apart"] = Json::array();
+  for (const auto& [a, b] : asset.apart)
+    report["apart"].push_back(
+        {asset.bodies[static_cast<std::size_t>(a)]->name(), asset.bodies[static_cast<std::size_t>(b)]->name()});
+}
+
 std::string provenance_text(const Provenance& p) {
   if (p.input.empty() && p.tool.empty()) return "";
   return fmt::format("baked from {} by {}{}\n", p.input.empty() ? "?" : p.input, p.tool.empty() ? "?" : p.tool,
@@ -207,6 +268,8 @@ void inspect(Program& program, const Arguments& a) {
     report["bodies"].push_back(body_report(*asset.bodies[i]));
     warn(*asset.bodies[i], program.warnings());
   }
+  program.print(joints_text(asset));
+  report_machine(asset, report);
   if (!a.frequencies.empty()) program.write_file(a.frequencies, frequencies_csv(asset));
 }
 
@@ -215,7 +278,8 @@ void inspect(Program& program, const Arguments& a) {
 
 int main(int argc, char** argv) {
   using namespace limber::tools;
-  Program program("limber-inspect", "Tells what is inside an asset: bodies, modes, frequencies, mass, sizes, memory.");
+  Program program("limber-inspect",
+                  "Tells what is inside an asset: bodies, modes, frequencies, mass, sizes, memory, joints.");
   Arguments arguments;
   program.options().add_option("ASSET.glb", arguments.asset, "asset file, as limber-precompute makes it")->required();
   program.options()

@@ -162,11 +162,15 @@ void declare_assembly_options(CLI::App& app, Arguments& a) {
   app.add_option("--rigid", a.assembly.rigid, "component that does not bend, or '*' for all; repeatable")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_option("--ground", a.assembly.ground,
-                 "component that stands still in the scene; repeatable; default: the first")
+  app.add_option("--ground", a.assembly.ground, "component that stands still; repeatable; default: the first")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_flag("--no-ground", a.assembly.free, "no component stands still in the scene");
+  app.add_flag("--no-ground", a.assembly.free, "no component stands still");
+  app.add_flag(
+      "--no-joint-modes", [&a](std::int64_t) { a.assembly.joint_compliance = false; },
+      "of an assembly: leave out the up to six modes of a part for each of its joints, by which it answers exactly "
+      "what "
+      "the joint does to it at rest");
 }
 
 // Meaning -----------------------------------------------------------------------------------------------------------
@@ -426,11 +430,11 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
   for (const auto& body : baked.asset.bodies)
     program.print(fmt::format("{:<24} {:>10.4g} kg  {:>3} modes\n", body->name(), body->data().mass, body->modes()));
   program.print(fmt::format("{}: {} bodies, {} joints, {:.2f} MB\n", a.output, baked.asset.bodies.size(),
-                            baked.joints.joints.size(), 1e-6 * static_cast<double>(bytes.size())));
+                            baked.asset.joints.size(), 1e-6 * static_cast<double>(bytes.size())));
   if (a.scene.empty()) return;
   const fs::path folder = fs::absolute(a.scene).parent_path();
-  program.write_file(a.scene,
-                     assembly_scene(baked, assembly, fs::absolute(a.output).lexically_relative(folder).string()));
+  program.write_file(a.scene, machine_scene(fs::path(a.mesh).stem().string(),
+                                            fs::absolute(a.output).lexically_relative(folder).string()));
 }
 
 void precompute(Program& program, const Arguments& a) {

@@ -8,49 +8,122 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 
 #include "empty_page.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/view/page_file.h"
 #include "program.h"
 
 namespace limber::tools {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Arguments {
-  std::string input, page, up = "z";
+  std::string input, page, joints, up = "z";
+  std::vector<std::string> bake;
 };
 
-PageContent content_of(const Arguments& arguments) {
-  const std::filesystem::path input = arguments.input;
-  const std::string extension = input.extension().string();
-  if (extension == ".json") return page_of_scene(input);
-  if (extension == ".glb") return page_of_asset(input, arguments.up == "y" ? UpAxis::kY : UpAxis::kZ);
-  throw InputError(fmt::format("{}: expected a scene (.json) or an asset (.glb); bake meshes with limber-precompute",
-                               input.string()));
+/// How an assembly is baked where nothing is said.
+constexpr const char* kBake[] = {"--material", "nylon", "--modes", "6", "--damping-ratio", "0.03@50,500"};
+
+std::string joined(std::span<const char* const> words) {
+  std::string text;
+  for (const char* word : words) text += (text.empty() ? "" : " ") + std::string(word);
+  return text;
 }
 
 /// A folder that nobody else can write to.
-std::filesystem::path temporary_page(const std::filesystem::path& input) {
-  std::string folder = (std::filesystem::temp_directory_path() / "limber-view-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) throw InputError(folder + ": cannot be made; give the page's place by -o");
-  return std::filesystem::path(folder) / (input.stem().string() + ".html");
+fs::path temporary_folder() {
+  std::string folder = (fs::temp_directory_path() / "limber-view-XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) throw InputError(folder + ": cannot be made; is TMPDIR a folder to write to?");
+  return folder;
 }
 
-/// @return whether the desktop took it
-bool opened(const std::string& page) {
-  std::string program = "xdg-open", argument = page;
-  char* const arguments[] = {program.data(), argument.data(), nullptr};
+/// One that goes with what is in it.
+struct ScratchFolder {
+  fs::path path = temporary_folder();
+  ScratchFolder() = default;
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+};
+
+/// Runs a program; what it prints is printed. @return its exit code; none: it could not be started
+std::optional<int> exit_code_of(const std::string& program, std::vector<std::string> arguments) {
+  std::vector<char*> pointers;
+  std::string name = program;
+  pointers.push_back(name.data());
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
   pid_t process = 0;
-  if (posix_spawnp(&process, "xdg-open", nullptr, nullptr, arguments, environ) != 0) return false;
+  if (posix_spawnp(&process, program.c_str(), nullptr, nullptr, pointers.data(), environ) != 0) return std::nullopt;
   int status = 0;
-  return waitpid(process, &status, 0) == process && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  if (waitpid(process, &status, 0) != process || !WIFEXITED(status)) return std::nullopt;
+  return WEXITSTATUS(status);
 }
+
+/// The program of this name beside this one, or else on the PATH.
+std::string neighbour(const char* name) {
+  std::error_code failed;
+  const fs::path self = fs::read_symlink("/proc/self/exe", failed);
+  const fs::path beside = self.parent_path() / name;
+  return !failed && fs::exists(beside, failed) ? beside.string() : name;
+}
+
+/// An assembly: its joints are found and its parts baked by limber-precompute, a program of its own because of the
+/// licences of what it links.
+PageContent page_of_assembly(const fs::path& input, const std::vector<std::string>& bake) {
+  const ScratchFolder folder;
+  const fs::path asset = folder.path / (input.stem().string() + ".glb");
+  std::vector<std::string> arguments{input.string(), "--auto-joints", "-o", asset.string()};
+  if (bake.empty())
+    arguments.insert(arguments.end(), std::begin(kBake), std::end(kBake));
+  else
+    arguments.insert(arguments.end(), bake.begin(), bake.end());
+  const std::optional<int> code = exit_code_of(neighbour("limber-precompute"), std::move(arguments));
+  if (!code)
+    throw InputError(
+        fmt::format("{}: an assembly needs limber-precompute, which is neither beside limber-view nor on "
+                    "the PATH; where it is, run limber-precompute {} --auto-joints -o machine.glb, then "
+                    "limber-view machine.glb here",
+                    input.string(), input.string()));
+  if (*code != 0)
+    throw InputError(
+        fmt::format("{}: limber-precompute could not bake it (see above); its options go after --", input.string()));
+  return page_of_asset(asset);
+}
+
+PageContent content_of(Program& program, const Arguments& arguments) {
+  const fs::path input = arguments.input;
+  const std::string extension = input.extension().string();
+  if (!arguments.joints.empty()) {
+    program.add_input(arguments.joints);
+    return page_of_pose(read_any_grouped_surface(input, program.warnings()), read_joints(arguments.joints),
+                        input.stem().string(), "\"" + fs::path(arguments.joints).filename().string() + "\"");
+  }
+  if (extension == ".json") return page_of_scene(input);
+  if (extension == ".glb" && arguments.bake.empty())
+    return page_of_asset(input, arguments.up == "y" ? UpAxis::kY : UpAxis::kZ);
+  if (!fs::exists(input)) throw InputError(input.string() + ": is not there");
+  return page_of_assembly(input, arguments.bake);
+}
+
+fs::path temporary_page(const fs::path& input) { return temporary_folder() / (input.stem().string() + ".html"); }
+
+/// @return whether the desktop took it
+bool opened(const std::string& page) { return exit_code_of("xdg-open", {page}) == 0; }
 
 void view(Program& program, const Arguments& arguments) {
   program.add_input(arguments.input);
-  const PageContent content = content_of(arguments);
+  const PageContent content = content_of(program, arguments);
   const std::string page = page_with(empty_page(), content);
   program.report()["files"] = content.files.size();
   program.report()["bytes"] = page.size();
@@ -70,14 +143,26 @@ void view(Program& program, const Arguments& arguments) {
 }  // namespace limber::tools
 
 int main(int argc, char** argv) {
-  limber::tools::Program program("limber-view",
-                                 "Writes a scene or an asset as one HTML page, engine inside, in which bodies are "
-                                 "dragged, poked, pinned and dropped. It needs no network and no server.");
+  limber::tools::Program program(
+      "limber-view",
+      "Writes a scene, an asset or an assembly as one HTML page, engine inside, in which bodies are dragged, poked, "
+      "pinned and dropped; or, with --joints, a model that is posed. The page needs no network and no server.");
   limber::tools::Arguments arguments;
-  program.options().add_option("INPUT", arguments.input, "scene (.json) or asset (.glb)")->required();
+  program.options()
+      .add_option("INPUT", arguments.input,
+                  "scene (.json), asset (.glb), or the surface of an assembly (OBJ, STL, PLY, glTF, ...), whose "
+                  "joints are found and whose parts are baked first")
+      ->required();
+  program.options().add_option(
+      "BAKE", arguments.bake,
+      "after --: how limber-precompute bakes the assembly; default: " + limber::tools::joined(limber::tools::kBake));
   program.options()
       .add_option("-o,--output", arguments.page, "page to write; without it a temporary one is opened")
       ->type_name("FILE.html");
+  program.options()
+      .add_option("--joints", arguments.joints,
+                  "joints file of a surface: a page in which it is posed, and its joints edited")
+      ->type_name("JOINTS.json");
   program.options()
       .add_option("--up", arguments.up, "of an asset: the axis of its mesh that points up")
       ->check(CLI::IsMember({"y", "z"}))

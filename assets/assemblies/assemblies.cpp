@@ -74,8 +74,8 @@ const std::vector<std::string>& tuning_names() {
 }
 
 const std::vector<std::string>& held_out_names() {
-  static const std::vector<std::string> names = {"telescope", "gimbal", "dovetail", "stack",  "drop link",
-                                                 "spindle",   "latch",  "gate",     "caster", "cardan"};
+  static const std::vector<std::string> names = {"telescope", "gimbal", "dovetail", "stack",  "drop link", "spindle",
+                                                 "latch",     "gate",   "caster",   "cardan", "four-bar"};
   return names;
 }
 

@@ -178,14 +178,47 @@ void cardan(Builder& b) {
   b.truth("upper yoke", "cross", JointType::kRevolute, at(Vec3::Zero(), y));
 }
 
+/// Crank, coupler and rocker on a frame: a closed chain of four hinges. Each turns in a layer of its own, so that
+/// the crank goes round.
+void four_bar(Builder& b) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), layer = 0.034 * y;
+  const double r = 0.01, h = 0.012, crank = 0.05, coupler = 0.12, rocker = 0.09, ground = 0.13, angle = 60 * kDegree;
+  const Vec3 fixed = Vec3::Zero(), far = ground * x, pin(crank * std::cos(angle), 0, crank * std::sin(angle));
+  // Where the circles of coupler and rocker meet above the frame.
+  const Vec3 between = far - pin;
+  const double d = between.norm(), along = (d * d + coupler * coupler - rocker * rocker) / (2 * d);
+  const Vec3 across = y.cross(between) / d;
+  const Vec3 knee = pin + along * between / d - std::sqrt(coupler * coupler - along * along) * across;
+  const auto hinge = [&](const std::string& a, const std::string& part, const Vec3& place) {
+    b.hinge(a, part, at(place, y), r, h);
+    b.range_unknown();
+  };
+  /// From the end of a shaft to a sleeve in the next layer.
+  const auto link = [&](const std::string& part, const Vec3& from, const Vec3& to) {
+    const Vec3 way = (to - from).normalized();
+    b.bar(part, from + 0.016 * y, from + layer, 0.01);
+    b.bar(part, from + layer - 0.005 * way, to + layer - 0.015 * way, 0.01);
+  };
+  hinge("frame", "crank", fixed);
+  hinge("frame", "rocker", far);
+  b.bar("frame", fixed + 0.015 * x, far - 0.015 * x, 0.01);
+  link("crank", fixed, pin);
+  link("rocker", far, knee);
+  hinge("crank", "coupler", pin + layer);
+  hinge("rocker", "coupler", knee + layer);
+  for (const Vec3& end : {pin, knee}) b.bar("coupler", end + layer + 0.016 * y, end + 2 * layer, 0.01);
+  const Vec3 way = (knee - pin).normalized();
+  b.bar("coupler", pin + 2 * layer - 0.005 * way, knee + 2 * layer + 0.005 * way, 0.01);
+}
+
 }  // namespace
 
 const std::map<std::string, Recipe>& held_out_recipes() {
-  static const std::map<std::string, Recipe> all = {{"telescope", {telescope, false}}, {"gimbal", {gimbal, true}},
-                                                    {"dovetail", {dovetail, false}},   {"stack", {stack, false}},
-                                                    {"drop link", {drop_link, true}},  {"spindle", {spindle, true}},
-                                                    {"latch", {latch, true}},          {"gate", {gate, true}},
-                                                    {"caster", {caster, true}},        {"cardan", {cardan, true}}};
+  static const std::map<std::string, Recipe> all = {
+      {"telescope", {telescope, false}}, {"gimbal", {gimbal, true}},       {"dovetail", {dovetail, false}},
+      {"stack", {stack, false}},         {"drop link", {drop_link, true}}, {"spindle", {spindle, true}},
+      {"latch", {latch, true}},          {"gate", {gate, true}},           {"caster", {caster, true}},
+      {"cardan", {cardan, true}},        {"four-bar", {four_bar, true}}};
   return all;
 }
 

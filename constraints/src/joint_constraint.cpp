@@ -56,21 +56,6 @@ Vec3 euler_rate_change(const Mat3& Q, const Mat3& dQ, int i) {
 
 }  // namespace
 
-void JointActuation::validate() const {
-  const auto number = [](double value, const char* name, double least) {
-    if (!(value >= least && std::isfinite(value)))
-      throw InvalidArgument(std::string("JointActuation: ") + name + " is " + std::to_string(value) +
-                            ", expected a finite number" + (least == 0.0 ? " of at least 0" : ""));
-  };
-  constexpr double kAny = -std::numeric_limits<double>::max();
-  number(motor_velocity, "motor_velocity", kAny);
-  number(motor_max_force, "motor_max_force", 0.0);
-  number(drive_target, "drive_target", kAny);
-  number(drive_stiffness, "drive_stiffness", 0.0);
-  number(drive_damping, "drive_damping", 0.0);
-  number(friction, "friction", 0.0);
-}
-
 JointConstraint::JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec)
     : a_(std::move(a)), b_(std::move(b)), spec_(spec), freedoms_(coordinate_count(spec.type)) {
   spec_.validate();

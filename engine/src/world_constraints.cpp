@@ -101,6 +101,21 @@ void World::remove_joint(JointId id) {
   impl_->constraints.remove(id.index);
 }
 
+void World::set_apart(BodyId a, BodyId b, bool apart) {
+  impl_->entry(a, "set_apart"), impl_->entry(b, "set_apart");
+  if (a == b) throw InvalidArgument("World::set_apart: both bodies are the same");
+  const Impl::Apart pair{.a = static_cast<Index>(std::min(a.index, b.index)),
+                         .b = static_cast<Index>(std::max(a.index, b.index)),
+                         .joint = Impl::Apart::kNoJoint};
+  const auto found = std::find(impl_->apart.begin(), impl_->apart.end(), pair);
+  if (apart == (found != impl_->apart.end())) return;
+  if (apart)
+    impl_->keep_apart(pair.a, pair.b, pair.joint);
+  else
+    impl_->let_meet(found);
+  impl_->sleep.wake(pair.a), impl_->sleep.wake(pair.b);
+}
+
 bool World::contains(JointId id) const { return impl_->find(id) != nullptr; }
 
 void World::set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation) {
@@ -206,7 +221,10 @@ void World::Impl::keep_apart(Index a, Index b, std::uint32_t joint) {
 /// What a joint that is removed kept apart.
 void World::Impl::let_meet(std::uint32_t joint) {
   const auto found = std::find_if(apart.begin(), apart.end(), [&](const Apart& pair) { return pair.joint == joint; });
-  if (found == apart.end()) return;
+  if (found != apart.end()) let_meet(found);
+}
+
+void World::Impl::let_meet(std::vector<Apart>::iterator found) {
   const Apart pair = *found;
   apart.erase(found);
   if (!are_apart(pair.a, pair.b)) tell_apart(pair.a, pair.b, false);

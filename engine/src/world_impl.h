@@ -53,8 +53,9 @@ struct World::Impl {
     bool placed = false;             // of a static one: the source has seen where it stands
     bool held = false;               // in an island in the last step, or its last part
   };
-  /// Two bodies that do not meet as long as some joint between them stands.
+  /// Two bodies that do not meet as long as some joint between them stands, or until someone lets them.
   struct Apart {
+    static constexpr std::uint32_t kNoJoint = 0xffffffff;
     Index a, b;
     std::uint32_t joint;  // its place
 
@@ -169,6 +170,7 @@ struct World::Impl {
   bool are_apart(Index a, Index b) const;
   void keep_apart(Index a, Index b, std::uint32_t joint);
   void let_meet(std::uint32_t joint);
+  void let_meet(std::vector<Apart>::iterator found);
   void set_apart(std::span<const Apart> pairs);
   void save_structure(StateWriter& state) const;
   void save_motion(StateWriter& state) const;

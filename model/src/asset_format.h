@@ -19,6 +19,7 @@ static_assert(std::endian::native == std::endian::little,
 inline constexpr char kExtension[] = "LIMBER_modal";
 inline constexpr int kFormatVersion = 1;
 inline constexpr int kSkinVersion = 1;
+inline constexpr int kMachineVersion = 1;
 inline constexpr std::string_view kHashPrefix = "sha256:";
 
 /// The content hash: provenance, then the numbers of every body, then the whole BIN chunk. It does not depend on how
@@ -66,6 +67,18 @@ class ContentHash {
     }
   }
 
+  /// After all bodies; nothing where there are neither joints nor pairs.
+  void add_machine(const std::vector<AssetJoint>& joints, const std::vector<std::array<Index, 2>>& apart) {
+    if (joints.empty() && apart.empty()) return;
+    add(std::string_view("machine"));
+    add(static_cast<std::uint64_t>(kMachineVersion));
+    add(std::uint64_t{joints.size()});
+    for (const AssetJoint& joint : joints) add_joint(joint);
+    add(std::uint64_t{apart.size()});
+    for (const auto& pair : apart)
+      for (const Index body : pair) add(static_cast<std::int64_t>(body));
+  }
+
   /// As the file holds it. Call once, last.
   std::string finish(std::string_view binary) {
     hash_.update(binary);
@@ -85,6 +98,29 @@ class ContentHash {
   }
   void add(const Mat3& m) {
     for (int row = 0; row < 3; ++row) add(Vec3(m.row(row)));
+  }
+  void add(const Interval& i) {
+    add(i.low);
+    add(i.high);
+  }
+  void add_joint(const AssetJoint& joint) {
+    add(static_cast<std::int64_t>(joint.a));
+    add(static_cast<std::int64_t>(joint.b));
+    add(to_string(joint.spec.type));
+    add(joint.spec.frame.origin);
+    add(joint.spec.frame.axes);
+    add(joint.spec.pitch);
+    add(joint.spec.limits.rotation);
+    for (const Interval& i : joint.spec.limits.translation) add(i);
+    add(joint.spec.limits.cone);
+    for (const Interval& i : joint.spec.limits.euler) add(i);
+    add(joint.patch_radius);
+    add(std::uint64_t{joint.collide});
+    add(std::uint64_t{joint.coordinates.size()});
+    for (const JointActuation& a : joint.coordinates)
+      for (const double x :
+           {a.motor_velocity, a.motor_max_force, a.drive_target, a.drive_stiffness, a.drive_damping, a.friction})
+        add(x);
   }
   void add_counts(const ModalSurface& surface) {
     add(std::uint64_t{surface.rest.size()});

@@ -5,6 +5,7 @@
 
 #include "accessor_type.h"
 #include "asset_format.h"
+#include "asset_machine.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/internal/strict_json.h"
@@ -351,6 +352,8 @@ class BodyReader {
 struct FileBlock {
   Provenance provenance;
   std::string content_hash;
+  const json* machine = nullptr;  ///< none: no joints
+  std::string machine_place;
 };
 
 FileBlock read_file_block(const JsonObject& root) {
@@ -371,7 +374,9 @@ FileBlock read_file_block(const JsonObject& root) {
                                .input = provenance.text("input"),
                                .input_hash = provenance.text("input_hash"),
                                .options = provenance.text("options")},
-                .content_hash = block.text("content_hash")};
+                .content_hash = block.text("content_hash"),
+                .machine = block.has("machine") ? &block.at("machine") : nullptr,
+                .machine_place = block.where("machine")};
   provenance.finish();
   block.finish();
   return out;
@@ -393,7 +398,7 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   for (const char* unread : {"asset", "scene", "scenes", "nodes", "materials", "extensionsUsed"})
     (void)root.has(unread);
 
-  Asset asset{.bodies = {}, .provenance = block.provenance};
+  Asset asset{.bodies = {}, .provenance = block.provenance, .joints = {}, .apart = {}};
   std::vector<ModalModelData> bodies;
   std::set<std::string> names;
   BinaryPieces pieces(root, binary);
@@ -407,6 +412,9 @@ Asset read_document(const json& document, std::string_view binary, const std::st
 
   ContentHash hash(block.provenance, bodies.size());
   for (const ModalModelData& body : bodies) hash.add_body(body);
+  if (block.machine != nullptr)
+    internal::read_machine(*block.machine, block.machine_place, static_cast<Index>(bodies.size()), asset);
+  hash.add_machine(asset.joints, asset.apart);
   if (hash.finish(binary) != block.content_hash)
     throw InputError(name + ": its content does not match its content_hash" + kNotAnAsset);
   for (ModalModelData& body : bodies) asset.bodies.push_back(checked_model(std::move(body), name));

@@ -1,7 +1,9 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "asset_format.h"
+#include "asset_machine.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/model/asset.h"
@@ -181,6 +183,34 @@ void check(const Asset& asset) {
                             " modes, expected at most " + std::to_string(kMaxMorphTargets) +
                             ", as viewers take no more morph targets; keep fewer (--modes)");
   }
+  const auto bodies = static_cast<Index>(asset.bodies.size());
+  const auto require_two = [&](Index a, Index b, Index least, const char* what) {
+    if (a < least || a >= bodies || b < 0 || b >= bodies || a == b)
+      throw InvalidArgument(std::string("asset_bytes: ") + what + " is of bodies " + std::to_string(a) + " and " +
+                            std::to_string(b) + ", expected two of " + std::to_string(bodies));
+  };
+  for (const auto& [a, b] : asset.apart) require_two(a, b, 0, "a pair that does not collide");
+  for (const AssetJoint& joint : asset.joints) {
+    require_two(joint.a, joint.b, AssetJoint::kWorld, "a joint");
+    joint.spec.validate();
+    if (!(joint.patch_radius >= 0.0 && std::isfinite(joint.patch_radius)))
+      throw InvalidArgument("asset_bytes: a joint's patch_radius is " + std::to_string(joint.patch_radius) +
+                            " m, expected a finite number of at least 0");
+    const JointFreedoms free = freedoms(joint.spec.type);
+    if (joint.coordinates.size() > static_cast<std::size_t>(free.rotations + free.translations))
+      throw InvalidArgument("asset_bytes: a " + std::string(to_string(joint.spec.type)) + " joint has " +
+                            std::to_string(joint.coordinates.size()) + " coordinates, more than its type");
+    for (const JointActuation& a : joint.coordinates) a.validate();
+  }
+}
+
+/// The block, and what it says under the hash: frames are read orthonormal to the last digit.
+json add_machine(const Asset& asset, ContentHash& hash) {
+  json block = internal::machine_block(asset);
+  Asset told;
+  internal::read_machine(block, "asset_bytes: machine", static_cast<Index>(asset.bodies.size()), told);
+  hash.add_machine(told.joints, told.apart);
+  return block;
 }
 
 }  // namespace
@@ -194,13 +224,14 @@ std::string asset_bytes(const Asset& asset) {
   const int material = glb.add_material(
       {.name = "limber", .base_color = {0.62f, 0.70f, 0.78f, 1.0f}, .roughness = 0.55f, .double_sided = true});
   for (const auto& body : asset.bodies) add_body(glb, *body, material, hash);
-  const json block = {{"version", asset_format::kFormatVersion},
-                      {"content_hash", hash.finish(glb.binary())},
-                      {"provenance",
-                       {{"tool", provenance.tool},
-                        {"input", provenance.input},
-                        {"input_hash", provenance.input_hash},
-                        {"options", provenance.options}}}};
+  json block = {{"version", asset_format::kFormatVersion},
+                {"provenance",
+                 {{"tool", provenance.tool},
+                  {"input", provenance.input},
+                  {"input_hash", provenance.input_hash},
+                  {"options", provenance.options}}}};
+  if (!asset.joints.empty() || !asset.apart.empty()) block["machine"] = add_machine(asset, hash);
+  block["content_hash"] = hash.finish(glb.binary());
   glb.set_extension(asset_format::kExtension, block.dump());
   return glb.bytes();
 }

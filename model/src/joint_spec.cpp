@@ -58,4 +58,25 @@ void JointSpec::validate() const {
   if (!std::isfinite(pitch)) throw InvalidArgument("JointSpec: the pitch is not finite");
 }
 
+JointSpec JointSpec::moved_by(const RigidTransform& X) const {
+  JointSpec moved = *this;
+  moved.frame = {.origin = X * frame.origin, .axes = to_matrix(X.q) * frame.axes};
+  return moved;
+}
+
+void JointActuation::validate() const {
+  const auto number = [](double value, const char* name, double least) {
+    if (!(value >= least && std::isfinite(value)))
+      throw InvalidArgument(std::string("JointActuation: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number" + (least == 0.0 ? " of at least 0" : ""));
+  };
+  constexpr double kAny = -std::numeric_limits<double>::max();
+  number(motor_velocity, "motor_velocity", kAny);
+  number(motor_max_force, "motor_max_force", 0.0);
+  number(drive_target, "drive_target", kAny);
+  number(drive_stiffness, "drive_stiffness", 0.0);
+  number(drive_damping, "drive_damping", 0.0);
+  number(friction, "friction", 0.0);
+}
+
 }  // namespace limber

@@ -104,6 +104,38 @@ void read_joint_frame(const JsonObject& o, JointSpec& joint) {
     joint.frame.axes = turned_to(joint.frame.axes, *column, unit);
 }
 
+// Writing ----------------------------------------------------------------------------------------------------------
+
+using OrderedJson = nlohmann::ordered_json;
+
+OrderedJson number_or_null(double x) { return std::isfinite(x) ? OrderedJson(x) : OrderedJson(); }
+OrderedJson json_of(const Interval& i) { return OrderedJson::array({number_or_null(i.low), number_or_null(i.high)}); }
+OrderedJson json_of(const Vec3& v) { return OrderedJson::array({v.x(), v.y(), v.z()}); }
+
+OrderedJson json_of(const Mat3& m) {
+  OrderedJson rows = OrderedJson::array();
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) rows.push_back(m(r, c));
+  return rows;
+}
+
+/// Whether anything stops the joint.
+bool limited(const JointSpec& joint) {
+  const JointLimits& l = joint.limits;
+  if (joint.type == JointType::kBall)
+    return std::isfinite(l.cone) ||
+           std::any_of(l.euler.begin(), l.euler.end(), [](const auto& i) { return !i.open(); });
+  const bool turn = has_rotation(joint.type) && !l.rotation.open();
+  const bool slide = has_translation(joint.type) && !l.translation[0].open();
+  return turn || slide || (joint.type == JointType::kPlanar && !l.translation[1].open());
+}
+
+double at_least_zero(const JsonObject& o, const std::string& key, double otherwise) {
+  const double x = o.number(key, otherwise);
+  if (x < 0.0) refuse(o.where(key), JsonObject::shown(x), "a number >= 0");
+  return x;
+}
+
 }  // namespace
 
 bool has_rotation(JointType t) {
@@ -146,6 +178,76 @@ JointSpec read_joint_kind(const JsonObject& o) {
   if (joint.pitch != 0.0 && joint.type != JointType::kCylindrical)
     throw InputError(o.where("pitch") + ": a " + std::string(to_string(joint.type)) + " joint has no pitch; remove it");
   return joint;
+}
+
+JointActuation read_joint_actuation(const nlohmann::json& value, const std::string& where) {
+  const JsonObject o(value, where);
+  JointActuation a;
+  if (o.has("motor")) {
+    const JsonObject motor(o.at("motor"), o.where("motor"));
+    a.motor_velocity = motor.number("velocity");
+    a.motor_max_force = motor.number("max_force");
+    if (!(a.motor_max_force > 0.0))
+      refuse(motor.where("max_force"), JsonObject::shown(a.motor_max_force), "a number > 0");
+    motor.finish();
+  }
+  if (o.has("drive")) {
+    const JsonObject drive(o.at("drive"), o.where("drive"));
+    a.drive_target = drive.number("target", 0.0);
+    a.drive_stiffness = at_least_zero(drive, "stiffness", 0.0);
+    a.drive_damping = at_least_zero(drive, "damping", 0.0);
+    drive.finish();
+  }
+  a.friction = at_least_zero(o, "friction", 0.0);
+  o.finish();
+  return a;
+}
+
+std::vector<JointActuation> read_joint_coordinates(const JsonObject& o, JointType type) {
+  std::vector<JointActuation> all;
+  if (o.has("coordinates"))
+    o.for_each("coordinates",
+               [&](const nlohmann::json& v, const std::string& w) { all.push_back(read_joint_actuation(v, w)); });
+  const JointFreedoms free = freedoms(type);
+  const std::size_t most = static_cast<std::size_t>(free.rotations) + static_cast<std::size_t>(free.translations);
+  if (all.size() > most)
+    refuse(o.where("coordinates"), "an array of " + std::to_string(all.size()) + " items",
+           "at most " + std::to_string(most) + ", which a " + std::string(to_string(type)) + " joint has");
+  return all;
+}
+
+void write_joint_kind(const JointSpec& joint, nlohmann::ordered_json& out) {
+  const auto column = axis_column(joint.type);
+  out["type"] = to_string(joint.type);
+  out["origin"] = json_of(joint.frame.origin);
+  out["axis"] = column ? json_of(Vec3(joint.frame.axes.col(*column))) : OrderedJson();
+  out["frame"] = json_of(joint.frame.axes);
+  if (joint.pitch != 0.0) out["pitch"] = joint.pitch;
+}
+
+nlohmann::ordered_json joint_limits_json(const JointSpec& joint) {
+  if (!limited(joint)) return {};
+  const JointLimits& l = joint.limits;
+  OrderedJson out = OrderedJson::object();
+  if (has_rotation(joint.type)) out["rotation"] = json_of(l.rotation);
+  if (joint.type == JointType::kPlanar)
+    out["translation"] = OrderedJson::array({json_of(l.translation[0]), json_of(l.translation[1])});
+  else if (has_translation(joint.type))
+    out["translation"] = json_of(l.translation[0]);
+  if (joint.type == JointType::kBall) {
+    out["cone"] = number_or_null(l.cone);
+    out["euler"] = OrderedJson::array({json_of(l.euler[0]), json_of(l.euler[1]), json_of(l.euler[2])});
+  }
+  return out;
+}
+
+nlohmann::ordered_json joint_actuation_json(const JointActuation& a) {
+  OrderedJson out = OrderedJson::object();
+  if (a.motor_max_force > 0.0) out["motor"] = {{"velocity", a.motor_velocity}, {"max_force", a.motor_max_force}};
+  if (a.drive_stiffness > 0.0 || a.drive_damping > 0.0)
+    out["drive"] = {{"target", a.drive_target}, {"stiffness", a.drive_stiffness}, {"damping", a.drive_damping}};
+  if (a.friction > 0.0) out["friction"] = a.friction;
+  return out;
 }
 
 }  // namespace limber::internal

@@ -211,12 +211,23 @@ void PosingSession::remove_handle(PoseHandle handle) {
   std::erase_if(impl_->now.handles, [&](const Handle& h) { return h.number == handle.number; });
 }
 
+bool PosingSession::contains(PoseHandle handle) const {
+  return std::any_of(impl_->now.handles.begin(), impl_->now.handles.end(),
+                     [&](const Handle& h) { return h.number == handle.number; });
+}
+
 Vec3 PosingSession::handle_point(PoseHandle handle) const { return impl_->place_of(impl_->handle(handle)); }
+Vec3 PosingSession::handle_target(PoseHandle handle) const { return impl_->handle(handle).target; }
 
 void PosingSession::set_pinned(Index part, bool pinned) {
   impl_->require(part, impl_->model.parts.size(), "part");
   if (impl_->now.pinned[static_cast<std::size_t>(part)] == pinned) return;
   impl_->change_structure([&] { impl_->now.pinned[static_cast<std::size_t>(part)] = pinned; });
+}
+
+bool PosingSession::pinned(Index part) const {
+  impl_->require(part, impl_->model.parts.size(), "part");
+  return impl_->now.pinned[static_cast<std::size_t>(part)];
 }
 
 void PosingSession::set_part(Index part, const PartOptions& options) {

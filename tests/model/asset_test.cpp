@@ -14,6 +14,7 @@
 #include "example_model.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/core/quaternion.h"
 #include "limber/model/glb.h"
 
 namespace limber {
@@ -22,6 +23,8 @@ namespace {
 using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
+
+constexpr double kOpen = std::numeric_limits<double>::infinity();
 
 /// The message of the InputError that reading gives; "accepted" if it gives none. Any other exception fails the test.
 std::string reading(const std::string& bytes) {
@@ -348,6 +351,77 @@ TEST(AssetReader, SkinsAreChecked) {
   EXPECT_THAT(change("handles", 5), HasSubstr(place + ".rest"));
   EXPECT_THAT(change("knees", 1), HasSubstr("knees"));
   EXPECT_NE(reading(with_document([](json& d) { block_of(d, 2).erase("skin"); })), "accepted");
+}
+
+/// The example with joints of every kind of number.
+Asset joined() {
+  Asset asset = example::asset();
+  const Mat3 axes = to_matrix(quaternion_from_rotation_vector({0.3, -0.2, 1.1}));
+  asset.joints.push_back({.b = 1, .spec = {.type = JointType::kFixed}, .patch_radius = 0.1, .collide = true});
+  asset.joints.push_back({.a = 0,
+                          .b = 1,
+                          .spec = {.type = JointType::kCylindrical,
+                                   .frame = {.origin = {0.1, 1.0 / 3.0, 0}, .axes = axes},
+                                   .limits = {.rotation = {-1.0 / 3.0, kOpen}, .translation = {Interval{-0.1, 0.7}}},
+                                   .pitch = 0.01},
+                          .coordinates = {{.motor_velocity = -2.0, .motor_max_force = 3.0},
+                                          {.drive_target = 0.1, .drive_stiffness = 5.0, .friction = 0.3}}});
+  asset.joints.push_back({.a = 2,
+                          .b = 0,
+                          .spec = {.type = JointType::kBall,
+                                   .frame = {.axes = axes},
+                                   .limits = {.cone = 0.7, .euler = {Interval{-kOpen, 1.0}}}}});
+  asset.apart.push_back({2, 1});
+  return asset;
+}
+
+TEST(Asset, JointsAndPairsAreReadBitForBit) {
+  const std::string bytes = asset_bytes(joined());
+  const Asset read = asset_from_bytes(bytes, "test");
+  EXPECT_EQ(read.joints, joined().joints);
+  EXPECT_EQ(read.apart, joined().apart);
+  expect_same_bytes(asset_bytes(read), bytes);
+}
+
+TEST(Asset, JointsOfBodiesThatAreNotThereAreRefused) {
+  const auto refused = [](auto&& change) {
+    Asset asset = joined();
+    change(asset);
+    EXPECT_THROW(asset_bytes(asset), InvalidArgument);
+  };
+  refused([](Asset& a) { a.joints[0].b = 3; });
+  refused([](Asset& a) { a.joints[1].a = 1; });
+  refused([](Asset& a) { a.joints[1].patch_radius = -1.0; });
+  refused([](Asset& a) { a.joints[0].coordinates.resize(1); });
+  refused([](Asset& a) { a.joints[1].coordinates[0].friction = -1.0; });
+  refused([](Asset& a) { a.apart[0] = {0, 0}; });
+  refused([](Asset& a) { a.apart[0] = {-1, 0}; });
+}
+
+TEST(AssetReader, JointsAreCheckedAndUnderTheHash) {
+  const auto change = [&](const std::function<void(json&)>& edit) {
+    const std::string bytes = asset_bytes(joined());
+    json document = json::parse(glb_chunks(bytes, "test").json);
+    edit(document["extensions"]["LIMBER_modal"]["machine"]);
+    return reading(glb_of(document.dump(), glb_chunks(bytes, "test").binary));
+  };
+  EXPECT_EQ(change([](json&) {}), "accepted");
+  const std::string place = "\"test.glb\".extensions.LIMBER_modal.machine";
+  EXPECT_THAT(change([](json& m) { m["version"] = 2; }), HasSubstr(place + ".version: is 2"));
+  EXPECT_THAT(change([](json& m) { m["joints"][1]["b"] = 3; }), HasSubstr(place + ".joints[1].b"));
+  EXPECT_THAT(change([](json& m) { m["joints"][1]["b"] = 0; }), HasSubstr("another body than"));
+  EXPECT_THAT(change([](json& m) { m["joints"][1]["tipe"] = "ball"; }), HasSubstr("\"type\""));
+  EXPECT_THAT(change([](json& m) { m["joints"][1]["limits"]["cone"] = 1.0; }), HasSubstr("has no such limit"));
+  EXPECT_THAT(change([](json& m) { m["apart"][0] = {1, 1}; }), HasSubstr(place + ".apart[0]"));
+  EXPECT_THAT(change([](json& m) { m["joints"] = json::array(), m["apart"] = json::array(); }),
+              HasSubstr("no such block"));
+  for (const auto& edit : std::vector<std::function<void(json&)>>{
+           [](json& m) { m["joints"][0]["a"] = 0; }, [](json& m) { m["joints"][0]["origin"][1] = 0.5; },
+           [](json& m) { m["joints"][0]["collide"] = false; }, [](json& m) { m["joints"][1]["pitch"] = 0.02; },
+           [](json& m) { m["joints"][1]["limits"]["rotation"][0] = -0.1; },
+           [](json& m) { m["joints"][1]["coordinates"][1]["friction"] = 0.4; },
+           [](json& m) { m["joints"][2]["limits"]["euler"][0][1] = 0.9; }, [](json& m) { m["apart"] = json::array(); }})
+    EXPECT_THAT(change(edit), HasSubstr("content_hash"));
 }
 
 TEST(AssetReader, WrongCountsAndTypesNameTheirPlace) {

@@ -74,6 +74,63 @@ TEST(PageFile, AnAssetFallsOnTheGround) {
   EXPECT_GT(scene.bodies[1].placement.pose.p.x() - scene.bodies[0].placement.pose.p.x(), testing::kBlockLength);
 }
 
+/// Two blocks on a hinge.
+Asset hinged_blocks(bool tied) {
+  ModalModelData other = testing::block_data(1, "other");
+  other.origin_in_input = {3, 0, 0};
+  Asset asset{.bodies = {testing::block_model(2), std::make_shared<const ModalModel>(std::move(other))}};
+  asset.joints.push_back({.a = 0, .b = 1, .spec = {.type = JointType::kRevolute, .frame = {.origin = {1.5, 0, 0}}}});
+  if (tied) asset.joints.push_back({.b = 0, .spec = {.type = JointType::kFixed}});
+  return asset;
+}
+
+TEST(PageFile, AMachineStandsAsDrawnOrFallsAsAWhole) {
+  const Folder folder("page_file_machine");
+  for (const bool tied : {true, false}) {
+    write_asset(folder.path / "asset.glb", hinged_blocks(tied));
+    const PageContent content = page_of_asset(folder.path / "asset.glb");
+    write_file(folder.path / "s.json", content.files[1].bytes);
+    const Scene scene = read_scene(folder.path / "s.json");
+    ASSERT_EQ(scene.bodies.size(), 2u);
+    ASSERT_EQ(scene.joints.size(), tied ? 2u : 1u);
+    EXPECT_NEAR((scene.bodies[1].placement.pose.p - scene.bodies[0].placement.pose.p - Vec3(3, 0, 0)).norm(), 0.0,
+                1e-12);
+    EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), tied ? 0.0 : 1.0, 1e-6) << "falls from half its height";
+    EXPECT_EQ(scene.contact.has_value(), !tied);
+  }
+}
+
+TEST(PageFile, AModelToBePosedTakesItsTrianglesAndJointsAlong) {
+  const Folder folder("page_file_pose");
+  write_file(folder.path / "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 5\n");
+  write_file(folder.path / "j.json",
+             R"({"components": [{"name": "</script>", "faces": [[2, 1]]}, {"name": "b", "faces": [[0, 2]]}],
+    "joints": [{"a": 0, "b": 1, "type": "ball", "origin": [1, 0, 0]}]})");
+  Warnings warnings;
+  const GroupedSurface surface = read_grouped_surface(folder.path / "m.obj", warnings);
+  const JointsFile joints = read_joints(folder.path / "j.json");
+  const PageContent content = page_of_pose(surface, joints, "m", "\"j.json\"");
+  for (const PageFile& file : content.files)
+    write_file(folder.path / "deep" / std::filesystem::path(file.path).filename(), file.bytes);
+  const JointsFile again = read_joints(folder.path / "deep" / std::filesystem::path(content.joints).filename());
+  EXPECT_EQ(again.components[0].name, "</script>");
+  const std::string page = page_with("<before>@FILES@<after>", content);
+  EXPECT_EQ(inside(page).find_first_of("<>&"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(inside(page))["joints"], content.joints);
+}
+
+/// Who builds the page is told of no host by it, and gets the same packages from whatever registry is configured.
+TEST(PageFile, TheLockFileNamesNoHostAndFixesEveryPackage) {
+  const auto lock =
+      nlohmann::json::parse(read_file(std::filesystem::path(LIMBER_SOURCE_DIR) / "view/web/package-lock.json"));
+  ASSERT_GT(lock["packages"].size(), 3u);
+  for (const auto& [name, package] : lock["packages"].items()) {
+    EXPECT_FALSE(package.contains("resolved")) << name;
+    if (!name.empty()) EXPECT_THAT(package.value("integrity", ""), ::testing::StartsWith("sha512-")) << name;
+  }
+  EXPECT_EQ(lock.dump().find("://"), std::string::npos);
+}
+
 TEST(PageFile, AnAssetDrawnWithYUpStandsUpright) {
   const Folder folder("page_file_up");
   ModalModelData data = testing::block_data(1);

@@ -10,6 +10,7 @@
 #include "block_model.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/core/stage_times.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/run.h"
 
@@ -201,6 +202,16 @@ TEST_F(PageWorldTest, SettingsOfTheNextStartAreTaken) {
   settings.step = -1.0;
   EXPECT_THROW(page.restart(settings), InvalidArgument);
   EXPECT_EQ(page.world().options().step, 1.0 / 30.0);
+}
+
+TEST_F(PageWorldTest, StagesOfAStepAreTimed) {
+  PageWorld page(scene());
+  step(page, 30);
+  const std::span<const double> stages = page.stage_seconds();
+  ASSERT_EQ(stages.size(), kStages);
+  for (const Stage stage : {Stage::kBookkeeping, Stage::kBroadPhase, Stage::kSolve})
+    EXPECT_GT(stages[static_cast<std::size_t>(stage)], 0.0) << to_string(stage);
+  EXPECT_EQ(stages[static_cast<std::size_t>(Stage::kReconstruct)], 0.0) << "is no part of a step";
 }
 
 TEST_F(PageWorldTest, TheDescriptionNamesWhatIsThere) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "limber/articulation/contact_region.h"
 #include "limber/articulation/detect_joints.h"
 #include "limber/articulation/range_of_motion.h"
 #include "limber/core/error.h"
@@ -59,8 +60,9 @@ bool is_rigid(const AssemblyOptions& options, const std::string& name) {
   return std::ranges::any_of(options.rigid, [&](const std::string& r) { return r == "*" || r == name; });
 }
 
+/// @param patches where its joints sit
 BakeResult bake_part(Program& program, const Component& part, const AssemblyOptions& options, BakeOptions bake_options,
-                     Jobs& jobs) {
+                     std::vector<AttachmentPatch> patches, Jobs& jobs) {
   const auto material = bake_options.materials.find(part.name);
   const auto rest = bake_options.materials.find("*");
   if (material == bake_options.materials.end() && rest == bake_options.materials.end())
@@ -72,7 +74,10 @@ BakeResult bake_part(Program& program, const Component& part, const AssemblyOpti
   TetrahedralisationOptions tets = options.tets;
   if (tets.cell_size == 0.0) tets.cell_size = kCell * options.scale * part.diagonal;
   const bool rigid = is_rigid(options, part.name);
-  if (rigid) bake_options.analysis.modes = 1, bake_options.analysis.certify = false;
+  if (rigid)
+    bake_options.analysis.modes = 1, bake_options.analysis.certify = false;
+  else if (options.joint_compliance)
+    bake_options.residual.patches = std::move(patches);
   program.progress().stage("\"" + part.name + "\"");
   BakeInput input{.name = part.name};
   try {
@@ -111,18 +116,59 @@ std::vector<std::string> fallers(const JointsFile& joints, const std::vector<std
   return names;
 }
 
-void scale_all(Json& numbers, double factor) {
-  if (numbers.is_number()) numbers = factor * numbers.get<double>();
-  if (numbers.is_array())
-    for (Json& inside : numbers) scale_all(inside, factor);
+/// Lengths of a joint times a factor.
+JointSpec scaled(JointSpec joint, double factor) {
+  joint.frame.origin *= factor;
+  joint.pitch *= factor;
+  for (Interval& i : joint.limits.translation) i.low *= factor, i.high *= factor;
+  return joint;
 }
 
-/// Of a joint as files tell it.
-void scale_lengths(Json& joint, double factor) {
-  scale_all(joint["origin"], factor);
-  if (joint.contains("pitch")) scale_all(joint["pitch"], factor);
-  if (joint.contains("limits") && joint["limits"].contains("translation"))
-    scale_all(joint["limits"]["translation"], factor);
+/// How far around its origin a joint holds its parts, m.
+double patch_radius(const Joined& joined, std::size_t joint, double scale) {
+  const double known = joined.patch_radii[joint];
+  if (known > 0.0) return scale * known;
+  const JointRecord& record = joined.joints.joints[joint];
+  const auto diagonal = [&](Index c) { return joined.assembly.components[static_cast<std::size_t>(c)].diagonal; };
+  return scale * kPatch * std::min(diagonal(record.a), diagonal(record.b));
+}
+
+/// Joints between the parts, m; then what holds those that stand still, by all of their surfaces.
+void add_joints(const Joined& joined, const AssemblyOptions& options, Asset& asset) {
+  for (std::size_t i = 0; i < joined.joints.joints.size(); ++i) {
+    const JointRecord& joint = joined.joints.joints[i];
+    asset.joints.push_back({.a = joint.a,
+                            .b = joint.b,
+                            .spec = scaled(joint.joint, options.scale),
+                            .patch_radius = patch_radius(joined, i, options.scale)});
+  }
+  for (const std::string& name : grounded(joined.joints, options)) {
+    const Index part = component_named(joined.assembly, name);
+    const ModalModel& body = *asset.bodies[static_cast<std::size_t>(part)];
+    asset.joints.push_back({.b = part,
+                            .spec = {.type = JointType::kFixed, .frame = {.origin = body.data().origin_in_input}},
+                            .patch_radius = 2.0 * body.collision_extent().radius});
+  }
+}
+
+/// Parts that touch as drawn and have no joint would be pushed apart where they are only near.
+void add_apart(const Assembly& assembly, Jobs& jobs, Asset& asset) {
+  for (const ContactRegion& region : find_contact_regions(assembly, {}, jobs)) {
+    const bool joined = std::ranges::any_of(asset.joints, [&](const AssetJoint& joint) {
+      return std::minmax(joint.a, joint.b) == std::minmax(region.a, region.b);
+    });
+    if (!joined) asset.apart.push_back({std::min(region.a, region.b), std::max(region.a, region.b)});
+  }
+}
+
+std::vector<AttachmentPatch> patches_on(Index part, const Joined& joined, double scale) {
+  std::vector<AttachmentPatch> patches;
+  for (std::size_t i = 0; i < joined.joints.joints.size(); ++i) {
+    const JointRecord& joint = joined.joints.joints[i];
+    if (joint.a == part || joint.b == part)
+      patches.push_back({scale * joint.joint.frame.origin, patch_radius(joined, i, scale)});
+  }
+  return patches;
 }
 
 }  // namespace
@@ -130,27 +176,23 @@ void scale_lengths(Json& joint, double factor) {
 BakedAssembly bake_assembly(Program& program, const std::string& path, const AssemblyOptions& options,
                             const BakeOptions& bake_options, Jobs& jobs) {
   const GroupedSurface surface = read_any_grouped_surface(path, program.warnings());
-  const Joined joined = options.joints_file.empty() ? detect(program, surface, options.components, jobs)
-                                                    : take(program, surface, options.components, options.joints_file);
+  Joined joined = options.joints_file.empty() ? detect(program, surface, options.components, jobs)
+                                              : take(program, surface, options.components, options.joints_file);
   for (const std::string& name : options.rigid)
     if (name != "*") component_named(joined.assembly, name);
   for (const std::string& name : options.ground) component_named(joined.assembly, name);
-  BakedAssembly baked{.asset = {}, .bodies = {}, .joints = joined.joints, .patch_radii = {}};
-  baked.joints.components.clear();  // in the assembly's order
+  joined.joints.components.clear();  // in the assembly's order
   for (const Component& part : joined.assembly.components)
-    baked.joints.components.push_back({.name = part.name, .faces = part.faces});
-  for (const Component& part : joined.assembly.components) {
-    BakeResult result = bake_part(program, part, options, bake_options, jobs);
+    joined.joints.components.push_back({.name = part.name, .faces = part.faces});
+  BakedAssembly baked{.asset = {}, .bodies = {}, .joints = joined.joints};
+  for (std::size_t i = 0; i < joined.assembly.components.size(); ++i) {
+    BakeResult result = bake_part(program, joined.assembly.components[i], options, bake_options,
+                                  patches_on(static_cast<Index>(i), joined, options.scale), jobs);
     baked.asset.bodies.push_back(std::move(result.asset.bodies[0]));
     baked.bodies.push_back(std::move(result.bodies[0]));
   }
-  const auto diagonal = [&](Index c) { return joined.assembly.components[static_cast<std::size_t>(c)].diagonal; };
-  for (std::size_t i = 0; i < joined.joints.joints.size(); ++i) {
-    const JointRecord& joint = joined.joints.joints[i];
-    const double known = joined.patch_radii[i];
-    baked.patch_radii.push_back(options.scale *
-                                (known > 0.0 ? known : kPatch * std::min(diagonal(joint.a), diagonal(joint.b))));
-  }
+  add_joints(joined, options, baked.asset);
+  add_apart(joined.assembly, jobs, baked.asset);
   if (!options.free)
     for (const std::string& name : fallers(baked.joints, grounded(baked.joints, options)))
       program.warnings().push_back("component \"" + name +
@@ -158,32 +200,11 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
   return baked;
 }
 
-std::string assembly_scene(const BakedAssembly& baked, const AssemblyOptions& options, const std::string& asset) {
-  Json scene = {{"step", 1.0 / 60.0}, {"duration", 60}, {"assets", {{"machine", asset}}}};
-  scene["joints"] = Json::array();
-  const std::vector<std::string> ground = grounded(baked.joints, options);
-  for (const auto& body : baked.asset.bodies) {
-    const Vec3& p = body->data().origin_in_input;
-    const Json place = {p.x(), p.y(), p.z()};
-    scene["bodies"].push_back(
-        {{"name", body->name()}, {"asset", "machine"}, {"part", body->name()}, {"position", place}});
-    if (std::ranges::find(ground, body->name()) == ground.end()) continue;
-    // By all of its surface.
-    scene["joints"].push_back({{"b", body->name()},
-                               {"type", "fixed"},
-                               {"origin", place},
-                               {"axis", nullptr},
-                               {"patch_radius", 2.0 * body->collision_extent().radius}});
-  }
-  const Json told = Json::parse(joints_text(baked.joints));
-  for (std::size_t i = 0; i < told["joints"].size(); ++i) {
-    Json joint = told["joints"][i];
-    for (const char* key : {"confidence", "alternatives", "reasons"}) joint.erase(key);
-    for (const char* part : {"a", "b"}) joint[part] = told["components"][joint[part].get<std::size_t>()]["name"];
-    scale_lengths(joint, options.scale);
-    joint["patch_radius"] = baked.patch_radii[i];
-    scene["joints"].push_back(joint);
-  }
+std::string machine_scene(const std::string& name, const std::string& asset) {
+  const Json scene = {{"step", 1.0 / 60.0},
+                      {"duration", 60},
+                      {"assets", {{"machine", asset}}},
+                      {"machines", Json::array({{{"name", name}, {"asset", "machine"}}})}};
   return scene.dump(1) + "\n";
 }
 

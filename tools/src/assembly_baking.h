@@ -18,15 +18,15 @@ struct AssemblyOptions {
   std::vector<std::string> rigid{};   ///< components without modes; "*": all
   std::vector<std::string> ground{};  ///< components that stand still; none: the first
   bool free = false;                  ///< none stands still
+  bool joint_compliance = true;       ///< parts that bend also answer what their joints do to them as a whole
   double scale = 1.0;                 ///< metres per unit of the file
   TetrahedralisationOptions tets{};
 };
 
 struct BakedAssembly {
-  Asset asset;  ///< a body per component, of its name
+  Asset asset;  ///< a body per component, of its name, and the joints
   std::vector<BodyReport> bodies;
-  JointsFile joints;                ///< lengths in the file's unit
-  std::vector<double> patch_radii;  ///< m, of each joint
+  JointsFile joints;  ///< lengths in the file's unit
 };
 
 /// @param bake its materials are named by components; "*" is the rest
@@ -35,6 +35,6 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
 
 /// A scene in which the machine stands as drawn, z up, and moves by its joints under gravity.
 /// @param asset file name, relative to the scene's folder
-std::string assembly_scene(const BakedAssembly& baked, const AssemblyOptions& options, const std::string& asset);
+std::string machine_scene(const std::string& name, const std::string& asset);
 
 }  // namespace limber::tools

@@ -97,6 +97,7 @@ EMSCRIPTEN_KEEPALIVE const char* page_hash() {
 }
 EMSCRIPTEN_KEEPALIVE const float* page_frame() { return page->frame().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_numbers() { return page->numbers().data(); }
+EMSCRIPTEN_KEEPALIVE const double* page_stage_seconds() { return page->stage_seconds().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_joint_frames() { return page->joint_frames().data(); }
 
 // The hit stays until the next cast. @return body (−1: none), point, distance

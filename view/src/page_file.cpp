@@ -6,7 +6,9 @@
 
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/mesh/write_mesh.h"
 #include "limber/model/asset.h"
+#include "limber/posing/posed_model.h"
 #include "limber/scene/scene_file.h"
 #include "limber/scene/scene_model.h"
 
@@ -63,20 +65,66 @@ class Renamed {
 };
 
 struct Extent {
-  Vec3 size;
-  double low = 0.0;  // the least z
+  Vec3 low = Vec3::Constant(1e300), high = Vec3::Constant(-1e300);
+
+  /// In the scene's axes. @param place of the body in the axes of the asset
+  void add(const ModalModel& model, UpAxis up, const Vec3& place) {
+    for (const Vec3f& at_rest : model.render().rest) {
+      Vec3 p = at_rest.cast<double>() + place;
+      if (up == UpAxis::kY) p = {p.x(), -p.z(), p.y()};
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  }
+  Vec3 size() const { return high - low; }
 };
 
-/// In the scene's axes.
-Extent extent_of(const ModalModel& model, UpAxis up) {
-  Vec3 most = Vec3::Constant(-1e300), least = Vec3::Constant(1e300);
-  for (const Vec3f& at_rest : model.render().rest) {
-    Vec3 p = at_rest.cast<double>();
-    if (up == UpAxis::kY) p = {p.x(), -p.z(), p.y()};
-    most = most.cwiseMax(p);
-    least = least.cwiseMin(p);
+constexpr double kDrop = 0.5;  // of its height, that something falls
+
+void stand_up(Json& placed, UpAxis up) {
+  if (up == UpAxis::kY) placed["orientation"] = {{"axis", {1, 0, 0}}, {"degrees", 90}};
+}
+
+void add_ground(Json& scene) {
+  scene["contact"] = Json::object();
+  scene["statics"] = Json::array({{{"name", "ground"}, {"shape", {{"half_space", Json::object()}}}}});
+}
+
+/// As it was drawn where it is tied to the world; else it falls on the ground.
+void add_machine(const Asset& asset, const std::string& name, UpAxis up, Json& scene) {
+  const bool tied = std::any_of(asset.joints.begin(), asset.joints.end(),
+                                [](const AssetJoint& joint) { return joint.a == AssetJoint::kWorld; });
+  Json machine = {{"name", name}, {"asset", "asset"}};
+  stand_up(machine, up);
+  if (!tied) {
+    Extent extent;
+    for (const auto& body : asset.bodies) extent.add(*body, up, body->data().origin_in_input);
+    machine["position"] = {0.0, 0.0, kDrop * extent.size().z() - extent.low.z()};
+    add_ground(scene);
   }
-  return {most - least, least.z()};
+  scene["machines"].push_back(std::move(machine));
+}
+
+void add_single_bodies(const Asset& asset, UpAxis up, Json& scene) {
+  constexpr double kGap = 0.25;  // of a body's size, between two
+  double x = 0.0;
+  bool falls = false;
+  for (std::size_t part = 0; part < asset.bodies.size(); ++part) {
+    const ModalModel& model = *asset.bodies[part];
+    Extent extent;
+    extent.add(model, up, Vec3::Zero());
+    const Vec3 size = extent.size();
+    if (part > 0) x += (0.5 + kGap) * size.x();
+    const bool free = model.data().motion == FrameMotion::kFree;
+    falls = falls || free;
+    scene["bodies"].push_back({{"name", "body " + std::to_string(part)},
+                               {"asset", "asset"},
+                               {"part", part},
+                               {"position", {x, 0.0, free ? kDrop * size.z() - extent.low.z() : 0.0}}});
+    stand_up(scene["bodies"].back(), up);
+    x += 0.5 * size.x();
+  }
+  if (falls) add_ground(scene);
 }
 
 }  // namespace
@@ -99,31 +147,25 @@ PageContent page_of_scene(const std::filesystem::path& path) {
 }
 
 PageContent page_of_asset(const std::filesystem::path& path, UpAxis up) {
-  constexpr double kGap = 0.25;  // of a body's size, between two
-  constexpr double kDrop = 0.5;  // of its height
   const Asset asset = read_asset(path);
   Json scene = {{"step", 1.0 / 60.0}, {"duration", 3600}, {"assets", {{"asset", "asset.glb"}}}};
-  double x = 0.0;
-  bool falls = false;
-  for (std::size_t part = 0; part < asset.bodies.size(); ++part) {
-    const ModalModel& model = *asset.bodies[part];
-    const auto [size, low] = extent_of(model, up);
-    if (part > 0) x += (0.5 + kGap) * size.x();
-    const bool free = model.data().motion == FrameMotion::kFree;
-    falls = falls || free;
-    scene["bodies"].push_back({{"name", "body " + std::to_string(part)},
-                               {"asset", "asset"},
-                               {"part", part},
-                               {"position", {x, 0.0, free ? kDrop * size.z() - low : 0.0}}});
-    if (up == UpAxis::kY) scene["bodies"].back()["orientation"] = {{"axis", {1, 0, 0}}, {"degrees", 90}};
-    x += 0.5 * size.x();
-  }
-  if (falls) {
-    scene["contact"] = Json::object();
-    scene["statics"] = Json::array({{{"name", "ground"}, {"shape", {{"half_space", Json::object()}}}}});
-  }
+  if (asset.joints.empty())
+    add_single_bodies(asset, up, scene);
+  else
+    add_machine(asset, path.stem().string(), up, scene);
   const std::string name = "/scene/" + path.stem().string() + ".json";
-  return {.scene = name, .files = {{"/scene/asset.glb", read_file(path)}, {name, scene.dump()}}};
+  return {.scene = name,
+          .files = {{"/scene/asset.glb", read_file(path)},
+                    {name, scene.dump(-1, ' ', true, Json::error_handler_t::replace)}}};
+}
+
+PageContent page_of_pose(const GroupedSurface& surface, const JointsFile& joints, const std::string& name,
+                         const std::string& joints_name) {
+  const JointedModel model = jointed_model(surface, joints, joints_name);
+  const std::string stem = "/scene/" + name;
+  return {.scene = stem + ".obj",
+          .files = {{stem + ".obj", obj_text(model.surface)}, {stem + ".json", joints_text(joints_file(model))}},
+          .joints = stem + ".json"};
 }
 
 std::string page_with(std::string_view empty, const PageContent& content) {
@@ -131,6 +173,7 @@ std::string page_with(std::string_view empty, const PageContent& content) {
   const std::size_t at = empty.find(kPlace);
   if (at == std::string_view::npos) throw InvalidArgument("page_with: the page has no place for files");
   Json json = {{"scene", content.scene}, {"files", Json::array()}};
+  if (!content.joints.empty()) json["joints"] = content.joints;
   for (const PageFile& file : content.files)
     json["files"].push_back({{"path", file.path}, {"base64", base64(file.bytes)}});
   std::string page(empty.substr(0, at));

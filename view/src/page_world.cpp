@@ -9,6 +9,7 @@
 
 #include "description.h"
 #include "limber/core/error.h"
+#include "limber/core/stage_times.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_player.h"
 #include "limber/scene/surface_ray.h"
@@ -65,13 +66,14 @@ struct PageWorld::Impl {
   SceneModels models;  // the same
   std::vector<std::shared_ptr<const ModalModel>> kinds;
   std::vector<PageModel> shown;
+  StageTimes times;
   std::optional<ScenePlayer> player;
   std::vector<internal::PageBody> bodies;
   std::vector<int> drops;  // model of each body dropped so far, in this history
   internal::Hands hands;
   internal::PageHistory history;
   std::vector<float> frame;
-  std::vector<double> numbers, joint_frames, amplitudes;
+  std::vector<double> numbers, joint_frames, amplitudes, stage_seconds = std::vector<double>(kStages, 0.0);
   std::vector<internal::JointPlace> joint_places;
 };
 
@@ -97,6 +99,7 @@ void PageWorld::Impl::start() {
   }
   for (SceneBody& body : scene.bodies) body.placement.modal_skin = false;  // as the page draws them
   player.emplace(scene, models, kForever);
+  world().set_stage_times(&times);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
   hands = {};
@@ -133,7 +136,13 @@ void PageWorld::restart(const PageSettings& settings) {
   keep();
 }
 
-void PageWorld::step() { impl_->player->step(); }
+void PageWorld::step() {
+  Impl& m = *impl_;
+  m.times = {};
+  m.player->step();
+  for (std::size_t i = 0; i < kStages; ++i) m.stage_seconds[i] = m.times[static_cast<Stage>(i)].seconds;
+}
+std::span<const double> PageWorld::stage_seconds() const { return impl_->stage_seconds; }
 std::int64_t PageWorld::steps_taken() const { return impl_->player->steps_taken(); }
 std::uint64_t PageWorld::state_hash() const { return impl_->world().state_hash(); }
 

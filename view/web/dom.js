@@ -38,6 +38,13 @@ export function choice(text, options, value, act) {
   return element('label', {}, text, select, '');
 }
 
+/** A file, to the browser's downloads. */
+export function download(content, type, name) {
+  const address = URL.createObjectURL(new Blob([content], { type }));
+  element('a', { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
 export function section(title, open, ...children) {
   return element('details', { open }, element('summary', { textContent: title }), ...children);
 }

@@ -13,17 +13,18 @@ async function unzipped(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** @param wasm compressed by gzip. @param files [{path, base64}], their paths below /scene/. @throws Error with the engine's own line */
-export async function openEngine(wasm, files, scene) {
+/** @param wasm compressed by gzip. @param files [{path, base64}], their paths below /scene/ */
+export async function openModule(wasm, files) {
   const module = await makePageEngine({ wasmBinary: await unzipped(wasm), print() {}, printErr() {} });
   for (const { path, base64 } of files) {
     module.FS.mkdirTree(path.slice(0, path.lastIndexOf('/')));
     module.FS.writeFile(path, bytesOf(base64));
   }
-  return new Engine(module, scene);
+  return module;
 }
 
-class Engine {
+export class Engine {
+  /** @throws Error with the engine's own line */
   constructor(module, scene) {
     this.module = module;
     const length = module.lengthBytesUTF8(scene) + 1, at = module._malloc(length);
@@ -78,6 +79,8 @@ class Engine {
       this.doubles(this.module._page_numbers(), 10);
     return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, settled };
   }
+  /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
+  stages() { return [...this.doubles(this.module._page_stage_seconds(), 9)]; }
   jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
 
   cast(from, along) {

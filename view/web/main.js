@@ -1,7 +1,10 @@
 // The page: a scene that goes on in real time, and a person who reaches into it.
-import { bytesOf, openEngine } from './engine.js';
-import { element } from './dom.js';
+import { bytesOf, Engine, openModule } from './engine.js';
+import { download } from './dom.js';
+import { tell } from './message.js';
 import { Panel } from './panel.js';
+import { PoseApp } from './pose.js';
+import { PoseEngine } from './pose_engine.js';
 import { Stage } from './stage.js';
 
 const MOST_STEPS_A_FRAME = 6;
@@ -85,7 +88,7 @@ class App {
   step() {
     const began = performance.now();
     this.engine.step();
-    this.panel.note(this.engine.numbers(), performance.now() - began);
+    this.panel.note(this.engine.numbers(), performance.now() - began, this.engine.stages());
   }
 
   stepOnce() {
@@ -127,9 +130,7 @@ class App {
     } catch (error) {
       return tell(error.message);
     }
-    const address = URL.createObjectURL(new Blob([bytes], { type: 'model/gltf-binary' }));
-    element('a', { href: address, download: `${this.engine.scene.name}.glb` }).click();
-    setTimeout(() => URL.revokeObjectURL(address), 10000);
+    download(bytes, 'model/gltf-binary', `${this.engine.scene.name}.glb`);
   }
 
   unpin() {
@@ -180,17 +181,13 @@ class App {
   }
 }
 
-function tell(text) {
-  const message = document.getElementById('message');
-  message.className = 'error';
-  message.textContent = text;
-}
-
 async function main() {
-  const { scene, files } = JSON.parse(document.getElementById('files').textContent);
-  const engine = await openEngine(bytesOf(document.getElementById('engine').textContent), files, scene);
+  const { scene, joints, files } = JSON.parse(document.getElementById('files').textContent);
+  const module = await openModule(bytesOf(document.getElementById('engine').textContent), files);
+  const engine = joints ? new PoseEngine(module, scene, joints) : new Engine(module, scene);
   document.title = `${engine.scene.name} – limber`;
-  const app = new App(engine, new Stage(document.getElementById('view')));
+  const stage = new Stage(document.getElementById('view'));
+  const app = joints ? new PoseApp(engine, stage) : new App(engine, stage);
   globalThis.limber = app;
   let last = performance.now();
   const draw = (now) => {

@@ -9,7 +9,8 @@ export class Panel {
   constructor(host, app) {
     this.app = app;
     this.energy = new Chart('Energy', 'J', [['motion', '#3d7ab8'], ['modes', '#d9822b'], ['all', '#1d2430']]);
-    this.time = new Chart('A step takes', 'ms', [['', '#5f9e4f']]);
+    this.time = new Chart('A step takes', 'ms', [['all', '#1d2430'], ['contacts looked for', '#3d7ab8'], ['contacts and joints solved', '#d9822b'], ['the rest', '#5f9e4f']]);
+    this.stages = [0, 0, 0];
     this.contacts = new Chart('Contacts', '', [['', '#b0508c']]);
     this.state = element('small');
     this.joints = element('table');
@@ -120,9 +121,14 @@ export class Panel {
     this.showJoints();
   }
 
-  note(numbers, milliseconds) {
+  /** @param stages seconds: the browser's clock is coarse, so that only means over many steps tell something */
+  note(numbers, milliseconds, stages) {
+    const [begin, ahead, broad, narrow, fast, rows, advance, solve, commit] = stages;
+    [ahead + broad + narrow + fast, rows + solve + commit, begin + advance].forEach((seconds, i) => {
+      this.stages[i] += (1000 * seconds - this.stages[i]) / 30;
+    });
     this.energy.add([numbers.rigid, numbers.modal + numbers.elastic, numbers.rigid + numbers.modal + numbers.elastic + numbers.potential]);
-    this.time.add([milliseconds]);
+    this.time.add([milliseconds, ...this.stages]);
     this.contacts.add([numbers.contacts]);
   }
 

@@ -82,7 +82,12 @@ export class Stage {
   }
 
   drawJoints(engine) {
-    const frames = engine.jointFrames(), ends = [], half = 0.06 * this.size;
+    this.drawAxes(engine.jointFrames());
+  }
+
+  /** @param frames nine numbers each: origin, axis, coordinates */
+  drawAxes(frames) {
+    const ends = [], half = 0.06 * this.size;
     for (let j = 0; j < frames.length; j += 9) {
       const [x, y, z, ax, ay, az] = frames.subarray(j, j + 6);
       ends.push(x - half * ax, y - half * ay, z - half * az, x + half * ax, y + half * ay, z + half * az);
@@ -99,9 +104,14 @@ export class Stage {
     });
     for (const shape of engine.scene.statics)
       if (!shape.ground) for (let k = 0; k < shape.points.length; k += 3) box.expandByPoint(point.fromArray(shape.points, k));
+    this.look(box, engine.scene.statics.some((shape) => shape.ground));
+  }
+
+  /** At a box, from in front and above. @param onGround which is at z = 0 */
+  look(box, onGround = false) {
     const middle = box.getCenter(new THREE.Vector3());
     this.size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
-    if (engine.scene.statics.some((shape) => shape.ground)) middle.z *= 0.6;
+    if (onGround) middle.z *= 0.6;
     this.controls.target.copy(middle);
     this.camera.position.copy(middle).addScaledVector(new THREE.Vector3(0.35, -1, 0.45).normalize(), 1.5 * this.size);
     this.camera.near = 0.01 * this.size;
@@ -122,6 +132,14 @@ export class Stage {
     this.camera.updateMatrixWorld();
     this.caster.setFromCamera(at, this.camera);
     return { from: this.caster.ray.origin.toArray(), along: this.caster.ray.direction.toArray() };
+  }
+
+  /** How far from the pointer a point is seen. */
+  pixelsFrom(event, point) {
+    const box = this.renderer.domElement.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    const seen = new THREE.Vector3(...point).project(this.camera);
+    return Math.hypot((0.5 + 0.5 * seen.x) * box.width - (event.clientX - box.left), (0.5 - 0.5 * seen.y) * box.height - (event.clientY - box.top));
   }
 
   /** Where the pointer is in the plane through a point across the line of sight. */
@@ -146,7 +164,7 @@ export class Stage {
   }
 }
 
-function setLines(lines, ends) {
+export function setLines(lines, ends) {
   lines.geometry.dispose();
   lines.geometry = new THREE.BufferGeometry();
   lines.geometry.setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));

@@ -1,7 +1,7 @@
 // Bodies that bend on the GPU: the modes of a model lie in a texture, a body's amplitudes are uniforms.
 import * as THREE from 'three';
 
-const COLOURS = [0xd9822b, 0x3d7ab8, 0x5f9e4f, 0xb0508c, 0x8a6fc1, 0xc2a32e, 0x3f9c98, 0xc4574b];
+export const COLOURS = [0xd9822b, 0x3d7ab8, 0x5f9e4f, 0xb0508c, 0x8a6fc1, 0xc2a32e, 0x3f9c98, 0xc4574b];
 
 const DECLARATIONS = `
 uniform highp sampler2D modes;

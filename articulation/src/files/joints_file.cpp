@@ -13,8 +13,6 @@
 namespace limber {
 namespace {
 
-using internal::has_rotation;
-using internal::has_translation;
 using internal::in_quotes;
 using internal::JsonObject;
 using internal::refuse;
@@ -27,69 +25,18 @@ std::string shown(double x) { return JsonObject::shown(Json(x)); }
 
 // Writing -------------------------------------------------------------------------------------------------------------
 
-OrderedJson number_or_null(double x) { return std::isfinite(x) ? OrderedJson(x) : OrderedJson(); }
-OrderedJson json_of(const Interval& i) { return OrderedJson::array({number_or_null(i.low), number_or_null(i.high)}); }
-OrderedJson json_of(const Vec3& v) { return OrderedJson::array({v.x(), v.y(), v.z()}); }
-
-OrderedJson json_of(const Mat3& m) {
-  OrderedJson rows = OrderedJson::array();
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) rows.push_back(m(r, c));
-  return rows;
-}
-
-OrderedJson axis_json(const JointSpec& joint) {
-  const auto column = internal::axis_column(joint.type);
-  return column ? json_of(Vec3(joint.frame.axes.col(*column))) : OrderedJson();
-}
-
-/// Whether anything stops the joint.
-bool limited(const JointSpec& joint) {
-  const JointLimits& l = joint.limits;
-  if (joint.type == JointType::kBall)
-    return std::isfinite(l.cone) ||
-           std::any_of(l.euler.begin(), l.euler.end(), [](const auto& i) { return !i.open(); });
-  const bool turn = has_rotation(joint.type) && !l.rotation.open();
-  const bool slide = has_translation(joint.type) && !l.translation[0].open();
-  return turn || slide || (joint.type == JointType::kPlanar && !l.translation[1].open());
-}
-
-OrderedJson limits_json(const JointSpec& joint) {
-  if (!limited(joint)) return {};
-  const JointLimits& l = joint.limits;
-  OrderedJson out = OrderedJson::object();
-  if (has_rotation(joint.type)) out["rotation"] = json_of(l.rotation);
-  if (joint.type == JointType::kPlanar)
-    out["translation"] = OrderedJson::array({json_of(l.translation[0]), json_of(l.translation[1])});
-  else if (has_translation(joint.type))
-    out["translation"] = json_of(l.translation[0]);
-  if (joint.type == JointType::kBall) {
-    out["cone"] = number_or_null(l.cone);
-    out["euler"] = OrderedJson::array({json_of(l.euler[0]), json_of(l.euler[1]), json_of(l.euler[2])});
-  }
-  return out;
-}
-
 OrderedJson alternative_json(const AlternativeRecord& a) {
-  OrderedJson out{{"type", to_string(a.joint.type)},
-                  {"origin", json_of(a.joint.frame.origin)},
-                  {"axis", axis_json(a.joint)},
-                  {"frame", json_of(a.joint.frame.axes)}};
-  if (a.joint.pitch != 0.0) out["pitch"] = a.joint.pitch;
+  OrderedJson out;
+  internal::write_joint_kind(a.joint, out);
   out["confidence"] = a.confidence;
   out["reason"] = a.reason;
   return out;
 }
 
 OrderedJson joint_json(const JointRecord& j) {
-  OrderedJson out{{"a", j.a},
-                  {"b", j.b},
-                  {"type", to_string(j.joint.type)},
-                  {"origin", json_of(j.joint.frame.origin)},
-                  {"axis", axis_json(j.joint)},
-                  {"frame", json_of(j.joint.frame.axes)}};
-  if (j.joint.pitch != 0.0) out["pitch"] = j.joint.pitch;
-  if (j.limits_known) out["limits"] = limits_json(j.joint);
+  OrderedJson out{{"a", j.a}, {"b", j.b}};
+  internal::write_joint_kind(j.joint, out);
+  if (j.limits_known) out["limits"] = internal::joint_limits_json(j.joint);
   out["confidence"] = j.confidence;
   out["alternatives"] = OrderedJson::array();
   for (const AlternativeRecord& a : j.alternatives) out["alternatives"].push_back(alternative_json(a));

@@ -18,6 +18,8 @@ namespace {
 using internal::append_residual_modes;
 using internal::mass_properties;
 using internal::MassProperties;
+using internal::node_loads;
+using internal::patch_loads;
 using internal::residual_compliance;
 using internal::SimplifiedSurface;
 using internal::simplify_surface;
@@ -184,6 +186,9 @@ struct BodyInput {
   SubMesh part;
   std::vector<Index> fixed;           // of part.mesh
   std::vector<Index> residual_nodes;  // of part.mesh
+  std::vector<AttachmentPatch> patches;
+
+  bool answers_loads() const { return !residual_nodes.empty() || !patches.empty(); }
   std::optional<SurfaceMesh> render, collision;
 };
 
@@ -248,12 +253,18 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
   return columns;
 }
 
-/// Modes at the chosen nodes join the analysis and those kept, which stay in order of frequency.
-void add_residual_modes(ModalAnalysis& a, std::span<const Index> nodes, std::vector<Index>& kept,
+/// Modes of the chosen nodes and patches join the analysis and those kept, which stay in order of frequency.
+void add_residual_modes(ModalAnalysis& a, const BodyInput& in, const PlacedSurface& touching, std::vector<Index>& kept,
                         ResidualReport& report) {
-  if (nodes.empty() || !a.compliance) return;
+  if (!in.answers_loads() || !a.compliance) return;
   const auto first = static_cast<Index>(a.eigenvalues.size());
-  report.modes = append_residual_modes(a, kept, nodes);
+  Eigen::MatrixXd F = node_loads(a.nodes, in.residual_nodes);
+  for (const AttachmentPatch& patch : in.patches) {
+    const Eigen::MatrixXd more = patch_loads(in.part.mesh, touching.surface.vertices, touching.embedding, patch);
+    F.conservativeResize(Eigen::NoChange, F.cols() + more.cols());
+    F.rightCols(more.cols()) = more;
+  }
+  report.modes = append_residual_modes(a, kept, F);
   for (Index m = 0; m < report.modes; ++m) kept.push_back(first + m);
   std::stable_sort(kept.begin(), kept.end(), [&](Index i, Index j) { return a.eigenvalues[i] < a.eigenvalues[j]; });
 }
@@ -356,7 +367,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   const TetMesh& mesh = in.part.mesh;
   const MassProperties mass = mass_properties(mesh, materials);
   ModalAnalysisOptions wanted = options.analysis;
-  wanted.keep_compliance = options.residual.surface || !in.residual_nodes.empty();
+  wanted.keep_compliance = options.residual.surface || in.answers_loads();
   ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
   fill_report(report, in, a, mass);
 
@@ -368,7 +379,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   report.seconds_embed = seconds_since(start);
 
   const auto residual_start = Clock::now();
-  add_residual_modes(a, in.residual_nodes, kept, report.residual);
+  add_residual_modes(a, in, surfaces.touching(), kept, report.residual);
   auto residual = surface_compliance(a, kept, mesh, surfaces.touching(), options.residual, report.residual);
   report.residual.seconds = seconds_since(residual_start);
 
@@ -414,6 +425,18 @@ void warn_of_fixed_loads(std::span<const char> loaded, std::span<const char> fix
                        " chosen nodes are fixed and get no residual modes");
 }
 
+/// The body that has the node nearest to a patch's centre.
+Index body_of(const AttachmentPatch& patch, const TetMesh& mesh, std::span<const Index> component) {
+  Index body = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (const Index n : mesh.tets[t]) {
+      const double distance = (mesh.nodes[static_cast<std::size_t>(n)] - patch.center).squaredNorm();
+      if (distance < least) least = distance, body = component[t];
+    }
+  return body;
+}
+
 void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warnings& warnings) {
   std::vector<char> used(mesh.nodes.size(), 0);
   for (const Tet& t : mesh.tets)
@@ -452,6 +475,9 @@ void RayleighDamping::validate() const {
 }
 
 void ResidualOptions::validate() const {
+  for (const AttachmentPatch& patch : patches)
+    if (!patch.center.allFinite() || !(patch.radius >= 0.0 && std::isfinite(patch.radius)))
+      throw InvalidArgument("ResidualOptions::patches: a centre is not finite, or a radius not a finite number >= 0");
   if (!(max_full_bytes >= 0.0))
     throw InvalidArgument("ResidualOptions::max_full_bytes is " + std::to_string(max_full_bytes) +
                           ", expected 0 or more");
@@ -502,6 +528,8 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
       else if (loaded[body.part.node_of[n]])
         body.residual_nodes.push_back(static_cast<Index>(n));
     }
+    for (const AttachmentPatch& patch : options.residual.patches)
+      if (body_of(patch, input.mesh, component) == b) body.patches.push_back(patch);
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
     result.asset.bodies.push_back(bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));

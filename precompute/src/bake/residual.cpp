@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limber/core/cross_matrix.h"
+
 namespace limber::internal {
 namespace {
 
@@ -97,19 +99,65 @@ Mat3 yielding(const Mat3& block) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
 }
 
+/// Vertices of a patch; the nearest one where none is within.
+std::vector<std::size_t> members_of(std::span<const Vec3> vertices, const AttachmentPatch& patch) {
+  std::vector<std::size_t> members;
+  std::size_t nearest = 0;
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const double distance = (vertices[v] - patch.center).norm();
+    if (distance <= patch.radius) members.push_back(v);
+    if (distance < (vertices[nearest] - patch.center).norm()) nearest = v;
+  }
+  if (members.empty()) members.push_back(nearest);
+  return members;
+}
+
 void append(const Eigen::MatrixXd& columns, std::vector<double>& all) {
   all.insert(all.end(), columns.data(), columns.data() + columns.size());
 }
 
 }  // namespace
 
-Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, std::span<const Index> nodes) {
-  const StaticModes modes(analysis, kept);
+Eigen::MatrixXd node_loads(Index mesh_nodes, std::span<const Index> nodes) {
   Eigen::MatrixXd F =
-      Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(analysis.nodes), 3 * static_cast<Eigen::Index>(nodes.size()));
+      Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh_nodes), 3 * static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t i = 0; i < nodes.size(); ++i)
     F.block<3, 3>(3 * nodes[i], 3 * static_cast<Eigen::Index>(i)).setIdentity();
+  return F;
+}
 
+Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices, const Embedding& surface,
+                            const AttachmentPatch& patch) {
+  const std::vector<std::size_t> members = members_of(vertices, patch);
+  const double weight = 1.0 / static_cast<double>(members.size());
+  Vec3 mean = Vec3::Zero();
+  for (const std::size_t v : members) mean += weight * vertices[v];
+  Mat3 inertia = Mat3::Zero();
+  for (const std::size_t v : members) {
+    const Vec3 x = vertices[v] - mean;
+    inertia += weight * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(inertia);
+  const double largest = eigen.eigenvalues().maxCoeff();
+  Vec3 inverse = Vec3::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (eigen.eigenvalues()[i] > kRoundOff * largest) inverse[i] = 1.0 / eigen.eigenvalues()[i];
+  const Mat3 turns = std::sqrt(largest) * eigen.eigenvectors() * inverse.asDiagonal();  // about the principal axes
+  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 6);
+  for (const std::size_t v : members) {
+    const EmbeddedVertex& at = surface.vertices[v];
+    // What the mean displacement and the rotation take of this vertex's displacement, transposed.
+    Eigen::Matrix<double, 3, 6> load;
+    load << Mat3::Identity(), cross_matrix(vertices[v] - mean).transpose() * turns;
+    for (int c = 0; c < 4; ++c)
+      F.middleRows<3>(3 * mesh.tets[static_cast<std::size_t>(at.tet)][static_cast<std::size_t>(c)]) +=
+          weight * at.weight[static_cast<std::size_t>(c)] * load;
+  }
+  return F;
+}
+
+Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, const Eigen::MatrixXd& F) {
+  const StaticModes modes(analysis, kept);
   Eigen::MatrixXd U = residual_displacements(*analysis.compliance, modes, F);
   // K U = F less what the zero and the kept modes carry, so UᵀKU = FᵀU.
   const Eigen::MatrixXd energy = F.transpose() * U;

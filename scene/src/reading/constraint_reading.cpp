@@ -23,28 +23,6 @@ HandleOptions read_handle_options(const JsonObject& o) {
   return options;
 }
 
-JointActuation read_coordinate(const Json& value, const std::string& where) {
-  const JsonObject o(value, where);
-  JointActuation a;
-  if (o.has("motor")) {
-    const JsonObject motor(o.at("motor"), o.where("motor"));
-    a.motor_velocity = motor.number("velocity");
-    a.motor_max_force = positive(motor, "max_force");
-    motor.finish();
-  }
-  if (o.has("drive")) {
-    const JsonObject drive(o.at("drive"), o.where("drive"));
-    a.drive_target = drive.number("target", 0.0);
-    a.drive_stiffness = non_negative(drive, "stiffness", 0.0);
-    a.drive_damping = non_negative(drive, "damping", 0.0);
-    drive.finish();
-  }
-  a.friction = non_negative(o, "friction", 0.0);
-  o.finish();
-  check_input(where, [&] { a.validate(); });
-  return a;
-}
-
 }  // namespace
 
 SceneHandle read_handle(const Json& value, const std::string& where, const Scene& scene) {
@@ -69,14 +47,7 @@ SceneJoint read_joint(const Json& value, const std::string& where) {
   check_input(where, [&] { j.spec.validate(); });
   j.patch_radius = non_negative(o, "patch_radius", 0.0);
   j.collide = o.boolean("collide", false);
-  if (o.has("coordinates"))
-    o.for_each("coordinates",
-               [&](const Json& v, const std::string& w) { j.coordinates.push_back(read_coordinate(v, w)); });
-  const JointFreedoms free = freedoms(j.spec.type);
-  const std::size_t most = static_cast<std::size_t>(free.rotations) + static_cast<std::size_t>(free.translations);
-  if (j.coordinates.size() > most)
-    refuse(o.where("coordinates"), "an array of " + std::to_string(j.coordinates.size()) + " items",
-           "at most " + std::to_string(most) + ", which a " + std::string(to_string(j.spec.type)) + " joint has");
+  j.coordinates = read_joint_coordinates(o, j.spec.type);
   o.finish();
   return j;
 }

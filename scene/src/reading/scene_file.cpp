@@ -11,20 +11,25 @@
 #include "limber/core/file.h"
 #include "reading/constraint_reading.h"
 #include "reading/contact_reading.h"
+#include "reading/machine_reading.h"
 #include "reading/scene_reading.h"
 
 namespace limber {
 namespace {
 
 using internal::choice;
+using internal::Grid;
 using internal::held_duration;
 using internal::JsonObject;
 using internal::kMaxIndex;
+using internal::known_asset;
 using internal::non_negative;
 using internal::positive;
 using internal::read_contact;
+using internal::read_grid;
 using internal::read_handle;
 using internal::read_joint;
+using internal::read_machines;
 using internal::read_movement;
 using internal::read_place;
 using internal::read_pose;
@@ -35,7 +40,6 @@ using internal::time_inside;
 using Json = nlohmann::json;
 
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
-constexpr std::int64_t kMaxCopies = 100'000;
 constexpr std::int64_t kMaxSubsteps = 1'000'000;
 
 Axes read_axes(const JsonObject& o) {
@@ -67,58 +71,21 @@ HeldForce read_force(const Json& value, const std::string& where, const Scene& s
   return f;
 }
 
-/// A grid of copies: count along x, y, z and the distances between them. One body where it is not given.
-struct Grid {
-  std::array<Index, 3> count{1, 1, 1};
-  Vec3 spacing = Vec3::Zero();
-};
-
-Grid read_grid(const JsonObject& body) {
-  Grid grid;
-  if (!body.has("copies")) return grid;
-  const JsonObject o(body.at("copies"), body.where("copies"));
-  const auto count = o.numbers("count", 3);
-  for (int a = 0; a < 3; ++a) {
-    if (count[a] != std::floor(count[a]) || count[a] < 1 || count[a] > kMaxCopies)
-      refuse(o.where("count"), JsonObject::shown(Json(count)), "three whole numbers >= 1");
-    grid.count[a] = static_cast<Index>(count[a]);
-  }
-  if (count[0] * count[1] * count[2] > kMaxCopies)
-    refuse(o.where("count"), JsonObject::shown(Json(count)), "at most " + std::to_string(kMaxCopies) + " copies");
-  grid.spacing = o.vec3("spacing");
-  o.finish();
-  return grid;
-}
-
 std::variant<Index, std::string> read_part(const JsonObject& o) {
   if (!o.has("part")) return Index{0};
   if (o.at("part").is_string()) return o.text("part");
   return static_cast<Index>(o.integer("part", 0, kMaxIndex));
 }
 
-std::string known_asset(const JsonObject& o, const Scene& scene) {
-  std::string name = o.text("asset");
-  if (scene.assets.contains(name)) return name;
-  std::vector<std::string> known;
-  for (const auto& [key, unused] : scene.assets) known.push_back(key);
-  throw InputError(o.where("asset") + ": \"" + name + "\" is not among the scene's assets; did you mean \"" +
-                   internal::nearest_word(name, known) + "\"?");
-}
-
 void add_copies(const SceneBody& original, const Grid& grid, Scene& scene) {
-  const bool alone = grid.count[0] == 1 && grid.count[1] == 1 && grid.count[2] == 1;
-  int i = 0;
-  for (Index z = 0; z < grid.count[2]; ++z)
-    for (Index y = 0; y < grid.count[1]; ++y)
-      for (Index x = 0; x < grid.count[0]; ++x) {
-        SceneBody copy = original;
-        if (!alone) copy.name += "[" + std::to_string(i++) + "]";
-        const Vec3 shift = Vec3(x, y, z).cwiseProduct(grid.spacing);
-        copy.placement.pose.p += shift;
-        if (auto* keys = std::get_if<std::vector<PoseKey>>(&copy.movement))
-          for (PoseKey& key : *keys) key.pose.p += shift;
-        scene.bodies.push_back(std::move(copy));
-      }
+  grid.for_each([&](int number, const Vec3& shift) {
+    SceneBody copy = original;
+    if (!grid.one()) copy.name += "[" + std::to_string(number) + "]";
+    copy.placement.pose.p += shift;
+    if (auto* keys = std::get_if<std::vector<PoseKey>>(&copy.movement))
+      for (PoseKey& key : *keys) key.pose.p += shift;
+    scene.bodies.push_back(std::move(copy));
+  });
 }
 
 void read_body(const Json& value, const std::string& where, const std::filesystem::path& folder, Scene& scene) {
@@ -169,6 +136,14 @@ void require_one_body(const Scene& scene, const std::string& name, const std::st
                      " copies, expected one of them, such as \"" + name + "[0]\"");
 }
 
+/// `apart`: two bodies each.
+void read_apart(const Json& value, const std::string& where, Scene& scene) {
+  if (!value.is_array() || value.size() != 2 || !value[0].is_string() || !value[1].is_string() || value[0] == value[1])
+    refuse(where, JsonObject::shown(value), "the names of two bodies");
+  scene.apart.push_back({value[0].get<std::string>(), value[1].get<std::string>()});
+  for (const std::string& name : scene.apart.back()) require_one_body(scene, name, where);
+}
+
 void require_joined_bodies(const Scene& scene, const SceneJoint& joint) {
   if (!joint.a.empty()) require_one_body(scene, joint.a, joint.where + ".a");
   require_one_body(scene, joint.b, joint.where + ".b");
@@ -183,6 +158,7 @@ void read_actions(const JsonObject& o, Scene& scene) {
   each("strikes", [&](const Json& v, const std::string& w) { scene.strikes.push_back(read_strike(v, w, scene)); });
   each("forces", [&](const Json& v, const std::string& w) { scene.forces.push_back(read_force(v, w, scene)); });
   each("handles", [&](const Json& v, const std::string& w) { scene.handles.push_back(read_handle(v, w, scene)); });
+  each("apart", [&](const Json& v, const std::string& w) { read_apart(v, w, scene); });
   each("joints", [&](const Json& v, const std::string& w) { scene.joints.push_back(read_joint(v, w)); });
   for (const Strike& s : scene.strikes) require_known_body(scene, s.body, s.where + ".body");
   for (const HeldForce& f : scene.forces) require_known_body(scene, f.body, f.where + ".body");
@@ -274,7 +250,9 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   if (o.has("statics"))
     o.for_each("statics",
                [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, folder)); });
-  o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
+  if (o.has("bodies") || !o.has("machines"))
+    o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
+  read_machines(o, folder, scene);
   if (scene.bodies.empty()) refuse(o.where("bodies"), "[]", "at least one body");
   require_unique_names(scene);
   read_actions(o, scene);

@@ -27,23 +27,6 @@
 
 namespace limber {
 
-/// What acts on one coordinate. Forces are N or N·m, velocities m/s or rad/s.
-struct JointActuation {
-  double motor_velocity = 0.0;
-  double motor_max_force = 0.0;  ///< ≥ 0; 0: no motor
-  double drive_target = 0.0;     ///< m or rad
-  double drive_stiffness = 0.0;  ///< k, N/m or N·m/rad; ≥ 0; 0: no drive
-  double drive_damping = 0.0;    ///< c, N·s/m or N·m·s/rad; ≥ 0; without a stiffness: a damper
-  double friction = 0.0;         ///< ≥ 0
-  void validate() const;         ///< @throws InvalidArgument naming the field and its value
-};
-
-template <class Self>
-requires std::is_same_v<std::remove_const_t<Self>, JointActuation>
-auto state_fields(Self& s) {
-  return std::tie(s.motor_velocity, s.motor_max_force, s.drive_target, s.drive_stiffness, s.drive_damping, s.friction);
-}
-
 class JointConstraint final : public Constraint {
  public:
   /// @param a, b the joint's frame on each part. @param spec its frame is not read

@@ -271,6 +271,9 @@ class World {
   JointId add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a = {},
                     const JointAttachment& on_b = {}, bool collide_connected = false);
   void remove_joint(JointId id);
+  /// Whether two bodies have contacts with each other, as far as no joint keeps them from it: parts of a machine that
+  /// are drawn into each other have none. They do at first. @throws InvalidArgument if a and b are the same
+  void set_apart(BodyId a, BodyId b, bool apart);
   bool contains(JointId id) const;
   /// Motor, drive and friction of one coordinate.
   void set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation);

@@ -3,26 +3,44 @@
 /// the runtime needs. Reader and writer live together; docs/formats/asset.md describes the file byte by byte.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "limber/model/joint_spec.h"
 #include "limber/model/modal_model.h"
 
 namespace limber {
 
-/// One or more bodies baked from one input.
+/// A joint between two bodies of an asset, or a body and the world, as they stand in the input: all its coordinates are
+/// 0 there.
+struct AssetJoint {
+  static constexpr Index kWorld = -1;
+  Index a = kWorld, b = 0;    ///< numbers of bodies; b moves relative to a. a may be the world
+  JointSpec spec{};           ///< its frame in the input's axes and coordinates (ModalModelData::origin_in_input), m
+  double patch_radius = 0.0;  ///< of the surface that the joint sits on, on each part; m, ≥ 0
+  bool collide = false;       ///< whether a and b have contacts with each other
+  std::vector<JointActuation> coordinates{};  ///< motors, drives and friction of the first so many coordinates
+
+  friend bool operator==(const AssetJoint&, const AssetJoint&) = default;
+};
+
+/// One or more bodies baked from one input, and what joins them: with joints, a machine (limber/scene/machine.h).
 struct Asset {
   std::vector<std::shared_ptr<const ModalModel>> bodies{};
   Provenance provenance{};
+  std::vector<AssetJoint> joints{};           ///< closed chains too
+  std::vector<std::array<Index, 2>> apart{};  ///< bodies without contacts with each other, though no joint says so
 };
 
 /// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this
 /// version.
 /// @throws InvalidArgument if there is no body, a name repeats or is not UTF-8, a body has more modes than viewers take
-/// (kMaxMorphTargets), or the file would have more than 4 GiB
+/// (kMaxMorphTargets), a joint or a pair names bodies that are not there or the same one twice, or a joint's numbers are
+/// not valid, or the file would have more than 4 GiB
 std::string asset_bytes(const Asset& asset);
 
 /// Writes whole or not at all. @throws InputError (disk), InvalidArgument

@@ -1,6 +1,6 @@
 /// @file limber/model/joint_spec.h
-/// What a joint between two parts is: its type, where it sits, and how far it may go. Shared by detection, posing,
-/// dynamics and the joints file (docs/formats/joints.md).
+/// What a joint between two parts is: its type, where it sits, how far it may go, and what drives it. Shared by
+/// detection, posing, dynamics, assets and the joints file (docs/formats/joints.md).
 ///
 /// A joint has a right-handed frame J. Part b moves, part a stays; where the parts are as read (the reference pose), J
 /// is the same in both, all coordinates are 0. Lengths are in m (or the file's own unit before it is scaled), angles in
@@ -24,6 +24,7 @@
 #include <tuple>
 #include <type_traits>
 
+#include "limber/core/rigid_transform.h"
 #include "limber/core/types.h"
 
 namespace limber {
@@ -51,11 +52,11 @@ struct Interval {
 
 /// How far each freedom goes; members that the type does not have stay open.
 struct JointLimits {
-  Interval rotation;                    ///< revolute, cylindrical: about x; planar: about z; rad
-  std::array<Interval, 2> translation;  ///< prismatic, cylindrical: [0] along x; planar: along x and y; m
+  Interval rotation{};                  ///< revolute, cylindrical: about x; planar: about z; rad
+  std::array<Interval, 2> translation{};  ///< prismatic, cylindrical: [0] along x; planar: along x and y; m
   double cone = std::numeric_limits<double>::infinity();  ///< ball: largest angle of b's x axis from a's, rad
   /// ball: intrinsic x-y-z Euler angles, rad
-  std::array<Interval, 3> euler;
+  std::array<Interval, 3> euler{};
 
   friend bool operator==(const JointLimits&, const JointLimits&) = default;
 };
@@ -72,6 +73,8 @@ auto state_fields(Self& s) { return std::tie(s.rotation, s.translation, s.cone, 
 struct JointFrame {
   Vec3 origin = Vec3::Zero();
   Mat3 axes = Mat3::Identity();
+
+  friend bool operator==(const JointFrame&, const JointFrame&) = default;
 };
 
 struct JointSpec {
@@ -82,6 +85,29 @@ struct JointSpec {
 
   /// @throws InvalidArgument if the axes are not orthonormal and right-handed to 1e-6, a number is NaN, or low > high
   void validate() const;
+  /// The joint carried along: its frame by X.
+  JointSpec moved_by(const RigidTransform& X) const;
+
+  friend bool operator==(const JointSpec&, const JointSpec&) = default;
 };
+
+/// What acts on one coordinate. Forces are N or N·m, velocities m/s or rad/s.
+struct JointActuation {
+  double motor_velocity = 0.0;
+  double motor_max_force = 0.0;  ///< ≥ 0; 0: no motor
+  double drive_target = 0.0;     ///< m or rad
+  double drive_stiffness = 0.0;  ///< k, N/m or N·m/rad; ≥ 0; 0: no drive
+  double drive_damping = 0.0;    ///< c, N·s/m or N·m·s/rad; ≥ 0; without a stiffness: a damper
+  double friction = 0.0;         ///< ≥ 0
+  void validate() const;         ///< @throws InvalidArgument naming the field and its value
+
+  friend bool operator==(const JointActuation&, const JointActuation&) = default;
+};
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, JointActuation>
+auto state_fields(Self& s) {
+  return std::tie(s.motor_velocity, s.motor_max_force, s.drive_target, s.drive_stiffness, s.drive_damping, s.friction);
+}
 
 }  // namespace limber

@@ -72,11 +72,15 @@ class PosingSession {
   /// Moves of one handle that follow each other are undone together. @throws InvalidArgument if it is not finite
   void move_handle(PoseHandle handle, const Vec3& target);
   void remove_handle(PoseHandle handle);
-  /// Where a handle's point is.
+  /// Whether there is such a handle: not after it was removed, or taken back.
+  bool contains(PoseHandle handle) const;
+  /// Where a handle's point is, and where it is wanted.
   Vec3 handle_point(PoseHandle handle) const;
+  Vec3 handle_target(PoseHandle handle) const;
 
   /// A pinned part stays where it stands now.
   void set_pinned(Index part, bool pinned);
+  bool pinned(Index part) const;
   /// Makes a part rigid or deformable, finer or stiffer. It keeps its shape as far as the new cells can show it.
   void set_part(Index part, const PartOptions& options);
   PartOptions part_options(Index part) const;

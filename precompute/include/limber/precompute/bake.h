@@ -61,10 +61,20 @@ struct BakeInput {
   Provenance provenance = {};
 };
 
+/// A patch of the collision surface that something is attached to: all vertices within a distance, or the nearest one,
+/// with equal weights, as JointAttachment (limber/engine/world.h) takes them.
+struct AttachmentPatch {
+  Vec3 center = Vec3::Zero();  ///< m, mesh coordinates
+  double radius = 0.0;         ///< m, ≥ 0
+};
+
 /// What the modes that are not kept still answer, statically (limber/model/residual_compliance.h).
 struct ResidualOptions {
   /// At these nodes static loads are answered exactly: up to three further modes per node join the basis.
   std::vector<NodeSelector> nodes = {};
+  /// Forces and moments that act on these patches as wholes, as those of joints do, are answered exactly: up to six
+  /// further modes per patch. On the body that has the node nearest to the centre.
+  std::vector<AttachmentPatch> patches = {};
   /// Store the residual compliance of the collision surface: three solves per vertex.
   bool surface = false;
   /// Bytes up to which all pairs of the surface's vertices are stored; above, single vertices alone.

@@ -11,6 +11,7 @@
 /// SI units throughout: m, s, kg, N, N·s; angles in degrees in the file only. World axes: z up.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -165,11 +166,12 @@ struct Scene {
   std::optional<ContactOptions> contact{};                ///< absent: bodies pass through each other
   SceneFinder finder = SceneFinder::kLimber;              ///< of contacts
   std::vector<SceneStatic> statics{};                     ///< none without contact
-  std::vector<SceneBody> bodies{};
+  std::vector<SceneBody> bodies{};                        ///< those of machines last
   std::vector<Strike> strikes{};
   std::vector<HeldForce> forces{};
   std::vector<SceneHandle> handles{};
   std::vector<SceneJoint> joints{};
+  std::vector<std::array<std::string, 2>> apart{};  ///< bodies without contacts with each other
 
   double duration() const { return step * static_cast<double>(steps); }
 };
@@ -183,8 +185,9 @@ std::string_view to_string(FrictionModel model);
 std::string_view to_string(ProgramGuard guard);
 std::string_view to_string(ImpactModel model);
 
-/// Reads and checks everything that can be checked without the assets and the files of shapes. Unknown keys are errors
-/// that name the nearest known one. @throws InputError in one line: file, place, seen, expected
+/// Reads and checks everything that can be checked without the assets and the files of shapes. Assets of machines are
+/// read: their bodies, joints and pairs stand among the scene's own, each body as "MACHINE/BODY". Unknown keys are
+/// errors that name the nearest known one. @throws InputError in one line: file, place, seen, expected
 Scene read_scene(const std::filesystem::path& path);
 
 /// The same from text. @param name shown in messages. @param folder that asset files are relative to

@@ -10,6 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "limber/articulation/joints_file.h"
+#include "limber/mesh/grouped_surface.h"
+
 namespace limber {
 
 /// A file as the page sees it, below /scene/.
@@ -19,8 +22,9 @@ struct PageFile {
 };
 
 struct PageContent {
-  std::string scene{};  ///< path of the scene's file among these
+  std::string scene{};  ///< path of the scene's file among these, or of a model to be posed
   std::vector<PageFile> files{};
+  std::string joints{};  ///< of a model to be posed: path of its joints file
 };
 
 /// A scene with its assets and the files of its shapes, which get names of our own. Reads and checks all of it.
@@ -30,9 +34,15 @@ PageContent page_of_scene(const std::filesystem::path& scene);
 /// Which axis of an asset's bodies points up.
 enum class UpAxis { kY, kZ };
 
-/// A scene made for an asset: its bodies side by side, free ones fall on the ground from half their size.
+/// A scene made for an asset: a machine as it was drawn, on the ground where nothing ties it to the world; single
+/// bodies side by side, free ones fall on the ground from half their size.
 /// @throws InputError as read_asset()
 PageContent page_of_asset(const std::filesystem::path& asset, UpAxis up = UpAxis::kZ);
+
+/// A model to be posed (limber/view/page_pose.h). @param name shown as the page's title. @param joints_name of the
+/// joints file, for messages @throws InputError where they do not go together
+PageContent page_of_pose(const GroupedSurface& surface, const JointsFile& joints, const std::string& name,
+                         const std::string& joints_name);
 
 /// @param empty the page without a scene, which limber-view has inside
 /// @throws InvalidArgument where `empty` has no place for files

@@ -78,6 +78,8 @@ class PageWorld {
   /// time (s), kinetic energy of the frames, of the modes, elastic, potential (J), bodies asleep, contacts that press,
   /// rows, iterations, settled (0 or 1).
   std::span<const double> numbers();
+  /// What the stages of the last step took, s, in the order of Stage (limber/core/stage_times.h).
+  std::span<const double> stage_seconds() const;
   /// What World::reconstruct() makes of a body: 3 V floats, world.
   void reconstruct(int body, float* positions) const;
   /// Per joint: origin and x axis in the world, coordinates (3).

@@ -1,0 +1,171 @@
+// A machine of steel and rubber links, held at one end and loaded at the other, against K u = f of all nodes of both.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "dense_fem.h"
+#include "limber/core/cross_matrix.h"
+#include "limber/precompute/bake.h"
+#include "limber/scene/machine.h"
+#include "tet_box.h"
+
+namespace limber {
+namespace {
+
+const Material kLinkSteel{.youngs_modulus = 2e11, .poisson_ratio = 0.3, .density = 7850.0};
+const Material kLinkRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.45, .density = 1100.0};
+
+constexpr double kLength = 0.2, kWidth = 0.02, kRadius = 0.016;
+
+/// A bar along x that begins at x.
+TetMesh link_at(double x) {
+  TetMesh mesh = testing::tet_box(10, 2, 2, {kLength, kWidth, kWidth});
+  for (Vec3& p : mesh.nodes) p += Vec3(x, -0.5 * kWidth, -0.5 * kWidth);
+  return mesh;
+}
+
+/// Nodes of the surface within reach of a joint.
+std::vector<Index> patch_of(const TetMesh& mesh, const Vec3& origin) {
+  std::vector<Index> patch;
+  double low = 1e9, high = -1e9;
+  for (const Vec3& p : mesh.nodes) low = std::min(low, p.x()), high = std::max(high, p.x());
+  for (std::size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const Vec3& p = mesh.nodes[n];
+    const bool outside =
+        std::max(std::abs(p.y()), std::abs(p.z())) > 0.5 * kWidth - 1e-9 || std::min(p.x() - low, high - p.x()) < 1e-9;
+    if (outside && (p - origin).norm() <= kRadius) patch.push_back(static_cast<Index>(n));
+  }
+  return patch;
+}
+
+/// What the frame of a joint at `origin` moves and turns by: 6 rows over the nodes' displacements.
+Eigen::MatrixXd frame_rows(const TetMesh& mesh, const Vec3& origin) {
+  const std::vector<Index> patch = patch_of(mesh, origin);
+  const double w = 1.0 / static_cast<double>(patch.size());
+  Vec3 mean = Vec3::Zero();
+  for (const Index n : patch) mean += w * mesh.nodes[static_cast<std::size_t>(n)];
+  Mat3 inertia = Mat3::Zero();
+  for (const Index n : patch) {
+    const Mat3 x = cross_matrix(mesh.nodes[static_cast<std::size_t>(n)] - mean);
+    inertia -= w * x * x;
+  }
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, static_cast<Eigen::Index>(3 * mesh.nodes.size()));
+  for (const Index n : patch) {
+    const Mat3 turn = w * inertia.inverse() * cross_matrix(mesh.nodes[static_cast<std::size_t>(n)] - mean);
+    rows.block<3, 3>(3, 3 * n) = turn;
+    rows.block<3, 3>(0, 3 * n) = w * Mat3::Identity() - cross_matrix(origin - mean) * turn;
+  }
+  return rows;
+}
+
+/// Nodes of the far end, which the load is spread over.
+std::vector<Index> tip_of(const TetMesh& mesh, double x) {
+  std::vector<Index> tip;
+  for (std::size_t n = 0; n < mesh.nodes.size(); ++n)
+    if (mesh.nodes[n].x() > x - 1e-9) tip.push_back(static_cast<Index>(n));
+  return tip;
+}
+
+struct Links {
+  TetMesh steel = link_at(0.0), rubber = link_at(kLength);
+  Vec3 wall{0, 0, 0}, hinge{kLength, 0, 0};
+
+  /// How far the tip goes under a force: all nodes of both, tied to the wall and to each other as the joints tie them.
+  double whole_model(const Vec3& force) const {
+    const auto n_steel = static_cast<Eigen::Index>(3 * steel.nodes.size());
+    const auto n = n_steel + static_cast<Eigen::Index>(3 * rubber.nodes.size());
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 12, n + 12);
+    add_stiffness(steel, kLinkSteel, 0, A);
+    add_stiffness(rubber, kLinkRubber, n_steel, A);
+    Eigen::MatrixXd ties = Eigen::MatrixXd::Zero(12, n);
+    ties.topLeftCorner(6, n_steel) = frame_rows(steel, wall);
+    ties.bottomLeftCorner(6, n_steel) = frame_rows(steel, hinge);
+    ties.bottomRightCorner(6, n - n_steel) = -frame_rows(rubber, hinge);
+    const double scale = 1e6;  // so that all rows are of one size
+    A.bottomLeftCorner(12, n) = scale * ties;
+    A.topRightCorner(n, 12) = scale * ties.transpose();
+    Eigen::VectorXd load = Eigen::VectorXd::Zero(n + 12);
+    const std::vector<Index> tip = tip_of(rubber, 2.0 * kLength);
+    for (const Index v : tip) load.segment<3>(n_steel + 3 * v) = force / static_cast<double>(tip.size());
+    const Eigen::VectorXd u = Eigen::FullPivLU<Eigen::MatrixXd>(A).solve(load);
+    double moved = 0.0;
+    for (const Index v : tip) moved += u.segment<3>(n_steel + 3 * v).dot(force.normalized());
+    return moved / static_cast<double>(tip.size());
+  }
+
+  static void add_stiffness(const TetMesh& mesh, const Material& material, Eigen::Index first, Eigen::MatrixXd& A) {
+    const auto material_of = [&](std::size_t) -> const Material& { return material; };
+    testing::for_each_element(mesh, false, material_of, [&](const Tet& t, const auto& K, const auto&) {
+      for (int i = 0; i < 12; ++i)
+        for (int j = 0; j < 12; ++j) A(first + 3 * t[i / 3] + i % 3, first + 3 * t[j / 3] + j % 3) += K(i, j);
+    });
+  }
+};
+
+std::shared_ptr<const ModalModel> baked_link(const TetMesh& mesh, const char* name, const Material& material,
+                                             std::vector<AttachmentPatch> patches) {
+  BakeOptions o;
+  o.materials = {{"*", material}};
+  o.analysis.modes = o.limits.max_modes = 6;
+  o.damping = RayleighDamping::from_ratio(1.0, 5.0, 50.0);
+  o.residual.patches = std::move(patches);
+  Warnings warnings;
+  return bake({.name = name, .mesh = mesh}, o, warnings).asset.bodies[0];
+}
+
+double tip_in_world(const Links& links, bool joint_modes, const Vec3& force) {
+  const auto patches = [&](std::vector<AttachmentPatch> all) {
+    return joint_modes ? all : std::vector<AttachmentPatch>{};
+  };
+  const AttachmentPatch at_wall{links.wall, kRadius}, at_hinge{links.hinge, kRadius};
+  Asset asset{.bodies = {baked_link(links.steel, "steel", kLinkSteel, patches({at_wall, at_hinge})),
+                         baked_link(links.rubber, "rubber", kLinkRubber, patches({at_hinge}))}};
+  asset.joints = {
+      {.b = 0, .spec = {.type = JointType::kFixed, .frame = {.origin = links.wall}}, .patch_radius = kRadius},
+      {.a = 0, .b = 1, .spec = {.type = JointType::kFixed, .frame = {.origin = links.hinge}}, .patch_radius = kRadius}};
+  World world({.step = 0.02, .gravity = Vec3::Zero()});
+  const Machine machine = add_machine(world, asset);
+  const ModalModel& model = *asset.bodies[1];
+  std::vector<SurfacePoint> tip;
+  const double end = 2.0 * kLength - model.data().origin_in_input.x();
+  std::vector<bool> seen(model.collision().rest.size(), false);
+  for (std::size_t t = 0; t < model.collision().triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(model.collision().triangles[t][k]);
+      if (seen[v] || model.collision().rest[v].x() < end - 1e-6) continue;
+      seen[v] = true;
+      SurfacePoint at{
+          .surface = SurfacePoint::Surface::kCollision, .triangle = static_cast<Index>(t), .weight = {0, 0, 0}};
+      at.weight[k] = 1.0;
+      tip.push_back(at);
+    }
+  const auto mean = [&] {
+    double sum = 0.0;
+    for (const SurfacePoint& at : tip) sum += world.position(machine.bodies[1], at).dot(force.normalized());
+    return sum / static_cast<double>(tip.size());
+  };
+  const double before = mean();
+  for (int step = 0; step < 600; ++step) {
+    for (const SurfacePoint& at : tip)
+      world.apply_force(machine.bodies[1], at, force / static_cast<double>(tip.size()));
+    world.step();
+  }
+  return mean() - before;
+}
+
+/// Small loads: the tip goes some hundredths of a link's width.
+TEST(MachineOfLinks, BendsAndStretchesAsTheWholeModelDoes) {
+  const Links links;
+  for (const Vec3& force : {Vec3(0, 0, -1e-4), Vec3(0.05, 0, 0)}) {
+    const double whole = links.whole_model(force), seen = tip_in_world(links, true, force);
+    EXPECT_GT(whole, 1e-6);
+    EXPECT_NEAR(seen / whole, 1.0, 0.02) << force.transpose();
+  }
+  const Vec3 across(0, 0, -1e-4);
+  EXPECT_LT(tip_in_world(links, false, across) / links.whole_model(across), 0.98)
+      << "without the modes of its joints it is too stiff, or this shows nothing";
+}
+
+}  // namespace
+}  // namespace limber

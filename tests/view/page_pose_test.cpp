@@ -1,0 +1,148 @@
+// What the page of a posed model drives, without a page.
+#include "limber/view/page_pose.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "limber/core/error.h"
+#include "limber/core/file.h"
+
+namespace limber {
+namespace {
+
+/// Two bars end to end along x, each 1 × 0.2 × 0.2, the second hinged to the first about y at x = 1.
+std::string bars() {
+  std::string text;
+  int first = 1;
+  for (const double x : {0.0, 1.02}) {
+    for (int i = 0; i < 8; ++i)
+      text += "v " + std::to_string(x + (i & 1)) + " " + std::to_string(0.2 * ((i >> 1) & 1)) + " " +
+              std::to_string(0.2 * (i >> 2)) + "\n";
+    for (const auto& [a, b, c, d] : std::vector<std::array<int, 4>>{
+             {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}})
+      text += "f " + std::to_string(first + a) + " " + std::to_string(first + b) + " " + std::to_string(first + c) +
+              " " + std::to_string(first + d) + "\n";
+    first += 8;
+  }
+  return text;
+}
+
+constexpr const char* kJoints =
+    R"({"components": [{"name": "base", "faces": [[0, 6]]}, {"name": "arm", "faces": [[6, 6]]}],
+  "joints": [{"a": 0, "b": 1, "type": "revolute", "origin": [1.01, 0.1, 0.1], "axis": [0, 1, 0],
+              "limits": {"rotation": [-1, 1]}}]})";
+
+class PagePoseTest : public ::testing::Test {
+ protected:
+  PagePoseTest() {
+    std::filesystem::create_directories(folder_);
+    write_file(folder_ / "bars.obj", bars());
+    write_file(folder_ / "bars.json", kJoints);
+  }
+  ~PagePoseTest() override { std::filesystem::remove_all(folder_); }
+  PagePose page() const { return PagePose(folder_ / "bars.obj", folder_ / "bars.json"); }
+
+ private:
+  const std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+PoseResult settle(PagePose& page) {
+  PoseResult result = page.solve();
+  for (int i = 0; i < 50 && result.status == PoseResult::Status::kIterationLimit; ++i) result = page.solve();
+  return result;
+}
+double turn(PagePose& page) { return page.joint_frames()[6]; }
+nlohmann::json told(const PagePose& page) { return nlohmann::json::parse(page.description()); }
+/// The tip of the arm, from above.
+PoseHit tip(const PagePose& page) { return page.cast_ray({1.97, 0.1, 5.0}, {0, 0, -1}); }
+
+TEST_F(PagePoseTest, PullingTurnsThePartWithinItsLimits) {
+  PagePose pose = page();
+  const PoseHit hit = tip(pose);
+  ASSERT_EQ(hit.part, 1);
+  EXPECT_NEAR(hit.point.z(), 0.2, 1e-12);
+  ASSERT_TRUE(pose.grab(hit));
+  pose.drag_to({1.9, 0.1, 0.7});
+  const PoseResult found = settle(pose);
+  EXPECT_LT(found.joint_error, 1e-9);
+  EXPECT_LT(turn(pose), -0.3) << "up is against the axis";
+  pose.drag_to({0.8, 0.1, 3.0});
+  settle(pose);
+  EXPECT_NEAR(turn(pose), -1.0, 1e-6) << "its limit";
+  for (int i = 0; i < 24; ++i)
+    EXPECT_NEAR(pose.positions()[static_cast<std::size_t>(i)],
+                pose.session().model().surface.vertices[static_cast<std::size_t>(i / 3)][i % 3], 1e-6)
+        << "the base is pinned";
+}
+
+TEST_F(PagePoseTest, HandlesStayAreTakenAgainAndUndone) {
+  PagePose pose = page();
+  pose.grab(tip(pose));
+  pose.drag_to({1.9, 0.1, 0.7});
+  settle(pose);
+  pose.let_go();
+  ASSERT_EQ(pose.handles().size(), 6u);
+  pose.take(0);
+  pose.drag_to({1.9, 0.1, -0.3});
+  settle(pose);
+  EXPECT_GT(turn(pose), 0.2);
+  EXPECT_EQ(pose.handles().size(), 6u);
+  EXPECT_NEAR(pose.handles()[5], -0.3, 1e-12);
+  while (pose.undo()) {
+  }
+  EXPECT_EQ(pose.handles().size(), 0u);
+  EXPECT_NEAR(turn(pose), 0.0, 1e-12);
+  EXPECT_THROW(pose.take(0), InvalidArgument);
+}
+
+TEST_F(PagePoseTest, JointsBecomeOthersAboutTheSameAxis) {
+  PagePose pose = page();
+  pose.set_joint(0, R"({"type": "planar", "limits": null})");
+  EXPECT_EQ(told(pose)["joints"][0]["type"], "planar");
+  EXPECT_NEAR(pose.session().model().joints[0].joint.frame.axes.col(2).y(), 1.0, 1e-12) << "its normal was the axis";
+  EXPECT_NEAR(pose.session().model().joints[0].joint.frame.axes.determinant(), 1.0, 1e-12);
+  pose.set_joint(0, R"({"type": "prismatic", "limits": {"translation": [0, 0.5]}})");
+  pose.grab(tip(pose));
+  pose.drag_to({1.97, 3.0, 0.2});
+  settle(pose);
+  EXPECT_NEAR(turn(pose), 0.5, 1e-6) << "slides along it, to its stop";
+  EXPECT_TRUE(pose.undo());
+  EXPECT_THROW(pose.set_joint(0, R"({"type": "hinge", "limits": null})"), InputError);
+  EXPECT_THROW(pose.set_joint(0, R"({"type": "revolute", "limits": {"cone": 1}})"), InputError);
+  EXPECT_THROW(pose.set_joint(3, R"({"type": "fixed", "limits": null})"), InvalidArgument);
+}
+
+TEST_F(PagePoseTest, ASoftPartBendsAndItsJointHolds) {
+  PagePose pose = page();
+  pose.set_joint(0, R"({"type": "fixed", "limits": null})");
+  pose.set_soft(1, true);
+  EXPECT_TRUE(told(pose)["parts"][1]["soft"]);
+  pose.grab(tip(pose));
+  pose.drag_to({1.9, 0.1, 0.6});
+  const PoseResult found = settle(pose);
+  EXPECT_LT(found.joint_error, 1e-9);
+  EXPECT_GT(pose.handles()[2], 0.4) << "its tip has gone up";
+}
+
+TEST_F(PagePoseTest, APoseIsSavedAsAModelOfItsOwn) {
+  PagePose pose = page();
+  pose.grab(tip(pose));
+  pose.drag_to({1.9, 0.1, 0.7});
+  settle(pose);
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "page_pose_saved";
+  std::filesystem::create_directories(folder);
+  write_file(folder / "m.obj", pose.model_text());
+  write_file(folder / "m.json", pose.joints_text());
+  PagePose again(folder / "m.obj", folder / "m.json");
+  for (std::size_t i = 0; i < pose.positions().size(); ++i)
+    EXPECT_NEAR(again.positions()[i], pose.positions()[i], 1e-6);
+  EXPECT_NEAR(again.session().model().joints[0].joint.limits.rotation.low, -1.0 - turn(pose), 1e-9);
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace limber

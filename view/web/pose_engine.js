@@ -1,0 +1,71 @@
+// Posing: WebAssembly behind plain functions.
+export class PoseEngine {
+  constructor(module, model, joints) {
+    this.module = module;
+    this.check(this.withTexts((a, b) => module._pose_open(a, b), model, joints));
+    this.describe();
+    const at = module._pose_triangles() / 4, count = 3 * this.scene.parts.reduce((sum, part) => sum + part.triangles, 0);
+    this.triangles = module.HEAPU32.slice(at, at + count);
+  }
+
+  check(done) {
+    if (!done) throw new Error(this.module.UTF8ToString(this.module._pose_error()));
+  }
+
+  withTexts(act, ...texts) {
+    const { module } = this, places = texts.map((text) => {
+      const length = module.lengthBytesUTF8(text) + 1, at = module._malloc(length);
+      module.stringToUTF8(text, at, length);
+      return at;
+    });
+    const result = act(...places);
+    for (const at of places) module._free(at);
+    return result;
+  }
+
+  describe() { this.scene = JSON.parse(this.module.UTF8ToString(this.module._pose_description())); }
+  doubles(at, count) { return this.module.HEAPF64.slice(at / 8, at / 8 + count); }
+
+  positions() {
+    const at = this.module._pose_positions() / 4;
+    return this.module.HEAPF32.slice(at, at + 3 * this.scene.vertices);
+  }
+  jointFrames() { return this.doubles(this.module._pose_joint_frames(), 9 * this.scene.joints.length); }
+  /** @return [{point, target}] */
+  handles() {
+    const count = this.module._pose_handle_count(), all = this.doubles(this.module._pose_handles(), 6 * count);
+    return Array.from({ length: count }, (_, i) => ({ point: [...all.slice(6 * i, 6 * i + 3)], target: [...all.slice(6 * i + 3, 6 * i + 6)] }));
+  }
+
+  cast(from, along) {
+    const [part, x, y, z, distance] = this.doubles(this.module._pose_cast(...from, ...along), 5);
+    return part < 0 ? null : { part, point: [x, y, z], distance };
+  }
+  grab() { this.check(this.module._pose_grab()); }
+  take(handle) { this.check(this.module._pose_take(handle)); }
+  dragTo(target) { this.module._pose_drag_to(...target); }
+  letGo() { this.module._pose_let_go(); }
+  removeHandles() { this.module._pose_remove_handles(); }
+
+  setPinned(part, pinned) { this.check(this.module._pose_set_pinned(part, pinned ? 1 : 0)); this.describe(); }
+  setSoft(part, soft) { this.check(this.module._pose_set_soft(part, soft ? 1 : 0)); this.describe(); }
+  setJoint(joint, told) {
+    this.check(this.withTexts((text) => this.module._pose_set_joint(joint, text), JSON.stringify(told)));
+    this.describe();
+  }
+  undo() {
+    const done = this.module._pose_undo() === 1;
+    this.describe();
+    return done;
+  }
+  reset() { this.module._pose_reset(); }
+
+  solve() {
+    const at = this.module._pose_solve();
+    this.check(at !== 0);
+    const [status, iterations, energy, jointError, limitViolation, handleError] = this.doubles(at, 6);
+    return { status: ['converged', 'going on', 'stalled', 'infeasible'][status], iterations, energy, jointError, limitViolation, handleError };
+  }
+  modelText() { return this.module.UTF8ToString(this.module._pose_model_text()); }
+  jointsText() { return this.module.UTF8ToString(this.module._pose_joints_text()); }
+}
