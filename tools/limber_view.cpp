@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -83,7 +84,8 @@ std::string neighbour(const char* name) {
 PageContent page_of_assembly(const fs::path& input, const std::vector<std::string>& bake) {
   const ScratchFolder folder;
   const fs::path asset = folder.path / (input.stem().string() + ".glb");
-  std::vector<std::string> arguments{input.string(), "--auto-joints", "-o", asset.string()};
+  std::vector<std::string> arguments{input.string(), "-o", asset.string()};
+  if (std::find(bake.begin(), bake.end(), "--joints") == bake.end()) arguments.emplace_back("--auto-joints");
   if (bake.empty())
     arguments.insert(arguments.end(), std::begin(kBake), std::end(kBake));
   else

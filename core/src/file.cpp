@@ -58,7 +58,7 @@ void write_all(const std::filesystem::path& shown, const std::filesystem::path& 
 
 }  // namespace
 
-std::string read_file(const std::filesystem::path& path, std::size_t max_bytes) {
+std::string read_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
   const std::string name = "read \"" + path.string() + "\": ";
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) throw InputError(name + reason());

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "block_model.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 
@@ -387,14 +388,20 @@ TEST(SceneFile, EverySceneThatIsShippedIsOne) {
 TEST(SceneFile, EveryExampleInItsManualPageIsAScene) {
   const std::string page = read_file(LIMBER_SOURCE_DIR "/docs/formats/scene.md");
   const std::string open = "```json\n", close = "```";
+  // The one with a machine reads its asset.
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "scene_manual_page";
+  std::filesystem::create_directories(folder);
+  write_asset(folder / "lamp.glb", {.bodies = {testing::block_model(1, "arm 1"), testing::block_model(1, "arm 2")},
+                                    .joints = {{.a = 0, .b = 1, .spec = {.type = JointType::kRevolute}}}});
   int examples = 0;
   for (std::size_t at = page.find(open); at != std::string::npos; at = page.find(open, at)) {
     at += open.size();
     const std::string text = page.substr(at, page.find(close, at) - at);
     SCOPED_TRACE(text);
-    EXPECT_NO_THROW(parse(text));
+    EXPECT_NO_THROW(parse_scene(text, "\"test.json\"", folder));
     ++examples;
   }
+  std::filesystem::remove_all(folder);
   EXPECT_GE(examples, 2);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -12,7 +13,7 @@ namespace limber {
 
 /// Reads a whole file. @throws InputError (one line, naming the file) if it is missing, a directory, unreadable, empty,
 /// not a regular file, or larger than max_bytes.
-std::string read_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{8} << 30);
+std::string read_file(const std::filesystem::path& path, std::uint64_t max_bytes = std::uint64_t{8} << 30);
 
 /// Writes bytes beside `path` (same folder) and renames: a reader never sees half a file, and a failure (full disk, no
 /// permission) leaves what was there before and no temporary. Devices and pipes are refused: they would be replaced.
