@@ -83,10 +83,10 @@ async function isEdited(page) {
 async function bends(page) {
   await page.locator('#panel button:has-text("Back to rest")').click();
   await page.locator('#panel select').first().selectOption('fixed');
+  const rest = await pull(page, await onScreen(page, 1), [0, -60]);
   await page.locator('#panel .part:has-text("arm") input').first().check();
-  const rest = await settled(page);
+  const bent = await settled(page);
   check((await page.evaluate(() => globalThis.limber.engine.scene.parts[1].soft)) === true, 'a part is made soft');
-  const bent = await pull(page, await onScreen(page, 1), [0, -60]);
   check(moved(bent, rest) > 0.02, `it bends, by ${moved(bent, rest)}`);
   check(bent.jointError < 1e-6, 'and hangs on its joint');
 }

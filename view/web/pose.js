@@ -113,14 +113,22 @@ export class PoseApp {
     download(this.engine.jointsText(), 'application/json', `${this.engine.scene.name}.posed.joints.json`);
   }
 
-  frame() {
-    if (this.unsettled) {
+  /** Some way towards the pose. What cannot be found is told; the pose stays, and the next change is another try. */
+  solve() {
+    try {
       this.result = this.engine.solve();
       this.unsettled = this.result.status === 'going on';
       if (this.result.status === 'infeasible') tell('joints, limits and pins contradict each other: undo, or loosen one');
-      this.geometry.attributes.position.array.set(this.engine.positions());
-      this.geometry.attributes.position.needsUpdate = true;
+    } catch (error) {
+      this.unsettled = false;
+      tell(error.message);
     }
+    this.geometry.attributes.position.array.set(this.engine.positions());
+    this.geometry.attributes.position.needsUpdate = true;
+  }
+
+  frame() {
+    if (this.unsettled) this.solve();
     const handles = this.engine.handles();
     this.points.geometry.dispose();
     this.points.geometry = new THREE.BufferGeometry();
