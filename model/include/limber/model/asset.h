@@ -39,8 +39,8 @@ struct Asset {
 /// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this
 /// version.
 /// @throws InvalidArgument if there is no body, a name repeats or is not UTF-8, a body has more modes than viewers take
-/// (kMaxMorphTargets), a joint or a pair names bodies that are not there or the same one twice, or a joint's numbers are
-/// not valid, or the file would have more than 4 GiB
+/// (kMaxMorphTargets), a joint or a pair names bodies that are not there or the same one twice, or a joint's numbers
+/// are not valid, or the file would have more than 4 GiB
 std::string asset_bytes(const Asset& asset);
 
 /// Writes whole or not at all. @throws InputError (disk), InvalidArgument

@@ -52,7 +52,7 @@ struct Interval {
 
 /// How far each freedom goes; members that the type does not have stay open.
 struct JointLimits {
-  Interval rotation{};                  ///< revolute, cylindrical: about x; planar: about z; rad
+  Interval rotation{};                    ///< revolute, cylindrical: about x; planar: about z; rad
   std::array<Interval, 2> translation{};  ///< prismatic, cylindrical: [0] along x; planar: along x and y; m
   double cone = std::numeric_limits<double>::infinity();  ///< ball: largest angle of b's x axis from a's, rad
   /// ball: intrinsic x-y-z Euler angles, rad

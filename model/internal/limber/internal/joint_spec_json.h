@@ -1,6 +1,6 @@
 /// @file limber/internal/joint_spec_json.h
-/// Joints as files tell them (docs/formats/joints.md): type, origin, axis or frame, pitch, limits, and what drives them.
-/// Shared by the joints file, scenes and assets. Private to limber's own sources.
+/// Joints as files tell them (docs/formats/joints.md): type, origin, axis or frame, pitch, limits, and what drives
+/// them. Shared by the joints file, scenes and assets. Private to limber's own sources.
 #pragma once
 
 #include <optional>
