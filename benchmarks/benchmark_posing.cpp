@@ -4,6 +4,7 @@
 // The bunny in the paper's form, some minutes, only if it is named. Tolerances: 1e-8 of the diagonal, and 1e-4, a tenth
 // of a pixel, as for dragging.
 //   benchmark_posing [--model NAME]
+//   benchmark_posing --local-global [--model NAME]     local/global iterations beside, without limits
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include "cpu_time.h"
 #include "limber/mesh/read_mesh.h"
 #include "limber/posing/posing_session.h"
+#include "local_global.h"
 #include "true_joints.h"
 
 namespace {
@@ -130,9 +132,112 @@ void run(const Case& c, limber::PoseFormulation formulation, double tolerance) {
       median(per_iteration), static_cast<double>(iterations) / frames, median(per_frame), median(surface), c.paper);
 }
 
+/// Where the drag's hand is, frame by frame.
+struct Drag {
+  std::vector<std::pair<Index, Vec3>> grips{};  // part, point at rest; the last is the hand
+  std::vector<Vec3> targets{};                  // of the hand
+};
+
+Drag drag_of(const Case& c, int frames) {
+  Drag out;
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : c.model.surface.vertices) box.extend(p);
+  if (c.pinned < 0)
+    for (const auto& [x, z] : {std::pair(-1, -1), std::pair(-1, 1), std::pair(1, -1), std::pair(1, 1)})
+      out.grips.emplace_back(0, extreme(c.model, 0, Vec3(x, -3, z)));
+  const Vec3 grip = furthest(c.model, c.pulled);
+  out.grips.emplace_back(c.pulled, grip);
+  for (int f = 1; f <= frames; ++f)
+    out.targets.push_back(grip + 0.005 * f * box.diagonal().norm() * Vec3(0.3, 0.5, -0.8));
+  return out;
+}
+
+void without_limits(limber::JointedModel& model) {
+  for (limber::ModelJoint& j : model.joints) j.joint.limits = {};
+}
+
+limber::PosingSession session_of(const Case& c, const Drag& drag, const limber::PosingOptions& options,
+                                 std::vector<limber::PoseHandle>& handles) {
+  limber::PosingSession session(c.model, options);
+  for (const Index p : c.soft) session.set_part(p, {.cells = limber::Subdivision::kUniform, .cell_size = c.cell});
+  if (c.pinned >= 0) session.set_pinned(c.pinned, true);
+  for (const auto& [part, point] : drag.grips) handles.push_back(session.add_handle(part, point));
+  return session;
+}
+
+/// Iterations and time of each frame until all but 1e-6 of the energy that it begins with, less the least, is gone, for
+/// the constrained form and for local/global iterations.
+void compare(Case c) {
+  using namespace limber::internal;
+  constexpr int kFrames = 5, kMost = 2000;
+  constexpr double kAsked = 1e-6;
+  without_limits(c.model);
+  const Drag drag = drag_of(c, kFrames);
+  std::vector<limber::PoseHandle> handles, exact_handles;
+  limber::PosingSession session = session_of(c, drag, {.tolerance = 1e-12, .energy_tolerance = kAsked}, handles),
+                        exact = session_of(c, drag, {.tolerance = 1e-12, .energy_tolerance = 0.0}, exact_handles);
+  std::vector<double> least, initial;
+  int iterations = 0;
+  double newton = 0.0, newton_off = 0.0;
+  for (const Vec3& target : drag.targets) {
+    exact.move_handle(exact_handles.back(), target);
+    const limber::PoseResult to = exact.solve();
+    least.push_back(to.energy), initial.push_back(to.initial_energy);
+    session.move_handle(handles.back(), target);
+    const double start = now();
+    const limber::PoseResult r = session.solve();
+    newton += now() - start;
+    iterations += r.iterations;
+    newton_off = std::max(newton_off, (r.energy - to.energy) / (to.initial_energy - to.energy));
+  }
+  std::printf("%-9s newton                  %7.1f iterations %9.2f ms a frame; energy off by %.0e\n", c.name,
+              static_cast<double>(iterations) / kFrames, newton / kFrames, newton_off);
+  std::vector<limber::PartOptions> parts(c.model.parts.size());
+  std::vector<bool> pinned(c.model.parts.size(), false);
+  for (const Index p : c.soft)
+    parts[static_cast<std::size_t>(p)] = {.cells = limber::Subdivision::kUniform, .cell_size = c.cell};
+  if (c.pinned >= 0) pinned[static_cast<std::size_t>(c.pinned)] = true;
+  const PoseStructure s = build_structure(c.model, parts, pinned, limber::StrainWeights::kVolume);
+  std::vector<HandleTerm> terms;
+  for (const auto& [part, point] : drag.grips) {
+    const Index body = cell_nearest(s, part, point).body;
+    terms.push_back({body, point - s.bodies[static_cast<std::size_t>(body)].centre, point, 10.0 * s.size});
+  }
+  for (const double stiffness : {0.01, 0.03, 0.1, 0.3, 1.0}) {
+    limber::benchmarks::LocalGlobal method(s, terms, stiffness);
+    int all = 0;
+    double spent = 0.0, off = 0.0, joints = 0.0, last = 0.0;
+    for (int f = 0; f < kFrames; ++f) {
+      method.set_target(terms.size() - 1, drag.targets[static_cast<std::size_t>(f)]);
+      terms.back().target = drag.targets[static_cast<std::size_t>(f)];
+      last = 0.0;
+      for (int i = 0; i < kMost; ++i) {
+        const double start = now();
+        method.iterate();
+        last += now() - start;
+        ++all;
+        const Pose pose{method.poses(), std::vector<double>(s.joints.size(), 0.0)};
+        const std::vector<limber::Mat3> R = rotations_of(pose.bodies);
+        const double e = least[static_cast<std::size_t>(f)];
+        off = std::abs(strain_energy(s, pose.bodies, R) + handle_energy(terms, pose.bodies, R) - e) /
+              (initial[static_cast<std::size_t>(f)] - e);
+        joints = feasibility(s, pose).joints;
+        if (off <= kAsked && joints <= kAsked) break;
+      }
+      spent += last;
+    }
+    std::printf(
+        "%-9s local/global, rho %5.3f %7.1f iterations %9.2f ms a frame, %.3f an iteration; energy off by %.0e, "
+        "joints by %.0e\n",
+        c.name, stiffness, static_cast<double>(all) / kFrames, spent / kFrames, spent / all, off, joints);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool beside = argc > 1 && std::strcmp(argv[1], "--local-global") == 0;
+  if (beside) --argc, ++argv;
   const char* only = argc == 3 && std::strcmp(argv[1], "--model") == 0 ? argv[2] : nullptr;
   std::vector<Case> cases;
   const auto wanted = [&](const char* name) { return only == nullptr || std::strcmp(only, name) == 0; };
@@ -148,6 +253,10 @@ int main(int argc, char** argv) {
     cases.push_back(std::move(c));
   }
   for (const Case& c : cases) {
+    if (beside) {
+      compare(c);
+      continue;
+    }
     for (const double tolerance : {1e-8, 1e-4}) run(c, limber::PoseFormulation::kConstrained, tolerance);
     if (only != nullptr || std::strcmp(c.name, "bunny") != 0) run(c, limber::PoseFormulation::kPenalty, 1e-8);
   }

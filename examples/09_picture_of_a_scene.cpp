@@ -8,6 +8,7 @@
 #include <map>
 
 #include "limber/core/file.h"
+#include "limber/dynamics/reconstruct.h"
 #include "limber/model/morph_targets.h"
 #include "limber/scene/run.h"
 #include "limber/scene/shape_surface.h"
@@ -43,18 +44,22 @@ std::size_t key_at(const limber::Trajectory& played, double seconds) {
   return std::min<std::size_t>(static_cast<std::size_t>(after - played.times.begin()), played.times.size() - 1);
 }
 
-/// Vertices as they are at a key: p = X (r + Σ z u), the whole shifted.
+/// Vertices as they are at a key, by the body's modes or its modal skin, the whole shifted.
 std::vector<float> vertices_at(const limber::BodyTrack& body, std::size_t key, const Vec3& shift) {
-  const limber::ModalSurface& surface = body.model->render();
+  const limber::ModalModel& model = *body.model;
   const auto z = body.amplitudes_at(key);
-  std::vector<float> xyz;
-  for (limber::Index v = 0; v < surface.vertices(); ++v) {
-    Vec3 p = surface.rest[static_cast<std::size_t>(v)].cast<double>();
-    for (std::size_t k = 0; k < z.size(); ++k)
-      p += z[k] * surface.basis.shape(v, static_cast<limber::Index>(k)).cast<double>();
-    p = body.poses[key] * p + shift;
-    for (int a = 0; a < 3; ++a) xyz.push_back(static_cast<float>(p[a]));
+  std::vector<float> xyz(3 * static_cast<std::size_t>(model.render().vertices()));
+  limber::RigidTransform X = body.poses[key];
+  X.p += shift;
+  limber::ReconstructionTarget target{.X_OB = X, .amplitudes = z.data(), .positions = xyz.data()};
+  if (!body.modal_skin) {
+    limber::reconstruct(model.render(), {&target, 1});
+    return xyz;
   }
+  limber::SkinPose skin(*model.data().skin);
+  skin.set(z);
+  target.skin = &skin;
+  limber::reconstruct(model.render(), limber::SkinTiles(model.data().skin->render), {&target, 1});
   return xyz;
 }
 

@@ -12,6 +12,7 @@
 #include "limber/mesh/surface_mesh.h"
 #include "limber/model/asset.h"
 #include "limber/model/morph_targets.h"
+#include "limber/scene/recording.h"
 #include "limber/scene/scene_model.h"
 #include "program.h"
 
@@ -21,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Arguments {
-  std::string asset, frequencies;
+  std::string asset, frequencies, clips;
 };
 
 /// One mode as people and tables want it.
@@ -271,6 +272,7 @@ void inspect(Program& program, const Arguments& a) {
   program.print(joints_text(asset));
   report_machine(asset, report);
   if (!a.frequencies.empty()) program.write_file(a.frequencies, frequencies_csv(asset));
+  if (!a.clips.empty()) program.write_file(a.clips, make_mode_clips(asset.bodies));
 }
 
 }  // namespace
@@ -285,5 +287,9 @@ int main(int argc, char** argv) {
   program.options()
       .add_option("--frequencies", arguments.frequencies, "write all frequencies as a table (Hz, 1/s)")
       ->type_name("FILE.csv");
+  program.options()
+      .add_option("--clips", arguments.clips,
+                  "write one short clip a mode for any glTF viewer: bodies with a modal skin bend by it")
+      ->type_name("FILE.glb");
   return program.run(argc, argv, [&] { inspect(program, arguments); });
 }

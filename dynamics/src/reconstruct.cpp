@@ -37,7 +37,7 @@ InstanceOutput instance_output(const ReconstructionTarget& target) {
   }
   out.displacement = target.displacement;
   out.positions = target.positions;
-  out.handles = target.skin ? target.skin->numbers().data() : nullptr;
+  if (target.skin && target.skin->largest_angle() > kDrawnStraight) out.handles = target.skin->numbers().data();
   return out;
 }
 

@@ -1,18 +1,15 @@
 #include "limber/dynamics/skin_extent.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <limits>
 
+#include "limber/core/cross_matrix.h"
 #include "limber/dynamics/body_shape.h"
 
 namespace limber {
 namespace {
-
-ModalSkin without_gauge(ModalSkin skin) {
-  skin.gauge = {};
-  return skin;
-}
 
 double dot(std::span<const double> a, std::span<const double> b) {
   double sum = 0.0;
@@ -20,14 +17,22 @@ double dot(std::span<const double> a, std::span<const double> b) {
   return sum;
 }
 
+double largest_stretch(const Mat3& m) {
+  return std::sqrt(Mat3(m.transpose() * m).selfadjointView<Eigen::Lower>().eigenvalues()[2]);
+}
+
+Mat3 symmetric_part(const Mat3& m) { return 0.5 * (m + m.transpose()); }
+
+/// What turns a couple into a turn about the mass centre, for C = Σ m r rᵀ: (tr C) 1 − C.
+Mat3 inertia_of(const Mat3& moment) { return moment.trace() * Mat3::Identity() - moment; }
+
 }  // namespace
 
 SkinExtent::SkinExtent(const ModalModel& model)
-    : bare_(without_gauge(*model.data().skin)),
+    : skin_(&*model.data().skin),
       k_(static_cast<std::size_t>(model.modes())),
-      balls_(static_cast<std::size_t>(bare_.handles)),
-      flexing_(k_, 0.0),
-      mean_radius_(std::sqrt(0.5 * model.data().inertia.trace() / model.data().mass)) {
+      balls_(static_cast<std::size_t>(skin_->handles)),
+      flexing_(k_, 0.0) {
   const ModalSurface& surface = model.collision();
   const std::span<const SkinInfluences> influences = skin_influences(model, SurfacePoint::Surface::kCollision);
   const auto for_vertices = [&](auto&& act) {
@@ -42,16 +47,24 @@ SkinExtent::SkinExtent(const ModalModel& model)
     if (balls_[h].used) balls_[h].center = boxes[h].center();
   for_vertices([&](Ball& ball, const Vec3& r, std::size_t h) {
     ball.radius = std::max(ball.radius, (r - ball.center).norm());
-    ball.reach = std::max(ball.reach, (r - bare_.rest[h]).norm());
+    ball.reach = std::max(ball.reach, (r - skin_->rest[h]).norm());
   });
   const auto norms = [&](const float* rows, std::vector<double>& to) {
     for (std::size_t i = 0; i < k_; ++i) to.push_back(std::hypot(rows[i], rows[k_ + i], rows[2 * k_ + i]));
   };
-  for (Index l = 0; l < bare_.handles; ++l) {
-    norms(bare_.rotation_row(l, 0), turns_);
-    for (Index h = 0; h < bare_.handles; ++h) norms(bare_.shift_row(l, h, 0), shifts_);
+  for (Index l = 0; l < skin_->handles; ++l) {
+    norms(skin_->rotation_row(l, 0), turns_);
+    for (Index h = 0; h < skin_->handles; ++h) norms(skin_->shift_row(l, h, 0), shifts_);
   }
-  SkinPose pose(bare_);
+  SkinPose pose(*skin_);
+  if (skin_->has_gauge()) {
+    pose.set(std::vector<double>(k_, 0.0));
+    const Mat3 moment = symmetric_part(pose.frame_moment());
+    const Eigen::SelfAdjointEigenSolver<Mat3> inertia(inertia_of(moment));
+    root_moment_ = Eigen::SelfAdjointEigenSolver<Mat3>(moment).operatorSqrt();
+    turned_ = inertia.operatorInverseSqrt();
+    thinnest_ = std::sqrt(inertia.eigenvalues()[0]);
+  }
   std::vector<double> unit(k_, 0.0);
   for (std::size_t i = 0; i < k_; ++i) {
     unit[i] = 1.0;
@@ -76,52 +89,98 @@ double SkinExtent::farthest(const SkinPose& pose, double flexed) const {
   return most + flexed;
 }
 
-double SkinExtent::find(const SkinPose& pose, SkinPose& bare, std::span<const double> z, std::span<const double> change,
-                        std::span<double> shape, std::span<double> rates) const {
-  bare.set(z);
-  bare.differentiate();
-  const double flexed = dot(flexing_, z), flexes = dot(flexing_, change);
-  std::fill(shape.begin(), shape.end(), 0.0);
+/// sup ‖[x]× J^−½‖ over the balls: what a couple of size 1 does to a point at most.
+double SkinExtent::farthest_over_turns(const SkinPose& pose, double flexed) const {
+  double most = 0.0;
+  for (std::size_t h = 0; h < balls_.size(); ++h) {
+    if (!balls_[h].used) continue;
+    const SkinPose::Handle& handle = pose.handles()[h];
+    const Vec3 center = balls_[h].center + handle.turn * balls_[h].center + handle.shift;
+    most = std::max(most, largest_stretch(cross_matrix(center) * turned_) + balls_[h].radius / thinnest_);
+  }
+  return most + flexed / thinnest_;
+}
+
+/// Σ_j |∂_ij x| change_j over the vertices of a handle, before a free body is put into its frame; the most goes to
+/// `out`.
+void SkinExtent::find_curvature(Index h, std::span<const double> z, std::span<const double> change,
+                                std::span<double> out, std::span<double> sums) const {
   const auto row = [&](const std::vector<double>& rows, Index block) {
     return std::span<const double>(rows).subspan(static_cast<std::size_t>(block) * k_, k_);
   };
-  for (Index h = 0; h < bare_.handles; ++h) {
+  const std::span<const double> turn_h = row(turns_, h);
+  const double own = dot(turn_h, change), flexes = dot(flexing_, change);
+  const double arm = balls_[static_cast<std::size_t>(h)].reach + dot(flexing_, z) + flexes;
+  for (std::size_t i = 0; i < k_; ++i) sums[i] = turn_h[i] * (1.5 * own * arm + flexes) + own * flexing_[i];
+  for (Index l = 0; l < skin_->handles; ++l) {
+    const std::span<const double> turn_l = row(turns_, l), D = row(shifts_, l * skin_->handles + h);
+    const double turns = dot(turn_l, change), shifts = dot(D, change);
+    const double by_turn = 1.5 * turns * (skin_->arm(l, h).norm() + dot(D, z) + shifts) + shifts;
+    for (std::size_t i = 0; i < k_; ++i) sums[i] += turn_l[i] * by_turn + turns * D[i];
+  }
+  for (std::size_t i = 0; i < k_; ++i) out[i] = std::max(out[i], sums[i]);
+}
+
+double SkinExtent::find(const SkinPose& pose, std::span<const double> z, std::span<const double> change,
+                        std::span<double> shape, std::span<double> scratch) const {
+  const std::span<double> curvatures = scratch.first(k_), free_rates = scratch.subspan(k_, k_);
+  const std::span<double> sums = scratch.subspan(2 * k_, k_);
+  const bool free = skin_->has_gauge();
+  const double flexed = dot(flexing_, z);
+  std::fill(shape.begin(), shape.end(), 0.0);
+  std::fill(scratch.begin(), scratch.end(), 0.0);
+  for (Index h = 0; h < skin_->handles; ++h) {
     const Ball& ball = balls_[static_cast<std::size_t>(h)];
     if (!ball.used) continue;
-    const SkinPose::Handle& handle = bare.handles()[static_cast<std::size_t>(h)];
+    find_curvature(h, z, change, curvatures, sums);
+    const SkinPose::Handle& handle = pose.handles()[static_cast<std::size_t>(h)];
     const Vec3 center = ball.center + handle.turn * ball.center;
-    const double own = dot(row(turns_, h), change), arm = ball.reach + flexed + flexes;
+    const auto fastest = [&](const Vec3& turn, const Vec3& shift, std::size_t i) {
+      return (shift + turn.cross(center)).norm() + turn.norm() * (ball.radius + flexed) + flexing_[i];
+    };
     for (std::size_t i = 0; i < k_; ++i) {
-      const auto [turn_rate, shift_rate] = bare.rate(h, static_cast<Index>(i));
-      rates[i] = (shift_rate + turn_rate.cross(center)).norm() + turn_rate.norm() * (ball.radius + flexed) +
-                 flexing_[i] + turn(h, i) * (1.5 * own * arm + flexes) + own * flexing_[i];
+      const auto [turn_rate, shift_rate] = pose.rate(h, static_cast<Index>(i));
+      shape[i] = std::max(shape[i], fastest(turn_rate, shift_rate, i));
+      if (!free) continue;
+      const Vec3& frame = pose.frame_rate(static_cast<Index>(i)).turn;
+      free_rates[i] = std::max(free_rates[i], fastest(turn_rate + frame, shift_rate + frame.cross(handle.shift), i));
     }
-    for (Index l = 0; l < bare_.handles; ++l) {
-      const std::span<const double> turn_l = row(turns_, l), D = row(shifts_, l * bare_.handles + h);
-      const double turns = dot(turn_l, change), shifts = dot(D, change);
-      const double by_turn = 1.5 * turns * (bare_.arm(l, h).norm() + dot(D, z) + shifts) + shifts;
-      for (std::size_t i = 0; i < k_; ++i) rates[i] += turn_l[i] * by_turn + turns * D[i];
-    }
-    for (std::size_t i = 0; i < k_; ++i) shape[i] = std::max(shape[i], rates[i]);
   }
   const double far = farthest(pose, flexed);
-  if (pose.skin().has_gauge()) keep_in_frame(pose.frame_stiffness(), far, change, shape);
+  if (free)
+    keep_in_frame(pose, flexed, far, change, scratch, shape);
+  else
+    for (std::size_t i = 0; i < k_; ++i) shape[i] += curvatures[i];
   return far;
 }
 
-/// x̃ = Qᵀ (x − c): |∂_i c| is at most that of some point, and Eckart's rotation θ_i = M⁻¹ axial(Qᵀ Σ m ∂_i x rᵀ) with
-/// M = (tr P) 1 − P, whose least eigenvalue falls by at most 2 |Δ Σ m x rᵀ|. However far that is, no point moves by
-/// more than both its distances from the mass centre.
-void SkinExtent::keep_in_frame(double firmness, double far, std::span<const double> change,
-                               std::span<double> shape) const {
-  const double moved = dot(shape, change), least = firmness - 2.0 * mean_radius_ * moved;
-  const double most = 2.0 * (far + moved);
-  double sum = 0.0, all = 0.0;
-  for (std::size_t i = 0; i < shape.size(); ++i) {
-    const double turns =
-        least > 0.0 ? std::numbers::sqrt2 * mean_radius_ * shape[i] / least : std::numeric_limits<double>::infinity();
-    shape[i] = 2.0 * shape[i] + turns * (far + 2.0 * moved);
-    sum += shape[i] * change[i], all += change[i];
+/// From rates now to rates of all amplitudes within reach; derivation: docs/derivations/modal-skin.md, section 6.
+/// However far that is, no point moves by more than both its distances from the mass centre.
+void SkinExtent::keep_in_frame(const SkinPose& pose, double flexed, double far, std::span<const double> change,
+                               std::span<const double> scratch, std::span<double> shape) const {
+  const std::span<const double> curvatures = scratch.first(k_), free_rates = scratch.subspan(k_, k_);
+  const Mat3 P = symmetric_part(pose.frame_moment()), inverse = P.inverse();
+  double curved = 0.0, B = 0.0, narrowed = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < k_; ++i) {
+    curved += curvatures[i] * change[i], all += change[i];
+    B += (free_rates[i] + 2.0 * curvatures[i]) * change[i];
+    narrowed += symmetric_part(pose.frame_rate(static_cast<Index>(i)).moment * inverse).norm() * change[i];
+  }
+  narrowed += 0.5 * curved * largest_stretch(root_moment_ * inverse);
+  const double firmness = Mat3(turned_ * inertia_of(P) * turned_).selfadjointView<Eigen::Lower>().eigenvalues()[0];
+  const double m = firmness * (1.0 - narrowed), most = 2.0 * (far + B);
+  double sum = std::numeric_limits<double>::infinity();
+  if (narrowed < 1.0) {
+    double reach = farthest_over_turns(pose, flexed);
+    reach += (m + reach) * std::expm1(B / (m * thinnest_));
+    const double growth = 1.0 + reach / m, turned = (B + growth * B) / (m * thinnest_);
+    sum = 0.0;
+    for (std::size_t i = 0; i < k_; ++i) {
+      const double rate = free_rates[i] + 2.0 * curvatures[i], turning = turned * rate;
+      shape[i] =
+          std::min(growth * rate, shape[i] + 2.0 * curvatures[i] + reach / m * (curvatures[i] + turning) + turning);
+      sum += shape[i] * change[i];
+    }
   }
   if (!(sum <= most)) std::fill(shape.begin(), shape.end(), all > 0.0 ? most / all : 0.0);
 }

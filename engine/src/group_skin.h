@@ -17,25 +17,23 @@ class GroupSkin {
   explicit GroupSkin(const ModalModel& model)
       : tiles_(model.data().skin->render),
         extent_(model),
-        bare_(extent_.bare()),
         change_(static_cast<std::size_t>(model.modes())),
         shape_(change_.size()),
-        rates_(change_.size()) {}
+        scratch_(3 * change_.size()) {}
 
   const SkinTiles& tiles() const { return tiles_; }
 
   /// BodyState::reach of a body: how far any of its points may come within its motion beside a displacement, m.
   double reach(const BodyShape& now, const ExactMotion& motion, const Vec3& displacement) {
     motion.changes(change_);
-    const double far = extent_.find(now.handles(), bare_, now.amplitudes(), change_, shape_, rates_);
+    const double far = extent_.find(now.differentiated(), now.amplitudes(), change_, shape_, scratch_);
     return motion.path().travel_beside(displacement) + motion.sway(far, shape_);
   }
 
  private:
   SkinTiles tiles_;
   SkinExtent extent_;
-  SkinPose bare_;
-  std::vector<double> change_, shape_, rates_;
+  std::vector<double> change_, shape_, scratch_;
 };
 
 }  // namespace limber::internal

@@ -74,6 +74,7 @@ void SkinPose::bind(const ModalSkin& skin) {
   turn_rates_.resize(3 * n * k);
   shift_rates_.resize(3 * n * k);
   drift_shapes_.assign(3 * n * k, 0.0);
+  frame_rates_.resize(skin.has_gauge() ? k : 0);
   for (Index h = 0; h < skin.handles; ++h) {
     double* drift = drift_shapes_.data() + row(h, 0);
     for (Index l = 0; l < skin.handles; ++l) {
@@ -240,11 +241,6 @@ SkinPose::Rate SkinPose::rate(Index handle, Index mode) const {
           {number(shift_rates_, 0), number(shift_rates_, 1), number(shift_rates_, 2)}};
 }
 
-double SkinPose::frame_stiffness() const {
-  const Mat3 symmetric = 0.5 * (stretch_ + stretch_.transpose());
-  return (symmetric.trace() * Mat3::Identity() - symmetric).selfadjointView<Eigen::Lower>().eigenvalues()[0];
-}
-
 // Derivative --------------------------------------------------------------------------------------------------------
 
 void SkinPose::differentiate() {
@@ -294,7 +290,9 @@ void SkinPose::differentiate_frame() {
       weight += weights;
     }
     const Vec3 centre = change.col(0);
-    const Vec3 angle = to_angle * axial(change.rightCols<3>() - centre * weight.tail<3>());
+    const Mat3 moment = change.rightCols<3>() - centre * weight.tail<3>();
+    const Vec3 angle = to_angle * axial(moment);
+    frame_rates_[i] = {angle, centre, moment};
     for (std::size_t h = 0; h < handles_.size(); ++h) {
       column(turn_rates_, h) -= angle;
       column(shift_rates_, h) -= centre + angle.cross(handles_[h].shift);

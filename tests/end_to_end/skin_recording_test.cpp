@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "glb_view.h"
 #include "limber/dynamics/body_shape.h"
 #include "limber/model/glb.h"
@@ -18,10 +20,11 @@ std::vector<std::uint8_t> bytes_of(const std::string& glb, const nlohmann::json&
   return {binary.begin(), binary.begin() + 4 * a.at("count").get<std::ptrdiff_t>()};
 }
 
-/// One key of a recording with one body, less the turn that puts glTF's y axis up.
+/// One key of an animation of one body, less the turn that puts glTF's y axis up.
 class Player {
  public:
-  Player(const std::string& glb, const std::string& body) : view_(glb), body_(body) {
+  Player(const std::string& glb, const std::string& body, std::size_t animation = 0)
+      : view_(glb), body_(body), animation_(animation) {
     const auto& node = view_.json.at("nodes").at(index_of(body + " surface"));
     const auto& primitive = view_.json.at("meshes").at(node.at("mesh").get<std::size_t>()).at("primitives").at(0);
     position_ = view_.floats(primitive.at("attributes").at("POSITION"));
@@ -33,10 +36,13 @@ class Player {
   }
 
   std::vector<Vec3> vertices(std::size_t key) const {
-    const RigidTransform X = pose(body_, key);
+    const bool moves = std::ranges::any_of(view_.json.at("animations").at(animation_).at("channels"),
+                                           [&](const auto& c) { return c.at("target").at("node") == index_of(body_); });
+    const std::vector<double> still = view_.json.at("nodes").at(index_of(body_)).at("translation");
+    const RigidTransform X = moves ? pose(body_, key) : RigidTransform{.p = Vec3(still[0], still[1], still[2])};
     std::vector<RigidTransform> joints;
     for (const std::string& name : names_) joints.push_back(X * pose(name, key));
-    const std::vector<float> w = view_.channel(body_ + " surface", "weights");
+    const std::vector<float> w = view_.channel(body_ + " surface", "weights", animation_);
     std::vector<Vec3> out;
     for (std::size_t v = 0; v < position_.size() / 3; ++v) {
       Vec3 p = vector(position_, v), sum = Vec3::Zero();
@@ -59,13 +65,15 @@ class Player {
     throw std::runtime_error("no node " + name);
   }
   RigidTransform pose(const std::string& name, std::size_t key) const {
-    const std::vector<float> p = view_.channel(name, "translation"), q = view_.channel(name, "rotation");
+    const std::vector<float> p = view_.channel(name, "translation", animation_),
+                             q = view_.channel(name, "rotation", animation_);
     const auto turn = [&](std::size_t i) { return static_cast<double>(q[4 * key + i]); };
     return {normalized(Quaternion{turn(3), turn(0), turn(1), turn(2)}), vector(p, key)};
   }
 
   GlbView view_;
   std::string body_;
+  std::size_t animation_;
   std::vector<float> position_, weights_;
   std::vector<std::uint8_t> joints_;
   std::vector<std::vector<float>> targets_;
@@ -106,6 +114,37 @@ TEST(RecordingOfASkin, AViewerShowsTheEnginesVertices) {
           }
       }
     }
+}
+
+/// By the energy of the softest mode that turns some handle by 60°, and as far as sliders at least.
+TEST(ModeClips, SwingEachModeByTheSkin) {
+  for (const bool held : {true, false}) {
+    const auto model = bar({.held = held});
+    const std::string glb = make_mode_clips({&model, 1});
+    SkinMemory memory(*model->data().skin);
+    SkinPose pose(*model->data().skin);
+    const std::vector<double>& lambda = model->data().eigenvalues;
+    std::vector<double> z;
+    double least = kInfinity;  // twice the energy
+    for (std::size_t m = 0; m < lambda.size(); ++m) {
+      z = zeros(*model);
+      z[m] = 1.0;
+      pose.set(z);
+      least = std::min(least, lambda[m] * std::pow(60.0 * kDegree / pose.largest_angle(), 2));
+    }
+    for (const std::size_t mode : {std::size_t{0}, std::size_t{3}}) {
+      z = zeros(*model);
+      z[mode] = std::max(std::sqrt(least / lambda[mode]), model->data().mode_scales[mode]);
+      const BodyShape shape(*model, z, &memory);
+      const std::vector<Vec3> shown = Player(glb, "bar", mode).vertices(12);  // a quarter of the swing
+      for (std::size_t t = 0; t < model->render().triangles.size(); ++t) {
+        const SurfacePoint at{
+            .surface = SurfacePoint::Surface::kRender, .triangle = static_cast<Index>(t), .weight = {1.0, 0.0, 0.0}};
+        const Vec3 expected = model->data().origin_in_input + shape.position(at);
+        EXPECT_LT((shown[static_cast<std::size_t>(model->render().triangles[t][0])] - expected).norm(), 1e-5 * kLength);
+      }
+    }
+  }
 }
 
 }  // namespace

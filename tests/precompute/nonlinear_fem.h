@@ -42,10 +42,12 @@ inline std::vector<Vec3> points_of(const NodeVectors& rows) {
   return points;
 }
 
-/// Nodes under a load that keeps its direction and is raised in steps of 10° of their turn, until that is an angle.
-/// Empty where that fails. @param direction unit @param small a force that turns the nodes by a few degrees, N
-inline std::vector<BentByLoad> bend_by_load(const SkinnedBody& b, std::span<const Index> nodes, const Vec3& direction,
-                                            double small, double angle) {
+/// Nodes under a load that keeps its direction and is raised in steps of 10° of the turn of some, until that is an
+/// angle. Empty where that fails. @param nodes loaded @param turning whose turn counts @param direction unit
+/// @param small a force that turns them by a few degrees, N
+inline std::vector<BentByLoad> bend_by_load(const SkinnedBody& b, std::span<const Index> nodes,
+                                            std::span<const Index> turning, const Vec3& direction, double small,
+                                            double angle) {
   const NodalElasticity body(b.mesh, kSoft, ElasticLaw::kStVenantKirchhoff, b.fixed);
   std::vector<Vec3> rest;
   for (std::size_t v = 0; v < b.mesh.nodes.size(); ++v) rest.push_back(b.rest(v));
@@ -55,7 +57,7 @@ inline std::vector<BentByLoad> bend_by_load(const SkinnedBody& b, std::span<cons
     const double force = path.back().force + step;
     const NodeVectors loads = spread_load(b, nodes, force * direction);
     BentByLoad next{points_of(equilibrium(body, rows_of(path.back().places), loads)), force};
-    const double to = turn_of(nodes, rest, next.places);
+    const double to = turn_of(turning, rest, next.places);
     if (!std::isfinite(to)) {
       step *= 0.5;
     } else if (std::abs(to - angle) < 1e-3) {

@@ -115,7 +115,7 @@ void expect_bends(Loaded& body, double length, const Vec3& normal, const Vec3& a
     SCOPED_TRACE(bend.degrees);
     // Tilted with the tip by half its turn, so that it bends more than it pulls.
     const Vec3 direction = Eigen::AngleAxisd(0.5 * bend.degrees * kDegree, axis) * normal;
-    const auto exact = bend_by_load(body.body(), body.tip(), direction, small, bend.degrees * kDegree);
+    const auto exact = bend_by_load(body.body(), body.tip(), body.tip(), direction, small, bend.degrees * kDegree);
     ASSERT_FALSE(exact.empty());
     const std::vector<Vec3>& places = exact.back().places;
     const auto loaded = body.places(body.under_dead_load(exact.back().force * direction));

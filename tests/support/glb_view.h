@@ -34,8 +34,8 @@ class GlbView {
   }
 
   /// The values of the animation channel that moves `path` of the node called `name`.
-  std::vector<float> channel(const std::string& name, const std::string& path) const {
-    const auto& animation = json.at("animations").at(0);
+  std::vector<float> channel(const std::string& name, const std::string& path, std::size_t number = 0) const {
+    const auto& animation = json.at("animations").at(number);
     for (const auto& c : animation.at("channels")) {
       const auto& target = c.at("target");
       if (json.at("nodes").at(target.at("node").get<std::size_t>()).at("name") != name || target.at("path") != path)

@@ -83,7 +83,7 @@ void CollisionSurface::find_undeformed_rows() {
   undeformed_.resize(3 * k * rest_.size());
   extent_.emplace(*model_);
   tiles_ = SkinTiles(skin_influences(*model_, SurfacePoint::Surface::kCollision));
-  SkinPose pose(extent_->bare());
+  SkinPose pose(*model_->data().skin);
   std::vector<double> unit(k, 0.0);
   for (std::size_t m = 0; m < k; ++m) {
     unit[m] = 1.0;

@@ -28,7 +28,7 @@ struct DeformedSurface::Scratch {
   float norm = 0.0f;
   double farthest = 0.0;
   // With a skin.
-  std::optional<SkinPose> pose{}, bare{};
+  std::optional<SkinPose> pose{};
   double flexed = 0.0;   ///< no |Ũ z| is larger, m
   double carried = 0.0;  ///< size of what handles add to a vertex, for round-off, m
   std::vector<double> rates{};

@@ -114,10 +114,10 @@ void DeformedSurface::set_skin(std::span<const double> z, bool same_surface) {
   if (skin == nullptr) return;
   Scratch& s = *scratch_;
   if (!s.pose)
-    s.pose.emplace(*skin), s.bare.emplace(surface_->extent_->bare());
+    s.pose.emplace(*skin);
   else if (!same_surface || &s.pose->skin() != skin)
-    s.pose->bind(*skin), s.bare->bind(surface_->extent_->bare());
-  s.rates.resize(z.size());
+    s.pose->bind(*skin);
+  s.rates.resize(3 * z.size());
   s.pose->set(z);
   s.flexed = s.farthest;
   s.farthest = s.carried = 0.0;
@@ -132,7 +132,8 @@ void DeformedSurface::set_skin(std::span<const double> z, bool same_surface) {
 const SkinPose* DeformedSurface::skin() const { return surface_->skin() ? &*scratch_->pose : nullptr; }
 
 double DeformedSurface::skin_extent(std::span<const double> change, std::span<double> shape) {
-  return surface_->extent_->find(*scratch_->pose, *scratch_->bare, amplitudes(), change, shape, scratch_->rates);
+  scratch_->pose->differentiate();
+  return surface_->extent_->find(*scratch_->pose, amplitudes(), change, shape, scratch_->rates);
 }
 
 /// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -240,28 +241,62 @@ std::vector<float> weights(const BodyTrack& body, const RecordedModel& record, b
   return out;
 }
 
-/// Where the handles of a body are in its frame, key by key: a node each, which the skin's joints are.
-struct Joints {
-  std::vector<int> nodes;
-  std::vector<std::vector<RigidTransform>> poses;  // by handle
+/// A body's nodes: its own, one per handle of its skin (the skin's joints), and the one that holds the mesh.
+struct BodyNodes {
+  int body = -1, surface = -1;
+  std::vector<int> joints{};
 };
 
-Joints add_joints(GlbBuilder& glb, const BodyTrack& body) {
+/// Where the handles of a body are in its frame. @return [handle][key]
+std::vector<std::vector<RigidTransform>> joint_poses(const BodyTrack& body) {
   SkinPose pose(*body.model->data().skin);
-  Joints joints;
-  joints.poses.resize(pose.handles().size());
+  std::vector<std::vector<RigidTransform>> out(pose.handles().size());
   for (std::size_t key = 0; key < body.poses.size(); ++key) {
     pose.set(body.amplitudes_at(key));
-    for (std::size_t h = 0; h < joints.poses.size(); ++h) {
+    for (std::size_t h = 0; h < out.size(); ++h) {
       const SkinPose::Handle& handle = pose.handles()[h];
-      joints.poses[h].push_back({normalized(quaternion_from_matrix(Mat3::Identity() + handle.turn)), handle.shift});
+      out[h].push_back({normalized(quaternion_from_matrix(Mat3::Identity() + handle.turn)), handle.shift});
     }
   }
-  for (std::size_t h = 0; h < joints.poses.size(); ++h)
-    joints.nodes.push_back(glb.add_node({.name = body.name + " handle " + std::to_string(h),
-                                         .translation = joints.poses[h].front().p,
-                                         .rotation = joints.poses[h].front().q}));
-  return joints;
+  return out;
+}
+
+/// As the body stands at its first key.
+BodyNodes add_nodes(GlbBuilder& glb, const Cast& cast, const BodyTrack& body) {
+  BodyNodes nodes;
+  if (cast.modal_skin)
+    for (const std::vector<RigidTransform>& joint : joint_poses(body))
+      nodes.joints.push_back(glb.add_node({.name = body.name + " handle " + std::to_string(nodes.joints.size()),
+                                           .translation = joint.front().p,
+                                           .rotation = joint.front().q}));
+  nodes.body = glb.add_node({.name = body.name,
+                             .mesh = cast.modal_skin ? -1 : cast.mesh,
+                             .children = nodes.joints,
+                             .translation = body.poses.front().p,
+                             .rotation = normalized(body.poses.front().q)});
+  // Where a skinned mesh is told by its joints alone; viewers want its node at the root.
+  nodes.surface =
+      cast.modal_skin
+          ? glb.add_node({.name = body.name + " surface", .mesh = cast.mesh, .skin = glb.add_skin(nodes.joints)})
+          : nodes.body;
+  return nodes;
+}
+
+/// Keys of how a body bends: its joints and its weights.
+void add_bends(GlbBuilder& glb, const Cast& cast, const BodyTrack& body, const BodyNodes& nodes, int times,
+               bool unsigned_weights, GlbAnimation& animation) {
+  const auto add = [&](int node, GlbPath path, const std::vector<float>& values) {
+    animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
+  };
+  if (cast.modal_skin) {
+    const auto joints = joint_poses(body);
+    for (std::size_t h = 0; h < joints.size(); ++h) {
+      add(nodes.joints[h], GlbPath::kTranslation, translation_keys(joints[h]));
+      add(nodes.joints[h], GlbPath::kRotation, rotation_keys(joints[h]));
+    }
+  }
+  if (!cast.record.recorded.empty())
+    add(nodes.surface, GlbPath::kWeights, weights(body, cast.record, unsigned_weights));
 }
 
 std::vector<float> shown_times(const Trajectory& trajectory, double slow_motion) {
@@ -365,27 +400,11 @@ Recording make_recording(const Trajectory& trajectory, const RecordingOptions& o
       const auto add = [&](int node, GlbPath path, const std::vector<float>& values) {
         animation.channels.push_back({node, path, times, glb.add_key_values(values, path)});
       };
-      Joints joints;
-      if (cast.modal_skin) joints = add_joints(glb, body);
-      const int node = glb.add_node({.name = body.name,
-                                     .mesh = cast.modal_skin ? -1 : cast.mesh,
-                                     .children = joints.nodes,
-                                     .translation = body.poses.front().p,
-                                     .rotation = normalized(body.poses.front().q)});
-      nodes.push_back(node);
-      add(node, GlbPath::kTranslation, translation_keys(body.poses));
-      add(node, GlbPath::kRotation, rotation_keys(body.poses));
-      for (std::size_t h = 0; h < joints.nodes.size(); ++h) {
-        add(joints.nodes[h], GlbPath::kTranslation, translation_keys(joints.poses[h]));
-        add(joints.nodes[h], GlbPath::kRotation, rotation_keys(joints.poses[h]));
-      }
-      // Where a skinned mesh is told by its joints alone; viewers want its node at the root.
-      const int shown =
-          cast.modal_skin
-              ? glb.add_node({.name = body.name + " surface", .mesh = cast.mesh, .skin = glb.add_skin(joints.nodes)})
-              : node;
-      if (!cast.record.recorded.empty())
-        add(shown, GlbPath::kWeights, weights(body, cast.record, options.unsigned_weights));
+      const BodyNodes own = add_nodes(glb, cast, body);
+      nodes.push_back(own.body);
+      add(own.body, GlbPath::kTranslation, translation_keys(body.poses));
+      add(own.body, GlbPath::kRotation, rotation_keys(body.poses));
+      add_bends(glb, cast, body, own, times, options.unsigned_weights, animation);
     }
     warn_of_fast_modes(trajectory, cast.record, recording.warnings);
     warn_of_many_targets(cast.record, recording.warnings);
@@ -398,6 +417,80 @@ Recording make_recording(const Trajectory& trajectory, const RecordingOptions& o
   glb.set_extras(extras_of(trajectory, casts, options));
   recording.glb = glb.bytes();
   return recording;
+}
+
+namespace {
+
+constexpr double kClipBend = std::numbers::pi / 3.0;
+constexpr double kClipSeconds = 2.0;
+constexpr std::size_t kClipKeys = 49;  // 24 a second: rotations between keys go along straight lines
+
+/// Largest turn of a handle, rad per unit of a mode's amplitude.
+double turn_of_mode(const ModalSkin& skin, Index mode) {
+  double largest = 0.0;
+  for (Index h = 0; h < skin.handles; ++h) {
+    const auto turn = [&](int axis) { return static_cast<double>(skin.rotation_row(h, axis)[mode]); };
+    largest = std::max(largest, Vec3(turn(0), turn(1), turn(2)).norm());
+  }
+  return largest;
+}
+
+/// How far each mode swings: with the energy that bends the softest by kClipBend, and as far as its slider at least.
+std::vector<double> clip_amplitudes(const ModalModel& model) {
+  std::vector<double> out = model.data().mode_scales;
+  if (!model.data().skin) return out;
+  const std::vector<double>& stiffness = model.data().eigenvalues;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double z = kClipBend / turn_of_mode(*model.data().skin, static_cast<Index>(i));
+    if (stiffness[i] > 0.0) least = std::min(least, stiffness[i] * z * z);
+  }
+  for (std::size_t i = 0; i < out.size(); ++i)
+    if (stiffness[i] > 0.0 && std::isfinite(least)) out[i] = std::max(out[i], std::sqrt(least / stiffness[i]));
+  return out;
+}
+
+/// One mode from rest to either side and back.
+BodyTrack swing(const std::shared_ptr<const ModalModel>& model, Index mode, double amplitude) {
+  BodyTrack track;
+  track.name = model->name(), track.model = model;
+  track.modal_skin = model->data().skin.has_value();
+  for (std::size_t key = 0; key < kClipKeys; ++key) {
+    const double part = static_cast<double>(key) / static_cast<double>(kClipKeys - 1);
+    track.poses.push_back({.p = model->data().origin_in_input});
+    for (Index i = 0; i < model->modes(); ++i)
+      track.amplitudes.push_back(i == mode ? amplitude * std::sin(2.0 * std::numbers::pi * part) : 0.0);
+  }
+  return track;
+}
+
+std::vector<float> clip_times() {
+  std::vector<float> out;
+  for (std::size_t key = 0; key < kClipKeys; ++key)
+    out.push_back(narrow(kClipSeconds * static_cast<double>(key) / static_cast<double>(kClipKeys - 1)));
+  return out;
+}
+
+}  // namespace
+
+std::string make_mode_clips(std::span<const std::shared_ptr<const ModalModel>> models) {
+  GlbBuilder glb;
+  const int times = glb.add_times(clip_times());
+  for (std::size_t b = 0; b < models.size(); ++b) {
+    const auto& model = models[b];
+    Cast cast{.model = model, .modal_skin = model->data().skin.has_value(), .bodies = {}, .record = {}};
+    cast.record.scales = clip_amplitudes(*model);
+    for (Index i = 0; i < model->modes(); ++i) cast.record.recorded.push_back(i);
+    cast.mesh = add_mesh(glb, cast, b, {});
+    const BodyNodes nodes = add_nodes(glb, cast, swing(model, 0, 0.0));
+    for (Index i = 0; i < model->modes(); ++i) {
+      const std::string mode = mode_target_name(i, model->modes(), model->frequency_hz(i));
+      GlbAnimation clip{.name = models.size() > 1 ? model->name() + " " + mode : mode};
+      add_bends(glb, cast, swing(model, i, cast.record.scales[static_cast<std::size_t>(i)]), nodes, times, false, clip);
+      glb.add_animation(clip);
+    }
+  }
+  return glb.bytes();
 }
 
 }  // namespace limber

@@ -48,8 +48,13 @@ Index drawn_modes(const SurfaceExtent& extent, std::span<const double> z, double
 void reconstruct(const ModalSurface& surface, std::span<const ReconstructionTarget> targets,
                  Jobs& jobs = serial_jobs());
 
-/// The same for targets of which some or all have a skin; the others get the bits that they get without. The error of a
-/// vertex with a skin is at most 64u of the size of every term: rest, Σ|z_m||shape_m|, d, t_h, e_h, |Θ_h z||rest|.
+/// No handle turns by more, rad: the body is drawn by its modes alone, at their price. A vertex is then off by no more
+/// than the angle's square times the body's size, 2.5e-5 of it, a part of a pixel, by which it jumps when it bends on.
+inline constexpr double kDrawnStraight = 0.005;
+
+/// The same for targets of which some or all have a skin; the others, and those straighter than kDrawnStraight, get the
+/// bits that they get without. The error of a vertex with a skin is at most 64u of the size of every term: rest,
+/// Σ|z_m||shape_m|, d, t_h, e_h, |Θ_h z||rest|.
 /// @param influences of the surface. @throws InvalidArgument also if they are not one per vertex, or name a handle that
 /// a skin has not
 void reconstruct(const ModalSurface& surface, const SkinTiles& influences,

@@ -6,8 +6,9 @@
 ///   |∂_ij x| ≤ Σ_l [3/2 |Θ_li||Θ_lj||a_lh + D_lh z| + |Θ_li||D_lhj| + |Θ_lj||D_lhi|]
 ///              + 3/2 |Θ_hi||Θ_hj||y − r_h| + |Θ_hi||Ũ_j| + |Θ_hj||Ũ_i|
 /// c and ρ a ball about the vertices of the handle. A vertex moves by at most the most of its handles, as weights are
-/// no less than 0 and sum to 1. Of free bodies the mean of all points and Eckart's rotation are added, the second by
-/// how firmly its condition holds the frame. Derivation: docs/derivations/modal-skin.md.
+/// no less than 0 and sum to 1. Of free bodies the rates now are those in their frame, and what Eckart's rotation adds
+/// to the second derivatives follows from how firmly its condition holds the frame, axis by axis. Derivation:
+/// docs/derivations/modal-skin.md.
 #pragma once
 
 #include <span>
@@ -24,15 +25,12 @@ class SkinExtent {
   /// @pre the model has a skin, and outlives this
   explicit SkinExtent(const ModalModel& model);
 
-  /// The skin without what keeps a free body in its frame.
-  const ModalSkin& bare() const { return bare_; }
-
   /// Bounds over all amplitudes ζ with |ζ_i − z_i| ≤ change_i.
-  /// @param pose at z. @param bare of bare(); scratch, as is `rates`. @param change ≥ 0
-  /// @param shape out: no vertex moves by more than Σ shape_i change_i
+  /// @param pose at z, differentiated. @param change ≥ 0
+  /// @param shape out: no vertex moves by more than Σ shape_i change_i. @param scratch 3 k numbers
   /// @return no vertex is farther from the body origin now, m
-  double find(const SkinPose& pose, SkinPose& bare, std::span<const double> z, std::span<const double> change,
-              std::span<double> shape, std::span<double> rates) const;
+  double find(const SkinPose& pose, std::span<const double> z, std::span<const double> change, std::span<double> shape,
+              std::span<double> scratch) const;
 
  private:
   /// The vertices that hang on a handle.
@@ -42,19 +40,21 @@ class SkinExtent {
     double reach = 0.0;          // about the handle
     bool used = false;
   };
-  double turn(Index h, std::size_t mode) const { return turns_[static_cast<std::size_t>(h) * k_ + mode]; }
-  double shift(Index l, Index h, std::size_t mode) const {
-    return shifts_[static_cast<std::size_t>(l * bare_.handles + h) * k_ + mode];
-  }
+  void find_curvature(Index h, std::span<const double> z, std::span<const double> change, std::span<double> out,
+                      std::span<double> sums) const;
   double farthest(const SkinPose& pose, double flexed) const;
-  void keep_in_frame(double firmness, double far, std::span<const double> change, std::span<double> shape) const;
+  double farthest_over_turns(const SkinPose& pose, double flexed) const;
+  void keep_in_frame(const SkinPose& pose, double flexed, double far, std::span<const double> change,
+                     std::span<const double> scratch, std::span<double> shape) const;
 
-  ModalSkin bare_;
+  const ModalSkin* skin_;
   std::size_t k_ = 0;
   std::vector<Ball> balls_;             // by handle
   std::vector<double> turns_, shifts_;  // |Θ_hi|; |D_lhi|
   std::vector<double> flexing_;         // the largest |Ũ_i|
-  double mean_radius_ = 0.0;            // √(Σ m |r|²/m)
+  // Of free bodies, with C = Σ m r rᵀ/m and J = (tr C) 1 − C: √C, 1/√J, √(least of J).
+  Mat3 root_moment_ = Mat3::Zero(), turned_ = Mat3::Zero();
+  double thinnest_ = 0.0;
 };
 
 }  // namespace limber

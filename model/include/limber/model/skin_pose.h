@@ -56,9 +56,15 @@ class SkinPose {
     Vec3 turn, shift;
   };
   Rate rate(Index handle, Index mode) const;
-  /// Of a free body, how firmly Eckart's condition holds its frame: the least eigenvalue of (tr P) 1 − P, Σ m x rᵀ/m =
-  /// Q P, m².
-  double frame_stiffness() const;
+  /// How a free body is kept in its frame, Σ m x rᵀ/m = Q P, and what a mode does to that, in the axes of the frame.
+  /// @pre has a gauge; for the second, differentiate()
+  const Mat3& frame_moment() const { return stretch_; }  ///< P, m²
+  struct FrameRate {
+    Vec3 turn = Vec3::Zero();    ///< [turn]× = Qᵀ dQ/dz_i
+    Vec3 centre = Vec3::Zero();  ///< Qᵀ dc/dz_i
+    Mat3 moment = Mat3::Zero();  ///< Qᵀ d(Σ m x rᵀ/m)/dz_i
+  };
+  const FrameRate& frame_rate(Index mode) const { return frame_rates_[static_cast<std::size_t>(mode)]; }
   /// g += J_vᵀ f but for the part that goes by U: the caller adds U_vᵀ f̄ with the force f̄ that is returned.
   /// @param f body axes @param g k numbers
   Vec3 add_rows(const SkinInfluences& at, const Vec3& rest, const Vec3& linear, const Vec3& f,
@@ -86,6 +92,7 @@ class SkinPose {
   std::vector<double> turn_rates_;    // Ω_h: [dR_h/dz_i Rᵀ]×, [handle][axis][mode]
   std::vector<double> shift_rates_;   // dt_h/dz
   std::vector<double> drift_shapes_;  // de_h/dz, which no amplitude changes
+  std::vector<FrameRate> frame_rates_;
 };
 
 }  // namespace limber

@@ -8,6 +8,8 @@
 /// targets divided by the same number, so that both are lit alike too.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -42,5 +44,12 @@ struct Recording {
 
 /// @throws InvalidArgument if the trajectory is empty or its times are not ascending
 Recording make_recording(const Trajectory& trajectory, const RecordingOptions& options = {});
+
+/// Bodies where they stand in their input, and an animation per mode of each that swings it once from rest to either
+/// side, two seconds long: by its modal skin where it has one, which sliders of the asset's morph targets cannot show.
+/// Each mode swings with the energy that bends the softest by 60°, and as far as its slider (mode_scales) at least.
+/// @return the file's bytes. Animations are called as the asset's morph targets, after the body's name where there are
+/// several bodies
+std::string make_mode_clips(std::span<const std::shared_ptr<const ModalModel>> models);
 
 }  // namespace limber
