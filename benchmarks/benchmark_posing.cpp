@@ -4,7 +4,8 @@
 // The bunny in the paper's form, some minutes, only if it is named. Tolerances: 1e-8 of the diagonal, and 1e-4, a tenth
 // of a pixel, as for dragging.
 //   benchmark_posing [--model NAME]
-//   benchmark_posing --local-global [--model NAME]     local/global iterations beside, without limits
+//   benchmark_posing --local-global [--model NAME]     local/global iterations beside, without limits,
+//                                                    and drags with few iterations a frame
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -233,6 +234,40 @@ void compare(Case c) {
   }
 }
 
+/// A drag whose frames have so many iterations and no more: their times, and how far vertices are from the pose sought.
+void keep_time(const Case& c, int budget) {
+  constexpr int kFrames = 40;
+  const Drag drag = drag_of(c, kFrames);
+  std::vector<limber::PoseHandle> handles, exact_handles;
+  limber::PosingSession session = session_of(c, drag, {.energy_tolerance = 1e-6, .max_iterations = budget}, handles),
+                        exact = session_of(c, drag, {.energy_tolerance = 1e-7}, exact_handles);
+  std::vector<double> times;
+  std::vector<Vec3> positions(c.model.surface.vertices.size()), sought(positions.size()), normals(positions.size());
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : c.model.surface.vertices) box.extend(p);
+  double behind = 0.0, surface = 0.0;
+  for (const Vec3& target : drag.targets) {
+    session.move_handle(handles.back(), target);
+    const double start = now();
+    session.solve();
+    times.push_back(now() - start);
+    session.reconstruct(positions, normals);
+    surface += now() - start - times.back();
+    exact.move_handle(exact_handles.back(), target);
+    exact.solve();
+    exact.reconstruct(sought);
+    for (std::size_t v = 0; v < positions.size(); ++v)
+      behind = std::max(behind, (positions[v] - sought[v]).norm() / box.diagonal().norm());
+  }
+  times.erase(times.begin());
+  const double late = static_cast<double>(std::count_if(times.begin(), times.end(), [](double t) { return t > 16.7; }));
+  std::printf(
+      "%-9s %d iterations a frame: median %.1f ms, longest but the first %.1f ms, %.0f of %zu over 16.7 ms; surface "
+      "with normals %.2f ms; vertices behind by %.1e of the size at most\n",
+      c.name, budget, median(times), *std::max_element(times.begin(), times.end()), late, times.size(),
+      surface / kFrames, behind);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -255,6 +290,7 @@ int main(int argc, char** argv) {
   for (const Case& c : cases) {
     if (beside) {
       compare(c);
+      for (const int budget : {1, 2, 3}) keep_time(c, budget);
       continue;
     }
     for (const double tolerance : {1e-8, 1e-4}) run(c, limber::PoseFormulation::kConstrained, tolerance);
