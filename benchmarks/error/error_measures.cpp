@@ -26,27 +26,38 @@ double largest_row(const NodeVectors& d) { return d.rowwise().norm().maxCoeff();
 
 double over(double error, double scale) { return scale > 0.0 ? error / scale : (error > 0.0 ? HUGE_VAL : 0.0); }
 
+/// Of the reference, from one of `seen` to the next.
+std::size_t samples_between(const NodeMotion& seen, const NodeMotion& reference) {
+  if (seen.empty() || reference.empty() || (seen.size() == 1) != (reference.size() == 1) ||
+      (seen.size() > 1 && (reference.size() - 1) % (seen.size() - 1) != 0))
+    throw InvalidArgument("motion_error: " + std::to_string(seen.size()) + " samples against " +
+                          std::to_string(reference.size()) + ", expected as many, or n times as many after the first");
+  return seen.size() == 1 ? 1 : (reference.size() - 1) / (seen.size() - 1);
+}
+
 }  // namespace
 
 MotionError motion_error(const NodeMotion& seen, const NodeMotion& reference, const Eigen::VectorXd& masses) {
-  if (seen.size() != reference.size() || seen.empty())
-    throw InvalidArgument("motion_error: " + std::to_string(seen.size()) + " samples against " +
-                          std::to_string(reference.size()) + ", expected as many, one or more");
+  const std::size_t each = samples_between(seen, reference);
   MotionError error;
   double vertex_peak = 0.0;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i].rows() != masses.size() || reference[i].rows() != masses.size())
-      throw InvalidArgument("motion_error: sample " + std::to_string(i) + " has another number of nodes than masses");
-    const NodeVectors moved = reference[i] - reference.front(), off = seen[i] - reference[i];
+  for (const NodeVectors& x : reference) {
+    if (x.rows() != masses.size()) throw InvalidArgument("motion_error: as many nodes as masses are expected");
+    const NodeVectors moved = x - reference.front();
     error.peak = std::max(error.peak, std::sqrt(mean_square(moved, masses)));
     vertex_peak = std::max(vertex_peak, largest_row(moved));
-    const double bent = mean_square(shape_difference(reference[i], reference.front(), masses), masses);
+    const double bent = mean_square(shape_difference(x, reference.front(), masses), masses);
     error.shape_peak = std::max(error.shape_peak, std::sqrt(bent));
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i].rows() != masses.size())
+      throw InvalidArgument("motion_error: sample " + std::to_string(i) + " has another number of nodes than masses");
+    const NodeVectors off = seen[i] - reference[each * i];
     const double square = mean_square(off, masses);
     error.mean += square;
     error.worst = std::max(error.worst, std::sqrt(square));
     error.worst_vertex = std::max(error.worst_vertex, largest_row(off));
-    error.shape_mean += mean_square(shape_difference(seen[i], reference[i], masses), masses);
+    error.shape_mean += mean_square(shape_difference(seen[i], reference[each * i], masses), masses);
   }
   const auto samples = static_cast<double>(seen.size());
   error.mean = over(std::sqrt(error.mean / samples), error.peak);
@@ -57,11 +68,11 @@ MotionError motion_error(const NodeMotion& seen, const NodeMotion& reference, co
 }
 
 double node_error(const NodeMotion& seen, const NodeMotion& reference, Index node) {
+  const std::size_t each = samples_between(seen, reference);
   double off = 0.0, peak = 0.0;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    off = std::max(off, (seen[i].row(node) - reference[i].row(node)).norm());
-    peak = std::max(peak, (reference[i].row(node) - reference.front().row(node)).norm());
-  }
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    off = std::max(off, (seen[i].row(node) - reference[each * i].row(node)).norm());
+  for (const NodeVectors& x : reference) peak = std::max(peak, (x.row(node) - reference.front().row(node)).norm());
   return over(off, peak);
 }
 

@@ -23,10 +23,11 @@ struct MotionError {
   double shape_mean = 0.0;    ///< root mean square over time, best rigid alignment of each sample taken away
   double peak = 0.0, shape_peak = 0.0;  ///< m, of the reference
 };
-/// @param masses kg, of the nodes @throws InvalidArgument if the motions are not of one size, or empty
+/// @param reference may have n times as many samples after the first, of which each n-th is compared; its peaks are
+/// those of all @param masses kg, of the nodes @throws InvalidArgument if the motions do not fit so, or are empty
 MotionError motion_error(const NodeMotion& seen, const NodeMotion& reference, const Eigen::VectorXd& masses);
 
-/// max_t |d_v| of one node over max_t |x_ref,v(t) − x_ref,v(0)|.
+/// The same: max_t |d_v| of one node over max_t |x_ref,v(t) − x_ref,v(0)|.
 double node_error(const NodeMotion& seen, const NodeMotion& reference, Index node);
 
 /// A mode that rings: z(t) = a cos(ωt) + b sin(ωt), fitted in the least-squares sense near a frequency that is known

@@ -50,7 +50,7 @@ ErrorScene drop() {
           .bodies = {falling},
           .gravity = kDown,
           .ground = true,
-          .duration = 0.5,
+          .duration = 0.3,
           .tip = kBar};
 }
 
@@ -73,7 +73,7 @@ ErrorScene spin() {
   return {.name = "spin",
           .what = "a bar turns about an axis across it and is struck at a corner",
           .bodies = {turning},
-          .forces = {{0, kBar, {0.0, 0.0, 20.0}, kSampleInterval}},
+          .forces = {{0, kBar, {0.0, 0.0, 20.0}, 1.0 / 30.0}},
           .tip = kBar};
 }
 
@@ -180,10 +180,18 @@ const ErrorScene& error_scene(const std::string& name) {
   throw InvalidArgument("error_scene: \"" + name + "\", expected one of " + known);
 }
 
+ErrorScene driven(ErrorScene scene, double times) {
+  scene.gravity *= times;
+  for (ErrorBody& body : scene.bodies) body.velocity *= times, body.angular_velocity *= times;
+  for (ErrorForce& f : scene.forces) f.force *= times;
+  for (ErrorLead& lead : scene.leads) lead.way *= times;
+  return scene;
+}
+
 std::string text(const ErrorSetting& s) {
-  return fmt::format("{} modes, step {:.6g} s, {}, {}, {} contacts, residual {}, {}, mesh {}", s.modes, s.step,
-                     s.method, s.impact, s.contacts == 0 ? "all" : std::to_string(s.contacts),
-                     s.residual ? "on" : "off", s.basis, s.mesh);
+  return fmt::format("{} modes, step {:.6g} s, {}, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}", s.modes,
+                     s.step, s.method, s.impact, s.contacts == 0 ? "all" : std::to_string(s.contacts),
+                     s.residual ? "on" : "off", s.basis, s.mesh, s.drive);
 }
 
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,

@@ -7,7 +7,9 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -63,7 +65,14 @@ struct ErrorScene {
 
   bool has_contact() const { return ground || bodies.front().wall.has_value(); }
 };
-inline constexpr double kSampleInterval = 1.0 / 30.0;  ///< s
+
+/// The references are looked at 240 times a second, limber as often as its steps allow: at 60 a soft body that swings
+/// 35 times a second would be seen in nearly the same place again and again.
+inline constexpr double kSampleInterval = 1.0 / 240.0;  ///< s
+inline constexpr double kSlowestStep = 1.0 / 60.0;      ///< s
+
+/// The scene with everything that drives it so many times as strong: forces, ways, velocities and gravity.
+ErrorScene driven(ErrorScene scene, double times);
 
 /// poke, drag, drop, collide, spin, lamp, squeeze, strip.
 const std::vector<ErrorScene>& error_scenes();
@@ -73,13 +82,14 @@ const ErrorScene& error_scene(const std::string& name);
 /// A point of every axis.
 struct ErrorSetting {
   int modes = 40;
-  double step = 1.0 / 240.0;             ///< s; divides kSampleInterval
+  double step = 1.0 / 240.0;             ///< s; divides kSlowestStep
   std::string method = "complementary";  ///< as in scene files
   std::string impact = "absorbed";       ///< the same
   int contacts = 4;                      ///< kept of a patch; 0: all. Others than 4 are not told by scene files
   bool residual = true;                  ///< static answers of the modes left out, where loads act and bodies touch
   std::string basis = "float";           ///< or "half": shapes rounded to IEEE half precision
   int mesh = 1;                          ///< times as many cells along each axis
+  double drive = 1.0;                    ///< see driven(), which the caller calls
 };
 std::string text(const ErrorSetting& setting);
 
@@ -102,12 +112,22 @@ class SceneBakery {
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,
                        const std::function<std::string(const std::string&)>& asset_file);
 
+/// What contacts gave in a step.
+struct Touch {
+  double time = 0.0, impulse = 0.0;  ///< s, at the step's end; N·s
+};
+/// From the first touch until nothing presses for kPause.
+struct FirstImpact {
+  static constexpr double kPause = 0.025;  ///< s
+  double begin = -1.0, end = -1.0, impulse = 0.0;
+};
+FirstImpact first_impact(std::span<const Touch> touches);
+
 /// How a scene went. Motions are those of the coarsest mesh's surface nodes, body by body.
 struct PlayedScene {
   std::vector<NodeMotion> motions;
   std::vector<double> step_seconds;  ///< of this thread, of every step
-  double impulse = 0.0;              ///< that contacts gave, N·s
-  double contact_time = 0.0;         ///< from the first to the last, s
+  std::vector<Touch> touches;        ///< steps in which contacts pressed; of walls that mirror each other, of one
   std::vector<Vec3> momenta;         ///< of all free bodies, at the samples, kg·m/s
   double energy_rise = 0.0,
          energy_loss = 0.0;  ///< after the last load has ended, of the largest energy of motion and shape
@@ -129,8 +149,11 @@ Index compared_tip(const ErrorScene& scene);
 struct SceneError {
   MotionError motion;
   double tip = 0.0;
-  double impulse = 0.0, contact_time = 0.0;  ///< relative; 0 without contact
-  double momentum = 0.0;                     ///< largest difference over the largest of the reference
+  double impulse = 0.0;  ///< of all contacts, relative; 0 without contact
+  /// Of the first impact: the motion until it ends, root mean square over the whole peak; its impulse and its length,
+  /// relative. What follows magnifies what was off here.
+  double first = 0.0, first_impulse = 0.0, first_length = 0.0;
+  double momentum = 0.0;  ///< largest difference over the largest of the reference
 };
 SceneError scene_error(const ErrorScene& scene, const PlayedScene& seen, const PlayedScene& reference);
 

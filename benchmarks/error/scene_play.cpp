@@ -90,6 +90,15 @@ std::vector<std::size_t> compared_vertices(const ErrorBody& body, const ModalMod
   return out;
 }
 
+/// As many times a second as both step and sample fit.
+std::int64_t steps_per_sample(double step) {
+  for (const double interval : {kSampleInterval, 2.0 * kSampleInterval, kSlowestStep}) {
+    const auto every = static_cast<std::int64_t>(std::llround(interval / step));
+    if (every >= 1 && std::abs(static_cast<double>(every) * step - interval) <= 1e-9) return every;
+  }
+  throw InvalidArgument("play: step " + std::to_string(step) + " s does not divide 1/60 s");
+}
+
 /// limber's side of a scene, step by step.
 class Playing {
  public:
@@ -111,9 +120,7 @@ class Playing {
 
   PlayedScene run() {
     const double step = scene_.step;
-    const auto every = static_cast<std::int64_t>(std::llround(kSampleInterval / step));
-    if (every < 1 || std::abs(static_cast<double>(every) * step - kSampleInterval) > 1e-9)
-      throw InvalidArgument("play: step " + std::to_string(step) + " s does not divide 1/30 s");
+    const std::int64_t every = steps_per_sample(step);
     sample();
     for (std::int64_t n = 1; n <= scene_.steps; ++n) {
       const double begin = thread_seconds();
@@ -122,7 +129,6 @@ class Playing {
       note_step(static_cast<double>(n) * step);
       if (n % every == 0) sample();
     }
-    played_.contact_time = last_ > 0.0 ? last_ - first_ + step : 0.0;
     played_.energy_rise /= scale_;
     played_.energy_loss /= scale_;
     return std::move(played_);
@@ -132,13 +138,9 @@ class Playing {
   void note_step(double time) {
     const World& world = player_.world();
     played_.unsettled += world.constraint_report().solved ? 0 : 1;
-    for (const ContactEvent& event : world.contact_events()) {
-      const double impulse = event.normal.dot(event.impulse);
-      if (impulse <= 0.0) continue;
-      played_.impulse += impulse;
-      if (first_ < 0.0) first_ = time;
-      last_ = time;
-    }
+    double impulse = 0.0;
+    for (const ContactEvent& event : world.contact_events()) impulse += std::max(0.0, event.normal.dot(event.impulse));
+    if (impulse > 0.0) played_.touches.push_back({time, impulse});
     double total = 0.0, moving = 0.0;
     for (const BodyId id : player_.bodies()) {
       const BodyEnergy e = world.energy(id);
@@ -178,7 +180,7 @@ class Playing {
   std::vector<std::vector<std::size_t>> vertices_;
   std::vector<float> drawn_;
   PlayedScene played_;
-  double quiet_from_ = 0.0, first_ = -1.0, last_ = -1.0, scale_ = 1e-300;
+  double quiet_from_ = 0.0, scale_ = 1e-300;
   std::optional<double> quiet_;
 };
 
@@ -218,6 +220,31 @@ ReferenceScene reference_scene(const ErrorScene& scene, ElasticLaw law, std::spa
 
 double relative(double seen, double reference) {
   return reference > 0.0 ? std::abs(seen - reference) / reference : std::abs(seen);
+}
+
+double sum_of(std::span<const Touch> touches) {
+  double sum = 0.0;
+  for (const Touch& touch : touches) sum += touch.impulse;
+  return sum;
+}
+
+/// Of bodies until a time, root mean square, over the peaks of the whole reference; the worst body's.
+double error_until(const ErrorScene& scene, const PlayedScene& seen, const PlayedScene& reference, double end) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const std::size_t each = (reference.motions[i].size() - 1) / (seen.motions[i].size() - 1);
+    const double interval = static_cast<double>(each) * kSampleInterval;
+    const auto count = std::min(seen.motions[i].size(), static_cast<std::size_t>(std::ceil(end / interval)) + 1);
+    const Eigen::VectorXd masses = compared_masses(scene.bodies[i]);
+    const MotionError whole = motion_error(reference.motions[i], reference.motions[i], masses);
+    const MotionError part =
+        motion_error(NodeMotion(seen.motions[i].begin(), seen.motions[i].begin() + static_cast<std::ptrdiff_t>(count)),
+                     NodeMotion(reference.motions[i].begin(),
+                                reference.motions[i].begin() + static_cast<std::ptrdiff_t>((count - 1) * each + 1)),
+                     masses);
+    if (whole.peak > 0.0) worst = std::max(worst, part.mean * part.peak / whole.peak);
+  }
+  return worst;
 }
 
 }  // namespace
@@ -273,9 +300,22 @@ PlayedScene play_reference(const ErrorScene& scene, ElasticLaw law, int mesh, do
   // Two bodies that meet have a wall each.
   const auto walls =
       std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const auto& b) { return b.wall.has_value(); });
-  played.impulse = world.wall_impulse() / static_cast<double>(std::max<std::ptrdiff_t>(1, walls));
-  played.contact_time = world.last_touch() - world.first_touch();
+  for (const auto& [time, impulse] : world.wall_impulses())
+    played.touches.push_back({time, impulse / static_cast<double>(std::max<std::ptrdiff_t>(1, walls))});
   return played;
+}
+
+FirstImpact first_impact(std::span<const Touch> touches) {
+  FirstImpact out;
+  for (const Touch& touch : touches) {
+    if (out.begin < 0.0)
+      out.begin = touch.time;
+    else if (touch.time - out.end > FirstImpact::kPause)
+      break;
+    out.end = touch.time;
+    out.impulse += touch.impulse;
+  }
+  return out;
 }
 
 SceneError scene_error(const ErrorScene& scene, const PlayedScene& seen, const PlayedScene& reference) {
@@ -291,13 +331,17 @@ SceneError scene_error(const ErrorScene& scene, const PlayedScene& seen, const P
   }
   out.tip = node_error(seen.motions[scene.tip_body], reference.motions[scene.tip_body], compared_tip(scene));
   if (scene.has_contact()) {
-    out.impulse = relative(seen.impulse, reference.impulse);
-    out.contact_time = relative(seen.contact_time, reference.contact_time);
+    out.impulse = relative(sum_of(seen.touches), sum_of(reference.touches));
+    const FirstImpact here = first_impact(seen.touches), there = first_impact(reference.touches);
+    out.first = error_until(scene, seen, reference, there.end);
+    out.first_impulse = relative(here.impulse, there.impulse);
+    out.first_length = relative(here.end - here.begin, there.end - there.begin);
   }
   double largest = 0.0;
+  const std::size_t each = (reference.momenta.size() - 1) / (seen.momenta.size() - 1);
   for (std::size_t n = 0; n < seen.momenta.size(); ++n) {
-    out.momentum = std::max(out.momentum, (seen.momenta[n] - reference.momenta[n]).norm());
-    largest = std::max(largest, reference.momenta[n].norm());
+    out.momentum = std::max(out.momentum, (seen.momenta[n] - reference.momenta[each * n]).norm());
+    largest = std::max(largest, reference.momenta[each * n].norm());
   }
   out.momentum = largest > 0.0 ? out.momentum / largest : 0.0;
   return out;

@@ -238,12 +238,10 @@ void ReferenceWorld::settle(std::vector<Row> rows, double h) {
     if (!found) break;
     solve_rows(rows, h);
   }
-  for (const Row& row : rows) {
-    if (!row.one_sided || row.impulse <= 0.0) continue;
-    wall_impulse_ += row.impulse;
-    if (first_touch_ < 0.0) first_touch_ = time_ + h;
-    last_touch_ = time_ + h;
-  }
+  double by_walls = 0.0;
+  for (const Row& row : rows)
+    if (row.one_sided) by_walls += row.impulse;
+  if (by_walls > 0.0) wall_impulses_.push_back({time_ + h, by_walls});
 }
 
 double ReferenceWorld::energy() const {

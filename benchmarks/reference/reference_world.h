@@ -79,10 +79,12 @@ class ReferenceWorld {
   const NodeVectors& velocities(std::size_t body) const { return scene_.bodies[body].v; }  ///< half a step before
   /// Kinetic (of the mean of the velocities before and after), elastic and in gravity, J.
   double energy() const;
-  Vec3 momentum() const;                                 ///< kg·m/s
-  double wall_impulse() const { return wall_impulse_; }  ///< by all walls so far, N·s
-  double first_touch() const { return first_touch_; }    ///< s; −1: none so far
-  double last_touch() const { return last_touch_; }
+  Vec3 momentum() const;  ///< kg·m/s
+  /// By all walls together, of the steps in which they gave any.
+  struct WallImpulse {
+    double time = 0.0, impulse = 0.0;  ///< s, at the step's end; N·s
+  };
+  const std::vector<WallImpulse>& wall_impulses() const { return wall_impulses_; }
 
  private:
   struct Row;
@@ -97,7 +99,8 @@ class ReferenceWorld {
   ReferenceScene scene_;
   std::vector<std::unique_ptr<MassSolver>> masses_;
   std::vector<std::optional<Vec3>> led_from_;
-  double time_ = 0.0, last_step_ = 0.0, wall_impulse_ = 0.0, first_touch_ = -1.0, last_touch_ = -1.0;
+  std::vector<WallImpulse> wall_impulses_;
+  double time_ = 0.0, last_step_ = 0.0;
 };
 
 /// Implicit midpoint of one body without walls, sparse direct: M (v₁ − v)/Δt = f((x + x₁)/2), x₁ = x + Δt (v + v₁)/2,

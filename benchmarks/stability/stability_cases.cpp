@@ -37,6 +37,7 @@ const std::vector<Axis>& axes() {
       {"one_tet", {0.0, 1.0}, [](StabilityCase& c, double x) { c.one_tet = x != 0.0; }},
       {"step", {1e-5, 1e-4, 1e-3, 1.0 / 240.0, 1.0 / 60.0, 0.1, 1.0}, [](StabilityCase& c, double x) { c.step = x; }},
       {"varying_step", {0.0, 1.0}, [](StabilityCase& c, double x) { c.varying_step = x != 0.0; }},
+      {"pause", {0.0, 3600.0}, [](StabilityCase& c, double x) { c.pause = x; }},
       {"damping", {0.0, 0.02, 1.0, 1e6}, [](StabilityCase& c, double x) { c.damping_ratio = x; }},
       {"modes", {0, 1, 8, 20, kAllModes}, [](StabilityCase& c, double x) { c.modes = static_cast<int>(x); }},
       {"mass_ratio", {1.0, 100.0, 1e4, 1e6}, [](StabilityCase& c, double x) { c.mass_ratio = x; }, has_weights},
@@ -106,6 +107,7 @@ std::vector<std::pair<const char*, double>> coordinates(const StabilityCase& c) 
           {"one_tet", c.one_tet},
           {"step", c.step},
           {"varying_step", c.varying_step},
+          {"pause", c.pause},
           {"damping", c.damping_ratio},
           {"modes", c.modes},
           {"mass_ratio", c.mass_ratio},
@@ -135,6 +137,11 @@ std::string text(const StabilityCase& c) {
   for (std::size_t i = 0; i < here.size(); ++i)
     if (here[i].second != usual[i].second) out += fmt::format(", {} {:g}", here[i].first, here[i].second);
   return out;
+}
+
+bool bullet_can(const StabilityCase& c) {
+  const bool alone = c.scene == StabilityScene::kFlight || c.scene == StabilityScene::kGround;
+  return alone && c.modes > 0 && c.far_away == 0.0 && c.pause == 0.0;
 }
 
 std::vector<StabilityCase> energy_grid() {

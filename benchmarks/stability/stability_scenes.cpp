@@ -1,7 +1,6 @@
 #include "stability_scenes.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -10,88 +9,21 @@
 #include "energy_meter.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
-#include "limber/precompute/bake.h"
-#include "limber/scene/scene_model.h"
-#include "tet_box.h"
+#include "stability_bars.h"
 
 namespace limber::testing {
 namespace {
 
-const Vec3 kSize{0.3, 0.1, 0.1};  // of a bar of size 1, m
+const Vec3 kSize = kBarSize;
 constexpr int kPullSteps = 10;
-
-/// Flat tetrahedra: in every sixth one stands a node a little above the middle of a face, at the angle asked for.
-void add_slivers(TetMesh& mesh, double degrees) {
-  const std::size_t count = mesh.tets.size();
-  for (std::size_t e = 0; e < count; e += 6) {
-    const Tet t = mesh.tets[e];
-    const auto corner = [&](int i) { return mesh.nodes[static_cast<std::size_t>(t[static_cast<std::size_t>(i)])]; };
-    const Vec3 normal = (corner(2) - corner(1)).cross(corner(3) - corner(1));
-    const double twice_area = normal.norm();
-    const std::array opposite{(corner(3) - corner(2)).norm(), (corner(1) - corner(3)).norm(),
-                              (corner(2) - corner(1)).norm()};
-    const double perimeter = opposite[0] + opposite[1] + opposite[2];
-    const Vec3 incenter = (opposite[0] * corner(1) + opposite[1] * corner(2) + opposite[2] * corner(3)) / perimeter;
-    const Vec3 inwards = normal * ((corner(0) - corner(1)).dot(normal) > 0.0 ? 1.0 : -1.0) / twice_area;
-    const auto added = static_cast<Index>(mesh.nodes.size());
-    mesh.nodes.push_back(incenter + std::tan(degrees * kDegree) * twice_area / perimeter * inwards);
-    for (std::size_t i = 0; i < 4; ++i) {
-      Tet part = t;
-      part[i] = added;
-      if (i == 0) {
-        mesh.tets[e] = part;
-      } else {
-        mesh.tets.push_back(part);
-        mesh.tet_region.push_back(mesh.tet_region[e]);
-      }
-    }
-  }
-}
-
-TetMesh bar_mesh(const StabilityCase& at) {
-  if (at.one_tet) {
-    TetMesh mesh;
-    mesh.regions = {{.name = "*"}};
-    mesh.nodes = {Vec3::Zero(), Vec3(kSize.x() * at.size, 0.0, 0.0), Vec3(0.0, kSize.y() * at.size, 0.0),
-                  Vec3(0.0, 0.0, kSize.z() * at.size)};
-    mesh.tets = {{0, 1, 2, 3}};
-    mesh.tet_region = {0};
-    return mesh;
-  }
-  TetMesh mesh = tet_box(3, 2, 2, at.size * kSize);
-  if (at.sliver_angle > 0.0) add_slivers(mesh, at.sliver_angle);
-  return mesh;
-}
-
-/// @param weight times the density, and the stiffness with it, so that the frequencies stay
-Material bar_material(const StabilityCase& at, double weight) {
-  return {
-      .youngs_modulus = weight * at.youngs_modulus, .poisson_ratio = at.poisson_ratio, .density = weight * at.density};
-}
-
-std::shared_ptr<const ModalModel> baked_bar(const StabilityCase& at, double weight) {
-  BakeOptions o;
-  o.materials = {{"*", bar_material(at, weight)}};
-  o.analysis.modes = o.limits.max_modes = std::max(1, at.modes);
-  o.analysis.mass = MassKind::kConsistent;  // so that the nodes have the inertia by which the frame turns
-  o.volume_block = true;
-  const auto bake_it = [&] {
-    Warnings warnings;
-    return bake({.name = "bar", .mesh = bar_mesh(at)}, o, warnings).asset.bodies[0];
-  };
-  auto bar = bake_it();
-  if (at.modes == 0) return reduce_model(*bar, {});
-  if (at.damping_ratio == 0.0) return bar;
-  o.damping.stiffness_proportional = 2.0 * at.damping_ratio / std::sqrt(bar->data().eigenvalues.front());
-  return bake_it();
-}
+constexpr std::uint64_t kPauseAfter = 40;  // steps
 
 struct Bar {
   std::shared_ptr<const ModalModel> model;
   std::shared_ptr<const EnergyMeter> meter;
 };
 Bar make_bar(const StabilityCase& at, double weight) {
-  const auto model = baked_bar(at, weight);
+  const auto model = baked_bar(at, weight, MassKind::kConsistent);
   return {model, std::make_shared<const EnergyMeter>(bar_mesh(at), bar_material(at, weight), model)};
 }
 
@@ -184,7 +116,10 @@ class Scene {
 
   void step(std::mt19937& random) {
     if (at_.varying_step) world_.set_step(at_.step * std::uniform_real_distribution<double>(0.1, 1.0)(random));
+    const bool pauses = at_.pause > 0.0 && world_.step_count() == kPauseAfter;
+    if (pauses) world_.set_step(at_.pause);
     world_.step();
+    if (pauses) world_.set_step(at_.step);
   }
 
   /// What is done to the body before its energy is watched: a blow, or a pull by a hand that then lets go.

@@ -32,6 +32,7 @@ struct StabilityCase {
   bool one_tet = false;         ///< a single tetrahedron in place of the bar
   double step = 1.0 / 60.0;     ///< s
   bool varying_step = false;    ///< each step its own, from a tenth of `step` to all of it
+  double pause = 0.0;           ///< length of one step amid the others, s; 0: none is
   double damping_ratio = 0.0;   ///< of the first mode; more of the higher ones
   int modes = 20;               ///< at most; kAllModes: as many as the mesh has
   double mass_ratio = 1.0;      ///< kPile, kChain
@@ -68,6 +69,13 @@ struct StabilityResult {
 
 /// Runs a case. @throws InputError if the bake does not take the material or the mesh
 StabilityResult run(const StabilityCase& at, int steps);
+
+/// The same by Bullet's reduced deformable body (explicit, as its own examples set it up), on modes of the same bake
+/// with lumped masses: one bar that flies, or falls onto a box, never far from the origin, without pauses. Energies are
+/// those of its nodes and modes. Overlap beyond its margin counts; nothing is told of momentum or of unsettled steps.
+bool bullet_can(const StabilityCase& at);
+StabilityResult run_by_bullet(const StabilityCase& at, int steps);
+bool has_bullet();  ///< whether this build has it; else run_by_bullet() throws InvalidArgument
 
 /// What a case must not do. Energies may rise by round-off alone, and by what changes of inertia the nodes' energy
 /// knows of; where something recovers from overlap, by the work of that, which is not judged.

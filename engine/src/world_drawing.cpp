@@ -71,9 +71,9 @@ void World::Impl::prepare_drawing(std::span<const DrawTarget> targets, double s)
     const std::size_t numbers = 3 * static_cast<std::size_t>(group(e).model().render().vertices());
     require_count(targets[i].positions.size(), numbers, "reconstruct", "positions");
     if (!targets[i].normals.empty()) require_count(targets[i].normals.size(), numbers, "reconstruct", "normals");
-    if (!(targets[i].tolerance >= 0.0))
+    if (!(targets[i].tolerance >= 0.0) || !std::isfinite(targets[i].tolerance))
       throw InvalidArgument("World::reconstruct: tolerance is " + std::to_string(targets[i].tolerance) +
-                            " m, expected at least 0");
+                            " m, expected at least 0 and finite");
     drawn.push_back({e.group, modes_to_draw(e, targets[i].tolerance, s), i});
     amplitudes += static_cast<std::size_t>(group(e).model().modes());
     if (is_dented(targets[i].id, s)) dents += numbers;

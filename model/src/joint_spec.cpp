@@ -1,6 +1,7 @@
 #include "limber/model/joint_spec.h"
 
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "limber/core/error.h"
@@ -10,10 +11,11 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kNames = {"ball", "revolute", "cylindrical", "prismatic", "planar", "fixed"};
 
-void require_ordered(const Interval& interval, const char* what) {
-  if (!(interval.low <= interval.high))  // false for NaN too
+void require_reachable(const Interval& interval, const char* what) {
+  constexpr double kOpen = std::numeric_limits<double>::infinity();
+  if (!(interval.low <= interval.high) || interval.low == kOpen || interval.high == -kOpen)  // false for NaN too
     throw InvalidArgument(std::string("JointSpec: limits of ") + what + " are " + std::to_string(interval.low) +
-                          " to " + std::to_string(interval.high) + ", expected the lower one first");
+                          " to " + std::to_string(interval.high) + ", expected the lower one first, and no end that is never reached");
 }
 
 }  // namespace
@@ -51,9 +53,9 @@ void JointSpec::validate() const {
       !((frame.axes.transpose() * frame.axes - Mat3::Identity()).cwiseAbs().maxCoeff() <= kTolerance) ||
       !(frame.axes.determinant() > 0.0))
     throw InvalidArgument("JointSpec: the frame's axes are not orthonormal and right-handed");
-  require_ordered(limits.rotation, "the rotation");
-  for (const Interval& along : limits.translation) require_ordered(along, "the translation");
-  for (const Interval& angle : limits.euler) require_ordered(angle, "the Euler angles");
+  require_reachable(limits.rotation, "the rotation");
+  for (const Interval& along : limits.translation) require_reachable(along, "the translation");
+  for (const Interval& angle : limits.euler) require_reachable(angle, "the Euler angles");
   if (!(limits.cone >= 0.0)) throw InvalidArgument("JointSpec: the cone's half-angle is negative or not a number");
   if (!std::isfinite(pitch)) throw InvalidArgument("JointSpec: the pitch is not finite");
 }

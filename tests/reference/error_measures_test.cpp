@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "constants.h"
+#include "error_scenes.h"
 #include "limber/core/error.h"
 
 namespace limber {
@@ -66,6 +67,28 @@ TEST(ErrorMeasures, MotionsOfOtherSizesAreRefused) {
   EXPECT_THROW(motion_error({}, {}, Eigen::VectorXd::Ones(8)), InvalidArgument);
   EXPECT_THROW(motion_error(motion, {motion[0]}, Eigen::VectorXd::Ones(8)), InvalidArgument);
   EXPECT_THROW(motion_error(motion, motion, Eigen::VectorXd::Ones(7)), InvalidArgument);
+}
+
+TEST(ErrorMeasures, AReferenceMayBeSeenMoreOften) {
+  const auto at_speed = [](double speed, int samples) {
+    return cube(samples,
+                [speed](const NodeVectors& x, double t) -> NodeVectors { return x.array() + speed * t * (2.0 - t); });
+  };
+  const Eigen::VectorXd masses = Eigen::VectorXd::Ones(8);
+  const MotionError often = motion_error(at_speed(1.02, 3), at_speed(1.0, 9), masses);
+  const MotionError as_often = motion_error(at_speed(1.02, 3), at_speed(1.0, 3), masses);
+  EXPECT_NEAR(often.mean, as_often.mean, 1e-15);
+  EXPECT_NEAR(node_error(at_speed(1.02, 3), at_speed(1.0, 9), 2), 0.02, 1e-12);
+  EXPECT_THROW(motion_error(at_speed(1.0, 4), at_speed(1.0, 9), masses), InvalidArgument);
+}
+
+TEST(ErrorMeasures, TheFirstImpactEndsWhereNothingPressesForAWhile) {
+  const std::vector<Touch> touches{{0.10, 1.0}, {0.11, 2.0}, {0.12, 3.0}, {0.20, 5.0}};
+  const FirstImpact first = first_impact(touches);
+  EXPECT_EQ(first.begin, 0.10);
+  EXPECT_EQ(first.end, 0.12);
+  EXPECT_EQ(first.impulse, 6.0);
+  EXPECT_EQ(first_impact({}).impulse, 0.0);
 }
 
 TEST(ErrorMeasures, FrequencyAndPhaseOfAModeAreFound) {

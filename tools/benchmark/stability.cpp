@@ -26,6 +26,7 @@ struct StabilityArguments {
   std::string grid = "extremes", scene, csv, plot;
   int random = 360, steps = 120, every = 1;
   bool simplify = false;
+  std::string peer;
 };
 
 /// A case and what became of it.
@@ -34,13 +35,18 @@ struct CaseRow {
   std::optional<StabilityResult> seen{};  // none: the bake did not take the body
   std::string refused{};                  // why
   unsigned faults = 0;
+  std::optional<StabilityResult> peer{};  // none: not asked for, or it cannot express the case
+  unsigned peer_faults = 0;
 };
 
-CaseRow try_case(const StabilityCase& at, int steps) {
+CaseRow try_case(const StabilityCase& at, int steps, bool with_peer = false) {
   CaseRow row{.at = at};
   try {
     row.seen = testing::run(at, steps);
     row.faults = testing::faults(at, *row.seen);
+    if (!with_peer || !testing::bullet_can(at)) return row;
+    row.peer = testing::run_by_bullet(at, steps);
+    row.peer_faults = testing::faults(at, *row.peer);
   } catch (const Error& e) {
     row.refused = e.what();
   }
@@ -70,16 +76,20 @@ std::string csv_of(const std::vector<CaseRow>& rows) {
   for (const auto& [column, value] : testing::coordinates({})) csv += fmt::format(",{}", column);
   csv +=
       ",verdict,steps,unsettled,worst_rise,total_rise,node_worst_rise,node_total_rise,spin_bound,spin_excess,"
-      "strain_difference,removed,overlap,rest_overlap,passed,off_target,momentum_error\n";
+      "strain_difference,removed,overlap,rest_overlap,passed,off_target,momentum_error,peer_verdict,peer_total_rise,"
+      "peer_overlap\n";
   for (const CaseRow& row : rows) {
     csv += testing::name(row.at.scene);
     for (const auto& [column, value] : testing::coordinates(row.at)) csv += fmt::format(",{:g}", value);
     const StabilityResult r = row.seen.value_or(StabilityResult{});
-    csv += fmt::format(
-        ",{},{},{},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{},{:.3g},{:.3g}\n",
-        verdict(row), r.steps, r.unsettled, r.worst_rise, r.total_rise, r.node_worst_rise, r.node_total_rise,
-        r.spin_bound, r.spin_excess, r.strain_difference, r.removed, r.overlap, r.rest_overlap, r.passed ? 1 : 0,
-        r.off_target, r.momentum_error);
+    csv +=
+        fmt::format(",{},{},{},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{},{:.3g},{:.3g}",
+                    verdict(row), r.steps, r.unsettled, r.worst_rise, r.total_rise, r.node_worst_rise,
+                    r.node_total_rise, r.spin_bound, r.spin_excess, r.strain_difference, r.removed, r.overlap,
+                    r.rest_overlap, r.passed ? 1 : 0, r.off_target, r.momentum_error);
+    const StabilityResult p = row.peer.value_or(StabilityResult{});
+    const std::string peer = !row.peer ? "" : row.peer_faults == 0 ? "good" : names_of(row.peer_faults);
+    csv += fmt::format(",{},{:.3g},{:.3g}\n", peer, p.total_rise, p.overlap);
   }
   return csv;
 }
@@ -114,6 +124,28 @@ std::string head() {
   return out + fmt::format(" {:>9}\n", "rise");
 }
 
+/// What both engines made of the cases that both can express.
+std::string peer_table(const std::vector<CaseRow>& rows) {
+  std::string out = fmt::format("\n{:<8} {:<8} {:>6} {:>6} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "scene", "by",
+                                "cases", "good", "not finite", "doubled", "energy", "passed", "overlap");
+  for (const auto scene : {testing::StabilityScene::kFlight, testing::StabilityScene::kGround})
+    for (const bool peer : {false, true}) {
+      int cases = 0, good = 0, doubled = 0;
+      std::array<int, testing::kStabilityFaults> by_fault{};
+      for (const CaseRow& row : rows) {
+        if (!row.peer || row.at.scene != scene) continue;
+        const StabilityResult& seen = peer ? *row.peer : *row.seen;
+        const unsigned bits = peer ? row.peer_faults : row.faults;
+        ++cases, good += bits == 0 ? 1 : 0, doubled += !seen.finite || seen.total_rise > 1.0 ? 1 : 0;
+        for (std::size_t i = 0; i < by_fault.size(); ++i) by_fault[i] += static_cast<int>(bits >> i & 1u);
+      }
+      out += fmt::format("{:<8} {:<8} {:>6} {:>6} {:>10} {:>10} {:>10} {:>10} {:>10}\n", testing::name(scene),
+                         peer ? "Bullet" : "limber", cases, good, by_fault[0], doubled, by_fault[1], by_fault[2],
+                         by_fault[3]);
+    }
+  return out;
+}
+
 /// Share of bad cases over stiffness and step, one field a pair.
 std::string svg_of(const std::vector<CaseRow>& rows) {
   std::map<std::pair<double, double>, std::pair<int, int>> fields;  // bad, all
@@ -146,6 +178,8 @@ std::string svg_of(const std::vector<CaseRow>& rows) {
 }
 
 void benchmark_stability(Program& program, const StabilityArguments& a) {
+  if (!a.peer.empty() && !testing::has_bullet())
+    throw InvalidArgument("--peer: this build found no Bullet (apt-get install libbullet-dev, then configure anew)");
   const std::vector<StabilityCase> grid =
       a.grid == "energy" ? testing::energy_grid() : testing::extreme_cases(a.random);
   std::vector<CaseRow> rows;
@@ -153,7 +187,7 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   for (std::size_t i = 0; i < grid.size(); i += static_cast<std::size_t>(a.every)) {
     if (!a.scene.empty() && a.scene != testing::name(grid[i].scene)) continue;
     program.progress().stage(testing::text(grid[i]));
-    rows.push_back(try_case(grid[i], a.steps));
+    rows.push_back(try_case(grid[i], a.steps, !a.peer.empty()));
     tallies[testing::name(grid[i].scene)].add(rows.back());
     tallies["all"].add(rows.back());
   }
@@ -162,6 +196,7 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
     if (scene != "all") program.print(line(scene, tally));
   const SceneTally& all = tallies["all"];
   program.print(line("all", all));
+  if (!a.peer.empty()) program.print(peer_table(rows));
   for (const CaseRow& row : rows) {
     if (row.faults == 0 && row.seen) continue;
     program.print(verdict(row) + ": " + testing::text(row.at) + "\n");
@@ -209,6 +244,9 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
+  app.add_option("--peer", a.peer, "run what Bullet's reduced deformable body can express by that, too")
+      ->type_name("bullet")
+      ->check(CLI::IsMember({"bullet"}));
   app.add_flag("--simplify", a.simplify,
                "tell for each case at fault the simplest one found that shares a fault with it");
   app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
