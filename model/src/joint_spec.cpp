@@ -15,7 +15,8 @@ void require_reachable(const Interval& interval, const char* what) {
   constexpr double kOpen = std::numeric_limits<double>::infinity();
   if (!(interval.low <= interval.high) || interval.low == kOpen || interval.high == -kOpen)  // false for NaN too
     throw InvalidArgument(std::string("JointSpec: limits of ") + what + " are " + std::to_string(interval.low) +
-                          " to " + std::to_string(interval.high) + ", expected the lower one first, and no end that is never reached");
+                          " to " + std::to_string(interval.high) +
+                          ", expected the lower one first, and no end that is never reached");
 }
 
 }  // namespace
