@@ -12,6 +12,10 @@ namespace limber {
 namespace {
 
 const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
+const ContactMemory* find_in(std::span<const ContactMemory> known, std::uint64_t id) {
+  const auto found = std::ranges::lower_bound(known, id, {}, &ContactMemory::id);
+  return found != known.end() && found->id == id ? &*found : nullptr;
+}
 const auto by_pair = [](const auto& x, const auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; };
 
 }  // namespace
@@ -38,6 +42,7 @@ struct ContactSet::Impl {
   std::vector<double> shapes;                      // of these
   std::vector<ContactMemory> memory, last_memory;  // by id, those that pressed in the last step
   std::vector<ContactMemory> resting_memory;       // by id, those of bodies that sleep
+  std::vector<ContactMemory> foreseen;             // by id, where the step has been foreseen before
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
   std::vector<std::unique_ptr<PairContacts>> pairs;
@@ -57,6 +62,7 @@ struct ContactSet::Impl {
   static void add_energy(std::vector<double>& energy, std::span<const ContactMemory> of);
   void find_energies();
   const ContactMemory* find(std::uint64_t id) const;
+  void remember_foreseen();
   double lasted(Index a, Index b) const;
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
@@ -66,12 +72,17 @@ struct ContactSet::Impl {
 };
 
 const ContactMemory* ContactSet::Impl::find(std::uint64_t id) const {
-  for (const std::vector<ContactMemory>* known : {&memory, &resting_memory}) {
-    const auto found = std::lower_bound(known->begin(), known->end(), id,
-                                        [](const ContactMemory& m, std::uint64_t i) { return m.id < i; });
-    if (found != known->end() && found->id == id) return &*found;
-  }
-  return nullptr;
+  const ContactMemory* known = find_in(memory, id);
+  return known != nullptr ? known : find_in(resting_memory, id);
+}
+
+/// Of contacts that are to be found anew for the step at hand.
+void ContactSet::Impl::remember_foreseen() {
+  foreseen.clear();
+  for (const PreparedContact& contact : contacts)
+    if (contact.foreseen)
+      foreseen.push_back({.id = contact.id, .force = contact.foreseen_force, .slip = contact.foreseen_slip});
+  std::ranges::sort(foreseen, by_id);
 }
 
 double ContactSet::Impl::lasted(Index a, Index b) const {
@@ -98,6 +109,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = find(point.id))
     contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
+  if (const ContactMemory* known = find_in(foreseen, point.id))
+    contact.foreseen = true, contact.foreseen_force = known->force, contact.foreseen_slip = known->slip;
   contacts.push_back(contact);
 }
 
@@ -150,6 +163,7 @@ ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points, const Vec3& origin,
                         std::span<const double> friction) {
   Impl& s = *impl_;
+  s.remember_foreseen();
   s.contacts.clear();
   s.constraints.clear();
   std::size_t bodies = s.give_energy.size();
@@ -160,6 +174,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
+  s.foreseen.reserve(s.contacts.capacity());
   s.pairs_used = s.rolling_used = 0;
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
@@ -255,6 +270,7 @@ void ContactSet::Impl::tell_ended(std::span<const char> asleep, bool some_woke) 
 
 void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
   Impl& s = *impl_;
+  for (PreparedContact& contact : s.contacts) contact.foreseen = false;
   s.tell_pressing();
   s.tell_ended(asleep, some_woke);
   s.remember(asleep, some_woke);

@@ -121,6 +121,16 @@ double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motio
   return within;
 }
 
+void PairContacts::foreseen(std::span<const double> impulses, std::span<const double> slip) {
+  std::size_t row = 0;
+  for (PreparedContact& contact : contacts_) {
+    contact.foreseen = true;
+    contact.foreseen_slip = slip[row];
+    contact.foreseen_force = impulse_of(contact, impulses.subspan(row)) / step_;
+    row += static_cast<std::size_t>(row_count(contact));
+  }
+}
+
 void PairContacts::slid(std::span<const double> slip) {
   std::size_t row = 0;
   for (PreparedContact& contact : contacts_) {
@@ -133,8 +143,8 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
   std::size_t row = 0;
   bool pressed = false;
   for (PreparedContact& contact : contacts_) {
-    Vec3 impulse = impulses[row++] * contact.axes.col(0);
-    for (int t = 1; t < 3 && contact.friction != 0.0; ++t) impulse += impulses[row++] * contact.axes.col(t);
+    const Vec3 impulse = impulse_of(contact, impulses.subspan(row));
+    row += static_cast<std::size_t>(row_count(contact));
     contact.last_force = impulse / step_;
     contact.give = give_;
     contact.impulse += impulse;
@@ -191,6 +201,13 @@ bool PairContacts::is_caught() const {
 Vec3 PairContacts::point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
   if (is_round(contact.a) != is_round(contact.b)) return is_round(contact.a) ? a : b;
   return 0.5 * (a + b);
+}
+
+Vec3 PairContacts::impulse_of(const PreparedContact& contact, std::span<const double> impulses) {
+  Vec3 sum = Vec3::Zero();
+  for (Index axis = 0; axis < row_count(contact); ++axis)
+    sum += impulses[static_cast<std::size_t>(axis)] * contact.axes.col(axis);
+  return sum;
 }
 
 Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) {
@@ -295,10 +312,12 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.goes_on = true;
     }
     law.last_force = n.dot(contact.last_force);
+    law.foreseen = contact.foreseen;
+    law.foreseen_force = n.dot(contact.foreseen_force);
     const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
     const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
     if (axis == 0) {
-      law.shift = contact.friction * contact.slip;
+      law.shift = contact.friction * (contact.foreseen ? contact.foreseen_slip : contact.slip);
     }
     rows.add(on_a, on_b, law);
   }

@@ -24,6 +24,7 @@ class PairContacts final : public Constraint {
   void bias_accelerations(const BodyStates& states, std::span<double> bias) const override;
   bool is_contact() const override { return true; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
+  void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
 
@@ -67,6 +68,9 @@ class PairContacts final : public Constraint {
 
   /// @param first row of the first contact
   void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows);
+
+  /// World, on a. @param impulses of its rows, and more
+  static Vec3 impulse_of(const PreparedContact& contact, std::span<const double> impulses);
 
   static Index row_count(const PreparedContact& contact) { return contact.friction == 0.0 ? 1 : 3; }
 

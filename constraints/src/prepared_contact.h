@@ -83,8 +83,11 @@ struct PreparedContact {
   Vec3 last_force = Vec3::Zero();  // world, on a, N
   double give = 0.0;               // what the contact yielded to it by itself, m/N
   double slip = 0.0;               // beyond what its spring gave, m
-  Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
-  Vec3 impulse = Vec3::Zero();     // of this step, world, on a
+  bool foreseen = false;           // the step has been foreseen before, with:
+  Vec3 foreseen_force = Vec3::Zero();
+  double foreseen_slip = 0.0;
+  Vec3 dent = Vec3::Zero();     // what the bodies yield at the step's start along the axes, m
+  Vec3 impulse = Vec3::Zero();  // of this step, world, on a
 };
 
 /// @param inwards the normal, into the body

@@ -9,7 +9,7 @@
 namespace limber::internal {
 
 void ConvexContactSolver::begin_structure() {
-  nodes_.clear(), units_.clear(), sides_.clear();
+  nodes_.clear(), units_.clear(), sides_.clear(), node_of_.clear();
   numbers_ = size_ = 0;
 }
 
@@ -25,8 +25,10 @@ std::size_t ConvexContactSolver::add_unit(std::size_t rows, const ContactPotenti
 }
 
 std::size_t ConvexContactSolver::add_side(std::size_t node) {
-  sides_.push_back({node, numbers_});
-  numbers_ += units_.back().rows * padded(nodes_[node].width);
+  const std::size_t width = padded(nodes_[node].width), rows = units_.back().rows;
+  sides_.push_back({.rows = rows, .column = nodes_[node].first, .width = width, .values = numbers_, .stride = width});
+  node_of_.push_back(node);
+  numbers_ += rows * width;
   ++units_.back().sides;
   return sides_.size() - 1;
 }
@@ -35,11 +37,12 @@ void ConvexContactSolver::end_structure() {
   // The order of elimination tells in the last bits: it comes from this problem and from none before it.
   factor_widths_.clear(), factor_pairs_.clear();
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
+  products_.reserve(3 * units_.capacity());
   for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
 
 MatrixView ConvexContactSolver::values(std::size_t side) {
-  return {values_.data() + sides_[side].values, padded(nodes_[sides_[side].node].width)};
+  return {values_.data() + sides_[side].values, sides_[side].stride};
 }
 
 /// To be read only.
@@ -61,25 +64,38 @@ Vec3 ConvexContactSolver::response(std::size_t unit) const {
 Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
   double sum[3] = {}, part[3];
   for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
-    const Node& node = nodes_[sides_[s].node];
     const MatrixView J = jacobian(s);
-    multiply_rows(part, J, nullptr, y + node.first, unit.rows, J.stride);
+    multiply_rows(part, J, nullptr, y + sides_[s].column, unit.rows, J.stride);
     for (std::size_t r = 0; r < unit.rows; ++r) sum[r] += part[r];
   }
   return {sum[0], sum[1], sum[2]};
 }
 
-/// y += Jᵀ rows
-void ConvexContactSolver::add_transposed(const Unit& unit, const Vec3& rows, double* y) const {
-  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
-    const Node& node = nodes_[sides_[s].node];
-    const MatrixView J = jacobian(s);
-    combine_rows(y + node.first, y + node.first, J, nullptr, rows.data(), unit.rows, J.stride);
-  }
+/// J y of all sides.
+void ConvexContactSolver::find_seen(const double* y) {
+  multiply_each(by_side_.need(kRowsOfEach * sides_.size()), sides_.data(), sides_.size(), values_.data(), y);
+}
+
+/// And of a unit.
+Vec3 ConvexContactSolver::seen_by(const Unit& unit) const {
+  Vec3 sum = Vec3::Zero();
+  const double* side = by_side_.data() + kRowsOfEach * unit.first_side;
+  for (std::size_t s = 0; s < unit.sides; ++s, side += kRowsOfEach) sum += Vec3(side[0], side[1], side[2]);
+  return sum;
+}
+
+/// y += Σ Jᵀ F
+void ConvexContactSolver::add_impulses(double* y) {
+  double* side = by_side_.need(kRowsOfEach * sides_.size());
+  for (const Unit& unit : units_)
+    for (std::size_t s = 0; s < unit.sides; ++s, side += kRowsOfEach)
+      std::copy_n(unit.impulse.data(), kRowsOfEach, side);
+  add_each(y, sides_.data(), sides_.size(), values_.data(), by_side_.data());
 }
 
 void ConvexContactSolver::find_ends(const double* y) {
-  for (Unit& unit : units_) unit.end = unit.start + seen(unit, y);
+  find_seen(y);
+  for (Unit& unit : units_) unit.end = unit.start + seen_by(unit);
 }
 
 /// (1)
@@ -92,22 +108,26 @@ double ConvexContactSolver::potential_of(const double* y) {
 
 void ConvexContactSolver::set_motion() {
   std::fill_n(y_.data(), size_, 0.0);
-  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, y_.data());
+  add_impulses(y_.data());
 }
 
 void ConvexContactSolver::begin_with_better_start() {
   double *free = y_.data(), *guess = d_.data();
   std::fill_n(free, size_, 0.0);
   std::fill_n(guess, size_, 0.0);
-  for (const Unit& unit : units_) add_transposed(unit, unit.impulse, guess);
+  add_impulses(guess);
   const double at_free = potential_of(free), at_guess = potential_of(guess);
   if (at_guess < at_free) std::copy_n(guess, size_, free);
 }
 
-ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
+void ConvexContactSolver::begin() {
   find_reaches();
-  begin_with_better_start();
   pairs_are_new_ = true;
+}
+
+ConvexContactReport ConvexContactSolver::solve(const ConvexContactOptions& options) {
+  begin();
+  begin_with_better_start();
   return solve_on(options);
 }
 
@@ -125,7 +145,8 @@ ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& op
     if (!factor_.factor()) break;
     double *d = d_.data(), *y = y_.data();
     find_direction(g, d);
-    for (Unit& unit : units_) unit.change = seen(unit, d);
+    find_seen(d);
+    for (Unit& unit : units_) unit.change = seen_by(unit);
     const double step = best_step(dot(g, d, size_));
     add_scaled(y, step, d, size_);
     for (Unit& unit : units_) unit.end += step * unit.change;
@@ -139,7 +160,7 @@ void ConvexContactSolver::find_reaches() {
     Unit& unit = units_[u];
     unit.reach = std::sqrt(response(u).maxCoeff());
     for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
-      double& reach = nodes_[sides_[s].node].reach;
+      double& reach = nodes_[node_of_[s]].reach;
       reach = std::max(reach, unit.reach / unit.tolerance);
     }
   }
@@ -155,12 +176,12 @@ ConvexContactSolver::Gradient ConvexContactSolver::gradient() {
     const ContactPotential::Value v = unit.potential.at(unit.end);
     unit.impulse = v.impulse, unit.stiffness = v.stiffness, unit.acts = v.acts;
     if (!v.acts) continue;
-    add_transposed(unit, v.impulse, g);
     const double rounded = kRounded * unit.reach / unit.potential.compliance;
     round_off += rounded * rounded * (unit.start.squaredNorm() + unit.end.squaredNorm());
     pairs_are_new_ = pairs_are_new_ || !unit.has_pressed;
     unit.has_pressed = true;
   }
+  add_impulses(g);
   const double* y = y_.data();
   for (std::size_t i = 0; i < size_; ++i) g[i] = y[i] - g[i];
   double residual = 0.0;
@@ -172,7 +193,7 @@ ConvexContactSolver::Gradient ConvexContactSolver::gradient() {
 }
 
 ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {
-  return std::minmax(sides_[unit.first_side].node, sides_[unit.first_side + 1].node);
+  return std::minmax(node_of_[unit.first_side], node_of_[unit.first_side + 1]);
 }
 
 /// Finds the blocks of all pairs that have pressed in this problem, in a new structure if that at hand lacks one.
@@ -202,21 +223,27 @@ void ConvexContactSolver::place_pairs() {
 /// 1 + Σ Jᵀ ∇²l J
 void ConvexContactSolver::assemble() {
   factor_.set_identity();
+  products_.clear();
   for (const Unit& unit : units_) {
     if (!unit.acts) continue;
     for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s)
-      add_product(unit, s, s, factor_.block(sides_[s].node, sides_[s].node));
+      list_product(unit, s, s, factor_.block(node_of_[s], node_of_[s]));
     if (unit.sides < 2) continue;
     std::size_t a = unit.first_side, b = a + 1;
-    if (!factor_.comes_first(sides_[a].node, sides_[b].node)) std::swap(a, b);
-    add_product(unit, a, b, unit.block);
+    if (!factor_.comes_first(node_of_[a], node_of_[b])) std::swap(a, b);
+    list_product(unit, a, b, unit.block);
   }
+  add_congruences(factor_.numbers_of_blocks(), values_.data(), products_.data(), products_.size());
 }
 
-void ConvexContactSolver::add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block) {
-  const MatrixView left = jacobian(a), right = jacobian(b);
-  add_congruence({factor_.upper(block), block.stride}, left, unit.stiffness.data(), right, unit.rows,
-                 nodes_[sides_[a].node].width, right.stride);
+void ConvexContactSolver::list_product(const Unit& unit, std::size_t a, std::size_t b,
+                                       const BlockFactor::Block& block) {
+  products_.push_back({.left = sides_[a],
+                       .right = sides_[b],
+                       .K = unit.stiffness.data(),
+                       .to = block.offset,
+                       .stride = block.stride,
+                       .columns = nodes_[node_of_[a]].width});
 }
 
 ConvexContactSolver::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {

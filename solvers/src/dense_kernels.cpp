@@ -216,8 +216,8 @@ HWY_ATTR void MultiplyRows(double* out, MatrixView M, const int* rows, const dou
   for (; i < count; ++i) MultiplyBlock<1>(out, M, rows, x, i, n);
 }
 
-HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
-                            std::size_t n) {
+HWY_INLINE HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows,
+                                       std::size_t p, std::size_t n) {
   const Doubles d;
   for (std::size_t j = 0; j < n; j += kLanes) {
     Vector right[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)}, weighted[3];
@@ -234,23 +234,60 @@ HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixV
   }
 }
 
+HWY_ATTR void AddCongruences(double* C, double* J, const Congruence* all, std::size_t count) {
+  for (const Congruence* c = all; c != all + count; ++c)
+    AddCongruence({C + c->to, c->stride}, {J + c->left.values, c->left.stride}, c->K,
+                  {J + c->right.values, c->right.stride}, c->left.rows, c->columns, c->right.width);
+}
+
+HWY_ATTR void MultiplyEach(double* out, const RowBlock* blocks, std::size_t count, const double* J, const double* x) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b, out += kRowsOfEach) {
+    Vector sum[kRowsOfEach][kVectors];
+    for (std::size_t r = 0; r < kRowsOfEach; ++r)
+      for (std::size_t v = 0; v < kVectors; ++v) sum[r][v] = hn::Zero(d);
+    for (std::size_t j = 0; j < b->width; j += kPad)
+      for (std::size_t v = 0; v < kVectors; ++v) {
+        const Vector from = hn::Load(d, x + b->column + j + v * kLanes);
+        for (std::size_t r = 0; r < b->rows; ++r)
+          sum[r][v] = hn::MulAdd(from, hn::Load(d, J + b->values + r * b->stride + j + v * kLanes), sum[r][v]);
+      }
+    for (std::size_t r = 0; r < kRowsOfEach; ++r) out[r] = SumOfBlock(sum[r]);
+  }
+}
+
+HWY_ATTR void AddEach(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y) {
+  const Doubles d;
+  for (const RowBlock* b = blocks; b != blocks + count; ++b, y += kRowsOfEach)
+    for (std::size_t j = 0; j < b->width; j += kLanes) {
+      Vector sum = hn::Load(d, x + b->column + j);
+      for (std::size_t r = 0; r < b->rows; ++r)
+        sum = hn::MulAdd(hn::Set(d, y[r]), hn::Load(d, J + b->values + r * b->stride + j), sum);
+      hn::Store(sum, d, x + b->column + j);
+    }
+}
+
 HWY_ATTR bool InvertPositive(MatrixView A, std::size_t n) {
   const Doubles d;
   const std::size_t columns = padded(n);
   for (std::size_t k = 0; k < n; ++k) {
     double* row = A.row(k);
     if (!(row[k] > 0.0) || !(row[k] < 1e300)) return false;
-    const double pivot = 1.0 / row[k];
-    row[k] = 1.0;
-    for (std::size_t j = 0; j < columns; j += kLanes)
-      hn::Store(hn::Mul(hn::Set(d, pivot), hn::Load(d, row + j)), d, row + j);
+    // Column k is masked: a vector that is read right after one of its numbers was written waits for it.
+    const Vector pivot = hn::Set(d, 1.0 / row[k]), at = hn::Set(d, static_cast<double>(k));
+    for (std::size_t j = 0; j < columns; j += kLanes) {
+      const auto own = hn::Eq(hn::Iota(d, static_cast<double>(j)), at);
+      hn::Store(hn::IfThenElse(own, pivot, hn::Mul(pivot, hn::Load(d, row + j))), d, row + j);
+    }
     for (std::size_t i = 0; i < n; ++i) {
       if (i == k) continue;
       double* other = A.row(i);
       const Vector part = hn::Set(d, other[k]);
-      other[k] = 0.0;
-      for (std::size_t j = 0; j < columns; j += kLanes)
-        hn::Store(hn::NegMulAdd(part, hn::Load(d, row + j), hn::Load(d, other + j)), d, other + j);
+      for (std::size_t j = 0; j < columns; j += kLanes) {
+        const auto own = hn::Eq(hn::Iota(d, static_cast<double>(j)), at);
+        const Vector rest = hn::IfThenZeroElse(own, hn::Load(d, other + j));
+        hn::Store(hn::NegMulAdd(part, hn::Load(d, row + j), rest), d, other + j);
+      }
     }
   }
   return true;
@@ -360,7 +397,9 @@ HWY_EXPORT(SubstituteBackward);
 HWY_EXPORT(Exchange);
 HWY_EXPORT(Gram);
 HWY_EXPORT(MultiplyRows);
-HWY_EXPORT(AddCongruence);
+HWY_EXPORT(AddCongruences);
+HWY_EXPORT(MultiplyEach);
+HWY_EXPORT(AddEach);
 HWY_EXPORT(InvertPositive);
 HWY_EXPORT(MultiplyBlocks);
 HWY_EXPORT(SubtractRuns);
@@ -414,9 +453,16 @@ void multiply_rows(double* out, MatrixView M, const int* rows, const double* x, 
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(out, M, rows, x, count, padded(n));
 }
 
-void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
-                    std::size_t n) {
-  HWY_DYNAMIC_DISPATCH(AddCongruence)(C, L, K, R, rows, p, padded(n));
+void add_congruences(double* C, double* J, const Congruence* all, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(AddCongruences)(C, J, all, count);
+}
+
+void multiply_each(double* out, const RowBlock* blocks, std::size_t count, const double* J, const double* x) {
+  HWY_DYNAMIC_DISPATCH(MultiplyEach)(out, blocks, count, J, x);
+}
+
+void add_each(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y) {
+  HWY_DYNAMIC_DISPATCH(AddEach)(x, blocks, count, J, y);
 }
 
 bool invert_positive(MatrixView A, std::size_t n) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(A, n); }

@@ -38,9 +38,15 @@ void add_scaled(double* y, double a, const double* x, std::size_t n);
 void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
                   std::size_t count, std::size_t n);
 
-/// C += Lᵀ K R: `rows` ≤ 3 rows of L, the first `p` columns of which count, and of R, n columns; K symmetric, 3 × 3.
-void add_congruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows, std::size_t p,
-                    std::size_t n);
+/// For each: C += Lᵀ K R at C + to, `stride` from row to row; L and R blocks of J, of at most 3 rows.
+void add_congruences(double* C, double* J, const Congruence* all, std::size_t count);
+
+/// Numbers that multiply_each() and add_each() have for each block.
+inline constexpr std::size_t kRowsOfEach = 3;
+/// out = J x for each block of at most 3 rows, 3 numbers each: 0 where there are fewer rows.
+void multiply_each(double* out, const RowBlock* blocks, std::size_t count, const double* J, const double* x);
+/// x += Jᵀ y for each, block after block.
+void add_each(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y);
 
 /// A ← A⁻¹, n × n, symmetric and positive definite: Gauss–Jordan without exchanges. @return false where a pivot is not
 /// positive

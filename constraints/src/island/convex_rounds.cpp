@@ -33,19 +33,20 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   begin_units(step);
   secants_.begin(step.size());
   ConvexContactReport done;
-  bool more = true;
+  bool more = !begun_;
   for (report.iterations = 1;; ++report.iterations) {
     take_impulses(step);
     step.predict();
     if (step.follow_bending()) fill_rows(step), contacts_.set_motion();
-    const Distance left = find_starts(step, report.iterations == 1);
+    const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
     if (!more && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return SolveStatus::kSolved;
     const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
     const ConvexContactOptions within{.tolerance = kLeft, .max_iterations = kMostNewtonSteps - report.newton_steps};
-    done = report.iterations == 1 ? contacts_.solve(within) : contacts_.solve_on(within);
+    done = begun_ ? contacts_.solve_on(within) : contacts_.solve(within);
+    begun_ = true;
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
     stiffen(step);
@@ -149,8 +150,10 @@ void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
   }
 }
 
-/// From the motion without contacts; springs begin at the impulses of the last step.
+/// From the motion without contacts; springs begin at the impulses of the last step. Where the step has been foreseen
+/// before, with fewer contacts: from where that ended.
 void ConvexRounds::begin_units(const IslandStep& step) {
+  begun_ = step.contacts_alone && step.any_law([](const RowLaw& law) { return law.foreseen; });
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
     const RowLaw& law = step.law(unit.first);
@@ -159,10 +162,14 @@ void ConvexRounds::begin_units(const IslandStep& step) {
       unit.impulse[axis] = step.length() * step.reaction[unit.first + r];
       unit.anchor[axis] = law.contact ? step.length() * step.law(unit.first + r).last_force : unit.impulse[axis];
     }
+    for (std::size_t r = 0; begun_ && r < unit.rows; ++r)
+      unit.impulse[static_cast<int>(r)] = unit.anchor[static_cast<int>(r)] =
+          step.length() * step.law(unit.first + r).foreseen_force;
     unit.anchor = contacts_.potential(u).nearest(unit.anchor);
     unit.shift = law.shift;
-    unit.dent = kUnbounded;
+    unit.changed = kUnbounded;
   }
+  if (begun_) contacts_.begin();
 }
 
 /// f of the units' impulses, and the motion that they make in the problem.
@@ -206,15 +213,16 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
     const ContactPotential& potential = contacts_.potential(u);
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
-    distance.from_law = std::max(distance.from_law, distance_from_law(unit, law, potential, open) / law.tolerance);
     unit.moved = contacts_.moved(u);
+    distance.from_law = std::max(distance.from_law, distance_from_law(unit, law, potential, open) / law.tolerance);
     contacts_.start(u) = open - yields - unit.moved;
     if (first_round) contacts_.impulse(u) = unit.anchor;
   }
   return distance;
 }
 
-/// Springs become stiffer where they yielded by as much as in the round before.
+/// Springs become stiffer where impulses changed by as much as in the round before, and by more than the law leaves
+/// them.
 void ConvexRounds::stiffen(const IslandStep& step) {
   constexpr double kSlow = 0.25, kStiffer = 0.1;
   for (std::size_t u = 0; u < units_.size(); ++u) {
@@ -222,10 +230,10 @@ void ConvexRounds::stiffen(const IslandStep& step) {
     const RowLaw& law = step.law(unit.first);
     if (law.compliance > 0.0) continue;
     double& c = contacts_.potential(u).compliance;
-    const double dent = c * (contacts_.impulse(u) - unit.anchor).norm();
-    if (dent > kSlow * unit.dent && dent > law.tolerance)
+    const double changed = unit.response * (contacts_.impulse(u) - unit.anchor).norm();
+    if (changed > kSlow * unit.changed && changed > law.tolerance)
       c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
-    unit.dent = dent;
+    unit.changed = changed;
   }
 }
 

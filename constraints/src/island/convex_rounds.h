@@ -27,7 +27,7 @@ class ConvexRounds {
     Vec3 anchor = Vec3::Zero();   // from where its spring yields
     Vec3 moved = Vec3::Zero();    // what all of them make of its gap, to first order
     Vec3 end = Vec3::Zero();      // its gap, less what it asks for
-    double response = 0.0, shift = 0.0, dent = 0.0;
+    double response = 0.0, shift = 0.0, changed = 0.0;
   };
   struct Distance {
     double from_law = 0.0, moved = 0.0;
@@ -57,6 +57,7 @@ class ConvexRounds {
   ResidualFactor residual_;         // of what bodies yield beyond their modes
   std::vector<double> root_;        // D^½, by degree of freedom
   std::vector<double> one_row_;
+  bool begun_ = false;                      // there is a motion to go on from
   SecantIteration secants_;                 // beside joints
   std::vector<double> at_, next_, change_;  // their numbers, by row
 };

@@ -54,6 +54,8 @@ struct IslandSolver::Impl {
   void foresee_cut();
   void foresee_divided();
   double next_cut(const internal::StepPart& part);
+  void find_impulses();
+  void tell_foreseen();
   void commit(const internal::StepPart& part, const IslandReport& done, IslandReport& report);
 
   // A part.

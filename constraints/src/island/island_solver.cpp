@@ -79,6 +79,7 @@ void IslandSolver::foresee(std::span<const ConstrainedBody> table, std::span<con
   at.gives_up = false;
   impl_->begin_times(options.timed);
   impl_->foresee_next();
+  if (at.part.ends) impl_->tell_foreseen();
   impl_->clock.lap(Stage::kSolve);
 }
 
@@ -173,22 +174,31 @@ double IslandSolver::Impl::next_cut(const StepPart& part) {
   return left;
 }
 
+/// Impulses and slip, by row.
+void IslandSolver::Impl::find_impulses() {
+  impulses.resize(step.size());
+  slip.assign(step.size(), 0.0);
+  for (std::size_t i = 0; i < step.size(); ++i)
+    impulses[i] = step.f[i] + step.length() * step.reaction[i] + step.touch_impulse[i] + step.end_impulse[i];
+  if (step.convex) rounds.write_slip(step, slip);
+}
+
+void IslandSolver::Impl::tell_foreseen() {
+  find_impulses();
+  for (std::size_t i = 0; i < step.part.constraints.size(); ++i)
+    step.part.constraints[i]->foreseen(step.of_constraint(impulses, i), step.of_constraint(slip, i));
+}
+
 /// What has been foreseen happens.
 void IslandSolver::Impl::commit(const StepPart& part, const IslandReport& done, IslandReport& report) {
   clock.lap(Stage::kSolve, step.rows.size());
   const BodyStates states(part.table);
   for (Index local = 0; local < step.bodies.count(); ++local)
     step.bodies.body(local).group->commit(step.bodies.body(local).slot, part.begins, part.ends);
-  impulses.resize(step.size());
-  slip.assign(step.size(), 0.0);
-  for (std::size_t i = 0; i < step.size(); ++i)
-    impulses[i] = step.f[i] + step.length() * step.reaction[i] + step.touch_impulse[i] + step.end_impulse[i];
-  if (step.convex) rounds.write_slip(step, slip);
+  find_impulses();
   for (std::size_t i = 0; i < part.constraints.size(); ++i) {
-    const auto begin = static_cast<std::size_t>(step.first_row[i]);
-    const std::size_t count = static_cast<std::size_t>(step.first_row[i + 1]) - begin;
-    part.constraints[i]->slid(std::span<const double>(slip).subspan(begin, count));
-    part.constraints[i]->accept(states, std::span<const double>(impulses).subspan(begin, count));
+    part.constraints[i]->slid(step.of_constraint(slip, i));
+    part.constraints[i]->accept(states, step.of_constraint(impulses, i));
   }
   report.programs.add(done.programs);
   report.attempts.add(done.attempts);

@@ -82,7 +82,7 @@ void IslandStep::begin_early() {
   loads.all_early = false;
   if (!convex || theta < 1.0) return;
   for (std::size_t row = 0; row < size(); ++row)
-    if (law(row).contact && law(row).last_force != 0.0)
+    if (law(row).contact && (law(row).last_force != 0.0 || law(row).foreseen_force != 0.0))
       for_bodies(row,
                  [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
   loads.all_early = !contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; });

@@ -82,6 +82,12 @@ struct IslandStep {
   const ContactRule& rule() const { return part.options.contact; }
   std::size_t size() const { return f.size(); }
   const RowLaw& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
+  /// Those of its rows.
+  std::span<const double> of_constraint(std::span<const double> by_row, std::size_t constraint) const {
+    const auto begin = static_cast<std::size_t>(first_row[constraint]),
+               end = static_cast<std::size_t>(first_row[constraint + 1]);
+    return by_row.subspan(begin, end - begin);
+  }
   bool any_law(bool (*holds)(const RowLaw&)) const;
 
   /// The bodies under θ f and the first half of the reaction at the start, their modes under all of both, held; and the

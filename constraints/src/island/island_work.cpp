@@ -19,26 +19,32 @@ double largest_recovery_work(const IslandStep& step, double distance) {
 /// N, over the step.
 double force(const IslandStep& step, std::size_t row) { return step.f[row] / step.length() + step.reaction[row]; }
 
+double given(const IslandStep& step, std::size_t row) {
+  return std::max(0.0, force(step, row) * step.law(row).agent_displacement);
+}
+
 }  // namespace
 
+double recovery_work(const IslandStep& step) {
+  double work = 0.0, recovery = 0.0;
+  for (std::size_t i = 0; i < step.size(); ++i) {
+    if (step.law(i).lower != 0.0) continue;
+    work += given(step, i);
+    recovery = std::max(recovery, step.law(i).agent_displacement);
+  }
+  return std::min(work, largest_recovery_work(step, recovery));
+}
+
 double agent_work(const IslandStep& step) {
-  double work = step.rows.stored_energy();
-  double recovery_work = 0.0, recovery = 0.0;
+  double work = step.rows.stored_energy() + recovery_work(step);
   for (std::size_t i = 0; i < step.size(); ++i) {
     const RowLaw& law = step.law(i);
-    const double given = std::max(0.0, force(step, i) * law.agent_displacement);
-    if (law.lower == 0.0) {
-      recovery_work += given;
-      recovery = std::max(recovery, law.agent_displacement);
-    } else {
-      work += given;
-    }
+    if (law.lower != 0.0) work += given(step, i);
     // A spring with one bound pushes on one side alone.
     const double before = law.lower == 0.0 ? std::min(step.start_gap[i], 0.0) : step.start_gap[i];
     const double after = law.lower == 0.0 ? std::min(step.gap[i], 0.0) : step.gap[i];
     work += 0.5 * law.stiffness * (before * before - after * after);
   }
-  work += std::min(recovery_work, largest_recovery_work(step, recovery));
   for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
     const auto i = static_cast<std::size_t>(g.i), j = static_cast<std::size_t>(g.j);
     work -= (i == j ? 0.5 : 1.0) * g.value * force(step, i) * force(step, j);

@@ -109,6 +109,9 @@ class Constraint {
   virtual bool may_be_divided() const { return false; }
   /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
   virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
+  /// After the step has been foreseen, which may be done again with more rows beside these. @param impulses, slip as
+  /// for accept() and slid()
+  virtual void foreseen(std::span<const double> /*impulses*/, std::span<const double> /*slip*/) {}
   /// Before accept(): how far contacts that press slid, m, in their normal rows; 0 where forces did not come at the
   /// step's start.
   virtual void slid(std::span<const double> /*slip*/) {}

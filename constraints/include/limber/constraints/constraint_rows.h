@@ -48,6 +48,9 @@ struct RowLaw {
   /// The row's force persists from step to step: springs, motors, friction.
   bool goes_on = false;
   double last_force = 0.0;  ///< that of the last step, from which solvers may begin
+  /// Of contacts: the step has been foreseen before, with this force (N).
+  bool foreseen = false;
+  double foreseen_force = 0.0;
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
   double agent_displacement = 0.0;

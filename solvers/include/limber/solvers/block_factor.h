@@ -34,6 +34,8 @@ class BlockFactor {
 
   /// Zero, but for 1 on the diagonal.
   void set_identity();
+  /// What blocks' offsets count from.
+  double* numbers_of_blocks() { return upper_.data(); }
   /// Blocks (i, j), i first, row by row of i.
   double* upper(const Block& b) { return upper_.data() + b.offset; }
 

@@ -71,6 +71,8 @@ class ConvexContactSolver {
   ContactPotential& potential(std::size_t unit) { return units_[unit].potential; }
   std::size_t units() const { return units_.size(); }
 
+  /// Before the first solve_on(), once values are there; solve() does it.
+  void begin();
   /// From the impulses given, or from the free motion where (1) is less there.
   ConvexContactReport solve(const ConvexContactOptions& options);
   /// Goes on from y, after potentials or starts were changed.
@@ -94,9 +96,6 @@ class ConvexContactSolver {
     bool has_pressed = false;    // in this problem
     BlockFactor::Block block{};  // of its pair, where it has two sides and has pressed
   };
-  struct Side {
-    std::size_t node = 0, values = 0;
-  };
   using Pair = std::pair<std::size_t, std::size_t>;
 
   std::span<double> part_of(AlignedBuffer& vector, std::size_t node) {
@@ -104,7 +103,9 @@ class ConvexContactSolver {
   }
   MatrixView jacobian(std::size_t side) const;
   Vec3 seen(const Unit& unit, const double* y) const;
-  void add_transposed(const Unit& unit, const Vec3& rows, double* y) const;
+  void find_seen(const double* y);
+  Vec3 seen_by(const Unit& unit) const;
+  void add_impulses(double* y);
   void begin_with_better_start();
   struct Gradient {
     double residual = 0.0;   // as reported
@@ -116,7 +117,7 @@ class ConvexContactSolver {
   Pair pair_of(const Unit& unit) const;
   void place_pairs();
   void assemble();
-  void add_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block);
+  void list_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block);
   void find_direction(const double* g, double* d);
   struct Slope {
     double first = 0.0, second = 0.0;
@@ -127,9 +128,11 @@ class ConvexContactSolver {
 
   std::vector<Node> nodes_;
   std::vector<Unit> units_;
-  std::vector<Side> sides_;
+  std::vector<RowBlock> sides_;       // their rows, in `values_` and in vectors of the nodes
+  std::vector<std::size_t> node_of_;  // by side
+  std::vector<Congruence> products_;  // of the units that act
   std::size_t numbers_ = 0, size_ = 0;
-  AlignedBuffer values_, y_, d_, gradient_, ordered_;
+  AlignedBuffer values_, y_, d_, gradient_, ordered_, by_side_;
   BlockFactor factor_;
   std::vector<std::size_t> factor_widths_, widths_;
   std::vector<Pair> factor_pairs_, pairs_;  // sorted

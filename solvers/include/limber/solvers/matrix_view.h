@@ -22,6 +22,13 @@ struct RowBlock {
   std::size_t rows = 0, column = 0, width = 0, values = 0, stride = 0;
 };
 
+/// Lᵀ K R, and where it goes (dense_kernels.h).
+struct Congruence {
+  RowBlock left{}, right{};
+  const double* K = nullptr;                    ///< 3 × 3, symmetric
+  std::size_t to = 0, stride = 0, columns = 0;  ///< columns of L that count
+};
+
 /// Numbers of one row that go to adjacent places in another; counts padded.
 struct RowRun {
   std::size_t from = 0, to = 0, count = 0;
