@@ -57,13 +57,21 @@ class Island {
   }
 
   IslandReport step() {
-    const IslandReport report = solver.step(table, members, constraints,
-                                            {.step = step_,
-                                             .gravity = gravity_,
-                                             .guard_energy = guard_energy,
-                                             .contact = rule,
-                                             .undisturbed = steps++ > 0,
-                                             .energy_surplus = surplus});
+    foresee();
+    return finish();
+  }
+  void foresee() {
+    solver.foresee(table, members, constraints,
+                   {.step = step_,
+                    .gravity = gravity_,
+                    .guard_energy = guard_energy,
+                    .contact = rule,
+                    .undisturbed = steps > 0,
+                    .energy_surplus = surplus});
+  }
+  IslandReport finish() {
+    ++steps;
+    const IslandReport report = solver.finish();
     surplus = report.energy_surplus;
     return report;
   }
