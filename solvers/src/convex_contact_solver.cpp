@@ -37,7 +37,9 @@ void ConvexContactSolver::end_structure() {
   // The order of elimination tells in the last bits: it comes from this problem and from none before it.
   factor_widths_.clear(), factor_pairs_.clear();
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
+  // With the units, which grow in large steps: how many press, and with whom, changes within a step.
   products_.reserve(3 * units_.capacity());
+  for (std::vector<Pair>* pairs : {&pairs_, &factor_pairs_}) pairs->reserve(units_.capacity());
   for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
 
@@ -206,7 +208,6 @@ void ConvexContactSolver::place_pairs() {
   pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
   if (widths_ != factor_widths_ || !std::ranges::includes(factor_pairs_, pairs_)) {
     factor_widths_ = widths_;
-    factor_pairs_.reserve(pairs_.capacity());  // which grows in large steps
     factor_pairs_ = pairs_;
     factor_.begin_pattern(widths_);
     for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
