@@ -1,5 +1,4 @@
-// limber beside FCL: distances of boxes and hulls that are apart, with their errors, and whole contact queries. See
-// README.md.
+// limber beside FCL: distances of boxes and hulls that are apart, with their errors. See README.md.
 #include <benchmark/benchmark.h>
 #include <fcl/geometry/shape/convex.h>
 #include <fcl/narrowphase/distance.h>
@@ -7,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "cpu_time.h"
-#include "finder_scenes.h"
 #include "limber/collision/closest_features.h"
-#include "limber/collision_fcl/fcl_contact_source.h"
+#include "random_states.h"
 
 namespace limber {
 namespace {
@@ -159,33 +158,6 @@ void convex(benchmark::State& state) {
   state.counters["fcl_tight_us"] = 1e6 * fcl_tight.seconds() / kPairs;
 }
 BENCHMARK(convex)->ArgName("kind")->DenseRange(kNear, kFlush);
-
-// -- Whole queries ----------------------------------------------------------------------------------------------------
-
-/// A heap of range(0) bent balls, boxes and capsules on a floor, which move by about a millimetre between queries.
-void heap(benchmark::State& state) {
-  testing::ContactScene scene = testing::heap(static_cast<int>(state.range(0)), 16);
-  ContactFinder finder;
-  FclContactSource source;
-  scene.add_all_to(finder);
-  scene.add_all_to(source);
-  LeastTime limber, fcl;
-  std::vector<ContactPoint> of_limber, of_fcl;
-  int step = 0;
-  for (auto _ : state) {
-    ++step;
-    for (std::size_t i = 0; i < scene.poses.size(); ++i)
-      scene.poses[i].p.x() += 0.001 * std::sin(0.3 * step + static_cast<double>(i));
-    const ContactQuery query{.states = scene.states(), .margin = 0.005};
-    limber.measure([&] { finder.find_contacts(query, of_limber, serial_jobs()); });
-    fcl.measure([&] { source.find_contacts(query, of_fcl, serial_jobs()); });
-  }
-  state.counters["limber_us"] = 1e6 * limber.seconds();
-  state.counters["fcl_us"] = 1e6 * fcl.seconds();
-  state.counters["limber_contacts"] = static_cast<double>(of_limber.size());
-  state.counters["fcl_contacts"] = static_cast<double>(of_fcl.size());
-}
-BENCHMARK(heap)->ArgName("bodies")->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace limber
