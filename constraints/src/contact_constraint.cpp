@@ -13,7 +13,9 @@ namespace {
 
 const auto by_id = [](const auto& x, const auto& y) { return x.id < y.id; };
 const ContactMemory* find_in(std::span<const ContactMemory> known, std::uint64_t id) {
-  const auto found = std::ranges::lower_bound(known, id, {}, &ContactMemory::id);
+  const auto found =
+      std::lower_bound(known.begin(), known.end(), id,
+                       [](const ContactMemory& memory, std::uint64_t sought) { return memory.id < sought; });
   return found != known.end() && found->id == id ? &*found : nullptr;
 }
 const auto by_pair = [](const auto& x, const auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; };
