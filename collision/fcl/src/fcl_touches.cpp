@@ -19,7 +19,7 @@ namespace {
 /// Sine of 15°: a vertex pushes along a normal that its own neighbours lie behind, or all but. Faces that rest on each
 /// other keep the vertices they have there while they bend and rock; sides of a solid, at 45° and more, are told.
 constexpr double kLeaning = 0.26;
-/// Sine up to which an edge is none: its two faces are one.
+/// Sine up to which an edge is none: its two faces are one. And part of its length by which it may miss another one.
 constexpr double kFlat = 1e-6;
 /// Sine below which two edges have no common perpendicular.
 constexpr double kParallel = 1e-9;
@@ -388,11 +388,12 @@ void FclTouches::touch_by_edges(const FclBody& a, Index e, const FclBody& b, Ind
   if (across.norm() <= kParallel * u.norm() * w.norm()) return;
   Vec3 between, x, y;
   fcl::detail::TriangleDistance<double>::segPoints(p[0], u, q[0], w, between, x, y);
-  const double s = u.dot(x - p[0]) / u.squaredNorm(), t = w.dot(y - q[0]) / w.squaredNorm();
-  if (!(s > kFlat && s < 1.0 - kFlat && t > kFlat && t < 1.0 - kFlat)) return;
+  // The ends belong to the edges: a vertex that lies beside a rim by a hair is in front of no face there.
+  const Vec3 straight = x - y, along = across.normalized();
+  if ((straight - along.dot(straight) * along).norm() > kFlat * std::max(u.norm(), w.norm())) return;
   for (const double sign : {1.0, -1.0}) {
-    const Vec3 n = sign * across.normalized();
-    const double gap = n.dot(x - y);
+    const Vec3 n = sign * along;
+    const double gap = n.dot(straight);
     if (gap - a.radius() - b.radius() > reach_) continue;
     if (a.surface() == nullptr && b.surface() == nullptr && gap < 0.0) continue;
     if (!in_front_at_edge(a, e, x, n, leaning_of(a, e)) || !in_front_at_edge(b, f, y, -n, leaning_of(b, f))) continue;

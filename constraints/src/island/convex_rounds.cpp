@@ -222,7 +222,7 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
 }
 
 /// Springs become stiffer where impulses changed by as much as in the round before, and by more than the law leaves
-/// them.
+/// them; beside joints, where secants follow such changes, where springs yielded by that.
 void ConvexRounds::stiffen(const IslandStep& step) {
   constexpr double kSlow = 0.25, kStiffer = 0.1;
   for (std::size_t u = 0; u < units_.size(); ++u) {
@@ -230,7 +230,7 @@ void ConvexRounds::stiffen(const IslandStep& step) {
     const RowLaw& law = step.law(unit.first);
     if (law.compliance > 0.0) continue;
     double& c = contacts_.potential(u).compliance;
-    const double changed = unit.response * (contacts_.impulse(u) - unit.anchor).norm();
+    const double changed = (step.contacts_alone ? unit.response : c) * (contacts_.impulse(u) - unit.anchor).norm();
     if (changed > kSlow * unit.changed && changed > law.tolerance)
       c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
     unit.changed = changed;
