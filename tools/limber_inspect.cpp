@@ -70,9 +70,30 @@ Box box_of(const ModalSurface& surface) {
 
 Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
-Json residual_report(const ModalModelData& d) {
-  if (!d.residual_compliance) return {};
-  return {{"form", to_string(d.residual_compliance->form())}, {"vertices", d.residual_compliance->vertices()}};
+/// How much of the static compliance of single vertices the modes show: the least, and the middle one.
+struct CapturedRange {
+  double least = 1.0, median = 1.0;
+};
+CapturedRange captured_range(const ModalModel& model) {
+  std::vector<double> shares = model.captured_shares();
+  std::sort(shares.begin(), shares.end());
+  return {shares.front(), shares[shares.size() / 2]};
+}
+
+Json residual_report(const ModalModel& model) {
+  const auto& r = model.data().residual_compliance;
+  if (!r) return {};
+  const CapturedRange range = captured_range(model);
+  return {{"form", to_string(r->form())},
+          {"vertices", r->vertices()},
+          {"captured", {{"least", range.least}, {"median", range.median}}}};
+}
+
+Json captured_report(const ModalModelData& d) {
+  Json loads = Json::array();
+  for (const CapturedLoad& load : d.captured)
+    loads.push_back({{"at", vector(load.at + d.origin_in_input)}, {"share", load.share}});
+  return loads;
 }
 
 Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
@@ -104,7 +125,8 @@ Json body_report(const ModalModel& model) {
       {"collision_surface", d.collision ? surface_report(*d.collision) : Json()},
       {"volume_block",
        d.volume_block ? Json{{"nodes", d.volume_block->rest.size()}, {"tets", d.volume_block->tets.size()}} : Json()},
-      {"residual_compliance", residual_report(d)},
+      {"residual_compliance", residual_report(model)},
+      {"captured", captured_report(d)},
       {"skin", d.skin ? Json{{"handles", d.skin->handles}} : Json()},
       {"memory_bytes", shape_bytes(d)},
       {"modes", modes}};
@@ -132,7 +154,8 @@ void warn(const ModalModel& model, Warnings& warnings) {
     warnings.push_back(fmt::format("{}: its render surface is open, with {} boundary edges.", body, q.boundary_edges));
 }
 
-std::string surfaces_text(const ModalModelData& d) {
+std::string surfaces_text(const ModalModel& model) {
+  const ModalModelData& d = model.data();
   std::string text =
       fmt::format("  drawn surface   {} vertices, {} triangles\n", d.render.vertices(), d.render.triangles.size());
   if (d.collision)
@@ -142,7 +165,18 @@ std::string surfaces_text(const ModalModelData& d) {
     text +=
         fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
   if (const auto& r = d.residual_compliance)
-    text += fmt::format("  residual        {}, of {} vertices\n", to_string(r->form()), r->vertices());
+    text += fmt::format(
+        "  residual        {}, of {} vertices; of their static compliance the modes show {:.0f} % ({:.0f} % and "
+        "more)\n",
+        to_string(r->form()), r->vertices(), 100.0 * captured_range(model).median, 100.0 * captured_range(model).least);
+  if (!d.captured.empty()) {
+    const auto least = std::min_element(d.captured.begin(), d.captured.end(),
+                                        [](const CapturedLoad& a, const CapturedLoad& b) { return a.share < b.share; });
+    text += fmt::format(
+        "  loads foreseen  at {} places, of whose static compliance the modes by frequency alone show {:.0f} % and "
+        "more\n",
+        d.captured.size(), 100.0 * least->share);
+  }
   if (d.skin) text += fmt::format("  skin            {} handles\n", d.skin->handles);
   return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
 }
@@ -157,7 +191,7 @@ std::string body_text(const ModalModel& model, std::size_t number) {
   text += fmt::format("  size            {:.4g} x {:.4g} x {:.4g} m\n", size.x(), size.y(), size.z());
   text += fmt::format("  centre of mass  ({:.6g}, {:.6g}, {:.6g}) m in the input mesh\n", center.x(), center.y(),
                       center.z());
-  text += surfaces_text(d);
+  text += surfaces_text(model);
   text += fmt::format("  {:>5} {:>14} {:>14} {:>14} {:>14}\n", "mode", "frequency Hz", "damped Hz", "damping ratio",
                       "decay 1/s");
   for (const ModeLine& m : mode_lines(model))

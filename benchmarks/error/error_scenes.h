@@ -157,13 +157,4 @@ struct SceneError {
 };
 SceneError scene_error(const ErrorScene& scene, const PlayedScene& seen, const PlayedScene& reference);
 
-/// How much of what the whole mesh gives way by, under a force at a vertex of the collision surface, the kept modes
-/// show:
-///
-///   c_v = 1 − tr G_vv / tr (G_vv + Σ u_v u_vᵀ/λ)
-///
-/// an a-priori bound of the static error at v, from the asset alone: G is its residual compliance.
-/// @throws InvalidArgument for a model without one
-std::vector<double> static_capture(const ModalModel& model);
-
 }  // namespace limber::testing

@@ -54,6 +54,7 @@ std::shared_ptr<const ModalModel> with_half_shapes(const ModalModel& model) {
   data.render = half_surface(whole.render);
   if (whole.collision) data.collision = half_surface(*whole.collision);
   data.residual_compliance = whole.residual_compliance;
+  data.captured = whole.captured;
   return std::make_shared<ModalModel>(std::move(data));
 }
 
@@ -345,25 +346,6 @@ SceneError scene_error(const ErrorScene& scene, const PlayedScene& seen, const P
   }
   out.momentum = largest > 0.0 ? out.momentum / largest : 0.0;
   return out;
-}
-
-std::vector<double> static_capture(const ModalModel& model) {
-  const ModalModelData& data = model.data();
-  if (!data.residual_compliance)
-    throw InvalidArgument("static_capture: \"" + data.name +
-                          "\" has no residual compliance, expected one (bake with --residual surface)");
-  const ModalBasis& basis = model.collision().basis;
-  std::vector<double> captured;
-  for (Index v = 0; v < basis.vertices(); ++v) {
-    double shown = 0.0;
-    for (Index m = 0; m < model.modes(); ++m) {
-      const double lambda = data.eigenvalues[static_cast<std::size_t>(m)];
-      if (lambda > 0.0) shown += static_cast<double>(basis.shape(v, m).squaredNorm()) / lambda;
-    }
-    const double left = data.residual_compliance->block(v, v).trace();
-    captured.push_back(shown + left > 0.0 ? shown / (shown + left) : 1.0);
-  }
-  return captured;
 }
 
 }  // namespace limber::testing

@@ -60,6 +60,11 @@ class ContentHash {
       add(to_string(body.residual_compliance->form()));
       add(static_cast<std::uint64_t>(body.residual_compliance->vertices()));
     }
+    if (!body.captured.empty()) {
+      add(std::string_view("captured"));
+      add(std::uint64_t{body.captured.size()});
+      for (const CapturedLoad& load : body.captured) add(load.at), add(load.share);
+    }
     if (body.skin) {
       add(std::string_view("skin"));
       add(static_cast<std::uint64_t>(kSkinVersion));

@@ -170,6 +170,7 @@ class BodyReader {
     if (block_.has("collision")) read_collision_surface();
     if (block_.has("volume_block")) read_volume();
     if (block_.has("residual_compliance")) read_residual();
+    if (block_.has("captured")) read_captured();
     if (block_.has("skin")) read_skin();
     block_.finish();
     for (const char* unread : {"weights", "extras"}) (void)mesh_.has(unread);
@@ -289,6 +290,15 @@ class BodyReader {
     std::memcpy(residual.values().data(), bytes.data(), bytes.size());
     block.finish();
     data_.residual_compliance = std::move(residual);
+  }
+
+  void read_captured() {
+    const JsonObject block(block_.at("captured"), block_.where("captured"));
+    const std::size_t loads = count_of(block, "loads");
+    const std::vector<double> places = block.numbers("places", 3 * loads), shares = block.numbers("shares", loads);
+    for (std::size_t i = 0; i < loads; ++i)
+      data_.captured.push_back({vector_from(std::span(places).subspan(3 * i, 3)), shares[i]});
+    block.finish();
   }
 
   void read_skin() {

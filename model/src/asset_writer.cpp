@@ -88,6 +88,15 @@ json residual_block(GlbBuilder& glb, const ResidualCompliance& residual) {
   return block;
 }
 
+json captured_block(const std::vector<CapturedLoad>& captured) {
+  json block = {{"loads", captured.size()}, {"places", json::array()}, {"shares", json::array()}};
+  for (const CapturedLoad& load : captured) {
+    for (int a = 0; a < 3; ++a) block["places"].push_back(load.at[a]);
+    block["shares"].push_back(load.share);
+  }
+  return block;
+}
+
 json skin_block(GlbBuilder& glb, const ModalSkin& skin) {
   json block = {{"version", asset_format::kSkinVersion}, {"handles", skin.handles}};
   const auto add = [&](const char* key, const auto& items) {
@@ -163,6 +172,7 @@ void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHas
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
   if (body.residual_compliance) block["residual_compliance"] = residual_block(glb, *body.residual_compliance);
+  if (!body.captured.empty()) block["captured"] = captured_block(body.captured);
   if (body.skin) block["skin"] = skin_block(glb, *body.skin);
   mesh.extras = extras_for_people(model);
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();

@@ -37,6 +37,9 @@ class Checker {
     if (d_.collision) check_surface(*d_.collision, "collision");
     if (d_.volume_block) check_volume(*d_.volume_block);
     if (d_.residual_compliance) check_residual(*d_.residual_compliance);
+    for (const CapturedLoad& load : d_.captured)
+      if (!load.at.allFinite() || !(load.share >= 0.0 && load.share <= 1.0))
+        refuse("captured", "has the share " + shown(load.share), "finite places, and shares from 0 to 1");
     if (d_.skin) check_skin(*d_.skin);
   }
 
@@ -309,6 +312,24 @@ ModalModel::ModalModel(ModalModelData data) : data_(std::move(data)) {
   if (data_.touchable) collision_rows_ = VertexRows(collision().basis);
   collision_extent_ = extent(collision());
   if (data_.collision) render_extent_ = extent(data_.render);
+}
+
+std::vector<double> ModalModel::captured_shares() const {
+  if (!data_.residual_compliance)
+    throw InvalidArgument("captured_shares: \"" + data_.name +
+                          "\" has no residual compliance, expected one (bake with --residual surface)");
+  const ModalBasis& basis = collision().basis;
+  std::vector<double> shares;
+  for (Index v = 0; v < basis.vertices(); ++v) {
+    double shown = 0.0;
+    for (Index m = 0; m < modes(); ++m) {
+      const double lambda = data_.eigenvalues[static_cast<std::size_t>(m)];
+      if (lambda > 0.0) shown += static_cast<double>(basis.shape(v, m).squaredNorm()) / lambda;
+    }
+    const double left = data_.residual_compliance->block(v, v).trace();
+    shares.push_back(shown + left > 0.0 ? shown / (shown + left) : 1.0);
+  }
+  return shares;
 }
 
 double ModalModel::frequency_hz(Index mode) const {

@@ -113,6 +113,11 @@ void expect_same_body(const ModalModelData& a, const ModalModelData& b) {
     EXPECT_EQ(a.residual_compliance->form(), b.residual_compliance->form());
     EXPECT_TRUE(std::ranges::equal(a.residual_compliance->values(), b.residual_compliance->values()));
   }
+  ASSERT_EQ(a.captured.size(), b.captured.size());
+  for (std::size_t i = 0; i < a.captured.size(); ++i) {
+    EXPECT_EQ(a.captured[i].at, b.captured[i].at);
+    EXPECT_EQ(a.captured[i].share, b.captured[i].share);
+  }
   ASSERT_EQ(a.skin.has_value(), b.skin.has_value());
   if (a.skin) expect_same_skin(*a.skin, *b.skin);
   ASSERT_EQ(a.volume_block.has_value(), b.volume_block.has_value());
@@ -162,6 +167,20 @@ TEST(Asset, GoesThroughAFile) {
   expect_same_bytes(asset_bytes(read_asset(path)), asset_bytes(example::asset()));
   std::filesystem::remove(path);
   EXPECT_THROW(read_asset(path), InputError);
+}
+
+TEST(Asset, SharesOfTheStaticComplianceAreKept) {
+  const auto captured = [](double share) {
+    ModalModelData data = example::box("bar", 3);
+    data.captured = {{{0.1, 0.2, 0.3}, share}, {{-0.1, 1.0 / 3.0, 0.0}, 1.0}};
+    return example::model(std::move(data));
+  };
+  const Asset written{.bodies = {captured(0.25)}, .provenance = {}};
+  const std::string bytes = asset_bytes(written);
+  const Asset read = asset_from_bytes(bytes, "test");
+  expect_same_body(read.bodies[0]->data(), written.bodies[0]->data());
+  EXPECT_NE(asset_bytes({.bodies = {captured(0.5)}, .provenance = {}}), bytes);
+  EXPECT_THROW(captured(1.5), InvalidArgument);
 }
 
 TEST(Asset, RigidBodyHasNoMorphTargets) {

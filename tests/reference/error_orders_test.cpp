@@ -87,12 +87,17 @@ TEST(ErrorOrders, TheAssetTellsWhatItsModesCapture) {
   for (const int modes : {5, 20, 80}) {
     const auto model = block.baked(modes, {.surface = true});
     const Index vertex = vertex_of(*model, at);
-    const double told = static_capture(*model)[static_cast<std::size_t>(vertex)];
+    const double told = model->captured_shares()[static_cast<std::size_t>(vertex)];
     EXPECT_NEAR(told, shown_compliance(*model, vertex).trace() / exact, 1e-4);
+    // The same is stored of a node that loads are foreseen at, beside the modes that make up for it.
+    const auto made_up = block.baked(modes, {.nodes = {NodesByIndex{{static_cast<Index>(kPokedNode)}}}});
+    ASSERT_EQ(made_up->data().captured.size(), 1u);
+    EXPECT_NEAR(made_up->data().captured[0].share, told, 1e-6);
+    EXPECT_LE((made_up->data().captured[0].at + made_up->data().origin_in_input - at).norm(), 1e-12);
     EXPECT_GT(told, before);
     before = told;
   }
-  EXPECT_THROW(static_capture(*block.baked(5, {})), InvalidArgument);
+  EXPECT_THROW(block.baked(5, {})->captured_shares(), InvalidArgument);
 }
 
 TEST(ErrorOrders, FreeMotionHasNoErrorOfTheStep) {

@@ -380,17 +380,27 @@ void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, 
   program.write_file(a.settings, scene_text(testing::driven(scene, best->at.drive), best->at, file_of));
 }
 
+/// What the assets tell of their own statics.
 void print_capture(Program& program, ErrorRuns& runs, const std::vector<const ErrorScene*>& scenes,
                    const ErrorArguments& a) {
   program.print(
-      "\nstatic compliance that the modes show at single vertices, %\nscene    body     modes    least   median\n");
+      "\nstatic compliance that the modes by frequency show, %: at the nodes that loads act on; of the vertices that "
+      "touch\n"
+      "scene    body     modes    least  |   least   median\n");
   for (const ErrorScene* scene : scenes)
-    for (const int modes : scene->has_contact() ? a.modes : std::vector<int>{})
+    for (const int modes : a.modes)
       for (const auto& [body, asset] : runs.bakery().baked(*scene, {.modes = modes}).assets) {
-        std::vector<double> shown = testing::static_capture(*asset.bodies[0]);
-        std::sort(shown.begin(), shown.end());
-        program.print(fmt::format("{:<8} {:<8} {:>5} {:>8.3g} {:>8.3g}\n", scene->name, body, modes,
-                                  100.0 * shown.front(), 100.0 * shown[shown.size() / 2]));
+        const ModalModel& model = *asset.bodies[0];
+        std::string line = fmt::format("{:<8} {:<8} {:>5}", scene->name, body, modes);
+        double least = 1.0;
+        for (const CapturedLoad& load : model.data().captured) least = std::min(least, load.share);
+        line += model.data().captured.empty() ? fmt::format(" {:>8}", "") : fmt::format(" {:>8.3g}", 100.0 * least);
+        if (scene->has_contact()) {
+          std::vector<double> shown = model.captured_shares();
+          std::sort(shown.begin(), shown.end());
+          line += fmt::format("  |{:>8.3g} {:>8.3g}", 100.0 * shown.front(), 100.0 * shown[shown.size() / 2]);
+        }
+        program.print(line + "\n");
       }
 }
 

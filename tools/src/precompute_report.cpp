@@ -26,7 +26,9 @@ Json json(const EmbeddingReport& e) {
 Json json(const ResidualReport& r) {
   Json form;
   if (r.form) form = to_string(*r.form);
-  return {{"modes", r.modes}, {"form", form}, {"vertices", r.vertices}, {"bytes", r.bytes}};
+  Json captured = Json::array();
+  for (const CapturedLoad& load : r.captured) captured.push_back({{"at", json(load.at)}, {"share", load.share}});
+  return {{"modes", r.modes}, {"captured", captured}, {"form", form}, {"vertices", r.vertices}, {"bytes", r.bytes}};
 }
 
 Json json(const SkinReport& r) {
@@ -35,6 +37,12 @@ Json json(const SkinReport& r) {
   for (const SkinReport::Mode& m : r.modes)
     modes.push_back({{"mode", m.mode}, {"degrees", SkinReport::kDegrees}, {"energy_ratio", m.energy}});
   return {{"handles", r.handles}, {"ground", r.ground}, {"spread", r.spread}, {"bytes", r.bytes}, {"modes", modes}};
+}
+
+double least_share(const std::vector<CapturedLoad>& captured) {
+  double least = 1.0;
+  for (const CapturedLoad& load : captured) least = std::min(least, load.share);
+  return least;
 }
 
 /// Mass, centre and inertia of all bodies together.
@@ -204,7 +212,10 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
       text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
                           b.frequencies_hz.front(), b.frequencies_hz.back(),
                           b.certified ? ", none missed (certified)" : ", not certified", b.selection.kept.size(), why);
-    if (b.residual.modes > 0) text += fmt::format("  {} residual modes at chosen nodes\n", b.residual.modes);
+    if (b.residual.modes > 0)
+      text += fmt::format(
+          "  {} residual modes at chosen places, of whose static compliance the others show {:.0f} % and more\n",
+          b.residual.modes, 100.0 * least_share(b.residual.captured));
     if (b.residual.form)
       text += fmt::format("  residual compliance of {} vertices, {}: {:.2f} MB, {:.2g} s\n", b.residual.vertices,
                           *b.residual.form == ResidualCompliance::Form::kFull ? "all pairs" : "single vertices",

@@ -253,6 +253,21 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
   return columns;
 }
 
+/// What the kept modes show of the static compliance where loads were foreseen, in directions of forces: the columns of
+/// the loads are three a node, then six a patch.
+std::vector<CapturedLoad> captured_loads(const BodyInput& in, const internal::ResidualModes& modes) {
+  std::vector<CapturedLoad> captured;
+  Eigen::Index column = 0;
+  const auto add = [&](const Vec3& at, Eigen::Index columns) {
+    const double shown = modes.shown.segment<3>(column).sum(), all = shown + modes.left.segment<3>(column).sum();
+    captured.push_back({at, all > 0.0 ? shown / all : 1.0});
+    column += columns;
+  };
+  for (const Index n : in.residual_nodes) add(in.part.mesh.nodes[static_cast<std::size_t>(n)], 3);
+  for (const AttachmentPatch& patch : in.patches) add(patch.center, 6);
+  return captured;
+}
+
 /// Modes of the chosen nodes and patches join the analysis and those kept, which stay in order of frequency.
 void add_residual_modes(ModalAnalysis& a, const BodyInput& in, const PlacedSurface& touching, std::vector<Index>& kept,
                         ResidualReport& report) {
@@ -264,7 +279,9 @@ void add_residual_modes(ModalAnalysis& a, const BodyInput& in, const PlacedSurfa
     F.conservativeResize(Eigen::NoChange, F.cols() + more.cols());
     F.rightCols(more.cols()) = more;
   }
-  report.modes = append_residual_modes(a, kept, F);
+  const internal::ResidualModes added = append_residual_modes(a, kept, F);
+  report.modes = added.appended;
+  report.captured = captured_loads(in, added);
   for (Index m = 0; m < report.modes; ++m) kept.push_back(first + m);
   std::stable_sort(kept.begin(), kept.end(), [&](Index i, Index j) { return a.eigenvalues[i] < a.eigenvalues[j]; });
 }
@@ -396,6 +413,8 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   if (surfaces.collision) data.collision = modal_surface(*surfaces.collision, a, mesh, kept, data.origin_in_input);
   if (options.volume_block) data.volume_block = modal_volume(a, mesh, kept, data.origin_in_input);
   data.residual_compliance = std::move(residual);
+  for (const CapturedLoad& load : report.residual.captured)
+    data.captured.push_back({load.at - data.origin_in_input, load.share});
   data.skin = modal_skin(a, kept, in, materials, surfaces, options, data.origin_in_input, report.skin, warnings);
   auto model = std::make_shared<const ModalModel>(std::move(data));
   report.render = surfaces.render.report();

@@ -156,15 +156,17 @@ Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices,
   return F;
 }
 
-Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, const Eigen::MatrixXd& F) {
+ResidualModes append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, const Eigen::MatrixXd& F) {
   const StaticModes modes(analysis, kept);
   Eigen::MatrixXd U = residual_displacements(*analysis.compliance, modes, F);
   // K U = F less what the zero and the kept modes carry, so UᵀKU = FᵀU.
   const Eigen::MatrixXd energy = F.transpose() * U;
+  const Eigen::MatrixXd answers = modes.inverse_eigenvalues.cwiseSqrt().asDiagonal() * (modes.W.transpose() * F);
+  ResidualModes out{.shown = answers.colwise().squaredNorm(), .left = energy.diagonal().cwiseMax(0.0)};
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (energy + energy.transpose()));
   const double largest = eigen.eigenvalues().size() == 0 ? 0.0 : eigen.eigenvalues().maxCoeff();
   const auto above = static_cast<Eigen::Index>((eigen.eigenvalues().array() > kRoundOff * largest).count());
-  if (above == 0) return 0;
+  if (above == 0) return out;
   Eigen::MatrixXd Y = U * (eigen.eigenvectors().rightCols(above) *
                            eigen.eigenvalues().tail(above).cwiseSqrt().cwiseInverse().asDiagonal());
   Y -= modes.W * (modes.MW.transpose() * Y);  // what round-off left of the kept modes
@@ -172,7 +174,8 @@ Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept
   analysis.eigenvalues.insert(analysis.eigenvalues.end(), ritz.eigenvalues.data(), ritz.eigenvalues.data() + above);
   append(ritz.W, analysis.shapes);
   append(ritz.MW, analysis.mass_times_shapes);
-  return static_cast<Index>(above);
+  out.appended = static_cast<Index>(above);
+  return out;
 }
 
 ResidualCompliance residual_compliance(const ModalAnalysis& analysis, std::span<const Index> kept, const TetMesh& mesh,

@@ -24,13 +24,19 @@ Eigen::MatrixXd node_loads(Index mesh_nodes, std::span<const Index> nodes);
 Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices, const Embedding& surface,
                             const AttachmentPatch& patch);
 
+/// What joined the analysis, and of each load what the kept modes show of fᵀ K⁺ f without it, and what they leave.
+struct ResidualModes {
+  Index appended = 0;
+  Eigen::VectorXd shown, left;  // m/N, of unit loads
+};
+
 /// Appends to the analysis the modes in the span of G_res F, so that kept and new modes together answer static loads
 /// in the span of F exactly. Rayleigh–Ritz in that span: they are M-orthonormal to each other
 /// and to the kept ones, with the eigenvalues that the span allows, ascending (above those of the modes that the span
 /// is made of). Directions whose compliance is below round-off of the largest are left out.
 /// @param kept columns of the analysis that the body keeps. @pre analysis.compliance
-/// @return how many were appended, behind all other columns
-Index append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, const Eigen::MatrixXd& F);
+/// New modes are behind all other columns.
+ResidualModes append_residual_modes(ModalAnalysis& analysis, std::span<const Index> kept, const Eigen::MatrixXd& F);
 
 /// G_res of a surface. @pre analysis.compliance
 ResidualCompliance residual_compliance(const ModalAnalysis& analysis, std::span<const Index> kept, const TetMesh& mesh,

@@ -42,6 +42,18 @@ struct ModalVolume {
   ModalBasis mass_times_basis;  ///< M W at every node, kg^½: z₀ = (MW)ᵀ d₀
 };
 
+/// A node or patch that forces were foreseen at, and the share of what it gives way by statically that those modes show
+/// which were chosen by frequency:
+///
+///   c = tr Σ u uᵀ/λ / tr (K⁺)_nn
+///
+/// With these alone the static answer there is off by 1 − c; the further modes that the bake adds for it
+/// (`--residual NODES`) make it exact. Told by the bake: models made for a scene, with fewer modes, hold none.
+struct CapturedLoad {
+  Vec3 at = Vec3::Zero();  ///< body frame, m
+  double share = 1.0;      ///< c, 0 to 1
+};
+
 /// Where an asset came from; every field may be empty.
 struct Provenance {
   std::string tool{};        ///< "limber-precompute 0.1.0"
@@ -78,6 +90,7 @@ struct ModalModelData {
   std::optional<ModalVolume> volume_block;
   /// Optional: of the collision surface's vertices (of the render surface's where that is what touches).
   std::optional<ResidualCompliance> residual_compliance;
+  std::vector<CapturedLoad> captured;  ///< may be empty
   /// Optional: what shows large bends without swelling.
   std::optional<ModalSkin> skin;
   /// Whether contacts may act on the collision surface. False, of a body that meets nothing (no part of an asset file):
@@ -107,6 +120,14 @@ class ModalModel {
 
   const SurfaceExtent& collision_extent() const { return collision_extent_; }
   const SurfaceExtent& render_extent() const { return data_.collision ? render_extent_ : collision_extent_; }
+
+  /// Of every vertex of collision() the share of what it gives way by statically that the modes show, 0 to 1:
+  ///
+  ///   c_v = 1 − tr G_vv / tr (G_vv + Σ u_v u_vᵀ/λ),   G the residual compliance
+  ///
+  /// Where contacts and handles act without a residual, 1 − c_v is what their static answer is off by.
+  /// @throws InvalidArgument for a model without a residual compliance
+  std::vector<double> captured_shares() const;
 
   /// Undamped frequency of a mode, √λ/2π, Hz.
   double frequency_hz(Index mode) const;

@@ -116,6 +116,7 @@ struct EmbeddingReport {
 /// What was made of ResidualOptions.
 struct ResidualReport {
   Index modes = 0;                                 ///< joined the basis; among the kept, not among frequencies_hz
+  std::vector<CapturedLoad> captured{};            ///< nodes, then patches; input coordinates
   std::optional<ResidualCompliance::Form> form{};  ///< of the stored compliance; none: not asked for
   Index vertices = 0;
   std::size_t bytes = 0;
