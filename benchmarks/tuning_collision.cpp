@@ -103,6 +103,9 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(finder, look_nearer),
     LIMBER_NUMBER(finder, look_again),
     LIMBER_NUMBER(finder, look_farther),
+    LIMBER_NUMBER(finder, visits_of_a_look),
+    LIMBER_NUMBER(finder, fine_doubt),
+    LIMBER_NUMBER_BY(finder, worth_a_look, between_bounds),
 };
 
 // -- What comes out ---------------------------------------------------------------------------------------------------

@@ -126,6 +126,12 @@ struct FinderTuning {
   /// an advancement, `look_farther` [2 to 10] times it is looked ahead. Advancements change by a sixth at most at half
   /// and twice; the answer is safe with any.
   double good_advancement = 0.25, look_nearer = 1.0 / 16.0, look_again = 2.0, look_farther = 4.0;
+  /// A look that has compared so many pairs of triangles [16 to 1,000] is broken off for a nearer one, as long as what
+  /// is not known of the motion is more than a part [0.1 to 1] of the least gap seen.
+  int visits_of_a_look = 48;
+  double fine_doubt = 0.25;
+  /// What comes later than this part [0.5 to 0.95] of the best time seen is left for the next look.
+  double worth_a_look = 0.9;
 };
 
 struct CollisionTuning {

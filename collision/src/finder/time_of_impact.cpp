@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "finder/moving_side.h"
 #include "finder/world_bounds.h"
 #include "limber/collision/closest_features.h"
 #include "limber/collision/collision_surface.h"
@@ -20,222 +21,33 @@
 namespace limber {
 
 using internal::box_about;
+using internal::ChordError;
+using internal::MovingSide;
+using internal::PlacedPart;
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Round-off of a pose and of what is done with it, in ε of its coordinates.
 constexpr double kMotionRoundOff = 32.0 * std::numeric_limits<double>::epsilon();
-/// How fast two things come together along a direction: they close c t + ½ k t² + f at most.
-struct Closing {
-  double speed, acceleration, offset;
-};
+/// The same of what the kernels do, in single precision.
+constexpr double kSlabRoundOff = 32.0 * static_cast<double>(std::numeric_limits<float>::epsilon());
 
-/// When a gap may be closed at the earliest.
-double time_to_close(double gap, const Closing& c) {
-  const double g = gap - c.offset;
-  if (!(g > 0.0)) return 0.0;  // NaN too: infinity less infinity
-  const double discriminant = c.speed * c.speed + 2.0 * c.acceleration * g;
-  if (discriminant < 0.0) return kInfinity;
-  const double root = std::sqrt(discriminant);
-  if (c.speed > 0.0) return 2.0 * g / (c.speed + root);
-  return c.acceleration > 0.0 ? (root - c.speed) / c.acceleration : kInfinity;
+/// From where on in a stretch a gap g₀ at its start, g₁ at its end and bent as much may be closed.
+double part_to_close(double gap, double gap_then, double bend) {
+  if (!(gap > 0.0)) return 0.0;
+  const double closing = gap - gap_then + bend, square = closing * closing - 4.0 * bend * gap;
+  if (square < 0.0) return 2.0;
+  const double sum = closing + std::sqrt(square);
+  return sum > 0.0 ? 2.0 * gap / sum : 2.0;
 }
 
 /// Largest distance of a point of a box from the origin.
 double farthest(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).norm(); }
 
-/// One body at one time, and what it can do within the time looked ahead.
-class Side {
- public:
-  void start(const MovingBody& body) {
-    if (!body.surface == !body.geometry)
-      throw InvalidArgument("TimeOfImpact::find: a body has both a surface and a geometry, or neither, expected one");
-    motion_ = body.motion;
-    surface_ = body.geometry ? body.geometry->surface() : body.surface;
-    core_ = {Vec3::Zero(), Vec3::Zero()};
-    core_count_ = 0;
-    core_radius_ = 0.0;
-    plane_.reset();
-    if (body.geometry) take_core(body.geometry->shape());
-    radius_ = surface_ ? surface_radius() : core_[0].norm();
-    if (!motion_) {
-      state_.time = 0.0;
-      state_.pose = body.pose;
-      state_.velocity = state_.angular_velocity = Vec3::Zero();
-      state_.amplitudes.assign(body.amplitudes.begin(), body.amplitudes.end());
-      state_.rates.assign(body.amplitudes.size(), 0.0);
-      bounds_.frame = {};
-      bounds_.modes.assign(body.amplitudes.size(), {});
-      for (std::size_t i = 0; i < bounds_.modes.size(); ++i) bounds_.modes[i].size = std::abs(body.amplitudes[i]);
-    }
-    bound_ = false;
-  }
-
-  void go_to(double t) {
-    if (motion_) motion_->evaluate(t, state_);
-    rotation_ = to_matrix(state_.pose.q);
-    if (surface_ && (!bound_ || (motion_ && surface_->modes() > 0))) shape_.bind(surface_, state_.amplitudes);
-    bound_ = true;
-  }
-
-  /// Chooses for each mode and for the turning: what it does now and a bound on how that changes, or a bound on all it
-  /// can do.
-  void look_ahead(double until, double duration) {
-    if (motion_) motion_->bounds(state_, until, bounds_);
-    const FrameBounds& frame = bounds_.frame;
-    const double chord = 2.0 * std::sin(0.5 * frame.turn), half_square = 0.5 * duration * duration;
-    double arm = radius_, bent_rate = 0.0, bent = 0.0, whole = 0.0;
-    flexing_speed_ = 0.0;
-    rates_.assign(state_.rates.size(), 0.0);
-    if (surface_ && surface_->skin()) arm = bend(whole);
-    for (std::size_t i = 0; i < bounds_.modes.size() && !(surface_ && surface_->skin()); ++i) {
-      const ModeBound& mode = bounds_.modes[i];
-      const double shape = surface_->largest_shape(static_cast<Index>(i));
-      arm += shape * mode.size;
-      if (half_square * mode.acceleration <= mode.change) {
-        rates_[i] = state_.rates[i];
-        flexing_speed_ += shape * std::abs(state_.rates[i]);
-        bent_rate += shape * mode.rate;
-        bent += shape * mode.acceleration;
-      } else {
-        whole += shape * mode.change;
-      }
-    }
-    arm_ = arm;
-    if (flexing_speed_ > 0.0) flow_.bind(surface_, rates_);
-    const bool as_it_turns = half_square * frame.bend <= chord;
-    turning_ = as_it_turns ? state_.angular_velocity : Vec3(Vec3::Zero());
-    turn_acceleration_ = as_it_turns ? frame.bend : 0.0;
-    turn_offset_ = as_it_turns ? 0.0 : chord;
-    acceleration_ = turn_acceleration_ * arm + (as_it_turns ? 2.0 * frame.angular_speed * bent_rate : 0.0) + bent;
-    offset_ = turn_offset_ * arm + whole;
-  }
-
-  /// A plane is as wide as the other body is far: its points are those abreast of it.
-  void widen_plane(double reach, double speed) {
-    acceleration_ =
-        turn_acceleration_ * reach + (turn_acceleration_ > 0.0 ? 2.0 * bounds_.frame.angular_speed * speed : 0.0);
-    offset_ = turn_offset_ * reach;
-  }
-
-  const std::optional<HalfSpace>& plane() const { return plane_; }
-  const Vec3& position() const { return state_.pose.p; }
-  const Mat3& rotation() const { return rotation_; }
-  const Vec3& velocity() const { return state_.velocity; }
-  const Vec3& turning() const { return turning_; }  ///< ω as far as it is taken as it is now
-  Vec3 linear_acceleration() const { return motion_ ? motion_->path().acceleration() : Vec3(Vec3::Zero()); }
-  double acceleration() const { return acceleration_; }
-  double offset() const { return offset_; }
-  double flexing_speed() const { return flexing_speed_; }
-  double thickness() const { return core_radius_; }
-  double arm() const { return arm_; }
-  const FrameBounds& frame_bounds() const { return bounds_.frame; }
-  double speed() const { return bounds_.frame.speed + bounds_.frame.angular_speed * arm_ + flexing_speed_; }
-  double smooth_until(double t) const { return motion_ ? motion_->smooth_until(t) : kInfinity; }
-
-  // The tree; a core is one leaf.
-  bool leaf(Index node) const { return !surface_ || surface_->node(node).leaf(); }
-  Index child(Index node) const { return surface_->node(node).child; }
-  /// Triangles below a node, or one core.
-  Index weight(Index node) const { return surface_ ? surface_->node(node).count : 1; }
-  Aabb box(Index node) {
-    if (surface_) return shape_.bounds(node);
-    Aabb box;
-    for (std::size_t i = 0; i < core_count_; ++i) box.include(core_[i]);
-    return box;
-  }
-
-  /// Points of one triangle or core, in the body frame, and their velocities there, as far as flexing goes.
-  struct Item {
-    std::array<Vec3, 3> point, flow;
-    std::size_t count = 0;
-    Aabb box() const {
-      Aabb b;
-      for (std::size_t i = 0; i < count; ++i) b.include(point[i]);
-      return b;
-    }
-  };
-  Item item(Index node, Index number) {
-    Item it;
-    if (!surface_) {
-      it.count = core_count_;
-      for (std::size_t i = 0; i < core_count_; ++i) it.point[i] = core_[i], it.flow[i] = Vec3::Zero();
-      return it;
-    }
-    const Index t = surface_->node_triangles(node)[static_cast<std::size_t>(number)];
-    it.count = 3;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Index v = surface_->triangle(t)[i];
-      it.point[i] = shape_.vertex(v);
-      it.flow[i] = Vec3::Zero();
-      if (flexing_speed_ > 0.0) it.flow[i] = flow_.vertex(v) - surface_->rest(v);
-    }
-    return it;
-  }
-
- private:
-  /// What a surface with a skin can do in the time looked ahead, as a whole. @return how far its vertices can be
-  double bend(double& whole) {
-    change_.resize(bounds_.modes.size()), shape_rates_.resize(bounds_.modes.size());
-    for (std::size_t i = 0; i < change_.size(); ++i) change_[i] = motion_ ? bounds_.modes[i].change : 0.0;
-    const double far = shape_.skin_extent(change_, shape_rates_);
-    for (std::size_t i = 0; i < change_.size(); ++i) whole += shape_rates_[i] * change_[i];
-    return far + whole;
-  }
-
-  double surface_radius() const {
-    const auto& model = surface_->model();
-    return model ? model->collision_extent().radius : farthest(surface_->rest_bounds());
-  }
-
-  void take_core(const Shape& shape) {
-    if (const auto* ball = std::get_if<Sphere>(&shape)) {
-      core_count_ = 1;
-      core_radius_ = ball->radius;
-    } else if (const auto* capsule = std::get_if<Capsule>(&shape)) {
-      core_ = {Vec3(0.0, 0.0, capsule->half_length), Vec3(0.0, 0.0, -capsule->half_length)};
-      core_count_ = 2;
-      core_radius_ = capsule->radius;
-    } else if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
-      plane_ = *half_space;
-      core_count_ = 1;
-    }
-  }
-
-  const ExactMotion* motion_ = nullptr;
-  std::shared_ptr<const CollisionSurface> surface_;
-  std::array<Vec3, 2> core_{Vec3::Zero(), Vec3::Zero()};
-  std::size_t core_count_ = 0;
-  double core_radius_ = 0.0;
-  std::optional<HalfSpace> plane_;
-  double radius_ = 0.0;  // of the rest shape about the body origin
-
-  MotionState state_;
-  MotionBounds bounds_;
-  DeformedSurface shape_;
-  DeformedSurface flow_;  // the surface after a second of the rates as they are now: its vertices tell their velocities
-  std::vector<double> rates_;
-  std::vector<double> change_, shape_rates_;  // with a skin
-  bool bound_ = false;
-
-  Mat3 rotation_ = Mat3::Identity();
-  Vec3 turning_ = Vec3::Zero();
-  double arm_ = 0.0;
-  double flexing_speed_ = 0.0, acceleration_ = 0.0, offset_ = 0.0, turn_acceleration_ = 0.0, turn_offset_ = 0.0;
-};
-
-/// A direction in which boxes of both sides are compared. With x_A, x_B points of the bodies:
-///   n·(p_a − p_b) = place + n_A·x_A − n_B·x_B,   its rate = velocity + w_A·x_A − w_B·x_B
-struct Axis {
-  Vec3 n_A, n_B, w_A, w_B;
-  double place, velocity, acceleration;
-};
-
-/// Two sides at one time.
+/// Two sides over one stretch.
 class Pair {
  public:
-  Side a, b;  // b may be a plane, a may not
+  MovingSide a, b;  // b may be a plane, a may not
 
   /// @return round-off of the pair's geometry, m
   double start(const MovingBody& first, const MovingBody& second, double step) {
@@ -243,8 +55,8 @@ class Pair {
     a.start(swap ? second : first);
     b.start(swap ? first : second);
     last_.reset();
-    go_to(0.0, step);
-    return kMotionRoundOff * (a.position().norm() + b.position().norm() + a.arm() + b.arm());
+    look_ahead(0.0, step);
+    return kMotionRoundOff * (a.position(0).norm() + b.position(0).norm() + a.arm() + b.arm());
   }
 
   void go_to(double t, double until) {
@@ -254,155 +66,195 @@ class Pair {
   }
 
   void look_ahead(double t, double until) {
-    a.look_ahead(until, until - t);
-    b.look_ahead(until, until - t);
-    apart_ = a.position() - b.position();
-    if (b.plane()) {
-      const double speed = a.speed() + b.frame_bounds().speed;
-      b.widen_plane(apart_.norm() + a.arm() + a.frame_bounds().travel + b.frame_bounds().travel, speed);
-    }
-    acceleration_ = a.acceleration() + b.acceleration();
-    offset_ = a.offset() + b.offset();
+    duration_ = until - t;
+    a.look_ahead(until);
+    b.look_ahead(until);
+    for (const int end : {0, 1}) apart_[static_cast<std::size_t>(end)] = a.position(end) - b.position(end);
     thickness_ = a.thickness() + b.thickness();
-    falling_ = a.linear_acceleration() - b.linear_acceleration();
-    make_axes();
+    falling_ = 0.5 * duration_ * duration_ * (a.linear_acceleration() - b.linear_acceleration());
+    const ChordError one = a.error(), other = b.plane() ? plane_error() : b.error();
+    plane_bend_ = b.plane() ? other.bend : 0.0;
+    offset_ = one.offset + other.offset;
+    doubt_ = 0.25 * (one.bend + other.bend) + offset_;
+    if (b.plane())
+      follow_plane();
+    else
+      choose_directions();
+    slab_round_off_ = kSlabRoundOff * (apart_[0].cwiseAbs().sum() + apart_[1].cwiseAbs().sum() + a.arm() + b.arm());
   }
 
   /// A nearer look would bound it more sharply.
   bool has_offset() const { return offset_ > 0.0; }
 
-  /// The earliest time from now, at most `best`, at which a gap may be down to `kept`; none where one is down to
-  /// `margin` now.
-  std::optional<double> advancement(double kept, double margin, double best) {
-    struct Entry {
-      Index m, n;
-      double time;
-    };
+  enum class Seen { kClear, kTouching, kTooMuch };
+  /// The earliest time from now, at most the stretch, at which a gap may be down to `kept`. Touching: one is down to
+  /// `margin` now. Too much: more than a few parts come near only as the stretch is long.
+  Seen advancement(double kept, double margin, double& time) {
+    const internal::FinderTuning& tuning = internal::collision_tuning().finder;
+    kept_ = kept, margin_ = margin;
+    best_ = pruned_ = 1.0;
+    nearest_ = std::numeric_limits<double>::infinity();
+    visits_ = 0;
+    Seen seen = last_ ? visit(a.points(last_->m, last_->i), b.points(last_->n, last_->j), last_bend()) : Seen::kClear;
+    if (seen == Seen::kClear) seen = walk(tuning);
+    time = std::min(best_, pruned_) * duration_;
+    return seen;
+  }
+
+ private:
+  struct Entry {
+    Index m, n;
+    double part;
+  };
+
+  Seen walk(const internal::FinderTuning& tuning) {
     std::array<Entry, 2 * CollisionSurface::kMaxDepth + 4> stack;
     std::size_t size = 0;
-    const auto entry = [&](Index m, Index n) { return Entry{m, n, earliest(a.box(m), b.box(n), kept)}; };
-    if (last_ && !visit(*last_, kept, margin, best)) return std::nullopt;
+    const auto entry = [&](Index m, Index n) { return Entry{m, n, earliest(a.node(m), b.node(n))}; };
     stack[size++] = entry(0, 0);
     while (size > 0) {
       const Entry e = stack[--size];
-      if (!(e.time < best)) continue;
+      if (pruned(e.part)) continue;
       if (a.leaf(e.m) && b.leaf(e.n)) {
-        if (!visit(e.m, e.n, kept, margin, best)) return std::nullopt;
+        if (const Seen seen = visit(e.m, e.n); seen != Seen::kClear) return seen;
+        if (visits_ > tuning.visits_of_a_look && doubt_ > tuning.fine_doubt * nearest_) return Seen::kTooMuch;
         continue;
       }
       const bool descend_a = b.leaf(e.n) || (!a.leaf(e.m) && a.weight(e.m) >= b.weight(e.n));
       Entry near = descend_a ? entry(a.child(e.m), e.n) : entry(e.m, b.child(e.n));
       Entry far = descend_a ? entry(a.child(e.m) + 1, e.n) : entry(e.m, b.child(e.n) + 1);
-      if (far.time < near.time) std::swap(near, far);
+      if (far.part < near.part) std::swap(near, far);
       stack[size++] = far;
       stack[size++] = near;
     }
-    return best;
+    return Seen::kClear;
   }
 
- private:
-  void make_axes() {
-    axis_count_ = 0;
-    if (b.plane()) {
-      const Vec3 n = b.rotation() * b.plane()->normal, w_b = n.cross(b.turning());
-      axes_[axis_count_++] = {.n_A = a.rotation().transpose() * n,
-                              .n_B = Vec3::Zero(),
-                              .w_A = a.rotation().transpose() * (n.cross(a.turning()) - w_b),
-                              .w_B = Vec3::Zero(),
-                              .place = n.dot(apart_) - b.plane()->offset,
-                              .velocity = n.dot(a.velocity() - b.velocity()) - w_b.dot(apart_),
-                              .acceleration = n.dot(falling_)};
-      return;
-    }
-    for (int i = 0; i < 6; ++i) {
-      const Vec3 n = i < 3 ? a.rotation().col(i) : b.rotation().col(i - 3);
-      axes_[axis_count_++] = {.n_A = a.rotation().transpose() * n,
-                              .n_B = b.rotation().transpose() * n,
-                              .w_A = a.rotation().transpose() * n.cross(a.turning()),
-                              .w_B = b.rotation().transpose() * n.cross(b.turning()),
-                              .place = n.dot(apart_),
-                              .velocity = n.dot(a.velocity() - b.velocity()),
-                              .acceleration = n.dot(falling_)};
-    }
+  /// What comes hardly earlier than the best is left for the next look, so that many that come together cost little.
+  bool pruned(double part) {
+    if (part < internal::collision_tuning().finder.worth_a_look * best_) return false;
+    pruned_ = std::min(pruned_, part);
+    return true;
   }
 
-  /// For all points of two boxes: the latest of what each axis says.
-  double earliest(const Aabb& box_A, const Aabb& box_B, double kept) const {
-    const Vec3 c_A = box_A.center(), h_A = box_A.half_extents(), c_B = box_B.center(), h_B = box_B.half_extents();
-    double time = 0.0;
-    for (std::size_t i = 0; i < axis_count_; ++i) {
-      const Axis& x = axes_[i];
-      const double place = x.place + x.n_A.dot(c_A) - x.n_B.dot(c_B);
-      const double sign = place < 0.0 && !b.plane() ? -1.0 : 1.0;
-      const double gap = sign * place - x.n_A.cwiseAbs().dot(h_A) - x.n_B.cwiseAbs().dot(h_B) - thickness_ - kept;
-      if (!(gap > offset_)) continue;
-      const double speed = -sign * (x.velocity + x.w_A.dot(c_A) - x.w_B.dot(c_B)) + x.w_A.cwiseAbs().dot(h_A) +
-                           x.w_B.cwiseAbs().dot(h_B) + a.flexing_speed() + b.flexing_speed();
-      time = std::max(time, time_to_close(gap, {speed, acceleration_ - sign * x.acceleration, offset_}));
-    }
-    return time;
+  ChordError plane_error() const {
+    const double speed = a.speed() + b.frame_bounds().speed;
+    const double reach = apart_[0].norm() + a.arm() + a.frame_bounds().travel + b.frame_bounds().travel;
+    ChordError e = b.plane_error(reach, speed);
+    if (b.frame_bounds().turn > 0.0) e.bend += falling_.norm();
+    return e;
   }
 
-  /// All pairs of items of two leaves. @return false where one is within the margin
-  bool visit(Index m, Index n, double kept, double margin, double& best) {
+  /// Along the plane's normal alone.
+  void follow_plane() {
+    std::array<std::array<Vec3, internal::kDirections>, 2> directions;
+    for (std::size_t end = 0; end < 2; ++end) {
+      const Vec3 n = b.rotation(static_cast<int>(end)) * b.plane()->normal;
+      directions[end].fill(n);
+      const double height = n.dot(apart_[end]) - b.plane()->offset;
+      std::fill_n(way_.between[end], internal::kDirections, static_cast<float>(height));
+    }
+    const double fall = b.frame_bounds().turn > 0.0 ? 0.0 : directions[0][0].dot(falling_);
+    std::fill_n(way_.bend, internal::kDirections, static_cast<float>(fall));
+    a.set_directions(directions);
+    b.set_directions(directions);
+  }
+
+  /// Axes of both bodies and what lies between them, the way of one as the other sees it, and directions across it,
+  /// along which they do not come nearer.
+  void choose_directions() {
+    std::array<std::array<Vec3, internal::kDirections>, 2> directions;
+    std::array<Vec3, internal::kDirections>& n = directions[0];
+    const Mat3 &A = a.rotation(0), &B = b.rotation(0);
+    for (int axis = 0; axis < 3; ++axis) n[static_cast<std::size_t>(axis)] = A.col(axis);
+    for (int axis = 0; axis < 3; ++axis) n[static_cast<std::size_t>(axis) + 3] = B.col(axis);
+    const Vec3 way = apart_[1] - apart_[0];
+    const Vec3 along = way.squaredNorm() > 0.0 ? Vec3(way.normalized()) : Vec3(Vec3::UnitX());
+    const Vec3 u = along.unitOrthogonal(), v = along.cross(u);
+    const double half = std::sqrt(0.5), third = std::sqrt(1.0 / 3.0);
+    n[6] = along, n[7] = u, n[8] = v, n[9] = half * (u + v), n[10] = half * (u - v);
+    n[11] = third * (along + u + v), n[12] = third * (along - u + v), n[13] = third * (along + u - v);
+    n[14] = third * (along - u - v);
+    n[15] = apart_[0].squaredNorm() > 0.0 ? Vec3(apart_[0].normalized()) : along;
+    directions[1] = n;
+    for (std::size_t i = 0; i < internal::kDirections; ++i) {
+      for (std::size_t end = 0; end < 2; ++end) way_.between[end][i] = static_cast<float>(n[i].dot(apart_[end]));
+      way_.bend[i] = static_cast<float>(n[i].dot(falling_));
+    }
+    a.set_directions(directions);
+    b.set_directions(directions);
+  }
+
+  double earliest(const PlacedPart& one, const PlacedPart& other) const {
+    const double kept = thickness_ + kept_ + offset_ + slab_round_off_;
+    const double bend = static_cast<double>(one.bend) + static_cast<double>(other.bend) + plane_bend_;
+    return static_cast<double>(
+        internal::earliest_in_stretch(one.slab, other.slab, way_, static_cast<float>(kept), static_cast<float>(bend)));
+  }
+
+  /// All pairs of items of two leaves.
+  Seen visit(Index m, Index n) {
     for (Index i = 0; i < a.weight(m); ++i) {
-      const Side::Item one = a.item(m, i);
-      const Aabb box_A = one.box();
+      const PlacedPart& one = a.item(m, i);
       for (Index j = 0; j < b.weight(n); ++j) {
-        const Side::Item other = b.item(n, j);
-        if (!(earliest(box_A, other.box(), kept) < best)) continue;
-        const double before = best;
-        if (!visit(one, other, kept, margin, best)) return false;
-        if (best < before) last_ = {m, n, i, j};
+        const PlacedPart& other = b.item(n, j);
+        if (pruned(earliest(one, other))) continue;
+        const double before = best_, bend = static_cast<double>(one.bend) + static_cast<double>(other.bend);
+        if (visit(a.points(m, i), b.points(n, j), bend) == Seen::kTouching) return Seen::kTouching;
+        if (best_ < before) last_ = {m, n, i, j};
       }
     }
-    return true;
+    return Seen::kClear;
   }
 
   struct ItemPair {
     Index m, n, i, j;
   };
-  bool visit(const ItemPair& p, double kept, double margin, double& best) {
-    return visit(a.item(p.m, p.i), b.item(p.n, p.j), kept, margin, best);
+  double last_bend() {
+    return static_cast<double>(a.item(last_->m, last_->i).bend) + static_cast<double>(b.item(last_->n, last_->j).bend);
   }
 
-  bool visit(const Side::Item& one, const Side::Item& other, double kept, double margin, double& best) const {
-    return b.plane() ? visit_plane(one, kept, margin, best) : visit_items(one, other, kept, margin, best);
+  Seen visit(const MovingSide::Item& one, const MovingSide::Item& other, double bend) {
+    ++visits_;
+    return b.plane() ? visit_plane(one, bend + plane_bend_) : visit_items(one, other, bend);
   }
 
-  bool visit_plane(const Side::Item& item, double kept, double margin, double& best) const {
-    const Axis& x = axes_[0];
+  Seen visit_plane(const MovingSide::Item& item, double bend) {
     for (std::size_t i = 0; i < item.count; ++i) {
-      const double gap = x.place + x.n_A.dot(item.point[i]) - thickness_;
-      if (gap <= margin) return false;
-      const double speed = -(x.velocity + x.w_A.dot(item.point[i]) + x.n_A.dot(item.flow[i]));
-      best = std::min(best, time_to_close(gap - kept, {speed, acceleration_ - x.acceleration, offset_}));
+      std::array<double, 2> gap;
+      for (std::size_t end = 0; end < 2; ++end) {
+        const int e = static_cast<int>(end);
+        const Vec3 n = b.rotation(e) * b.plane()->normal;
+        gap[end] = n.dot(apart_[end] + a.rotation(e) * item.point[end][i]) - b.plane()->offset - thickness_;
+      }
+      if (gap[0] <= margin_) return Seen::kTouching;
+      nearest_ = std::min(nearest_, gap[0]);
+      const double fall = b.frame_bounds().turn > 0.0 ? 0.0 : (b.rotation(0) * b.plane()->normal).dot(falling_);
+      best_ = std::min(best_, part_to_close(gap[0] - kept_ - offset_, gap[1] - kept_ - offset_, bend + fall));
     }
-    return true;
+    return Seen::kClear;
   }
 
   /// Along the line of the nearest points: convex items stay apart as long as their corners do.
-  bool visit_items(const Side::Item& one, const Side::Item& other, double kept, double margin, double& best) const {
-    std::array<Vec3, 3> x, y;  // from the origin of b, world axes
-    for (std::size_t i = 0; i < one.count; ++i) x[i] = apart_ + a.rotation() * one.point[i];
-    for (std::size_t j = 0; j < other.count; ++j) y[j] = b.rotation() * other.point[j];
-    const Vec3 between = nearest(x, one.count, y, other.count);
-    const double distance = between.norm();
-    if (distance - thickness_ <= margin) return false;
-    const Vec3 direction = between / distance;
-    const double acceleration = acceleration_ - direction.dot(falling_);
-    const Vec3 w_a = direction.cross(a.turning()), w_b = direction.cross(b.turning());
-    const Vec3 n_A = a.rotation().transpose() * direction, n_B = b.rotation().transpose() * direction;
-    const double velocity = direction.dot(a.velocity() - b.velocity());
-    for (std::size_t i = 0; i < one.count; ++i) {
-      const double place_a = direction.dot(x[i]), velocity_a = w_a.dot(x[i] - apart_) + n_A.dot(one.flow[i]);
-      for (std::size_t j = 0; j < other.count; ++j) {
-        const double gap = place_a - direction.dot(y[j]) - thickness_ - kept;
-        const double speed = -(velocity + velocity_a - w_b.dot(y[j]) - n_B.dot(other.flow[j]));
-        best = std::min(best, time_to_close(gap, {speed, acceleration, offset_}));
-      }
+  Seen visit_items(const MovingSide::Item& one, const MovingSide::Item& other, double bend) {
+    std::array<std::array<Vec3, 3>, 2> x, y;  // from the origin of b, world axes
+    for (std::size_t end = 0; end < 2; ++end) {
+      const int e = static_cast<int>(end);
+      for (std::size_t i = 0; i < one.count; ++i) x[end][i] = apart_[end] + a.rotation(e) * one.point[end][i];
+      for (std::size_t j = 0; j < other.count; ++j) y[end][j] = b.rotation(e) * other.point[end][j];
     }
-    return true;
+    const Vec3 between = nearest(x[0], one.count, y[0], other.count);
+    const double distance = between.norm();
+    if (distance - thickness_ <= margin_) return Seen::kTouching;
+    nearest_ = std::min(nearest_, distance - thickness_);
+    const Vec3 direction = between / distance;
+    const double less = thickness_ + kept_ + offset_;
+    bend += direction.dot(falling_);
+    for (std::size_t i = 0; i < one.count; ++i)
+      for (std::size_t j = 0; j < other.count; ++j)
+        best_ = std::min(best_, part_to_close(direction.dot(x[0][i] - y[0][j]) - less,
+                                              direction.dot(x[1][i] - y[1][j]) - less, bend));
+    return Seen::kClear;
   }
 
   /// From the nearest point of y to that of x; zero where they intersect.
@@ -419,11 +271,17 @@ class Pair {
     return y_count == 2 ? Vec3(-difference(c)) : difference(c);
   }
 
-  Vec3 apart_ = Vec3::Zero(), falling_ = Vec3::Zero();
-  double acceleration_ = 0.0, offset_ = 0.0, thickness_ = 0.0;
-  std::array<Axis, 6> axes_;
-  std::size_t axis_count_ = 0;
+  double duration_ = 0.0;
+  std::array<Vec3, 2> apart_{Vec3::Zero(), Vec3::Zero()};
+  Vec3 falling_ = Vec3::Zero();
+  double thickness_ = 0.0, plane_bend_ = 0.0, offset_ = 0.0, doubt_ = 0.0, slab_round_off_ = 0.0;
+  internal::SlabWay way_;
   std::optional<ItemPair> last_;  // whose time was the least: likely to be it again
+
+  // Of the look at hand.
+  double kept_ = 0.0, margin_ = 0.0;
+  double best_ = 1.0, pruned_ = 1.0, nearest_ = 0.0;  // parts of the stretch; m
+  int visits_ = 0;
 };
 
 }  // namespace
@@ -453,17 +311,20 @@ ImpactTime TimeOfImpact::find(const MovingBody& first, const MovingBody& second,
   double t = 0.0, until = step;
   for (int n = 1; n <= impl_->options.max_advancements; ++n) {
     const double ahead = until - t;
-    const std::optional<double> safe = pair.advancement(t == 0.0 ? margin : tuning.kept_gap * margin, margin, ahead);
-    if (!safe) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
-    if (*safe < tuning.good_advancement * ahead && pair.has_offset()) {
+    double safe = 0.0;
+    const Pair::Seen seen = pair.advancement(t == 0.0 ? margin : tuning.kept_gap * margin, margin, safe);
+    if (seen == Pair::Seen::kTouching) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
+    const bool short_way = safe < tuning.good_advancement * ahead && pair.has_offset();
+    if (seen == Pair::Seen::kTooMuch || short_way) {
       const double kick = std::min(pair.a.smooth_until(t), pair.b.smooth_until(t));
-      until = std::min(t + std::max(tuning.look_nearer * ahead, tuning.look_again * *safe), kick > t ? kick : until);
+      const double nearer = std::clamp(tuning.look_again * safe, tuning.look_nearer * ahead, 0.5 * ahead);
+      until = std::min(t + nearer, kick > t ? kick : until);
       pair.look_ahead(t, until);
       continue;
     }
-    t += *safe;
+    t += safe;
     if (t >= step) return {Status::kNone, step, n};
-    until = std::min(step, t + tuning.look_farther * *safe);
+    until = std::min(step, t + tuning.look_farther * safe);
     pair.go_to(t, until);
   }
   return {Status::kResting, t, impl_->options.max_advancements};

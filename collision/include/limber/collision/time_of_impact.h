@@ -7,12 +7,13 @@
 ///   const MovingBody ball{.geometry = &sphere, .motion = &flight}, sheet{.surface = surface, .motion = &vibration};
 ///   const ImpactTime t = solver.find(ball, sheet, 1.0 / 60.0, 1e-4);
 ///
-/// For each pair of nodes or triangles, not of bodies, the time is bounded along the direction n that separates them:
-///   n·(x_a(t) − x_b(t)) ≥ gap − c t − ½ K t² − F
-/// c the closing speed of those points now, K a bound on all accelerations (gravity, turning, flexing), F on what is
-/// bounded as a whole: modes that swing and bodies that turn within the time looked ahead. Branch and bound finds the
-/// least. From a gap g the next is O(g²): few advancements. Derivation: docs/derivations/motion-bounds.md; what comes
-/// out in touch, at rest or past grazing: docs/collision.md.
+/// A stretch of time is looked at from both of its ends. Along a direction n two points whose gaps there are g₀ and g₁
+/// are in between, s of the stretch having passed, no nearer than
+///   (1 − s) g₀ + s g₁ − s (1 − s) B − F
+/// B from bounds on all accelerations (gravity, turning, flexing), F from what is bounded as a whole: modes that swing
+/// and bodies that turn within the stretch. Nodes and triangles are compared along sixteen directions at once; branch
+/// and bound finds the least time. From a gap g the next is O(g²): few advancements. Derivation:
+/// docs/derivations/collision.md, section 7; what comes out in touch, at rest or past grazing: docs/collision.md.
 ///
 /// Surfaces, modal or rigid, are their triangles, two-sided, whether or not they bound a solid; balls, capsules and
 /// half-spaces are solid. Triangles of one body against itself are not looked at.
