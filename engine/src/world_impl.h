@@ -186,6 +186,7 @@ struct World::Impl {
   double free_reach(Index body, const Vec3& displacement) const;
   static void expect_to_stay(BodyState& state);
   void expect(Index body);
+  void expect_in_part(Index body, double left);
   double beside(Index body, const ExpectedEnd& end) const;
   double difference(Index body, const Quaternion& q, std::span<const double> z, const ExpectedEnd& end) const;
   void foreseen_end(Index body, ExpectedEnd& end) const;

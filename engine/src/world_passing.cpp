@@ -151,6 +151,7 @@ void World::Impl::advance_passing(int part) {
     states[i].pose = group(entries[i]).frame(entries[i].slot).pose();
     states[i].reach = 0.0;
     states[i].displacement = states[i].rotation = Vec3::Zero();
+    expect_to_stay(states[i]);
   }
   p.turns.assign(entries.size(), 1);
   p.wears_shape.assign(entries.size(), 0);
@@ -206,6 +207,18 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
   for (const Index member : members) sleep.wake(member);
 }
 
+/// Where a body would be when the part ends, if nothing held it. What it meets takes at most its velocity from it.
+void World::Impl::expect_in_part(Index body, double left) {
+  const auto i = static_cast<std::size_t>(body);
+  BodyState& state = states[i];
+  ExpectedEnd& end = expected[i];
+  end.amplitudes.resize(state.amplitudes.size());
+  motions[i].at(left, end.pose, end.amplitudes);
+  state.end_pose = end.pose;
+  state.end_amplitudes = end.amplitudes;
+  state.doubt = fall() + state.displacement.norm();
+}
+
 /// Of the members among each other and with what never moves: as far as the smallest of them, so that where one part
 /// of it touches the others have their contacts.
 std::span<const ContactPoint> World::Impl::contacts_of_cluster(std::span<const Index> members, bool first,
@@ -216,6 +229,7 @@ std::span<const ContactPoint> World::Impl::contacts_of_cluster(std::span<const I
     smallest = std::min(smallest, entries[static_cast<std::size_t>(member)].extent.radius);
   for (const Index member : members) {
     write_state(member, left);
+    expect_in_part(member, left);
     states[static_cast<std::size_t>(member)].look_ahead = smallest;
   }
   if (first)

@@ -129,9 +129,12 @@ class PairSurface {
   void expect_end(DeformedSurface& end, const RigidTransform& X_PS) {
     end_ = &end;
     end_X_PS_ = X_PS;
+    end_turn_PS_ = to_matrix(X_PS.q);
   }
   // What a face passes through on the straight way there. @pre expect_end()
   const Aabb& swept_box(Index t);
+  // The same of all faces below a node of its tree.
+  const Aabb& swept_node(Index n);
   Vec3 expected_motion(const Vec3& point) const { return displacement_ + rotation_.cross(point - X_PS_.p); }
 
   // Faces that meet at a feature, whose key is that of a vertex, an edge or a face.
@@ -191,8 +194,9 @@ class PairSurface {
   Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
   DeformedSurface* end_ = nullptr;
   RigidTransform end_X_PS_{};
-  std::vector<std::uint32_t> swept_stamp_;
-  std::vector<Aabb> swept_;
+  Mat3 turn_PS_ = Mat3::Identity(), end_turn_PS_ = Mat3::Identity();
+  std::vector<std::uint32_t> swept_stamp_, swept_node_stamp_;
+  std::vector<Aabb> swept_, swept_nodes_;
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;
   std::vector<Vec3> vertices_;

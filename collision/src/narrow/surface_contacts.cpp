@@ -21,6 +21,19 @@ bool planes_separate(const PairSurface::Face& s, const PairSurface::Face& t, dou
   return beyond(s, t.x) || beyond(t, s.x);
 }
 
+// Nodes that stay apart on the way to where the bodies are expected: stay_apart() holds for all triangles below.
+class OnTheWay final : public NodePairTest {
+ public:
+  OnTheWay(PairSurface& a, PairSurface& b, double doubt) : a_(a), b_(b), doubt_(doubt) {}
+  bool leaves_out(Index node_a, Index node_b) override {
+    return apart(a_.swept_node(node_a), b_.swept_node(node_b), doubt_);
+  }
+
+ private:
+  PairSurface &a_, &b_;
+  double doubt_;
+};
+
 }  // namespace
 
 void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool self,
@@ -88,13 +101,15 @@ void SurfaceContacts::test_pairs(const RigidTransform& X_AB, const ContactReach&
 // The way counts as far as gaps go.
 void SurfaceContacts::find_pairs(const RigidTransform& X_AB, const ContactReach& reach) {
   DeformedSurface &a = side_[0]->deformed(), &b = side_[1]->deformed();
+  OnTheWay on_the_way(*side_[0], *side_[1], reach.doubt);
+  NodePairTest* test = std::isfinite(reach.doubt) ? &on_the_way : nullptr;
   if (reach.all_around()) {
-    find_triangle_pairs(a, b, X_AB, reach.margin, pairs_);
+    find_triangle_pairs(a, b, X_AB, reach.margin, pairs_, Vec3::Zero(), test);
     return;
   }
   const double way = reach.way_A.norm();
   const double share = way > 0.0 ? std::min(1.0, (reach.margin - reach.beside) / way) : 0.0;
-  find_triangle_pairs(a, b, X_AB, reach.beside, pairs_, share * reach.way_A);
+  find_triangle_pairs(a, b, X_AB, reach.beside, pairs_, share * reach.way_A, test);
 }
 
 bool SurfaceContacts::stay_apart(Index s, Index t, double doubt) {
