@@ -143,6 +143,10 @@ Index World::Impl::group_of(std::shared_ptr<const ModalModel> model) {
     const ModalModel& known = (*found)->model();
     skins[static_cast<std::size_t>(found - groups.begin())] =
         known.data().skin ? std::make_unique<internal::GroupSkin>(known) : nullptr;
+    halves.resize(groups.size());
+    const bool is_halved = options.half_precision && !known.data().skin;
+    halves[static_cast<std::size_t>(found - groups.begin())] =
+        is_halved ? std::make_unique<const HalfBasis>(known.render().basis) : nullptr;
   }
   return static_cast<Index>(found - groups.begin());
 }
@@ -214,6 +218,7 @@ void World::remove_body(BodyId id) {
     if (group.count() == 0) {  // lets go of the model
       impl_->dented[static_cast<std::size_t>(known.group)].reset();
       impl_->skins[static_cast<std::size_t>(known.group)].reset();
+      impl_->halves[static_cast<std::size_t>(known.group)].reset();
       impl_->groups[static_cast<std::size_t>(known.group)].reset();
     }
   }

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <string>
 
 #include "world_impl.h"
@@ -25,6 +27,18 @@ void World::Impl::interpolate(BodyId id, double s, Real* amplitudes) const {
   const std::span<const double> newest = group(e).amplitudes(e.slot), previous = group(e).previous_amplitudes(e.slot);
   for (std::size_t i = 0; i < newest.size(); ++i)
     amplitudes[i] = static_cast<Real>(s == 1.0 ? newest[i] : previous[i] + s * (newest[i] - previous[i]));
+}
+
+/// By how much a vertex drawn in half precision may be off between the last two states; infinite where there is none.
+double World::Impl::half_precision_error(const Entry& e, double tolerance, double s) const {
+  const HalfBasis* half = halves[static_cast<std::size_t>(e.group)].get();
+  if (half == nullptr || tolerance == 0.0) return HUGE_VAL;
+  const auto error = [&](std::span<const double> z) {
+    return std::transform_reduce(z.begin(), z.end(), half->errors().begin(), 0.0, std::plus<>(),
+                                 [](double amplitude, double off) { return std::abs(amplitude) * off; });
+  };
+  const double newest = error(group(e).amplitudes(e.slot));
+  return s == 1.0 ? newest : std::max(newest, error(group(e).previous_amplitudes(e.slot)));
 }
 
 /// Between the last two states, of which either may bend more.
@@ -74,14 +88,16 @@ void World::Impl::prepare_drawing(std::span<const DrawTarget> targets, double s)
     if (!(targets[i].tolerance >= 0.0) || !std::isfinite(targets[i].tolerance))
       throw InvalidArgument("World::reconstruct: tolerance is " + std::to_string(targets[i].tolerance) +
                             " m, expected at least 0 and finite");
-    drawn.push_back({e.group, modes_to_draw(e, targets[i].tolerance, s), i});
+    const double error = half_precision_error(e, targets[i].tolerance, s);
+    const bool half = error <= targets[i].tolerance;
+    drawn.push_back({e.group, half, modes_to_draw(e, targets[i].tolerance - (half ? error : 0.0), s), i});
     amplitudes += static_cast<std::size_t>(group(e).model().modes());
     if (is_dented(targets[i].id, s)) dents += numbers;
   }
   if (drawn_amplitudes.size() < amplitudes) drawn_amplitudes.resize(amplitudes);
   if (drawn_dents.size() < dents) drawn_dents.resize(dents);
   std::sort(drawn.begin(), drawn.end(), [](const Drawn& a, const Drawn& b) {
-    return std::tie(a.group, a.modes, a.target) < std::tie(b.group, b.modes, b.target);
+    return std::tie(a.group, a.half, a.modes, a.target) < std::tie(b.group, b.half, b.modes, b.target);
   });
 }
 
@@ -115,12 +131,14 @@ void World::reconstruct(std::span<const DrawTarget> targets, double interpolatio
   }
   const auto& drawn = impl_->drawn;
   for (std::size_t begin = 0, end = 0; begin < drawn.size(); begin = end) {
-    while (end < drawn.size() && drawn[end].group == drawn[begin].group) ++end;
-    const ModalModel& model = impl_->groups[static_cast<std::size_t>(drawn[begin].group)]->model();
+    const auto group = static_cast<std::size_t>(drawn[begin].group);
+    while (end < drawn.size() && drawn[end].group == drawn[begin].group && drawn[end].half == drawn[begin].half) ++end;
+    const ModalModel& model = m.groups[group]->model();
     const std::span<const ReconstructionTarget> of_model = std::span(m.reconstruction).subspan(begin, end - begin);
     if (model.data().skin)
-      limber::reconstruct(model.render(), m.skins[static_cast<std::size_t>(drawn[begin].group)]->tiles(), of_model,
-                          *m.jobs);
+      limber::reconstruct(model.render(), m.skins[group]->tiles(), of_model, *m.jobs);
+    else if (drawn[begin].half)
+      limber::reconstruct(model.render(), *m.halves[group], of_model, *m.jobs);
     else
       limber::reconstruct(model.render(), of_model, *m.jobs);
   }

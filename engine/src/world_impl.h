@@ -20,6 +20,7 @@
 #include "limber/core/error.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/exact_motion.h"
+#include "limber/dynamics/half_basis.h"
 #include "limber/dynamics/reconstruct.h"
 #include "limber/engine/world.h"
 #include "passing_bodies.h"
@@ -77,6 +78,7 @@ struct World::Impl {
   std::vector<std::unique_ptr<BodyGroup>> groups;                // null where the last body of a model was removed
   std::vector<std::unique_ptr<internal::DentedSurface>> dented;  // by group; null where nothing dents its bodies
   std::vector<std::unique_ptr<internal::GroupSkin>> skins;       // by group; null where the model has none
+  std::vector<std::unique_ptr<const HalfBasis>> halves;          // by group; null where none is kept
   std::vector<Range> ranges;                                     // covers the bodies that are awake
   std::vector<std::pair<Index, Index>> awake_slots;              // scratch of make_ranges(): group and slot
   std::uint64_t ranges_of = 0, states_of = 0, contacts_of = 0;   // SleepStage::changes(), the last: wakings()
@@ -122,6 +124,7 @@ struct World::Impl {
   // Scratch of drawing, kept so that it is not allocated again.
   struct Drawn {
     Index group;
+    bool half;
     Index modes;
     std::size_t target;
   };
@@ -221,6 +224,7 @@ struct World::Impl {
   bool is_dented(BodyId id, double s) const;
   template <class Real>
   void interpolate(BodyId id, double s, Real* amplitudes) const;
+  double half_precision_error(const Entry& e, double tolerance, double s) const;
   Index modes_to_draw(const Entry& e, double tolerance, double s) const;
   const SkinPose* skin_at(BodyId id, const double* z) const;
   void prepare_drawing(std::span<const DrawTarget> targets, double s);

@@ -16,11 +16,12 @@ constexpr double kFloat = 1e-6;  // of single precision at 1 m
 
 /// A box of 20 modes that ring, each shown by a little less than the one before.
 struct RingingBox {
-  World world{{.gravity = Vec3::Zero()}};
+  World world;
   BodyId id = world.add_body(testing::sample_model({.modes = 20}));
   std::size_t floats = 3 * static_cast<std::size_t>(world.model(id).render().vertices());
 
-  RingingBox() {
+  explicit RingingBox(bool half_precision = false)
+      : world({.gravity = Vec3::Zero(), .half_precision = half_precision}) {
     std::vector<double> z(20), rates(20, 0.0);
     for (std::size_t i = 0; i < z.size(); ++i)
       z[i] = 0.1 * std::pow(0.6, static_cast<double>(i)) / world.model(id).render_extent().shape[i];
@@ -66,6 +67,19 @@ TEST(WorldDetail, NoVertexIsOffByMoreThanTheTolerance) {
     }
   }
   EXPECT_GT(seen, 0.1);  // something was left out
+}
+
+TEST(WorldDetail, HalfPrecisionIsPartOfTheTolerance) {
+  RingingBox box, lean(true);
+  for (int n = 0; n < 50; ++n) {
+    box.world.step(), lean.world.step();
+    for (const double tolerance : {3e-5, 1e-3, 1e-2})
+      for (const double s : {0.4, 1.0})
+        EXPECT_LE(distance(lean.drawn(tolerance, s), box.drawn(0.0, s)), tolerance + kFloat);
+    EXPECT_GT(distance(lean.drawn(1e-3), box.drawn(1e-3)), kFloat);  // read from the shapes in half precision
+    // Where their error is too large, shapes are those in single precision.
+    for (const double tolerance : {0.0, 1e-8}) EXPECT_EQ(lean.drawn(tolerance), box.drawn(tolerance));
+  }
 }
 
 TEST(WorldDetail, ABodyThatGoesAwayJumpsByNoMoreThanTheTolerance) {

@@ -92,6 +92,10 @@ struct WorldOptions {
   Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s², world
   int max_steps_per_advance = 8;  ///< ≥ 1; time beyond this is dropped (and counted), so a slow frame cannot snowball
   SleepOptions sleep{};
+  /// Keeps the drawn surfaces' shapes in half precision too (half_basis.h), half as many bytes again: a body that is
+  /// drawn with a tolerance is drawn from these where what they are off by is within it. Half the time to read where
+  /// bodies are drawn that share no shapes. Not for bodies with a modal skin.
+  bool half_precision = false;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
@@ -179,8 +183,8 @@ struct DrawTarget {
   std::span<float> positions;  ///< 3V floats of the render surface
   std::span<float> normals{};  ///< empty, or 3V floats
   /// m, ≥ 0: modes that together move no vertex by more than this are not drawn, so that a body that is far away is
-  /// drawn by few (visible_displacement() of mode_selection.h). More or fewer from frame to frame show as a jump of no
-  /// more than this; normals go by the vertices.
+  /// drawn by few (visible_displacement() of mode_selection.h); what WorldOptions::half_precision is off by is part of
+  /// it. More or fewer from frame to frame show as a jump of no more than this; normals go by the vertices.
   double tolerance = 0.0;
 };
 
