@@ -89,7 +89,8 @@ unsigned faults(const StabilityCase& at, const StabilityResult& r) {
     if (at_fault) bits |= 1u << static_cast<unsigned>(fault);
   };
   judge(StabilityFault::kNotFinite, !r.finite);
-  judge(StabilityFault::kEnergy, !recovers && (r.total_rise > kRise || r.node_total_rise > kRise + 2.0 * r.spin_bound));
+  const double rise = kRise + (16.0 + r.steps) * r.energy_digits;  // each step rounds it
+  judge(StabilityFault::kEnergy, !recovers && (r.total_rise > rise || r.node_total_rise > rise + 2.0 * r.spin_bound));
   judge(StabilityFault::kPassed, r.passed);
   judge(StabilityFault::kOverlap, r.rest_overlap > kMostOverlap);
   judge(StabilityFault::kOffTarget, r.off_target > kOff + digits);

@@ -94,6 +94,8 @@ class Scene {
       result.node_worst_rise = std::max(result.node_worst_rise, (node_now - node_before) / scale_);
       result.node_total_rise = std::max(result.node_total_rise, (node_now - node_first) / scale_);
       if (!world_.constraint_report().solved) ++result.unsettled;
+      result.energy_digits = std::max(result.energy_digits, energy_digits());
+      result.largest_turn = std::max(result.largest_turn, largest_turn());
       result.removed += world_.constraint_report().energy_removed / scale_;
       see_places(result);
       before = now, node_before = node_now;
@@ -118,6 +120,7 @@ class Scene {
     if (at_.varying_step) world_.set_step(at_.step * std::uniform_real_distribution<double>(0.1, 1.0)(random));
     const bool pauses = at_.pause > 0.0 && world_.step_count() == kPauseAfter;
     if (pauses) world_.set_step(at_.pause);
+    last_step_ = world_.options().step;
     world_.step();
     if (pauses) world_.set_step(at_.step);
   }
@@ -187,6 +190,20 @@ class Scene {
       sum += e.kinetic_rigid + e.kinetic_modal + e.elastic;
     }
     return sum;
+  }
+  /// Kinetic and potential energy cancel where bodies fall far: their sum has no digits beyond those of either.
+  double energy_digits() const {
+    double sum = 0.0;
+    for (const BodyId id : bodies_) {
+      const BodyEnergy e = world_.energy(id);
+      sum += e.kinetic_rigid + std::abs(e.potential);
+    }
+    return kEpsilon * sum / scale_;
+  }
+  double largest_turn() const {
+    double turn = 0.0;
+    for (const BodyId id : bodies_) turn = std::max(turn, last_step_ * world_.body(id).angular_velocity.norm());
+    return turn;
   }
   double total() const {
     double sum = 0.0;
@@ -260,7 +277,7 @@ class Scene {
   std::vector<float> vertices_;
   State start_{};
   bool has_ground_ = false;
-  double scale_ = 1.0;
+  double scale_ = 1.0, last_step_ = 0.0;
 };
 
 }  // namespace

@@ -48,9 +48,10 @@ inline constexpr int kAllModes = 1000;
 
 /// What was seen. Energies over their scale: the largest of the energy put in and Σ m g size.
 struct StabilityResult {
-  double worst_rise = 0.0;  ///< of World::energy in a step
-  double total_rise = 0.0;  ///< largest excess over the energy that was put in
-  double removed = 0.0;     ///< what the constraints took out on purpose (ConstraintReport)
+  double worst_rise = 0.0;     ///< of World::energy in a step
+  double total_rise = 0.0;     ///< largest excess over the energy that was put in
+  double energy_digits = 0.0;  ///< round-off of the largest kinetic and potential energies, whose sum this is
+  double removed = 0.0;        ///< what the constraints took out on purpose (ConstraintReport)
 
   // The same by the nodes of the meshes (energy_meter.h).
   double node_worst_rise = 0.0, node_total_rise = 0.0;
@@ -62,6 +63,7 @@ struct StabilityResult {
   double overlap = 0.0;          ///< deepest vertex below the ground, over the bar's length
   double rest_overlap = 0.0;     ///< the same at the last step
   bool passed = false;           ///< some body was wholly below the ground
+  double largest_turn = 0.0;     ///< by which a body turned in a step, rad
   double off_target = 0.0;       ///< of the held point or the joints, over the bar's length
   double momentum_error = 0.0;   ///< of the mass centre's parabola and of the angular momentum, relative; kFlight
   int steps = 0, unsettled = 0;  ///< steps; those in which some island did not come to its targets

@@ -3,27 +3,25 @@
 
 #include <gtest/gtest.h>
 
-#include "asked.h"
-
 namespace limber::testing {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__)
-constexpr int kDrawn = 1, kExtremeSteps = 10;
+constexpr int kExtremeSteps = 10;
 #else
-constexpr int kDrawn = 3, kExtremeSteps = 60;
+constexpr int kExtremeSteps = 60;
 #endif
 
 bool flies_or_falls(const StabilityCase& at) {
   return at.scene == StabilityScene::kFlight || at.scene == StabilityScene::kGround;
 }
 
+#if defined(__SANITIZE_ADDRESS__)
+/// In other builds tools.stability_within_its_limits sees more than this.
 TEST(Extremes, NothingIsEverNotFinite) {
-  for (const StabilityCase& at : extreme_cases(static_cast<int>(asked("LIMBER_DRAWN", kDrawn)))) {
-    const StabilityResult seen = run(at, kExtremeSteps);
-    EXPECT_TRUE(seen.finite) << text(at);
-  }
+  for (const StabilityCase& at : extreme_cases(1)) EXPECT_TRUE(run(at, kExtremeSteps).finite) << text(at);
 }
+#endif
 
 /// One quantity at a time: whatever flies keeps its momentum and energy, whatever falls on the ground stays above it
 /// and keeps its energy; every step settles. Not so where steps vary from one to the next: modes that pass the step's

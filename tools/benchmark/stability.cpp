@@ -3,13 +3,22 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
+#include <sstream>
+#include <variant>
 
+#include "../cpu_time.h"
+#include "figures.h"
 #include "limber/core/error.h"
+#include "limber/core/file.h"
+#include "limber/internal/strict_json.h"
 #include "plot.h"
 #include "program.h"
 #include "stability_scenes.h"
@@ -23,10 +32,10 @@ using limber::testing::StabilityResult;
 using Json = nlohmann::ordered_json;
 
 struct StabilityArguments {
-  std::string grid = "extremes", scene, csv, plot;
-  int random = 360, steps = 120, every = 1;
+  std::string grid = "extremes", csv, plot, limits, peer;
+  std::vector<std::string> scenes, known;
+  int random = 360, steps = 120, every = 1, first = 0;
   bool simplify = false;
-  std::string peer;
 };
 
 /// A case and what became of it.
@@ -35,28 +44,39 @@ struct CaseRow {
   std::optional<StabilityResult> seen{};  // none: the bake did not take the body
   std::string refused{};                  // why
   unsigned faults = 0;
+  double seconds = 0.0;                   // of this thread
   std::optional<StabilityResult> peer{};  // none: not asked for, or it cannot express the case
   unsigned peer_faults = 0;
 };
 
-CaseRow try_case(const StabilityCase& at, int steps, bool with_peer = false) {
-  CaseRow row{.at = at};
-  try {
-    row.seen = testing::run(at, steps);
-    row.faults = testing::faults(at, *row.seen);
-    if (!with_peer || !testing::bullet_can(at)) return row;
-    row.peer = testing::run_by_bullet(at, steps);
-    row.peer_faults = testing::faults(at, *row.peer);
-  } catch (const Error& e) {
-    row.refused = e.what();
-  }
-  return row;
-}
+// Tables -----------------------------------------------------------------------------------------------------------
 
-/// The simplest case found with one of the same faults.
-CaseRow simplest(const CaseRow& bad, int steps) {
-  const auto is_alike = [&](const StabilityCase& at) { return (try_case(at, steps).faults & bad.faults) != 0; };
-  return try_case(testing::simplified(bad.at, is_alike), steps);
+using Place = std::variant<double StabilityResult::*, int StabilityResult::*, bool StabilityResult::*>;
+constexpr std::array<std::pair<const char*, Place>, 18> kResults{
+    {{"steps", &StabilityResult::steps},
+     {"unsettled", &StabilityResult::unsettled},
+     {"finite", &StabilityResult::finite},
+     {"worst_rise", &StabilityResult::worst_rise},
+     {"total_rise", &StabilityResult::total_rise},
+     {"energy_digits", &StabilityResult::energy_digits},
+     {"node_worst_rise", &StabilityResult::node_worst_rise},
+     {"node_total_rise", &StabilityResult::node_total_rise},
+     {"spin_bound", &StabilityResult::spin_bound},
+     {"spin_excess", &StabilityResult::spin_excess},
+     {"strain_difference", &StabilityResult::strain_difference},
+     {"removed", &StabilityResult::removed},
+     {"overlap", &StabilityResult::overlap},
+     {"rest_overlap", &StabilityResult::rest_overlap},
+     {"passed", &StabilityResult::passed},
+     {"off_target", &StabilityResult::off_target},
+     {"largest_turn", &StabilityResult::largest_turn},
+     {"momentum_error", &StabilityResult::momentum_error}}};
+
+double value_of(const StabilityResult& r, const Place& place) {
+  return std::visit([&](auto member) { return static_cast<double>(r.*member); }, place);
+}
+void set_value(StabilityResult& r, const Place& place, double value) {
+  std::visit([&](auto member) { r.*member = static_cast<std::decay_t<decltype(r.*member)>>(value); }, place);
 }
 
 std::string names_of(unsigned faults) {
@@ -71,27 +91,104 @@ std::string verdict(const CaseRow& row) {
   return row.faults == 0 ? "good" : names_of(row.faults);
 }
 
-std::string csv_of(const std::vector<CaseRow>& rows) {
-  std::string csv = "scene";
-  for (const auto& [column, value] : testing::coordinates({})) csv += fmt::format(",{}", column);
-  csv +=
-      ",verdict,steps,unsettled,worst_rise,total_rise,node_worst_rise,node_total_rise,spin_bound,spin_excess,"
-      "strain_difference,removed,overlap,rest_overlap,passed,off_target,momentum_error,peer_verdict,peer_total_rise,"
-      "peer_overlap\n";
-  for (const CaseRow& row : rows) {
-    csv += testing::name(row.at.scene);
-    for (const auto& [column, value] : testing::coordinates(row.at)) csv += fmt::format(",{:g}", value);
-    const StabilityResult r = row.seen.value_or(StabilityResult{});
-    csv +=
-        fmt::format(",{},{},{},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{},{:.3g},{:.3g}",
-                    verdict(row), r.steps, r.unsettled, r.worst_rise, r.total_rise, r.node_worst_rise,
-                    r.node_total_rise, r.spin_bound, r.spin_excess, r.strain_difference, r.removed, r.overlap,
-                    r.rest_overlap, r.passed ? 1 : 0, r.off_target, r.momentum_error);
-    const StabilityResult p = row.peer.value_or(StabilityResult{});
-    const std::string peer = !row.peer ? "" : row.peer_faults == 0 ? "good" : names_of(row.peer_faults);
-    csv += fmt::format(",{},{:.3g},{:.3g}\n", peer, p.total_rise, p.overlap);
+/// A case as its columns of the table.
+std::string key_of(const StabilityCase& at) {
+  std::string key = testing::name(at.scene);
+  for (const auto& [column, value] : testing::coordinates(at)) key += fmt::format(",{:g}", value);
+  return key;
+}
+
+std::string csv_head() {
+  std::string head = "scene";
+  for (const auto& [column, value] : testing::coordinates({})) head += fmt::format(",{}", column);
+  head += ",verdict,seconds";
+  for (const auto& [column, place] : kResults) head += fmt::format(",{}", column);
+  head += ",peer_verdict";
+  for (const auto& [column, place] : kResults) head += fmt::format(",peer_{}", column);
+  return head;
+}
+
+std::string csv_of(const CaseRow& row) {
+  const auto results = [](const std::optional<StabilityResult>& r) {
+    std::string out;
+    for (const auto& [column, place] : kResults) out += r ? fmt::format(",{:.6g}", value_of(*r, place)) : ",";
+    return out;
+  };
+  const std::string peer = !row.peer ? "" : row.peer_faults == 0 ? "good" : names_of(row.peer_faults);
+  return key_of(row.at) + fmt::format(",{},{:.3g}", verdict(row), row.seconds) + results(row.seen) + "," + peer +
+         results(row.peer);
+}
+
+/// Cases of earlier tables, by their keys.
+using KnownRows = std::map<std::string, std::vector<std::string>>;
+
+KnownRows read_known(Program& program, const std::vector<std::string>& files) {
+  KnownRows known;
+  const std::size_t coordinates = 1 + testing::coordinates({}).size();
+  for (const std::string& file : files) {
+    std::istringstream lines(read_file(file));
+    program.add_input(file);
+    std::string line;
+    if (!std::getline(lines, line) || line != csv_head())
+      throw InputError(internal::in_quotes(file) + ": is no table of this program's --csv, expected its columns");
+    const std::ptrdiff_t columns = std::count(line.begin(), line.end(), ',') + 1;
+    for (int number = 2; std::getline(lines, line); ++number) {
+      std::vector<std::string> fields;
+      std::istringstream row(line + ",");
+      for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
+      if (std::ssize(fields) != columns)
+        throw InputError(fmt::format("{}: line {} has {} fields, expected {}", internal::in_quotes(file), number,
+                                     fields.size(), columns));
+      const auto end = fields.begin() + static_cast<std::ptrdiff_t>(coordinates);
+      known[fmt::format("{}", fmt::join(fields.begin(), end, ","))] = {end, fields.end()};
+    }
   }
-  return csv;
+  return known;
+}
+
+/// Results that a table tells from a field on; none where it has none.
+std::optional<StabilityResult> results_at(std::span<const std::string> fields, const std::string& key) {
+  if (fields.front().empty()) return std::nullopt;
+  StabilityResult r;
+  for (std::size_t i = 0; i < kResults.size(); ++i) {
+    char* end = nullptr;
+    set_value(r, kResults[i].second, std::strtod(fields[i].c_str(), &end));
+    if (end == fields[i].c_str() || *end != '\0')
+      throw InputError(
+          fmt::format("--known: {} of {} is \"{}\", expected a number", kResults[i].first, key, fields[i]));
+  }
+  return r;
+}
+
+// Runs -------------------------------------------------------------------------------------------------------------
+
+CaseRow try_case(const StabilityCase& at, int steps, bool with_peer = false, const KnownRows& known = {}) {
+  CaseRow row{.at = at};
+  if (const auto told = known.find(key_of(at)); told != known.end()) {
+    const std::span<const std::string> fields = told->second;  // verdict, seconds, …, the peer's verdict, …
+    row.seconds = std::strtod(fields[1].c_str(), nullptr);
+    row.seen = results_at(fields.subspan(2), told->first);
+    row.peer = results_at(fields.subspan(3 + kResults.size()), told->first);
+  }
+  try {
+    if (!row.seen) {
+      const double begin = thread_seconds();
+      row.seen = testing::run(at, steps);
+      row.seconds = thread_seconds() - begin;
+    }
+    if (with_peer && !row.peer && testing::bullet_can(at)) row.peer = testing::run_by_bullet(at, steps);
+  } catch (const Error& e) {
+    row.refused = e.what();
+  }
+  if (row.seen) row.faults = testing::faults(at, *row.seen);
+  if (row.peer) row.peer_faults = testing::faults(at, *row.peer);
+  return row;
+}
+
+/// The simplest case found with one of the same faults.
+CaseRow simplest(const CaseRow& bad, int steps) {
+  const auto is_alike = [&](const StabilityCase& at) { return (try_case(at, steps).faults & bad.faults) != 0; };
+  return try_case(testing::simplified(bad.at, is_alike), steps);
 }
 
 /// What became of the cases of one scene.
@@ -100,6 +197,7 @@ struct SceneTally {
   std::array<int, testing::kStabilityFaults> by_fault{};
   long steps = 0, unsettled = 0;
   double worst_rise = 0.0;  // where nothing recovers
+  double seconds = 0.0;
 
   void add(const CaseRow& row) {
     ++cases;
@@ -107,6 +205,7 @@ struct SceneTally {
     if (!row.seen) return;
     good += row.faults == 0 ? 1 : 0;
     for (std::size_t i = 0; i < by_fault.size(); ++i) by_fault[i] += static_cast<int>(row.faults >> i & 1u);
+    seconds += row.seconds;
     steps += row.seen->steps, unsettled += row.seen->unsettled;
     if (row.at.recovery_speed == 0.0) worst_rise = std::max(worst_rise, row.seen->worst_rise);
   }
@@ -115,13 +214,13 @@ struct SceneTally {
 std::string line(std::string_view scene, const SceneTally& t) {
   std::string out = fmt::format("{:<8} {:>6} {:>6} {:>8}", scene, t.cases, t.good, t.refused);
   for (const int count : t.by_fault) out += fmt::format(" {:>10}", count);
-  return out + fmt::format(" {:>9.1e}\n", t.worst_rise);
+  return out + fmt::format(" {:>9.1e} {:>8.1f}\n", t.worst_rise, t.seconds);
 }
 
 std::string head() {
   std::string out = fmt::format("{:<8} {:>6} {:>6} {:>8}", "scene", "cases", "good", "refused");
   for (int i = 0; i < testing::kStabilityFaults; ++i) out += fmt::format(" {:>10}", name(StabilityFault(i)));
-  return out + fmt::format(" {:>9}\n", "rise");
+  return out + fmt::format(" {:>9} {:>8}\n", "rise", "seconds");
 }
 
 /// What both engines made of the cases that both can express.
@@ -146,13 +245,14 @@ std::string peer_table(const std::vector<CaseRow>& rows) {
   return out;
 }
 
-/// Share of bad cases over stiffness and step, one field a pair.
+/// Share of bad cases over stiffness and step, one field a pair; a panel of the cases without an hour in one step, and
+/// one of those with.
 std::string svg_of(const std::vector<CaseRow>& rows) {
-  std::map<std::pair<double, double>, std::pair<int, int>> fields;  // bad, all
+  std::map<std::pair<double, double>, std::pair<int, int>> fields[2];  // bad, all
   std::map<double, int> moduli, steps;
   for (const CaseRow& row : rows) {
     if (!row.seen) continue;
-    auto& [bad, all] = fields[{row.at.youngs_modulus, row.at.step}];
+    auto& [bad, all] = fields[row.at.pause > 0.0 ? 1 : 0][{row.at.youngs_modulus, row.at.step}];
     bad += row.faults != 0 ? 1 : 0, ++all;
     moduli[row.at.youngs_modulus], steps[row.at.step];
   }
@@ -161,20 +261,44 @@ std::string svg_of(const std::vector<CaseRow>& rows) {
     for (auto& [level, at] : levels) at = i++;
   };
   number(moduli), number(steps);
-  std::string data, labels_x, labels_y, commands;
-  for (const auto& [place, count] : fields)
-    data += fmt::format("{},{},{},{}/{}\n", moduli[place.first], steps[place.second],
-                        100.0 * count.first / count.second, count.first, count.second);
+  std::string data, labels_x, labels_y, plots;
   for (const auto& [level, at] : moduli) labels_x += fmt::format("{}'{:.0e}' {}", at > 0 ? "," : "", level, at);
   for (const auto& [level, at] : steps) labels_y += fmt::format("{}'{:.2g}' {}", at > 0 ? "," : "", level, at);
-  commands = fmt::format(
+  int panels = 0;
+  for (int paused = 0; paused < 2; ++paused) {
+    if (fields[paused].empty()) continue;
+    for (const auto& [place, count] : fields[paused])
+      data += fmt::format("{},{},{},{}/{}\n", moduli[place.first], steps[place.second],
+                          100.0 * count.first / count.second, count.first, count.second);
+    data += "\n\n";
+    plots += fmt::format(
+        "set title '{}'\nplot 'data.csv' index {} using 1:2:3 with image pixels notitle, '' index {} using 1:2:4 with "
+        "labels font ',10' notitle\n",
+        paused == 0 ? "all but those with an hour in one step" : "with an hour in one step", panels, panels);
+    ++panels;
+  }
+  const std::string commands = fmt::format(
       "set datafile separator ','\nset xtics ({})\nset ytics ({})\nset xlabel \"Young's modulus, Pa\"\nset ylabel "
-      "'step, s'\n"
-      "set title 'share of cases at fault, %; at fault / all'\nset cbrange [0:100]\n"
-      "set palette defined (0 '#f7fbff', 10 '#fdd0a2', 100 '#a50f15')\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\n"
-      "plot 'data.csv' using 1:2:3 with image pixels notitle, '' using 1:2:4 with labels font ',10' notitle",
-      labels_x, labels_y, static_cast<double>(moduli.size()) - 0.5, static_cast<double>(steps.size()) - 0.5);
-  return svg_by_gnuplot({820, 520}, data, commands);
+      "'step, s'\nset cbrange [0:100]\nset palette defined (0 '#f7fbff', 10 '#fdd0a2', 100 '#a50f15')\n"
+      "set cblabel 'share at fault, %'\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\n"
+      "set multiplot layout {},1 title 'cases at fault / all'\n{}unset multiplot\n",
+      labels_x, labels_y, static_cast<double>(moduli.size()) - 0.5, static_cast<double>(steps.size()) - 0.5, panels,
+      plots);
+  return svg_by_gnuplot({820, 60 + 420 * panels}, data, commands);
+}
+
+/// What a change must not make worse.
+std::vector<Figure> figures_of(const std::map<std::string, SceneTally>& tallies) {
+  std::vector<Figure> figures;
+  for (const auto& [scene, tally] : tallies) {
+    if (scene == "all") continue;
+    figures.push_back({scene + ".cases", static_cast<double>(tally.cases)});
+    for (int i = 0; i < testing::kStabilityFaults; ++i)
+      figures.push_back({fmt::format("{}.{}", scene, name(StabilityFault(i))),
+                         static_cast<double>(tally.by_fault[static_cast<std::size_t>(i)])});
+    figures.push_back({scene + ".unsettled_steps", static_cast<double>(tally.unsettled)});
+  }
+  return figures;
 }
 
 void benchmark_stability(Program& program, const StabilityArguments& a) {
@@ -182,12 +306,15 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
     throw InvalidArgument("--peer: this build found no Bullet (apt-get install libbullet-dev, then configure anew)");
   const std::vector<StabilityCase> grid =
       a.grid == "energy" ? testing::energy_grid() : testing::extreme_cases(a.random);
+  const KnownRows known = read_known(program, a.known);
   std::vector<CaseRow> rows;
   std::map<std::string, SceneTally> tallies;
-  for (std::size_t i = 0; i < grid.size(); i += static_cast<std::size_t>(a.every)) {
-    if (!a.scene.empty() && a.scene != testing::name(grid[i].scene)) continue;
+  for (std::size_t i = static_cast<std::size_t>(a.first); i < grid.size(); i += static_cast<std::size_t>(a.every)) {
+    if (!a.scenes.empty() &&
+        std::find(a.scenes.begin(), a.scenes.end(), testing::name(grid[i].scene)) == a.scenes.end())
+      continue;
     program.progress().stage(testing::text(grid[i]));
-    rows.push_back(try_case(grid[i], a.steps, !a.peer.empty()));
+    rows.push_back(try_case(grid[i], a.steps, !a.peer.empty(), known));
     tallies[testing::name(grid[i].scene)].add(rows.back());
     tallies["all"].add(rows.back());
   }
@@ -217,8 +344,13 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   report["steps"] = all.steps;
   report["unsettled_steps"] = all.unsettled;
   report["worst_rise"] = all.worst_rise;
-  if (!a.csv.empty()) program.write_file(a.csv, csv_of(rows));
+  if (!a.csv.empty()) {
+    std::string csv = csv_head() + "\n";
+    for (const CaseRow& row : rows) csv += csv_of(row) + "\n";
+    program.write_file(a.csv, csv);
+  }
   if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows));
+  if (!a.limits.empty()) hold_to_limits(program, figures_of(tallies), a.limits);
 }
 
 void declare(CLI::App& app, StabilityArguments& a) {
@@ -229,8 +361,9 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("NAME")
       ->check(CLI::IsMember({"extremes", "energy"}))
       ->capture_default_str();
-  app.add_option("--scene", a.scene, "this scene alone: flight, ground, pile, handle or chain")
-      ->type_name("NAME")
+  app.add_option("--scene", a.scenes, "these scenes alone: flight, ground, pile, handle, chain")
+      ->type_name("NAME,...")
+      ->delimiter(',')
       ->check(CLI::IsMember({"flight", "ground", "pile", "handle", "chain"}));
   app.add_option("--random", a.random, "random cases of each scene, for --grid extremes")
       ->type_name("N")
@@ -244,11 +377,20 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
+  app.add_option("--first", a.first, "the first of these, from 0: the grid in so many parts")
+      ->type_name("I")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
   app.add_option("--peer", a.peer, "run what Bullet's reduced deformable body can express by that, too")
       ->type_name("bullet")
       ->check(CLI::IsMember({"bullet"}));
   app.add_flag("--simplify", a.simplify,
                "tell for each case at fault the simplest one found that shares a fault with it");
+  app.add_option("--known", a.known, "take cases from these tables of earlier --csv, and run only the others")
+      ->type_name("FILE.csv,...")
+      ->delimiter(',');
+  app.add_option("--check", a.limits, "hold the counts of faults to these limits, and fail beyond them")
+      ->type_name("FILE.json");
   app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
   app.add_option("--plot", a.plot, "plot the share of faults over stiffness and step (needs gnuplot)")
       ->type_name("FILE.svg");
