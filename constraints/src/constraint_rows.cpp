@@ -14,13 +14,24 @@ void ConstraintRows::clear() {
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {
   Row& row = rows_.emplace_back(Row{.sides = {}, .law = law});
-  for (int s = 0; s < 2; ++s) {
+  const bool itself = a.body >= 0 && a.body == b.body;
+  for (int s = 0; s < (itself ? 1 : 2); ++s) {
     const RowSide& side = s == 0 ? a : b;
     if (side.body < 0) continue;
     row.sides[s] = {side.body, side.linear, side.angular, modal_.size(), side.modal.size()};
     modal_.insert(modal_.end(), side.modal.begin(), side.modal.end());
   }
+  if (itself) add_to(row.sides[0], b);
   return size() - 1;
+}
+
+void ConstraintRows::add_to(Side& side, const RowSide& other) {
+  side.linear += other.linear, side.angular += other.angular;
+  if (side.modal_count < other.modal.size()) {
+    side.modal_count = other.modal.size();
+    modal_.resize(side.modal_begin + side.modal_count, 0.0);
+  }
+  for (std::size_t i = 0; i < other.modal.size(); ++i) modal_[side.modal_begin + i] += other.modal[i];
 }
 
 void ConstraintRows::take_modal(const ConstraintRows& from, Index row, std::size_t side) {

@@ -61,9 +61,11 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
     for (const VertexShare& s : other.region) answer += s.share * b.answer[b.in_regions(s.vertex)];
     const Mat3 G = other.axes.transpose() * answer * side.axes;
     const bool itself = &other == &b.rows.back();
+    // Both sides of one contact, where a body touches itself: each gives to the other's force as well.
+    const bool opposite = !itself && other.first == side.first;
     for (Index p = 0; p < side.count; ++p)
       for (Index q = 0; q < (itself ? p + 1 : other.count); ++q)
-        rows.add_flexibility(body, side.first + p, other.first + q, G(q, p));
+        rows.add_flexibility(body, side.first + p, other.first + q, (opposite && p == q ? 2.0 : 1.0) * G(q, p));
   }
 }
 

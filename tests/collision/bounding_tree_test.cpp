@@ -204,28 +204,20 @@ TEST(TreeTraversal, SelfPairsHoldWhatBruteForceFinds) {
   for (int trial = 0; trial < 12; ++trial) {
     a.bind(s, random.amplitudes(6, trial % 2 ? 2.0 : 0.05), static_cast<BoundsChoice>(trial % 3));
     const double margin = trial % 4 < 2 ? 0.0 : 0.02;
-    for (const bool near_at_rest : {false, true}) {
-      std::vector<TrianglePair> pairs;
-      find_self_pairs(a, margin, near_at_rest, pairs);
-      const std::set<TrianglePair> found(pairs.begin(), pairs.end());
-      EXPECT_EQ(found.size(), pairs.size());
-      for (Index t = 0; t < s->triangles(); ++t)
-        for (Index u = t + 1; u < s->triangles(); ++u) {
-          const auto at_rest = [&](Index i) {
-            const auto& [p, q, r] = s->triangle(i);
-            return TrianglePoints{s->rest(p), s->rest(q), s->rest(r)};
-          };
-          const bool left_out =
-              s->adjacent(t, u) || (!near_at_rest && closest_points(at_rest(t), at_rest(u)).distance <= margin);
-          if (left_out) {
-            EXPECT_FALSE(found.contains({t, u}));
-          } else if (!found.contains({t, u})) {
-            ASSERT_GT(closest_points(a.triangle(t), a.triangle(u)).distance, margin);
-          } else {
-            ++touching;
-          }
+    std::vector<TrianglePair> pairs;
+    find_self_pairs(a, margin, pairs);
+    const std::set<TrianglePair> found(pairs.begin(), pairs.end());
+    EXPECT_EQ(found.size(), pairs.size());
+    for (Index t = 0; t < s->triangles(); ++t)
+      for (Index u = t + 1; u < s->triangles(); ++u) {
+        if (s->adjacent(t, u)) {
+          EXPECT_FALSE(found.contains({t, u}));
+        } else if (!found.contains({t, u})) {
+          ASSERT_GT(closest_points(a.triangle(t), a.triangle(u)).distance, margin);
+        } else {
+          ++touching;
         }
-    }
+      }
   }
   EXPECT_GT(touching, 100) << "the bar was to meet itself";
 }
@@ -238,7 +230,7 @@ TEST(TreeTraversal, PartsFarApartAtRestAreNoPairs) {
   DeformedSurface a;
   a.bind(s, std::vector<double>(4, 0.1));
   std::vector<TrianglePair> pairs;
-  find_self_pairs(a, 0.1, true, pairs);
+  find_self_pairs(a, 0.1, pairs);
   for (const auto& [t, u] : pairs) EXPECT_EQ(t < of_first, u < of_first);
 }
 
@@ -258,7 +250,7 @@ TEST(TreeTraversal, DegenerateSurfacesAreWalked) {
       std::vector<TrianglePair> pairs;
       find_triangle_pairs(a, b, {}, 0.01, pairs);
       EXPECT_FALSE(first == second && pairs.empty()) << "a surface meets itself";
-      find_self_pairs(a, 0.01, true, pairs);
+      find_self_pairs(a, 0.01, pairs);
       EXPECT_TRUE(nearest_point(a, Vec3(3.0, 0.0, 0.0)).has_value());
     }
 }
@@ -274,7 +266,7 @@ TEST(TreeTraversal, WarmWalksAllocateNothing) {
     a.bind(s, z);
     b.bind(s, z);
     find_triangle_pairs(a, b, {.q = {}, .p = {1.8, 0.0, 0.0}}, 0.01, pairs);
-    find_self_pairs(a, 0.0, false, pairs);
+    find_self_pairs(a, 0.0, pairs);
     find_triangles_in_box(a, {Vec3(0.8, -0.2, -0.2), Vec3(1.2, 0.2, 0.2)}, triangles);
     (void)nearest_point(a, Vec3(1.2, 0.0, 0.0));
   };
@@ -291,7 +283,7 @@ TEST(TreeTraversal, RefusesANegativeMargin) {
   b.bind(s, std::vector<double>(2, 0.0));
   std::vector<TrianglePair> pairs;
   EXPECT_THROW(find_triangle_pairs(a, b, {}, -1.0, pairs), InvalidArgument);
-  EXPECT_THROW(find_self_pairs(a, std::nan(""), false, pairs), InvalidArgument);
+  EXPECT_THROW(find_self_pairs(a, std::nan(""), pairs), InvalidArgument);
 }
 
 }  // namespace

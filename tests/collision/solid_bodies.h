@@ -55,7 +55,7 @@ inline TetMesh tet_ball(double radius, Index cells) {
 }
 
 /// With waves for modes; the surface is the boundary of the volume.
-inline std::shared_ptr<const ModalModel> solid(const TetMesh& mesh, Index modes = 0) {
+inline ModalModelData solid_data(const TetMesh& mesh, Index modes = 0) {
   const BoundarySurface boundary = boundary_surface(mesh);
   ModalModelData data = wavy_data(boundary.surface, modes);
   double size = 0.0;
@@ -68,7 +68,11 @@ inline std::shared_ptr<const ModalModel> solid(const TetMesh& mesh, Index modes 
     for (Index i = 0; i < modes; ++i)
       volume.basis.set(v, i, wavy_shape(mesh.nodes[static_cast<std::size_t>(v)], size, i).cast<float>());
   data.volume_block = std::move(volume);
-  return std::make_shared<const ModalModel>(std::move(data));
+  return data;
+}
+
+inline std::shared_ptr<const ModalModel> solid(const TetMesh& mesh, Index modes = 0) {
+  return std::make_shared<const ModalModel>(solid_data(mesh, modes));
 }
 
 inline Body body_of(const TetMesh& mesh, Index modes = 0) {

@@ -103,7 +103,8 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
-    worker.narrow.find_self_contacts(a, margin, origin, contacts);
+    worker.narrow.find_self_contacts(a, margin + 2.0 * std::min(state(pair.a).reach, state(pair.a).look_ahead), origin,
+                                     contacts);
   } else {
     const bool plane = at(pair.a).is_half_space() || at(pair.b).is_half_space();
     const BodyState &s = state(pair.a), &t = state(pair.b);

@@ -24,14 +24,25 @@ inline Aabb world_box(const Aabb& box_B, const RigidTransform& X_WB) {
   return box_about(X_WB * box_B.center(), to_matrix(X_WB.q).cwiseAbs() * box_B.half_extents());
 }
 
-/// Of any rigid shape but a half-space, which has none.
+/// With all that lies below it.
+inline Aabb with_all_below(Aabb box, const Vec3& up) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (up[axis] > 0.0) box.low[axis] = -kInfinity;
+    if (up[axis] < 0.0) box.high[axis] = kInfinity;
+  }
+  return box;
+}
+
+/// Of any rigid shape but a half-space, which has none. With what is solid below it.
 inline Aabb world_box(const RigidGeometry& geometry, const RigidTransform& X_WB) {
   if (const auto* ball = std::get_if<Sphere>(&geometry.shape())) return box_about(X_WB.p, Vec3::Constant(ball->radius));
   if (const auto* capsule = std::get_if<Capsule>(&geometry.shape())) {
     const Vec3 end = X_WB.q * Vec3(0.0, 0.0, capsule->half_length);
     return box_about(X_WB.p, end.cwiseAbs() + Vec3::Constant(capsule->radius));
   }
-  return world_box(geometry.bounds(), X_WB);
+  const Aabb box = world_box(geometry.bounds(), X_WB);
+  return with_all_below(box, X_WB.q * geometry.up());
 }
 
 /// In world coordinates.

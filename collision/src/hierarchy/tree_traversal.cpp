@@ -84,24 +84,14 @@ void append_leaf_pairs(BoxReader& a, BoxReader& b, Index m, Index n, const BoxFr
   }
 }
 
-/// The triangles are within `margin` of each other in the rest shape.
-bool near_in_rest_shape(const CollisionSurface& surface, Index t, Index u, double margin) {
-  const auto corners = [&](Index i) {
-    const auto& [a, b, c] = surface.triangle(i);
-    return TrianglePoints{surface.rest(a), surface.rest(b), surface.rest(c)};
-  };
-  return closest_points(corners(t), corners(u)).distance <= margin;
-}
-
 /// One leaf with itself or another of the same surface.
-void append_self(DeformedSurface& a, Index m, Index n, double margin, bool near_at_rest,
-                 std::vector<TrianglePair>& pairs) {
+void append_self(DeformedSurface& a, Index m, Index n, double margin, std::vector<TrianglePair>& pairs) {
   const CollisionSurface& surface = a.surface();
   for (const Index t : surface.node_triangles(m)) {
     const Aabb box = box_of(a.triangle(t)).grown(margin);
     for (const Index u : surface.node_triangles(n)) {
       if ((m == n && u <= t) || surface.adjacent(t, u) || !box.overlaps(box_of(a.triangle(u)))) continue;
-      if (near_at_rest || !near_in_rest_shape(surface, t, u, margin)) pairs.push_back({std::min(t, u), std::max(t, u)});
+      pairs.push_back({std::min(t, u), std::max(t, u)});
     }
   }
 }
@@ -145,7 +135,7 @@ void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTran
   }
 }
 
-void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::vector<TrianglePair>& pairs) {
+void find_self_pairs(DeformedSurface& a, double margin, std::vector<TrianglePair>& pairs) {
   if (!(margin >= 0.0)) throw InvalidArgument("find_self_pairs: margin is negative or not a number, expected ≥ 0");
   const CollisionSurface& surface = a.surface();
   BoxReader boxes(a);
@@ -163,7 +153,7 @@ void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::
     const TreeNode &ma = surface.node(m), &nb = surface.node(n);
     if (m != n && apart(m, n)) continue;
     if (ma.leaf() && nb.leaf()) {
-      append_self(a, m, n, margin, near_at_rest, pairs);
+      append_self(a, m, n, margin, pairs);
     } else if (m == n) {
       stack[count++] = {ma.child, ma.child + 1};
       stack[count++] = {ma.child + 1, ma.child + 1};

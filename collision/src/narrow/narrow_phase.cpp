@@ -47,6 +47,7 @@ struct RigidGeometry::Impl {
   std::shared_ptr<const CollisionSurface> surface{};
   ConvexCore core{};  // of the convex ones
   Aabb bounds{};
+  Vec3 up = Vec3::Zero();
 };
 
 namespace {
@@ -74,6 +75,24 @@ Aabb bounds_of(const ConvexCore& core) {
   return box.grown(core.radius);
 }
 
+// The way that an open surface looks as a whole, if no face looks back.
+Vec3 up_of(const CollisionSurface& surface) {
+  const auto corners = [&](Index t) {
+    const auto& [a, b, c] = surface.triangle(t);
+    return TrianglePoints{surface.rest(a), surface.rest(b), surface.rest(c)};
+  };
+  if (surface.closed()) return Vec3::Zero();
+  Vec3 sum = Vec3::Zero();
+  for (Index t = 0; t < surface.triangles(); ++t) {
+    const TrianglePoints x = corners(t);
+    sum += (x[1] - x[0]).cross(x[2] - x[0]);
+  }
+  const Vec3 up = internal::unit_or(sum, Vec3::Zero());
+  for (Index t = 0; t < surface.triangles(); ++t)
+    if (unit_normal(corners(t)).dot(up) < -internal::kRoundOff) return Vec3::Zero();
+  return up;
+}
+
 }  // namespace
 
 RigidGeometry::RigidGeometry(const Shape& shape) {
@@ -92,7 +111,8 @@ RigidGeometry::RigidGeometry(const Shape& shape) {
       Overloaded{[&](const HalfSpace& s) { impl->bounds = bounds_of(s); },
                  [&](const Sphere& s) { convex(convex_core(s)); }, [&](const Capsule& s) { convex(convex_core(s)); },
                  [&](const Box& s) { convex(convex_core(s)); }, [&](const ConvexHull& s) { convex(convex_core(s)); },
-                 [&](const TriangleMesh& s) { mesh(s); }, [&](const HeightField& s) { mesh(s); }},
+                 [&](const TriangleMesh& s) { mesh(s), impl->up = up_of(*impl->surface); },
+                 [&](const HeightField& s) { mesh(s), impl->up = Vec3::UnitZ(); }},
       shape);
   impl_ = std::move(impl);
 }
@@ -102,6 +122,7 @@ RigidGeometry& RigidGeometry::operator=(RigidGeometry&&) noexcept = default;
 
 const Shape& RigidGeometry::shape() const { return impl_->shape; }
 Aabb RigidGeometry::bounds() const { return impl_->bounds; }
+const Vec3& RigidGeometry::up() const { return impl_->up; }
 const std::shared_ptr<const CollisionSurface>& RigidGeometry::surface() const { return impl_->surface; }
 
 // -- Pairs ------------------------------------------------------------------------------------------------------------
@@ -206,7 +227,8 @@ double NarrowPhase::Impl::size(const CollisionBody& body) {
 }
 
 void NarrowPhase::Impl::bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side) {
-  surface[side].bind(deformed(body, side), X_PB, tolerance);
+  surface[side].bind(deformed(body, side), X_PB, tolerance,
+                     body.geometry != nullptr ? body.geometry->up() : Vec3(Vec3::Zero()));
 }
 
 // For vertices inside each, in the frame of a, both surfaces of which are bound; null: the nearest point.
@@ -355,7 +377,9 @@ void NarrowPhase::find_self_contacts(const CollisionBody& body, double margin, c
   Impl& impl = *impl_;
   impl.found.clear();
   impl.bind(body, {}, kRoundOff * impl.size(body), 0);
-  impl.surface_contacts.find_self(impl.surface[0], margin, impl.found);
+  if (body.volume != nullptr) impl.rest_depth[0].bind(*body.volume->impl_, *body.surface, {});
+  impl.surface_contacts.find_self(impl.surface[0], margin, body.volume != nullptr ? &impl.rest_depth[0] : nullptr,
+                                  impl.found);
   impl.deliver(body, {}, body, {}, {body.X_WB.q, body.X_WB.p - origin}, contacts);
 }
 

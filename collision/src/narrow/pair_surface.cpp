@@ -39,8 +39,10 @@ int corner_of_edge(const CollisionSurface& s, Index t, Index e) {
 
 }  // namespace
 
-void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, double tolerance) {
+void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, double tolerance,
+                       const Vec3& solid_below) {
   deformed_ = &deformed;
+  up_ = X_PS.q * solid_below;
   tolerance_ = tolerance, directionless_ = collision_tuning().narrow.directionless * tolerance;
   X_PS_ = X_PS, X_SP_ = X_PS.inverse();
   turn_PS_ = to_matrix(X_PS.q);
@@ -288,7 +290,8 @@ PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
       max_distance);
   if (r.triangle < 0) return r;
   r.outward = normal_at(r.triangle, r.foot.feature);
-  r.inside = sided_ && r.outward.dot(p - r.foot.point) < 0.0 && !on_rim(r.triangle, r.foot.feature);
+  r.inside = !up_.isZero(0.0) ? is_below(p)
+                              : sided_ && r.outward.dot(p - r.foot.point) < 0.0 && !on_rim(r.triangle, r.foot.feature);
   return r;
 }
 

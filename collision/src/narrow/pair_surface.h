@@ -58,7 +58,10 @@ class PairSurface {
 
   // X_PS: the surface's body frame in the pair's. Forgets the state before.
   // @param tolerance a length that is round-off here, m
-  void bind(DeformedSurface& deformed, const RigidTransform& X_PS, double tolerance);
+  // @param solid_below unit, body frame: up, of the top of something solid (RigidGeometry::up()); zero: of anything
+  // else
+  void bind(DeformedSurface& deformed, const RigidTransform& X_PS, double tolerance,
+            const Vec3& solid_below = Vec3::Zero());
 
   DeformedSurface& deformed() const { return *deformed_; }
   const CollisionSurface& surface() const { return deformed_->surface(); }
@@ -166,7 +169,8 @@ class PairSurface {
     SurfaceFoot foot{};
     double distance = 0.0;
     Vec3 outward = Vec3::Zero();  // pseudonormal at the foot
-    bool inside = false;          // the point is behind the surface; never where the foot is on a rim
+    bool inside = false;          // the point is behind the surface; never where the foot is on a rim, but of
+                                  // what is solid below, where that is above
   };
   Nearest nearest(const Vec3& p, double max_distance);
   // Where a ray from a point inside first goes out through a face.
@@ -176,10 +180,17 @@ class PairSurface {
   };
   // @param direction unit
   WayOut way_out(const Vec3& p, const Vec3& direction);
-  // False only where p is outside the surface's bounds.
-  bool may_hold(const Vec3& p) { return deformed_->bounds(0).contains(X_SP_ * p); }
+  // False only where p is not inside: outside the bounds of a closed surface, under none that is solid below.
+  bool may_hold(const Vec3& p) {
+    if (!up_.isZero(0.0)) return is_below(p);
+    return surface().closed() && deformed_->bounds(0).contains(X_SP_ * p);
+  }
 
  private:
+  bool is_below(const Vec3& p) {
+    const WayOut way = way_out(p, up_);
+    return way.triangle >= 0 && way.distance > tolerance_;
+  }
   void make_vertex(Index v);
   void make_face(Index t);
   bool on_rim(Index t, const Feature& feature) const;
@@ -190,6 +201,7 @@ class PairSurface {
   DeformedSurface* deformed_ = nullptr;
   RigidTransform X_PS_{}, X_SP_{};
   bool sided_ = false;
+  Vec3 up_ = Vec3::Zero();  // in the pair's frame
   double tolerance_ = 0.0, directionless_ = 0.0;
   Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
   DeformedSurface* end_ = nullptr;

@@ -88,7 +88,7 @@ void CoreContacts::edge_against_core(Index e) {
 
 void CoreContacts::end_inside(int end) {
   const Vec3& p = core_.ends[static_cast<std::size_t>(end)];
-  if (!surface_->surface().closed() || !surface_->may_hold(p)) return;
+  if (!surface_->may_hold(p)) return;
   const PairSurface::Nearest nearest = surface_->nearest(p, std::numeric_limits<double>::infinity());
   if (!nearest.inside) return;
   const Vec3 n = nearest.distance > surface_->directionless() ? Vec3((nearest.foot.point - p) / nearest.distance)

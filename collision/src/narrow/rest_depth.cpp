@@ -1,5 +1,6 @@
 #include "narrow/rest_depth.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -71,28 +72,52 @@ bool RestDepthRule::carry_back(const Vec3& p_B, const Vec3& first_guess, Place& 
   return false;
 }
 
-bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) {
+void RestDepthRule::bind_rest(PairSurface& surface) {
+  if (rest_is_bound_) return;
   const CollisionSurface& mesh = surface.surface();
-  if (!rest_is_bound_) {
-    zeros_.assign(static_cast<std::size_t>(mesh.modes()), 0.0);
-    // Not owned: the deformed surface that is bound to it outlives the query.
-    at_rest_.bind(std::shared_ptr<const CollisionSurface>(std::shared_ptr<void>(), &mesh), zeros_);
-    rest_surface_.bind(at_rest_, {}, surface.tolerance());
-    rest_is_bound_ = true;
-  }
-  Vec3 guess = Vec3::Zero();
-  for (std::size_t c = 0; c < 3; ++c) guess += nearest.foot.weight[c] * mesh.rest(mesh.triangle(nearest.triangle)[c]);
-  Place place;
-  if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
+  zeros_.assign(static_cast<std::size_t>(mesh.modes()), 0.0);
+  // Not owned: the deformed surface that is bound to it outlives the query.
+  at_rest_.bind(std::shared_ptr<const CollisionSurface>(std::shared_ptr<void>(), &mesh), zeros_);
+  rest_surface_.bind(at_rest_, {}, surface.tolerance());
+  rest_is_bound_ = true;
+}
 
-  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
-  if (!rest.inside || rest.distance <= surface.directionless()) return false;
+// By the nearest point of the rest surface, carried forward.
+void RestDepthRule::lead_out(PairSurface& surface, const Place& place, const PairSurface::Nearest& rest,
+                             Exit& exit) const {
   SurfaceFoot foot = rest.foot;
   foot.point.setZero();
   for (std::size_t c = 0; c < 3; ++c) foot.point += foot.weight[c] * surface.face(rest.triangle).x[c];
   exit.at = surface.at_foot(rest.triangle, foot);
-  exit.normal = X_PB_.q * (place.F.inverse().transpose() * (rest.foot.point - place.rest)).normalized();
+  const Vec3 N = rest.distance > surface.directionless() ? Vec3(rest.foot.point - place.rest) : rest.outward;
+  exit.normal = X_PB_.q * (place.F.inverse().transpose() * N).normalized();
+}
+
+bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) {
+  bind_rest(surface);
+  const CollisionSurface& mesh = surface.surface();
+  Vec3 guess = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c) guess += nearest.foot.weight[c] * mesh.rest(mesh.triangle(nearest.triangle)[c]);
+  Place place;
+  if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
+  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  if (!rest.inside || rest.distance <= surface.directionless()) return false;
+  lead_out(surface, place, rest, exit);
   return exit.normal.dot(p - exit.at.point) < 0.0;
+}
+
+bool RestDepthRule::exit_of(Index v, PairSurface& surface, const FeatureSide& near, Exit& exit) {
+  bind_rest(surface);
+  const CollisionSurface& mesh = surface.surface();
+  Vec3 guess = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c) guess += near.weight[c] * mesh.rest(mesh.triangle(near.triangle)[c]);
+  Place place;
+  if (!carry_back(X_PB_.inverse() * surface.vertex(v), guess, place)) return false;
+  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  const Triangle& corners = mesh.triangle(rest.triangle);
+  if (!rest.inside || std::find(corners.begin(), corners.end(), v) != corners.end()) return false;  // v itself
+  lead_out(surface, place, rest, exit);
+  return exit.normal.dot(surface.vertex(v) - exit.at.point) <= 0.0;
 }
 
 }  // namespace limber::internal

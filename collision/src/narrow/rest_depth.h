@@ -29,18 +29,22 @@ class RestDepth {
 };
 
 // For one body in one state.
-class RestDepthRule final : public OverlapRule {
+class RestDepthRule final : public OverlapRule, public SelfOverlapRule {
  public:
   // All are used until the next bind(). @param X_PB pose of the body in the pair's frame
   void bind(const RestDepth& rest, DeformedSurface& deformed, const RigidTransform& X_PB);
   bool exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) override;
+  // It is where another point of the body is as well: the one found from the part that it is near.
+  bool exit_of(Index v, PairSurface& surface, const FeatureSide& near, Exit& exit) override;
 
  private:
   struct Place {
     Vec3 rest;  // where the material point is at rest, body frame
     Mat3 F;     // deformation gradient there
   };
+  void bind_rest(PairSurface& surface);
   bool carry_back(const Vec3& p_B, const Vec3& first_guess, Place& place) const;
+  void lead_out(PairSurface& surface, const Place& place, const PairSurface::Nearest& rest, Exit& exit) const;
 
   const RestDepth* rest_ = nullptr;
   DeformedSurface* deformed_ = nullptr;

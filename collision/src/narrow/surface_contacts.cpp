@@ -70,10 +70,16 @@ void SurfaceContacts::find(PairSurface& a, PairSurface& b, const RigidTransform&
   if (!overlap_) push_out_of_faces();
 }
 
-void SurfaceContacts::find_self(PairSurface& a, double margin, std::vector<FeatureContact>& contacts) {
+void SurfaceContacts::find_self(PairSurface& a, double margin, SelfOverlapRule* places,
+                                std::vector<FeatureContact>& contacts) {
   begin(a, a, margin, true, contacts);
-  find_self_pairs(a.deformed(), margin, false, pairs_);
+  find_self_pairs(a.deformed(), margin, pairs_);
   for (const auto& [s, t] : pairs_) test_pair(s, t, kAllTests);
+  if (places != nullptr) {
+    spread_inside_itself(*places);
+    cross_edges();
+  }
+  if (!a.sided()) push_out_of_faces();
 }
 
 // A list has the pairs of triangles in the order of a search.
@@ -160,9 +166,9 @@ void SurfaceContacts::test_pair(Index s, Index t, FeatureTests tests) {
   test_vertices(0, s, t, tests);
   test_vertices(1, t, s, tests);
   test_edges(s, t, tests);
-  if (self_ || apart(f.box, g.box, 0.0)) return;
+  if (apart(f.box, g.box, 0.0)) return;
   find_piercings(0, s, t, tests);
-  find_piercings(1, t, s, tests);
+  find_piercings(self_ ? 0 : 1, t, s, tests);  // of itself a surface is one side
 }
 
 // -- A vertex and a surface -------------------------------------------------------------------------------------------
@@ -190,7 +196,7 @@ double SurfaceContacts::nearness(int of, Index v, Index t) {
 
 void SurfaceContacts::add_vertex(int of, Index v, PairSurface::Minimum minimum) {
   PairSurface& mine = *side_[of];
-  const bool solids = !self_ && mine.sided() && side_[1 - of]->sided();
+  const bool solids = mine.sided() && side_[1 - of]->sided();
   const bool near = solids && minimum.distance <= nearness(of, v, minimum.at.triangle);
   if (near && rests_on_faces(of, v, minimum)) return;
   if (near && kind_of(minimum.at.key) == Feature::Kind::kVertex) {  // or the other's corner on my faces

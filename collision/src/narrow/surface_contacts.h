@@ -24,6 +24,14 @@ class OverlapRule {
   virtual bool exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) = 0;
 };
 
+// Answers whether a vertex is inside another part of its own body, and where it is to leave that.
+class SelfOverlapRule {
+ public:
+  virtual ~SelfOverlapRule() = default;
+  // @param near a point of the surface next to it, on that part @return false: it is not inside
+  virtual bool exit_of(Index v, PairSurface& surface, const FeatureSide& near, OverlapRule::Exit& exit) = 0;
+};
+
 // How far apart two surfaces may be to have contacts, m.
 struct ContactReach {
   double margin = 0.0;                                     // of gaps
@@ -46,8 +54,9 @@ class SurfaceContacts {
   // null: the nearest point @param memory of the pair; null: none is kept
   void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach, OverlapRule* rule_a,
             OverlapRule* rule_b, PairMemory* memory, std::vector<FeatureContact>& contacts);
-  // Of a surface with itself.
-  void find_self(PairSurface& a, double margin, std::vector<FeatureContact>& contacts);
+  // Of a surface with itself. @param places of points inside; null: parts that have passed through each other are not
+  // told from others
+  void find_self(PairSurface& a, double margin, SelfOverlapRule* places, std::vector<FeatureContact>& contacts);
 
  private:
   // An edge of one side that goes through a face of the other.
@@ -105,10 +114,12 @@ class SurfaceContacts {
   void spread_inside(int of, OverlapRule* rule);
   double distance_to(int of, Index t, const Vec3& p);
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
+  bool leave_behind(int of, Index v, OverlapRule::Exit& exit);
   bool find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit);
   bool flush(int of, Index v, const FeatureSide& at);
   bool enters(int of, Index v, Index near);
   void find_enclosed(int of, OverlapRule* rule);
+  void spread_inside_itself(SelfOverlapRule& places);
   void cross_edges();
   void find_loops();
   void cross_edges_of_loop(std::size_t first, std::size_t end);

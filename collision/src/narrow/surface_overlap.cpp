@@ -9,7 +9,7 @@
 namespace limber::internal {
 void SurfaceContacts::find_piercings(int of, Index s, Index t, FeatureTests tests) {
   for (int c = 0; c < 3; ++c)
-    if ((tests & piercing_test(of, c)) != 0 && side_[of]->owns_edge(s, c))
+    if ((tests & piercing_test(of, c)) != 0 && (self_ || side_[of]->owns_edge(s, c)))
       find_piercing(of, side_[of]->surface().edge_of(s, c), t);
 }
 
@@ -50,6 +50,25 @@ void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
   }
 }
 
+// The same of one surface. Its nearest point tells nothing there: that is the vertex itself.
+void SurfaceContacts::spread_inside_itself(SelfOverlapRule& places) {
+  PairSurface& mine = *side_[0];
+  std::vector<Seed>& seeds = seeds_[0];
+  OverlapRule::Exit exit;
+  while (!seeds.empty()) {
+    const auto [v, near] = seeds.back();
+    seeds.pop_back();
+    std::uint32_t& visited = visited_[0][static_cast<std::size_t>(v)];
+    if (visited > generation_) continue;
+    visited = generation_;
+    if (!places.exit_of(v, mine, mine.on_face(near, mine.vertex(v)), exit)) continue;
+    visited = generation_ + 1;
+    exit_normal_[0][static_cast<std::size_t>(v)] = exit.normal;
+    add(0, mine.at_vertex(v), exit.at, exit.normal, exit.normal.dot(mine.vertex(v) - exit.at.point));
+    for (const Index w : mine.surface().vertex_neighbours(v)) seeds.push_back({w, exit.at.triangle});
+  }
+}
+
 double SurfaceContacts::distance_to(int of, Index t, const Vec3& p) {
   return (p - closest_on_triangle(p, side_[of]->corners(t)).point).norm();
 }
@@ -58,7 +77,7 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
   PairSurface& other = *side_[1 - of];
   const Vec3& p = side_[of]->vertex(v);
   OverlapRule::Exit exit;
-  if (rule == nullptr || !rule->exit(other, p, nearest, exit)) {
+  if (!leave_behind(of, v, exit) && (rule == nullptr || !rule->exit(other, p, nearest, exit))) {
     exit.at = other.at_foot(nearest.triangle, nearest.foot);
     exit.normal = nearest.distance > directionless_ ? Vec3((exit.at.point - p) / nearest.distance)
                                                     : unit_or(nearest.outward, Vec3::UnitZ());
@@ -68,6 +87,18 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
   overlap_ = true;
   exit_normal_[of][static_cast<std::size_t>(v)] = exit.normal;
   add(of, side_[of]->at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
+}
+
+// A vertex of a surface that has a front and encloses nothing leaves the other where that ends behind it, however much
+// nearer its front side is: what has come through from behind goes on to the front.
+bool SurfaceContacts::leave_behind(int of, Index v, OverlapRule::Exit& exit) {
+  PairSurface &mine = *side_[of], &other = *side_[1 - of];
+  if (mine.surface().closed() || !other.surface().closed()) return false;
+  const Vec3 back = -unit_or(mine.vertex_normal(v), Vec3::Zero());
+  const PairSurface::WayOut way = other.way_out(mine.vertex(v), back);
+  if (way.triangle < 0) return false;
+  exit = {other.on_face(way.triangle, mine.vertex(v) + way.distance * back), other.face(way.triangle).normal};
+  return true;
 }
 
 // Next to a rim, the nearest point may be on a face that the vertex's own surface does not follow: the top box of a
@@ -94,7 +125,6 @@ bool SurfaceContacts::find_supporting_face(int of, Index v, Index near, bool ali
 
 // Parts of one surface that are inside the other without meeting it.
 void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
-  if (!side_[1 - of]->surface().closed()) return;
   for (const Index v : side_[of]->surface().component_vertices()) {
     if (visited_[of][static_cast<std::size_t>(v)] >= generation_) continue;
     if (!side_[1 - of]->may_hold(side_[of]->vertex(v))) continue;
@@ -127,8 +157,10 @@ void SurfaceContacts::find_loops() {
   crossed_.clear();
   for (std::size_t i = 0; i < piercings_.size(); ++i) {
     const Piercing& p = piercings_[i];
-    for (const Index t : side_[p.of]->surface().edge_triangles(p.edge))
-      crossed_.push_back({p.of == 0 ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+    for (const Index t : side_[p.of]->surface().edge_triangles(p.edge)) {
+      const bool in_order = self_ ? t < p.face : p.of == 0;
+      crossed_.push_back({in_order ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+    }
   }
   std::sort(crossed_.begin(), crossed_.end(), [](const Crossed& a, const Crossed& b) {
     return std::tie(a.triangles, a.piercing) < std::tie(b.triangles, b.piercing);
@@ -147,7 +179,9 @@ void SurfaceContacts::cross_edges_of_loop(std::size_t first, std::size_t end) {
   const double same_way = tuning_->same_way;
   for (const EdgePair& crossing : crossings_) {
     const Vec3 n = -crossing.direction;
-    if (std::none_of(ways_out_.begin(), ways_out_.end(), [&](const Vec3& way) { return n.dot(way) > same_way; }))
+    // Of one surface either part may be the one that an edge is of; its cones have told which way is out.
+    if (std::none_of(ways_out_.begin(), ways_out_.end(),
+                     [&](const Vec3& way) { return (self_ ? std::abs(n.dot(way)) : n.dot(way)) > same_way; }))
       continue;
     overlap_ = true;
     add_edges(crossing, n);

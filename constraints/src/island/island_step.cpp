@@ -126,22 +126,29 @@ void IslandStep::predict_under_loads() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
-    if (loads.early[static_cast<std::size_t>(local)] != 0) {
-      const FrameConstants& c = body.group->frame_constants();
-      const Vec3 early = length() * c.mass * part.options.gravity,
-                 arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
-      load.impulse += early + length() * body.group->held_force(body.slot);
-      load.moment += arm.cross(early);
-    }
+    if (loads.early[static_cast<std::size_t>(local)] != 0) load_early(body, load);
     body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
   measure(StepTime::kEnd, gap);
 }
 
+/// The frame's part. Modes of a free body do not feel gravity; those of one that is held somewhere have it over the
+/// whole part, as they have contact forces.
+void IslandStep::load_early(const ConstrainedBody& body, ConstraintLoad& load) const {
+  const FrameConstants& c = body.group->frame_constants();
+  const Vec3 weight = c.mass * part.options.gravity, arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+  load.moment += length() * arm.cross(weight);
+  if (c.motion == FrameMotion::kFree)
+    load.impulse += length() * (weight + body.group->held_force(body.slot));
+  else
+    load.torque -= arm.cross(weight);
+}
+
 /// What is left of gravity and held forces for the whole part, where those come at its start.
 Vec3 IslandStep::held_gravity(Index local) const {
-  if (loads.early[static_cast<std::size_t>(local)] == 0) return part.options.gravity;
   const ConstrainedBody& body = bodies.body(local);
+  if (loads.early[static_cast<std::size_t>(local)] == 0 || body.group->frame_constants().motion != FrameMotion::kFree)
+    return part.options.gravity;
   return -body.group->held_force(body.slot) / body.group->frame_constants().mass;
 }
 

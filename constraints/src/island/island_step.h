@@ -119,6 +119,7 @@ struct IslandStep {
   void for_bodies(std::size_t row, Action&& act) const;
 
  private:
+  void load_early(const ConstrainedBody& body, ConstraintLoad& load) const;
   Vec3 held_gravity(Index local) const;
   void find_kind();
   void begin_early();

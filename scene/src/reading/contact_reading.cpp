@@ -125,13 +125,17 @@ SceneStatic read_static(const Json& value, const std::string& where, const std::
 }
 
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
-  for (const char* key : {"friction", "shape", "layers", "meets"})
+  for (const char* key : {"friction", "shape", "layers", "meets", "touches_itself"})
     if (o.has(key) && !scene.contact)
       throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
                        "\"statics\" beside \"bodies\"");
   body.placement.friction = read_friction(o);
   body.placement.filter = read_filter(o);
+  body.placement.filter.self = o.boolean("touches_itself", false);
   if (o.has("shape")) body.shape = read_shape(o, folder, true);
+  if (o.has("shape") && body.placement.filter.self)
+    throw InputError(o.where("touches_itself") + ": is true, but the body has a \"shape\", which does not deform, " +
+                     "expected one of the two");
 }
 
 }  // namespace limber::internal

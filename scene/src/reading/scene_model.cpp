@@ -196,9 +196,10 @@ std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<
 
 /// What a scene does with the bodies of one model.
 struct ModelNeeds {
-  bool meets = false;      // others, by its own surface
-  bool yields = false;     // so that its residual compliance acts
-  bool bends = false;      // by its modal skin
+  bool meets = false;   // others, by its own surface
+  bool yields = false;  // so that its residual compliance acts
+  bool bends = false;   // by its modal skin
+  bool meets_itself = false;
   bool is_tied = false;    // by joints, whose patches lie on the collision surface
   bool is_loaded = false;  // by strikes, forces and handles, whose places are on the render surface
 };
@@ -212,6 +213,7 @@ ModelNeeds needs_of(const Scene& scene, const std::set<std::string>& bodies, con
     const bool in_reach = filter.self || (filter.layers != 0 && filter.mask != 0);
     needs.meets = needs.meets || (scene.contact && in_reach && !wears);
     needs.bends = needs.bends || body->placement.modal_skin;
+    needs.meets_itself = needs.meets_itself || filter.self;
   }
   needs.yields = needs.meets && scene.contact->residual_compliance;
   const auto names = [&](const auto& all) {
@@ -280,7 +282,8 @@ class Leaving {
 
 void leave_out_parts(Leaving& leaving, const ModalModelData& data, const ModelNeeds& needs, const SceneUse& use) {
   const bool is_private = !use.reached_into;
-  leaving.leave(&Parts::volume, LeftOut::kVolume, data.volume_block.has_value(), "nothing in a scene reads it");
+  leaving.leave(&Parts::volume, LeftOut::kVolume, data.volume_block && !needs.meets_itself,
+                "no body of it touches itself");
   leaving.leave(&Parts::rows, LeftOut::kVertexRows, data.touchable && !data.eigenvalues.empty() && !needs.meets,
                 "no body of it meets another by its surface");
   leaving.leave(&Parts::residual, LeftOut::kResidual, data.residual_compliance && !needs.yields,
@@ -362,7 +365,13 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
     if (asset == assets.end()) throw InvalidArgument("make_models: the asset \"" + body.asset + "\" is not given");
     return std::pair(body.asset, find_part(body, asset->second));
   };
-  for (const SceneBody& body : scene.bodies) own[part_of(body)].push_back(&body);
+  for (const SceneBody& body : scene.bodies) {
+    const auto part = part_of(body);
+    own[part].push_back(&body);
+    if (body.placement.filter.self && !assets.at(body.asset).bodies[part.second]->data().volume_block)
+      throw InputError(body.where + ".touches_itself: is true, but asset \"" + body.asset +
+                       "\" has no volume block, bake it with limber-precompute --volume");
+  }
   for (const SceneBody& body : scene.bodies) {
     const auto key = part_of(body);
     auto& model = made[key];

@@ -37,9 +37,8 @@ void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTran
 
 /// Triangles of one surface, t < u without a common vertex, that may be within `margin` of each other; appended.
 /// Parts of the body that the amplitudes cannot bring so near are left out without looking at their boxes: rest
-/// distance − Σ_i |z_i| max |u_ai − u_bi| > margin. Not reported: pairs already within `margin` in the rest shape,
-/// unless `near_at_rest`: neighbours over a fold or across a thin wall.
-void find_self_pairs(DeformedSurface& a, double margin, bool near_at_rest, std::vector<TrianglePair>& pairs);
+/// distance − Σ_i |z_i| max |u_ai − u_bi| > margin.
+void find_self_pairs(DeformedSurface& a, double margin, std::vector<TrianglePair>& pairs);
 
 /// Triangles that may overlap a box of the body frame; appended.
 void find_triangles_in_box(DeformedSurface& a, const Aabb& box_B, std::vector<Index>& triangles);

@@ -111,7 +111,7 @@ class ConstraintRows {
   void clear();
   /// How often they have been cleared: rows made since belong together.
   std::uint64_t makings() const { return makings_; }
-  /// @return the row's index. Copies the modal parts.
+  /// @return the row's index. Copies the modal parts. Two sides of one body become one, their sum.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
@@ -132,6 +132,8 @@ class ConstraintRows {
   double stored_energy() const { return stored_energy_; }
 
  private:
+  void add_to(Side& side, const RowSide& other);
+
   std::vector<Row> rows_;
   std::vector<Flexibility> flexibility_;
   double stored_energy_ = 0.0;

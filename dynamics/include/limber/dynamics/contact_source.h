@@ -33,7 +33,7 @@ struct BodyGeometry {
 struct CollisionFilter {
   std::uint32_t layers = 1;
   std::uint32_t mask = 0xffffffffu;
-  bool self = false;  ///< also find where the body touches itself (modal bodies)
+  bool self = false;  ///< also find where the body touches itself (modal bodies with a volume block)
 
   friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
 };

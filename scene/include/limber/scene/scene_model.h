@@ -20,7 +20,7 @@ namespace limber {
 /// What a scene may do without, each by itself.
 enum class LeftOut {
   kModes,             ///< modes that Scene::limits say nobody can see
-  kVolume,            ///< the volume block: nothing in a scene reads it
+  kVolume,            ///< the volume block: only bodies that touch themselves read it
   kVertexRows,        ///< shapes vertex by vertex, of bodies that meet nothing (ModalModelData::touchable)
   kResidual,          ///< residual compliance of bodies that meet nothing, or where contacts do not use it
   kSkin,              ///< the modal skin where all bodies bend by their modes alone
