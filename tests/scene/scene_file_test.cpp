@@ -64,6 +64,19 @@ TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
   EXPECT_EQ(std::get<NearestTo>(s.forces[0].at).frame, PlaceFrame::kInput);
 }
 
+TEST(SceneFile, ABodyTouchesItselfIfToldSoAndIfItDeforms) {
+  const std::string contact = R"("contact": {})";
+  EXPECT_FALSE(parse(scene_with(kBell, contact)).bodies.at(0).placement.filter.self);
+  const Scene s = parse(scene_with(R"({"name": "bell", "asset": "bell", "touches_itself": true})", contact));
+  EXPECT_TRUE(s.bodies.at(0).placement.filter.self);
+  EXPECT_THROW(parse(scene_with(R"({"name": "bell", "asset": "bell", "touches_itself": true,
+                                    "shape": {"sphere": {"radius": 1}}})",
+                                contact)),
+               InputError);
+  EXPECT_THROW(parse(scene_with(R"({"name": "bell", "asset": "bell", "touches_itself": true})", "\"time\": 0")),
+               InputError);
+}
+
 TEST(SceneFile, ContactIsReadWhereItBelongs) {
   const Scene s = parse(scene_with(
       R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},

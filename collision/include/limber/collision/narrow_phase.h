@@ -66,8 +66,9 @@ class RigidGeometry {
   const Shape& shape() const;
   /// In the body frame, m. A half-space's is infinite, but on the side of its normal if that is an axis.
   Aabb bounds() const;
-  /// Of an open mesh or a height field none of whose faces looks back: the way it looks, the direction of the sum of its
-  /// area vectors, unit. It is the top of something solid, and all that it is above of is inside. Zero for the rest.
+  /// Of an open mesh or a height field none of whose faces looks back: the way it looks, the direction of the sum of
+  /// its area vectors, unit. It is the top of something solid, and all that it is above of is inside. Zero for the
+  /// rest.
   const Vec3& up() const;
   /// The triangles of a box, hull, mesh or height field; null for the other shapes.
   const std::shared_ptr<const CollisionSurface>& surface() const;
@@ -159,8 +160,8 @@ class NarrowPhase {
                      std::vector<ContactPoint>& contacts, internal::PairMemory* memory = nullptr);
 
   /// Where a modal body touches itself: contacts of triangles that have no vertex in common, as of two bodies. Vertices
-  /// that are inside another part are those that another point of the material coincides with, and leave it as kRestDepth
-  /// says; told with CollisionBody::volume alone.
+  /// that are inside another part are those that another point of the material coincides with, and leave it as
+  /// kRestDepth says; told with CollisionBody::volume alone.
   void find_self_contacts(const CollisionBody& body, double margin, const Vec3& origin,
                           std::vector<ContactPoint>& contacts);
 
