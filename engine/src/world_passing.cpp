@@ -207,7 +207,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
   for (const Index member : members) sleep.wake(member);
 }
 
-/// Where a body would be when the part ends, if nothing held it. What it meets takes at most its velocity from it.
+/// Where a body would be when the part ends, if nothing held it.
 void World::Impl::expect_in_part(Index body, double left) {
   const auto i = static_cast<std::size_t>(body);
   BodyState& state = states[i];
@@ -216,7 +216,7 @@ void World::Impl::expect_in_part(Index body, double left) {
   motions[i].at(left, end.pose, end.amplitudes);
   state.end_pose = end.pose;
   state.end_amplitudes = end.amplitudes;
-  state.doubt = fall() + state.displacement.norm();
+  state.doubt = fall();
 }
 
 /// Of the members among each other and with what never moves: as far as the smallest of them, so that where one part
