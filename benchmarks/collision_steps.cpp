@@ -1,6 +1,6 @@
 // What finding contacts costs while bodies move: scenes run in a World, every query that it asks is written down, and
-// then asked again of a fresh ContactFinder, in the same order, on one thread. Prints Markdown: µs of all queries of
-// one step, by the thread's own work, of three runs through the least for each query.
+// then asked again of a fresh ContactFinder and of a fresh FclContactSource, in the same order, on one thread. Prints
+// Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb]]     part of the names of the scenes wanted ("": all), the asset of the bunnies
 // Figures: docs/reports/collision.md.
 #include <algorithm>
@@ -15,6 +15,7 @@
 
 #include "cpu_time.h"
 #include "finder_scenes.h"
+#include "limber/collision_fcl/fcl_contact_source.h"
 #include "limber/model/asset.h"
 #include "limber/precompute/bake.h"
 #include "pile.h"
@@ -65,13 +66,13 @@ class Recorder final : public ContactSource {
  public:
   void add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) override {
     finder_.add_body(body, geometry, filter);
-    replayed_.emplace_back([=](ContactFinder& to) { to.add_body(body, geometry, filter); });
+    replayed_.emplace_back([=](ContactSource& to) { to.add_body(body, geometry, filter); });
   }
   void remove_body(Index) override { throw std::logic_error("Recorder: bodies stay"); }
   void set_filter(Index, const CollisionFilter&) override { throw std::logic_error("Recorder: filters stay"); }
   void exclude_pair(Index a, Index b, bool excluded) override {
     finder_.exclude_pair(a, b, excluded);
-    replayed_.emplace_back([=](ContactFinder& to) { to.exclude_pair(a, b, excluded); });
+    replayed_.emplace_back([=](ContactSource& to) { to.exclude_pair(a, b, excluded); });
   }
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override {
     queries_.emplace_back(query);
@@ -86,14 +87,15 @@ class Recorder final : public ContactSource {
   std::size_t queries() const { return queries_.size(); }
 
   struct Cost {
-    double seconds = 1e30, broad = 1e30;
+    double seconds = 1e30;
     std::size_t contacts = 0;
   };
+  template <class Source>
   std::vector<Cost> replay() const {
     std::vector<Cost> costs(queries_.size());
     std::vector<ContactPoint> contacts;
     for (int pass = 0; pass < kPasses; ++pass) {
-      ContactFinder finder;
+      Source finder;
       for (const auto& make : replayed_) make(finder);
       for (std::size_t q = 0; q < queries_.size(); ++q) {
         ContactQuery query = queries_[q].asked();
@@ -108,7 +110,7 @@ class Recorder final : public ContactSource {
 
  private:
   ContactFinder finder_;
-  std::vector<std::function<void(ContactFinder&)>> replayed_;
+  std::vector<std::function<void(ContactSource&)>> replayed_;
   std::vector<Query> queries_;
 };
 
@@ -118,24 +120,42 @@ struct Phase {
   int steps;
 };
 
-void print_row(const std::string& scene, const std::string& phase, std::span<const Recorder::Cost> costs,
-               std::span<const std::size_t> ends) {
+/// Of all queries of each step, µs ascending.
+std::vector<double> times_of_steps(std::span<const Recorder::Cost> costs, std::span<const std::size_t> ends) {
   std::vector<double> times;
   std::size_t begin = 0;
-  double contacts = 0.0;
   for (const std::size_t end : ends) {
     double sum = 0.0;
     for (std::size_t q = begin; q < end; ++q) sum += costs[q].seconds;
-    if (end > begin) contacts += static_cast<double>(costs[end - 1].contacts);
     times.push_back(1e6 * sum);
     begin = end;
   }
   std::ranges::sort(times);
-  const auto last = static_cast<double>(times.size() - 1);
-  const auto quantile = [&](double part) { return times[static_cast<std::size_t>(part * last + 0.5)]; };
-  std::printf("| %s, %s | %zu | %.1f | %.0f | %.0f | %.0f | %.0f |\n", scene.c_str(), phase.c_str(), ends.size(),
-              static_cast<double>(costs.size()) / static_cast<double>(ends.size()),
-              contacts / static_cast<double>(ends.size()), quantile(0.5), quantile(0.99), quantile(1.0));
+  return times;
+}
+
+double contacts_a_step(std::span<const Recorder::Cost> costs, std::span<const std::size_t> ends) {
+  double contacts = 0.0;
+  std::size_t begin = 0;
+  for (const std::size_t end : ends) {
+    if (end > begin) contacts += static_cast<double>(costs[end - 1].contacts);
+    begin = end;
+  }
+  return contacts / static_cast<double>(ends.size());
+}
+
+void print_row(const std::string& scene, const std::string& phase, std::span<const Recorder::Cost> costs,
+               std::span<const Recorder::Cost> fcl, std::span<const std::size_t> ends) {
+  std::printf("| %s, %s | %zu | %.1f", scene.c_str(), phase.c_str(), ends.size(),
+              static_cast<double>(costs.size()) / static_cast<double>(ends.size()));
+  for (const std::span<const Recorder::Cost> of : {costs, fcl}) {
+    const std::vector<double> times = times_of_steps(of, ends);
+    const auto last = static_cast<double>(times.size() - 1);
+    const auto quantile = [&](double part) { return times[static_cast<std::size_t>(part * last + 0.5)]; };
+    std::printf(" | %.0f | %.0f | %.0f | %.0f", contacts_a_step(of, ends), quantile(0.5), quantile(0.99),
+                quantile(1.0));
+  }
+  std::printf(" |\n");
   std::fflush(stdout);
 }
 
@@ -148,7 +168,7 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
       step();
       ends.push_back(recorder.queries());
     }
-  const std::vector<Recorder::Cost> costs = recorder.replay();
+  const std::vector<Recorder::Cost> costs = recorder.replay<ContactFinder>(), fcl = recorder.replay<FclContactSource>();
   std::size_t first_step = 0, first_query = 0;
   for (const Phase& phase : phases) {
     const auto count = static_cast<std::size_t>(phase.steps);
@@ -156,8 +176,10 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
                                       ends.begin() + static_cast<std::ptrdiff_t>(first_step + count));
     const std::size_t end_query = of_phase.back();
     for (std::size_t& end : of_phase) end -= first_query;
+    const std::size_t queries = end_query - first_query;
     if (!phase.name.empty())
-      print_row(name, phase.name, std::span(costs).subspan(first_query, end_query - first_query), of_phase);
+      print_row(name, phase.name, std::span(costs).subspan(first_query, queries),
+                std::span(fcl).subspan(first_query, queries), of_phase);
     first_step += count, first_query = end_query;
   }
 }
@@ -248,7 +270,9 @@ int main(int argc, char** argv) try {
   using namespace limber::testing;
   const std::string wanted = argc > 1 ? argv[1] : "", asset = argc > 2 ? argv[2] : "";
   std::printf(
-      "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst |\n|---|---|---|---|---|---|---|\n");
+      "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst | FCL: contacts | p50 | p99 | worst "
+      "|\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
   const std::vector<std::pair<std::string, std::function<void()>>> scenes{
       {"boxes", hundred_boxes},
       {"coarse",
