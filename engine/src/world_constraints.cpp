@@ -145,6 +145,7 @@ ConstraintReport World::constraint_report() const {
           .rows = r.rows,
           .iterations = impl_->iterations,
           .newton_steps = impl_->newton_steps,
+          .residual = impl_->residual,
           .programs = impl_->programs,
           .attempts = impl_->attempts,
           .solved = impl_->solved,

@@ -111,6 +111,7 @@ struct World::Impl {
   double energy_removed = 0.0;                      // of the step's parts before the last
   bool solved = true;
   int iterations = 0, newton_steps = 0;
+  double residual = 0.0;
   StepAttempts attempts;
   ProgramReport programs;
   std::vector<ExactMotion> motions;

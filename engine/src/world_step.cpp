@@ -7,7 +7,7 @@ namespace limber {
 
 void World::step() {
   Impl& m = *impl_;
-  m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = 0;
+  m.energy_removed = 0.0, m.solved = true, m.iterations = m.newton_steps = 0, m.residual = 0.0;
   m.attempts = {};
   m.programs = {};
   m.clock = StageClock(m.stage_times);
@@ -20,6 +20,7 @@ void World::step() {
     m.solved = m.solved && report.status == SolveStatus::kSolved;
     m.iterations = std::max(m.iterations, report.iterations);
     m.newton_steps = std::max(m.newton_steps, report.newton_steps);
+    m.residual = std::max(m.residual, report.change);
     m.attempts.add(report.attempts);
     m.programs.add(report.programs);
   }

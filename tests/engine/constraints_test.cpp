@@ -201,6 +201,68 @@ TEST(Constraints, AHandThatPushesABlockIntoTheGroundThrowsNothing) {
   }
 }
 
+/// A chain of rigid links that is let go level over the ground, so that its end falls on it and drags, also where the
+/// last link is a hundred times as heavy: all rows meet, joints and ground, in every step.
+TEST(Constraints, AChainWhoseEndDragsOnTheGroundHangsTogetherAndGainsNothing) {
+  constexpr double kRise = 1e-9;  // of Σ m g size
+  for (const double times : {1.0, 100.0}) {
+    testing::GroundedWorld scene({.friction = 0.5, .recovery_speed = 0.0});
+    World& world = scene.world;
+    const auto model = sample_model({.modes = 0});
+    ModalModelData heavy = testing::sample_model_data({.modes = 0});
+    heavy.mass *= times, heavy.inertia *= times;
+    Chain chain = add_chain(world, model, 3, {0.0, 0.0, 1.2});
+    const Vec3 end(3.0 * kSampleSize, 0.0, 1.2);
+    const BodyId last = world.add_body(std::make_shared<const ModalModel>(std::move(heavy)),
+                                       {.pose = {.p = end + 0.5 * kSampleSize * Vec3::UnitX()}});
+    chain.joints.push_back(
+        world.add_joint(chain.links.back(), last, hinge_at(end), {.radius = 0.25}, {.radius = 0.25}));
+    chain.links.push_back(last);
+    double scale = 0.0, before = total_energy(world, chain);
+    for (const BodyId id : chain.links) scale += world.model(id).data().mass * testing::kGravity * kSampleSize;
+    int pressed = 0;
+    for (int i = 0; i < 240; ++i) {
+      world.step();
+      ASSERT_TRUE(world.constraint_report().solved) << times << ", step " << i;
+      for (const JointId joint : chain.joints) ASSERT_LT(world.joint(joint).distance_error, kExact) << times;
+      const double now = total_energy(world, chain);
+      ASSERT_LT(now - before, kRise * scale) << times << ", step " << i;
+      before = now;
+      pressed += world.contact_events().empty() ? 0 : 1;
+    }
+    EXPECT_GT(pressed, 120) << times;
+    EXPECT_GT(testing::lowest(world, last), -1e-6 * kSampleSize) << times;
+  }
+}
+
+/// An arm that turns at 20 rad/s, a third of a radian a step, between stops. What it turns on does not give.
+TEST(Constraints, StopsThatAreHitAtTwentyRadiansASecondHold) {
+  constexpr double kStop = 0.5;
+  for (const int modes : {0, 8}) {
+    World world;
+    JointSpec hinge = hinge_at({0.0, 0.0, 1.0});
+    hinge.limits.rotation = {-kStop, kStop};
+    const Vec3 omega(0.0, 20.0, 0.0), arm = 0.5 * kSampleSize * Vec3::UnitX();
+    const auto model = sample_model({.modes = modes, .lowest_hz = 30.0, .decay = 6.0});
+    const BodyId body = world.add_body(
+        model, {.pose = {.p = Vec3::UnitZ() + arm}, .velocity = omega.cross(arm), .angular_velocity = omega});
+    const JointId joint = world.add_joint(BodyId{}, body, hinge, {.radius = 0.25}, {.radius = 0.25});
+    const double scale = world.energy(body).total();
+    double before = scale, farthest = 0.0;
+    for (int i = 0; i < 300; ++i) {
+      world.step();
+      ASSERT_TRUE(world.constraint_report().solved) << modes << ", step " << i;
+      const double now = world.energy(body).total();
+      ASSERT_LT(now - before, 1e-12 * scale) << modes << ", step " << i;
+      before = now;
+      farthest = std::max(farthest, std::abs(world.joint(joint).position[0]));
+      ASSERT_LT(world.joint(joint).distance_error, kExact);
+    }
+    EXPECT_GT(farthest, kStop - 1e-6) << modes << ": it has come to a stop";
+    EXPECT_LT(farthest, kStop + 1e-9) << modes;
+  }
+}
+
 TEST(Constraints, BodiesTakeTheirHandlesAndJointsWithThem) {
   World world;
   const Chain chain = add_chain(world, sample_model(), 3, Vec3::Zero());

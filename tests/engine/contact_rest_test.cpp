@@ -51,6 +51,28 @@ TEST(WorldContact, ABoxOnABoxStands) {
   }
 }
 
+/// A rigid box on one that is ten thousand times lighter.
+TEST(WorldContact, ABoxStandsOnAMuchLighterOne) {
+  constexpr double kHeight = 0.2;  // m, of the one below
+  GroundedWorld scene({.recovery_speed = 0.0});
+  World& world = scene.world;
+  const auto light = sample_model({.modes = 0});
+  ModalModelData d = sample_model_data({.modes = 0});
+  d.mass *= 1e4, d.inertia *= 1e4;
+  const double half = depth_below_origin(*light);
+  const BodyId below = world.add_body(light, {.pose = {.p = {0.0, 0.0, half}}});
+  const BodyId above =
+      world.add_body(std::make_shared<const ModalModel>(std::move(d)), {.pose = {.p = {0.0, 0.0, kHeight + half}}});
+  const Vec3 start = world.body(above).pose.p;
+  for (int i = 0; i < 300; ++i) {
+    world.step();
+    ASSERT_TRUE(world.constraint_report().solved) << i;
+  }
+  EXPECT_LT((world.body(above).pose.p - start).norm(), 1e-4 * kSampleSize);
+  EXPECT_GT(lowest(world, below), -1e-5 * kSampleSize);
+  EXPECT_LT(world.body(above).velocity.norm(), 1e-6);
+}
+
 TEST(WorldContact, AStackOfTenRigidBoxesStands) {
   constexpr int kBoxes = 10;
   constexpr double kHeight = 0.2, kApart = 1e-5;                      // of a box; between boxes, m
