@@ -68,6 +68,7 @@ TEST(WorldContact, ABoxStandsOnAMuchLighterOne) {
     world.step();
     ASSERT_TRUE(world.constraint_report().solved) << i;
   }
+  EXPECT_LE(world.constraint_report().residual, 1.0);
   EXPECT_LT((world.body(above).pose.p - start).norm(), 1e-4 * kSampleSize);
   EXPECT_GT(lowest(world, below), -1e-5 * kSampleSize);
   EXPECT_LT(world.body(above).velocity.norm(), 1e-6);
