@@ -257,7 +257,7 @@ void check_small(Program& program, const StepArguments& a) {
   };
   figures.push_back({"flight.time_of_300_over_30", ratio("flight", 300, 30)});
   figures.push_back({"chain.time_of_16_over_4", ratio("chain", 16, 4)});
-  figures.push_back({"sleepers.time_of_1000_over_100", ratio("sleepers", 1000, 100)});
+  figures.push_back({"sleepers.time_of_10000_over_100", ratio("sleepers", 10000, 100)});
   figures.push_back({"drawing.normals_over_positions", normals});
   hold_to_limits(program, figures, a.limits);
 }
