@@ -152,39 +152,7 @@ TEST(TreeTraversal, NearestPointIsTheNearestOfAllTriangles) {
   }
 }
 
-TEST(TreeTraversal, NearestPairIsTheNearestOfAllPairs) {
-  Random random(15);
-  const Surface s = wavy_surface(shapes::sphere(Vec3::Zero(), 1.0, 1), 5, 2);
-  DeformedSurface a, b;
-  for (int trial = 0; trial < 40; ++trial) {
-    a.bind(s, random.amplitudes(5, 0.2));
-    b.bind(s, random.amplitudes(5, 0.2));
-    const RigidTransform X_AB = random.pose(4.0);
-    const auto distance = [&](Index t, Index u) {
-      return closest_points(a.triangle(t), moved(X_AB, b.triangle(u))).distance;
-    };
-    double least = std::numeric_limits<double>::infinity();
-    for (Index t = 0; t < s->triangles(); ++t)
-      for (Index u = 0; u < s->triangles(); ++u) least = std::min(least, distance(t, u));
-    const double found = nearest_triangle_pair(
-        a, b, X_AB, [&](Index t, Index u, double best) { return std::min(best, distance(t, u)); });
-    EXPECT_EQ(found, least);
-  }
-}
-
-TEST(TreeTraversal, BoxDistanceIsALowerBoundAndSeesBothFrames) {
-  Random random(16);
-  for (int trial = 0; trial < 2000; ++trial) {
-    const Vec3 ha = random.vector(1.0).cwiseAbs(), hb = random.vector(1.0).cwiseAbs(), ca = random.vector(1.0),
-               cb = random.vector(1.0);
-    const RigidTransform X_AB = random.pose(3.0);
-    const double bound = distance_between_boxes({ca - ha, ca + ha}, {cb - hb, cb + hb}, X_AB);
-    const Vec3 p = ca + ha.cwiseProduct(random.vector(1.0)), q = X_AB * (cb + hb.cwiseProduct(random.vector(1.0)));
-    EXPECT_LE(bound, (p - q).norm());
-  }
-}
-
-/// All pairs of triangles without a common vertex that are within the margin and were not at rest.
+/// All pairs of triangles without a common vertex that are within the margin.
 TEST(TreeTraversal, SelfPairsHoldWhatBruteForceFinds) {
   Random random(17);
   // A thin bar, finely divided along its length, that can be bent until its ends meet.

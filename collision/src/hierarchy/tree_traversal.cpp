@@ -98,10 +98,6 @@ void append_self(DeformedSurface& a, Index m, Index n, double margin, std::vecto
 
 }  // namespace
 
-double distance_between_boxes(const Aabb& box_A, const Aabb& box_B, const RigidTransform& X_AB) {
-  return std::max(0.0, Separation(X_AB)(box_A, box_B));
-}
-
 double distance_to_box(const Vec3& p, const Aabb& box) {
   return (box.low - p).cwiseMax(p - box.high).cwiseMax(0.0).norm();
 }

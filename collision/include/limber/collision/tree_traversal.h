@@ -95,17 +95,8 @@ double branch_and_bound(DeformedSurface& a, const LowerBound& lower_bound, const
   return best;
 }
 
-/// Lower bound on the distance between a box of frame A and one of frame B, m; 0 where they may overlap.
-double distance_between_boxes(const Aabb& box_A, const Aabb& box_B, const RigidTransform& X_AB);
 /// Distance of a point from a box, m; 0 inside.
 double distance_to_box(const Vec3& p, const Aabb& box);
-
-/// Branch and bound over pairs of triangles of two surfaces, as above.
-/// @param visit (Index of a, Index of b, double best) → double: the new best distance, m, ≤ best
-/// @return the least distance, or `best` where nothing is nearer
-template <class Visit>
-double nearest_triangle_pair(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, const Visit& visit,
-                             double best = std::numeric_limits<double>::infinity());
 
 /// The point of a surface nearest to a given one.
 struct SurfaceProximity {
@@ -117,40 +108,5 @@ struct SurfaceProximity {
 /// @param max_distance m; none where the surface is not nearer than that. Of equally near ones the first visited.
 std::optional<SurfaceProximity> nearest_point(DeformedSurface& a, const Vec3& p_B,
                                               double max_distance = std::numeric_limits<double>::infinity());
-
-// -- Implementation of the template
-// ------------------------------------------------------------------------------------
-
-template <class Visit>
-double nearest_triangle_pair(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, const Visit& visit,
-                             double best) {
-  struct Entry {
-    Index a, b;
-    double bound;
-  };
-  std::array<Entry, 2 * CollisionSurface::kMaxDepth + 4> stack;
-  std::size_t size = 0;
-  const auto entry = [&](Index m, Index n) {
-    return Entry{m, n, distance_between_boxes(a.bounds(m), b.bounds(n), X_AB)};
-  };
-  stack[size++] = entry(0, 0);
-  while (size > 0) {
-    const Entry e = stack[--size];
-    if (!(e.bound < best)) continue;
-    const TreeNode &m = a.surface().node(e.a), &n = b.surface().node(e.b);
-    if (m.leaf() && n.leaf()) {
-      for (const Index t : a.surface().node_triangles(e.a))
-        for (const Index u : b.surface().node_triangles(e.b)) best = visit(t, u, best);
-      continue;
-    }
-    const bool descend_a = n.leaf() || (!m.leaf() && m.count >= n.count);
-    Entry near = descend_a ? entry(m.child, e.b) : entry(e.a, n.child);
-    Entry far = descend_a ? entry(m.child + 1, e.b) : entry(e.a, n.child + 1);
-    if (far.bound < near.bound) std::swap(near, far);
-    stack[size++] = far;
-    stack[size++] = near;
-  }
-  return best;
-}
 
 }  // namespace limber
