@@ -11,8 +11,7 @@ namespace {
 // Energy is given back, and where little of it is too much is taken, at most at this part of the relative kinetic
 // energy in a step: a pendulum that turns round is not to stop there.
 constexpr double kLargestChange = 0.1;
-// This part of the energies at hand may wait for the next step; and as much as recovery has given, whose work is that
-// of rows as they are at the step's start: bodies that are pushed apart turn.
+// This part of the energies at hand may wait for the next step.
 constexpr double kPatience = 1e-7;
 // A gain above this many times the energies at hand is nonsense, not motion to be slowed: digits would not be left.
 constexpr double kNonsense = 10.0;
@@ -107,7 +106,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
   const double gain = after - before_ - work + step.part.options.energy_surplus;
   // Of what there was, never of what came out: that may be any number where the rows did not come together.
   const double at_hand = scale_ + std::max(0.0, work);
-  const double patience = kPatience * (at_hand > 0.0 ? at_hand : recovery_) + recovery_work(step);
+  const double patience = kPatience * (at_hand > 0.0 ? at_hand : recovery_);
   const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};

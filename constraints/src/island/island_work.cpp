@@ -23,8 +23,7 @@ double given(const IslandStep& step, std::size_t row) {
   return std::max(0.0, force(step, row) * step.law(row).agent_displacement);
 }
 
-}  // namespace
-
+/// Of what pushes apart what overlaps.
 double recovery_work(const IslandStep& step) {
   double work = 0.0, recovery = 0.0;
   for (std::size_t i = 0; i < step.size(); ++i) {
@@ -34,6 +33,8 @@ double recovery_work(const IslandStep& step) {
   }
   return std::min(work, largest_recovery_work(step, recovery));
 }
+
+}  // namespace
 
 double agent_work(const IslandStep& step) {
   double work = step.rows.stored_energy() + recovery_work(step);

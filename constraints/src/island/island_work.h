@@ -6,8 +6,6 @@
 namespace limber::internal {
 
 /// Of what moves the rows: f/Δt times the agents' displacements, what is negative not counted, and what springs give.
-/// Of that, what pushes apart what overlaps.
-double recovery_work(const IslandStep& step);
 double agent_work(const IslandStep& step);
 /// Of the forces that the caller holds over the step.
 double load_work(const IslandStep& step);
