@@ -27,6 +27,13 @@ void BlockFactor::begin_pattern(std::span<const std::size_t> widths) {
   widths_.assign(widths.begin(), widths.end());
   words_ = (widths_.size() + kBits - 1) / kBits;
   adjacency_.assign(words_ * widths_.size(), 0);
+  kept_.assign(widths_.size(), false);
+  eliminated_ = widths_.size();
+}
+
+void BlockFactor::keep(std::size_t node) {
+  if (!kept_[node]) --eliminated_;
+  kept_[node] = true;
 }
 
 void BlockFactor::add_edge(std::size_t i, std::size_t j) {
@@ -56,7 +63,7 @@ void BlockFactor::find_order() {
   for (std::size_t step = 0; step < n; ++step) {
     std::size_t next = n;
     for (std::size_t i = 0; i < n; ++i)
-      if (place_[i] == n && (next == n || degree_[i] < degree_[next])) next = i;
+      if (place_[i] == n && kept_[i] == (step >= eliminated_) && (next == n || degree_[i] < degree_[next])) next = i;
     place_[next] = step;
     columns_.push_back({.node = next, .width = widths_[next]});
     const std::uint64_t* around = neighbours(next);
@@ -150,7 +157,8 @@ bool BlockFactor::factor() {
   double* U = upper_.data();
   const MatrixView memory = inverse_.need(widest_, widest_);
   double* divided_memory = divided_.need(widest_, longest_).values;
-  for (const Column& column : columns_) {
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const Column& column = columns_[c];
     const std::size_t n = column.width, head = padded(n), tail = column.stride - head;
     const MatrixView inverse{memory.values, head}, divided{divided_memory, column.stride};
     for (std::size_t i = 0; i < n; ++i) std::copy_n(U + column.offset + i * column.stride, head, inverse.row(i));
@@ -167,6 +175,15 @@ bool BlockFactor::factor() {
   return true;
 }
 
+double BlockFactor::work() const {
+  double sum = 0.0;
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const double width = static_cast<double>(columns_[c].width), length = static_cast<double>(columns_[c].stride);
+    sum += 0.5 * width * length * length;
+  }
+  return sum;
+}
+
 void BlockFactor::times_inverse_pivot(const Column& column, const double* x, double* out) const {
   const double* inverse = upper_.data() + column.offset;
   for (std::size_t i = 0; i < column.width; ++i) {
@@ -176,23 +193,36 @@ void BlockFactor::times_inverse_pivot(const Column& column, const double* x, dou
   }
 }
 
-void BlockFactor::solve(double* x) {
-  double *y = row_.need(2 * padded(widest_)), *part = y + padded(widest_);
-  for (const Column& column : columns_) {
+void BlockFactor::reduce(double* x) {
+  double* y = row_.need(2 * padded(widest_));
+  for (std::size_t c = 0; c < eliminated_; ++c) {
+    const Column& column = columns_[c];
     double* own = x + first_[column.node];
     times_inverse_pivot(column, own, y);
     std::copy_n(y, column.width, own);
     for (std::size_t i = 0; i < column.width; ++i) y[i] = -own[i];
     gather_blocks(x, blocks_.data() + column.first_entry, column.entries, upper_.data(), y);
   }
-  for (std::size_t c = columns_.size(); c-- > 0;) {
+}
+
+void BlockFactor::expand(double* x, std::size_t count) {
+  double *y = row_.need(2 * padded(widest_)), *part = y + padded(widest_);
+  for (std::size_t c = eliminated_; c-- > 0;) {
     const Column& column = columns_[c];
-    double* own = x + first_[column.node];
-    std::fill_n(y, column.width, 0.0);
-    spread_blocks(y, blocks_.data() + column.first_entry, column.entries, upper_.data(), x);
-    times_inverse_pivot(column, y, part);
-    for (std::size_t q = 0; q < column.width; ++q) own[q] -= part[q];
+    for (std::size_t k = 0; k < count; ++k) {
+      double* all = x + k * size_;
+      double* own = all + first_[column.node];
+      std::fill_n(y, column.width, 0.0);
+      spread_blocks(y, blocks_.data() + column.first_entry, column.entries, upper_.data(), all);
+      times_inverse_pivot(column, y, part);
+      for (std::size_t q = 0; q < column.width; ++q) own[q] -= part[q];
+    }
   }
+}
+
+void BlockFactor::solve(double* x) {
+  reduce(x);
+  expand(x);
 }
 
 }  // namespace limber::internal

@@ -88,6 +88,64 @@ TEST(BlockFactor, SolvesAsADenseFactorDoes) {
   }
 }
 
+TEST(BlockFactor, WhatIsLeftOfKeptNodesIsTheSchurComplement) {
+  BlockFactor factor;
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    const System system(4 + seed % 9, 3 * (seed % 11), seed);
+    const std::size_t nodes = system.widths.size();
+    const std::vector<std::size_t> kept{0, nodes / 2, nodes - 1};
+    factor.begin_pattern(system.widths);
+    for (const auto& [a, b] : system.edges) factor.add_edge(a, b);
+    for (const std::size_t i : kept) {
+      factor.keep(i);
+      for (const std::size_t j : kept) factor.add_edge(i, j);
+    }
+    factor.end_pattern();
+    system.write(factor);
+    ASSERT_TRUE(factor.factor()) << seed;
+
+    // (M⁻¹) of the kept rows and columns is the inverse of the Schur complement.
+    Eigen::Index size = 0;
+    std::vector<Eigen::Index> at, rows;
+    for (const std::size_t i : kept) {
+      at.push_back(size);
+      for (std::size_t k = 0; k < system.widths[i]; ++k) rows.push_back(static_cast<Eigen::Index>(system.first[i] + k));
+      size += static_cast<Eigen::Index>(system.widths[i]);
+    }
+    Eigen::MatrixXd S(size, size);
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      for (std::size_t j = 0; j < kept.size(); ++j) {
+        if (i != j && !factor.comes_first(kept[i], kept[j])) continue;
+        const BlockFactor::Block block = factor.block(kept[i], kept[j]);
+        for (std::size_t p = 0; p < system.widths[kept[i]]; ++p)
+          for (std::size_t q = 0; q < system.widths[kept[j]]; ++q) {
+            const auto row = at[i] + static_cast<Eigen::Index>(p), column = at[j] + static_cast<Eigen::Index>(q);
+            S(row, column) = S(column, row) = factor.upper(block)[p * block.stride + q];
+          }
+      }
+    const Eigen::MatrixXd inverse = Eigen::MatrixXd(system.M.inverse())(rows, rows);
+    EXPECT_LE((S * inverse - Eigen::MatrixXd::Identity(size, size)).norm(), 1e-9 * S.norm() * inverse.norm()) << seed;
+
+    const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(system.M.cols(), -1.0, 2.0);
+    AlignedBuffer memory;
+    double* x = memory.need(factor.size());
+    for (std::size_t i = 0; i < nodes; ++i)
+      std::copy_n(b.data() + system.first[i], system.widths[i], x + factor.first(i));
+    factor.reduce(x);
+    Eigen::VectorXd condensed(size);
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      std::copy_n(x + factor.first(kept[i]), system.widths[kept[i]], condensed.data() + at[i]);
+    condensed = S.ldlt().solve(condensed).eval();
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      std::copy_n(condensed.data() + at[i], system.widths[kept[i]], x + factor.first(kept[i]));
+    factor.expand(x);
+    Eigen::VectorXd result(b.size());
+    for (std::size_t i = 0; i < nodes; ++i)
+      std::copy_n(x + factor.first(i), system.widths[i], result.data() + system.first[i]);
+    EXPECT_LE((system.M * result - b).norm(), 1e-10 * system.M.norm() * result.norm()) << seed;
+  }
+}
+
 TEST(BlockFactor, RefusesWhatIsNotPositive) {
   System system(4, 6, 3);
   system.M(5, 5) = -1.0;

@@ -18,6 +18,9 @@ class BlockFactor {
   void begin_pattern(std::span<const std::size_t> widths);
   /// Blocks (i, j) and (j, i) may hold numbers; i = j always may.
   void add_edge(std::size_t i, std::size_t j);
+  /// A node that factor() does not eliminate: what is left of the blocks between such nodes is the Schur complement of
+  /// all others. Two of them may hold numbers only if an edge says so, or elimination links them.
+  void keep(std::size_t node);
   /// Finds the order and places the blocks. Memory grows to the largest pattern seen.
   void end_pattern();
 
@@ -39,11 +42,21 @@ class BlockFactor {
   /// @return false where a pivot is not positive
   bool factor();
 
+  /// Multiply-adds of factor(), and numbers of the factor: what solve() reads twice.
+  double work() const;
+  std::size_t numbers() const { return numbers_; }
+
   /// Where a node's numbers begin in vectors; each node's part is padded.
   std::size_t first(std::size_t node) const { return first_[node]; }
   std::size_t size() const { return size_; }
-  /// x ← M⁻¹ x, by the last factor. Padding zero.
+  /// x ← M⁻¹ x, by the last factor. Padding zero. @pre no node is kept
   void solve(double* x);
+  /// The two halves of it. Between them x holds the right-hand side of the Schur complement at kept nodes, and is given
+  /// its solution there.
+  void reduce(double* x);
+  void expand(double* x) { expand(x, 1); }
+  /// Of several, size() apart.
+  void expand(double* x, std::size_t count);
 
  private:
   struct Column {  // one node, in the order of elimination
@@ -55,14 +68,16 @@ class BlockFactor {
   };
 
   void find_order();
+  void eliminate(std::size_t node);
   void place_columns();
   void find_runs(const Column& column, std::size_t entry);
   void times_inverse_pivot(const Column& column, const double* x, double* out) const;
   std::uint64_t* neighbours(std::size_t node) { return adjacency_.data() + node * words_; }
 
-  std::vector<std::size_t> widths_, place_, first_, degree_;
+  std::vector<std::size_t> widths_, place_, first_, degree_, alive_;
   std::vector<std::uint64_t> adjacency_;  // by node, in bits
-  std::size_t words_ = 0, size_ = 0, numbers_ = 0;
+  std::vector<bool> kept_;
+  std::size_t words_ = 0, size_ = 0, numbers_ = 0, eliminated_ = 0;
   std::vector<Column> columns_;
   std::vector<Entry> entries_;
   std::vector<RowRun> runs_;      // from the rows of a node to those of a later one
