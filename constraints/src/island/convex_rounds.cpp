@@ -37,7 +37,7 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   for (report.iterations = 1;; ++report.iterations) {
     take_impulses(step);
     step.predict();
-    if (step.follow_bending()) fill_rows(step), contacts_.set_motion();
+    if (step.skinned) fill_rows(step), contacts_.set_motion();
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.

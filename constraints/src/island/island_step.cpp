@@ -1,6 +1,7 @@
 #include "island_step.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace limber::internal {
@@ -112,6 +113,12 @@ void IslandStep::measure(StepTime when, std::vector<double>& into) const {
 }
 
 void IslandStep::predict() {
+  set_loads();
+  if (skinned) follow_bending();
+  predict_under_loads();
+}
+
+void IslandStep::set_loads() {
   loads.clear(bodies);
   loads.add(bodies, rows, f, theta, 1.0);
   loads.add(bodies, rows, reaction, 0.5 * length(), length());
@@ -119,17 +126,59 @@ void IslandStep::predict() {
     loads.frames[i].impulse -= part.slowed * part.relative[i].linear;
     loads.frames[i].moment -= part.slowed * part.relative[i].angular;
   }
-  predict_under_loads();
 }
 
 void IslandStep::predict_under_loads() {
+  move_under_loads();
+  measure(StepTime::kEnd, gap);
+}
+
+void IslandStep::move_under_loads() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
     if (loads.early[static_cast<std::size_t>(local)] != 0) load_early(body, load);
     body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
-  measure(StepTime::kEnd, gap);
+}
+
+/// What the modes bear bends the body, and by how it bends on its way its points tell what the modes bear: a map of
+/// modal loads to themselves, which the impulses stiffen and soften (by f · ∂²x/∂z²). Its fixed point is one answer to
+/// the impulses; a rows' way that lags behind would be another for every way to come to them.
+void IslandStep::follow_bending() {
+  constexpr int kMost = 20;
+  constexpr double kMet = 1e-11;  // of what bends the bodies
+  const std::size_t n = loads.modes.size();
+  for (std::vector<double>* v : {&borne_change_, &metric_, &bent_}) v->resize(n);
+  bodies.write_position_metric(length(), theta, metric_);
+  bending_.begin(n);
+  borne_ = loads.modes;
+  for (int i = 0;; ++i) {
+    move_under_loads();
+    bend_rows();
+    set_loads();
+    double all = 0.0, left = 0.0;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double weight = std::sqrt(metric_[k]);
+      borne_change_[k] = loads.modes[k] - borne_[k];
+      bent_[k] = weight * borne_change_[k];
+      all = std::max(all, weight * std::abs(loads.modes[k]));
+      left = std::max(left, std::abs(bent_[k]));
+    }
+    if (!(left > kMet * all) || i == kMost) return;
+    bending_.advance(borne_, borne_change_, bent_);
+    loads.modes.assign(borne_.begin(), borne_.end());
+  }
+}
+
+/// By the way to where the bodies were predicted last.
+void IslandStep::bend_rows() {
+  linearise(StepTime::kMiddle, mean_rows);
+  for (Index i = 0; i < rows.size(); ++i)
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Index local = bodies.local(rows.row(i).sides[side].body);
+      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot)) rows.take_modal(mean_rows, i, side);
+    }
 }
 
 /// The frame's part. Modes of a free body do not feel gravity; those of one that is held somewhere have it over the
@@ -171,17 +220,6 @@ void IslandStep::linearise(StepTime when, ConstraintRows& to) const {
 void IslandStep::linearise_end() {
   bodies.place(StepTime::kEnd);
   linearise(StepTime::kEnd, end_rows);
-}
-
-bool IslandStep::follow_bending() {
-  if (!skinned) return false;
-  linearise(StepTime::kMiddle, mean_rows);
-  for (Index i = 0; i < rows.size(); ++i)
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Index local = bodies.local(rows.row(i).sides[side].body);
-      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot)) rows.take_modal(mean_rows, i, side);
-    }
-  return true;
 }
 
 void IslandStep::load_end() {

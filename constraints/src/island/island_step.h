@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limber/constraints/island_solver.h"
+#include "limber/solvers/secant_iteration.h"
 
 namespace limber::internal {
 
@@ -91,7 +92,8 @@ struct IslandStep {
   bool any_law(bool (*holds)(const RowLaw&)) const;
 
   /// The bodies under θ f and the first half of the reaction at the start, their modes under all of both, held; and the
-  /// gaps there.
+  /// gaps there. Modes of bodies with a skin get of the impulses what moves the rows' points on the way to where the
+  /// bodies then are, so that the impulses do the work that the gaps tell: rows say it from then on.
   void predict();
   /// Under the loads as they are.
   void predict_under_loads();
@@ -100,9 +102,6 @@ struct IslandStep {
   /// Linearises the rows elsewhere than at the start.
   void linearise(StepTime when, ConstraintRows& to) const;
   void linearise_end();
-  /// Bodies with a skin: their modes get of the impulses what moves the rows' points on the way to where the bodies
-  /// were predicted last, so that the impulses do the work that the gaps tell. @return whether there are any
-  bool follow_bending();
   void measure(StepTime when, std::vector<double>& into) const;
   /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
   void load_end();
@@ -121,9 +120,17 @@ struct IslandStep {
  private:
   void load_early(const ConstrainedBody& body, ConstraintLoad& load) const;
   Vec3 held_gravity(Index local) const;
+  void set_loads();
+  void move_under_loads();
+  void follow_bending();
+  void bend_rows();
   void find_kind();
   void begin_early();
   void set_modal_steps();
+
+  SecantIteration bending_;                            // of modal loads
+  std::vector<double> borne_, borne_change_, metric_;  // by degree of freedom
+  std::vector<double> bent_;                           // what changes of them bend
 };
 
 template <class Action>

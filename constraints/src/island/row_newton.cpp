@@ -28,7 +28,7 @@ SolveStatus RowNewton::iterate(IslandStep& step, IslandReport& report) {
   secants_.begin(F_.size());
   for (report.iterations = 1;; ++report.iterations) {
     take(step, F_);
-    if (step.follow_bending()) factor(step);
+    if (step.skinned) factor(step);
     const SolveStatus status = improve(step);
     report.change = largest_change(step);
     if (report.change <= 1.0) return status;
