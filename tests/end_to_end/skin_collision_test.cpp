@@ -147,5 +147,37 @@ TEST(SkinnedSurfaces, ABarThatFallsBackOnAPlaneGainsNoEnergyAndDoesNotSinkIn) {
   EXPECT_LE(r.deepest, 5e-4);
 }
 
+/// A bar that lies on rough ground is pulled up and over by a hand at its end, under a weight that bends it. How it
+/// bends on its way and what its modes bear are found together; rows that lag a round behind leave 153 of these steps
+/// unsettled.
+TEST(SkinnedSurfaces, AHandBendsABarThatLiesOnTheGround) {
+  const auto model = bar({.held = false, .damped = true});
+  ContactFinder finder;
+  World world({.step = kPeriod / 60.0, .gravity = {0.0, 0.0, -0.1}});
+  world.set_contact_source(&finder, {.friction = 0.5});
+  world.add_static(std::make_shared<Shape>(HalfSpace{}), {.p = -model->data().origin_in_input});
+  const BodyId id = world.add_body(model);
+  const SurfacePoint end = vertex_at(*model, {kLength, 0.75, 1.0}), other = vertex_at(*model, {0.0, 0.75, 0.0});
+  const HandleId hand = world.add_handle(id, end, {.stiffness = 5000.0, .damping = 5000.0});
+  const Vec3 start = world.position(id, end);
+  const double ground = -model->data().origin_in_input.z();
+  constexpr int kSteps = 240;
+  int unsettled = 0;
+  double deepest = 0.0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double angle = std::min(1.0, i / 180.0) * 60.0 * kDegree;
+    world.set_handle_target(hand,
+                            {.position = start + 0.5 * kLength * Vec3(std::cos(angle) - 1.0, 0.0, std::sin(angle))});
+    world.step();
+    if (world.constraint_report().solved)
+      deepest = std::max(deepest, ground - world.position(id, other).z());
+    else
+      ++unsettled;
+  }
+  EXPECT_LE(unsettled, kSteps / 20);  // five; by its modes alone 46
+  EXPECT_LE(deepest, 1e-3 * kLength);
+  EXPECT_GT(world.position(id, end).z(), start.z() + 0.3 * kLength);
+}
+
 }  // namespace
 }  // namespace limber::testing
