@@ -2,8 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <optional>
+
 #include "constants.h"
+#include "limber/mesh/read_mesh.h"
 #include "limber/model/skin_pose.h"
+#include "limber/precompute/tetrahedralise.h"
 #include "nonlinear_fem.h"
 
 namespace limber {
@@ -12,11 +17,12 @@ namespace {
 using namespace limber::testing;
 using Vector = Eigen::VectorXd;
 
-/// One body, held at x = 0 and loaded at its far end.
+/// One body, some nodes of which are held and some, its tip, loaded.
 class Loaded {
  public:
-  Loaded(TetMesh mesh, const std::function<bool(const Vec3&)>& held, const std::function<bool(const Vec3&)>& tip)
-      : body_(limber::testing::skinned(mesh, nodes_where(mesh, held), 20, 16)),
+  Loaded(TetMesh mesh, const std::function<bool(const Vec3&)>& held, const std::function<bool(const Vec3&)>& tip,
+         int modes = 20, Index handles = 16)
+      : body_(limber::testing::skinned(mesh, nodes_where(mesh, held), modes, handles)),
         tip_(nodes_where(mesh, tip)),
         pose_(body_->skin.skin) {}
 
@@ -90,6 +96,7 @@ class Loaded {
         const Vector step = KKT.partialPivLu().solve(rhs);
         z += step.head(modes());
         f += step.tail<3>();
+        if (step.head(modes()).norm() <= 1e-10 * z.norm()) break;
       }
     return {z, f};
   }
@@ -103,7 +110,8 @@ class Loaded {
   SkinPose pose_;
 };
 
-/// What is asked of a bend: largest errors over the length, and of the hand's force.
+/// What is asked of a bend: largest errors over the length, and of the hand's force. Dead loads that may err by
+/// anything are not tried.
 struct Bend {
   double degrees, dead_load, hand, hand_force;
 };
@@ -118,11 +126,13 @@ void expect_bends(Loaded& body, double length, const Vec3& normal, const Vec3& a
     const auto exact = bend_by_load(body.body(), body.tip(), body.tip(), direction, small, bend.degrees * kDegree);
     ASSERT_FALSE(exact.empty());
     const std::vector<Vec3>& places = exact.back().places;
-    const auto loaded = body.places(body.under_dead_load(exact.back().force * direction));
     std::vector<Vec3> path;
     for (const BentByLoad& at : exact) path.push_back(body.mean_tip(at.places));
     const auto [z, f] = body.pulled_along(path);
-    EXPECT_LE(largest_distance(loaded, places) / length, bend.dead_load);
+    if (bend.dead_load < kInfinity) {
+      const auto loaded = body.places(body.under_dead_load(exact.back().force * direction));
+      EXPECT_LE(largest_distance(loaded, places) / length, bend.dead_load);
+    }
     EXPECT_LE(largest_distance(body.places(z), places) / length, bend.hand);
     EXPECT_NEAR(f.norm() / exact.back().force, 1.0, bend.hand_force);
   }
@@ -134,6 +144,82 @@ TEST(SkinStatics, BarBendsAsNonlinearFiniteElementsDo) {
       [](const Vec3& x) { return x.x() > 10.0 - 1e-9; });
   expect_bends(bar, 10.0, Vec3::UnitZ(), -Vec3::UnitY(), 10.0,
                std::vector<Bend>{{60.0, 0.04, 0.006, 0.1}, {90.0, 0.1, 0.015, 0.15}, {120.0, kInfinity, 0.027, 0.3}});
+}
+
+/// The Stanford bunny, 2 m long, held below its ears, and the ear whose tip stands highest. None where Debian's package
+/// glmark2-data is not installed.
+class BunnyEar {
+ public:
+  static std::optional<TetMesh> mesh() {
+    const std::filesystem::path file = "/usr/share/glmark2/models/bunny.obj";
+    if (!std::filesystem::exists(file)) return std::nullopt;
+    Warnings warnings;
+    return tetrahedralise(read_surface_mesh(file, warnings), {.cell_size = 0.16, .max_nodes = 1}, warnings).mesh;
+  }
+  explicit BunnyEar(TetMesh mesh) : top_(highest(mesh)), loaded_(std::move(mesh), is_held, is_tip(top_), 40, 24) {
+    const SkinnedBody& b = loaded_.body();
+    // The two lowest modes bend an ear each.
+    const Index mode = shift(0).norm() > shift(1).norm() ? 0 : 1;
+    const Vec3 along = top_ - kRoot;
+    length_ = along.norm();
+    normal_ = shift(mode) - along * (shift(mode).dot(along) / along.squaredNorm());
+    if (normal_.z() > 0.0) normal_ = -normal_;
+    // What moves the tip by a tenth of the ear if nothing but that mode gives way.
+    small_force_ = 0.1 * length_ * b.body->eigenvalues[static_cast<std::size_t>(mode)] / normal_.squaredNorm();
+    normal_.normalize();
+    axis_ = along.cross(normal_).normalized();
+  }
+  Loaded& loaded() { return loaded_; }
+  double length() const { return length_; }
+  const Vec3& normal() const { return normal_; }
+  const Vec3& axis() const { return axis_; }
+  double small_force() const { return small_force_; }
+
+ private:
+  inline static const Vec3 kRoot{-0.4, 0.45, -0.1};  // of the ears
+  static bool is_held(const Vec3& x) { return x.y() < kRoot.y(); }
+  static Vec3 highest(const TetMesh& mesh) {
+    return *std::ranges::max_element(mesh.nodes, {}, [](const Vec3& x) { return x.y(); });
+  }
+  static std::function<bool(const Vec3&)> is_tip(const Vec3& top) {
+    return [top](const Vec3& x) { return (x - top).norm() < 0.25; };
+  }
+  Vec3 shift(Index mode) const {
+    Vec3 sum = Vec3::Zero();
+    for (const Index v : loaded_.tip()) sum += loaded_.body().shape(static_cast<std::size_t>(v), mode);
+    return sum / static_cast<double>(loaded_.tip().size());
+  }
+
+  Vec3 top_;
+  Loaded loaded_;
+  double length_ = 0.0, small_force_ = 0.0;
+  Vec3 normal_, axis_;
+};
+
+/// Modes from the third on bend one ear or both in waves.
+TEST(SkinStatics, BunnysEarsAreWhereRotationStrainWarpingHasThem) {
+  std::optional<TetMesh> mesh = BunnyEar::mesh();
+  if (!mesh) GTEST_SKIP() << "Debian package glmark2-data is not installed";
+  BunnyEar ear(std::move(*mesh));
+  const SkinnedBody& b = ear.loaded().body();
+  for (Index mode = 0; mode < 6; ++mode) {
+    SCOPED_TRACE(mode);
+    const std::vector<double> z = turned_by(b, mode, 120.0 * kDegree);
+    const std::vector<Vec3> places = b.places(z);
+    EXPECT_LE(largest_distance(places, rotation_strain(b, z)), 0.04 * ear.length());
+    for (const Index v : b.fixed) EXPECT_EQ(places[static_cast<std::size_t>(v)], b.rest(static_cast<std::size_t>(v)));
+  }
+}
+
+TEST(SkinStatics, BunnysEarIsPulledAsNonlinearFiniteElementsAre) {
+  std::optional<TetMesh> mesh = BunnyEar::mesh();
+  if (!mesh) GTEST_SKIP() << "Debian package glmark2-data is not installed";
+  BunnyEar ear(std::move(*mesh));
+  const std::vector<Bend> bends{{60.0, kInfinity, 0.02, 0.15}};
+  for (const double side : {1.0, -1.0}) {
+    SCOPED_TRACE(side);
+    expect_bends(ear.loaded(), ear.length(), side * ear.normal(), side * ear.axis(), ear.small_force(), bends);
+  }
 }
 
 }  // namespace
