@@ -191,7 +191,8 @@ void slope(int modes, double angle, double friction) {
 void run_all() {
   std::printf("%d steps each. Energy over kinetic and elastic energy at first and Σ m g size.\n\n", kSteps);
   std::printf(
-      "| scene | modes | recovery, m/s | unsettled | off the law, of lengths | most rounds, Newton steps | divided, "
+      "| scene | modes | recovery, m/s | unsettled | off the law (residual × 1e-9) | most rounds, Newton steps | "
+      "divided, "
       "slowed, refused | joints "
       "apart, m | deepest / size | "
       "largest rise | taken by the guard |\n|---|---|---|---|---|---|---|---|---|---|---|\n");

@@ -84,7 +84,7 @@ int main(int argc, char** argv) {
               std::max(modes, 0));
   std::printf(
       "| second | ms a step by the clock, p50 | p99 | worst | by CPU time, p50 | worst | contacts | steps not settled "
-      "of 60 | off the law by more than 1e-6 of the lengths | by the most | deepest / size | farthest moved, m | "
+      "of 60 | residual over 1,000 | the largest, × 1e-9 | deepest / size | farthest moved, m | "
       "largest rise of energy, J |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   StepTimes all;

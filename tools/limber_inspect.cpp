@@ -164,11 +164,13 @@ std::string surfaces_text(const ModalModel& model) {
   if (d.volume_block)
     text +=
         fmt::format("  volume block    {} nodes, {} tets\n", d.volume_block->rest.size(), d.volume_block->tets.size());
-  if (const auto& r = d.residual_compliance)
+  if (const auto& r = d.residual_compliance) {
+    const CapturedRange range = captured_range(model);
     text += fmt::format(
         "  residual        {}, of {} vertices; of their static compliance the modes show {:.0f} % ({:.0f} % and "
         "more)\n",
-        to_string(r->form()), r->vertices(), 100.0 * captured_range(model).median, 100.0 * captured_range(model).least);
+        to_string(r->form()), r->vertices(), 100.0 * range.median, 100.0 * range.least);
+  }
   if (!d.captured.empty()) {
     const auto least = std::min_element(d.captured.begin(), d.captured.end(),
                                         [](const CapturedLoad& a, const CapturedLoad& b) { return a.share < b.share; });

@@ -5,17 +5,11 @@
 #include <limits>
 #include <variant>
 
+#include "finder/world_bounds.h"
 #include "limber/collision/narrow_phase.h"
 #include "limber/core/error.h"
 
 namespace limber::internal {
-namespace {
-
-/// Largest distance of a point of a box from the origin.
-double farthest_of(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).norm(); }
-
-}  // namespace
-
 void MovingSide::start(const MovingBody& body) {
   if (!body.surface == !body.geometry)
     throw InvalidArgument("TimeOfImpact::find: a body has both a surface and a geometry, or neither, expected one");
@@ -158,13 +152,21 @@ void MovingSide::set_directions(const std::array<std::array<Vec3, kDirections>, 
   stamp_ = 1;
 }
 
-const PlacedPart& MovingSide::node(Index node) {
-  if (!surface_) return item(node, 0);
-  Slot& slot = slots_[static_cast<std::size_t>(node)];
-  if (slot.stamp == stamp_) return parts_[slot.part];
+/// Of a node or a triangle, and whether it has been placed along the directions at hand.
+std::pair<PlacedPart*, bool> MovingSide::part_at(std::size_t key) {
+  if (slots_.size() <= key) slots_.resize(key + 1);
+  Slot& slot = slots_[key];
+  if (slot.stamp == stamp_) return {&parts_[slot.part], true};
   slot = {stamp_, static_cast<std::uint32_t>(parts_used_)};
   if (parts_used_ == parts_.size()) parts_.emplace_back();
-  PlacedPart& part = parts_[parts_used_++];
+  return {&parts_[parts_used_++], false};
+}
+
+const PlacedPart& MovingSide::node(Index node) {
+  if (!surface_) return item(node, 0);
+  const auto [found, is_placed] = part_at(static_cast<std::size_t>(node));
+  PlacedPart& part = *found;
+  if (is_placed) return part;
   double arm = 0.0;
   for (const int end : {0, 1}) {
     const Aabb box = shape(end).bounds(node);
@@ -179,12 +181,9 @@ const PlacedPart& MovingSide::node(Index node) {
 
 const PlacedPart& MovingSide::item(Index node, Index number) {
   const auto key = surface_ ? surface_->nodes().size() + static_cast<std::size_t>(item_triangle(node, number)) : 0u;
-  if (slots_.size() <= key) slots_.resize(key + 1);
-  Slot& slot = slots_[key];
-  if (slot.stamp == stamp_) return parts_[slot.part];
-  slot = {stamp_, static_cast<std::uint32_t>(parts_used_)};
-  if (parts_used_ == parts_.size()) parts_.emplace_back();
-  PlacedPart& part = parts_[parts_used_++];
+  const auto [found, is_placed] = part_at(key);
+  PlacedPart& part = *found;
+  if (is_placed) return part;
   const Item it = points(node, number);
   double arm = 0.0;
   for (std::size_t end = 0; end < 2; ++end) {

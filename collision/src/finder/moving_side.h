@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "finder/impact_kernels.h"
@@ -84,6 +85,7 @@ class MovingSide {
   void bound_flexing();
   void bound_skin();
   void bound_turning();
+  std::pair<PlacedPart*, bool> part_at(std::size_t key);
   static void fill_below(Slab& slab);
   double surface_radius() const;
   Index item_triangle(Index node, Index number) const {

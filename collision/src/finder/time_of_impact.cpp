@@ -41,9 +41,6 @@ double part_to_close(double gap, double gap_then, double bend) {
   return sum > 0.0 ? 2.0 * gap / sum : 2.0;
 }
 
-/// Largest distance of a point of a box from the origin.
-double farthest(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).norm(); }
-
 /// Two sides over one stretch.
 class Pair {
  public:
@@ -343,7 +340,7 @@ Aabb swept(const Aabb& box_B, std::span<const double> shape, const ExactMotion& 
       track.low[axis] = std::min(track.low[axis], turn);
       track.high[axis] = std::max(track.high[axis], turn);
     }
-  const double arm = farthest(box_B), sway = motion.sway(arm, shape);
+  const double arm = internal::farthest_of(box_B), sway = motion.sway(arm, shape);
   const Vec3 center = start.q * box_B.center();
   const Vec3 half = to_matrix(start.q).cwiseAbs() * box_B.half_extents();
   const Vec3 low = (center - half).array() - sway, high = (center + half).array() + sway;

@@ -24,6 +24,9 @@ inline Aabb world_box(const Aabb& box_B, const RigidTransform& X_WB) {
   return box_about(X_WB * box_B.center(), to_matrix(X_WB.q).cwiseAbs() * box_B.half_extents());
 }
 
+/// Largest distance of a point of a box from the origin.
+inline double farthest_of(const Aabb& box) { return box.low.cwiseAbs().cwiseMax(box.high.cwiseAbs()).norm(); }
+
 /// With all that lies below it.
 inline Aabb with_all_below(Aabb box, const Vec3& up) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();

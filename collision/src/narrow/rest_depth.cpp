@@ -82,6 +82,19 @@ void RestDepthRule::bind_rest(PairSurface& surface) {
   rest_is_bound_ = true;
 }
 
+// The material point at p, and what of the rest surface is nearest to it. @param weight of the triangle's corners:
+// where to begin @return false: there is none
+bool RestDepthRule::find_at_rest(PairSurface& surface, const Vec3& p, Index triangle,
+                                 const std::array<double, 3>& weight, Place& place, PairSurface::Nearest& rest) {
+  bind_rest(surface);
+  const CollisionSurface& mesh = surface.surface();
+  Vec3 guess = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c) guess += weight[c] * mesh.rest(mesh.triangle(triangle)[c]);
+  if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
+  rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  return true;
+}
+
 // By the nearest point of the rest surface, carried forward.
 void RestDepthRule::lead_out(PairSurface& surface, const Place& place, const PairSurface::Nearest& rest,
                              Exit& exit) const {
@@ -94,27 +107,19 @@ void RestDepthRule::lead_out(PairSurface& surface, const Place& place, const Pai
 }
 
 bool RestDepthRule::exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest& nearest, Exit& exit) {
-  bind_rest(surface);
-  const CollisionSurface& mesh = surface.surface();
-  Vec3 guess = Vec3::Zero();
-  for (std::size_t c = 0; c < 3; ++c) guess += nearest.foot.weight[c] * mesh.rest(mesh.triangle(nearest.triangle)[c]);
   Place place;
-  if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
-  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  PairSurface::Nearest rest;
+  if (!find_at_rest(surface, p, nearest.triangle, nearest.foot.weight, place, rest)) return false;
   if (!rest.inside || rest.distance <= surface.directionless()) return false;
   lead_out(surface, place, rest, exit);
   return exit.normal.dot(p - exit.at.point) < 0.0;
 }
 
 bool RestDepthRule::exit_of(Index v, PairSurface& surface, const FeatureSide& near, Exit& exit) {
-  bind_rest(surface);
-  const CollisionSurface& mesh = surface.surface();
-  Vec3 guess = Vec3::Zero();
-  for (std::size_t c = 0; c < 3; ++c) guess += near.weight[c] * mesh.rest(mesh.triangle(near.triangle)[c]);
   Place place;
-  if (!carry_back(X_PB_.inverse() * surface.vertex(v), guess, place)) return false;
-  const PairSurface::Nearest rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
-  const Triangle& corners = mesh.triangle(rest.triangle);
+  PairSurface::Nearest rest;
+  if (!find_at_rest(surface, surface.vertex(v), near.triangle, near.weight, place, rest)) return false;
+  const Triangle& corners = surface.surface().triangle(rest.triangle);
   if (!rest.inside || std::find(corners.begin(), corners.end(), v) != corners.end()) return false;  // v itself
   lead_out(surface, place, rest, exit);
   return exit.normal.dot(surface.vertex(v) - exit.at.point) <= 0.0;

@@ -43,6 +43,8 @@ class RestDepthRule final : public OverlapRule, public SelfOverlapRule {
     Mat3 F;     // deformation gradient there
   };
   void bind_rest(PairSurface& surface);
+  bool find_at_rest(PairSurface& surface, const Vec3& p, Index triangle, const std::array<double, 3>& weight,
+                    Place& place, PairSurface::Nearest& rest);
   bool carry_back(const Vec3& p_B, const Vec3& first_guess, Place& place) const;
   void lead_out(PairSurface& surface, const Place& place, const PairSurface::Nearest& rest, Exit& exit) const;
 

@@ -56,6 +56,9 @@ void IslandStep::begin(const StepPart& of) {
   measure(StepTime::kStart, start_gap);
   gap = start_gap;
   set_modal_steps();
+  if (!skinned) return;
+  metric_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
+  bodies.write_position_metric(length(), theta, metric_);
 }
 
 bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
@@ -149,8 +152,7 @@ void IslandStep::follow_bending() {
   constexpr int kMost = 20;
   constexpr double kMet = 1e-11;  // of what bends the bodies
   const std::size_t n = loads.modes.size();
-  for (std::vector<double>* v : {&borne_change_, &metric_, &bent_}) v->resize(n);
-  bodies.write_position_metric(length(), theta, metric_);
+  for (std::vector<double>* v : {&borne_change_, &bent_}) v->resize(n);
   bending_.begin(n);
   borne_ = loads.modes;
   for (int i = 0;; ++i) {
