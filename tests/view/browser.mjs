@@ -12,14 +12,24 @@ export const wrong = [];
 export const check = (holds, claim) => { if (!holds) wrong.push(claim); };
 export const wait = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 
+/** A machine with other work to do may be slow: so long is waited for what a page does in a moment. */
+const patience = 100000;
+/** Waits until it holds. @return whether it did */
+export async function until(holds) {
+  for (const began = Date.now(); !(await holds()); await wait(50)) if (Date.now() - began > patience) return false;
+  return true;
+}
+
 const browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
   executablePath: process.env.CHROMIUM ?? execFileSync('sh', ['-c', 'command -v chromium']).toString().trim(),
   headless: true,
+  timeout: patience,
   hasTouch: true,
   viewport: { width: 900, height: 560 },
   args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
     '--disable-background-networking', '--disable-component-update', '--disable-sync'],
 });
+browser.setDefaultTimeout(patience);
 
 let probing = false;  // what is refused then is told on the console, as it should be
 
@@ -32,10 +42,7 @@ export async function open(path) {
     if (request.url() !== url && !/^(data|blob):/.test(request.url())) wrong.push(`a request: ${request.url().slice(0, 200)}`);
   });
   await page.goto(url);
-  for (let tries = 0; tries < 150; ++tries) {
-    if (await page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== '')) break;
-    await wait(100);
-  }
+  await until(() => page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== ''));
   return page;
 }
 

@@ -2,7 +2,7 @@
 // model as a person would: two hinged bars, of which the first is pinned. Every claim that does not hold is a line, and the
 // exit code is 1.
 import { readFileSync } from 'node:fs';
-import { check, isSafe, open, run, wait, wrong } from './browser.mjs';
+import { check, isSafe, open, run, until, wrong } from './browser.mjs';
 
 const [file, picture] = process.argv.slice(2);
 
@@ -95,9 +95,9 @@ async function isSaved(page) {
   const files = [];
   page.on('download', (file) => files.push(file));
   await page.locator('#panel button:has-text("Save")').click();
-  for (let tries = 0; tries < 50 && files.length < 2; ++tries) await wait(100);
-  check(files.length === 2, 'the pose is saved as two files');
-  if (files.length < 2) return;
+  const saved = await until(() => files.length === 2);
+  check(saved, 'the pose is saved as two files');
+  if (!saved) return;
   const texts = await Promise.all(files.map(async (file) => readFileSync(await file.path(), 'utf8')));
   check(texts.some((text) => /^v /m.test(text) && /^f /m.test(text)), 'one is a model');
   check(texts.some((text) => text.startsWith('{"components"')), 'one its joints');

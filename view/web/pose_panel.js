@@ -13,20 +13,22 @@ export class PosePanel {
     this.app = app;
     this.host = host;
     this.state = element('small');
-    this.opened = new Set();
+    this.lists = [];  // of joints
     this.build();
   }
 
   build() {
     const { app } = this, { scene } = app.engine;
     this.coordinates = [];
+    const opened = this.lists.map((list) => list.open);  // an event of it may still be on its way
+    this.lists = scene.joints.map((joint, j) => this.joint(joint, j, opened[j] ?? false));
     this.host.replaceChildren(
       element('h1', { textContent: scene.name }),
       element('div', { className: 'row' }, button('Undo', () => app.undo()), button('Back to rest', () => app.reset()),
         button('Let all go', () => app.change(() => app.engine.removeHandles())), button('Save', () => app.save())),
       element('small', { textContent: 'Pull at any point: it stays where it is let go. Pull at a red point to move it again.' }),
       section('Parts', true, ...scene.parts.map((part, i) => this.part(part, i))),
-      section('Joints', true, ...scene.joints.map((joint, j) => this.joint(joint, j))),
+      section('Joints', true, ...this.lists),
       this.state,
       section('About', false, element('small', { textContent: document.getElementById('licences').textContent })));
   }
@@ -39,15 +41,12 @@ export class PosePanel {
       box('soft', part.soft, (on) => app.engine.setSoft(i, on)), box('pinned', part.pinned, (on) => app.engine.setPinned(i, on)));
   }
 
-  joint(joint, j) {
+  joint(joint, j, open) {
     const { app } = this, coordinates = element('small');
     this.coordinates.push(coordinates);
     const set = (told) => app.change(() => app.engine.setJoint(j, told));
-    const list = section(`${joint.a} – ${joint.b}`, this.opened.has(j),
-      choice('Type', TYPES.map((type) => [type, type]), joint.type, (type) => set({ type, limits: null })),
+    return section(`${joint.a} – ${joint.b}`, open, choice('Type', TYPES.map((type) => [type, type]), joint.type, (type) => set({ type, limits: null })),
       ...MEMBERS[joint.type].flatMap(([member, text]) => this.limits(joint, member, text, set)), coordinates);
-    list.addEventListener('toggle', () => (list.open ? this.opened.add(j) : this.opened.delete(j)));
-    return list;
   }
 
   /** Fields for the ends of a member; an empty one is open. Angles in degrees. */
