@@ -1,12 +1,19 @@
 #include "limber/dynamics/exact_motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "limber/core/error.h"
+#include "mode_flow_kernels.h"
 
 namespace limber {
+namespace {
+
+constexpr std::size_t kChunk = 64;  // modes whose other half of the state is let go at once
+
+}  // namespace
 
 void ExactMotion::set_frame(const RigidMotion& motion, double step) {
   const Quaternion& q = motion.pose.q;
@@ -43,28 +50,40 @@ std::span<double> ExactMotion::add_impulse(double time) {
   return {impulses_.data() + impulses_.size() - z_.size(), z_.size()};
 }
 
-ModeState ExactMotion::mode_at(std::size_t i, double t) const {
+void ExactMotion::modes_at(double t, std::size_t first, std::size_t count, double* z, double* rates) const {
+  const internal::Oscillators modes{lambda_.data() + first, decay_.data() + first, count};
+  internal::flow_modes(modes, t, z_.data() + first, rates_.data() + first, force_.data() + first, z, rates);
+  for (std::size_t n = 0; n < impulse_times_.size(); ++n)
+    if (impulse_times_[n] <= t)
+      internal::add_impulse_flow(modes, t - impulse_times_[n], impulses_at(n).data() + first, z, rates);
+}
+
+ModeState ExactMotion::start(std::size_t i) const {
   ModeState s{z_[i], rates_[i]};
-  if (t > 0.0 && (s.z != 0.0 || s.zdot != 0.0 || force_[i] != 0.0)) s = advance(propagator(mode(i), t), s, force_[i]);
-  for (std::size_t n = 0; n < impulse_times_.size(); ++n) {
-    const double j = impulses_at(n)[i];
-    if (impulse_times_[n] > t || j == 0.0) continue;
-    const ModeState change = impulse_response(mode(i), t - impulse_times_[n], j);
-    s.z += change.z;
-    s.zdot += change.zdot;
-  }
+  for (std::size_t n = 0; n < impulse_times_.size(); ++n)
+    if (impulse_times_[n] <= 0.0) s.zdot += impulses_at(n)[i];
   return s;
+}
+
+double ExactMotion::amplitude(Index mode, double t) const {
+  double z = 0.0, rate = 0.0;
+  modes_at(t, static_cast<std::size_t>(mode), 1, &z, &rate);
+  return z;
 }
 
 void ExactMotion::at(double t, RigidTransform& pose, std::span<double> amplitudes) const {
   pose = path_.pose(t);
-  for (std::size_t i = 0; i < z_.size(); ++i) amplitudes[i] = mode_at(i, t).z;
+  std::array<double, kChunk> unused;
+  for (std::size_t i = 0; i < z_.size(); i += kChunk)
+    modes_at(t, i, std::min(kChunk, z_.size() - i), amplitudes.data() + i, unused.data());
 }
 
 void ExactMotion::rates_at(double t, Vec3& velocity, Vec3& angular_velocity, std::span<double> rates) const {
   velocity = path_.velocity(t);
   angular_velocity = path_.angular_velocity(t);
-  for (std::size_t i = 0; i < z_.size(); ++i) rates[i] = mode_at(i, t).zdot;
+  std::array<double, kChunk> unused;
+  for (std::size_t i = 0; i < z_.size(); i += kChunk)
+    modes_at(t, i, std::min(kChunk, z_.size() - i), unused.data(), rates.data() + i);
 }
 
 void ExactMotion::evaluate(double t, MotionState& state) const {
@@ -74,11 +93,7 @@ void ExactMotion::evaluate(double t, MotionState& state) const {
   state.angular_velocity = path_.angular_velocity(t);
   state.amplitudes.resize(z_.size());
   state.rates.resize(z_.size());
-  for (std::size_t i = 0; i < z_.size(); ++i) {
-    const ModeState s = mode_at(i, t);
-    state.amplitudes[i] = s.z;
-    state.rates[i] = s.zdot;
-  }
+  modes_at(t, 0, z_.size(), state.amplitudes.data(), state.rates.data());
 }
 
 double ExactMotion::smooth_until(double t) const {
@@ -118,13 +133,13 @@ double ExactMotion::reach(double distance, std::span<const double> shape, const 
 }
 
 void ExactMotion::changes(std::span<double> change) const {
-  for (std::size_t i = 0; i < z_.size(); ++i) change[i] = bound(i, mode_at(i, 0.0), 0.0, step()).change + released(i);
+  for (std::size_t i = 0; i < z_.size(); ++i) change[i] = bound(i, start(i), 0.0, step()).change + released(i);
 }
 
 double ExactMotion::sway(double arm, std::span<const double> shape) const {
   double flexing = 0.0;
   for (std::size_t i = 0; i < z_.size(); ++i)
-    flexing += shape[i] * (bound(i, mode_at(i, 0.0), 0.0, step()).change + released(i));
+    flexing += shape[i] * (bound(i, start(i), 0.0, step()).change + released(i));
   return 2.0 * std::sin(0.5 * path_.bounds(0.0, step()).turn) * arm + flexing;
 }
 

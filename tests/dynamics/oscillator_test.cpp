@@ -16,6 +16,7 @@
 #include "constants.h"
 #include "instruction_sets.h"
 #include "limber/core/error.h"
+#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 namespace {
@@ -341,6 +342,136 @@ TEST(PropagatorTable, InstructionSetsWithFusedMultiplyAddGiveTheSameBits) {
   });
   for (std::size_t i = 2; i < results.size(); ++i)
     EXPECT_TRUE(std::equal(std::begin(results[i].value), std::end(results[i].value), std::begin(results[i % 2].value)));
+}
+
+// The flow of many modes at once, which ExactMotion evaluates within a step.
+
+/// All of for_every_regime()'s modes that have this step.
+struct ManyModes {
+  std::vector<double> lambda, decay, z, rates, force;
+  double h = 0.0;
+
+  explicit ManyModes(double step) : h(step) {
+    for (const double ratio : damping_ratios())
+      for (const double phase : phases()) {
+        const double omega = phase / h;
+        lambda.push_back(omega * omega), decay.push_back(ratio * omega);
+      }
+    z.resize(lambda.size()), rates.resize(lambda.size()), force.resize(lambda.size());
+  }
+  ExactMotion motion() const {
+    ExactMotion m;
+    m.set_frame({}, h);
+    m.set_modes(lambda, decay, z, rates);
+    std::ranges::copy(force, m.forces().begin());
+    return m;
+  }
+  MotionState at(double t) const {
+    MotionState s;
+    motion().evaluate(t, s);
+    return s;
+  }
+  std::size_t size() const { return lambda.size(); }
+};
+
+TEST(ManyModes, FlowExactlyInEveryRegime) {
+  ManyModes modes(0.25);
+  std::ranges::fill(modes.rates, 1.0);
+  const MotionState kicked = modes.at(modes.h);
+  std::ranges::fill(modes.rates, 0.0);
+  for (std::size_t i = 0; i < modes.size(); ++i) modes.z[i] = 1.0 / std::sqrt(modes.lambda[i]);
+  const MotionState displaced = modes.at(modes.h);
+  std::ranges::fill(modes.z, 0.0);
+  std::ranges::fill(modes.force, 1.0);
+  const MotionState pushed = modes.at(modes.h);
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const Mode mode{modes.lambda[i], modes.decay[i]};
+    const Wide omega = sqrt(Wide(mode.lambda));
+    SCOPED_TRACE(::testing::Message() << "phase " << std::sqrt(mode.lambda) * modes.h << ", damping ratio "
+                                      << mode.decay / std::sqrt(mode.lambda));
+    const ScaledFlow exact = reference(mode, modes.h), halfway = reference(mode, modes.h / 2);
+    const ScaledFlow flow{omega * displaced.amplitudes[i],
+                          omega * kicked.amplitudes[i],
+                          displaced.rates[i],
+                          kicked.rates[i],
+                          omega * pushed.amplitudes[i],
+                          pushed.rates[i]};
+    EXPECT_LE(free_error(flow, exact), round_off(mode, modes.h));
+    const double error = static_cast<double>(size(flow.z_g - exact.z_g, flow.v_g - exact.v_g));
+    const double response = static_cast<double>(std::max(size(exact.z_g, exact.v_g), size(halfway.z_g, halfway.v_g)));
+    EXPECT_LE(error, 2.0 * round_off(mode, modes.h) * response);
+  }
+}
+
+TEST(ManyModes, ImpulsesGoOnFromTheirTimeAsOfOneModeAlone) {
+  const ManyModes modes(0.1);
+  ExactMotion motion = modes.motion();
+  std::ranges::fill(motion.add_impulse(0.0), 0.5);
+  std::ranges::fill(motion.add_impulse(0.03), -0.8);
+  std::ranges::fill(motion.add_impulse(0.09), 1e3);  // not yet
+  MotionState s;
+  motion.evaluate(0.07, s);
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const Mode mode{modes.lambda[i], modes.decay[i]};
+    const ModeState first = impulse_response(mode, 0.07, 0.5), second = impulse_response(mode, 0.07 - 0.03, -0.8);
+    const double omega = std::sqrt(mode.lambda), error = 2.0 * round_off(mode, 0.07);
+    EXPECT_NEAR(omega * s.amplitudes[i], omega * (first.z + second.z), error);
+    EXPECT_NEAR(s.rates[i], first.zdot + second.zdot, error);
+    EXPECT_EQ(motion.amplitude(static_cast<Index>(i), 0.07), s.amplitudes[i]);
+  }
+}
+
+TEST(ManyModes, StayFiniteAndNoLargerThanTheyWere) {
+  const std::vector<double> sizes{0.0, 1e-100, 1e-18, 1e-9, 1e-3, 1.0, 7.0, 1e3, 1e6, 1e9, 1e12, 1e18, 1e24, 1e100};
+  std::vector<double> lambda, decay;
+  for (const double l : sizes)
+    for (const double d : sizes) lambda.push_back(l), decay.push_back(d);
+  const std::vector<double> ones(lambda.size(), 1.0), zeros(lambda.size(), 0.0);
+  for (const double h : sizes) {
+    ExactMotion motion;
+    motion.set_frame({}, h);
+    MotionState s;
+    motion.set_modes(lambda, decay, zeros, ones);
+    motion.evaluate(h, s);
+    for (std::size_t i = 0; i < lambda.size(); ++i) {
+      SCOPED_TRACE(::testing::Message() << "lambda " << lambda[i] << ", decay " << decay[i] << ", time " << h);
+      EXPECT_LE(std::abs(s.rates[i]), 1.0 + 8.0 * kEpsilon);
+      EXPECT_LE(std::sqrt(lambda[i]) * std::abs(s.amplitudes[i]), 1.0 + 8.0 * kEpsilon);
+    }
+    motion.set_modes(lambda, decay, ones, zeros);
+    std::ranges::fill(motion.forces(), 1.0);
+    motion.evaluate(h, s);
+    for (std::size_t i = 0; i < lambda.size(); ++i)
+      EXPECT_TRUE(std::isfinite(s.amplitudes[i]) && std::isfinite(s.rates[i]))
+          << "lambda " << lambda[i] << ", decay " << decay[i] << ", time " << h;
+  }
+}
+
+TEST(ManyModes, MechanismsCoastAndFall) {
+  ManyModes modes(0.3);
+  modes.lambda = {0.0, 0.0, 0.0}, modes.decay = {0.0, 1.0, 1e3};
+  modes.z = {2.0, 2.0, 2.0}, modes.rates = {5.0, 5.0, 5.0}, modes.force = {-9.81, -9.81, -9.81};
+  const MotionState s = modes.at(0.3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const ModeState alone = advance(propagator({0.0, modes.decay[i]}, 0.3), {2.0, 5.0}, -9.81);
+    EXPECT_DOUBLE_EQ(s.amplitudes[i], alone.z);
+    EXPECT_NEAR(s.rates[i], alone.zdot, 4.0 * kEpsilon);
+  }
+}
+
+TEST(ManyModes, InstructionSetsWithFusedMultiplyAddGiveTheSameBits) {
+  ManyModes modes(0.02);
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    modes.z[i] = std::sin(i), modes.rates[i] = std::cos(i), modes.force[i] = 0.1 * static_cast<double>(i);
+  std::vector<MotionState> results;
+  for_each_instruction_set([&](std::int64_t target) {
+    const MotionState s = modes.at(0.013);
+    if (has_fused_multiply_add(target)) results.push_back(s);
+  });
+  for (const MotionState& s : results) {
+    EXPECT_EQ(s.amplitudes, results.front().amplitudes);
+    EXPECT_EQ(s.rates, results.front().rates);
+  }
 }
 
 }  // namespace
