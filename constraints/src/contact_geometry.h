@@ -17,10 +17,13 @@ inline Mat3 frame_along(const Vec3& n) {
   return axes;
 }
 
-/// By how much a body turns in the step, rotation vector, world, rad.
-inline Vec3 turn_of_step(const BodyStates& states, Index body) {
+/// By how much a body turns in the step, world, rad, whole turns and all: what it turns by as it turns at the step's
+/// end, and what is left from there to where it is. (From its orientations alone only the shortest turn could be told.)
+inline Vec3 turn_of_step(const BodyStates& states, Index body, double step) {
   if (states.is_static(body)) return Vec3::Zero();
-  return rotation_vector(states.pose(body, StepTime::kEnd).q * states.pose(body, StepTime::kStart).q.conjugate());
+  const Vec3 turn = step * states.angular_velocity(body, StepTime::kEnd);
+  const Quaternion turned = states.pose(body, StepTime::kEnd).q * states.pose(body, StepTime::kStart).q.conjugate();
+  return turn + rotation_vector(turned * quaternion_from_rotation_vector(-turn));
 }
 
 }  // namespace limber

@@ -210,9 +210,9 @@ Vec3 PairContacts::impulse_of(const PreparedContact& contact, std::span<const do
   return sum;
 }
 
-Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) {
+Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) const {
   if (when == StepTime::kStart) return Vec3::Zero();
-  return contact.a.rolled(states) - contact.b.rolled(states);
+  return contact.a.rolled(states, step_) - contact.b.rolled(states, step_);
 }
 
 std::span<const VertexShare> PairContacts::region(const PreparedContact& contact, std::size_t side) {

@@ -44,7 +44,7 @@ class PairContacts final : public Constraint {
 
   static Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact);
 
-  static Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact);
+  Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) const;
 
   /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
   static const PreparedSide& side_of(const PreparedContact& contact, std::size_t side) {

@@ -44,7 +44,7 @@ struct PreparedSide {
     return states.pose(body, when) * place(states.amplitudes(body, when)) + rim;
   }
   /// How far what is there has come beyond that by rolling, by the end of the step.
-  Vec3 rolled(const BodyStates& states) const { return turn_of_step(states, body).cross(rim); }
+  Vec3 rolled(const BodyStates& states, double step) const { return turn_of_step(states, body, step).cross(rim); }
   Vec3 velocity(const BodyStates& states, StepTime when) const {
     const RigidTransform& X = states.pose(body, when);
     Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);

@@ -36,7 +36,7 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
 
 void RollingResistance::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
   Vec3 turned = Vec3::Zero();
-  if (when == StepTime::kEnd) turned = turn_of_step(states, a_) - turn_of_step(states, b_);
+  if (when == StepTime::kEnd) turned = turn_of_step(states, a_, step_) - turn_of_step(states, b_, step_);
   for (int i = 0; i < 3; ++i) gaps[static_cast<std::size_t>(i)] = turned[i];
 }
 
