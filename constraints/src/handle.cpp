@@ -47,9 +47,9 @@ Handle::Handle(MaterialFrame point, const Vec3& start, const HandleOptions& opti
 void Handle::set_target(const HandleTarget& target) { next_ = target; }
 
 /// The target goes to where it is wanted at an even speed.
-void Handle::begin_part(double length, double left, double whole) {
-  step_ = length, left_ = left, whole_ = whole;
-  then_ = length == left ? next_.position : Vec3(now_ + length / left * (next_.position - now_));
+void Handle::begin_part(const PartOfStep& part) {
+  step_ = part.length, left_ = part.left, whole_ = part.whole;
+  then_ = step_ == left_ ? next_.position : Vec3(now_ + step_ / left_ * (next_.position - now_));
 }
 
 void Handle::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {

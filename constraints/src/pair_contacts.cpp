@@ -49,13 +49,14 @@ Vec3 place(const BodyStates& states, StepTime when, const PreparedSide& side) {
   return 0.5 * (side.position(states, StepTime::kStart) + side.position(states, StepTime::kEnd));
 }
 
-/// How closely a gap can be met: by the arms of its points a and b, and their place.
+/// How closely a gap can be met: by the arms of its points a and b, and their place; so much closer in a short part of
+/// a step that velocities come out as well.
 double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
-                     const Vec3& b) {
+                     const Vec3& b, double share) {
   double arms = 0.0;
   if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
   if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
-  return distance_tolerance(kRelativeTolerance, arms, a);
+  return distance_tolerance(share * kRelativeTolerance, arms, a);
 }
 
 }  // namespace
@@ -231,7 +232,7 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
     return n.dot(a - b);
   };
   double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
-  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b);
+  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b, 1.0);
   if (!(gap_open > least && gap_closed < 0.0)) return within;
   for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
     // Secants from both ends close in from one side alone: every third step halves.
@@ -290,7 +291,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
                                ConstraintRows& rows) {
   const Vec3 a = place(states, when, contact.a), b = place(states, when, contact.b);
   const Vec3 end = point_of_action(contact, a, b);
-  const double tolerance = gap_tolerance(states, when, contact, a, b);
+  const double tolerance = gap_tolerance(states, when, contact, a, b, part_.share());
   for (Index axis = 0; axis < row_count(contact); ++axis) {
     const Vec3 n = contact.axes.col(axis);
     RowLaw law{.tolerance = tolerance, .contact = true};
@@ -298,7 +299,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
       const double recovery =
           caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
-      law.offset = std::min(0.0, gap) + recovery;
+      law.offset = (when == StepTime::kStart ? closes_to(gap) : std::min(0.0, gap)) + recovery;
       law.agent_displacement = recovery;
       law.lower = 0.0;
       law.holds = true;
@@ -334,6 +335,11 @@ void PairContacts::make_spring(const BodyStates& states, const PreparedContact& 
   law.lets_go_within = 0.0;
   law.goes_on = true;
   law.agent_displacement = 0.0;
+}
+
+double PairContacts::closes_to(double gap) const {
+  const double touching = std::min(gap, part_.clearance);
+  return touching + (1.0 - part_.share()) * (gap - touching);
 }
 
 double PairContacts::reduced_mass(const BodyStates& states, const PreparedContact& contact) {

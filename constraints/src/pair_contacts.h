@@ -23,6 +23,7 @@ class PairContacts final : public Constraint {
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void bias_accelerations(const BodyStates& states, std::span<double> bias) const override;
   bool is_contact() const override { return true; }
+  void begin_part(const PartOfStep& part) override { part_ = part; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
   void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void slid(std::span<const double> slip) override;
@@ -79,6 +80,9 @@ class PairContacts final : public Constraint {
   /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
   void make_spring(const BodyStates& states, const PreparedContact& contact, double gap, RowLaw& law) const;
 
+  /// What a gap may close to by the part's end: what is ahead comes to the clearance when all that is ahead has passed.
+  double closes_to(double gap) const;
+
   static double reduced_mass(const BodyStates& states, const PreparedContact& contact);
 
   std::span<PreparedContact> contacts_;
@@ -88,6 +92,7 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
+  PartOfStep part_;
   double give_ = 0.0;  // of each contact of bodies that flex, m/N
   std::vector<double> modal_a_, modal_b_;
   Passage passage_a_, passage_b_;

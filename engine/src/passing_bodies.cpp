@@ -25,6 +25,15 @@ void PassingBodies::list_touching(std::span<const ContactPoint> in_force) {
   touching.erase(begin, end);
 }
 
+void PassingBodies::drop_watched() {
+  const auto plain = [&](Index body) {
+    return turns[static_cast<std::size_t>(body)] == 0 && bends[static_cast<std::size_t>(body)] == 0;
+  };
+  std::erase_if(touching, [&](const std::pair<Index, Index>& pair) {
+    return plain(pair.first) && plain(pair.second) && std::ranges::find(crept, pair) == crept.end();
+  });
+}
+
 /// Half-spaces are planes for good.
 void PassingBodies::drop_planes() {
   std::erase_if(touches, [&](const Impact& touch) {
@@ -48,6 +57,7 @@ double PassingWatch::clear_until(const FreeMotions& found, double length) {
                         .motions = passing_.motions,
                         .step = until,
                         .margin = margin_,
+                        .least_margin = PassingBodies::kLeast * passing_.first_margin,
                         .bodies = found.members,
                         .except = passing_.touching},
                        passing_.touches, serial_jobs());

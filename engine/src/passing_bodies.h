@@ -31,6 +31,8 @@ struct PassingBodies {
   static constexpr double kSlow = 0.5;
   /// Of that part, for those who come after: what came to a touch is apart then.
   static constexpr double kNearer = 0.45;
+  /// Of that part: so near bodies that touch may come before they are no more looked at.
+  static constexpr double kLeast = 1e-3;
   /// rad, about which a body may turn while contacts hold it: by then other parts of it would touch.
   static constexpr double kMostTurn = 0.5;
   /// Of a cluster's step.
@@ -51,11 +53,15 @@ struct PassingBodies {
   std::vector<std::pair<Index, Index>> crept;     // of the cluster: so near for long that it took no end
   std::vector<char> planes;                       // by body: a half-space, whose contacts are good however far
   std::vector<char> turns;                        // by body: what it touches with changes as it turns
+  std::vector<char> bends;                        // by body
   std::vector<char> wears_shape;                  // by body: it shows a rigid shape, which its modes do not move
   std::vector<ExactMotion> frames;                // by member, of those
   double first_margin = 0.0, margin = 0.0;        // m, at which bodies touch; each cluster takes a smaller one
 
   void drop_planes();
+  /// Of those that touch, what can be looked at as it goes on: two bodies that neither bend nor change what they touch
+  /// with as they turn.
+  void drop_watched();
   /// @param in_force ordered by pairs
   void list_touching(std::span<const ContactPoint> in_force);
   bool any() const { return !members.empty(); }
@@ -74,6 +80,7 @@ class PassingWatch final : public MotionWatch {
   PassingWatch(ContactSource& source, std::span<const BodyState> states, PassingBodies& passing)
       : source_(source), states_(states), passing_(passing), margin_(passing.margin) {}
   double clear_until(const FreeMotions& found, double length) override;
+  double clearance() const override { return passing_.first_margin; }
   /// What ended the last motion shown; none: nothing did.
   const Impact* touch() const { return touch_.a < 0 ? nullptr : &touch_; }
 

@@ -153,13 +153,15 @@ void World::Impl::advance_passing(int part) {
     states[i].displacement = states[i].rotation = Vec3::Zero();
     expect_to_stay(states[i]);
   }
-  p.turns.assign(entries.size(), 1);
+  p.turns.assign(entries.size(), 0);
+  p.bends.assign(entries.size(), 0);
   p.wears_shape.assign(entries.size(), 0);
   for (const Index member : p.members) {
     const auto i = static_cast<std::size_t>(member);
     const Shape* shape = entries[i].shape.get();
     p.wears_shape[i] = shape != nullptr;
     p.turns[i] = shape == nullptr || !std::holds_alternative<Sphere>(*shape);
+    p.bends[i] = shape == nullptr && group(entries[i]).model().modes() > 0;
   }
   std::size_t begin = 0;
   for (const std::size_t end : p.ends) {
@@ -184,6 +186,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
     const std::span<const ContactPoint> found = contacts_of_cluster(members, count == 1, step.step);
     set_contacts(found);
     p.list_touching(found);
+    p.drop_watched();
     PassingWatch watch(*source, states, p);
     step.watch = &watch;
     const double taken = constraints.step_together(members, contacts.constraints(), step);
@@ -198,7 +201,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
       return p.rests[static_cast<std::size_t>(body)] != 0 && constraints.moves(body);
     };
     const bool met_another = touch != nullptr && (stands(touch->a) || stands(touch->b));
-    if (met_another || taken == 0.0 || count == PassingBodies::kMostParts) {
+    if (met_another || count == PassingBodies::kMostParts) {
       ++attempts[StepAttempt::kHeldAtTouch];
       break;
     }

@@ -362,6 +362,28 @@ TEST(TimeOfImpact, StartsInTouchAreForTheContacts) {
   EXPECT_EQ(find({.geometry = &ball, .motion = &inside}, {.geometry = &ground}, kFrame, 0.0).status, Status::kTouching);
 }
 
+/// A ball that slides along a wall, within the margin of it or just beyond, to another one.
+TEST(TimeOfImpact, BodiesThatTouchFromTheStartAreSeenToComeNearerElsewhere) {
+  constexpr double kRadius = 0.1, kNear = 1e-3, kSpeed = 5.0, kAway = 0.05;
+  const RigidGeometry ball{Sphere{kRadius}};
+  const RigidGeometry walls{TriangleMesh{
+      {{0.0, -1.0, -1.0}, {0.0, 1.0, -1.0}, {0.0, -1.0, 1.0}, {0.0, 1.0, 1.0}, {1.0, -1.0, -1.0}, {1.0, 1.0, -1.0}},
+      {{0, 1, 3}, {0, 3, 2}, {0, 4, 5}, {0, 5, 1}}}};
+  const ExactMotion slides =
+      mover({.pose = {.p = {kRadius + kNear, 0.0, -1.0 + kRadius + kAway}}, .velocity = {0.0, 0.0, -kSpeed}}, kFrame);
+  const MovingBody moving{.geometry = &ball, .motion = &slides}, still{.geometry = &walls};
+  TimeOfImpact solver;
+  for (const double gap : {1.2, 1.0 + 1e-12, 0.9, 0.3}) {  // of the margin, to the wall that it slides along
+    const double margin = kNear / gap;
+    const ImpactTime t = solver.find(moving, still, kFrame, margin, 1e-3 * margin);
+    EXPECT_EQ(t.status, Status::kImpact) << gap;
+    EXPECT_LE(t.time, kAway / kSpeed) << gap;
+    EXPECT_GE(t.time, (kAway - margin) / kSpeed) << gap;
+    EXPECT_LT(t.advancements, 10) << gap;
+  }
+  EXPECT_EQ(solver.find(moving, still, kFrame, 2.0 * kNear).status, Status::kTouching);
+}
+
 TEST(TimeOfImpact, WhatStandsStillNeverMeets) {
   const RigidGeometry ball{Sphere{0.1}}, ground{HalfSpace{}};
   const ImpactTime t = find({.geometry = &ball, .pose = {.p = {0.0, 0.0, 0.2}}}, {.geometry = &ground}, kFrame, 0.0);

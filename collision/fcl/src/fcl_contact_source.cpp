@@ -389,7 +389,8 @@ void FclContactSource::find_impacts(const ImpactQuery& query, std::vector<Impact
     if (m.motion(pair.a) == nullptr && m.motion(pair.b) == nullptr) continue;
     if (std::ranges::binary_search(query.except, std::pair(pair.a, pair.b))) continue;
     using Status = ImpactTime::Status;
-    const ImpactTime t = m.time_of_impact.find(m.moving_body(pair.a), m.moving_body(pair.b), query.step, query.margin);
+    const ImpactTime t = m.time_of_impact.find(m.moving_body(pair.a), m.moving_body(pair.b), query.step, query.margin,
+                                               query.least_margin);
     if (t.status == Status::kImpact || t.status == Status::kResting)
       impacts.push_back({.a = pair.a, .b = pair.b, .time = t.time, .resting = t.status == Status::kResting});
   }

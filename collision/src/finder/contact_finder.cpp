@@ -186,7 +186,7 @@ MovingBody ContactFinder::Impl::moving_body(Index index) const {
 }
 
 ImpactTime ContactFinder::Impl::find_impact(const BodyPair& pair, Worker& worker) const {
-  return worker.time_of_impact.find(moving_body(pair.a), moving_body(pair.b), step, margin);
+  return worker.time_of_impact.find(moving_body(pair.a), moving_body(pair.b), step, margin, least_margin);
 }
 
 void ContactFinder::Impl::find_impacts_in_pairs(Jobs& jobs) {
@@ -296,6 +296,7 @@ void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& 
   m.awake = {};
   m.step = query.step;
   m.margin = query.margin;
+  m.least_margin = query.least_margin;
   m.find_near_pairs(jobs);
   m.drop_pairs(query.except);
   m.find_impacts_in_pairs(jobs);

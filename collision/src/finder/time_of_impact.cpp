@@ -306,25 +306,36 @@ ImpactTime TimeOfImpact::find(const MovingBody& first, const MovingBody& second,
   margin = std::max(margin, round_off);
   const internal::FinderTuning& tuning = internal::collision_tuning().finder;
   double t = 0.0, until = step;
+  bool apart = false;  // at the start, by more than the margin: from then on half of it is kept
   for (int n = 1; n <= impl_->options.max_advancements; ++n) {
     const double ahead = until - t;
     double safe = 0.0;
-    const Pair::Seen seen = pair.advancement(t == 0.0 ? margin : tuning.kept_gap * margin, margin, safe);
+    const Pair::Seen seen = pair.advancement(apart ? tuning.kept_gap * margin : margin, margin, safe);
     if (seen == Pair::Seen::kTouching) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
-    const bool short_way = safe < tuning.good_advancement * ahead && pair.has_offset();
-    if (seen == Pair::Seen::kTooMuch || short_way) {
+    const bool first = !apart, short_way = safe < tuning.good_advancement * ahead;
+    apart = apart || seen == Pair::Seen::kClear;
+    if (seen == Pair::Seen::kTooMuch || (short_way && pair.has_offset())) {
       const double kick = std::min(pair.a.smooth_until(t), pair.b.smooth_until(t));
       const double nearer = std::clamp(tuning.look_again * safe, tuning.look_nearer * ahead, 0.5 * ahead);
       until = std::min(t + nearer, kick > t ? kick : until);
       pair.look_ahead(t, until);
       continue;
     }
+    if (first && short_way) continue;
     t += safe;
     if (t >= step) return {Status::kNone, step, n};
     until = std::min(step, t + tuning.look_farther * safe);
     pair.go_to(t, until);
   }
   return {Status::kResting, t, impl_->options.max_advancements};
+}
+
+ImpactTime TimeOfImpact::find(const MovingBody& a, const MovingBody& b, double step, double margin, double least) {
+  constexpr double kNearer = 0.5, kSmallestMargin = std::numeric_limits<double>::min();
+  ImpactTime time = find(a, b, step, margin);
+  while (time.status == ImpactTime::Status::kTouching && kNearer * margin >= std::max(least, kSmallestMargin))
+    time = find(a, b, step, margin *= kNearer);
+  return time;
 }
 
 Aabb swept(const Aabb& box_B, std::span<const double> shape, const ExactMotion& motion) {

@@ -108,20 +108,21 @@ void IslandSolver::Impl::begin_times(bool timed) {
 
 void IslandSolver::Impl::foresee_next() { parts.divides ? foresee_divided() : foresee_cut(); }
 
-/// One part, as long as the watch lets it be. A shorter one is another motion, which the watch is shown in its turn.
+/// One part, as long as the watch lets it be. The impulses of a shorter one are found anew. As they are those of a
+/// shorter part of the same step (PartOfStep::ahead), it moves as the longer one would have until then, but for how
+/// bodies bend; so the last one is not looked at again. However short, its impulses act.
 void IslandSolver::Impl::take_watched(StepPart part, IslandReport& report) {
   constexpr int kMostLooks = 3;
-  constexpr double kShortest = 1e-9;  // of the whole step: less is no motion
+  constexpr double kShortest = 1e-9;  // of the whole step
   IslandOptions& options = part.options;
   if (options.whole_step > 0.0) part.whole_step = options.whole_step;
   part.begins = options.begins, part.ends = false;
-  IslandReport done;
-  for (int looks = 1;; ++looks) {
-    done = foresee_guarded(part);
+  IslandReport done = foresee_guarded(part);
+  for (int looks = 0; looks < kMostLooks; ++looks) {
     const double clear = options.watch->clear_until({part.members, motions}, options.step);
-    if (!(clear < options.step) || looks == kMostLooks) break;
-    if (clear < kShortest * part.whole_step) return;
-    options.step = clear;
+    if (!(clear < options.step)) break;
+    options.step = std::max(clear, kShortest * part.whole_step);
+    done = foresee_guarded(part);
   }
   report.taken = options.step;
   commit(part, done, report);

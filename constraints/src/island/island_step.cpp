@@ -40,8 +40,14 @@ void IslandStep::begin(const StepPart& of) {
   rows.clear();
   first_row.clear();
   const BodyStates states(part.table);
+  const MotionWatch* watch = part.options.watch;
+  const PartOfStep now{.length = length(),
+                       .left = part.left,
+                       .whole = part.whole_step,
+                       .ahead = watch != nullptr ? part.left : length(),
+                       .clearance = watch != nullptr ? watch->clearance() : 0.0};
   for (Constraint* constraint : part.constraints) {
-    constraint->begin_part(length(), part.left, part.whole_step);
+    constraint->begin_part(now);
     first_row.push_back(rows.size());
     constraint->add_rows(states, StepTime::kStart, length(), rows);
   }

@@ -72,6 +72,9 @@ class TimeOfImpact {
   /// @throws InvalidArgument for a body that is not one of surface and geometry, and for amplitudes of wrong number or
   /// not finite, as DeformedSurface::bind()
   ImpactTime find(const MovingBody& a, const MovingBody& b, double step, double margin);
+  /// The same; bodies that touch are looked at with half of the margin, a quarter and so on, as long as that is no
+  /// smaller than `least`: touching are those that do so with the smallest.
+  ImpactTime find(const MovingBody& a, const MovingBody& b, double step, double margin, double least);
 
  private:
   struct Impl;

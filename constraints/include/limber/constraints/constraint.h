@@ -53,6 +53,20 @@ struct FreeMotions {
   const ExactMotion* of(Index body) const;
 };
 
+/// A step, or a part of one.
+struct PartOfStep {
+  double length = 0.0;  ///< s, its own
+  double left = 0.0;    ///< s, of the step, with it
+  double whole = 0.0;   ///< s, the step
+  /// s, ≥ length: when what is ahead is reached at the soonest. Beyond the part's end where a watch may end it sooner
+  /// than it was meant to: bodies then go as fast towards each other whatever its length.
+  double ahead = 0.0;
+  double clearance = 0.0;  ///< m, of the watch
+
+  /// Of the time until then.
+  double share() const { return length < ahead ? length / ahead : 1.0; }
+};
+
 /// Looks at a motion before it happens.
 class MotionWatch {
  public:
@@ -60,6 +74,8 @@ class MotionWatch {
   /// @param motions of an island's members over the coming step, constraint forces and all
   /// @return how far they may go, s; their length or more: all the way
   virtual double clear_until(const FreeMotions& motions, double length) = 0;
+  /// How far contacts keep bodies apart that come nearer, m, so that it can tell what touches from what goes on.
+  virtual double clearance() const { return 0.0; }
 };
 
 /// How what rows exert on one body changes with where another one, or it itself, ends a step. World axes; shifts are of
@@ -85,8 +101,8 @@ class Constraint {
 
   /// The two bodies (−1: the world) that the rows touch: they end in one island.
   virtual std::array<Index, 2> bodies() const = 0;
-  /// What follows, up to accept(), is a part of a step. @param left of it from here, s. @param whole the step, s
-  virtual void begin_part(double /*length*/, double /*left*/, double /*whole*/) {}
+  /// What follows, up to accept(), is a part of a step.
+  virtual void begin_part(const PartOfStep&) {}
   /// Appends the rows, linearised at the step's start, at its predicted end or in the middle, where J (Δp, τ, Δz) is
   /// to be what the gap changes by over the step, so that forces do the work that they are to do: as many, in the same
   /// order. Laws count at the start and at the end.

@@ -48,7 +48,7 @@ class Handle final : public Constraint {
 
   std::array<Index, 2> bodies() const override { return {point_.body(), -1}; }
   bool may_be_divided() const override { return true; }
-  void begin_part(double length, double left, double whole) override;
+  void begin_part(const PartOfStep& part) override;
   void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
                             ForceDerivative& sum) const override;
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;

@@ -71,7 +71,7 @@ struct IslandOptions {
 struct IslandReport {
   SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
   int bodies = 0, rows = 0;
-  double taken = 0.0;  ///< s, where there is a watch; 0: it lets nothing go on, and nothing has been done
+  double taken = 0.0;  ///< s, where there is a watch
   StepAttempts attempts{};
   ProgramReport programs{};     ///< of the contact rule, if it has any
   int iterations = 0;           ///< predictions made, in the part of the step that needed most

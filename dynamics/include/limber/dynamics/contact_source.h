@@ -84,6 +84,9 @@ struct ImpactQuery {
   std::span<const ExactMotion* const> motions{};  ///< by body index; null: no such body, or one that does not move
   double step = 0.0;                              ///< s, ≥ 0, at most that of the motions
   double margin = 0.0;                            ///< m, ≥ 0: bodies this near each other touch
+  /// m: pairs that are within the margin from the start, but not this near, touch where they come nearer still: within
+  /// a half, a quarter and so on of the margin. As it is, they are not looked at.
+  double least_margin = std::numeric_limits<double>::infinity();
   /// Ascending; none: all that have a motion. Otherwise these alone have one, and all others stand where they were in
   /// the last query of all contacts, or within their reach of it: a few bodies cost what they meet.
   std::span<const Index> bodies{};
