@@ -1,7 +1,8 @@
 // What finding contacts costs while bodies move: scenes run in a World, every query that it asks is written down, and
 // then asked again of a fresh ContactFinder and of a fresh FclContactSource, in the same order, on one thread. Prints
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
-//   collision_steps [SCENE [BUNNY.glb]]     part of the names of the scenes wanted ("": all), the asset of the bunnies
+//   collision_steps [SCENE [BUNNY.glb [alone]]]     part of the names of the scenes wanted ("": all), the asset of the
+//   bunnies ("": without them), alone: without FCL
 // Figures: docs/reports/collision.md.
 #include <algorithm>
 #include <cmath>
@@ -26,6 +27,7 @@ namespace {
 
 constexpr double kStep = 1.0 / 60.0;
 constexpr int kPasses = 3;
+bool alone = false;  // limber's finder, without FCL's beside it
 
 /// A query with copies of all that it points to.
 struct Query {
@@ -148,7 +150,9 @@ void print_row(const std::string& scene, const std::string& phase, std::span<con
                std::span<const Recorder::Cost> fcl, std::span<const std::size_t> ends) {
   std::printf("| %s, %s | %zu | %.1f", scene.c_str(), phase.c_str(), ends.size(),
               static_cast<double>(costs.size()) / static_cast<double>(ends.size()));
-  for (const std::span<const Recorder::Cost> of : {costs, fcl}) {
+  std::vector<std::span<const Recorder::Cost>> finders{costs};
+  if (!alone) finders.push_back(fcl);
+  for (const std::span<const Recorder::Cost> of : finders) {
     const std::vector<double> times = times_of_steps(of, ends);
     const auto last = static_cast<double>(times.size() - 1);
     const auto quantile = [&](double part) { return times[static_cast<std::size_t>(part * last + 0.5)]; };
@@ -168,7 +172,8 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
       step();
       ends.push_back(recorder.queries());
     }
-  const std::vector<Recorder::Cost> costs = recorder.replay<ContactFinder>(), fcl = recorder.replay<FclContactSource>();
+  const std::vector<Recorder::Cost> costs = recorder.replay<ContactFinder>();
+  const std::vector<Recorder::Cost> fcl = alone ? costs : recorder.replay<FclContactSource>();
   std::size_t first_step = 0, first_query = 0;
   for (const Phase& phase : phases) {
     const auto count = static_cast<std::size_t>(phase.steps);
@@ -269,10 +274,11 @@ void stirred_heap() {
 int main(int argc, char** argv) try {
   using namespace limber::testing;
   const std::string wanted = argc > 1 ? argv[1] : "", asset = argc > 2 ? argv[2] : "";
+  alone = argc > 3;
   std::printf(
-      "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst | FCL: contacts | p50 | p99 | worst "
-      "|\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst "
+      "|%s\n|---|---|---|---|---|---|---|%s\n",
+      alone ? "" : " FCL: contacts | p50 | p99 | worst |", alone ? "" : "---|---|---|---|");
   const std::vector<std::pair<std::string, std::function<void()>>> scenes{
       {"boxes", hundred_boxes},
       {"coarse",

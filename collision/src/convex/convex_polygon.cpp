@@ -27,7 +27,8 @@ std::array<std::size_t, 2> farthest_pair(const std::vector<PlanePoint>& hull) {
 template <class Consider>
 void for_each_diagonal(const std::vector<PlanePoint>& hull, const Consider& consider) {
   const std::size_t n = hull.size();
-  const auto at = [&](std::size_t i) -> const PlanePoint& { return hull[i % n]; };
+  const auto wrapped = [n](std::size_t i) { return i < n ? i : i - n; };  // all below are less than 2n
+  const auto at = [&](std::size_t i) -> const PlanePoint& { return hull[wrapped(i)]; };
   for (std::size_t i = 0; i < n; ++i) {
     std::size_t right = i + 1, left = i + 2;
     for (std::size_t k = i + 2; k < i + n; ++k) {
@@ -36,7 +37,7 @@ void for_each_diagonal(const std::vector<PlanePoint>& hull, const Consider& cons
       left = std::max(left, k + 1);
       while (left + 1 < i + n && doubled_area(at(i), at(k), at(left + 1)) > doubled_area(at(i), at(k), at(left)))
         ++left;
-      consider(i, right % n, k % n, left < i + n ? left % n : i);
+      consider(i, wrapped(right), wrapped(k), left < i + n ? wrapped(left) : i);
     }
   }
 }

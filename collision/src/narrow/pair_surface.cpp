@@ -50,15 +50,15 @@ void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, do
   end_ = nullptr;
   sided_ = surface().closed() || surface().model() == nullptr;
   grow(vertices_, surface().vertices()), grow(vertex_stamp_, surface().vertices());
+  grow(end_vertices_, surface().vertices()), grow(end_vertex_stamp_, surface().vertices());
   grow(faces_, surface().triangles()), grow(face_stamp_, surface().triangles());
   grow(swept_, surface().triangles()), grow(swept_stamp_, surface().triangles());
   const auto nodes = static_cast<Index>(surface().nodes().size());
   grow(swept_nodes_, nodes), grow(swept_node_stamp_, nodes);
   if (++generation_ == 0) {  // after 2³² queries the old stamps would come to life again
-    std::fill(vertex_stamp_.begin(), vertex_stamp_.end(), 0u);
-    std::fill(face_stamp_.begin(), face_stamp_.end(), 0u);
-    std::fill(swept_stamp_.begin(), swept_stamp_.end(), 0u);
-    std::fill(swept_node_stamp_.begin(), swept_node_stamp_.end(), 0u);
+    for (std::vector<std::uint32_t>* stamps :
+         {&vertex_stamp_, &face_stamp_, &swept_stamp_, &swept_node_stamp_, &end_vertex_stamp_})
+      std::fill(stamps->begin(), stamps->end(), 0u);
     generation_ = 1;
   }
 }
@@ -86,13 +86,22 @@ void PairSurface::make_face(Index t) {
   face_stamp_[i] = generation_;
 }
 
+const Vec3& PairSurface::end_vertex(Index v) {
+  const auto i = static_cast<std::size_t>(v);
+  if (end_vertex_stamp_[i] != generation_) {
+    end_vertices_[i] = end_X_PS_ * end_->vertex(v);
+    end_vertex_stamp_[i] = generation_;
+  }
+  return end_vertices_[i];
+}
+
 const Aabb& PairSurface::swept_box(Index t) {
   const auto i = static_cast<std::size_t>(t);
   if (swept_stamp_[i] != generation_) {
     swept_[i] = {};
     for (const Index v : surface().triangle(t)) {
       swept_[i].include(vertex(v));
-      swept_[i].include(end_X_PS_ * end_->vertex(v));
+      swept_[i].include(end_vertex(v));
     }
     swept_stamp_[i] = generation_;
   }
@@ -270,24 +279,32 @@ bool PairSurface::on_rim(Index t, const Feature& feature) const {
   return false;
 }
 
+double PairSurface::distance_from(Index t, const Vec3& p) {
+  return (p - closest_on_triangle(p, corners(t)).point).norm();
+}
+
 // Of equally near triangles the first by number, whichever boxes are at hand and in whatever order that leads there.
 PairSurface::Nearest PairSurface::nearest(const Vec3& p, double max_distance) {
   constexpr double kSurely = 1.0 - 1e-9;  // so that what is equally near is looked at
+  const auto box_distance2 = [](const Vec3& q, const Vec3& low, const Vec3& high) {
+    return kSurely * (low - q).cwiseMax(q - high).cwiseMax(0.0).squaredNorm();
+  };
   Nearest r;
+  r.distance = max_distance;
   const Vec3 p_S = X_SP_ * p;
   branch_and_bound(
-      *deformed_, [&](const Aabb& box) { return kSurely * distance_to_box(p_S, box); },
-      [&](Index t, double best) {
+      *deformed_, [&](const Aabb& box) { return box_distance2(p_S, box.low, box.high); },
+      [&](Index t, double best2) {
         const TrianglePoints x = corners(t);
-        const Aabb box{x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])};
-        if (!(kSurely * distance_to_box(p, box) < best)) return best;
+        if (!(box_distance2(p, x[0].cwiseMin(x[1]).cwiseMin(x[2]), x[0].cwiseMax(x[1]).cwiseMax(x[2])) < best2))
+          return best2;
         const SurfaceFoot foot = closest_on_triangle(p, x);
         const double d = (p - foot.point).norm();
-        if (!(d < best) && !(d == best && t < r.triangle)) return best;
+        if (!(d < r.distance) && !(d == r.distance && t < r.triangle)) return best2;
         r.triangle = t, r.foot = foot, r.distance = d;
-        return d;
+        return d * d;
       },
-      max_distance);
+      max_distance * max_distance);
   if (r.triangle < 0) return r;
   r.outward = normal_at(r.triangle, r.foot.feature);
   r.inside = !up_.isZero(0.0) ? is_below(p)

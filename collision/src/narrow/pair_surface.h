@@ -173,6 +173,8 @@ class PairSurface {
                                   // what is solid below, where that is above
   };
   Nearest nearest(const Vec3& p, double max_distance);
+  // Of one triangle: what the nearest point is not beyond.
+  double distance_from(Index t, const Vec3& p);
   // Where a ray from a point inside first goes out through a face.
   struct WayOut {
     Index triangle = -1;    // −1: nowhere
@@ -192,6 +194,7 @@ class PairSurface {
     return way.triangle >= 0 && way.distance > tolerance_;
   }
   void make_vertex(Index v);
+  const Vec3& end_vertex(Index v);
   void make_face(Index t);
   bool on_rim(Index t, const Feature& feature) const;
   bool edge_minimum(const Vec3& p, Index e, double reach, Minimum& minimum);
@@ -207,7 +210,8 @@ class PairSurface {
   DeformedSurface* end_ = nullptr;
   RigidTransform end_X_PS_{};
   Mat3 turn_PS_ = Mat3::Identity(), end_turn_PS_ = Mat3::Identity();
-  std::vector<std::uint32_t> swept_stamp_, swept_node_stamp_;
+  std::vector<std::uint32_t> swept_stamp_, swept_node_stamp_, end_vertex_stamp_;
+  std::vector<Vec3> end_vertices_;
   std::vector<Aabb> swept_, swept_nodes_;
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;

@@ -91,7 +91,8 @@ bool RestDepthRule::find_at_rest(PairSurface& surface, const Vec3& p, Index tria
   Vec3 guess = Vec3::Zero();
   for (std::size_t c = 0; c < 3; ++c) guess += weight[c] * mesh.rest(mesh.triangle(triangle)[c]);
   if (!carry_back(X_PB_.inverse() * p, guess, place)) return false;
-  rest = rest_surface_.nearest(place.rest, std::numeric_limits<double>::infinity());
+  rest = rest_surface_.nearest(place.rest,
+                               rest_surface_.distance_from(triangle, place.rest) + rest_surface_.directionless());
   return true;
 }
 

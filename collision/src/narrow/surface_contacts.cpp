@@ -100,8 +100,17 @@ void SurfaceContacts::test_pairs(const RigidTransform& X_AB, const ContactReach&
     return;
   }
   if (advice == PairMemory::Advice::kList) list_tests(X_AB, *memory);
-  for (const auto& [s, t, tests] : memory->list())
-    if (!stay_apart(s, t, reach.doubt)) test_pair(s, t, tests);
+  // Most of a list's tests find nothing: whether its triangles stay apart is asked of those alone that do.
+  for (const auto& [s, t, tests] : memory->list()) {
+    undecided_ = {s, t, reach.doubt, std::isfinite(reach.doubt)};
+    test_pair(s, t, tests);
+  }
+  undecided_ = {};
+}
+
+bool SurfaceContacts::counts() {
+  if (undecided_.asked) undecided_ = {.counts = !stay_apart(undecided_.s, undecided_.t, undecided_.doubt)};
+  return undecided_.counts;
 }
 
 // The way counts as far as gaps go.
@@ -182,7 +191,7 @@ void SurfaceContacts::test_vertices(int of, Index s, Index t, FeatureTests tests
 void SurfaceContacts::vertex_against_face(int of, Index v, Index t) {
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
   other.for_each_minimum(mine.vertex(v), t, margin_, self_, [&](const PairSurface::Minimum& minimum) {
-    if (mine.sees(v, minimum.at.point)) add_vertex(of, v, minimum);
+    if (mine.sees(v, minimum.at.point) && counts()) add_vertex(of, v, minimum);
   });
 }
 
@@ -269,15 +278,16 @@ bool SurfaceContacts::enters(int of, Index v, Index near) {
 // Whether a face at a vertex lies in one plane with a face of the other's, the one solid within the other there.
 bool SurfaceContacts::flush(int of, Index v, const FeatureSide& at) {
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
-  const Vec3 into = -unit_or(mine.vertex_normal(v), Vec3::Zero());
-  bool any = false, within = true;
+  bool any = false;
   other.for_faces_at(at.key, [&](Index t) {
-    const Vec3& n = other.face(t).normal;
-    within = within && n.dot(into) < -tuning_->flat;
     for (const Index g : mine.surface().vertex_triangles(v))
-      any = any || mine.face(g).normal.dot(n) > 1.0 - tuning_->flat * tuning_->flat;
+      any = any || mine.face(g).normal.dot(other.face(t).normal) > 1.0 - tuning_->flat * tuning_->flat;
   });
-  return any && within;
+  if (!any) return false;
+  const Vec3 into = -unit_or(mine.vertex_normal(v), Vec3::Zero());
+  bool within = true;
+  other.for_faces_at(at.key, [&](Index t) { within = within && other.face(t).normal.dot(into) < -tuning_->flat; });
+  return within;
 }
 
 // Whether the surface at a vertex lies on a face of the other's, at a point of its rim: flat on it with an area or an
@@ -331,7 +341,7 @@ void SurfaceContacts::test_edges(Index s, Index t, FeatureTests tests) {
     for (int d = 0; d < 3; ++d) {
       if ((tests & edge_test(c, d)) == 0 || (!self_ && !side_[1]->owns_edge(t, d))) continue;
       const EdgePair pair = nearest_of_edges(side_[0]->surface().edge_of(s, c), side_[1]->surface().edge_of(t, d));
-      if (pair.distance <= margin_) add_separated_edges(pair);
+      if (pair.distance <= margin_ && counts()) add_separated_edges(pair);
     }
   }
 }
@@ -348,7 +358,9 @@ SurfaceContacts::EdgePair SurfaceContacts::nearest_of_edges(Index e, Index f) {
   const double n2 = n.squaredNorm(), u2 = u.squaredNorm(), w2 = w.squaredNorm();
   const double parallel = collision_tuning().convex.parallel_lines;
   if (!(n2 > parallel * parallel * u2 * w2)) return pair;
-  const double s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
+  const double along_e = r.cross(w).dot(n), along_f = r.cross(u).dot(n);
+  if (!(along_e > 0.0 && along_e < n2 && along_f > 0.0 && along_f < n2)) return pair;
+  const double s = along_e / n2, t = along_f / n2;
   const double end_s = tolerance_ / std::sqrt(u2), end_t = tolerance_ / std::sqrt(w2);
   if (!(s > end_s && s < 1.0 - end_s && t > end_t && t < 1.0 - end_t)) return pair;
   // Feet again, one upon the other: for nearly parallel lines s and t are far less exact than the distance.

@@ -88,6 +88,7 @@ class SurfaceContacts {
   void test_pairs(const RigidTransform& X_AB, const ContactReach& reach, PairMemory* memory);
   void find_pairs(const RigidTransform& X_AB, const ContactReach& reach);
   bool stay_apart(Index s, Index t, double doubt);
+  bool counts();
   void list_tests(const RigidTransform& X_AB, PairMemory& memory);
   FeatureTests tests_within(Index s, Index t, double reach, double slack);
   void test_pair(Index s, Index t, FeatureTests tests);
@@ -112,7 +113,6 @@ class SurfaceContacts {
   void find_piercings(int of, Index s, Index t, FeatureTests tests);
   void find_piercing(int of, Index e, Index t);
   void spread_inside(int of, OverlapRule* rule);
-  double distance_to(int of, Index t, const Vec3& p);
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
   bool leave_behind(int of, Index v, OverlapRule::Exit& exit);
   bool find_supporting_face(int of, Index v, Index near, bool aligned, OverlapRule::Exit& exit);
@@ -137,6 +137,13 @@ class SurfaceContacts {
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
   std::vector<ListedTests> listed_;
+  // The triangles under way: whether what they find counts, or how to tell once they have found something.
+  struct Undecided {
+    Index s = -1, t = -1;
+    double doubt = 0.0;
+    bool asked = false, counts = true;
+  };
+  Undecided undecided_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;
   DisjointSets loops_;

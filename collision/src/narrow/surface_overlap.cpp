@@ -25,7 +25,7 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   const Vec3 p = x0 + std::clamp(h0 / (h0 - h1), 0.0, 1.0) * (x1 - x0);
   double within = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
-  if (within < -tolerance_) return;
+  if (within < -tolerance_ || !counts()) return;
   if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], t});
   // An edge that only begins or ends on the face, or meets its rim, touches it.
   if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});
@@ -41,8 +41,9 @@ void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
     if (visited >= generation_) continue;
     visited = generation_;
     const Vec3& p = side_[of]->vertex(seed.vertex);
-    const double reach = seed.near < 0 ? std::numeric_limits<double>::infinity() : distance_to(1 - of, seed.near, p);
-    const PairSurface::Nearest nearest = side_[1 - of]->nearest(p, reach + directionless_);
+    PairSurface& other = *side_[1 - of];
+    const double reach = seed.near < 0 ? std::numeric_limits<double>::infinity() : other.distance_from(seed.near, p);
+    const PairSurface::Nearest nearest = other.nearest(p, reach + directionless_);
     if (!nearest.inside) continue;
     visited = generation_ + 1;
     add_inside(of, seed.vertex, nearest, rule);
@@ -67,10 +68,6 @@ void SurfaceContacts::spread_inside_itself(SelfOverlapRule& places) {
     add(0, mine.at_vertex(v), exit.at, exit.normal, exit.normal.dot(mine.vertex(v) - exit.at.point));
     for (const Index w : mine.surface().vertex_neighbours(v)) seeds.push_back({w, exit.at.triangle});
   }
-}
-
-double SurfaceContacts::distance_to(int of, Index t, const Vec3& p) {
-  return (p - closest_on_triangle(p, side_[of]->corners(t)).point).norm();
 }
 
 void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule) {

@@ -17,6 +17,12 @@ double line_parameter(const Vec3& p, const SegmentPoints& s) {
   return (p - s[0]).dot(d) / length2;
 }
 
+// Of a foot_at() the point alone.
+Vec3 point_at(const SegmentPoints& s, double t) {
+  if (!(t > 0.0)) return s[0];
+  return t >= 1.0 ? s[1] : between(s, t);
+}
+
 // The longest edge of a triangle, from vertex a to b, and the height of the third vertex c over it.
 struct Altitude {
   explicit Altitude(const TrianglePoints& t) {
@@ -76,14 +82,15 @@ SurfaceFoot closest_on_triangle(const Vec3& p, const TrianglePoints& t) {
       return inside;
     }
   }
-  SurfaceFoot best{};
-  double best2 = std::numeric_limits<double>::infinity();
+  int nearest = 0;
+  double parameter = 0.0, least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
-    const SurfaceFoot foot = on_edge(closest_on_segment(p, edge_of(t, i)), i);
-    const double d2 = (p - foot.point).squaredNorm();
-    if (d2 < best2) best = foot, best2 = d2;
+    const SegmentPoints s = edge_of(t, i);
+    const double along = line_parameter(p, s);
+    const double d2 = (p - point_at(s, along)).squaredNorm();
+    if (d2 < least) nearest = i, parameter = along, least = d2;
   }
-  return best;
+  return on_edge(foot_at(edge_of(t, nearest), parameter), nearest);
 }
 
 }  // namespace limber
