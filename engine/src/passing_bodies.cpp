@@ -14,24 +14,15 @@ void PassingBodies::leave_out(std::span<const char> asleep, std::span<const Cont
   for (const Index member : members) rests[static_cast<std::size_t>(member)] = 1;
 }
 
-void PassingBodies::list_touching(std::span<const ContactPoint> in_force) {
+void PassingBodies::list_touching(std::span<const ContactPoint> in_force, double within) {
   touching.clear();
   for (const ContactPoint& c : in_force) {
     const std::pair pair(c.a.body, c.b.body);
-    if (c.gap <= first_margin || std::ranges::find(crept, pair) != crept.end()) touching.push_back(pair);
+    if (c.gap <= within || std::ranges::find(crept, pair) != crept.end()) touching.push_back(pair);
   }
   std::ranges::sort(touching);
   const auto [begin, end] = std::ranges::unique(touching);
   touching.erase(begin, end);
-}
-
-void PassingBodies::drop_watched() {
-  const auto plain = [&](Index body) {
-    return turns[static_cast<std::size_t>(body)] == 0 && bends[static_cast<std::size_t>(body)] == 0;
-  };
-  std::erase_if(touching, [&](const std::pair<Index, Index>& pair) {
-    return plain(pair.first) && plain(pair.second) && std::ranges::find(crept, pair) == crept.end();
-  });
 }
 
 /// Half-spaces are planes for good.
@@ -57,7 +48,7 @@ double PassingWatch::clear_until(const FreeMotions& found, double length) {
                         .motions = passing_.motions,
                         .step = until,
                         .margin = margin_,
-                        .least_margin = PassingBodies::kLeast * passing_.first_margin,
+                        .least_margin = passing_.least_margin(),
                         .bodies = found.members,
                         .except = passing_.touching},
                        passing_.touches, serial_jobs());

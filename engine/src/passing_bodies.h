@@ -49,21 +49,19 @@ struct PassingBodies {
   std::vector<const ExactMotion*> motions;        // by body
   std::vector<ContactPoint> contacts;             // of the part at hand
   std::vector<char> rests;                        // by body: not in the part at hand
-  std::vector<std::pair<Index, Index>> touching;  // pairs whose contacts are in force; they are not looked at
+  std::vector<std::pair<Index, Index>> touching;  // pairs too near to be looked at: their contacts are in force
   std::vector<std::pair<Index, Index>> crept;     // of the cluster: so near for long that it took no end
   std::vector<char> planes;                       // by body: a half-space, whose contacts are good however far
   std::vector<char> turns;                        // by body: what it touches with changes as it turns
-  std::vector<char> bends;                        // by body
   std::vector<char> wears_shape;                  // by body: it shows a rigid shape, which its modes do not move
   std::vector<ExactMotion> frames;                // by member, of those
   double first_margin = 0.0, margin = 0.0;        // m, at which bodies touch; each cluster takes a smaller one
 
   void drop_planes();
-  /// Of those that touch, what can be looked at as it goes on: two bodies that neither bend nor change what they touch
-  /// with as they turn.
-  void drop_watched();
-  /// @param in_force ordered by pairs
-  void list_touching(std::span<const ContactPoint> in_force);
+  /// @param in_force ordered by pairs. @param within m: of those, the pairs that are so near
+  void list_touching(std::span<const ContactPoint> in_force, double within);
+  /// m: nearer pairs are not looked at.
+  double least_margin() const { return kLeast * first_margin; }
   bool any() const { return !members.empty(); }
   bool looks_farther(Index body) const {
     return static_cast<std::size_t>(body) < farther.size() && farther[static_cast<std::size_t>(body)] != 0;

@@ -52,11 +52,12 @@ void World::Impl::find_first_touches() {
   }
   p.margin = p.first_margin;
   p.crept.clear();
-  p.list_touching(touching);
+  p.list_touching(touching, p.first_margin);
   source->find_impacts({.states = states,
                         .motions = p.motions,
                         .step = parts->length(),
                         .margin = p.margin,
+                        .least_margin = p.least_margin(),
                         .bodies = p.fast,
                         .except = p.touching},
                        p.touches, *jobs);
@@ -154,14 +155,12 @@ void World::Impl::advance_passing(int part) {
     expect_to_stay(states[i]);
   }
   p.turns.assign(entries.size(), 0);
-  p.bends.assign(entries.size(), 0);
   p.wears_shape.assign(entries.size(), 0);
   for (const Index member : p.members) {
     const auto i = static_cast<std::size_t>(member);
     const Shape* shape = entries[i].shape.get();
     p.wears_shape[i] = shape != nullptr;
     p.turns[i] = shape == nullptr || !std::holds_alternative<Sphere>(*shape);
-    p.bends[i] = shape == nullptr && group(entries[i]).model().modes() > 0;
   }
   std::size_t begin = 0;
   for (const std::size_t end : p.ends) {
@@ -185,8 +184,7 @@ void World::Impl::advance_cluster(std::span<const Index> members, int part) {
   for (int count = 1;; ++count, step.begins = false) {
     const std::span<const ContactPoint> found = contacts_of_cluster(members, count == 1, step.step);
     set_contacts(found);
-    p.list_touching(found);
-    p.drop_watched();
+    p.list_touching(found, p.least_margin());
     PassingWatch watch(*source, states, p);
     step.watch = &watch;
     const double taken = constraints.step_together(members, contacts.constraints(), step);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "coarse_bunny.h"
+#include "constants.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/engine/world.h"
 #include "random_states.h"
@@ -251,6 +252,60 @@ TEST(WorldPassing, NoShotPassesWithoutContact) {
   RecordProperty("passed_after_contact", tally.passed_after_contact);  // kept in the report; no claim (docs/contact.md)
   RecordProperty("held", tally.held);
   RecordProperty("most_contacts_of_a_ball", tally.most_contacts_of_a_ball);
+}
+
+/// A ball that moves far within a step while it touches meets each bump in its way: a contact is a plane, and bumps are
+/// not.
+TEST(WorldPassing, ABallThatSkimsARoughFieldStaysAboveIt) {
+  constexpr double kRadius = 1e-3, kWay = 0.08;
+  Random random(23);
+  HeightField field{21, 21, 0.05 * kSide, 0.05 * kSide, {}};
+  for (int i = 0; i < 441; ++i) field.heights.push_back(static_cast<float>(random.uniform(-0.01, 0.01)));
+  for (const double speed : {3.0, 30.0, 300.0})
+    for (int shot = 0; shot < 20; ++shot) {
+      ContactFinder finder;
+      World world({.step = kWay / speed, .gravity = Vec3::Zero()});
+      world.set_contact_source(&finder);
+      const RigidTransform at{{}, {-0.5 * kSide, -0.5 * kSide, 0.0}};
+      world.add_static(std::make_shared<const Shape>(field), at);
+      const Vec3 aim(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), 0.0);
+      const Vec3 towards = Vec3(random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), -1.0).normalized();
+      const BodyId ball = world.add_body(rigid(kRadius, 4e3 * kRadius * kRadius * kRadius),
+                                         {.pose = {{}, aim - 0.05 * towards},
+                                          .velocity = speed * towards,
+                                          .shape = std::make_shared<const Shape>(Sphere{kRadius})});
+      for (int i = 0; i < 10; ++i) {
+        world.step();
+        ASSERT_FALSE(is_below(field, world.body(ball).pose.p - at.p)) << speed << ' ' << shot << ' ' << i;
+      }
+    }
+}
+
+/// What is brought to its touch part way into a step goes on, so nothing hangs in the air.
+TEST(WorldPassing, SoftBodiesThatFallOnEachOtherComeDown) {
+  constexpr int kBodies = 3, kSteps = 60;
+  constexpr double kSize = 0.1, kLift = 0.4, kApart = 0.15;
+  SurfaceMesh bunny = coarse_bunny(200).value_or(shapes::sphere(Vec3::Zero(), 0.5, 2));
+  for (Vec3& p : bunny.vertices) p *= kSize;
+  ModalModelData data = wavy_data(bunny, 6);
+  data.mass = 1.0;
+  data.inertia = Mat3::Identity() * (0.1 * kSize * kSize);
+  const auto model = std::make_shared<const ModalModel>(std::move(data));
+  ContactFinder finder;
+  World world({.step = kFrame, .gravity = {0.0, 0.0, -kGravity}});
+  world.set_contact_source(&finder);
+  world.add_static(std::make_shared<const Shape>(Box{{1.0, 1.0, 0.1}}), {{}, {0.0, 0.0, -0.1}});
+  std::vector<BodyId> bodies;
+  for (int i = 0; i < kBodies; ++i)
+    bodies.push_back(world.add_body(model, {.pose = {{}, {0.01 * i, 0.0, kLift + kApart * i}}}));
+  for (int i = 0; i < kSteps; ++i) world.step();
+  double fastest = 0.0, highest = 0.0;
+  for (const BodyId body : bodies) {
+    fastest = std::max(fastest, world.body(body).velocity.norm());
+    highest = std::max(highest, world.body(body).pose.p.z());
+  }
+  EXPECT_LT(highest, kBodies * kSize) << "nothing is higher than a heap";
+  EXPECT_LT(fastest, 0.2 * kGravity * kSteps * kFrame) << "of what falls freely";
 }
 
 /// Balls at each other, head on and past each other, of unlike sizes and speeds.

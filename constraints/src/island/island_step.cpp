@@ -99,16 +99,18 @@ void IslandStep::begin_early() {
   if (loads.all_early) std::ranges::fill(early, 1);
 }
 
-/// Makes the modes go through a part of a step, or through an impact, in which all of them move: those that answer
-/// statically would lose what they store, and no hand is there to whip them.
+/// Makes the modes go through a part of a step, or through an impact or a part that is watched, in which all of them
+/// move: those that answer statically would lose what they store, take any blow of a short part as springs without a
+/// mass, and no hand is there to whip them.
 void IslandStep::set_modal_steps() {
-  if (theta == 1.0 && length() == part.whole_step) return;
+  const bool all_move = theta < 1.0 || part.options.watch != nullptr;
+  if (!all_move && length() == part.whole_step) return;
   const auto count = static_cast<std::size_t>(bodies.count());
   if (loads.steps.size() < count) loads.steps.resize(count);
   for (Index local = 0; local < bodies.count(); ++local) {
     const ModalModelData& data = bodies.body(local).group->model().data();
-    loads.steps[static_cast<std::size_t>(local)].set(
-        data.eigenvalues, data.decays, length(), theta < 1.0 ? ModalStep::kNone : std::numbers::pi / part.whole_step);
+    loads.steps[static_cast<std::size_t>(local)].set(data.eigenvalues, data.decays, length(),
+                                                     all_move ? ModalStep::kNone : std::numbers::pi / part.whole_step);
   }
   bodies.set_modal_steps(std::span(loads.steps).first(count));
 }
