@@ -233,7 +233,11 @@ void Shot::take(Tally& tally) const {
       break;
     }
     if (projectile_.shape && std::holds_alternative<Sphere>(*projectile_.shape))
-      tally.most_contacts_of_a_ball = std::max(tally.most_contacts_of_a_ball, static_cast<int>(contacts));
+      tally.most_contacts_of_a_ball =
+          std::max(tally.most_contacts_of_a_ball,
+                   static_cast<int>(std::ranges::count_if(flight.world.contact_events(), [](const ContactEvent& event) {
+                     return event.phase != ContactPhase::kEnded;
+                   })));
     before = now;
   }
   tally.met += met ? 1 : 0;
