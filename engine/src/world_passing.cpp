@@ -37,7 +37,7 @@ void World::Impl::list_fast() {
   }
 }
 
-/// Of the fast, while all others stand still.
+/// Of the fast, among all that move: what is slow may come to meet them.
 void World::Impl::find_first_touches() {
   PassingBodies& p = passing;
   p.motions.assign(entries.size(), nullptr);
@@ -45,9 +45,10 @@ void World::Impl::find_first_touches() {
   for (std::size_t i = 0; i < entries.size(); ++i)
     p.planes[i] = entries[i].alive && entries[i].shape && std::holds_alternative<HalfSpace>(*entries[i].shape);
   p.first_margin = std::numeric_limits<double>::infinity();
+  for (const Index body : sleep.awake())
+    p.motions[static_cast<std::size_t>(body)] = &motions[static_cast<std::size_t>(body)];
   for (const Index body : p.fast) {
     const auto i = static_cast<std::size_t>(body);
-    p.motions[i] = &motions[i];
     p.first_margin = std::min(p.first_margin, PassingBodies::kTouch * states[i].look_ahead);
   }
   p.margin = p.first_margin;
@@ -61,7 +62,7 @@ void World::Impl::find_first_touches() {
                         .bodies = p.fast,
                         .except = p.touching},
                        p.touches, *jobs);
-  for (const Index body : p.fast) p.motions[static_cast<std::size_t>(body)] = nullptr;
+  for (const Index body : sleep.awake()) p.motions[static_cast<std::size_t>(body)] = nullptr;
   std::erase_if(p.touches, [&](const Impact& touch) { return planes_last(touch.a, touch.b); });
 }
 

@@ -312,6 +312,25 @@ TEST(WorldPassing, SoftBodiesThatFallOnEachOtherComeDown) {
   EXPECT_LT(fastest, 0.2 * kGravity * kSteps * kFrame) << "of what falls freely";
 }
 
+/// A small ball that is fast and a large one that is not, as it is thick: neither way alone would bring them together.
+TEST(WorldPassing, WhatIsFastMeetsWhatIsThickAndComesSlowly) {
+  constexpr double kSmall = 1e-3, kLarge = 20e-3, kSpeed = 0.9 * kLarge / kFrame, kApart = 1.5 * kSpeed * kFrame;
+  ContactFinder finder;
+  World world({.step = kFrame, .gravity = Vec3::Zero()});
+  world.set_contact_source(&finder);
+  const auto add = [&](double radius, double x) {
+    return world.add_body(rigid(radius, 4e3 * radius * radius * radius),
+                          {.pose = {{}, {x, 0.0, 0.0}},
+                           .velocity = {x > 0.0 ? -kSpeed : kSpeed, 0.0, 0.0},
+                           .shape = std::make_shared<const Shape>(Sphere{radius})});
+  };
+  const double between = kSmall + kLarge + kApart;
+  const BodyId small = add(kSmall, 0.5 * between), large = add(kLarge, -0.5 * between);
+  world.step();
+  EXPECT_FALSE(world.contact_events().empty());
+  EXPECT_GT(world.body(small).pose.p.x() - world.body(large).pose.p.x(), kSmall + kLarge);
+}
+
 /// Balls at each other, head on and past each other, of unlike sizes and speeds.
 TEST(WorldPassing, BallsMeet) {
   Random random(19);
