@@ -87,8 +87,9 @@ struct ImpactQuery {
   /// m: pairs that are within the margin from the start, but not this near, touch where they come nearer still: within
   /// a half, a quarter and so on of the margin. As it is, they are not looked at.
   double least_margin = std::numeric_limits<double>::infinity();
-  /// Ascending; none: all that have a motion. Otherwise these alone have one, and all others stand where they were in
-  /// the last query of all contacts, or within their reach of it: a few bodies cost what they meet.
+  /// Ascending; none: all that have a motion. Otherwise pairs with one of these are looked at alone, and all others
+  /// stand where they were in the last query of all contacts, or go no farther than that was told: a few bodies cost
+  /// what they meet.
   std::span<const Index> bodies{};
   std::span<const std::pair<Index, Index>> except{};  ///< (a, b), a < b, ascending: pairs that are not looked at
 };
