@@ -15,15 +15,15 @@ namespace {
 using testing::Body;
 using testing::Random;
 
-constexpr double kLength = 4.0, kHalf = 0.5;
+constexpr double kBarLength = 4.0, kHalf = 0.5;
 
 Vec3 on_arc(const Vec3& r, double angle) {
-  const double radius = kLength / angle, a = r.x() / radius;
+  const double radius = kBarLength / angle, a = r.x() / radius;
   return {(radius - r.z()) * std::sin(a), r.y(), radius - (radius - r.z()) * std::cos(a)};
 }
 
 std::shared_ptr<const ModalModel> arc(double angle) {
-  const TetMesh mesh = testing::solid_box({0.5 * kLength, kHalf, kHalf}, {24, 6, 6});
+  const TetMesh mesh = testing::solid_box({0.5 * kBarLength, kHalf, kHalf}, {24, 6, 6});
   ModalModelData data = testing::solid_data(mesh, 1);
   for (Index v = 0; v < data.render.vertices(); ++v) {
     const Vec3 r = data.render.rest[static_cast<std::size_t>(v)].cast<double>();
@@ -56,7 +56,7 @@ TEST(RestDepth, IsTheDepthOfTheNearestPointInABentBar) {
     Random random(5);
     std::vector<double> turns;
     for (int i = 0; i < 300; ++i) {
-      const Vec3 r = random.vector(1.0).cwiseProduct(Vec3(0.4 * kLength, 0.48, 0.48));
+      const Vec3 r = random.vector(1.0).cwiseProduct(Vec3(0.4 * kBarLength, 0.48, 0.48));
       const ContactPoint rest = at_point(bar, on_arc(r, angle), OverlapMethod::kRestDepth),
                          nearest = at_point(bar, on_arc(r, angle), OverlapMethod::kNearestPoint);
       if (!(nearest.gap < 0.0)) continue;  // between the mesh and the arc

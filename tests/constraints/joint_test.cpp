@@ -158,7 +158,7 @@ Unguarded run_without_guard(const JointSpec& spec, const SampleOptions& sample, 
 TEST(Joint, WithoutTheGuardEnergyNeverRisesWhateverTheTypeStiffnessAndStep) {
   for (const JointType type : kTypes)
     for (const double step : {1e-3, kFrame, 0.1, 1.0})
-      for (const double hz : {0.3, 3.0, 20.0, 1e4}) {
+      for (const double hz : testing::all_or_first<double>({3.0, 0.3, 20.0, 1e4})) {
         if (step * 0.3 > 0.1 && hz == 0.3) continue;  // a body that falls by many times its length while it bends once
         const double seconds = std::max(0.5, 40.0 * step);
         const Unguarded seen = run_without_guard({.type = type, .frame = {.axes = hinge_axes()}},
