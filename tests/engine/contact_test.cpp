@@ -248,5 +248,34 @@ TEST(WorldContact, StateHashIsTheSameForAnyThreadCount) {
   EXPECT_EQ(hashes_of_islands_in_contact(jobs), serial) << "oneTBB";
 }
 
+TEST(Contact, AChainWhoseDraggingEndWeighsAThousandLinksHoldsTogetherOnTheGround) {
+  GroundedWorld s({.friction = 0.5, .recovery_speed = 0.0});
+  std::vector<BodyId> bodies;
+  std::vector<JointId> joints;
+  BodyId before{};
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 start(i * kSampleSize, 0.0, 1.2);
+    ModalModelData d = sample_model_data({.modes = 0});
+    if (i == 3) d.mass *= 1e3, d.inertia *= 1e3;
+    const BodyId next = s.world.add_body(std::make_shared<const ModalModel>(std::move(d)),
+                                         {.pose = {.p = start + 0.5 * kSampleSize * Vec3::UnitX()}});
+    joints.push_back(s.world.add_joint(before, next, {.type = JointType::kBall, .frame = {.origin = start}},
+                                       {.radius = 0.25}, {.radius = 0.25}));
+    bodies.push_back(before = next);
+  }
+  StepAttempts attempts;
+  double apart = 0.0, deepest = 0.0;
+  for (int i = 0; i < 120; ++i) {
+    s.world.step();
+    EXPECT_TRUE(s.world.constraint_report().solved) << i;
+    attempts.add(s.world.constraint_report().attempts);
+    for (const JointId joint : joints) apart = std::max(apart, s.world.joint(joint).distance_error);
+    for (const BodyId body : bodies) deepest = std::max(deepest, -lowest(s.world, body));
+  }
+  EXPECT_GT(attempts[StepAttempt::kInTheMiddle], 0);
+  EXPECT_LE(apart, 1e-8);
+  EXPECT_LE(deepest, 1e-6 * kSampleSize);
+}
+
 }  // namespace
 }  // namespace limber::testing

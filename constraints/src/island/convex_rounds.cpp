@@ -16,13 +16,6 @@ constexpr double kLeft = 0.03;
 // end: a few milliseconds.
 constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
 
-ContactPotential potential_of(const RowLaw& law) {
-  using Set = ContactPotential::Set;
-  if (law.radius > 0.0) return {.set = Set::kBall, .bound = law.radius};
-  if (law.friction > 0.0) return {.set = Set::kCone, .bound = law.friction};
-  return {.set = Set::kInterval, .lower = law.lower, .upper = law.upper};
-}
-
 }  // namespace
 
 /// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
@@ -89,7 +82,7 @@ void ConvexRounds::place_units(const IslandStep& step) {
         contacts_.add_node(static_cast<std::size_t>(bodies.response(local).size()) + residual_.rank(local)));
   for (std::size_t i = 0, count = 1; i < step.size(); i += count) {
     count = static_cast<std::size_t>(contact_rows(step.law(i)));
-    contacts_.add_unit(count, potential_of(step.law(i)), step.law(i).tolerance);
+    contacts_.add_unit(count, set_of(step.law(i)), step.law(i).tolerance);
     units_.push_back({.first = i, .rows = count});
     step.for_bodies(i, [&](const ConstraintRows::Side&, Index local, bool again) {
       if (!again) contacts_.add_side(nodes_[static_cast<std::size_t>(local)]);

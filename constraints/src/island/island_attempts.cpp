@@ -20,9 +20,31 @@ IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
   if (step.holds_contact_forces()) touch.solve(step, reaction, done.programs);
   reaction.find(step, StepTime::kStart);
   done.status = step.convex ? rounds.solve(step, done) : newton.solve(step, done);
+  if (done.status != SolveStatus::kSolved && foresee_middle(done)) return done;
   if (part.options.watch != nullptr) step.trace(motions);
   act_at_end();
   return done;
+}
+
+/// Joints beside contacts that rounds have not found: by rows of the middle of the step and true derivatives. @return
+/// whether that is found; else what the rounds came to stays
+bool IslandSolver::Impl::foresee_middle(IslandReport& done) {
+  if (!step.convex || !step.touches || step.contacts_alone || step.part.options.watch != nullptr) return false;
+  constexpr std::size_t kMostRows = 80;  // matrices are dense
+  if (step.size() > kMostRows) return false;
+  IslandReport middle;
+  step.take_middle(true);
+  middle.status = mean.solve(step, middle, true);
+  middle.attempts[StepAttempt::kInTheMiddle] = 1;
+  if (middle.status == SolveStatus::kSolved) {
+    done = middle;
+    return true;
+  }
+  step.take_middle(false);
+  reaction.find(step, StepTime::kStart);
+  done = {};
+  done.status = rounds.solve(step, done);
+  return false;
 }
 
 /// Of bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the

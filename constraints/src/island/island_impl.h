@@ -61,6 +61,7 @@ struct IslandSolver::Impl {
   // A part.
   IslandReport foresee(const internal::StepPart& part);
   IslandReport foresee_guarded(internal::StepPart part);
+  bool foresee_middle(IslandReport& done);
   void foresee_mean(IslandReport& done);
   void act_at_end();
   void refuse_impulses(IslandReport& report);

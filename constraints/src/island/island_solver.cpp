@@ -182,6 +182,7 @@ void IslandSolver::Impl::find_impulses() {
   for (std::size_t i = 0; i < step.size(); ++i)
     impulses[i] = step.f[i] + step.length() * step.reaction[i] + step.touch_impulse[i] + step.end_impulse[i];
   if (step.convex) rounds.write_slip(step, slip);
+  if (step.mean) mean.write_slip(step, slip);
 }
 
 void IslandSolver::Impl::tell_foreseen() {

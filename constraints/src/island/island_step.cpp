@@ -67,6 +67,12 @@ void IslandStep::begin(const StepPart& of) {
   bodies.write_position_metric(length(), theta, metric_);
 }
 
+void IslandStep::take_middle(bool middle) {
+  mean = middle, convex = !middle;
+  std::ranges::fill(reaction, 0.0);
+  begin_early();
+}
+
 bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
   for (Index i = 0; i < rows.size(); ++i)
     if (holds(rows.row(i).law)) return true;
@@ -76,9 +82,9 @@ bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
 /// Forces are truly held, θ = ½, while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
 void IslandStep::find_kind() {
   contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
-  const bool contacts = any_law([](const RowLaw& law) { return law.contact || law.radius > 0.0; });
-  mean = part.options.watch == nullptr && !contacts;
-  convex = !mean && (rule().is_convex() || !contacts);
+  touches = any_law([](const RowLaw& law) { return law.contact; });
+  mean = part.options.watch == nullptr && !touches;
+  convex = !mean && (rule().is_convex() || !touches);
   skinned = false;
   for (Index local = 0; local < bodies.count(); ++local)
     skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);
@@ -90,7 +96,7 @@ void IslandStep::begin_early() {
   std::vector<char>& early = loads.early;
   early.assign(static_cast<std::size_t>(bodies.count()), 0);
   loads.all_early = false;
-  if (!convex || theta < 1.0) return;
+  if (!(convex || mean) || theta < 1.0) return;
   for (std::size_t row = 0; row < size(); ++row)
     if (law(row).contact && (law(row).last_force != 0.0 || law(row).foreseen_force != 0.0))
       for_bodies(row,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limber/constraints/island_solver.h"
+#include "limber/solvers/contact_potential.h"
 #include "limber/solvers/secant_iteration.h"
 
 namespace limber::internal {
@@ -15,6 +16,13 @@ inline bool is_equality(const RowLaw& law) {
 }
 /// Rows of the contact whose normal row this is, or of the vector whose first row it is.
 inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
+/// Where its impulse stays, or theirs.
+inline ContactPotential set_of(const RowLaw& first) {
+  using Set = ContactPotential::Set;
+  if (first.radius > 0.0) return {.set = Set::kBall, .bound = first.radius};
+  if (first.friction > 0.0) return {.set = Set::kCone, .bound = first.friction};
+  return {.set = Set::kInterval, .lower = first.lower, .upper = first.upper};
+}
 
 /// The frame before the step, or as predicted for its end.
 inline const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
@@ -66,8 +74,9 @@ struct IslandStep {
   bool convex = false;                       // in rounds: with contacts by a rule for that, or watched
   bool contacts_alone = false;               // among the rows
   bool skinned = false;                      // some bodies bend by their modal skins
-  bool mean = false;   // joints and the like without contacts: impulses act in the middle of the step
-  double theta = 1.0;  // the part of f that frames get at the start; the rest at the end
+  bool mean = false;                         // joints and the like: impulses act by the rows of the middle of the step
+  bool touches = false;                      // some rows are contacts
+  double theta = 1.0;                        // the part of f that frames get at the start; the rest at the end
   std::vector<double> start_gap, gap;
   std::vector<double> f;                       // N·s, beside the reactions
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
@@ -79,6 +88,8 @@ struct IslandStep {
 
   /// Linearises the rows. All impulses are zero.
   void begin(const StepPart& of);
+  /// Joints beside contacts: to be solved by the rows of the middle of the step, or in rounds.
+  void take_middle(bool middle);
   double length() const { return part.options.step; }
   const ContactRule& rule() const { return part.options.contact; }
   std::size_t size() const { return f.size(); }
@@ -116,6 +127,14 @@ struct IslandStep {
   /// act(side, local, again) for the bodies of a row; again: the one before was the same body.
   template <class Action>
   void for_bodies(std::size_t row, Action&& act) const;
+  /// act(first row, number of rows) for each row, or the rows of one contact or vector.
+  template <class Action>
+  void for_units(Action&& act) const {
+    for (std::size_t i = 0, count = 1; i < size(); i += count) {
+      count = static_cast<std::size_t>(contact_rows(law(i)));
+      act(i, count);
+    }
+  }
 
  private:
   void load_early(const ConstrainedBody& body, ConstraintLoad& load) const;

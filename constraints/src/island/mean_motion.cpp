@@ -43,20 +43,23 @@ void keep(const Mat3& projection, Rows&& rows) {
   for (Eigen::Index j = 0; j < rows.cols(); ++j) rows.col(j) = (projection * Vec3(rows.col(j))).eval();
 }
 
-/// By what holds the body to its line: m in (1 + ½[τ]) I τ/Δt = L₀ + ½(1 − ½[τ])(L₁ − L₀ + m), across the line.
-Vec3 parent_moment(const Mat3& inertia, const Mat3& loose, const Vec3& turn, const Vec3& before, const Vec3& after,
-                   double length) {
-  const Vec3 spin = inertia * turn / length, left = 2.0 * (spin + 0.5 * turn.cross(spin) - before);
-  const Vec3 moment = (Mat3::Identity() - 0.5 * cross_matrix(turn)).inverse() * left - (after - before);
-  return moment - loose * moment;
-}
-
 }  // namespace
+
+/// (1 − (1 − s)[τ]): of what acts, in the equation of the turn.
+Mat3 MeanMotion::late(const Vec3& turn) const { return Mat3::Identity() - (1.0 - share_) * cross_matrix(turn); }
+
+/// By what holds the body to its line: m in (1 + ½[τ]) I τ/Δt = L₀ + s (1 − (1 − s)[τ])(L₁ − L₀ + m), across the line.
+Vec3 MeanMotion::parent_moment(const Body& b, const Vec3& after) const {
+  const Vec3 spin = b.inertia * b.turn / length_, left = (spin + 0.5 * b.turn.cross(spin) - b.momentum) / share_;
+  const Vec3 moment = late(b.turn).inverse() * left - (after - b.momentum);
+  return moment - b.loose * moment;
+}
 
 void MeanMotion::begin(IslandStep& step, bool bends) {
   const double h = step.length();
   bodies_.clear(), carried_.clear();
   length_ = h, bends_ = bends;
+  share_ = step.loads.all_early ? 1.0 : 0.5;
   Index modes = 0;
   for (Index local = 0; local < step.bodies.count(); ++local) {
     const ConstrainedBody& at = step.bodies.body(local);
@@ -73,7 +76,7 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
               .first_mode = modes,
               .modes = step.bodies.response(local).modes};
     body.flight =
-        h * frame.velocity() + 0.5 * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
+        h * frame.velocity() + share_ * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
     if (c.motion == FrameMotion::kPoint) body.turn = free_turn(body.inertia, body.momentum, h);
     if (c.motion != FrameMotion::kFree) begin_carried(step, local, body);
     body.shift = body.flight;  // and what is free turns as guess() tells
@@ -94,8 +97,8 @@ void MeanMotion::guess(const IslandStep& step, std::span<const double> impulses)
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];
     if (b.carried >= 0) continue;
-    b.shift = b.flight + 0.5 * length_ / b.mass * impulse_[static_cast<std::size_t>(local)];
-    b.turn = free_turn(b.inertia, b.momentum + 0.5 * (moment_[static_cast<std::size_t>(local)] + b.torque), length_);
+    b.shift = b.flight + share_ * length_ / b.mass * impulse_[static_cast<std::size_t>(local)];
+    b.turn = free_turn(b.inertia, b.momentum + share_ * (moment_[static_cast<std::size_t>(local)] + b.torque), length_);
   }
   load_.setZero();
   for (Index i = 0; bends_ && i < step.rows.size(); ++i)
@@ -161,8 +164,9 @@ void MeanMotion::turn_about_line(Body& body) {
   const Vec3 along = carried.tangent.normalized();
   body.loose = along * along.transpose();
   // What holds the body to its line is across it: so much of ½(1 − ½[τ]) m is not to count.
-  body.kept = along * (along + 0.25 * body.turn * body.turn.dot(along) - 0.5 * body.turn.cross(along)).transpose() /
-              (1.0 + 0.25 * body.turn.squaredNorm());
+  const Vec3 late = 2.0 * (1.0 - share_) * body.turn;
+  body.kept = along * (along + 0.25 * late * late.dot(along) - 0.5 * late.cross(along)).transpose() /
+              (1.0 + 0.25 * late.squaredNorm());
   body.easy = body.loose / along.dot(body.inertia * along);
 }
 
@@ -242,7 +246,7 @@ void MeanMotion::take_rows(const IslandStep& step, std::vector<MeanRow>& rows) c
       side.body = step.bodies.local(middle.body);
       if (side.body < 0) continue;
       const Body& b = bodies_[static_cast<std::size_t>(side.body)];
-      side.force << 0.5 * middle.linear, 0.5 * (middle.angular - 0.5 * b.turn.cross(middle.angular));
+      side.force << share_ * middle.linear, share_ * (late(b.turn) * middle.angular);
       side.gap << end.linear, (end.angular - 0.5 * b.turn.cross(end.angular)) / (1.0 + 0.25 * b.turn.squaredNorm());
       side.modal_force = step.mean_rows.modal(middle), side.modal_gap = step.end_rows.modal(end);
       if (b.carried >= 0) side.force << Vec3::Zero(), b.kept * Vec3(side.force.tail<3>());
@@ -256,7 +260,7 @@ bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const do
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const Vec3 spin = b.inertia * b.turn / length_,
-               turned = spin + 0.5 * b.turn.cross(spin) - 0.5 * b.torque + 0.25 * b.turn.cross(b.torque);
+               turned = spin + 0.5 * b.turn.cross(spin) - share_ * (late(b.turn) * b.torque);
     const double mass = b.carried < 0 ? b.mass / length_ : 0.0;
     residual.segment<6>(6 * local) << mass * (b.shift - b.flight), b.kept * (turned - b.momentum);
     terms_.segment<2>(2 * local) << mass * (b.shift.norm() + b.flight.norm()),
@@ -300,8 +304,8 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
       const Body& b = bodies[static_cast<std::size_t>(i)];
       const ConstrainedBody& at = step.bodies.body(i);
       const Mat3 f = cross_matrix(impulse);
-      const Mat3 by_place = 0.25 * (Mat3::Identity() - 0.5 * cross_matrix(b.turn)) * f *
-                            to_matrix(at.group->predicted_frame(at.slot).pose().q);
+      const Mat3 by_place =
+          0.5 * motion.share_ * motion.late(b.turn) * f * to_matrix(at.group->predicted_frame(at.slot).pose().q);
       const Mat3 by_turn = -0.5 * f * to_matrix(at.group->frame(at.slot).pose().q);
       for (std::size_t k = 0; k < shapes.size(); ++k) {
         motion.bend_.col(b.first_mode + static_cast<Index>(k)) += by_place * shapes[k];
@@ -311,8 +315,8 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
     void add(Index body, Of of, Index moved, By by, const Mat3& value) override {
       const Index i = step.bodies.local(body), j = step.bodies.local(moved);
       if (i < 0 || j < 0) return;
-      Mat3 d = -0.5 * value;
-      if (of == Of::kMoment) d = (Mat3::Identity() - 0.5 * cross_matrix(bodies[static_cast<std::size_t>(i)].turn)) * d;
+      Mat3 d = -motion.share_ * value;
+      if (of == Of::kMoment) d = motion.late(bodies[static_cast<std::size_t>(i)].turn) * d;
       if (by == By::kTurn) d = d * end_turn(bodies[static_cast<std::size_t>(j)].turn);
       K.block<3, 3>(6 * i + (of == Of::kMoment ? 3 : 0), 6 * j + (by == By::kTurn ? 3 : 0)) += d;
     }
@@ -324,13 +328,13 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
     K.block<3, 3>(6 * local, 6 * local) = b.mass / h * Mat3::Identity();
     K.block<3, 3>(6 * local + 3, 6 * local + 3) =
         (b.inertia + 0.5 * (cross_matrix(b.turn) * b.inertia - cross_matrix(b.inertia * b.turn))) / h -
-        0.25 * cross_matrix(b.torque);
+        share_ * (1.0 - share_) * cross_matrix(b.torque);
   }
   for (Index i = 0; i < step.mean_rows.size(); ++i)
     for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides)
       if (const Index local = step.bodies.local(side.body); local >= 0)
         K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
-            0.25 * impulses[static_cast<std::size_t>(i)] * cross_matrix(side.angular);
+            share_ * (1.0 - share_) * impulses[static_cast<std::size_t>(i)] * cross_matrix(side.angular);
   bend_.setZero(3, load_.size()), turned_.setZero(3, load_.size()), swung_.setZero(3, load_.size());
   Sum sum(step, *this, K);
   const BodyStates states(step.part.table);
@@ -350,7 +354,7 @@ void MeanMotion::find_field_derivative(const IslandStep& step, Index local, Matr
   const auto& [group, slot, pose] = step.bodies.body(local);
   const Mat3 field = cross_matrix(carried_[static_cast<std::size_t>(b.carried)].field),
              start = to_matrix(group->frame(slot).pose().q), end = to_matrix(group->predicted_frame(slot).pose().q),
-             by_place = 0.25 * (Mat3::Identity() - 0.5 * cross_matrix(b.turn)) * field;
+             by_place = 0.5 * share_ * late(b.turn) * field;
   K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
       by_place * cross_matrix(end * group->predicted_first_moment(slot)) * end_turn(b.turn);
   if (!bends_) return;
@@ -431,7 +435,7 @@ double MeanMotion::mobility(const MeanRow& row) const {
   row.for_sides([&](const MeanRow::Side& side) {
     const Body& b = bodies_[static_cast<std::size_t>(side.body)];
     const Vec3 turned = side.gap.tail<3>(), moment = side.force.tail<3>();
-    sum += side.force.head<3>().squaredNorm() * 2.0 / b.mass +
+    sum += side.force.head<3>().norm() * side.gap.head<3>().norm() / b.mass +
            std::sqrt(turned.dot(b.easy * turned) * moment.dot(b.easy * moment));
   });
   return length_ * sum;
@@ -506,7 +510,7 @@ void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
     const ConstrainedBody& at = step.bodies.body(local);
     Vec3 momentum = b.momentum + moment_[static_cast<std::size_t>(local)] + b.torque;
     if (b.carried >= 0) {
-      momentum += parent_moment(b.inertia, b.loose, b.turn, b.momentum, momentum, h);
+      momentum += parent_moment(b, momentum);
       predict(step, local, end_of(step, local, momentum));
       continue;
     }

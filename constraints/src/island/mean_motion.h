@@ -5,6 +5,9 @@
 //   (1 + ½[τ]) I τ/Δt = L₀ + ½ (1 − ½[τ]) (l + Δt t)          I at the start, world axes
 //   v₁ = v₀ + Δt g + (p + Δt f)/m,    L₁ = L₀ + l + Δt t
 //
+// Where a contact presses all of this comes at the start, s = 1 in place of ½: (d/Δt − v₀) m = s (p + …) and
+// (1 + ½[τ]) I τ/Δt = L₀ + s (1 − (1 − s)[τ]) (l + Δt t), so that what rests has no velocity.
+//
 // The kinetic energy changes by exactly (p·d + l·τ)/Δt and what is held. Modes take the impulses as a force held.
 //
 // The origin of a body with fixed nodes goes where its parent takes it. In the parent's field g − a the mass moment s
@@ -147,10 +150,12 @@ class MeanMotion {
   void find_field_derivative(const IslandStep& step, Index local, Matrix& K);
   void hold_carried(Matrix& K);
   void sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies, std::span<const double> impulses);
+  Vec3 parent_moment(const Body& body, const Vec3& after) const;
 
   std::vector<Body> bodies_;
   std::vector<Carried> carried_;
-  double length_ = 0.0;
+  Mat3 late(const Vec3& turn) const;
+  double length_ = 0.0, share_ = 0.5;  // Δt, s
   bool bends_ = true;
   std::vector<Vec3> impulse_, moment_;  // of the rows, by body
   Vector response_, load_;

@@ -14,32 +14,68 @@ constexpr double kOfForces = 1.0 / 32.0;
 }  // namespace
 
 SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
-  constexpr int kMost = 40;
   begin(step, bends);
-  for (report.iterations = 0; report.iterations < kMost;) {
+  SolveStatus status = iterate(step, report);
+  // From the impulses found; contacts that let go again in this are too few to matter.
+  if (status == SolveStatus::kSolved && presses_early(step)) {
+    motion_.begin(step, bends);
+    motion_.guess(step, impulses_);
+    forget_matrix();
+    status = iterate(step, report);
+  }
+  if (status == SolveStatus::kSolved) finish(step);
+  return status;
+}
+
+SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
+  constexpr int kMost = 40;
+  const bool first = report.iterations == 0;
+  for (int i = 0; i < kMost;) {
     motion_.place(step);
-    if (problem_.measure(step, motion_, impulses_)) return finish(step);
-    ++report.iterations;
+    if (problem_.measure(step, motion_, impulses_)) return SolveStatus::kSolved;
+    ++i, ++report.iterations;
     if (!improve(step)) break;
-    if (report.iterations == 1 && free_is_nearer()) {
+    if (first && i == 1 && free_is_nearer()) {
       forget_forces(step);
       continue;
     }
     report.change = size();
-    move();
+    move(step);
     if (repeated_ || report.change > 1.0) continue;
     // What is left of the equations is of second order in this last change.
     motion_.place(step);
-    return finish(step);
+    if (step.touches) problem_.measure(step, motion_, impulses_);
+    return problem_.touches_law() ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
   }
   return SolveStatus::kIterationLimit;
 }
 
-void MeanNewton::move() {
+/// Where something presses all impulses and what is held come at the step's start. @return whether they did not yet
+bool MeanNewton::presses_early(IslandStep& step) const {
+  if (step.loads.all_early) return false;
+  for (std::size_t i = 0; i < impulses_.size(); ++i)
+    if (step.law(i).contact && impulses_[i] != 0.0) {
+      step.loads.all_early = true;
+      return true;
+    }
+  return false;
+}
+
+void MeanNewton::move(const IslandStep& step) {
   const double part = motion_.part_of(change_.motion);
   motion_.move(change_.motion, change_.load, part);
-  for (std::size_t i = 0; i < impulses_.size(); ++i)
-    impulses_[i] += part * change_.impulses[static_cast<Eigen::Index>(i)];
+  step.for_units([&](std::size_t first, std::size_t count) {
+    Vec3 impulse = Vec3::Zero();
+    for (std::size_t r = 0; r < count; ++r)
+      impulse[static_cast<int>(r)] =
+          impulses_[first + r] + part * change_.impulses[static_cast<Eigen::Index>(first + r)];
+    if (!is_equality(step.law(first))) {
+      ContactPotential set = set_of(step.law(first));
+      set.compliance = 1.0;
+      impulse = set.nearest(impulse);
+    }
+    for (std::size_t r = 0; r < count; ++r) impulses_[first + r] = impulse[static_cast<int>(r)];
+  });
   if (part < 1.0) secants_.clear();
 }
 
@@ -57,10 +93,14 @@ void MeanNewton::begin(IslandStep& step, bool bends) {
   motion_.write_place(guess_);
 }
 
-/// To free flight.
-void MeanNewton::forget_forces(const IslandStep& step) {
+void MeanNewton::forget_matrix() {
   linear_ = false;
   secants_.clear();
+}
+
+/// To free flight.
+void MeanNewton::forget_forces(const IslandStep& step) {
+  forget_matrix();
   impulses_.resize(step.size()), within_.resize(step.size());
   for (std::size_t i = 0; i < impulses_.size(); ++i)
     impulses_[i] = std::clamp(0.0, step.law(i).lower, step.law(i).upper);
@@ -74,11 +114,17 @@ bool MeanNewton::free_is_nearer() const {
   return !(first.norm() <= kOfForces * (guess_ + first - free_).norm());
 }
 
-SolveStatus MeanNewton::finish(IslandStep& step) {
+void MeanNewton::finish(IslandStep& step) {
   std::ranges::copy(impulses_, step.f.begin());
   motion_.finish(step, impulses_);
   velocities_.meet_rows(step, within_);
-  return SolveStatus::kSolved;
+}
+
+void MeanNewton::write_slip(const IslandStep& step, std::span<double> slip) const {
+  if (!step.loads.all_early) return;
+  for (std::size_t i = 0; i < impulses_.size(); ++i)
+    if (step.law(i).friction > 0.0 && impulses_[i] > 0.0)
+      slip[i] = problem_.off().segment<2>(static_cast<Eigen::Index>(i) + 1).norm();
 }
 
 /// To change_: Newton's step from where things are, by the matrix of an earlier place while that does. @return whether

@@ -20,17 +20,22 @@ class MeanNewton {
   SolveStatus solve(IslandStep& step, IslandReport& report, bool bends);
   /// Nothing moves but what is slower for it: for the part of a step whose motion was not found.
   void stay(IslandStep& step) { motion_.stay(step); }
+  /// Of contacts that press, where the next step is to begin with it, in their normal rows. @param slip by row
+  void write_slip(const IslandStep& step, std::span<double> slip) const;
 
  private:
+  SolveStatus iterate(IslandStep& step, IslandReport& report);
   void begin(IslandStep& step, bool bends);
+  bool presses_early(IslandStep& step) const;
+  void forget_matrix();
   void forget_forces(const IslandStep& step);
   bool free_is_nearer() const;
   bool improve(const IslandStep& step);
   bool repeat(const IslandStep& step);
   void take(const IslandStep& step);
   double size() const;
-  void move();
-  SolveStatus finish(IslandStep& step);
+  void move(const IslandStep& step);
+  void finish(IslandStep& step);
 
   MeanMotion motion_;
   MeanProblem problem_;

@@ -4,30 +4,57 @@
 #include <cmath>
 
 namespace limber::internal {
-namespace {
-
-/// Whether a row's law is met where its modes are off by what `bent` is.
-bool is_met(const RowLaw& law, double off, double bent, double impulse) {
-  const double least = std::max(law.digits, kMetTo * law.tolerance);
-  if (!(std::abs(bent) <= least)) return false;
-  if (impulse <= law.lower && off >= 0.0) return true;
-  if (impulse >= law.upper && off <= 0.0) return true;
-  return std::abs(off) <= least;
-}
-
-}  // namespace
 
 bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
   motion.take_rows(step, now_);
   bool met = motion.find_residual(now_, impulses, residual_, modal_residual_);
   off_.resize(static_cast<Eigen::Index>(now_.size()));
-  for (std::size_t i = 0; i < now_.size(); ++i) {
-    const RowLaw& law = step.law(i);
-    const double off = step.gap[i] - law.offset + law.compliance * impulses[i];
-    off_[static_cast<Eigen::Index>(i)] = off;
-    met = met && is_met(law, off, bent(motion, now_[i], modal_residual_), impulses[i]);
+  for (std::size_t i = 0; i < now_.size(); ++i)
+    off_[static_cast<Eigen::Index>(i)] = step.gap[i] - step.law(i).offset + step.law(i).compliance * impulses[i];
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
+    off_[g.i] += g.value / step.length() * impulses[static_cast<std::size_t>(g.j)];
+    if (g.i != g.j) off_[g.j] += g.value / step.length() * impulses[static_cast<std::size_t>(g.i)];
   }
+  gap_change_.setZero(off_.size());
+  find_responses(step, motion);
+  worst_contact_ = 0.0;
+  step.for_units(
+      [&](std::size_t first, std::size_t count) { met = is_met(step, first, count, impulses, motion) && met; });
   return met;
+}
+
+/// Whether the law is met, with the modes where they are wanted.
+bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
+                         const MeanMotion& motion) {
+  const RowLaw& law = step.law(first);
+  const double least = std::max(law.digits, kMetTo * law.tolerance), response = response_[first];
+  Vec3 impulse = Vec3::Zero(), open = Vec3::Zero();
+  bool bent_as_wanted = true;
+  for (std::size_t r = 0; r < count; ++r) {
+    bent_as_wanted = bent_as_wanted && std::abs(bent(motion, now_[first + r], modal_residual_)) <= least;
+    impulse[static_cast<int>(r)] = impulses[first + r];
+    open[static_cast<int>(r)] = off_[static_cast<Eigen::Index>(first + r)];
+  }
+  if (law.friction > 0.0) open[0] += law.friction * open.tail<2>().norm();
+  ContactPotential natural = set_of(law);
+  natural.compliance = response;
+  const double left = response * (natural.at(open - response * impulse).impulse - impulse).norm();
+  if (law.contact) worst_contact_ = std::max(worst_contact_, left / law.tolerance);
+  return bent_as_wanted && left <= least;
+}
+
+/// Where the bodies are.
+void MeanProblem::find_responses(const IslandStep& step, const MeanMotion& motion) {
+  response_.resize(now_.size());
+  for (std::size_t i = 0; i < now_.size(); ++i)
+    response_[i] = motion.mobility(now_[i]) + motion.through_modes(now_[i], now_[i]) + step.law(i).compliance;
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility())
+    if (g.i == g.j) response_[static_cast<std::size_t>(g.i)] += g.value / step.length();
+  step.for_units([&](std::size_t first, std::size_t count) {
+    double& response = response_[first];
+    for (std::size_t r = 1; r < count; ++r) response += response_[first + r];
+    response = response > 0.0 ? response / static_cast<double>(count) : 1.0;
+  });
 }
 
 bool MeanProblem::linearise(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
@@ -52,12 +79,11 @@ void MeanProblem::aim(const MeanMotion& motion) {
 /// 1/a and more where forces are large.
 void MeanProblem::stiffen(const IslandStep& step, const MeanMotion& motion) {
   const Eigen::Index m = off_.size();
-  stiffness_.setZero(m), scale_.setZero(m);
+  stiffness_.setZero(m);
   const double harder = 1.0 + motion.force_to_inertia(K_);
   for (Eigen::Index i = 0; i < m; ++i) {
     const MeanRow& row = rows_[static_cast<std::size_t>(i)];
     const double by_frames = motion.mobility(row), a = by_frames + motion.through_modes(row, row);
-    if (a > 0.0) scale_[i] = 1.0 / std::sqrt(a);
     if (!(by_frames > 0.0) || !is_equality(step.law(static_cast<std::size_t>(i)))) continue;
     stiffness_[i] = harder / a;
     row.for_sides([&](const MeanRow::Side& pushed) {
@@ -105,10 +131,24 @@ void MeanProblem::reduce(const IslandStep& step, const MeanMotion& motion, std::
     for (Eigen::Index j = 0; j < m; ++j) through(i, j) = motion.through_modes(at(rows[i]), at(rows[j]));
     through(i, i) += step.law(static_cast<std::size_t>(rows[i])).compliance;
   }
+  add_flexibility(step, rows, through);
   A = made + through;
   for (Eigen::Index i = 0; i < m; ++i)
     for (Eigen::Index j = 0; j < m; ++j)
       if (const double softer = through(i, j) * stiffness_[rows[j]]; softer != 0.0) A.row(i) -= softer * made.row(j);
+}
+
+/// What bodies yield beyond their modes.
+void MeanProblem::add_flexibility(const IslandStep& step, std::span<const Index> rows, Eigen::Ref<Matrix> to) {
+  if (step.rows.flexibility().empty()) return;
+  place_.assign(now_.size(), -1);
+  for (std::size_t k = 0; k < rows.size(); ++k) place_[static_cast<std::size_t>(rows[k])] = static_cast<Index>(k);
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
+    const Index i = place_[static_cast<std::size_t>(g.i)], j = place_[static_cast<std::size_t>(g.j)];
+    if (i < 0 || j < 0) continue;
+    to(i, j) += g.value / step.length();
+    if (i != j) to(j, i) += g.value / step.length();
+  }
 }
 
 void MeanProblem::find_open(const MeanMotion& motion, std::span<const Index> rows, RowVector& to) const {

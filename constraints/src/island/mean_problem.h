@@ -28,22 +28,33 @@ class MeanProblem {
   /// What ΔQ of these rows makes of everything. @param to but for its size
   void answer(const MeanMotion& motion, std::span<const Index> rows, const RowVector& change, MeanChange& to);
 
+  /// Whether contacts meet their law to their tolerance, as measured last.
+  bool touches_law() const { return worst_contact_ <= 1.0; }
+
   /// gap − offset + compliance × impulse, of all rows
   const Vector& off() const { return off_; }
-  const Vector& scale() const { return scale_; }            // of all rows, 1/√(what an impulse makes of the own gap)
+  /// What an impulse makes of the row's own gap, > 0; of a contact's or a vector's rows, at their first, all of them.
+  double response(std::size_t row) const { return response_[row]; }
   const Vector& gap_change() const { return gap_change_; }  // of all rows, without their compliance
 
  private:
+  void find_responses(const IslandStep& step, const MeanMotion& motion);
+  bool is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
+              const MeanMotion& motion);
   void stiffen(const IslandStep& step, const MeanMotion& motion);
+  void add_flexibility(const IslandStep& step, std::span<const Index> rows, Eigen::Ref<Matrix> to);
   const MeanRow& at(Index row) const { return rows_[static_cast<std::size_t>(row)]; }
   double gap_of(Index row, const Vector& x) const;
   static double bent(const MeanMotion& motion, const MeanRow& row, const Vector& load);
 
   std::vector<MeanRow> rows_, now_;  // where the derivatives are of, and where the bodies are
   Vector residual_, modal_residual_, off_;
-  Vector stiffness_, scale_;  // γ, and of impulses
+  double worst_contact_ = 0.0;    // what is left of their law, by tolerance
+  Vector stiffness_;              // γ
+  std::vector<double> response_;  // by row
   Matrix K_;
   RowMatrix moved_, made_, through_;
+  std::vector<Index> place_;  // by row: among those that reduce() is for
   Vector stopped_, gap_change_;
   UnsymmetricFactor factor_;
 };

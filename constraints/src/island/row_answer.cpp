@@ -4,127 +4,168 @@
 #include <cmath>
 
 namespace limber::internal {
+namespace {
+
+/// Of a row or a contact, beside others: a set whose impulse stays as it is wherever gaps let it.
+bool stays(const RowLaw& law, const Vec3& impulse, const Vec3& off, double response) {
+  ContactPotential set = set_of(law);
+  set.compliance = response;
+  return set.at(off - response * impulse).impulse == impulse;
+}
+
+}  // namespace
+
 void RowAnswer::begin(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem) {
-  const std::size_t m = impulses.size();
   rows_.clear();
-  takes_part_.assign(m, 0), within_.assign(m, 0);
-  for (std::size_t i = 0; i < m; ++i) {
-    const RowLaw& law = step.law(i);
-    const auto row = static_cast<Eigen::Index>(i);
-    const double scale = problem.scale()[row],
-                 wanted = std::clamp(impulses[i] - problem.off()[row] * scale * scale, law.lower, law.upper);
-    const bool inside = impulses[i] > law.lower && impulses[i] < law.upper;
-    if (!inside && wanted == impulses[i]) continue;
-    takes_part_[i] = 1, within_[i] = is_equality(law) ? 1 : 0;
+  takes_part_.assign(impulses.size(), 0), within_.assign(impulses.size(), 0);
+  for (std::size_t i = 0; i < impulses.size(); ++i)
+    if (is_equality(step.law(i))) add(i, 1), within_[i] = 1;
+  equalities_ = rows_.size();
+  extend(step, impulses, problem);
+}
+
+void RowAnswer::add(std::size_t first, std::size_t count) {
+  for (std::size_t i = first; i < first + count; ++i) {
+    takes_part_[i] = 1;
     rows_.push_back(static_cast<Index>(i));
   }
 }
 
 bool RowAnswer::extend(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem) {
   const std::size_t before = rows_.size();
-  for (std::size_t i = 0; i < impulses.size(); ++i) {
-    if (takes_part_[i] != 0) continue;
-    const RowLaw& law = step.law(i);
-    const auto row = static_cast<Eigen::Index>(i);
-    const double scale = problem.scale()[row], off = problem.off()[row] + problem.gap_change()[row];
-    if (std::clamp(impulses[i] - off * scale * scale, law.lower, law.upper) == impulses[i]) continue;
-    takes_part_[i] = 1;
-    rows_.push_back(static_cast<Index>(i));
-  }
+  step.for_units([&](std::size_t first, std::size_t count) {
+    if (takes_part_[first] != 0) return;
+    Vec3 impulse = Vec3::Zero(), off = Vec3::Zero();
+    bool inside = false;
+    for (std::size_t r = 0; r < count; ++r) {
+      const std::size_t i = first + r;
+      const auto row = static_cast<Eigen::Index>(i);
+      impulse[static_cast<int>(r)] = impulses[i];
+      off[static_cast<int>(r)] = problem.off()[row] + problem.gap_change()[row];
+      inside = inside || (impulses[i] != step.law(i).lower && impulses[i] != step.law(i).upper);
+    }
+    if (inside || !stays(step.law(first), impulse, off, problem.response(first))) add(first, count);
+  });
   return rows_.size() > before;
 }
 
-/// All rows go over at a time that want to, and where that does not end one at a time, the first: that does (Júdice and
-/// Pires 1994, Murty 1974).
 void RowAnswer::solve(const IslandStep& step, std::span<const double> impulses, MeanProblem& problem,
                       const MeanMotion& motion) {
-  constexpr int kTogether = 4, kTrials = 100;
-  constexpr double kYields = 1e-6, kYieldsMore = 1e-2;
   problem.reduce(step, motion, rows_, A_);
   problem.find_open(motion, rows_, open_);
-  scale_.resize(open_.size());
-  for (std::size_t i = 0; i < rows_.size(); ++i) scale_[static_cast<Eigen::Index>(i)] = problem.scale()[rows_[i]];
-  find_damping(step);
-  change_.resize(open_.size()).setZero();
-  then_ = open_;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    if (!find_within(step, impulses, trial >= kTogether) && trial > 0) break;
-    factor(step, trial < kTogether ? kYields : kYieldsMore);
-    meet();
-  }
+  scale_.resize(open_.size()), change_.resize(open_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    scale_[static_cast<Eigen::Index>(i)] = 1.0 / std::sqrt(problem.response(static_cast<std::size_t>(rows_[i])));
+  factor(step);
+  find_equilibrium(step, problem);
+  meet(impulses);
+  find_within(step);
 }
 
 bool RowAnswer::solve_again(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem,
                             const MeanMotion& motion) {
   problem.find_open(motion, rows_, open_);
-  change_.resize(open_.size()).setZero();
-  meet();
-  return !find_within(step, impulses, true);
+  meet(impulses);
+  return !find_within(step);
 }
 
 /// Redundant rows are so to the accuracy alone to which gaps are closed: what is smaller than these tells nothing.
-void RowAnswer::find_damping(const IslandStep& step) {
-  constexpr double kOfGaps = 1e-3, kLeast = 1e-9, kMost = 1e-2;
+/// Beside contacts rows yield to a change of their impulses by as much, so that what no motion gives, as a hand in the
+/// ground, is left with them.
+void RowAnswer::factor(const IslandStep& step) {
+  constexpr double kOfGaps = 1e-3, kLeast = 1e-9, kMost = 1e-2, kLeastBesideContacts = 1e-6;
   constexpr double kLengths = 1e11;  // tolerances
+  const auto m = static_cast<Eigen::Index>(equalities_);
   double off = 0.0;
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const RowLaw& law = step.law(static_cast<std::size_t>(rows_[i]));
-    if (is_equality(law))
-      off = std::max(off, std::abs(open_[static_cast<Eigen::Index>(i)]) / (kLengths * law.tolerance));
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const RowLaw& law = step.law(static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]));
+    off = std::max(off, std::abs(open_[i]) / (kLengths * law.tolerance));
   }
-  damping_ = std::clamp(kOfGaps * off, kLeast, kMost);
+  const double damping = std::clamp(kOfGaps * off, kLeast, kMost);
+  const auto A = A_.view();
+  auto factored = factored_.resize(m, m);
+  for (Eigen::Index i = 0; i < m; ++i)
+    for (Eigen::Index j = 0; j < m; ++j) factored(i, j) = scale_[i] * A(i, j) * scale_[j];
+  if (step.touches) factored.diagonal().array() += std::max(damping, kLeastBesideContacts);
+  least_squares_.factor(factored_.numbers(), equalities_, step.touches ? kLeast : damping);
+}
+
+/// x ← A⁺ x of the equalities.
+std::span<double> RowAnswer::solve_equalities(std::span<double> x) {
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] *= scale_[static_cast<Eigen::Index>(i)];
+  least_squares_.solve(x);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] *= scale_[static_cast<Eigen::Index>(i)];
+  return x;
+}
+
+/// What is left between the rows with bounds where those without are met.
+void RowAnswer::find_equilibrium(const IslandStep& step, const MeanProblem& problem) {
+  const auto m = static_cast<Eigen::Index>(equalities_), n = static_cast<Eigen::Index>(rows_.size()) - m;
+  const auto A = A_.view();
+  auto answers = answers_.resize(n, m);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    answers.row(j) = A.col(m + j).head(m).transpose();
+    solve_equalities(answers_.numbers().subspan(static_cast<std::size_t>(j * m), equalities_));
+  }
+  W_.resize(static_cast<std::size_t>(n * n));
+  Eigen::Map<Matrix> W(W_.data(), n, n);
+  W = A.bottomRightCorner(n, n);
+  W.noalias() -= A.bottomLeftCorner(n, m) * answers.transpose();
+  equilibrium_.clear();
+  for (std::size_t i = equalities_, count = 1; i < rows_.size(); i += count) {
+    const auto row = static_cast<std::size_t>(rows_[i]);
+    const RowLaw& law = step.law(row);
+    count = static_cast<std::size_t>(contact_rows(law));
+    ContactPotential set = set_of(law);
+    set.compliance = problem.response(row);
+    equilibrium_.add_unit(count, set, law.tolerance);
+  }
+  equilibrium_.factor(W_);
+}
+
+/// Δ of all rows that take part.
+void RowAnswer::meet(std::span<const double> impulses) {
+  const auto m = static_cast<Eigen::Index>(equalities_), n = open_.size() - m;
+  const auto A = A_.view();
+  apart_.assign(open_.numbers().begin(), open_.numbers().begin() + m);
+  const Eigen::Map<const Vector> stopped(solve_equalities(apart_).data(), m);
+  auto change = change_.view();
+  bounded_.resize(static_cast<std::size_t>(2 * n));
+  Eigen::Map<Vector> f(bounded_.data(), n), b(bounded_.data() + n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    f[i] = impulses[static_cast<std::size_t>(rows_[static_cast<std::size_t>(m + i)])];
+  const Eigen::Map<const Matrix> W(W_.data(), n, n);
+  b = open_.view().tail(n);
+  b.noalias() -= A.bottomLeftCorner(n, m) * stopped;
+  b.noalias() -= W * f;
+  change.tail(n) = -f;
+  equilibrium_.solve(std::span(b.data(), static_cast<std::size_t>(n)),
+                     std::span(f.data(), static_cast<std::size_t>(n)));
+  change.tail(n) += f;
+  change.head(m) = -stopped;
+  change.head(m).noalias() -= answers_.view().transpose() * change.tail(n);
 }
 
 /// @return whether rows are within their bounds now that were not, or the other way round
-bool RowAnswer::find_within(const IslandStep& step, std::span<const double> impulses, bool one) {
+bool RowAnswer::find_within(const IslandStep& step) {
+  constexpr double kInside = 1.0 - 1e-9;  // of a cone or a ball
   bool changed = false;
-  for (std::size_t i = 0; i < rows_.size() && !(one && changed); ++i) {
-    const auto row = static_cast<std::size_t>(rows_[i]);
-    const auto at = static_cast<Eigen::Index>(i);
-    const RowLaw& law = step.law(row);
-    if (is_equality(law)) continue;
-    const double wanted = impulses[row] + change_[at] - then_[at] * scale_[at] * scale_[at];
-    const char within = wanted > law.lower && wanted < law.upper ? 1 : 0;
-    changed = changed || within != within_[row];
-    within_[row] = within;
-    if (within == 0) change_[at] = std::clamp(wanted, law.lower, law.upper) - impulses[row];
+  for (std::size_t i = equalities_, count = 1; i < rows_.size(); i += count) {
+    const auto first = static_cast<std::size_t>(rows_[i]);
+    const RowLaw& law = step.law(first);
+    count = static_cast<std::size_t>(contact_rows(law));
+    Vec3 f = Vec3::Zero();
+    for (std::size_t r = 0; r < count; ++r) f[static_cast<int>(r)] = bounded_[i - equalities_ + r];
+    const bool stuck =
+        law.radius > 0.0 ? f.norm() < kInside * law.radius : f.tail<2>().norm() < kInside * law.friction * f[0];
+    for (std::size_t r = 0; r < count; ++r) {
+      const bool alone = law.radius == 0.0 && r == 0;
+      const char within = alone ? f[0] > law.lower && f[0] < law.upper : stuck;
+      changed = changed || within != within_[first + r];
+      within_[first + r] = within;
+    }
   }
   return changed;
-}
-
-/// Rows with bounds that ask for what no motion gives, as a motor against its stop, push against each other until one
-/// comes to its bound: each yields a little to what it exerts. Where two are all but the same, as limits of a ball
-/// joint that meet, their part of A can have a negative determinant, as forces are those of the step's middle and gaps
-/// those of its end: then they yield by more, and the next iteration makes up for it. @param yields of what an impulse
-/// moves its own row by
-void RowAnswer::factor(const IslandStep& step, double yields) {
-  const Eigen::Index m = open_.size();
-  const auto A = A_.view();
-  auto reduced = reduced_.resize(m, m);
-  reduced.setIdentity();
-  for (Eigen::Index i = 0; i < m; ++i) {
-    if (!within(i)) continue;
-    for (Eigen::Index j = 0; j < m; ++j)
-      if (within(j)) reduced(i, j) = scale_[i] * A(i, j) * scale_[j];
-    if (!is_equality(step.law(static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)])))) reduced(i, i) += yields;
-  }
-  least_squares_.factor(reduced_.numbers(), static_cast<std::size_t>(m), damping_);
-}
-
-/// Δ of the rows within their bounds, under that of the others; and what gaps are then.
-void RowAnswer::meet() {
-  const Eigen::Index m = open_.size();
-  right_.resize(m);
-  for (Eigen::Index i = 0; i < m; ++i)
-    if (within(i)) change_[i] = 0.0;
-  then_ = open_;
-  then_.view().noalias() += A_.view() * change_.view();
-  for (Eigen::Index i = 0; i < m; ++i) right_[i] = within(i) ? -scale_[i] * then_[i] : 0.0;
-  least_squares_.solve(right_.numbers());
-  for (Eigen::Index i = 0; i < m; ++i)
-    if (within(i)) change_[i] = scale_[i] * right_[i];
-  then_ = open_;
-  then_.view().noalias() += A_.view() * change_.view();
 }
 
 }  // namespace limber::internal

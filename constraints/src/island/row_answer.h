@@ -5,15 +5,16 @@
 #include <vector>
 
 #include "limber/solvers/damped_least_squares.h"
+#include "limber/solvers/row_equilibrium.h"
 #include "mean_problem.h"
 
 namespace limber::internal {
 
-/// Rows strictly within their bounds by equality, in the sense of least squares with rows scaled alike; the others at
-/// their bounds.
+/// Rows without bounds are met in the sense of least squares with rows scaled alike, and eliminated; what is left is
+/// between contacts and rows with bounds (RowEquilibrium).
 class RowAnswer {
  public:
-  /// Chooses the rows that take part: those without bounds, those within theirs, and those that leave theirs.
+  /// Chooses the rows that take part: those without bounds, those that exert something, and those that are to.
   void begin(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem);
   /// Finds Δ, and which rows are within their bounds.
   void solve(const IslandStep& step, std::span<const double> impulses, MeanProblem& problem, const MeanMotion& motion);
@@ -30,20 +31,22 @@ class RowAnswer {
   std::span<const char> within() const { return within_; }
 
  private:
-  bool within(Eigen::Index i) const {
-    return within_[static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)])] != 0;
-  }
-  void find_damping(const IslandStep& step);
-  bool find_within(const IslandStep& step, std::span<const double> impulses, bool one);
-  void factor(const IslandStep& step, double yields);
-  void meet();
+  void add(std::size_t first, std::size_t count);
+  bool find_within(const IslandStep& step);
+  void factor(const IslandStep& step);
+  void find_equilibrium(const IslandStep& step, const MeanProblem& problem);
+  void meet(std::span<const double> impulses);
+  std::span<double> solve_equalities(std::span<double> rows);
 
-  std::vector<Index> rows_;
+  std::vector<Index> rows_;                // equalities first
+  std::size_t equalities_ = 0;             // of these
   std::vector<char> within_, takes_part_;  // by row of the island
-  RowMatrix A_, reduced_;
-  RowVector open_, scale_, then_, change_, right_;
-  double damping_ = 0.0;
+  RowMatrix A_, factored_;
+  RowMatrix answers_;  // of the equalities to the others: row by row of the others
+  RowVector open_, scale_, change_;
+  std::vector<double> W_, bounded_, apart_;  // bounded_: impulses, and gaps without them
   DampedLeastSquares least_squares_;
+  RowEquilibrium equilibrium_;
 };
 
 }  // namespace limber::internal

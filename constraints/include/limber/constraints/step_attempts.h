@@ -17,6 +17,7 @@ enum class StepAttempt {
   kHeldAtTouch,      ///< and stay for the rest of the step
   kLookedFarther,    ///< contacts were found anew: bodies came farther than they had been looked for
   kRefused,          ///< impulses or bending were given up: the step is unsettled
+  kInTheMiddle,      ///< joints beside contacts by rows of the middle of the step, after rounds did not settle
 };
 /// How many parts of steps were taken so.
 class StepAttempts {
@@ -33,7 +34,7 @@ class StepAttempts {
   }
 
  private:
-  std::array<int, 8> counts_{};
+  std::array<int, 9> counts_{};
 };
 
 }  // namespace limber

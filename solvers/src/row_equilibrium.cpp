@@ -1,0 +1,123 @@
+#include "limber/solvers/row_equilibrium.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dense_kernels.h"
+
+namespace limber::internal {
+namespace {
+
+// Of what an impulse moves its own unit by, what the unit yields to a change of it in a round.
+constexpr double kYield = 1e-5;
+// Pivots that count, as part of the largest; what is cut is made up for by all of W.
+constexpr double kCut = 1e-7;
+constexpr double kMetTo = 1e-3;  // of tolerances
+
+Vec3 part_of(std::span<const double> v, std::size_t first, std::size_t rows) {
+  Vec3 part = Vec3::Zero();
+  for (std::size_t r = 0; r < rows; ++r) part[static_cast<int>(r)] = v[first + r];
+  return part;
+}
+
+}  // namespace
+
+void RowEquilibrium::add_unit(std::size_t rows, const ContactPotential& set, double tolerance) {
+  units_.push_back({.first = size_, .rows = rows, .set = set, .tolerance = tolerance});
+  size_ += rows;
+}
+
+void RowEquilibrium::factor(std::span<const double> W) {
+  to_scale(W);
+  const MatrixView S = symmetric_.need(size_, size_);
+  for (std::size_t i = 0; i < size_; ++i) {
+    std::fill(S.row(i) + size_, S.row(i) + S.stride, 0.0);
+    for (std::size_t j = 0; j < size_; ++j) S.row(i)[j] = 0.5 * (W_[i * size_ + j] + W_[j * size_ + i]);
+  }
+  cholesky_.factor(S, size_, kCut);
+  convex_.begin_structure();
+  convex_.add_node(std::max<std::size_t>(1, cholesky_.rank()));
+  for (const Unit& unit : units_) {
+    convex_.add_unit(unit.rows, unit.set, unit.tolerance);
+    convex_.add_side(0);
+  }
+  convex_.end_structure();
+  for (std::size_t u = 0; u < units_.size(); ++u)
+    for (std::size_t r = 0; r < units_[u].rows; ++r)
+      for (std::size_t c = 0; c < cholesky_.rank(); ++c)
+        convex_.values(u).row(r)[c] = cholesky_.columns().row(c)[units_[u].first + r];
+  convex_.begin();
+}
+
+/// To W_, so that impulses move their own units by about 1; and the sets with it.
+void RowEquilibrium::to_scale(std::span<const double> W) {
+  const std::size_t n = size_;
+  W_.assign(W.begin(), W.end());
+  for (Unit& unit : units_) {
+    unit.scale = inverse_power_of_two(std::sqrt(unit.set.compliance));  // bounds stay what they are, to the bit
+    unit.tolerance *= unit.scale;
+    unit.set.compliance = kYield;
+    unit.set.lower /= unit.scale, unit.set.upper /= unit.scale;
+    if (unit.set.set == ContactPotential::Set::kBall) unit.set.bound /= unit.scale;
+    for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r)
+      for (std::size_t j = 0; j < n; ++j) W_[r * n + j] *= unit.scale, W_[j * n + r] *= unit.scale;
+  }
+}
+
+double RowEquilibrium::solve(std::span<const double> b, std::span<double> f) {
+  constexpr int kMostSteps = 60;  // of Newton's method
+  // What is asked for follows gaps linearly to no more than this part of what is left at first.
+  constexpr double kEnough = 0.03;
+  b_.resize(size_), f_.resize(size_), gap_.resize(size_);
+  for (const Unit& unit : units_)
+    for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r)
+      b_[r] = unit.scale * b[r], f_[r] = f[r] / unit.scale;
+  double best = kUnbounded, enough = kMetTo;
+  for (int steps = 0, round = 0;; ++round) {
+    find_gaps();
+    const double left = take_starts();
+    if (round == 0) enough = std::max(enough, kEnough * left);
+    if (!(left >= best)) {
+      best = left;
+      for (const Unit& unit : units_)
+        for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r) f[r] = unit.scale * f_[r];
+    }
+    if (left <= enough || steps >= kMostSteps || !std::isfinite(left)) return best;
+    steps += 1 + improve(kMostSteps - steps);
+  }
+}
+
+void RowEquilibrium::find_gaps() {
+  for (std::size_t i = 0; i < size_; ++i) {
+    gap_[i] = b_[i];
+    for (std::size_t j = 0; j < size_; ++j) gap_[i] += W_[i * size_ + j] * f_[j];
+  }
+}
+
+/// The starts of the convex problem, so that its gaps are right under the impulses at hand. @return what these leave of
+/// the law, by tolerance
+double RowEquilibrium::take_starts() {
+  double left = 0.0;
+  for (std::size_t u = 0; u < units_.size(); ++u) convex_.impulse(u) = part_of(f_, units_[u].first, units_[u].rows);
+  convex_.set_motion();
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const Unit& unit = units_[u];
+    const Vec3& F = convex_.impulse(u);
+    Vec3 open = part_of(gap_, unit.first, unit.rows);
+    if (unit.set.set == ContactPotential::Set::kCone) open[0] += unit.set.bound * open.tail<2>().norm();
+    convex_.start(u) = open - unit.set.compliance * F - convex_.moved(u);
+    ContactPotential natural = unit.set;
+    natural.compliance = 1.0;
+    left = std::max(left, (natural.at(open - F).impulse - F).norm() / unit.tolerance);
+  }
+  return left;
+}
+
+int RowEquilibrium::improve(int most) {
+  const ConvexContactReport done = convex_.solve_on({.tolerance = kMetTo, .max_iterations = most});
+  for (std::size_t u = 0; u < units_.size(); ++u)
+    for (std::size_t r = 0; r < units_[u].rows; ++r) f_[units_[u].first + r] = convex_.impulse(u)[static_cast<int>(r)];
+  return done.iterations;
+}
+
+}  // namespace limber::internal
