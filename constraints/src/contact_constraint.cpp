@@ -19,6 +19,10 @@ const ContactMemory* find_in(std::span<const ContactMemory> known, std::uint64_t
   return found != known.end() && found->id == id ? &*found : nullptr;
 }
 const auto by_pair = [](const auto& x, const auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; };
+const Vec3* moment_of(std::span<const RollingMemory> known, Index a, Index b) {
+  const auto found = std::lower_bound(known.begin(), known.end(), RollingMemory{.a = a, .b = b}, by_pair);
+  return found != known.end() && found->a == a && found->b == b ? &found->moment : nullptr;
+}
 
 }  // namespace
 
@@ -47,6 +51,7 @@ struct ContactSet::Impl {
   std::vector<ContactMemory> foreseen;             // by id, where the step has been foreseen before
   std::vector<StrikeMemory> strikes;               // by (a, b), those that did so in the last step
   std::vector<RollingMemory> rolling_memory;       // by (a, b), of the last step
+  std::vector<RollingMemory> rolling_foreseen;     // and where the step has been foreseen before
   std::vector<std::unique_ptr<PairContacts>> pairs;
   std::vector<std::unique_ptr<RollingResistance>> rolling;
   std::size_t pairs_used = 0, rolling_used = 0;
@@ -85,6 +90,13 @@ void ContactSet::Impl::remember_foreseen() {
     if (contact.foreseen)
       foreseen.push_back({.id = contact.id, .force = contact.foreseen_force, .slip = contact.foreseen_slip});
   std::ranges::sort(foreseen, by_id);
+  rolling_foreseen.clear();
+  for (std::size_t i = 0; i < rolling_used; ++i)
+    if (rolling[i]->is_foreseen()) {
+      const auto [a, b] = rolling[i]->bodies();
+      rolling_foreseen.push_back({a, b, rolling[i]->foreseen_moment()});
+    }
+  std::ranges::sort(rolling_foreseen, by_pair);
 }
 
 double ContactSet::Impl::lasted(Index a, Index b) const {
@@ -204,11 +216,10 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
                  std::max(0.0, contact.axes.col(0).dot(contact.last_force));
   if (largest == 0.0) return;
   const Index a = pair.front().a.body, b = pair.front().b.body;
-  const auto known = std::ranges::lower_bound(rolling_memory, RollingMemory{.a = a, .b = b}, by_pair);
-  const bool knows = known != rolling_memory.end() && known->a == a && known->b == b;
+  const Vec3 *last = moment_of(rolling_memory, a, b), *known = moment_of(rolling_foreseen, a, b);
   if (rolling_used == rolling.size()) rolling.push_back(std::make_unique<RollingResistance>());
   RollingResistance& resistance = *rolling[rolling_used++];
-  resistance.set(a, b, largest, knows ? known->moment : Vec3(Vec3::Zero()));
+  resistance.set(a, b, largest, last != nullptr ? *last : Vec3(Vec3::Zero()), known);
   constraints.push_back(&resistance);
 }
 

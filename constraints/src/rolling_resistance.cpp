@@ -10,8 +10,10 @@ constexpr double kTurnTolerance = 1e-9;
 
 }  // namespace
 
-void RollingResistance::set(Index a, Index b, double largest, const Vec3& last) {
+void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, const Vec3* foreseen) {
   a_ = a, b_ = b, largest_ = largest, moment_ = last;
+  is_foreseen_ = foreseen != nullptr;
+  foreseen_ = is_foreseen_ ? *foreseen : Vec3(Vec3::Zero());
 }
 
 /// About the world's axes: a ball looks the same from all sides.
@@ -29,6 +31,8 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
               .tolerance = kTurnTolerance,
               .goes_on = true,
               .last_force = moment_[i],
+              .foreseen = is_foreseen_,
+              .foreseen_force = foreseen_[i],
               .radius = radius,
               .contact = true});
   }
@@ -40,8 +44,14 @@ void RollingResistance::gaps(const BodyStates& states, StepTime when, std::span<
   for (int i = 0; i < 3; ++i) gaps[static_cast<std::size_t>(i)] = turned[i];
 }
 
+void RollingResistance::foreseen(std::span<const double> impulses, std::span<const double>) {
+  foreseen_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
+  is_foreseen_ = true;
+}
+
 void RollingResistance::accept(const BodyStates&, std::span<const double> impulses) {
   moment_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
+  is_foreseen_ = false;
 }
 
 }  // namespace limber

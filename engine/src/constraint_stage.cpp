@@ -275,6 +275,19 @@ void ConstraintStage::foresee(Jobs& jobs, const IslandOptions& options) {
   });
 }
 
+void ConstraintStage::refine(Jobs& jobs) {
+  if (islands_.empty()) return;
+  jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t island = begin; island < end; ++island)
+      if (solvers_[island].foreseen().rough) solvers_[island].refine();
+  });
+}
+
+bool ConstraintStage::are_settled() const {
+  return std::all_of(solvers_.begin(), solvers_.begin() + static_cast<std::ptrdiff_t>(islands_.size()),
+                     [](const IslandSolver& solver) { return solver.foreseen().status == SolveStatus::kSolved; });
+}
+
 void ConstraintStage::foresee_island(std::size_t island) {
   const Island& at = islands_[island];
   const std::span<const Index> members = members_of(at);

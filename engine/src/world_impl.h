@@ -90,7 +90,7 @@ struct World::Impl {
   std::vector<Apart> apart, apart_then;  // the second: scratch of restore_state()
   ContactSource* source = nullptr;
   ContactSet contacts;
-  std::vector<ContactPoint> touching;
+  std::vector<ContactPoint> touching, known;  // the latter while contacts are looked for anew
   std::function<bool(const ContactPoint&)> contact_acts;
   ContactOptions contact_options;
   std::vector<BodyState> states;  // by entries' indices, for the source
@@ -186,7 +186,8 @@ struct World::Impl {
   bool some_woke();
   void write_state(Index body, double length);
   bool can_wait(Index body) const;
-  void find_contacts();
+  void look_for_contacts();
+  void take_contacts();
   double free_reach(Index body, const Vec3& displacement) const;
   static void expect_to_stay(BodyState& state);
   void expect(Index body);
@@ -195,7 +196,16 @@ struct World::Impl {
   double difference(Index body, const Quaternion& q, std::span<const double> z, const ExpectedEnd& end) const;
   void foreseen_end(Index body, ExpectedEnd& end) const;
   double fall() const;
+  double sinking() const;
+  double roughness();
+  void find_end(Index body, ExpectedEnd& end) const;
   bool find_elsewhere();
+  void keep_known();
+  bool end_elsewhere();
+  bool are_met(std::span<const ContactPoint> before);
+  bool is_left_open(std::span<const ContactPoint> in_force, const ContactPoint& contact, double deepest);
+  double gap_at_end(const ContactPoint& contact);
+  Vec3 place_at_end(const ContactSide& side, const Vec3& inwards);
   Vec3 place_at_start(ContactSide& side, const Vec3& inwards) const;
   bool find_at_end();
   bool list_ends(double least);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "world_impl.h"
@@ -95,7 +96,9 @@ void World::Impl::foresee() {
   constexpr int kMostLooks = 3;
   expected.resize(entries.size());
   for (const Index body : sleep.awake()) expected[static_cast<std::size_t>(body)].foreseen = false;
-  find_contacts();
+  const double rough = roughness();
+  look_for_contacts();
+  take_contacts();
   for (int look = 0;; ++look) {
     constraints.hold_back(passing.members);
     constraints.find_islands(sleep.awake());
@@ -103,7 +106,8 @@ void World::Impl::foresee() {
     constraints.foresee(*jobs, {.step = parts->length(),
                                 .gravity = options.gravity,
                                 .contact = contacts.options().rule,
-                                .timed = clock.runs()});
+                                .timed = clock.runs(),
+                                .rough = source != nullptr && look < kMostLooks ? rough : 0.0});
     if (clock.runs()) clock.lap(constraints.foreseen_times(), Stage::kSolve);
     if (source == nullptr || look == kMostLooks) break;
     if (find_elsewhere())
@@ -115,10 +119,23 @@ void World::Impl::foresee() {
     ++attempts[StepAttempt::kLookedFarther];
   }
   clock.lap(Stage::kLookAhead);
+  constraints.refine(*jobs);
+  if (clock.runs()) clock.lap(constraints.foreseen_times(), Stage::kSolve);
 }
 
-/// What touches, or may within the step, as rows for the islands.
-void World::Impl::find_contacts() {
+/// How near to the law motions are found that are only looked at, m: to a share of what makes a look, and of the
+/// thinnest body.
+double World::Impl::roughness() {
+  constexpr double kOfSinking = 0.25, kOfThickness = 1e-4;
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const Index body : sleep.awake())
+    if (const Entry& e = entries[static_cast<std::size_t>(body)]; shows(e))
+      thinnest = std::min(thinnest, e.extent.thickness);
+  return std::min(kOfSinking * sinking(), kOfThickness * thinnest);
+}
+
+/// What touches, or may within the step.
+void World::Impl::look_for_contacts() {
   if (source == nullptr) return;
   passing.farther.clear();
   do {
@@ -126,6 +143,12 @@ void World::Impl::find_contacts() {
     if (contact_acts) std::erase_if(touching, [this](const ContactPoint& contact) { return !contact_acts(contact); });
   } while (wake_what_is_touched() || find_passing());
   clock.lap(Stage::kFastBodies);
+  known.reserve(touching.capacity());
+}
+
+/// As rows for the islands.
+void World::Impl::take_contacts() {
+  if (source == nullptr) return;
   if (!passing.any()) {
     set_contacts(touching);
   } else {

@@ -25,16 +25,24 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   fill_units(step);
   begin_units(step);
   secants_.begin(step.size());
+  loads_change_ = !begun_;
+  report.iterations = 1;
+  return go_on(step, report);
+}
+
+SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
   ConvexContactReport done;
-  bool more = !begun_;
-  for (report.iterations = 1;; ++report.iterations) {
+  for (;; ++report.iterations) {
     take_impulses(step);
     step.predict();
     if (step.skinned) fill_rows(step), contacts_.set_motion();
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
-    if (!more && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return SolveStatus::kSolved;
+    if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0)))
+      return SolveStatus::kSolved;
+    report.rough = step.contacts_alone && begun_ && !loads_change_ && left.off < step.part.options.rough;
+    if (report.rough) return SolveStatus::kSolved;
     const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
     const ConvexContactOptions within{.tolerance = kLeft, .max_iterations = kMostNewtonSteps - report.newton_steps};
@@ -43,8 +51,8 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
     stiffen(step);
-    more = press_early(step);
-    if (more) secants_.begin(step.size());
+    loads_change_ = press_early(step);
+    if (loads_change_) secants_.begin(step.size());
     advance_units(step);
   }
   return end_unsettled(done.status, step, report);
@@ -54,6 +62,7 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
 /// left unsolved in the first of them is the motion that it found.
 SolveStatus ConvexRounds::end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report) {
   if (!step.contacts_alone) return take_best(step, report);
+  report.rough = step.part.options.rough > 0.0 && report.iterations > 1;
   if (report.iterations > 1) return SolveStatus::kSolved;
   for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = contacts_.impulse(u);
   take_impulses(step);
@@ -207,7 +216,9 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
     unit.moved = contacts_.moved(u);
-    distance.from_law = std::max(distance.from_law, distance_from_law(unit, law, potential, open) / law.tolerance);
+    const double off = distance_from_law(unit, law, potential, open);
+    distance.from_law = std::max(distance.from_law, off / law.tolerance);
+    if (law.radius == 0.0) distance.off = std::max(distance.off, off);
     contacts_.start(u) = open - yields - unit.moved;
     if (first_round) contacts_.impulse(u) = unit.anchor;
   }

@@ -17,6 +17,8 @@ class ConvexRounds {
  public:
   /// Finds step.f, with the step predicted and measured under it.
   SolveStatus solve(IslandStep& step, IslandReport& report);
+  /// From where it ended, roughly, to the law. @pre step.part.options.rough has been taken back
+  SolveStatus go_on(IslandStep& step, IslandReport& report);
   /// Of contacts that press, where the next step is to begin with it, in their normal rows. @param slip by row
   void write_slip(const IslandStep& step, std::span<double> slip) const;
 
@@ -30,7 +32,7 @@ class ConvexRounds {
     double response = 0.0, shift = 0.0, changed = 0.0;
   };
   struct Distance {
-    double from_law = 0.0, moved = 0.0;
+    double from_law = 0.0, moved = 0.0, off = 0.0;  // by tolerance; the last in m, of contacts
   };
 
   void place_units(const IslandStep& step);
@@ -58,6 +60,7 @@ class ConvexRounds {
   std::vector<double> root_;        // D^½, by degree of freedom
   std::vector<double> one_row_;
   bool begun_ = false;                      // there is a motion to go on from
+  bool loads_change_ = false;               // the last round has brought some to the step's start
   SecantIteration secants_;                 // beside joints
   std::vector<double> at_, next_, change_;  // their numbers, by row
 };

@@ -67,10 +67,23 @@ void IslandSolver::Impl::act_at_end() {
 
 /// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
 /// start, if all rows came together, or impulses are refused.
-IslandReport IslandSolver::Impl::foresee_guarded(StepPart part) {
+IslandReport IslandSolver::Impl::foresee_guarded(const StepPart& part) {
+  const IslandReport done = foresee(part);
+  return done.rough ? done : guard(part, done);
+}
+
+/// What has been foreseen roughly, to the law, and guarded.
+IslandReport IslandSolver::Impl::refine(const StepPart& part, IslandReport done) {
+  step.part.options.rough = 0.0;
+  done.newton_steps = 0;  // bounded as those of the look were
+  done.status = rounds.go_on(step, done);
+  act_at_end();
+  return guard(part, done);
+}
+
+IslandReport IslandSolver::Impl::guard(StepPart part, IslandReport done) {
   constexpr int kSlowings = 3;
   const ContactRule& rule = part.options.contact;
-  IslandReport done = foresee(part);
   if (step.mean && done.status != SolveStatus::kSolved && !part.last_resort) return done;
   if (!part.options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {

@@ -30,7 +30,7 @@ struct StepInParts {
   IslandReport report;      // of the parts taken
   double left = 0.0;        // s, with the part
   double length = 0.0;      // s, of a part, where the step is divided
-  bool may_cut = false, divides = false, gives_up = false;
+  bool may_cut = false, cuts = false, divides = false, gives_up = false;
 };
 
 struct IslandSolver::Impl {
@@ -52,6 +52,7 @@ struct IslandSolver::Impl {
   void begin_times(bool timed);
   void foresee_next();
   void foresee_cut();
+  void end_cut();
   void foresee_divided();
   double next_cut(const internal::StepPart& part);
   void find_impulses();
@@ -60,8 +61,10 @@ struct IslandSolver::Impl {
 
   // A part.
   IslandReport foresee(const internal::StepPart& part);
-  IslandReport foresee_guarded(internal::StepPart part);
   bool foresee_middle(IslandReport& done);
+  IslandReport foresee_guarded(const internal::StepPart& part);
+  IslandReport refine(const internal::StepPart& part, IslandReport done);
+  IslandReport guard(internal::StepPart part, IslandReport done);
   void foresee_mean(IslandReport& done);
   void act_at_end();
   void refuse_impulses(IslandReport& report);

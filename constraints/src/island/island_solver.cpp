@@ -83,6 +83,17 @@ void IslandSolver::foresee(std::span<const ConstrainedBody> table, std::span<con
   impl_->clock.lap(Stage::kSolve);
 }
 
+void IslandSolver::refine() {
+  StepInParts& at = impl_->parts;
+  at.part.options.rough = 0.0;
+  impl_->begin_times(at.part.options.timed);
+  at.done = impl_->refine(at.part, at.done);
+  impl_->end_cut();
+  if (at.part.ends) impl_->tell_foreseen();
+  impl_->clock.lap(Stage::kSolve);
+}
+
+const IslandReport& IslandSolver::foreseen() const { return impl_->parts.done; }
 const StageTimes& IslandSolver::times() const { return impl_->times; }
 
 IslandReport IslandSolver::finish() {
@@ -133,14 +144,19 @@ void IslandSolver::Impl::foresee_cut() {
   constexpr int kMostCuts = 4;
   StepPart& part = parts.part;
   part.last_resort = true;
-  const bool cuts = parts.may_cut && parts.report.attempts.cuts() < kMostCuts;
+  parts.cuts = parts.may_cut && parts.report.attempts.cuts() < kMostCuts;
   part.options.step = part.left = parts.left;
-  const double time = cuts ? next_cut(part) : parts.left;
+  const double time = parts.cuts ? next_cut(part) : parts.left;
   if (is_part(time, parts.left, part.whole_step)) part.options.step = time;
   part.ends = part.options.step == parts.left;
   parts.done = foresee_guarded(part);
-  parts.done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
-  if (cuts) end_at_release(part, parts.done);
+  end_cut();
+}
+
+void IslandSolver::Impl::end_cut() {
+  if (parts.done.rough) return;
+  parts.done.attempts[StepAttempt::kCutAtTouch] = parts.part.ends ? 0 : 1;
+  if (parts.cuts) end_at_release(parts.part, parts.done);
 }
 
 /// What is left, in halves, quarters and so on of the step from where the rows do not come together: impulses at a

@@ -57,6 +57,9 @@ struct IslandOptions {
   /// are the same: what joints alone lose to the method is then given back.
   bool undisturbed = false;
   bool timed = false;  ///< fill IslandReport::times
+  /// m. Above 0 it is only to be seen where the members end: rounds among contacts stop once these are as near to the
+  /// law, or where their work ends, and no energy is guarded. See IslandSolver::foreseen().
+  double rough = 0.0;
   /// J: the energy error carried over from the last step, IslandReport::energy_surplus; at most 1e-7 of the energies
   /// at hand, of bodies that had no motion to take it from.
   double energy_surplus = 0.0;
@@ -81,6 +84,7 @@ struct IslandReport {
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
   StageTimes times{};           ///< kRows, kSolve and kCommit, with IslandOptions::timed
+  bool rough = false;           ///< foreseen as IslandOptions::rough asks, and not to the law
 };
 
 /// The solver and its memory, which grows to the largest island seen; after that a step allocates nothing. One thread
@@ -102,9 +106,13 @@ class IslandSolver {
   /// to last until finish(). @pre no watch
   void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
                std::span<Constraint* const> constraints, const IslandOptions& options);
-  /// What foresee() took, with IslandOptions::timed; finish() tells of itself.
+  /// Of foresee().
+  const IslandReport& foreseen() const;
+  /// What has been foreseen roughly, to the law. @pre foreseen().rough
+  void refine();
+  /// What foresee() or refine() took, with IslandOptions::timed; finish() tells of itself.
   const StageTimes& times() const;
-  /// Moves them there, and through the parts that are left. @pre foresee()
+  /// Moves them there, and through the parts that are left. @pre foresee(), not rough
   IslandReport finish();
 
  private:
