@@ -278,8 +278,7 @@ void ConstraintStage::foresee(Jobs& jobs, const IslandOptions& options) {
 void ConstraintStage::refine(Jobs& jobs) {
   if (islands_.empty()) return;
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island)
-      if (solvers_[island].foreseen().rough) solvers_[island].refine();
+    for (std::size_t island = begin; island < end; ++island) solvers_[island].refine();
   });
 }
 

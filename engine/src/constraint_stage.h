@@ -50,9 +50,9 @@ class ConstraintStage {
   void find_islands(std::span<const Index> awake);
   /// Finds where the step takes all islands, BodyGroup::predicted_frame() and the like; nothing moves yet.
   void foresee(Jobs& jobs, const IslandOptions& options);
-  /// Whether all of these motions have settled.
+  /// Whether all islands settle, as foreseen.
   bool are_settled() const;
-  /// The same for islands that have been foreseen roughly, to the law.
+  /// What of them has been foreseen roughly, to the law.
   void refine(Jobs& jobs);
   /// Advances them.
   void finish(Jobs& jobs);

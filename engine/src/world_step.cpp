@@ -96,9 +96,12 @@ void World::Impl::foresee() {
   constexpr int kMostLooks = 3;
   expected.resize(entries.size());
   for (const Index body : sleep.awake()) expected[static_cast<std::size_t>(body)].foreseen = false;
-  const double rough = roughness();
-  look_for_contacts();
-  take_contacts();
+  double rough = 0.0;
+  if (source != nullptr) {
+    rough = roughness();
+    look_for_contacts();
+    take_contacts();
+  }
   for (int look = 0;; ++look) {
     constraints.hold_back(passing.members);
     constraints.find_islands(sleep.awake());
@@ -107,7 +110,7 @@ void World::Impl::foresee() {
                                 .gravity = options.gravity,
                                 .contact = contacts.options().rule,
                                 .timed = clock.runs(),
-                                .rough = source != nullptr && look < kMostLooks ? rough : 0.0});
+                                .rough = look < kMostLooks ? rough : 0.0});
     if (clock.runs()) clock.lap(constraints.foreseen_times(), Stage::kSolve);
     if (source == nullptr || look == kMostLooks) break;
     if (find_elsewhere())
@@ -136,7 +139,6 @@ double World::Impl::roughness() {
 
 /// What touches, or may within the step.
 void World::Impl::look_for_contacts() {
-  if (source == nullptr) return;
   passing.farther.clear();
   do {
     ask_source();
@@ -148,7 +150,6 @@ void World::Impl::look_for_contacts() {
 
 /// As rows for the islands.
 void World::Impl::take_contacts() {
-  if (source == nullptr) return;
   if (!passing.any()) {
     set_contacts(touching);
   } else {

@@ -108,7 +108,7 @@ double RowEquilibrium::take_starts() {
     convex_.start(u) = open - unit.set.compliance * F - convex_.moved(u);
     ContactPotential natural = unit.set;
     natural.compliance = 1.0;
-    left = std::max(left, (natural.at(open - F).impulse - F).norm() / unit.tolerance);
+    left = std::max(left, (natural.natural(open, F) - F).norm() / unit.tolerance);
   }
   return left;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "asked.h"
 #include "constants.h"
 #include "contact_rules.h"
 #include "contact_scene.h"
@@ -13,12 +14,6 @@
 
 namespace limber::testing {
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kToRest = false;  // the sanitizers take twenty times as long
-#else
-constexpr bool kToRest = true;
-#endif
 
 RigidTransform above(double height, const Vec3& turn = Vec3::Zero()) {
   return {quaternion_from_rotation_vector(turn), {0.0, 0.0, height}};
@@ -140,7 +135,7 @@ TEST(Contact, BodiesThatDoNotMeetMoveInOneIslandAsEachInItsOwn) {
 /// More than 150 rows, with what the bodies yield beyond their modes.
 TEST(Contact, BodiesThatBendComeToRestInOneLargeIslandAndGainNoEnergy) {
   constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4, kRise = 1e-6;
-  constexpr int kBodies = 7, kSteps = kToRest ? 240 : 30;
+  constexpr int kBodies = 7, kSteps = testing::kSanitized ? 30 : 240;
   GroundedIsland island({.modes = 8, .dropped = 4, .lowest_hz = 30.0, .decay = 6.0}, kFrame);
   for (int i = 0; i < kBodies; ++i)
     island.add_body({quaternion_from_rotation_vector({0.05 * i, 0.1, 0.05 * i}), {2.0 * i, 0.0, 0.35}});
@@ -155,7 +150,7 @@ TEST(Contact, BodiesThatBendComeToRestInOneLargeIslandAndGainNoEnergy) {
     before = after;
   }
   EXPECT_LT(worst, kRise);
-  if (!kToRest) return;
+  if (testing::kSanitized) return;
   EXPECT_GT(island.lowest_gap(), -kPenetration);
   double weight = 0.0;
   for (const Index body : island.members) {

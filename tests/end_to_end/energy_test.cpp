@@ -10,11 +10,8 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kEvery = 47, kEveryPile = 397;
-#else
-constexpr int kEvery = 13, kEveryPile = 131;
-#endif                          // prime to the grid's sides, so that all their values come up
+// Prime to the grid's sides, so that all their values come up.
+constexpr int kEvery = kSanitized ? 47 : 13, kEveryPile = kSanitized ? 397 : 131;
 constexpr double kRise = 1e-6;  // of the energy's scale, in a step
 constexpr int kSteps = 30;
 

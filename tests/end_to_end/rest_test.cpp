@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "asked.h"
 #include "energy_meter.h"
 #include "grounded_world.h"
 #include "limber/precompute/bake.h"
@@ -14,11 +15,7 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kBoxes = 3, kRestSteps = 10;  // the sanitizers take twenty times as long
-#else
-constexpr int kBoxes = 5, kRestSteps = 240;
-#endif
+constexpr int kBoxes = kSanitized ? 3 : 5, kRestSteps = kSanitized ? 10 : 240;
 
 const Material kBoxRubber{.youngs_modulus = 5e6, .poisson_ratio = 0.4, .density = 1100.0};
 

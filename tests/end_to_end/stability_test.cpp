@@ -1,4 +1,5 @@
 // Baked bars driven to the ends of every axis (stability_scenes.h). All of it: `limber-benchmark stability`.
+#include "asked.h"
 #include "stability_scenes.h"
 
 #include <gtest/gtest.h>
@@ -6,11 +7,7 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kExtremeSteps = 10;
-#else
-constexpr int kExtremeSteps = 60;
-#endif
+constexpr int kExtremeSteps = kSanitized ? 10 : 60;
 
 bool flies_or_falls(const StabilityCase& at) {
   return at.scene == StabilityScene::kFlight || at.scene == StabilityScene::kGround;

@@ -12,11 +12,7 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kStepsOfLump = 20;
-#else
-constexpr int kStepsOfLump = 60;
-#endif
+constexpr int kStepsOfLump = kSanitized ? 20 : 60;
 
 /// Bricks that fly towards each other and end in one lump: an island of more than fifty contacts.
 void expect_momenta_kept_in_a_lump(int modes) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "asked.h"
 #include "bar_model.h"
 #include "grounded_world.h"
 #include "pile.h"
@@ -14,11 +15,7 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kStepsToRest = 60;  // of the largest stack; the sanitizers take twenty times as long
-#else
-constexpr int kStepsToRest = 300;
-#endif
+constexpr int kStepsToRest = kSanitized ? 60 : 300;  // of the largest stack
 
 TEST(WorldContact, AFallingBoxComesToRestOnTheGround) {
   for (const int modes : {0, 12}) {

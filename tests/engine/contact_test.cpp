@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "asked.h"
 #include "contact_rules.h"
 #include "counted_new.h"
 #include "grounded_world.h"
@@ -19,11 +20,7 @@
 namespace limber::testing {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kHashSteps = 20;  // the sanitizers take twenty times as long
-#else
-constexpr int kHashSteps = 60;
-#endif
+constexpr int kHashSteps = kSanitized ? 20 : 60;
 
 void expect_no_allocation_in_a_warm_pile(int bend) {
   Pile pile(kPileBoxes, bend, false);

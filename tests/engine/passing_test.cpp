@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "asked.h"
 #include "coarse_bunny.h"
 #include "constants.h"
 #include "limber/collision/contact_finder.h"
@@ -23,11 +24,7 @@ namespace {
 constexpr std::array kSteps = {1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0, 1.0 / 30.0, 1.0 / 10.0};
 constexpr double kSide = 0.4;
 constexpr int kSheetCells = 20;
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int kShots = 10;  // the sanitizers take twenty times as long
-#else
-constexpr int kShots = 60;
-#endif
+constexpr int kShots = kSanitized ? 10 : 60;
 
 std::shared_ptr<const ModalModel> rigid(double size, double mass) {
   ModalModelData d = sample_model_data({.modes = 0, .half_extent = Vec3::Constant(size)});

@@ -6,16 +6,13 @@
 #include <memory>
 #include <vector>
 
+#include "asked.h"
 #include "grounded_world.h"
 
 namespace limber::testing {
 
-inline constexpr double kPileSize = 0.3;  // of its bodies, m
-#if defined(__SANITIZE_ADDRESS__)
-inline constexpr int kPileBoxes = 9;  // of a test's pile; the sanitizers take twenty times as long
-#else
-inline constexpr int kPileBoxes = 18;
-#endif
+inline constexpr double kPileSize = 0.3;                // of its bodies, m
+inline constexpr int kPileBoxes = kSanitized ? 9 : 18;  // of a test's pile
 
 /// A pit with sloping sides, so that what rolls comes to rest, and bodies above it in layers of nine.
 struct Pile : GroundedWorld {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <numbers>
 
+#include "asked.h"
 #include "counted_new.h"
 #include "grounded_world.h"
 #include "limber/core/error.h"
@@ -140,13 +141,9 @@ TEST(Rolling, TakesEnergyAwayAndAllocatesNothing) {
 }
 
 TEST(Rolling, APileOfMixedBodiesComesToRest) {
-#if defined(__SANITIZE_ADDRESS__)
-  constexpr int kBodies = 9, kSteps = 120;
-#else
-  constexpr int kBodies = 18, kSteps = 180;
-#endif
+  constexpr int kSteps = kSanitized ? 120 : 180;
   constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
-  Pile pile(kBodies, -1, true, {.rolling_friction = 0.1});
+  Pile pile(kPileBoxes, -1, true, {.rolling_friction = 0.1});
   for (int i = 0; i < kSteps; ++i) pile.step_once();
   std::vector<Vec3> before;
   for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);

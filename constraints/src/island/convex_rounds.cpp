@@ -30,6 +30,11 @@ SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   return go_on(step, report);
 }
 
+void ConvexRounds::take_again(IslandStep& step) {
+  take_impulses(step);
+  step.predict();
+}
+
 SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
   ConvexContactReport done;
   for (;; ++report.iterations) {
@@ -62,8 +67,10 @@ SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
 /// left unsolved in the first of them is the motion that it found.
 SolveStatus ConvexRounds::end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report) {
   if (!step.contacts_alone) return take_best(step, report);
-  report.rough = step.part.options.rough > 0.0 && report.iterations > 1;
-  if (report.iterations > 1) return SolveStatus::kSolved;
+  if (report.iterations > 1) {
+    report.rough = step.part.options.rough > 0.0;
+    return SolveStatus::kSolved;
+  }
   for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = contacts_.impulse(u);
   take_impulses(step);
   take_motion(step);
@@ -89,14 +96,13 @@ void ConvexRounds::place_units(const IslandStep& step) {
   for (Index local = 0; local < bodies.count(); ++local)
     nodes_.push_back(
         contacts_.add_node(static_cast<std::size_t>(bodies.response(local).size()) + residual_.rank(local)));
-  for (std::size_t i = 0, count = 1; i < step.size(); i += count) {
-    count = static_cast<std::size_t>(contact_rows(step.law(i)));
-    contacts_.add_unit(count, set_of(step.law(i)), step.law(i).tolerance);
-    units_.push_back({.first = i, .rows = count});
-    step.for_bodies(i, [&](const ConstraintRows::Side&, Index local, bool again) {
+  step.for_units([&](std::size_t first, std::size_t count) {
+    contacts_.add_unit(count, set_of(step.law(first)), step.law(first).tolerance);
+    units_.push_back({.first = first, .rows = count});
+    step.for_bodies(first, [&](const ConstraintRows::Side&, Index local, bool again) {
       if (!again) contacts_.add_side(nodes_[static_cast<std::size_t>(local)]);
     });
-  }
+  });
   contacts_.end_structure();
 }
 
@@ -192,7 +198,7 @@ double ConvexRounds::distance_from_law(const Unit& unit, const RowLaw& law, cons
   ContactPotential natural = potential;
   natural.compliance = std::max(unit.response, std::numeric_limits<double>::min());
   if (law.compliance > 0.0) gap[0] += law.compliance * unit.impulse[0];
-  return unit.response * (natural.at(gap - natural.compliance * unit.impulse).impulse - unit.impulse).norm();
+  return unit.response * (natural.natural(gap, unit.impulse) - unit.impulse).norm();
 }
 
 /// u⁰: the rows' true gaps at the end of the motion that is predicted, less what they ask for, what is linear in the
@@ -285,8 +291,7 @@ bool ConvexRounds::press_early(IslandStep& step) const {
     });
   }
   if (more && !step.contacts_alone && !step.loads.all_early) {
-    step.loads.all_early = true;
-    std::ranges::fill(early, 1);
+    step.loads.take_all_early();
     std::ranges::fill(step.reaction, 0.0);
   }
   return more;

@@ -19,6 +19,8 @@ class ConvexRounds {
   SolveStatus solve(IslandStep& step, IslandReport& report);
   /// From where it ended, roughly, to the law. @pre step.part.options.rough has been taken back
   SolveStatus go_on(IslandStep& step, IslandReport& report);
+  /// What was found last, after something else has been tried in the step. @pre its loads are as they were
+  void take_again(IslandStep& step);
   /// Of contacts that press, where the next step is to begin with it, in their normal rows. @param slip by row
   void write_slip(const IslandStep& step, std::span<double> slip) const;
 

@@ -32,6 +32,7 @@ bool IslandSolver::Impl::foresee_middle(IslandReport& done) {
   if (!step.convex || !step.touches || step.contacts_alone || step.part.options.watch != nullptr) return false;
   constexpr std::size_t kMostRows = 80;  // matrices are dense
   if (step.size() > kMostRows) return false;
+  const bool all_early = step.loads.all_early;
   IslandReport middle;
   step.take_middle(true);
   middle.status = mean.solve(step, middle, true);
@@ -41,9 +42,9 @@ bool IslandSolver::Impl::foresee_middle(IslandReport& done) {
     return true;
   }
   step.take_middle(false);
+  if (all_early) step.loads.take_all_early();
   reaction.find(step, StepTime::kStart);
-  done = {};
-  done.status = rounds.solve(step, done);
+  rounds.take_again(step);
   return false;
 }
 

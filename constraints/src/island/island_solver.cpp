@@ -85,8 +85,9 @@ void IslandSolver::foresee(std::span<const ConstrainedBody> table, std::span<con
 
 void IslandSolver::refine() {
   StepInParts& at = impl_->parts;
-  at.part.options.rough = 0.0;
   impl_->begin_times(at.part.options.timed);
+  if (!at.done.rough) return;
+  at.part.options.rough = 0.0;
   at.done = impl_->refine(at.part, at.done);
   impl_->end_cut();
   if (at.part.ends) impl_->tell_foreseen();

@@ -101,8 +101,7 @@ void IslandStep::begin_early() {
     if (law(row).contact && (law(row).last_force != 0.0 || law(row).foreseen_force != 0.0))
       for_bodies(row,
                  [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
-  loads.all_early = !contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; });
-  if (loads.all_early) std::ranges::fill(early, 1);
+  if (!contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; })) loads.take_all_early();
 }
 
 /// Makes the modes go through a part of a step, or through an impact or a part that is watched, in which all of them

@@ -2,6 +2,7 @@
 // and the bodies' motion under these.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -56,6 +57,10 @@ struct IslandLoads {
   std::vector<char> early;             // by body: whether it gets gravity and held forces at the part's start
   bool all_early = false;
 
+  void take_all_early() {
+    all_early = true;
+    std::ranges::fill(early, 1);
+  }
   void clear(const IslandBodies& bodies);
   /// @param values by row. @param frame_scale, modal_scale of them, what frames and modes get
   void add(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> values, double frame_scale,

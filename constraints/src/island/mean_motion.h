@@ -150,11 +150,11 @@ class MeanMotion {
   void find_field_derivative(const IslandStep& step, Index local, Matrix& K);
   void hold_carried(Matrix& K);
   void sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies, std::span<const double> impulses);
+  Mat3 late(const Vec3& turn) const;
   Vec3 parent_moment(const Body& body, const Vec3& after) const;
 
   std::vector<Body> bodies_;
   std::vector<Carried> carried_;
-  Mat3 late(const Vec3& turn) const;
   double length_ = 0.0, share_ = 0.5;  // Δt, s
   bool bends_ = true;
   std::vector<Vec3> impulse_, moment_;  // of the rows, by body

@@ -38,7 +38,7 @@ bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t 
   if (law.friction > 0.0) open[0] += law.friction * open.tail<2>().norm();
   ContactPotential natural = set_of(law);
   natural.compliance = response;
-  const double left = response * (natural.at(open - response * impulse).impulse - impulse).norm();
+  const double left = response * (natural.natural(open, impulse) - impulse).norm();
   if (law.contact) worst_contact_ = std::max(worst_contact_, left / law.tolerance);
   return bent_as_wanted && left <= least;
 }

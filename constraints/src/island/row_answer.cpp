@@ -10,7 +10,7 @@ namespace {
 bool stays(const RowLaw& law, const Vec3& impulse, const Vec3& off, double response) {
   ContactPotential set = set_of(law);
   set.compliance = response;
-  return set.at(off - response * impulse).impulse == impulse;
+  return set.natural(off, impulse) == impulse;
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ class IslandSolver {
                std::span<Constraint* const> constraints, const IslandOptions& options);
   /// Of foresee().
   const IslandReport& foreseen() const;
-  /// What has been foreseen roughly, to the law. @pre foreseen().rough
+  /// What has been foreseen roughly, to the law; nothing where it is not rough. @pre foresee()
   void refine();
   /// What foresee() or refine() took, with IslandOptions::timed; finish() tells of itself.
   const StageTimes& times() const;

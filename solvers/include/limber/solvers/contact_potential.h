@@ -42,6 +42,8 @@ struct ContactPotential {
 
   /// The impulse of the set that is nearest.
   Vec3 nearest(const Vec3& impulse) const { return at(-compliance * impulse).impulse; }
+  /// P_K(F − u/c), the natural map: F itself where it is what the set exerts at the gap u.
+  Vec3 natural(const Vec3& u, const Vec3& impulse) const { return at(u - compliance * impulse).impulse; }
   /// Of l(u + t d) at t = 0: its first and second derivatives.
   struct Slope {
     double first = 0.0, second = 0.0;

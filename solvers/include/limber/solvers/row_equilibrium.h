@@ -36,7 +36,6 @@ class RowEquilibrium {
     double tolerance = 1.0, scale = 1.0;  // 1/√ρ: of impulses and gaps
   };
   void to_scale(std::span<const double> W);
-  void begin_rounds();
   void find_gaps();
   double take_starts();
   int improve(int most);
