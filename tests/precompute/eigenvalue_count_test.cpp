@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include "dense_fem.h"
+#include "dense_eigenvalues.h"
 #include "eigen/elastic_modes.h"
 #include "eigen/sparse_operations.h"
 #include "limber/core/error.h"

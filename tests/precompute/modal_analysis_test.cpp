@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "dense_fem.h"
+#include "dense_eigenvalues.h"
 #include "limber/core/error.h"
 #include "rubber_box.h"
 

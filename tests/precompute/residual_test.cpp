@@ -1,10 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "dense_fem.h"
+#include "dense_modes.h"
 #include "limber/core/error.h"
 #include "rubber_box.h"
 
@@ -35,11 +35,11 @@ Eigen::MatrixXd dense_compliance(std::span<const Index> fixed) {
   std::vector<Index> free;
   for (Index dof = 0; dof < model.K.rows(); ++dof)
     if (std::find(fixed.begin(), fixed.end(), dof / 3) == fixed.end()) free.push_back(dof);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(model.K(free, free), model.M(free, free));
+  const testing::DenseModes modes = testing::dense_modes(model.K(free, free), model.M(free, free));
   const Eigen::Index rigid = fixed.empty() ? 6 : 0;
-  const Eigen::MatrixXd W = eigen.eigenvectors().rightCols(eigen.eigenvectors().cols() - rigid);
+  const Eigen::MatrixXd W = modes.W.rightCols(modes.W.cols() - rigid);
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(model.K.rows(), model.K.cols());
-  all(free, free) = W * eigen.eigenvalues().tail(W.cols()).cwiseInverse().asDiagonal() * W.transpose();
+  all(free, free) = W * modes.lambda.tail(W.cols()).cwiseInverse().asDiagonal() * W.transpose();
   return all;
 }
 

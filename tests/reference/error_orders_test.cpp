@@ -1,12 +1,13 @@
 // What theory says of limber's errors, beside finite elements of all nodes.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "closed_forms.h"
 #include "constants.h"
+#include "dense_modes.h"
 #include "error_scenes.h"
 #include "limber/core/error.h"
 #include "limber/engine/world.h"
@@ -40,11 +41,11 @@ struct FreeBlock {
     Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * body.nodes(), 3 * body.nodes());
     for (int axis = 0; axis < 3; ++axis)
       M(Eigen::seqN(axis, body.nodes(), 3), Eigen::seqN(axis, body.nodes(), 3)) = Eigen::MatrixXd(body.mass());
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> all(body.stiffness(body.rest()), M);
+    const DenseModes all = dense_modes(body.stiffness(body.rest()), M);
     Mat3 sum = Mat3::Zero();
     for (Eigen::Index i = 6; i < M.rows(); ++i) {
-      const Vec3 w = all.eigenvectors().block<3, 1>(3 * node, i);
-      sum += w * w.transpose() / all.eigenvalues()[i];
+      const Vec3 w = all.W.block<3, 1>(3 * node, i);
+      sum += w * w.transpose() / all.lambda[i];
     }
     return sum;
   }

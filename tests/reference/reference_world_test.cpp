@@ -8,6 +8,7 @@
 #include "closed_forms.h"
 #include "constants.h"
 #include "dense_fem.h"
+#include "dense_modes.h"
 #include "tet_box.h"
 
 namespace limber {
@@ -71,12 +72,11 @@ TEST(ReferenceWorld, LinearBodiesMoveAsTheSumOfAllTheirModes) {
   for (Eigen::Index v = 0; v < bar.body->nodes(); ++v)
     for (Eigen::Index i = 0; i < 3 && bar.body->is_fixed()[static_cast<std::size_t>(v)] == 0; ++i)
       free.push_back(3 * v + i);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(dense.K(free, free), dense.M(free, free));
-  const Eigen::VectorXd rates =
-      modes.eigenvectors().transpose() * (dense.M(free, free) * Eigen::VectorXd(numbers_of(bar.v)(free)));
+  const DenseModes modes = dense_modes(dense.K(free, free), dense.M(free, free));
+  const Eigen::VectorXd rates = modes.W.transpose() * (dense.M(free, free) * Eigen::VectorXd(numbers_of(bar.v)(free)));
   constexpr double kSeconds = 0.5;
-  const Eigen::ArrayXd omega = modes.eigenvalues().array().sqrt();
-  const Eigen::VectorXd u = modes.eigenvectors() * (rates.array() * (omega * kSeconds).sin() / omega).matrix();
+  const Eigen::ArrayXd omega = modes.lambda.array().sqrt();
+  const Eigen::VectorXd u = modes.W * (rates.array() * (omega * kSeconds).sin() / omega).matrix();
   const NodeVectors moved = bar.by_differences(kSeconds, stable_step(*bar.body) / 32.0) - bar.body->rest();
   EXPECT_LE((numbers_of(moved)(free) - u).norm(), 2e-4 * u.norm());
   EXPECT_NEAR(stable_step(*bar.body), 2.0 / omega.maxCoeff(), 0.01 * 2.0 / omega.maxCoeff());

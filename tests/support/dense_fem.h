@@ -1,6 +1,5 @@
 /// @file dense_fem.h
-/// A second route to the matrices of linear tets and their eigenvalues: everything dense, nothing shared with the
-/// library but the mesh type.
+/// A second route to the matrices of linear tets: everything dense, nothing shared with the library but the mesh type.
 ///
 /// Stiffness as the Hessian of the strain energy ½ ∫ (λ (tr ε)² + 2μ ε:ε), with the displacement gradient F from F·E =
 /// U (edge matrices), and mass by a quadrature rule exact for quadratics.
@@ -85,18 +84,6 @@ inline DenseModel dense_model(const TetMesh& mesh, std::span<const Material> mat
       }
   });
   return model;
-}
-
-/// All eigenvalues, ascending, with the fixed nodes' rows and columns struck out.
-inline Eigen::VectorXd dense_eigenvalues(const DenseModel& model, std::span<const Index> fixed_nodes = {}) {
-  std::vector<bool> held(model.K.rows(), false);
-  for (const Index node : fixed_nodes)
-    for (int axis = 0; axis < 3; ++axis) held[3 * node + axis] = true;
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index i = 0; i < model.K.rows(); ++i)
-    if (!held[i]) kept.push_back(i);
-  const Eigen::MatrixXd K = model.K(kept, kept), M = model.M(kept, kept);
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
 }  // namespace limber::testing
