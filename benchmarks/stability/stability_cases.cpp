@@ -145,7 +145,7 @@ bool bullet_can(const StabilityCase& c) {
   return alone && c.modes > 0 && c.far_away == 0.0 && c.pause == 0.0;
 }
 
-std::vector<StabilityCase> energy_grid() {
+std::vector<StabilityCase> energy_grid(double recovery_speed) {
   std::vector<StabilityCase> grid;
   for (const StabilityScene scene : kScenes)
     for (const double modulus : {1e2, 1e4, 1e6, 1e8, 1e10, 1e12})
@@ -162,7 +162,8 @@ std::vector<StabilityCase> energy_grid() {
                                 .step = step,
                                 .damping_ratio = damping,
                                 .modes = modes,
-                                .mass_ratio = ratio});
+                                .mass_ratio = ratio,
+                                .recovery_speed = has_contact(scene) ? recovery_speed : 0.0});
               }
   return grid;
 }

@@ -100,8 +100,8 @@ const char* name(StabilityScene scene);
 std::string text(const StabilityCase& at);  ///< in one line, what differs from the defaults
 
 /// E 1e2…1e12 Pa × step 1e-4…0.1 s × damping 0…overdamped × modes 0…64 × ν 0.3 and 0.499 × mass ratio 1 and 1e4, where
-/// the scene has two weights; all scenes but kFlight, no recovery: 2,616 cases.
-std::vector<StabilityCase> energy_grid();
+/// the scene has two weights; all scenes but kFlight: 2,616 cases. @param recovery_speed m/s, where there is contact
+std::vector<StabilityCase> energy_grid(double recovery_speed = 0.0);
 
 /// All axes to their ends: each level of each by itself, and `random` cases of each scene drawn from all of them at
 /// once, the same for the same number. Default recovery.

@@ -358,6 +358,53 @@ TEST(ContactClusters, WeightsOfASquareAreThoseOfItsSymmetry) {
     EXPECT_NEAR(part[i], clusters.kept(static_cast<Index>(i)) ? 81.0 / 4.0 : 0.0, 1e-9);
 }
 
+/// Against even samples of the hull, each given to what is nearest.
+TEST(ContactClusters, TheCellOfAContactIsWhatIsNearerToItThanToAnyOther) {
+  constexpr double kSample = 1.0 / 128.0;
+  for (const Region& region : {kRegions[0], kRegions[6], kRegions[10]}) {
+    auto contacts = samples(region.inside, 0.25);
+    for (ContactPoint& c : contacts) c.position.x() += 0.05 * std::sin(9.0 * c.position.y());
+    const auto corners = hull(contacts);
+    const auto inside = [&](const Vec3& p) {
+      for (std::size_t i = 0; i < corners.size(); ++i)
+        if (cross(corners[i], corners[(i + 1) % corners.size()], p) < 0.0) return false;
+      return true;
+    };
+    ContactClusters clusters;
+    clusters.reduce(contacts, 0, {}, {}, true);
+    const std::span<const ContactPoint> all = clusters.all();
+    std::vector<double> nearest(all.size(), 0.0);
+    for (double x = -2.0 + 0.5 * kSample; x < 2.0; x += kSample)
+      for (double y = -2.0 + 0.5 * kSample; y < 2.0; y += kSample) {
+        const Vec3 p(x, y, 0.0);
+        if (!inside(p)) continue;
+        const auto distance = [&](const ContactPoint& c) { return (c.position - p).squaredNorm(); };
+        const auto at = std::min_element(all.begin(), all.end(),
+                                         [&](const auto& c, const auto& d) { return distance(c) < distance(d); });
+        nearest[static_cast<std::size_t>(at - all.begin())] += kSample * kSample;
+      }
+    for (std::size_t i = 0; i < all.size(); ++i)
+      EXPECT_NEAR(clusters.cell(static_cast<Index>(i)), nearest[i], 0.5 * kSample) << region.name << ' ' << i;
+  }
+}
+
+TEST(ContactClusters, ContactsUponEachOtherShareTheirCellAndALineHasNone) {
+  auto contacts = samples(kRegions[0].inside, 0.5);
+  const std::size_t once = contacts.size();
+  for (std::size_t i = 0; i < once; ++i) {
+    contacts.push_back(contacts[i]);
+    contacts.back().id += 1000;
+  }
+  ContactClusters clusters;
+  clusters.reduce(contacts, 0, {}, {}, true);
+  double sum = 0.0;
+  for (Index i = 0; i < static_cast<Index>(2 * once); ++i) sum += clusters.cell(i);
+  EXPECT_NEAR(sum, 4.0, kRoundOff);
+  auto line = samples([](double x, double y) { return std::abs(x) <= 1.0 && y == 0.0; }, 0.25);
+  clusters.reduce(line, 0, {}, {}, true);
+  for (Index i = 0; i < static_cast<Index>(clusters.all().size()); ++i) EXPECT_TRUE(std::isinf(clusters.cell(i)));
+}
+
 TEST(ContactClusters, WhatIsFartherIsNotPressedWithWhatIsKept) {
   auto contacts = samples(kRegions[0].inside, 0.25);
   for (ContactPoint& c : contacts) c.gap = 0.1 * (1.0 + c.position.x());  // 0 to 0.2 of an extent of 2.8: a tilted face

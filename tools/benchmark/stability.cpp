@@ -16,6 +16,7 @@
 
 #include "../cpu_time.h"
 #include "figures.h"
+#include "limber/constraints/contact_constraint.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/internal/strict_json.h"
@@ -35,7 +36,7 @@ struct StabilityArguments {
   std::string grid = "extremes", csv, plot, limits, peer;
   std::vector<std::string> scenes, known;
   int random = 360, steps = 120, every = 1, first = 0;
-  bool simplify = false;
+  bool simplify = false, recovers = false;
 };
 
 /// A case and what became of it.
@@ -305,7 +306,8 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   if (!a.peer.empty() && !testing::has_bullet())
     throw InvalidArgument("--peer: this build found no Bullet (apt-get install libbullet-dev, then configure anew)");
   const std::vector<StabilityCase> grid =
-      a.grid == "energy" ? testing::energy_grid() : testing::extreme_cases(a.random);
+      a.grid == "energy" ? testing::energy_grid(a.recovers ? ContactOptions{}.recovery_speed : 0.0)
+                         : testing::extreme_cases(a.random);
   const KnownRows known = read_known(program, a.known);
   std::vector<CaseRow> rows;
   std::map<std::string, SceneTally> tallies;
@@ -357,7 +359,7 @@ void declare(CLI::App& app, StabilityArguments& a) {
   app.add_option(
          "--grid", a.grid,
          "extremes: every level of every axis by itself, and random cases of all of them; energy: a full grid of "
-         "stiffness, step, damping, modes and weights, without recovery")
+         "stiffness, step, damping, modes and weights")
       ->type_name("NAME")
       ->check(CLI::IsMember({"extremes", "energy"}))
       ->capture_default_str();
@@ -369,6 +371,7 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("N")
       ->check(CLI::Range(0, 1'000'000))
       ->capture_default_str();
+  app.add_flag("--recovery", a.recovers, "push bodies that overlap apart as by default, for --grid energy");
   app.add_option("--steps", a.steps, "steps per case")
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <utility>
 
 #include "convex/convex_polygon.h"
+#include "finder/patch_cells.h"
 #include "finder/patch_weights.h"
 #include "limber/core/error.h"
 #include "tuning.h"
@@ -18,6 +20,7 @@ using internal::convex_hull;
 using internal::diameter;
 using internal::kMostCorners;
 using internal::largest_polygon;
+using internal::PatchCells;
 using internal::PatchWeights;
 using internal::PlanePoint;
 
@@ -77,6 +80,8 @@ struct ContactClusters::Impl {
   std::vector<ContactPoint> all;
   std::vector<ContactWeight> weights;
   PatchWeights patch_weights;
+  PatchCells patch_cells;
+  std::vector<double> cells;  ///< by contact
 
   void sort_by_id();
   void find_patches();
@@ -237,6 +242,8 @@ void ContactClusters::Impl::reduce_patch() {
 void ContactClusters::Impl::weigh_patch() {
   const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
   const double pressed_with = internal::collision_tuning().finder.pressed_with * diameter(all_corners);
+  const std::vector<double>& parts = patch_cells.find(place);
+  for (std::size_t i = 0; i < place.size(); ++i) cells[static_cast<std::size_t>(place[i].item)] = parts[i];
   patch_weights.set(kept);
   for (const PlanePoint& p : place)
     for (const PatchWeights::Weight& w : patch_weights.find(p)) {
@@ -261,7 +268,10 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
   m.previous = previous;
   m.sort_by_id();
   m.keep.assign(m.contacts.size(), 1);
-  if (weigh) m.all.assign(m.contacts.begin(), m.contacts.end());
+  if (weigh) {
+    m.all.assign(m.contacts.begin(), m.contacts.end());
+    m.cells.assign(m.contacts.size(), std::numeric_limits<double>::infinity());
+  }
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
   m.wanted = spacing;
   m.find_patches();
@@ -280,6 +290,7 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
 
 std::span<const ContactPoint> ContactClusters::all() const { return impl_->all; }
 bool ContactClusters::kept(Index contact) const { return impl_->keep[static_cast<std::size_t>(contact)] != 0; }
+double ContactClusters::cell(Index contact) const { return impl_->cells[static_cast<std::size_t>(contact)]; }
 std::span<const ContactWeight> ContactClusters::weights() const { return impl_->weights; }
 
 }  // namespace limber

@@ -8,18 +8,20 @@ namespace {
 
 const ContactSide& side_of(const ContactPoint& c, std::size_t side) { return side == 0 ? c.a : c.b; }
 
-/// Where a contact is with a vertex; −1: within an edge or a triangle.
-Index vertex_of(const CollisionSurface& surface, const ContactSide& side) {
-  for (std::size_t c = 0; c < 3; ++c)
-    if (side.weight[c] == 1.0) return surface.triangle(side.triangle)[c];
-  return -1;
-}
-
+/// A third of the triangles that have the vertex or the edge that touches, or of the one that is touched within.
 /// @param outwards body frame
-double area_about(const CollisionSurface& surface, Index vertex, const Vec3& outwards) {
+double area_about(const CollisionSurface& surface, const ContactSide& side, const Vec3& outwards) {
+  const Triangle& touched = surface.triangle(side.triangle);
+  const auto has_all = [&](const Triangle& corners) {
+    for (std::size_t c = 0; c < 3; ++c)
+      if (side.weight[c] > 0.0 && std::find(corners.begin(), corners.end(), touched[c]) == corners.end()) return false;
+    return true;
+  };
+  const auto one = static_cast<std::size_t>(std::max_element(side.weight.begin(), side.weight.end()) - side.weight.begin());
   double area = 0.0;
-  for (const Index t : surface.vertex_triangles(vertex)) {
+  for (const Index t : surface.vertex_triangles(touched[one])) {
     const Triangle& corners = surface.triangle(t);
+    if (!has_all(corners)) continue;
     const Vec3 &p = surface.rest(corners[0]), &q = surface.rest(corners[1]), &r = surface.rest(corners[2]);
     area += std::max(0.0, outwards.dot((q - p).cross(r - p))) / 6.0;
   }
@@ -67,13 +69,13 @@ void RegionFinder::weigh(const ContactClusters& clusters, const std::array<Regio
     const ContactPoint& contact = all[static_cast<std::size_t>(w.contact)];
     double& area = areas_[static_cast<std::size_t>(w.contact)];
     if (area < 0.0) {
-      area = 0.0;
+      double surfaces = 0.0;
       for (std::size_t side = 0; side < 2; ++side) {
         if (sides[side].surface == nullptr) continue;
-        const Index vertex = vertex_of(*sides[side].surface, side_of(contact, side));
         const Vec3 outwards = sides[side].turn.conjugate() * (side == 0 ? -contact.normal : contact.normal);
-        if (vertex >= 0) area += area_about(*sides[side].surface, vertex, outwards);
+        surfaces += area_about(*sides[side].surface, side_of(contact, side), outwards);
       }
+      area = std::min(clusters.cell(w.contact), surfaces);
     }
     if (area > 0.0) parts_.push_back({.kept = w.kept, .contact = w.contact, .area = w.weight * area});
   }

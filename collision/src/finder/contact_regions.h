@@ -29,9 +29,9 @@ struct RegionSide {
   Quaternion turn{};
 };
 
-/// The contact r of a patch stands for its contacts i with w_i = φ_r(i) a_i / Σ_j φ_r(j) a_j. The area a_i is what a
-/// uniform pressure along the normal gives to the vertices that touch there: a third of the triangles about them, seen
-/// along the normal at rest.
+/// The contact r of a patch stands for its contacts i with w_i = φ_r(i) a_i / Σ_j φ_r(j) a_j, the integral of φ_r over
+/// what touches. The area a_i is that of the patch's hull that is nearer to i than to its other contacts, and no more
+/// than a third of the triangles about i, seen along the normal at rest: a hull also covers what has no surface.
 class RegionFinder {
  public:
   /// Appends the regions of what the clusters have kept last.

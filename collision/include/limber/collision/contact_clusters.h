@@ -77,6 +77,9 @@ class ContactClusters {
   /// Where a contact is farther than a kept one it is not pressed with it: then φ falls to 0 as the difference of their
   /// gaps grows from 5e-3 to 1e-2 of the patch's extent.
   std::span<const ContactWeight> weights() const;
+  /// Of a contact of such a patch: the area of its contacts' hull that is nearer to it than to any other, m². Infinite
+  /// where all of the patch lie on a line, which has no area to be shared.
+  double cell(Index contact) const;
 
  private:
   struct Impl;
