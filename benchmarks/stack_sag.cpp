@@ -21,8 +21,8 @@ constexpr double kGap = 1e-5;  // between boxes as they are laid, m
 constexpr int kSteps = 240, kModes = 12;
 
 struct Way {
-  bool all = false;        // contacts
-  bool residual = true;    // compliance
+  bool all = false;      // contacts
+  bool residual = true;  // compliance
   double spacing = ContactFinderOptions{}.region_spacing;
 };
 

@@ -56,7 +56,7 @@ class WholeStack {
  private:
   using Row = std::vector<std::pair<Index, double>>;  // of displacements, by node of the stack
   static constexpr double kYield = 1e-10;             // m/N, so that redundant rows share
-  static constexpr double kSideways = 1.0;            // N/m at each node, where nothing else holds boxes in their places
+  static constexpr double kSideways = 1.0;  // N/m at each node, where nothing else holds boxes in their places
 
   Index size() const { return 3 * nodes_ * stack_.boxes; }
 
@@ -120,7 +120,8 @@ class WholeStack {
       if (!(weights[n] > 1.0)) continue;  // less than one sample of the plane
       Row row;
       for (Index m = 0; m < 2 * nodes_; ++m)
-        if (means[n][m] != 0.0) row.emplace_back(m < nodes_ ? first + m : second + m - nodes_, means[n][m] / weights[n]);
+        if (means[n][m] != 0.0)
+          row.emplace_back(m < nodes_ ? first + m : second + m - nodes_, means[n][m] / weights[n]);
       rows_.push_back(row);
     }
   }

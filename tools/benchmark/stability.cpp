@@ -305,9 +305,9 @@ std::vector<Figure> figures_of(const std::map<std::string, SceneTally>& tallies)
 void benchmark_stability(Program& program, const StabilityArguments& a) {
   if (!a.peer.empty() && !testing::has_bullet())
     throw InvalidArgument("--peer: this build found no Bullet (apt-get install libbullet-dev, then configure anew)");
-  const std::vector<StabilityCase> grid =
-      a.grid == "energy" ? testing::energy_grid(a.recovers ? ContactOptions{}.recovery_speed : 0.0)
-                         : testing::extreme_cases(a.random);
+  const std::vector<StabilityCase> grid = a.grid == "energy"
+                                              ? testing::energy_grid(a.recovers ? ContactOptions{}.recovery_speed : 0.0)
+                                              : testing::extreme_cases(a.random);
   const KnownRows known = read_known(program, a.known);
   std::vector<CaseRow> rows;
   std::map<std::string, SceneTally> tallies;

@@ -8,6 +8,8 @@ namespace {
 
 const ContactSide& side_of(const ContactPoint& c, std::size_t side) { return side == 0 ? c.a : c.b; }
 
+bool is_vertex(const ContactSide& side) { return std::count(side.weight.begin(), side.weight.end(), 0.0) == 2; }
+
 /// A third of the triangles that have the vertex or the edge that touches, or of the one that is touched within.
 /// @param outwards body frame
 double area_about(const CollisionSurface& surface, const ContactSide& side, const Vec3& outwards) {
@@ -17,7 +19,8 @@ double area_about(const CollisionSurface& surface, const ContactSide& side, cons
       if (side.weight[c] > 0.0 && std::find(corners.begin(), corners.end(), touched[c]) == corners.end()) return false;
     return true;
   };
-  const auto one = static_cast<std::size_t>(std::max_element(side.weight.begin(), side.weight.end()) - side.weight.begin());
+  const auto one =
+      static_cast<std::size_t>(std::max_element(side.weight.begin(), side.weight.end()) - side.weight.begin());
   double area = 0.0;
   for (const Index t : surface.vertex_triangles(touched[one])) {
     const Triangle& corners = surface.triangle(t);
@@ -69,13 +72,15 @@ void RegionFinder::weigh(const ContactClusters& clusters, const std::array<Regio
     const ContactPoint& contact = all[static_cast<std::size_t>(w.contact)];
     double& area = areas_[static_cast<std::size_t>(w.contact)];
     if (area < 0.0) {
-      double surfaces = 0.0;
+      const bool both = sides[0].surface != nullptr && sides[1].surface != nullptr;
+      area = 0.0;
       for (std::size_t side = 0; side < 2; ++side) {
-        if (sides[side].surface == nullptr) continue;
+        const ContactSide& at = side_of(contact, side);
+        if (sides[side].surface == nullptr || !(both || is_vertex(at))) continue;
         const Vec3 outwards = sides[side].turn.conjugate() * (side == 0 ? -contact.normal : contact.normal);
-        surfaces += area_about(*sides[side].surface, side_of(contact, side), outwards);
+        area += area_about(*sides[side].surface, at, outwards);
       }
-      area = std::min(clusters.cell(w.contact), surfaces);
+      if (both) area = std::min(area, clusters.cell(w.contact));
     }
     if (area > 0.0) parts_.push_back({.kept = w.kept, .contact = w.contact, .area = w.weight * area});
   }
