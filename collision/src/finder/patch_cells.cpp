@@ -22,6 +22,7 @@ const std::vector<double>& PatchCells::find(const std::vector<PlanePoint>& point
   convex_hull(scratch_, hull_);
   const double extent = diameter(hull_), squared = extent * extent;
   if (hull_.size() < 3 || !(area(hull_) > kNoArea * squared)) return areas_;
+  for (std::vector<PlanePoint>* cell : {&cell_, &next_}) cell->reserve(hull_.size() + points.size());  // a cut adds one
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PlanePoint& p = points[i];
     cell_.assign(hull_.begin(), hull_.end());
