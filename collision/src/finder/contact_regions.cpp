@@ -72,7 +72,7 @@ void RegionFinder::weigh(const ContactClusters& clusters, const std::array<Regio
     const ContactPoint& contact = all[static_cast<std::size_t>(w.contact)];
     double& area = areas_[static_cast<std::size_t>(w.contact)];
     if (area < 0.0) {
-      const bool both = sides[0].surface != nullptr && sides[1].surface != nullptr;
+      const bool both = contact.a.body != contact.b.body && sides[0].surface != nullptr && sides[1].surface != nullptr;
       area = 0.0;
       for (std::size_t side = 0; side < 2; ++side) {
         const ContactSide& at = side_of(contact, side);

@@ -30,10 +30,11 @@ struct RegionSide {
 };
 
 /// The contact r of a patch stands for its contacts i with w_i = φ_r(i) a_i / Σ_j φ_r(j) a_j, the integral of φ_r over
-/// what touches. Where one surface yields, a_i is what a uniform pressure along the normal gives to the vertex that
-/// touches: a third of the triangles about it, seen along the normal at rest. Where two do, the patch has vertices of
-/// both, also beside what the other one covers: a_i is the part of the patch's hull that is nearer to i than to its
-/// other contacts, and no more than a third of the triangles about i, as a hull also covers what has no surface.
+/// what touches. Where one body yields, or touches itself, a_i is what a uniform pressure along the normal gives to the
+/// vertex that touches: a third of the triangles about it, seen along the normal at rest. Where two do, the patch has
+/// vertices of both, also beside what the other one covers: a_i is the part of the patch's hull that is nearer to i
+/// than to its other contacts, and no more than a third of the triangles about i, as a hull also covers what has no
+/// surface.
 class RegionFinder {
  public:
   /// Appends the regions of what the clusters have kept last.
