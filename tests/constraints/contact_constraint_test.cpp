@@ -263,6 +263,23 @@ TEST(Contact, AStepForeseenAnewGoesOnFromWhereItWas) {
   }
 }
 
+TEST(Contact, StepsThatEndByACapAreCountedAndTheirMotionIsTaken) {
+  constexpr int kSteps = 20;
+  for (const int rounds : {1, 30}) {
+    GroundedIsland island({.modes = 3}, kFrame);
+    island.max_iterations = rounds;
+    island.add_body(above(0.4, {0.3, 0.2, 0.1}), {1.0, 0.0, -3.0}, {2.0, -1.0, 0.5});
+    int capped = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const IslandReport report = island.step();
+      EXPECT_EQ(report.attempts[StepAttempt::kEndedByCap], report.change > 1.0 ? 1 : 0) << i;
+      capped += report.attempts[StepAttempt::kEndedByCap];
+    }
+    EXPECT_EQ(capped > 0, rounds == 1) << rounds;
+    EXPECT_GT(island.lowest_gap(), -0.1 * kSampleSize) << rounds;
+  }
+}
+
 TEST(Contact, EventsTellWhenContactsBeginAndEnd) {
   GroundedIsland island({.modes = 0}, kFrame);
   island.add_body(above(0.2));

@@ -64,6 +64,7 @@ class Island {
     solver.foresee(table, members, constraints,
                    {.step = step_,
                     .gravity = gravity_,
+                    .max_iterations = max_iterations,
                     .guard_energy = guard_energy,
                     .contact = rule,
                     .undisturbed = steps > 0,
@@ -123,6 +124,7 @@ class Island {
   std::vector<JointConstraint*> joints;
   IslandSolver solver;
   ContactRule rule;
+  int max_iterations = IslandOptions{}.max_iterations;
   bool guard_energy = true;
   int steps = 0;
   double surplus = 0.0;

@@ -37,6 +37,7 @@ void ConvexRounds::take_again(IslandStep& step) {
 
 SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
   ConvexContactReport done;
+  report.attempts[StepAttempt::kEndedByCap] = 0;  // of a rough look
   for (;; ++report.iterations) {
     take_impulses(step);
     step.predict();
@@ -67,6 +68,7 @@ SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
 /// left unsolved in the first of them is the motion that it found.
 SolveStatus ConvexRounds::end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report) {
   if (!step.contacts_alone) return take_best(step, report);
+  report.attempts[StepAttempt::kEndedByCap] = 1;
   if (report.iterations > 1) {
     report.rough = step.part.options.rough > 0.0;
     return SolveStatus::kSolved;

@@ -162,7 +162,7 @@ struct ConstraintReport {
   int newton_steps = 0;  ///< the same, of the contacts with friction: bounded (island_solver.h)
   /// What is left where the solver ended, of the island that is farthest from its rows' law, in units of what rows are
   /// met to (3e-9 of the arms of a contact's points, 1e-11 of those of joints and hands): at most 1 where all is met.
-  /// Contacts alone may count as solved with more (docs/contact-solvers.md).
+  /// Contacts alone may count as solved with more: StepAttempt::kEndedByCap counts such islands.
   double residual = 0.0;
   ProgramReport programs{};     ///< linear programs of the contact rule
   StepAttempts attempts{};      ///< how many islands' steps, or parts of them, were cut or tried in another way
