@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "limber/core/cross_matrix.h"
+
 namespace limber {
 namespace {
 
@@ -200,8 +202,40 @@ bool PairContacts::is_caught() const {
 }
 
 Vec3 PairContacts::point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
-  if (is_round(contact.a) != is_round(contact.b)) return is_round(contact.a) ? a : b;
-  return 0.5 * (a + b);
+  return share_of_place(contact, 0) * a + share_of_place(contact, 1) * b;
+}
+
+double PairContacts::share_of_place(const PreparedContact& contact, std::size_t side) {
+  if (is_round(contact.a) == is_round(contact.b)) return 0.5;
+  return is_round(side_of(contact, side)) ? 1.0 : 0.0;
+}
+
+/// Of the moments, by where the bodies end: forces keep their directions, and act midway between where the points were
+/// and are.
+void PairContacts::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                                        ForceDerivative& sum) const {
+  using Of = ForceDerivative::Of;
+  using By = ForceDerivative::By;
+  std::size_t row = 0;
+  for (const PreparedContact& contact : contacts_) {
+    const Vec3 impulse = impulse_of(contact, impulses.subspan(row));
+    row += static_cast<std::size_t>(row_count(contact));
+    if (impulse.isZero(0.0)) continue;
+    for (std::size_t pressed = 0; pressed < 2; ++pressed) {
+      const Index of = body(contact, pressed);
+      if (states.is_static(of)) continue;
+      const Mat3 half = 0.5 * sign(pressed) * cross_matrix(impulse);
+      sum.add(of, Of::kMoment, of, By::kShift, half);
+      for (std::size_t moved = 0; moved < 2; ++moved) {
+        const PreparedSide& side = side_of(contact, moved);
+        if (states.is_static(side.body)) continue;
+        const Vec3 arm = side.position(states, StepTime::kEnd) - side.rim - states.origin(side.body, StepTime::kEnd);
+        const Mat3 by_place = -share_of_place(contact, moved) * half;
+        sum.add(of, Of::kMoment, side.body, By::kShift, by_place);
+        sum.add(of, Of::kMoment, side.body, By::kTurn, -by_place * cross_matrix(arm));
+      }
+    }
+  }
 }
 
 Vec3 PairContacts::impulse_of(const PreparedContact& contact, std::span<const double> impulses) {

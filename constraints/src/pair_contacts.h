@@ -28,6 +28,8 @@ class PairContacts final : public Constraint {
   void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
+  void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
+                            ForceDerivative& sum) const override;
 
   /// Since when the bodies have struck each other, after the step, s; 0: they have not.
   double lasted() const { return lasted_; }
@@ -42,6 +44,9 @@ class PairContacts final : public Constraint {
 
   /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
   static Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b);
+
+  /// Of the place where both forces act, that of a side's point: the other's is 1 less.
+  static double share_of_place(const PreparedContact& contact, std::size_t side);
 
   static Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact);
 

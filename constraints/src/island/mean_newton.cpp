@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace limber::internal {
 namespace {
@@ -14,28 +15,23 @@ constexpr double kOfForces = 1.0 / 32.0;
 }  // namespace
 
 SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
-  begin(step, bends);
-  SolveStatus status = iterate(step, report);
-  // From the impulses found; contacts that let go again in this are too few to matter.
-  if (status == SolveStatus::kSolved && presses_early(step)) {
-    motion_.begin(step, bends);
-    motion_.guess(step, impulses_);
-    forget_matrix();
-    status = iterate(step, report);
-  }
+  bends_ = bends;
+  begin(step);
+  const SolveStatus status = iterate(step, report);
   if (status == SolveStatus::kSolved) finish(step);
   return status;
 }
 
 SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
   constexpr int kMost = 40;
-  const bool first = report.iterations == 0;
+  bool first = report.iterations == 0;
   for (int i = 0; i < kMost;) {
     motion_.place(step);
     if (problem_.measure(step, motion_, impulses_)) return SolveStatus::kSolved;
     ++i, ++report.iterations;
     if (!improve(step)) break;
-    if (first && i == 1 && free_is_nearer()) {
+    if (presses_early(step)) continue;
+    if (std::exchange(first, false) && free_is_nearer()) {
       forget_forces(step);
       continue;
     }
@@ -45,17 +41,23 @@ SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
     // What is left of the equations is of second order in this last change.
     motion_.place(step);
     if (step.touches) problem_.measure(step, motion_, impulses_);
-    return problem_.touches_law() ? SolveStatus::kSolved : SolveStatus::kIterationLimit;
+    if (problem_.touches_law()) return SolveStatus::kSolved;
   }
   return SolveStatus::kIterationLimit;
 }
 
-/// Where something presses all impulses and what is held come at the step's start. @return whether they did not yet
-bool MeanNewton::presses_early(IslandStep& step) const {
+/// Where something presses all impulses and what is held come at the step's start: anew from the impulses at hand.
+/// Contacts that let go again in this are too few to matter. @return whether they did not yet
+bool MeanNewton::presses_early(IslandStep& step) {
   if (step.loads.all_early) return false;
   for (std::size_t i = 0; i < impulses_.size(); ++i)
-    if (step.law(i).contact && impulses_[i] != 0.0) {
-      step.loads.all_early = true;
+    if (step.law(i).contact && impulses_[i] + change_.impulses[static_cast<Eigen::Index>(i)] != 0.0) {
+      step.loads.take_all_early();
+      motion_.begin(step, bends_);
+      motion_.write_place(free_);
+      motion_.guess(step, impulses_);
+      motion_.write_place(guess_);
+      forget_matrix();
       return true;
     }
   return false;
@@ -80,8 +82,8 @@ void MeanNewton::move(const IslandStep& step) {
 }
 
 /// From where the last step's forces would take the bodies.
-void MeanNewton::begin(IslandStep& step, bool bends) {
-  motion_.begin(step, bends);
+void MeanNewton::begin(IslandStep& step) {
+  motion_.begin(step, bends_);
   forget_forces(step);
   motion_.write_place(free_);
   for (std::size_t i = 0; i < impulses_.size(); ++i) {

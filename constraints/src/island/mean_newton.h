@@ -25,8 +25,8 @@ class MeanNewton {
 
  private:
   SolveStatus iterate(IslandStep& step, IslandReport& report);
-  void begin(IslandStep& step, bool bends);
-  bool presses_early(IslandStep& step) const;
+  void begin(IslandStep& step);
+  bool presses_early(IslandStep& step);
   void forget_matrix();
   void forget_forces(const IslandStep& step);
   bool free_is_nearer() const;
@@ -46,6 +46,7 @@ class MeanNewton {
   Vector free_, guess_;       // where bodies would be in free flight, and under the last step's forces
   MeanChange change_;
   MeanSecants secants_;                     // of the steps by one matrix
+  bool bends_ = true;
   bool linear_ = false, repeated_ = false;  // there is a matrix; the last step was by that of an earlier place
 };
 
