@@ -120,24 +120,6 @@ void lp(benchmark::State& state) {
   });
 }
 
-/// The same A with two b in turn.
-void lp_new_b(benchmark::State& state) {
-  LinearProgramSolver solver;
-  const ContactSample* made_for = nullptr;
-  std::vector<double> other;
-  bool turn = false;
-  time_solves(state, [&](const ContactSample& s, std::vector<double>& f) {
-    if (made_for != &s) {
-      made_for = &s;
-      other = s.b;
-      for (double& b : other) b *= 0.99;
-      solver.solve(program_of(s), f);
-    }
-    turn = !turn;
-    return solver.solve_again(turn ? other : s.b, f).status == SolveStatus::kSolved;
-  });
-}
-
 /// The model is made before the clock starts: the time of the solve alone, presolve off as for all small problems.
 void clp(benchmark::State& state) {
   const ContactSample* made_for = nullptr;
@@ -264,11 +246,6 @@ void handles_new_target(benchmark::State& state) {
   time_handles(state, [&] { solver.solve(h.r, h.f); });
 }
 
-void handles_orthogonal_decomposition(benchmark::State& state) {
-  Handles h(state);
-  time_handles(state, [&] { solve_by_orthogonal_decomposition(h.J, h.metric, h.r, h.f); });
-}
-
 void contact_counts(benchmark::internal::Benchmark* b) {
   b->ArgName("contacts")->Iterations(1);
   for (int m = 1; m <= 128; m *= 2) b->Arg(m);
@@ -283,14 +260,12 @@ BENCHMARK(qp)->Apply(contact_counts);
 BENCHMARK(qp_factored)->Apply(contact_counts);
 BENCHMARK(qp_warm)->Apply(contact_counts);
 BENCHMARK(lp)->Apply(contact_counts);
-BENCHMARK(lp_new_b)->Apply(contact_counts);
 BENCHMARK(clp)->Apply(contact_counts);
 BENCHMARK(glpk)->Apply(contact_counts);
 BENCHMARK(gauss_seidel)->Apply(contact_counts);
 BENCHMARK(gauss_seidel_1e4)->Apply(contact_counts);
 BENCHMARK(handles)->Apply(handle_counts);
 BENCHMARK(handles_new_target)->Apply(handle_counts);
-BENCHMARK(handles_orthogonal_decomposition)->ArgNames({"points", "dof"})->Args({10, 40})->Args({100, 40});
 
 }  // namespace
 }  // namespace limber

@@ -62,15 +62,11 @@ Vec3 ConvexContactSolver::response(std::size_t unit) const {
   return sum;
 }
 
-/// J y
-Vec3 ConvexContactSolver::seen(const Unit& unit, const double* y) const {
-  double sum[3] = {}, part[3];
-  for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s) {
-    const MatrixView J = jacobian(s);
-    multiply_rows(part, J, nullptr, y + sides_[s].column, unit.rows, J.stride);
-    for (std::size_t r = 0; r < unit.rows; ++r) sum[r] += part[r];
-  }
-  return {sum[0], sum[1], sum[2]};
+Vec3 ConvexContactSolver::moved(std::size_t unit) {
+  const Unit& of = units_[unit];
+  multiply_each(by_side_.need(kRowsOfEach * sides_.size()) + kRowsOfEach * of.first_side, sides_.data() + of.first_side,
+                of.sides, values_.data(), y_.data());
+  return seen_by(of);
 }
 
 /// J y of all sides.
@@ -247,8 +243,8 @@ void ConvexContactSolver::list_product(const Unit& unit, std::size_t a, std::siz
                        .columns = nodes_[node_of_[a]].width});
 }
 
-ConvexContactSolver::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {
-  Slope slope{yd + step * dd, dd};
+ContactPotential::Slope ConvexContactSolver::slope_at(double step, double yd, double dd) const {
+  ContactPotential::Slope slope{yd + step * dd, dd};
   for (const Unit& unit : units_) {
     const ContactPotential::Slope along = unit.potential.along(unit.end + step * unit.change, unit.change);
     slope.first += along.first;
@@ -275,7 +271,7 @@ double ConvexContactSolver::best_step(double slope_at_start) const {
   const double yd = dot(y_.data(), d_.data(), size_), dd = dot(d_.data(), d_.data(), size_);
   double step = 1.0, low = 0.0, high = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMost; ++i) {
-    const Slope slope = slope_at(step, yd, dd);
+    const ContactPotential::Slope slope = slope_at(step, yd, dd);
     if (std::abs(slope.first) <= (i == 0 ? kEnoughOfFullStep : kEnough) * std::abs(slope_at_start)) break;
     (slope.first < 0.0 ? low : high) = step;
     const double next = step - slope.first / slope.second;

@@ -48,36 +48,12 @@ HWY_ATTR double Dot(const double* x, const double* y, std::size_t n) {
   return SumOfBlock(sum);
 }
 
-HWY_ATTR void Equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
-  const Doubles d;
-  std::fill_n(C, n, 0.0);
-  for (std::size_t i = 0; i < rows; ++i) {
-    const double* row = M.row(i);
-    Vector most = hn::Zero(d);
-    for (std::size_t j = 0; j < n; j += kLanes) most = hn::Max(most, hn::Abs(hn::Load(d, row + j)));
-    R[i] = inverse_power_of_two(hn::GetLane(hn::MaxOfLanes(d, most)));
-    const Vector r = hn::Set(d, R[i]);
-    for (std::size_t j = 0; j < n; j += kLanes)
-      hn::Store(hn::Max(hn::Load(d, C + j), hn::Mul(r, hn::Abs(hn::Load(d, row + j)))), d, C + j);
-  }
-  for (std::size_t j = 0; j < n; ++j) C[j] = inverse_power_of_two(C[j]);
-  for (std::size_t i = 0; i < rows; ++i) {
-    double* row = M.row(i);
-    const Vector r = hn::Set(d, R[i]);
-    for (std::size_t j = 0; j < n; j += kLanes)
-      hn::Store(hn::Mul(hn::Mul(r, hn::Load(d, row + j)), hn::Load(d, C + j)), d, row + j);
-  }
-}
-
-HWY_INLINE HWY_ATTR void Add(double* HWY_RESTRICT y, double a, const double* HWY_RESTRICT x, std::size_t from,
-                             std::size_t to) {
+HWY_ATTR void AddScaled(double* HWY_RESTRICT y, double a, const double* HWY_RESTRICT x, std::size_t n) {
   const Doubles d;
   const Vector va = hn::Set(d, a);
-  for (std::size_t i = from; i < to; i += kLanes)
+  for (std::size_t i = 0; i < n; i += kLanes)
     hn::Store(hn::MulAdd(va, hn::Load(d, x + i), hn::Load(d, y + i)), d, y + i);
 }
-
-HWY_ATTR void AddScaled(double* y, double a, const double* x, std::size_t n) { Add(y, a, x, 0, n); }
 
 // kBlocks·kPad columns of combine_rows(), in registers.
 template <std::size_t kBlocks>
@@ -86,7 +62,8 @@ HWY_INLINE HWY_ATTR void CombineColumns(double* out, const double* init, MatrixV
   const Doubles d;
   constexpr std::size_t kCount = kBlocks * kVectors;
   Vector sum[kCount];
-  for (std::size_t v = 0; v < kCount; ++v) sum[v] = hn::Load(d, init + column + v * kLanes);
+  for (std::size_t v = 0; v < kCount; ++v)
+    sum[v] = init == nullptr ? hn::Zero(d) : hn::Load(d, init + column + v * kLanes);
   for (std::size_t i = 0; i < count; ++i) {
     const double* row = M.row(rows ? static_cast<std::size_t>(rows[i]) : i) + column;
     const Vector a = hn::Set(d, coefficients[i]);
@@ -114,40 +91,6 @@ HWY_ATTR void Rotate(double* x, double* y, double c, double s, std::size_t n) {
     const Vector a = hn::Load(d, x + i), b = hn::Load(d, y + i);
     hn::Store(hn::MulAdd(vc, a, hn::Mul(vs, b)), d, x + i);
     hn::Store(hn::NegMulAdd(vs, a, hn::Mul(vc, b)), d, y + i);
-  }
-}
-
-// The triangular solves subtract whole blocks: what is at and before the diagonal is zero, so nothing known changes.
-HWY_ATTR void SubstituteForward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first,
-                                std::size_t n) {
-  for (std::size_t i = first; i < n; ++i) {
-    x[i] *= inverse_diagonal[i];
-    Add(x, -x[i], R.row(i), i / kPad * kPad, n);
-  }
-}
-
-HWY_ATTR void SubstituteBackward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n) {
-  for (std::size_t i = n; i-- > 0;) {
-    x[i] *= inverse_diagonal[i];
-    Add(x, -x[i], L.row(i), 0, i + 1);
-  }
-}
-
-HWY_ATTR void Exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q) {
-  const Doubles d;
-  double* pivot_row = T.row(p);
-  const double inverse = 1.0 / pivot_row[q];
-  const Vector vi = hn::Set(d, inverse);
-  for (std::size_t j = 0; j < T.stride; j += kLanes)
-    hn::Store(hn::Mul(vi, hn::Load(d, pivot_row + j)), d, pivot_row + j);
-  pivot_row[q] = inverse;
-  for (std::size_t i = 0; i < rows; ++i) {
-    if (i == p) continue;
-    double* row = T.row(i);
-    const double factor = row[q];
-    if (factor == 0.0) continue;
-    row[q] = 0.0;
-    Add(row, -factor, pivot_row, 0, T.stride);
   }
 }
 
@@ -216,28 +159,27 @@ HWY_ATTR void MultiplyRows(double* out, MatrixView M, const int* rows, const dou
   for (; i < count; ++i) MultiplyBlock<1>(out, M, rows, x, i, n);
 }
 
-HWY_INLINE HWY_ATTR void AddCongruence(MatrixView C, MatrixView L, const double* K, MatrixView R, std::size_t rows,
-                                       std::size_t p, std::size_t n) {
+HWY_ATTR void AddCongruences(double* C, double* J, const Congruence* all, std::size_t count) {
   const Doubles d;
-  for (std::size_t j = 0; j < n; j += kLanes) {
-    Vector right[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)}, weighted[3];
-    for (std::size_t r = 0; r < rows; ++r) right[r] = hn::Load(d, R.row(r) + j);
-    for (std::size_t r = 0; r < 3; ++r)
-      weighted[r] =
-          hn::MulAdd(hn::Set(d, K[3 * r]), right[0],
-                     hn::MulAdd(hn::Set(d, K[3 * r + 1]), right[1], hn::Mul(hn::Set(d, K[3 * r + 2]), right[2])));
-    for (std::size_t i = 0; i < p; ++i) {
-      Vector sum = hn::Load(d, C.row(i) + j);
-      for (std::size_t r = 0; r < rows; ++r) sum = hn::MulAdd(hn::Set(d, L.row(r)[i]), weighted[r], sum);
-      hn::Store(sum, d, C.row(i) + j);
+  for (const Congruence* c = all; c != all + count; ++c) {
+    const MatrixView to{C + c->to, c->stride}, L{J + c->left.values, c->left.stride},
+        R{J + c->right.values, c->right.stride};
+    const std::size_t rows = c->left.rows;
+    const double* K = c->K;
+    for (std::size_t j = 0; j < c->right.width; j += kLanes) {
+      Vector right[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)}, weighted[3];
+      for (std::size_t r = 0; r < rows; ++r) right[r] = hn::Load(d, R.row(r) + j);
+      for (std::size_t r = 0; r < 3; ++r)
+        weighted[r] =
+            hn::MulAdd(hn::Set(d, K[3 * r]), right[0],
+                       hn::MulAdd(hn::Set(d, K[3 * r + 1]), right[1], hn::Mul(hn::Set(d, K[3 * r + 2]), right[2])));
+      for (std::size_t i = 0; i < c->columns; ++i) {
+        Vector sum = hn::Load(d, to.row(i) + j);
+        for (std::size_t r = 0; r < rows; ++r) sum = hn::MulAdd(hn::Set(d, L.row(r)[i]), weighted[r], sum);
+        hn::Store(sum, d, to.row(i) + j);
+      }
     }
   }
-}
-
-HWY_ATTR void AddCongruences(double* C, double* J, const Congruence* all, std::size_t count) {
-  for (const Congruence* c = all; c != all + count; ++c)
-    AddCongruence({C + c->to, c->stride}, {J + c->left.values, c->left.stride}, c->K,
-                  {J + c->right.values, c->right.stride}, c->left.rows, c->columns, c->right.width);
 }
 
 HWY_ATTR void MultiplyEach(double* out, const RowBlock* blocks, std::size_t count, const double* J, const double* x) {
@@ -256,9 +198,10 @@ HWY_ATTR void MultiplyEach(double* out, const RowBlock* blocks, std::size_t coun
   }
 }
 
-HWY_ATTR void AddEach(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y) {
+HWY_ATTR void AddTransposed(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y,
+                            std::size_t stride) {
   const Doubles d;
-  for (const RowBlock* b = blocks; b != blocks + count; ++b, y += kRowsOfEach)
+  for (const RowBlock* b = blocks; b != blocks + count; ++b, y += stride)
     for (std::size_t j = 0; j < b->width; j += kLanes) {
       Vector sum = hn::Load(d, x + b->column + j);
       for (std::size_t r = 0; r < b->rows; ++r)
@@ -342,17 +285,6 @@ HWY_ATTR void SubtractRuns(MatrixView to, const double* left, MatrixView W, std:
   }
 }
 
-HWY_ATTR void GatherBlocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
-  const Doubles d;
-  for (const RowBlock* b = blocks; b != blocks + count; ++b)
-    for (std::size_t j = 0; j < b->width; j += kLanes) {
-      Vector sum = hn::Load(d, x + b->column + j);
-      for (std::size_t r = 0; r < b->rows; ++r)
-        sum = hn::MulAdd(hn::Set(d, y[r]), hn::Load(d, G + b->values + r * b->stride + j), sum);
-      hn::Store(sum, d, x + b->column + j);
-    }
-}
-
 // Rows [r, r + kRows) of spread_blocks(): their sums stay in registers over all blocks.
 template <std::size_t kRows>
 HWY_INLINE HWY_ATTR void SpreadRows(double* y, const RowBlock* blocks, std::size_t count, const double* G,
@@ -387,38 +319,21 @@ HWY_AFTER_NAMESPACE();
 namespace limber::internal {
 
 HWY_EXPORT(AllFinite);
-HWY_EXPORT(Equilibrate);
 HWY_EXPORT(Dot);
 HWY_EXPORT(AddScaled);
 HWY_EXPORT(CombineRows);
 HWY_EXPORT(Rotate);
-HWY_EXPORT(SubstituteForward);
-HWY_EXPORT(SubstituteBackward);
-HWY_EXPORT(Exchange);
 HWY_EXPORT(Gram);
 HWY_EXPORT(MultiplyRows);
 HWY_EXPORT(AddCongruences);
 HWY_EXPORT(MultiplyEach);
-HWY_EXPORT(AddEach);
+HWY_EXPORT(AddTransposed);
 HWY_EXPORT(InvertPositive);
 HWY_EXPORT(MultiplyBlocks);
 HWY_EXPORT(SubtractRuns);
-HWY_EXPORT(GatherBlocks);
 HWY_EXPORT(SpreadBlocks);
 
 bool all_finite(const double* x, std::size_t n) { return HWY_DYNAMIC_DISPATCH(AllFinite)(x, n); }
-
-void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C) {
-  HWY_DYNAMIC_DISPATCH(Equilibrate)(M, rows, padded(n), R, C);
-}
-
-std::size_t steepest(const double* d, const double* weight, double least, std::size_t n) {
-  std::size_t best = n;
-  double square = 0.0, over = 1.0;  // d²/w of the best as a fraction: no division in the loop
-  for (std::size_t i = 0; i < n; ++i)
-    if (d[i] > least && d[i] * d[i] * over > square * weight[i]) best = i, square = d[i] * d[i], over = weight[i];
-  return best;
-}
 
 double dot(const double* x, const double* y, std::size_t n) { return HWY_DYNAMIC_DISPATCH(Dot)(x, y, padded(n)); }
 
@@ -433,18 +348,6 @@ void combine_rows(double* out, const double* init, MatrixView M, const int* rows
 
 void rotate(double* x, double* y, double c, double s, std::size_t n) {
   HWY_DYNAMIC_DISPATCH(Rotate)(x, y, c, s, padded(n));
-}
-
-void substitute_forward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first, std::size_t n) {
-  HWY_DYNAMIC_DISPATCH(SubstituteForward)(R, inverse_diagonal, x, first, n);
-}
-
-void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n) {
-  HWY_DYNAMIC_DISPATCH(SubstituteBackward)(L, inverse_diagonal, x, n);
-}
-
-void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q) {
-  HWY_DYNAMIC_DISPATCH(Exchange)(T, rows, p, q);
 }
 
 void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n) { HWY_DYNAMIC_DISPATCH(Gram)(C, X, rows, n); }
@@ -462,7 +365,7 @@ void multiply_each(double* out, const RowBlock* blocks, std::size_t count, const
 }
 
 void add_each(double* x, const RowBlock* blocks, std::size_t count, const double* J, const double* y) {
-  HWY_DYNAMIC_DISPATCH(AddEach)(x, blocks, count, J, y);
+  HWY_DYNAMIC_DISPATCH(AddTransposed)(x, blocks, count, J, y, kRowsOfEach);
 }
 
 bool invert_positive(MatrixView A, std::size_t n) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(A, n); }
@@ -477,7 +380,7 @@ void subtract_runs(MatrixView to, const double* left, MatrixView W, std::size_t 
 }
 
 void gather_blocks(double* x, const RowBlock* blocks, std::size_t count, const double* G, const double* y) {
-  HWY_DYNAMIC_DISPATCH(GatherBlocks)(x, blocks, count, G, y);
+  HWY_DYNAMIC_DISPATCH(AddTransposed)(x, blocks, count, G, y, 0);
 }
 
 void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const double* G, const double* x) {

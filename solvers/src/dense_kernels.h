@@ -18,10 +18,6 @@ namespace limber::internal {
 /// Whether x[0 … n) holds neither an infinity nor a NaN. x may have any alignment, n any value.
 bool all_finite(const double* x, std::size_t n);
 
-/// Brings the rows, then the columns, of M to entries of about 1: M ← R M C, with powers of two, which round nothing.
-/// R gets `rows` numbers, C n and zeros in its padding.
-void equilibrate(MatrixView M, std::size_t rows, std::size_t n, double* R, double* C);
-
 /// The power of two next below 1/x; 1 for x = 0. @pre x ≥ 0, finite
 inline double inverse_power_of_two(double x) {
   if (x == 0.0) return 1.0;
@@ -34,7 +30,8 @@ double dot(const double* x, const double* y, std::size_t n);
 /// y += a x
 void add_scaled(double* y, double a, const double* x, std::size_t n);
 
-/// out = init + Σ_i coefficients[i]·M.row(rows[i]) over n columns. `rows` null: 0, 1, …; out may be init.
+/// out = init + Σ_i coefficients[i]·M.row(rows[i]) over n columns. `rows` null: 0, 1, …; `init` null: 0;
+/// out may be init.
 void combine_rows(double* out, const double* init, MatrixView M, const int* rows, const double* coefficients,
                   std::size_t count, std::size_t n);
 
@@ -67,20 +64,6 @@ void spread_blocks(double* y, const RowBlock* blocks, std::size_t count, const d
 
 /// (x, y) ← (c x + s y, c y − s x)
 void rotate(double* x, double* y, double c, double s, std::size_t n);
-
-/// Solves Rᵀx = x, R upper triangular: its rows above the diagonal, zero at and below it; `inverse_diagonal` apart.
-/// The first `first` numbers of the right-hand side are known to be zero.
-void substitute_forward(MatrixView R, const double* inverse_diagonal, double* x, std::size_t first, std::size_t n);
-
-/// Solves R x = x with the same R given as L = Rᵀ: its rows below the diagonal, zero at and above it.
-void substitute_backward(MatrixView L, const double* inverse_diagonal, double* x, std::size_t n);
-
-/// One exchange of a condensed simplex tableau: T(i, ·) −= T(i, q)·T(p, ·)/T(p, q) for i ≠ p, row p over the pivot,
-/// column q over the negative pivot, the pivot inverted.
-void exchange(MatrixView T, std::size_t rows, std::size_t p, std::size_t q);
-
-/// The entry of d to enter next: the largest d_i²/weight_i among d_i > least; n if there is none.
-std::size_t steepest(const double* d, const double* weight, double least, std::size_t n);
 
 /// C = XᵀX for the `rows` rows of X, n columns. All of C is written.
 void gram(MatrixView C, MatrixView X, std::size_t rows, std::size_t n);

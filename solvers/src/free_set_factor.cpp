@@ -19,7 +19,7 @@ void FreeSetFactor::reset(std::size_t capacity) {
 bool FreeSetFactor::append(double* column, double diagonal) {
   const std::size_t k = size_;
   std::fill(column + k, column + padded(k + 1), 0.0);  // also what the padding held
-  substitute_forward(R_, inverse_, column, 0, k);
+  solve_lower(column, 0);
   const double pivot = diagonal - (k == 0 ? 0.0 : dot(column, column, k));
   // The difference is of this size by rounding alone when the rows are dependent.
   const double rounding =
@@ -64,10 +64,24 @@ void FreeSetFactor::rebuild_lower(std::size_t from) {
 }
 
 void FreeSetFactor::solve(double* x, std::size_t first) const {
-  substitute_forward(R_, inverse_, x, first, size_);
+  solve_lower(x, first);
   solve_upper(x);
 }
 
-void FreeSetFactor::solve_upper(double* x) const { substitute_backward(L_, inverse_, x, size_); }
+/// Whole blocks are subtracted: what is at and before the diagonal is zero, so nothing known changes.
+void FreeSetFactor::solve_lower(double* x, std::size_t first) const {
+  for (std::size_t i = first; i < size_; ++i) {
+    x[i] *= inverse_[i];
+    const std::size_t from = i / kPad * kPad;
+    add_scaled(x + from, -x[i], R_.row(i) + from, size_ - from);
+  }
+}
+
+void FreeSetFactor::solve_upper(double* x) const {
+  for (std::size_t i = size_; i-- > 0;) {
+    x[i] *= inverse_[i];
+    add_scaled(x, -x[i], L_.row(i), i + 1);
+  }
+}
 
 }  // namespace limber::internal

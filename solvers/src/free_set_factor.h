@@ -30,6 +30,7 @@ class FreeSetFactor {
 
  private:
   void rebuild_lower(std::size_t from);
+  void solve_lower(double* x, std::size_t first) const;  // x ← R⁻ᵀx
 
   std::size_t size_ = 0;
   MatrixBuffer upper_memory_, lower_memory_;

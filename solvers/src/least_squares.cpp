@@ -15,10 +15,8 @@ namespace {
 
 using Numbers = std::span<const double>;
 
-void check(const char* name, const LeastSquaresOptions& options) {
-  check_option(name, "rank_tolerance", options.rank_tolerance > 0.0, options.rank_tolerance, "> 0");
-  check_option(name, "ridge", options.ridge >= 0.0 && std::isfinite(options.ridge), options.ridge, "0 or more, finite");
-}
+// Pivots below this part of the largest are taken as zero: (singular value ratio)².
+constexpr double kRankTolerance = 1e-11;
 
 double* zeros(AlignedBuffer& memory, std::size_t n) {
   double* to = memory.need(n);
@@ -26,20 +24,15 @@ double* zeros(AlignedBuffer& memory, std::size_t n) {
   return to;
 }
 
-void add_to_diagonal(MatrixView S, std::size_t n, double ridge) {
-  for (std::size_t i = 0; i < n; ++i) S.row(i)[i] += ridge;
-}
-
 }  // namespace
 
 struct LeastSquaresSolver::Impl {
   std::size_t m = 0, d = 0;
   bool valid = false;
-  double ridge = 0.0;
   MatrixBuffer B_memory, Bt_memory, S_memory;
   MatrixView B{};         // J D^½, m × d
-  PivotedCholesky small;  // of S = B Bᵀ (m ≤ d) or N = BᵀB, with the ridge
-  AlignedBuffer root_memory, rest_memory, force_memory, small_memory, zero_memory;
+  PivotedCholesky small;  // of S = B Bᵀ (m ≤ d) or N = BᵀB
+  AlignedBuffer root_memory, rest_memory, force_memory, small_memory;
 
   void scale_rows(Numbers J, Numbers metric);
   void apply(double* r, double* f);
@@ -58,7 +51,7 @@ void LeastSquaresSolver::Impl::scale_rows(Numbers J, Numbers metric) {
   }
 }
 
-// f = (B Bᵀ + ridge)⁺ r, without refinement. r is overwritten.
+// f = (B Bᵀ)⁺ r, without refinement. r is overwritten.
 void LeastSquaresSolver::Impl::apply(double* r, double* f) {
   if (m <= d) {
     small.apply_pseudoinverse(r);
@@ -66,24 +59,18 @@ void LeastSquaresSolver::Impl::apply(double* r, double* f) {
     return;
   }
   double* u = small_memory.data();
-  combine_rows(u, zero_memory.data(), B, nullptr, r, m, d);
+  combine_rows(u, nullptr, B, nullptr, r, m, d);
   small.apply_pseudoinverse(u);
-  if (ridge == 0.0) {
-    small.apply_pseudoinverse(u);
-    multiply_rows(f, B, nullptr, u, m, d);
-    return;
-  }
-  // (B Bᵀ + ρ)⁻¹ = (1 − B (BᵀB + ρ)⁻¹ Bᵀ)/ρ
+  small.apply_pseudoinverse(u);
   multiply_rows(f, B, nullptr, u, m, d);
-  for (std::size_t i = 0; i < m; ++i) f[i] = (r[i] - f[i]) / ridge;
 }
 
-// rest −= (B Bᵀ + ridge) f
+// rest −= B Bᵀ f
 void LeastSquaresSolver::Impl::residual(const double* f, double* rest, double* u) {
-  combine_rows(u, zero_memory.data(), B, nullptr, f, m, d);
+  combine_rows(u, nullptr, B, nullptr, f, m, d);
   double* Su = force_memory.data() + padded(m);
   multiply_rows(Su, B, nullptr, u, m, d);
-  for (std::size_t i = 0; i < m; ++i) rest[i] -= Su[i] + ridge * f[i];
+  for (std::size_t i = 0; i < m; ++i) rest[i] -= Su[i];
 }
 
 LeastSquaresSolver::LeastSquaresSolver() : impl_(std::make_unique<Impl>()) {}
@@ -91,9 +78,8 @@ LeastSquaresSolver::~LeastSquaresSolver() = default;
 LeastSquaresSolver::LeastSquaresSolver(LeastSquaresSolver&&) noexcept = default;
 LeastSquaresSolver& LeastSquaresSolver::operator=(LeastSquaresSolver&&) noexcept = default;
 
-LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int rows, const LeastSquaresOptions& options) {
+LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int rows) {
   const char* name = "LeastSquaresSolver::factor";
-  check(name, options);
   check_option(name, "rows", rows >= 0, rows, "0 or more");
   Impl& s = *impl_;
   s.m = static_cast<std::size_t>(rows), s.d = metric.size();
@@ -101,9 +87,8 @@ LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int row
   s.valid = all_finite(J.data(), J.size()) && all_finite(metric.data(), metric.size()) &&
             std::all_of(metric.begin(), metric.end(), [](double x) { return x >= 0.0; });
   if (!s.valid) return {.status = SolveStatus::kInvalidInput};
-  s.ridge = options.ridge;
   s.scale_rows(J, metric);
-  zeros(s.zero_memory, s.d), zeros(s.small_memory, 2 * padded(s.d));
+  zeros(s.small_memory, 2 * padded(s.d));
   zeros(s.rest_memory, 2 * padded(s.m)), zeros(s.force_memory, 2 * padded(s.m));
   const std::size_t n = std::min(s.m, s.d);
   const MatrixView S = s.S_memory.need(n, n);
@@ -114,8 +99,7 @@ LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int row
   } else {
     gram(S, s.B, s.m, s.d);
   }
-  add_to_diagonal(S, n, s.ridge);
-  s.small.factor(S, n, options.rank_tolerance);
+  s.small.factor(S, n, kRankTolerance);
   return {.status = SolveStatus::kSolved, .rank = static_cast<int>(s.small.rank())};
 }
 
@@ -150,13 +134,13 @@ struct EqualityElimination::Impl {
   PivotedCholesky factor;
   AlignedBuffer scale_memory, b_memory, x_memory, work_memory, coefficient_memory;
 
-  void take(Numbers A, Numbers b, double ridge);
+  void take(Numbers A, Numbers b);
   MatrixView solve_rows();
 };
 
 // A_ee with rows and columns, A_ec and b_e with rows, scaled to a unit diagonal: joints mix metres and radians, and the
 // rank cut compares pivots. Rows that nothing moves are left small.
-void EqualityElimination::Impl::take(Numbers A, Numbers b, double ridge) {
+void EqualityElimination::Impl::take(Numbers A, Numbers b) {
   const std::size_t n = e + c;
   double* scale = zeros(scale_memory, e);
   double largest = 0.0;
@@ -170,7 +154,6 @@ void EqualityElimination::Impl::take(Numbers A, Numbers b, double ridge) {
   for (std::size_t i = 0; i < e; ++i) {
     for (std::size_t j = 0; j < e; ++j) A_ee.row(i)[j] = scale[i] * scale[j] * A[i * n + j];
     std::fill(A_ee.row(i) + e, A_ee.row(i) + A_ee.stride, 0.0);
-    A_ee.row(i)[i] += ridge * scale[i] * scale[i];
     for (std::size_t j = 0; j < c; ++j) A_ec.row(i)[j] = scale[i] * A[i * n + e + j];
     std::fill(A_ec.row(i) + c, A_ec.row(i) + A_ec.stride, 0.0);
     b_e[i] = scale[i] * b[i];
@@ -197,9 +180,8 @@ EqualityElimination::EqualityElimination(EqualityElimination&&) noexcept = defau
 EqualityElimination& EqualityElimination::operator=(EqualityElimination&&) noexcept = default;
 
 LeastSquaresResult EqualityElimination::reduce(Numbers A, Numbers b, int equalities, std::span<double> A_reduced,
-                                               std::span<double> b_reduced, const LeastSquaresOptions& options) {
+                                               std::span<double> b_reduced) {
   const char* name = "EqualityElimination::reduce";
-  check(name, options);
   const std::size_t n = b.size();
   check_option(name, "equalities", equalities >= 0 && static_cast<std::size_t>(equalities) <= n, equalities,
                "0 to the number of rows");
@@ -214,8 +196,8 @@ LeastSquaresResult EqualityElimination::reduce(Numbers A, Numbers b, int equalit
     std::fill(b_reduced.begin(), b_reduced.end(), 0.0);
     return {.status = SolveStatus::kInvalidInput};
   }
-  s.take(A, b, options.ridge);
-  s.factor.factor(s.A_ee, s.e, options.rank_tolerance);
+  s.take(A, b);
+  s.factor.factor(s.A_ee, s.e, kRankTolerance);
 
   const MatrixView Y = s.solve_rows();
   const MatrixView YtY = s.gram_memory.need(s.c, s.c);

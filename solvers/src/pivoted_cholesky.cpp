@@ -39,8 +39,6 @@ void PivotedCholesky::factor(MatrixView S, std::size_t n, double tolerance) {
     for (const std::size_t earlier : pivots_) remaining[earlier] = 0.0;
     pivots_.push_back(p);
   }
-  double* zero = zero_memory_.need(n);
-  std::fill_n(zero, padded(n), 0.0);
   scratch_memory_.need(2 * padded(n));
   if (rank() == n || rank() == 0) return;
   // LᵀL, of full rank
@@ -78,7 +76,7 @@ void PivotedCholesky::apply_pseudoinverse(double* x) const {
   multiply_rows(t, Lt_, nullptr, x, rank(), n_);
   gram_factor_->apply_pseudoinverse(t);
   gram_factor_->apply_pseudoinverse(t);
-  combine_rows(x, zero_memory_.data(), Lt_, nullptr, t, rank(), n_);
+  combine_rows(x, nullptr, Lt_, nullptr, t, rank(), n_);
 }
 
 }  // namespace limber::internal

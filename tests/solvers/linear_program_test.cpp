@@ -206,33 +206,6 @@ TEST(LinearProgram, SlackBoughtIsTheLeastThatClpFinds) {
   EXPECT_GT(infeasible, 100);
 }
 
-TEST(LinearProgram, WarmSolvesFindTheColdOptimum) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  LinearProgramSolver warm, cold;
-  int warm_pivots = 0, cold_pivots = 0;
-  for (int n = 0; n < 100; ++n) {
-    const ContactSample contacts = make_contacts(5 + n % 30, 20, static_cast<Touching>(n % 2), random);
-    Sample s{.rows = contacts.contacts, .columns = contacts.contacts, .A = contacts.A, .b = contacts.b};
-    std::vector<double> f(s.b.size()), g(s.b.size());
-    warm.solve(s.program(), f);
-    for (int change = 0; change < 4; ++change) {
-      for (double& b : s.b) b *= 1.0 + 0.05 * normal(random);
-      // b in the range of A is feasible; changed on its own it need not be
-      const bool new_matrix = change % 2 == 1;
-      if (new_matrix)
-        for (std::size_t i = 0; i < s.b.size(); ++i) s.A[i * (s.b.size() + 1)] *= 1.02;
-      const auto again = new_matrix ? warm.solve_warm(s.program(), f) : warm.solve_again(s.b, f);
-      const auto fresh = cold.solve(s.program(), g);
-      ASSERT_EQ(again.status, fresh.status) << n;
-      warm_pivots += again.pivots, cold_pivots += fresh.pivots;
-      if (fresh.status != SolveStatus::kSolved) continue;
-      EXPECT_NEAR(again.objective, fresh.objective, kObjective * std::max(1.0, fresh.objective)) << n;
-    }
-  }
-  EXPECT_LT(warm_pivots, cold_pivots);
-}
-
 TEST(LinearProgram, CanAddEnergyAndTheGuardTakesItOut) {
   std::mt19937 random(4);
   LinearProgramSolver program;
@@ -246,7 +219,7 @@ TEST(LinearProgram, CanAddEnergyAndTheGuardTakesItOut) {
     ASSERT_EQ(program.solve({.rows = s.contacts, .columns = s.contacts, .A = s.A, .b = s.b}, f_lp).status,
               SolveStatus::kSolved);
     complementary.solve(ContactQp{.size = s.contacts, .A = s.A, .b = s.b}, f_lcp);
-    const auto guarded = guard_energy(VelocityLevelEnergy{s.A, s.b}, f_lp, f_lcp, f);
+    const auto guarded = guard_energy(ImpulseWork{.A = s.A, .b = s.b}, f_lp, f_lcp, f);
     report.add(guarded);
     double size = 1e-3;
     for (std::size_t i = 0; i < f.size(); ++i) size += std::abs(f_lcp[i] * s.b[i]) + std::abs(f_lp[i] * s.b[i]);
@@ -272,7 +245,6 @@ TEST(LinearProgram, NumbersThatAreNotFiniteAreAResultNotAnException) {
   EXPECT_EQ(f[0], 0.0);
   s.A = {1}, s.c = {-1};
   EXPECT_EQ(solver.solve(s.program(), f).status, SolveStatus::kInvalidInput);
-  EXPECT_THROW(solver.solve_again(s.b, f), InvalidArgument);
   s.b = {1, 2};
   EXPECT_THROW(solver.solve(s.program(), f), InvalidArgument);
 }
@@ -290,11 +262,8 @@ TEST(LinearProgram, SameBitsEveryTimeAndNoAllocationOnceWarm) {
   other.solve(program(large), h);
   other.solve(program(small), g);
   EXPECT_EQ(f, g);
-  other.solve_warm(program(small), g);
   const long before = testing::allocations();
   other.solve(program(large), h);
-  other.solve_warm(program(large), h);
-  other.solve_again(large.b, h);
   EXPECT_EQ(testing::allocations(), before);
 }
 

@@ -88,8 +88,7 @@ SolveStatus ContactProgramSolver::solve_normals(const ContactProblem& problem, c
   SolveStatus status = qp_.solve(ContactQp{.size = static_cast<int>(m), .A = A_, .b = b_}, f_complementary_).status;
   if (rule.least_sum) {
     const int size = static_cast<int>(m);
-    const LinearProgramResult result =
-        program_.solve_warm({.rows = size, .columns = size, .A = A_, .b = b_}, f_program_);
+    const LinearProgramResult result = program_.solve({.rows = size, .columns = size, .A = A_, .b = b_}, f_program_);
     status = result.status;
     report.relaxed = status == SolveStatus::kRelaxed ? 1 : 0;
     if (status == SolveStatus::kIterationLimit || status == SolveStatus::kInvalidInput) f_program_ = f_complementary_;
@@ -108,16 +107,11 @@ void ContactProgramSolver::guard(const ContactProblem& problem, const ContactPro
   const auto presses = [](double f) { return f > 0.0; };
   if (std::ranges::none_of(f_program_, presses) && std::ranges::none_of(f_complementary_, presses)) return;
   product_.resize(f_program_.size());
-  EnergyGuardResult result;
-  if (problem.gap_before.empty()) {
-    result = guard_energy(VelocityLevelEnergy{.A = A_, .b = b_}, f_program_, f_complementary_, product_);
-  } else {
-    // θ = 1 would lower both by the frames' ½ fᵀA_r f: left out, the guard is on the safe side.
-    gap_.clear();
+  gap_.clear();
+  if (!problem.gap_before.empty())
     for (const std::size_t row : one_sided_) gap_.push_back(problem.gap_before[row]);
-    result = guard_energy(GapLevelEnergy{.A = A_, .b = b_, .gap_before = gap_, .step = problem.step, .theta = 0.5},
-                          f_program_, f_complementary_, product_);
-  }
+  const EnergyGuardResult result = guard_energy({.A = A_, .b = b_, .gap_before = gap_, .step = problem.step},
+                                                f_program_, f_complementary_, product_);
   report.guard.add(result);
   const double size = std::max(std::abs(result.energy_program), std::abs(result.energy_complementary));
   report.different = std::abs(result.energy_program - result.energy_complementary) > kDifferent * size ? 1 : 0;

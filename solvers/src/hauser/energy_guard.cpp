@@ -13,32 +13,23 @@ namespace {
 
 using Numbers = std::span<const double>;
 
-// ΔE(f) = fᵀq + ½ fᵀQ f with Q = a A − r A_r and q = c (b − g₀): both levels in one form.
-struct Work {
-  Numbers A, A_rigid, b, gap_before;
-  double a, r, c;
-
-  double quadratic(std::size_t i, std::size_t j) const {
-    const std::size_t at = i * b.size() + j;
-    return a * A[at] - (A_rigid.empty() ? 0.0 : r * A_rigid[at]);
-  }
-  double linear(std::size_t i) const { return c * (b[i] - (gap_before.empty() ? 0.0 : gap_before[i])); }
-};
-
 // ΔE along f₀ + s (f₁ − f₀), and the size of the terms it is summed from, which bounds its rounding.
 struct Line {
   double phi0 = 0.0, phi1 = 0.0, phi2 = 0.0, size = 0.0;
   double at(double s) const { return phi0 + s * (phi1 + s * phi2); }
 };
 
-Line along(const Work& work, Numbers f1, Numbers f0) {
+/// ΔE(f) = fᵀq + ½ fᵀQ f with Q = a A and q = c (b − g₀): both levels in one form.
+Line along(const ImpulseWork& work, Numbers f1, Numbers f0) {
   Line line;
+  const bool gaps = !work.gap_before.empty();
+  const double a = gaps ? 2.0 / work.step : 1.0, c = gaps ? 1.0 / work.step : 1.0;
   const std::size_t m = work.b.size();
   for (std::size_t i = 0; i < m; ++i) {
-    const double di = f1[i] - f0[i], qi = work.linear(i);
+    const double di = f1[i] - f0[i], qi = c * (work.b[i] - (gaps ? work.gap_before[i] : 0.0));
     double Qf = 0.0, Qd = 0.0, size = 0.0;
     for (std::size_t j = 0; j < m; ++j) {
-      const double Qij = work.quadratic(i, j);
+      const double Qij = a * work.A[i * m + j];
       Qf += Qij * f0[j];
       Qd += Qij * (f1[j] - f0[j]);
       size += std::abs(Qij) * (std::abs(f0[j]) + std::abs(f1[j]));
@@ -49,21 +40,6 @@ Line along(const Work& work, Numbers f1, Numbers f0) {
     line.size += (std::abs(f0[i]) + std::abs(f1[i])) * (std::abs(qi) + size);
   }
   return line;
-}
-
-EnergyGuardResult guard(const Work& work, Numbers f_program, Numbers f_complementary, std::span<double> f) {
-  const std::size_t m = work.b.size();
-  check_length("guard_energy", "A", work.A.size(), m * m);
-  check_optional_length("guard_energy", "A_rigid", work.A_rigid.size(), m * m);
-  check_length("guard_energy", "f_program", f_program.size(), m);
-  check_length("guard_energy", "f_complementary", f_complementary.size(), m);
-  check_length("guard_energy", "f", f.size(), m);
-  const Line line = along(work, f_program, f_complementary);
-  // What the sums above round to is no energy: without this, forces that do no work at all would count as clamped.
-  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * line.size;
-  const double s = largest_safe_blend(line.phi0 - rounding, line.phi1, line.phi2);
-  for (std::size_t i = 0; i < m; ++i) f[i] = (1.0 - s) * f_complementary[i] + s * f_program[i];
-  return {.blend = s, .energy_program = line.at(1.0), .energy_complementary = line.phi0, .energy = line.at(s)};
 }
 
 }  // namespace
@@ -89,24 +65,22 @@ void EnergyGuardReport::add(const EnergyGuardResult& result) {
   energy_refused += std::max(0.0, result.energy_program) - std::max(0.0, result.energy);
 }
 
-EnergyGuardResult guard_energy(const VelocityLevelEnergy& energy, Numbers f_program, Numbers f_complementary,
+EnergyGuardResult guard_energy(const ImpulseWork& work, Numbers f_program, Numbers f_complementary,
                                std::span<double> f) {
-  return guard({.A = energy.A, .A_rigid = {}, .b = energy.b, .gap_before = {}, .a = 1.0, .r = 0.0, .c = 1.0}, f_program,
-               f_complementary, f);
-}
-
-EnergyGuardResult guard_energy(const GapLevelEnergy& energy, Numbers f_program, Numbers f_complementary,
-                               std::span<double> f) {
-  check_option("guard_energy", "step", energy.step > 0.0, energy.step, "> 0");
-  check_length("guard_energy", "gap_before", energy.gap_before.size(), energy.b.size());
-  return guard({.A = energy.A,
-                .A_rigid = energy.A_rigid,
-                .b = energy.b,
-                .gap_before = energy.gap_before,
-                .a = 2.0 / energy.step,
-                .r = 2.0 * energy.theta - 1.0,
-                .c = 1.0 / energy.step},
-               f_program, f_complementary, f);
+  const char* name = "guard_energy";
+  const std::size_t m = work.b.size();
+  check_length(name, "A", work.A.size(), m * m);
+  check_optional_length(name, "gap_before", work.gap_before.size(), m);
+  check_option(name, "step", work.gap_before.empty() || work.step > 0.0, work.step, "> 0");
+  check_length(name, "f_program", f_program.size(), m);
+  check_length(name, "f_complementary", f_complementary.size(), m);
+  check_length(name, "f", f.size(), m);
+  const Line line = along(work, f_program, f_complementary);
+  // What the sums above round to is no energy: without this, forces that do no work at all would count as clamped.
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * line.size;
+  const double s = largest_safe_blend(line.phi0 - rounding, line.phi1, line.phi2);
+  for (std::size_t i = 0; i < m; ++i) f[i] = (1.0 - s) * f_complementary[i] + s * f_program[i];
+  return {.blend = s, .energy_program = line.at(1.0), .energy_complementary = line.phi0, .energy = line.at(s)};
 }
 
 }  // namespace limber

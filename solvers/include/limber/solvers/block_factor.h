@@ -68,13 +68,12 @@ class BlockFactor {
   };
 
   void find_order();
-  void eliminate(std::size_t node);
   void place_columns();
   void find_runs(const Column& column, std::size_t entry);
   void times_inverse_pivot(const Column& column, const double* x, double* out) const;
   std::uint64_t* neighbours(std::size_t node) { return adjacency_.data() + node * words_; }
 
-  std::vector<std::size_t> widths_, place_, first_, degree_, alive_;
+  std::vector<std::size_t> widths_, place_, first_, degree_;
   std::vector<std::uint64_t> adjacency_;  // by node, in bits
   std::vector<bool> kept_;
   std::size_t words_ = 0, size_ = 0, numbers_ = 0, eliminated_ = 0;

@@ -11,8 +11,8 @@
 /// which is updated as forces enter and leave (Lawson and Hanson, *Solving Least Squares Problems*, chapter 23, in the
 /// form for bounds). A force whose row depends on those of the free ones never enters, so A may have any rank: more
 /// contacts than degrees of freedom, the same contact twice. w is unique; f then is one of many.
-/// Where b has no solution at all (b outside the range of A, rows that contradict each other), compliance is added to
-/// the diagonal and the result says so.
+/// Where b has no solution at all (b outside the range of A, rows that contradict each other), 1e-6 of the diagonal is
+/// added to it as compliance, or more, and the result says so.
 #pragma once
 
 #include <memory>
@@ -43,18 +43,12 @@ struct FactoredContactQp {
   std::span<const double> upper = {};
 };
 
-struct ContactQpOptions {
-  double tolerance = 1e-11;             ///< of the residual below; > 0
-  double infeasible_compliance = 1e-6;  ///< added to the diagonal, as a part of it, where (2) has no solution; > 0
-  int max_iterations = 0;               ///< ≥ 0; 0: 100 + 20 m
-};
-
 struct ContactQpResult {
   SolveStatus status = SolveStatus::kSolved;
   int iterations = 0;  ///< forces that entered or left the free set
   int free = 0;        ///< forces strictly between their bounds
-  double residual =
-      0.0;  ///< of (2): max_i |√A_ii f_i − clamp(√A_ii f_i − w_i/√A_ii)| over max_i(|b_i|/√A_ii, √A_ii|f_i|)
+  /// Of (2): max_i |√A_ii f_i − clamp(√A_ii f_i − w_i/√A_ii)| over max_i(|b_i|/√A_ii, √A_ii|f_i|); ≤ 1e-11 if solved.
+  double residual = 0.0;
   double slack = 0.0;  ///< largest violation of (2) among the w_i, in their unit; 0 unless relaxed
 };
 
@@ -69,9 +63,9 @@ class ContactQpSolver {
 
   /// @param f m; on entry a guess, such as the last step's solution (forces strictly between their bounds start free),
   /// or zero; on return the solution, or zero for kInvalidInput.
-  /// @throws InvalidArgument if a span's length does not fit, or an option is out of range
-  ContactQpResult solve(const ContactQp& problem, std::span<double> f, const ContactQpOptions& options = {});
-  ContactQpResult solve(const FactoredContactQp& problem, std::span<double> f, const ContactQpOptions& options = {});
+  /// @throws InvalidArgument if a span's length does not fit
+  ContactQpResult solve(const ContactQp& problem, std::span<double> f);
+  ContactQpResult solve(const FactoredContactQp& problem, std::span<double> f);
 
  private:
   struct Impl;

@@ -58,7 +58,7 @@ class ConvexContactSolver {
   /// y of the impulses given.
   void set_motion();
   /// J_c y
-  Vec3 moved(std::size_t unit) const { return seen(units_[unit], y_.data()); }
+  Vec3 moved(std::size_t unit);
   /// |J_c|² row by row: how far a unit impulse of each moves its own row.
   Vec3 response(std::size_t unit) const;
   /// u_c, as many numbers as the unit has rows.
@@ -102,7 +102,6 @@ class ConvexContactSolver {
     return {vector.data() + nodes_[node].first, nodes_[node].width};
   }
   MatrixView jacobian(std::size_t side) const;
-  Vec3 seen(const Unit& unit, const double* y) const;
   void find_seen(const double* y);
   Vec3 seen_by(const Unit& unit) const;
   void add_impulses(double* y);
@@ -119,10 +118,7 @@ class ConvexContactSolver {
   void assemble();
   void list_product(const Unit& unit, std::size_t a, std::size_t b, const BlockFactor::Block& block);
   void find_direction(const double* g, double* d);
-  struct Slope {
-    double first = 0.0, second = 0.0;
-  };
-  Slope slope_at(double step, double yd, double dd) const;
+  ContactPotential::Slope slope_at(double step, double yd, double dd) const;
   double best_step(double slope_at_start) const;
   double potential_of(const double* y);
 

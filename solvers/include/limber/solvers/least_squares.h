@@ -6,7 +6,7 @@
 /// the least-norm least-squares forces of m rows over d degrees of freedom with a diagonal metric D ≥ 0 (1/mass; H/Δt
 /// for modes under a held force). Conflicting rows are met in the least-squares sense, redundant ones share the force.
 /// Worked in the smaller of m and d with B = J D^½: S = B Bᵀ for m ≤ d, N = BᵀB for m > d, either factored by Cholesky
-/// with diagonal pivoting and a rank cut, P ᵀ S P ≈ L Lᵀ with L of r columns:
+/// with diagonal pivoting and a rank cut at 1e-11 of the largest pivot, P ᵀ S P ≈ L Lᵀ with L of r columns:
 ///   S⁺ = L (LᵀL)⁻² Lᵀ  (m ≤ d),      (B Bᵀ)⁺ = B (N⁺)² Bᵀ,  N⁺ = L (LᵀL)⁻² Lᵀ  (m > d)
 /// One step of iterative refinement follows. Cost O(m d min(m, d) + min³) to factor, O(m d) per right-hand side.
 #pragma once
@@ -17,12 +17,6 @@
 #include "limber/solvers/solve_status.h"
 
 namespace limber {
-
-struct LeastSquaresOptions {
-  double rank_tolerance =
-      1e-11;           ///< pivots below this part of the largest are taken as zero: (singular value ratio)²; > 0
-  double ridge = 0.0;  ///< ≥ 0: (J D Jᵀ + ridge·1) instead of (1), the compliance of a soft handle
-};
 
 struct LeastSquaresResult {
   SolveStatus status = SolveStatus::kSolved;
@@ -40,9 +34,8 @@ class LeastSquaresSolver {
 
   /// @param J m × d, row-major. @param metric D, d numbers ≥ 0
   /// @return kInvalidInput if a number is not finite or D has a negative: solve() then gives zero
-  /// @throws InvalidArgument if lengths do not fit or an option is out of range
-  LeastSquaresResult factor(std::span<const double> J, std::span<const double> metric, int rows,
-                            const LeastSquaresOptions& options = {});
+  /// @throws InvalidArgument if lengths do not fit
+  LeastSquaresResult factor(std::span<const double> J, std::span<const double> metric, int rows);
 
   /// f = (J D Jᵀ)⁺ r for the factored J and D. @param r, f m numbers each; may be the same memory
   /// @throws InvalidArgument if lengths do not fit
@@ -52,11 +45,6 @@ class LeastSquaresSolver {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// (1) by Eigen's complete orthogonal decomposition of B: the reference for LeastSquaresSolver. Allocates; 3–5 times
-/// the time. @throws InvalidArgument if lengths do not fit
-void solve_by_orthogonal_decomposition(std::span<const double> J, std::span<const double> metric,
-                                       std::span<const double> r, std::span<double> f, double rank_tolerance = 1e-11);
 
 /// Removes equality rows e from a problem with other rows c, so that a linear program or QP sees the latter alone:
 ///
@@ -78,8 +66,7 @@ class EqualityElimination {
   /// @return kInvalidInput if a number is not finite: outputs are zero then
   /// @throws InvalidArgument if lengths do not fit
   LeastSquaresResult reduce(std::span<const double> A, std::span<const double> b, int equalities,
-                            std::span<double> A_reduced, std::span<double> b_reduced,
-                            const LeastSquaresOptions& options = {});
+                            std::span<double> A_reduced, std::span<double> b_reduced);
 
   /// The equality forces that go with f_c. @param f_c n − e numbers. @param f_e e numbers
   void recover(std::span<const double> f_c, std::span<double> f_e) const;

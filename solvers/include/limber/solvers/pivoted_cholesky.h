@@ -32,7 +32,7 @@ class PivotedCholesky {
 
   std::size_t n_ = 0;
   MatrixBuffer columns_memory_, rows_memory_, gram_memory_;
-  AlignedBuffer diagonal_memory_, coefficient_memory_, right_memory_, zero_memory_;
+  AlignedBuffer diagonal_memory_, coefficient_memory_;
   MatrixView Lt_{};
   std::vector<std::size_t> pivots_;
   mutable AlignedBuffer scratch_memory_;

@@ -21,14 +21,14 @@ class SecantIteration {
   std::span<const double> best_iterate() const { return best_x_; }
 
  private:
-  static constexpr int kDepth = 5;
+  static constexpr std::size_t kDepth = 5;
 
   void remember(std::span<const double> x, std::span<const double> step, std::span<const double> residual);
   std::array<double, kDepth> secant_weights(std::span<const double> residual) const;
 
   std::vector<double> x_, step_, residual_, best_x_, best_step_;  // of the last iterate, and the best
-  std::array<std::vector<double>, kDepth> dx_, dstep_, dresidual_;
-  int known_ = 0;  // secants
+  std::array<std::vector<double>, kDepth> change_, dresidual_;    // change_: of x and step together
+  std::size_t known_ = 0;                                         // secants
   bool first_ = true;
   double best_ = 0.0, length_ = 1.0;
 };

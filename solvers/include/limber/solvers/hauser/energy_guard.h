@@ -3,30 +3,23 @@
 ///
 /// The work of forces f is a quadratic of f, which level is solved deciding which:
 ///   velocity   ΔE(f) = fᵀb + ½ fᵀA f                                                                            (1)
-///   gap        ΔE(f) = fᵀ(A f + b − g₀)/Δt − (θ − ½) fᵀA_r f,   A_r = J_r M⁻¹J_rᵀ of the rigid frames            (2)
-/// with g₀ the gaps at the step's start and f an impulse. Both the complementary solution (contact_qp.h) and the
-/// linear program's lie in the convex set A f + b ≥ 0, f ≥ 0, so any f(s) = (1 − s) f_LCP + s f_LP does. The guard
-/// takes the largest s in [0, 1] with ΔE(f(s)) ≤ 0: the root of one quadratic.
+///   gap        ΔE(f) = fᵀ(A f + b − g₀)/Δt                                                                      (2)
+/// with g₀ the gaps at the step's start and f an impulse, held over the step: where it all comes at the start, frames
+/// take less. Both the complementary solution (contact_qp.h) and the linear program's lie in the convex set
+/// A f + b ≥ 0, f ≥ 0, so any f(s) = (1 − s) f_LCP + s f_LP does. The guard takes the largest s in [0, 1] with
+/// ΔE(f(s)) ≤ 0: the root of one quadratic.
 #pragma once
 
 #include <span>
 
 namespace limber {
 
-/// ΔE of velocity level, (1).
-struct VelocityLevelEnergy {
-  std::span<const double> A = {};  ///< m × m, symmetric
-  std::span<const double> b = {};  ///< m, relative speeds before, m/s
-};
-
-/// ΔE of gap level, (2).
-struct GapLevelEnergy {
-  std::span<const double> A = {};           ///< m × m, symmetric: gap per impulse, s/kg
-  std::span<const double> b = {};           ///< m, gaps predicted at the step's end, m
-  std::span<const double> gap_before = {};  ///< g₀, m, m
-  std::span<const double> A_rigid = {};     ///< A_r, m × m, symmetric, 1/kg; empty: 0
-  double step = 0.0;                        ///< Δt, s; > 0
-  double theta = 1.0;                       ///< θ: 1 impulse at the step's start, ½ force held over it
+/// ΔE of impulses, (1) or (2).
+struct ImpulseWork {
+  std::span<const double> A = {};           ///< m × m, symmetric; at gap level gap per impulse, s/kg
+  std::span<const double> b = {};           ///< m: relative speeds before, m/s, or gaps predicted at the step's end, m
+  std::span<const double> gap_before = {};  ///< g₀, m, m; empty: velocity level
+  double step = 0.0;                        ///< Δt, s; > 0 at gap level
 };
 
 /// What the guard did to one solve.
@@ -50,9 +43,7 @@ struct EnergyGuardReport {
 /// @param f m, the safe forces f(s); may be the same memory as either input. If even f_LCP adds energy (a gap that was
 /// negative at the start), s is the one of least ΔE.
 /// @throws InvalidArgument if lengths do not fit, or Δt ≤ 0. Does not allocate.
-EnergyGuardResult guard_energy(const VelocityLevelEnergy& energy, std::span<const double> f_program,
-                               std::span<const double> f_complementary, std::span<double> f);
-EnergyGuardResult guard_energy(const GapLevelEnergy& energy, std::span<const double> f_program,
+EnergyGuardResult guard_energy(const ImpulseWork& work, std::span<const double> f_program,
                                std::span<const double> f_complementary, std::span<double> f);
 
 /// The largest s in [0, 1] with φ₀ + φ₁s + φ₂s² ≤ 0; where there is none, the s of the least value.
