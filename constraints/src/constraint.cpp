@@ -6,12 +6,19 @@
 
 namespace limber {
 
+namespace {
+
+const RigidFrame& frame_at(const ConstrainedBody& body, StepTime when) {
+  return when == StepTime::kStart ? body.group->frame(body.slot) : body.group->predicted_frame(body.slot);
+}
+
+}  // namespace
+
 const RigidTransform& BodyStates::pose(Index body, StepTime when) const {
   static const RigidTransform kWorld{};
   if (body < 0) return kWorld;
   const ConstrainedBody& b = this->body(body);
-  if (b.group == nullptr) return b.pose;
-  return when == StepTime::kStart ? b.group->frame(b.slot).pose() : b.group->predicted_frame(b.slot).pose();
+  return b.group == nullptr ? b.pose : frame_at(b, when).pose();
 }
 
 Vec3 BodyStates::origin(Index body, StepTime when) const {
@@ -55,17 +62,13 @@ const ExactMotion* FreeMotions::of(Index body) const {
 }
 
 Vec3 BodyStates::velocity(Index body, StepTime when) const {
-  if (is_static(body)) return Vec3::Zero();
-  const ConstrainedBody& b = this->body(body);
-  return when == StepTime::kStart ? b.group->frame(b.slot).velocity() : b.group->predicted_frame(b.slot).velocity();
+  return is_static(body) ? Vec3(Vec3::Zero()) : frame_at(this->body(body), when).velocity();
 }
 
 Vec3 BodyStates::angular_velocity(Index body, StepTime when) const {
   if (is_static(body)) return Vec3::Zero();
   const ConstrainedBody& b = this->body(body);
-  const FrameConstants& c = b.group->frame_constants();
-  return when == StepTime::kStart ? b.group->frame(b.slot).angular_velocity(c)
-                                  : b.group->predicted_frame(b.slot).angular_velocity(c);
+  return frame_at(b, when).angular_velocity(b.group->frame_constants());
 }
 
 }  // namespace limber

@@ -99,37 +99,4 @@ void IslandBodies::write_frame_metric(std::span<double> metric) const {
   for (Index b = 0; b < count(); ++b) response(b).write_frame_metric(metric.data() + first(b));
 }
 
-namespace {
-
-/// One row of J against another: they meet where they share a body.
-double product(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric, Index i,
-               Index j) {
-  double sum = 0.0;
-  for (const ConstraintRows::Side& a : rows.row(i).sides)
-    for (const ConstraintRows::Side& b : rows.row(j).sides) {
-      const Index body = a.body == b.body ? bodies.local(a.body) : -1;
-      if (body < 0) continue;
-      const BodyResponse& r = bodies.response(body);
-      const double* D = metric.data() + bodies.first(body);
-      for (int t = 0; t < r.translations; ++t) sum += *D++ * a.linear[t] * b.linear[t];
-      for (int t = 0; t < r.rotations; ++t) sum += *D++ * r.axes.col(t).dot(a.angular) * r.axes.col(t).dot(b.angular);
-      const std::span<const double> za = rows.modal(a), zb = rows.modal(b);
-      for (std::size_t m = 0; m < std::min(za.size(), zb.size()); ++m) sum += D[m] * za[m] * zb[m];
-    }
-  return sum;
-}
-
-}  // namespace
-
-void assemble(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric,
-              std::span<double> A) {
-  const Index m = rows.size();
-  const auto at = [&](Index i, Index j) -> double& {
-    return A[static_cast<std::size_t>(i) * static_cast<std::size_t>(m) + static_cast<std::size_t>(j)];
-  };
-  for (Index i = 0; i < m; ++i)
-    for (Index j = 0; j <= i; ++j)
-      at(i, j) = at(j, i) = product(bodies, rows, metric, i, j) + (i == j ? rows.row(i).law.compliance : 0.0);
-}
-
 }  // namespace limber

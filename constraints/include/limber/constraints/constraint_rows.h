@@ -180,8 +180,4 @@ class IslandBodies {
   int degrees_of_freedom_ = 0;
 };
 
-/// A = J D Jᵀ + diag(compliance), rows × rows, symmetric. For reference and small problems: the solver works on J.
-void assemble(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> metric,
-              std::span<double> A);
-
 }  // namespace limber
