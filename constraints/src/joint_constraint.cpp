@@ -20,8 +20,6 @@ constexpr double kLimitRecoverySpeed = 1.0;
 // Euler angles are singular at ±90° of the second; closer than this to it their rows keep a finite size.
 constexpr double kLeastEulerDeterminant = 1e-3;
 
-int coordinate_count(JointType type) { return freedoms(type).rotations + freedoms(type).translations; }
-
 Vec3 euler_xyz(const Mat3& Q) {
   return {std::atan2(-Q(1, 2), Q(2, 2)), std::asin(std::clamp(Q(0, 2), -1.0, 1.0)), std::atan2(-Q(0, 1), Q(0, 0))};
 }
@@ -57,103 +55,84 @@ Vec3 euler_rate_change(const Mat3& Q, const Mat3& dQ, int i) {
 }  // namespace
 
 JointConstraint::JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec)
-    : a_(std::move(a)), b_(std::move(b)), spec_(spec), freedoms_(coordinate_count(spec.type)) {
+    : a_(std::move(a)), b_(std::move(b)), spec_(spec) {
   spec_.validate();
-  plan_locked_rows();
-  plan_limits();
+  plan();
 }
 
 void JointConstraint::set_actuation(int coordinate, const JointActuation& actuation) {
-  if (coordinate < 0 || coordinate >= freedoms_)
+  if (coordinate < 0 || coordinate >= coordinates())
     throw InvalidArgument("JointConstraint: coordinate " + std::to_string(coordinate) + ", expected 0 to " +
-                          std::to_string(freedoms_ - 1) + " for a " + std::string(to_string(spec_.type)) + " joint");
+                          std::to_string(coordinates() - 1) + " for a " + std::string(to_string(spec_.type)) +
+                          " joint");
   actuation.validate();
   actuation_[static_cast<std::size_t>(coordinate)] = actuation;
 }
 
 void JointConstraint::restore_state(StateReader& state) {
   state(*this);
-  freedoms_ = coordinate_count(spec_.type);
+  plan();
+}
+
+// What the rows are ---------------------------------------------------------------------------------------------------
+
+void JointConstraint::plan() {
   plan_.clear();
   plan_locked_rows();
   plan_limits();
 }
 
-// What the rows are ---------------------------------------------------------------------------------------------------
-
 void JointConstraint::plan_locked_rows() {
-  const JointType type = spec_.type;
-  const bool along_x = type == JointType::kCylindrical || type == JointType::kPrismatic;
+  const int rotations = freedoms(spec_.type).rotations;
   for (int axis = 0; axis < 3; ++axis) {
-    if (type == JointType::kPlanar ? axis < 2 : along_x && axis == 0) continue;
-    plan_.push_back({.measure = Measure::kTranslation, .axis = axis});
+    bool is_free = false;
+    for (int i = 0; i < coordinates(); ++i) is_free = is_free || (!is_angle(i) && axis_of(i) == axis);
+    if (!is_free) plan_.push_back({.measure = Measure::kTranslation, .axis = axis});
   }
-  if (type == JointType::kCylindrical && spec_.pitch != 0.0) plan_.push_back({.measure = Measure::kScrew});
-  if (type == JointType::kRevolute || type == JointType::kCylindrical)
-    for (const int axis : {1, 2}) plan_.push_back({.measure = Measure::kTurnOfX, .axis = axis});
-  if (type == JointType::kPlanar)
-    for (const int axis : {0, 1}) plan_.push_back({.measure = Measure::kTurnOfZ, .axis = axis});
-  if (type == JointType::kPrismatic || type == JointType::kFixed)
-    for (int axis = 0; axis < 3; ++axis) plan_.push_back({.measure = Measure::kTurn, .axis = axis});
+  if (spec_.type == JointType::kCylindrical && spec_.pitch != 0.0) plan_.push_back({.measure = Measure::kScrew});
+  for (int axis = 0; axis < 3 && rotations < 3; ++axis)
+    if (rotations == 0 || axis != turning_axis())
+      plan_.push_back({.measure = rotations == 0 ? Measure::kTurn : Measure::kAcross, .axis = axis});
 }
 
 void JointConstraint::plan_limits() {
   const JointLimits& limits = spec_.limits;
-  switch (spec_.type) {
-    case JointType::kBall:
-      for (int i = 0; i < 3; ++i) plan_limit(i, limits.euler[static_cast<std::size_t>(i)]);
-      if (std::isfinite(limits.cone)) plan_.push_back({.measure = Measure::kCone, .bound = limits.cone});
-      break;
-    case JointType::kRevolute:
-      plan_limit(0, limits.rotation);
-      break;
-    case JointType::kCylindrical:
-      plan_limit(0, limits.rotation);
-      plan_limit(1, limits.translation[0]);
-      break;
-    case JointType::kPrismatic:
-      plan_limit(0, limits.translation[0]);
-      break;
-    case JointType::kPlanar:
-      plan_limit(0, limits.translation[0]);
-      plan_limit(1, limits.translation[1]);
-      plan_limit(2, limits.rotation);
-      break;
-    case JointType::kFixed:
-      break;
+  for (int i = 0; i < coordinates(); ++i) {
+    const Interval& interval = spec_.type == JointType::kBall ? limits.euler[static_cast<std::size_t>(i)]
+                               : is_angle(i)                  ? limits.rotation
+                                             : limits.translation[static_cast<std::size_t>(axis_of(i))];
+    if (std::isfinite(interval.low)) plan_.push_back(row_of(i, Law::kLimit, 1.0, interval.low));
+    if (std::isfinite(interval.high)) plan_.push_back(row_of(i, Law::kLimit, -1.0, interval.high));
   }
-}
-
-void JointConstraint::plan_limit(int coordinate, const Interval& interval) {
-  if (std::isfinite(interval.low))
-    plan_.push_back({.measure = Measure::kLimit, .axis = coordinate, .sign = 1.0, .bound = interval.low});
-  if (std::isfinite(interval.high))
-    plan_.push_back({.measure = Measure::kLimit, .axis = coordinate, .sign = -1.0, .bound = interval.high});
+  if (spec_.type == JointType::kBall && std::isfinite(limits.cone))
+    plan_.push_back({.measure = Measure::kCone, .law = Law::kLimit, .sign = -1.0, .zero = limits.cone});
 }
 
 void JointConstraint::plan_actuation() {
   rows_ = plan_;
-  for (int i = 0; i < freedoms_; ++i) {
+  for (int i = 0; i < coordinates(); ++i) {
     const JointActuation& act = actuation(i);
-    if (act.motor_max_force > 0.0) rows_.push_back({.measure = Measure::kMotor, .axis = i});
-    if (act.drive_stiffness > 0.0 || act.drive_damping > 0.0) rows_.push_back({.measure = Measure::kDrive, .axis = i});
-    if (act.friction > 0.0) rows_.push_back({.measure = Measure::kFriction, .axis = i});
+    if (act.motor_max_force > 0.0) rows_.push_back(row_of(i, Law::kMotor));
+    if (act.drive_stiffness > 0.0 || act.drive_damping > 0.0)
+      rows_.push_back(row_of(i, Law::kDrive, 1.0, act.drive_target));
+    if (act.friction > 0.0) rows_.push_back(row_of(i, Law::kFriction));
   }
+}
+
+JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double sign, double zero) const {
+  return {.measure = is_angle(coordinate) ? Measure::kAngle : Measure::kTranslation,
+          .law = law,
+          .axis = axis_of(coordinate),
+          .coordinate = coordinate,
+          .sign = sign,
+          .zero = zero};
 }
 
 // Coordinates ---------------------------------------------------------------------------------------------------------
 
+/// Rotations come first, but for planar joints.
 bool JointConstraint::is_angle(int coordinate) const {
-  switch (spec_.type) {
-    case JointType::kPrismatic:
-      return false;
-    case JointType::kPlanar:
-      return coordinate == 2;
-    case JointType::kCylindrical:
-      return coordinate == 0;
-    default:
-      return true;
-  }
+  return spec_.type == JointType::kPlanar ? coordinate == 2 : coordinate < freedoms(spec_.type).rotations;
 }
 
 int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
@@ -172,18 +151,17 @@ JointConstraint::Placement JointConstraint::place(const BodyStates& states, Step
   return {a_.position(states, when), b_.position(states, when), a_.axes(states, when), b_.axes(states, when)};
 }
 
-double JointConstraint::raw_coordinate(const Placement& at, int i) const {
-  if (!is_angle(i)) return at.d[axis_of(i)];
+double JointConstraint::raw_angle(const Placement& at, int i) const {
   const Mat3 Q = at.R_a.transpose() * at.R_b;
   if (spec_.type == JointType::kBall) return euler_xyz(Q)[i];
   const int x = (axis_of(i) + 1) % 3, y = (axis_of(i) + 2) % 3;
   return std::atan2(Q(y, x) - Q(x, y), Q(x, x) + Q(y, y));
 }
 
-/// With the number of full turns that is nearest to the last step's.
+/// Angles with the number of full turns that is nearest to the last step's.
 double JointConstraint::unwrapped(const Placement& at, int i) const {
-  const double raw = raw_coordinate(at, i);
-  if (!is_angle(i)) return raw;
+  if (!is_angle(i)) return at.d[axis_of(i)];
+  const double raw = raw_angle(at, i);
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return raw + kTurn * std::round((last_[static_cast<std::size_t>(i)] - raw) / kTurn);
 }
@@ -192,84 +170,65 @@ double JointConstraint::coordinate(int i, const BodyStates& states) const {
   return unwrapped(place(states, StepTime::kStart), i);
 }
 
-JointConstraint::Direction JointConstraint::coordinate_direction(const Placement& at, int i) const {
-  const Vec3 axis = at.R_a.col(axis_of(i));
-  if (!is_angle(i)) return {.linear = axis};
-  if (spec_.type == JointType::kBall) return {.angular = at.R_a * euler_rate(at.R_a.transpose() * at.R_b, i)};
-  return {.angular = axis};
-}
-
 // Gaps and their derivatives ------------------------------------------------------------------------------------------
 
-/// x_b or z_b along that of a: an axis of a that it is to be normal to, with the sign that makes the row a rotation.
-/// And for rows that lock a turn the two products that make half the skew part of R_aᵀR_b, which is 0 where the turn
-/// is.
-std::array<JointConstraint::TurnAxes, 2> JointConstraint::turn_axes(const RowPlan& row) {
-  if (row.measure == Measure::kTurnOfX) return {row.axis == 1 ? TurnAxes{2, 0, -1.0} : TurnAxes{1, 0, 1.0}, {}};
-  if (row.measure == Measure::kTurnOfZ) return {row.axis == 0 ? TurnAxes{1, 2, -1.0} : TurnAxes{0, 2, 1.0}, {}};
+/// What is across: an axis of b and that of a it is to be normal to, with the sign that makes the row a rotation. And
+/// for rows that lock a turn the two products that make half the skew part of R_aᵀR_b, which is 0 where the turn is.
+std::array<JointConstraint::TurnAxes, 2> JointConstraint::turn_axes(const RowPlan& row) const {
   const int j = (row.axis + 1) % 3, k = (row.axis + 2) % 3;
-  return {TurnAxes{k, j, 0.5}, TurnAxes{j, k, -0.5}};
+  if (row.measure == Measure::kTurn) return {TurnAxes{k, j, 0.5}, TurnAxes{j, k, -0.5}};
+  return {k == turning_axis() ? TurnAxes{j, k, -1.0} : TurnAxes{k, j, 1.0}, {}};
 }
 
-double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
+double JointConstraint::measured(const Placement& at, const RowPlan& row) const {
   switch (row.measure) {
     case Measure::kTranslation:
       return at.d[row.axis];
     case Measure::kScrew:
       return at.d.x() - spec_.pitch * unwrapped(at, 0);
-    case Measure::kTurnOfX:
-    case Measure::kTurnOfZ: {
+    case Measure::kAcross: {
       const TurnAxes turn = turn_axes(row)[0];
       return turn.sign * at.R_a.col(turn.of_a).dot(at.R_b.col(turn.of_b));
     }
     case Measure::kTurn:
       return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
-    case Measure::kLimit:
-      return row.sign * (unwrapped(at, row.axis) - row.bound);
+    case Measure::kAngle:
+      return unwrapped(at, row.coordinate);
     case Measure::kCone: {
       const Vec3 x_a = at.R_a.col(0), x_b = at.R_b.col(0);
-      return row.bound - std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
+      return std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
     }
-    case Measure::kDrive:
-      return unwrapped(at, row.axis) - actuation(row.axis).drive_target;
-    case Measure::kMotor:
-    case Measure::kFriction:
-      return unwrapped(at, row.axis);
   }
   return 0.0;
 }
 
+double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
+  return row.sign * (measured(at, row) - row.zero);
+}
+
 JointConstraint::Direction JointConstraint::direction(const Placement& at, const RowPlan& row) const {
-  const auto a = [&](int i) -> Vec3 { return at.R_a.col(i); };
-  const auto b = [&](int i) -> Vec3 { return at.R_b.col(i); };
+  const Vec3 axis = row.sign * at.R_a.col(row.axis);
   switch (row.measure) {
     case Measure::kTranslation:
-      return {.linear = a(row.axis)};
+      return {.linear = axis};
     case Measure::kScrew:
-      return {.linear = a(0), .angular = -spec_.pitch * a(0)};
-    case Measure::kTurnOfX:
-    case Measure::kTurnOfZ: {
+      return {.linear = axis, .angular = -spec_.pitch * axis};
+    case Measure::kAcross: {
       const TurnAxes turn = turn_axes(row)[0];
-      return {.angular = turn.sign * b(turn.of_b).cross(a(turn.of_a))};
+      return {.angular = turn.sign * at.R_b.col(turn.of_b).cross(at.R_a.col(turn.of_a))};
     }
     case Measure::kTurn: {
       // d (2 vec q) = w ω + ω × vec q, in the axes of a
       const Quaternion q = normalized(quaternion_from_matrix(at.R_a.transpose() * at.R_b));
       return {.angular = at.R_a * (q.w * Vec3::Unit(row.axis) + q.vector().cross(Vec3::Unit(row.axis)))};
     }
-    case Measure::kLimit: {
-      Direction d = coordinate_direction(at, row.axis);
-      d.linear *= row.sign, d.angular *= row.sign;
-      return d;
-    }
+    case Measure::kAngle:
+      if (spec_.type != JointType::kBall) return {.angular = axis};
+      return {.angular = row.sign * (at.R_a * euler_rate(at.R_a.transpose() * at.R_b, row.coordinate))};
     case Measure::kCone: {
-      const Vec3 axis = b(0).cross(a(0));
-      return {.angular = axis.norm() > 0.0 ? axis.normalized() : a(1)};
+      const Vec3 normal = at.R_a.col(0).cross(at.R_b.col(0));
+      return {.angular = row.sign * (normal.norm() > 0.0 ? normal.normalized() : Vec3(-at.R_a.col(1)))};
     }
-    case Measure::kMotor:
-    case Measure::kDrive:
-    case Measure::kFriction:
-      return coordinate_direction(at, row.axis);
   }
   return {};
 }
@@ -278,18 +237,16 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
 Vec3 JointConstraint::direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a,
                                        const Mat3& dR_b) const {
   if (row.measure == Measure::kCone) {
-    const Vec3 normal = at.R_b.col(0).cross(at.R_a.col(0)),
-               change = dR_b.col(0).cross(at.R_a.col(0)) + at.R_b.col(0).cross(dR_a.col(0));
+    const Vec3 normal = at.R_a.col(0).cross(at.R_b.col(0)),
+               change = dR_a.col(0).cross(at.R_b.col(0)) + at.R_a.col(0).cross(dR_b.col(0));
     const double size = normal.norm();
-    if (!(size > 0.0)) return dR_a.col(1);
-    return (change - normal * (normal.dot(change) / (size * size))) / size;
+    if (!(size > 0.0)) return -row.sign * dR_a.col(1);
+    return row.sign * (change - normal * (normal.dot(change) / (size * size))) / size;
   }
-  if (row.measure == Measure::kScrew) return -spec_.pitch * dR_a.col(0);
-  const double sign = row.measure == Measure::kLimit ? row.sign : 1.0;
-  if (!is_angle(row.axis)) return Vec3::Zero();
-  if (spec_.type != JointType::kBall) return sign * dR_a.col(axis_of(row.axis));
+  if (row.measure == Measure::kScrew) return -spec_.pitch * dR_a.col(row.axis);
+  if (spec_.type != JointType::kBall) return row.sign * dR_a.col(row.axis);
   const Mat3 Q = at.R_a.transpose() * at.R_b, dQ = dR_a.transpose() * at.R_b + at.R_a.transpose() * dR_b;
-  return sign * (dR_a * euler_rate(Q, row.axis) + at.R_a * euler_rate_change(Q, dQ, row.axis));
+  return row.sign * (dR_a * euler_rate(Q, row.coordinate) + at.R_a * euler_rate_change(Q, dQ, row.coordinate));
 }
 
 /// In the middle of the step an angle φ about an axis that both parts share changes by its direction times the relative
@@ -299,12 +256,11 @@ JointConstraint::Direction JointConstraint::mean_direction(const Placement& star
                                                            const Placement& at, const RowPlan& row,
                                                            const Vec3& turn) const {
   Direction mean = direction(at, row);
-  const bool coordinate = row.measure == Measure::kLimit || row.measure >= Measure::kMotor;
-  const bool turns = row.measure == Measure::kScrew || (coordinate && is_angle(row.axis));
+  const bool turns = row.measure == Measure::kScrew || row.measure == Measure::kAngle;
   if (!turns || spec_.type == JointType::kBall) return mean;
-  const int angle = row.measure == Measure::kScrew ? 0 : row.axis;
+  const int angle = row.measure == Measure::kScrew ? 0 : row.coordinate;
   const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
-  const Vec3 axis = start.R_a.col(axis_of(angle)), mean_axis = at.R_a.col(axis_of(angle));
+  const Vec3 axis = start.R_a.col(row.axis), mean_axis = at.R_a.col(row.axis);
   const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
   mean.angular *=
       ratio * (1.0 - 0.5 * tangent * turn.dot(axis)) / ((1.0 + 0.25 * turn.squaredNorm()) * mean_axis.squaredNorm());
@@ -314,53 +270,37 @@ JointConstraint::Direction JointConstraint::mean_direction(const Placement& star
 // Rows of one step ----------------------------------------------------------------------------------------------------
 
 RowLaw JointConstraint::law_of(const RowPlan& plan, double gap) const {
-  RowLaw law;
+  if (plan.law >= Law::kMotor) return actuation_law(plan, gap);
   const double recovery = kLimitRecoverySpeed * step_;
-  switch (plan.measure) {
-    case Measure::kMotor:
-    case Measure::kDrive:
-    case Measure::kFriction:
-      return actuation_law(plan, gap);
-    case Measure::kLimit:
-    case Measure::kCone:
-      law.lower = 0.0;
-      law.offset = std::min(0.0, gap + recovery);
-      break;
-    default:
-      law.offset = gap - std::clamp(gap, -recovery, recovery);
-  }
-  law.holds = true;
+  RowLaw law{.holds = true};
+  law.offset = gap - std::clamp(gap, -recovery, recovery);
+  if (plan.law == Law::kLimit) law.lower = 0.0, law.offset = std::min(0.0, gap + recovery);
   return law;
 }
 
 RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
-  const JointActuation& act = actuation(plan.axis);
-  const auto coordinate = static_cast<std::size_t>(plan.axis);
-  RowLaw law{.goes_on = true};
-  if (plan.measure == Measure::kDrive) {
+  const JointActuation& act = actuation(plan.coordinate);
+  RowLaw law{.goes_on = true, .last_force = force_.actuation[actuator(plan)]};
+  if (plan.law == Law::kDrive) {
     const double implicit = step_ * act.drive_stiffness + act.drive_damping;
     law.compliance = 1.0 / implicit;
     law.offset = act.drive_damping / implicit * gap;
     law.stiffness = act.drive_stiffness;
-    law.last_force = drive_force_[coordinate];
     return law;
   }
-  const bool motor = plan.measure == Measure::kMotor;
+  const bool motor = plan.law == Law::kMotor;
   law.upper = step_ * (motor ? act.motor_max_force : act.friction);
   law.lower = -law.upper;
   law.end_rate = motor ? act.motor_velocity : 0.0;
   law.agent_displacement = step_ * law.end_rate;
   law.offset = gap + law.agent_displacement;
-  law.last_force = motor ? motor_force_[coordinate] : friction_force_[coordinate];
   return law;
 }
 
 /// Of axes and distances: exact for any step, in its middle too. @return whether it is such a row
 bool JointConstraint::measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a,
                                        FrameMeasure& of_b) const {
-  const bool coordinate = plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor;
-  if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ ||
-      (plan.measure == Measure::kTurn && at.a.when == StepTime::kMiddle)) {
+  if (plan.measure == Measure::kAcross || (plan.measure == Measure::kTurn && at.a.when == StepTime::kMiddle)) {
     for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {
       if (sign == 0.0) continue;
       at.a.add_axis(axis_a, sign * at.place.R_b.col(axis_b), of_a);
@@ -368,12 +308,10 @@ bool JointConstraint::measure_straight(const Instant& at, const RowPlan& plan, F
     }
     return true;
   }
-  if (plan.measure != Measure::kTranslation && (!coordinate || is_angle(plan.axis))) return false;
-  const int axis = coordinate ? axis_of(plan.axis) : plan.axis;
-  const double sign = plan.measure == Measure::kLimit ? plan.sign : 1.0;
-  const Vec3 n = sign * at.place.R_a.col(axis);
+  if (plan.measure != Measure::kTranslation) return false;
+  const Vec3 n = plan.sign * at.place.R_a.col(plan.axis);
   at.b.add_point(at.place.o_b, n, of_b);
-  at.a.add_axis(axis, sign * (at.place.o_b - at.place.o_a), of_a);
+  at.a.add_axis(plan.axis, plan.sign * (at.place.o_b - at.place.o_a), of_a);
   at.a.add_point(at.place.o_a, -n, of_a);
   return true;
 }
@@ -400,14 +338,12 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
                nearest = distance_tolerance(kJointTolerance, length, at.place.o_b);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
-    const bool distance =
-        plan.measure == Measure::kTranslation || plan.measure == Measure::kScrew ||
-        ((plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor) && !is_angle(plan.axis));
+    const bool distance = is_distance(plan);
     const double gap = this->gap(at.place, plan);
     RowLaw law = law_of(plan, gap);
     law.tolerance = distance ? nearest : kJointTolerance;
     law.digits = digits_of(distance ? length + at.place.o_b.norm() : 1.0 + std::abs(gap));
-    if (i < plan_force_.size()) law.last_force = plan_force_[i];
+    if (i < force_.plan.size()) law.last_force = force_.plan[i];
     FrameMeasure of_a, of_b;
     if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at.place, plan), of_a, of_b);
     rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_), law);
@@ -443,7 +379,7 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
     const Direction along = direction(mean, plan), there = direction(end, plan);
     force += p * along.linear, force_end += p * there.linear;
     if (along.angular.isZero(0.0)) continue;
-    if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ || plan.measure == Measure::kTurn) {
+    if (plan.measure == Measure::kAcross || plan.measure == Measure::kTurn) {
       for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {  // the couple on b is b × a
         by_a -= 0.5 * sign * p * cross_matrix(mean.R_b.col(axis_b)) * cross_matrix(end.R_a.col(axis_a));
         by_b += 0.5 * sign * p * cross_matrix(mean.R_a.col(axis_a)) * cross_matrix(end.R_b.col(axis_b));
@@ -484,32 +420,29 @@ void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<do
 }
 
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
-  force_ = Vec3::Zero();
-  coordinate_force_ = motor_force_ = drive_force_ = friction_force_ = {};
-  plan_force_.resize(plan_.size());
+  force_.locked = Vec3::Zero();
+  force_.coordinate = {};
+  force_.actuation = {};
+  force_.plan.resize(plan_.size());
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const double force = impulses[i] / step_;
-    if (i < plan_force_.size()) plan_force_[i] = force;
-    if (plan.measure == Measure::kTranslation) force_ += force * axes_at_start_.col(plan.axis);
-    if (plan.measure == Measure::kMotor) motor_force_[static_cast<std::size_t>(plan.axis)] = force;
-    if (plan.measure == Measure::kDrive) drive_force_[static_cast<std::size_t>(plan.axis)] = force;
-    if (plan.measure == Measure::kFriction) friction_force_[static_cast<std::size_t>(plan.axis)] = force;
-    if (plan.measure == Measure::kLimit || plan.measure >= Measure::kMotor)
-      coordinate_force_[static_cast<std::size_t>(plan.axis)] += plan.sign * force;
+    if (i < force_.plan.size()) force_.plan[i] = force;
+    if (plan.law >= Law::kMotor) force_.actuation[actuator(plan)] = force;
+    if (plan.coordinate >= 0)
+      force_.coordinate[static_cast<std::size_t>(plan.coordinate)] += plan.sign * force;
+    else if (plan.measure == Measure::kTranslation)
+      force_.locked += force * axes_at_start_.col(plan.axis);
   }
   const Placement at = place(states, StepTime::kStart);  // the state has been taken: the step's end
-  for (int i = 0; i < freedoms_; ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
+  for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
 }
 
 JointConstraint::Error JointConstraint::error(const BodyStates& states) const {
   const Placement at = place(states, StepTime::kStart);
   Vec3 distance = Vec3::Zero(), angle = Vec3::Zero();
   for (const RowPlan& plan : plan_) {
-    if (plan.measure == Measure::kTranslation) distance[plan.axis] = gap(at, plan);
-    if (plan.measure == Measure::kScrew) distance.x() = gap(at, plan);
-    if (plan.measure == Measure::kTurnOfX || plan.measure == Measure::kTurnOfZ || plan.measure == Measure::kTurn)
-      angle[plan.axis] = gap(at, plan);
+    if (plan.law == Law::kLocked) (is_distance(plan) ? distance : angle)[plan.axis] = gap(at, plan);
   }
   return {distance.norm(), angle.norm()};
 }

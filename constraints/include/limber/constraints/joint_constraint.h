@@ -34,16 +34,16 @@ class JointConstraint final : public Constraint {
   JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec);
 
   const JointSpec& spec() const { return spec_; }
-  int coordinates() const { return freedoms_; }
+  int coordinates() const { return freedoms(spec_.type).rotations + freedoms(spec_.type).translations; }
   void set_actuation(int coordinate, const JointActuation& actuation);
   const JointActuation& actuation(int coordinate) const { return actuation_[static_cast<std::size_t>(coordinate)]; }
 
   /// q at the end of the last step, angles with their full turns.
   double coordinate(int i, const BodyStates& states) const;
   /// Force along the coordinate over the last step: limit, motor, drive and friction together, N or N·m.
-  double coordinate_force(int i) const { return coordinate_force_[static_cast<std::size_t>(i)]; }
+  double coordinate_force(int i) const { return force_.coordinate[static_cast<std::size_t>(i)]; }
   /// Force of the locked translations on b over the last step, world, N.
-  const Vec3& force() const { return force_; }
+  const Vec3& force() const { return force_.locked; }
   /// How far the locked freedoms are off: largest distance (m) and angle (rad).
   struct Error {
     double distance = 0.0, angle = 0.0;
@@ -66,8 +66,7 @@ class JointConstraint final : public Constraint {
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.a_, s.b_, s.spec_.type, s.spec_.frame.origin, s.spec_.frame.axes, s.spec_.limits, s.spec_.pitch,
-                    s.actuation_, s.last_, s.plan_force_, s.coordinate_force_, s.motor_force_, s.drive_force_,
-                    s.friction_force_, s.force_);
+                    s.actuation_, s.last_, s.force_.plan, s.force_.coordinate, s.force_.actuation, s.force_.locked);
   }
 
   /// Both frames at one instant.
@@ -81,12 +80,25 @@ class JointConstraint final : public Constraint {
     FrameInstant a, b;
     Placement place;
   };
-  enum class Measure { kTranslation, kTurnOfX, kTurnOfZ, kTurn, kScrew, kLimit, kCone, kMotor, kDrive, kFriction };
+  /// What a row measures: d_i; one axis of b across one of a; q_i of the vector part of Q's quaternion, twice; the
+  /// screw's d_x − pitch q; an angle q; how far x_b is from x_a.
+  enum class Measure { kTranslation, kAcross, kTurn, kScrew, kAngle, kCone };
+  /// What it asks for. The last three are those of actuation.
+  enum class Law { kLocked, kLimit, kMotor, kDrive, kFriction };
+  /// A row's gap is sign (measure − zero).
   struct RowPlan {
-    Measure measure;
-    int axis = 0;        // of J, or the coordinate
-    double sign = 1.0;   // kLimit: −1 for the upper end
-    double bound = 0.0;  // kLimit
+    Measure measure = Measure::kTranslation;
+    Law law = Law::kLocked;
+    int axis = 0;         // of J
+    int coordinate = -1;  // that is measured; −1: none
+    double sign = 1.0, zero = 0.0;
+  };
+  /// Of the last step.
+  struct Forces {
+    std::array<double, 3> coordinate{};
+    std::array<double, 9> actuation{};  // by actuator()
+    std::vector<double> plan;           // by row of plan_
+    Vec3 locked = Vec3::Zero();
   };
   /// Relative motion that a row measures: linear along n at o_b, and angular about a; world.
   struct Direction {
@@ -98,12 +110,12 @@ class JointConstraint final : public Constraint {
     double sign = 0.0;
   };
 
-  static std::array<TurnAxes, 2> turn_axes(const RowPlan& row);
+  std::array<TurnAxes, 2> turn_axes(const RowPlan& row) const;
   Placement place(const BodyStates& states, StepTime when) const;
   Instant instant(const BodyStates& states, StepTime when) const;
-  double raw_coordinate(const Placement& at, int i) const;
+  double raw_angle(const Placement& at, int i) const;
   double unwrapped(const Placement& at, int i) const;
-  Direction coordinate_direction(const Placement& at, int i) const;
+  double measured(const Placement& at, const RowPlan& row) const;
   double gap(const Placement& at, const RowPlan& row) const;
   Direction direction(const Placement& at, const RowPlan& row) const;
   Vec3 direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
@@ -111,9 +123,17 @@ class JointConstraint final : public Constraint {
                            const Vec3& turn) const;
   bool is_angle(int coordinate) const;
   int axis_of(int coordinate) const;
+  int turning_axis() const { return spec_.type == JointType::kPlanar ? 2 : 0; }  // of what turns about one alone
+  static bool is_distance(const RowPlan& row) {
+    return row.measure == Measure::kTranslation || row.measure == Measure::kScrew;
+  }
+  static std::size_t actuator(const RowPlan& row) {
+    return static_cast<std::size_t>(3 * (static_cast<int>(row.law) - static_cast<int>(Law::kMotor)) + row.coordinate);
+  }
+  RowPlan row_of(int coordinate, Law law, double sign = 1.0, double zero = 0.0) const;
+  void plan();
   void plan_locked_rows();
   void plan_limits();
-  void plan_limit(int coordinate, const Interval& interval);
   void plan_actuation();
   void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
   bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
@@ -123,15 +143,11 @@ class JointConstraint final : public Constraint {
 
   MaterialFrame a_, b_;
   JointSpec spec_;
-  int freedoms_ = 0;
   std::array<JointActuation, 3> actuation_{};
   std::array<double, 3> last_{};  // coordinates at the last step's end: where angles are counted from
   std::vector<RowPlan> plan_;     // locked rows, then limits
   std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
-  std::array<double, 3> coordinate_force_{};
-  std::array<double, 3> motor_force_{}, drive_force_{}, friction_force_{};  // of the last step
-  std::vector<double> plan_force_;                                          // of the same, of plan_
-  Vec3 force_ = Vec3::Zero();
+  Forces force_;
   double step_ = 0.0;
   Mat3 axes_at_start_ = Mat3::Identity();
   std::vector<double> modal_a_, modal_b_;
