@@ -61,6 +61,34 @@ double gap_tolerance(const BodyStates& states, StepTime when, const PreparedCont
   return distance_tolerance(share * kRelativeTolerance, arms, a);
 }
 
+/// Of the place where both forces act, that of a side's point: the other's is 1 less.
+double share_of_place(const PreparedContact& contact, std::size_t side) {
+  if (is_round(contact.a) == is_round(contact.b)) return 0.5;
+  return is_round(contact.side(side)) ? 1.0 : 0.0;
+}
+
+/// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
+Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
+  return share_of_place(contact, 0) * a + share_of_place(contact, 1) * b;
+}
+
+/// ṅ of a normal that is that of a face: it turns with the frame of the body whose face it is. Of edges, and between
+/// two rigid shapes or two round ones, which one's it is cannot be told from the points: 0.
+Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
+  const PreparedSide* owner = nullptr;
+  if (is_pointed(contact.a) && has_face(contact.b)) owner = &contact.b;
+  if (is_pointed(contact.b) && has_face(contact.a)) owner = &contact.a;
+  return owner != nullptr ? states.angular_velocity(owner->body, StepTime::kStart).cross(contact.axes.col(0))
+                          : Vec3(Vec3::Zero());
+}
+
+double reduced_mass(const BodyStates& states, const PreparedContact& contact) {
+  double inverse = 0.0;
+  for (const PreparedSide* side : {&contact.a, &contact.b})
+    if (!states.is_static(side->body)) inverse += 1.0 / states.body(side->body).group->frame_constants().mass;
+  return 1.0 / inverse;
+}
+
 }  // namespace
 
 void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents,
@@ -70,6 +98,7 @@ void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions
   dents_ = &dents;
   lasted_ = lasted;
   const PreparedContact& first = contacts.front();
+  flexes_ = flexes(first.a) || flexes(first.b);
   yields_ = {options.residual_compliance && yields(first.a), options.residual_compliance && yields(first.b)};
 }
 
@@ -82,112 +111,93 @@ void PairContacts::add_rows(const BodyStates& states, StepTime when, double step
 }
 
 void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
-  std::size_t row = 0;
-  for (const PreparedContact& contact : contacts_) {
-    const Vec3 offset = contact.a.position(states, when) - contact.b.position(states, when);
-    gaps[row++] = contact.axes.col(0).dot(offset) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
-    if (contact.friction == 0.0) continue;
-    const Vec3 slip = offset - contact.offset + rolled(states, when, contact);
-    for (int t = 1; t < 3; ++t)
-      gaps[row++] = contact.axes.col(t).dot(slip) + (when == StepTime::kStart ? contact.dent[t] : 0.0);
-  }
+  const bool start = when == StepTime::kStart;
+  visit_rows([&](const PreparedContact& contact, std::size_t row) {
+    const Vec3 apart = contact.apart(states, when), dent = start ? contact.dent : Vec3(Vec3::Zero());
+    gaps[row] = contact.axes.col(0).dot(apart) + dent[0];
+    if (contact.friction == 0.0) return;
+    Vec3 slip = apart - contact.offset;
+    if (!start) slip += contact.a.rolled(states, step_) - contact.b.rolled(states, step_);
+    for (int t = 1; t < 3; ++t) gaps[row + static_cast<std::size_t>(t)] = contact.axes.col(t).dot(slip) + dent[t];
+  });
 }
 
 /// Of the gap n·d, d from b's point to a's: n·d̈ + 2 ṅ·ḋ + n̈·d, of what slides along an axis e: e·d̈. At a touch d is
 /// along n, by the radii of what is round, and n̈·n = −|ṅ|².
 void PairContacts::bias_accelerations(const BodyStates& states, std::span<double> bias) const {
-  std::size_t row = 0;
-  for (const PreparedContact& contact : contacts_) {
+  visit_rows([&](const PreparedContact& contact, std::size_t row) {
     const PointMotion a = contact.a.motion(states), b = contact.b.motion(states);
     const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact);
-    bias[row++] = n.dot(a.bias - b.bias) + 2.0 * turn.dot(a.velocity - b.velocity) -
-                  turn.squaredNorm() * n.dot(a.place - b.place);
-    for (Index axis = 1; axis < row_count(contact); ++axis) bias[row++] = contact.axes.col(axis).dot(a.bias - b.bias);
-  }
-}
-
-/// ṅ of a normal that is that of a face: it turns with the frame of the body whose face it is. Of edges, and between
-/// two rigid shapes or two round ones, which one's it is cannot be told from the points: 0.
-Vec3 PairContacts::turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
-  const PreparedSide* owner = nullptr;
-  if (is_pointed(contact.a) && has_face(contact.b)) owner = &contact.b;
-  if (is_pointed(contact.b) && has_face(contact.a)) owner = &contact.a;
-  return owner != nullptr ? states.angular_velocity(owner->body, StepTime::kStart).cross(contact.axes.col(0))
-                          : Vec3(Vec3::Zero());
+    for (Index axis = 0; axis < contact.rows(); ++axis)
+      bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(a.bias - b.bias);
+    bias[row] += 2.0 * turn.dot(a.velocity - b.velocity) - turn.squaredNorm() * n.dot(a.place - b.place);
+  });
 }
 
 double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motions, double within) {
-  const PreparedContact& first = contacts_.front();
-  const bool struck = options_->impact == ImpactModel::kHeldFromTouch && (flexes(first.a) || flexes(first.b));
+  const bool struck = options_->impact == ImpactModel::kHeldFromTouch && flexes_;
   if (!struck && options_->rule.method != ContactMethod::kVelocityProgram) return within;
   for (const PreparedContact& contact : contacts_) within = touch(states, motions, contact, within);
   return within;
 }
 
 void PairContacts::foreseen(std::span<const double> impulses, std::span<const double> slip) {
-  std::size_t row = 0;
-  for (PreparedContact& contact : contacts_) {
+  visit_rows([&](PreparedContact& contact, std::size_t row) {
     contact.foreseen = true;
     contact.foreseen_slip = slip[row];
-    contact.foreseen_force = impulse_of(contact, impulses.subspan(row)) / step_;
-    row += static_cast<std::size_t>(row_count(contact));
-  }
+    contact.foreseen_force = contact.impulse_of(impulses.subspan(row)) / step_;
+  });
 }
 
 void PairContacts::slid(std::span<const double> slip) {
-  std::size_t row = 0;
-  for (PreparedContact& contact : contacts_) {
-    contact.slip = slip[row];
-    row += static_cast<std::size_t>(row_count(contact));
-  }
+  visit_rows([&](PreparedContact& contact, std::size_t row) { contact.slip = slip[row]; });
 }
 
 void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
-  std::size_t row = 0;
   bool pressed = false;
-  for (PreparedContact& contact : contacts_) {
-    const Vec3 impulse = impulse_of(contact, impulses.subspan(row));
-    row += static_cast<std::size_t>(row_count(contact));
+  visit_rows([&](PreparedContact& contact, std::size_t row) {
+    const Vec3 impulse = contact.impulse_of(impulses.subspan(row));
     contact.last_force = impulse / step_;
     contact.give = give_;
     contact.impulse += impulse;
     pressed = pressed || !impulse.isZero(0.0);
-    for (std::size_t side = 0; side < 2; ++side)
-      if (yields_[side])
-        dents_->press(body(contact, side), region(contact, side),
-                      side_of(contact, side).turned_back(turn_[side].conjugate() * (sign(side) * contact.last_force)));
-  }
+    for (std::size_t i = 0; i < 2; ++i) {
+      const PreparedSide& side = contact.side(i);
+      if (yields_[i])
+        dents_->press(side.body, side.region,
+                      side.turned_back(turn_[i].conjugate() * (PreparedContact::sign(i) * contact.last_force)));
+    }
+  });
   lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
 }
 
 void PairContacts::begin(const BodyStates& states) {
-  for (PreparedContact& contact : contacts_)
-    contact.offset = contact.a.position(states, StepTime::kStart) - contact.b.position(states, StepTime::kStart);
+  for (PreparedContact& contact : contacts_) contact.offset = contact.apart(states, StepTime::kStart);
   strikes_ = strikes(states);
-  for (std::size_t side = 0; side < 2; ++side)
-    if (yields_[side]) turn_[side] = states.pose(body(contacts_.front(), side), StepTime::kStart).q;
+  const PreparedContact& first = contacts_.front();
+  for (std::size_t i = 0; i < 2; ++i)
+    if (yields_[i]) turn_[i] = states.pose(first.side(i).body, StepTime::kStart).q;
   for (PreparedContact& contact : contacts_)
     for (PreparedSide* side : {&contact.a, &contact.b})
       if (side->skin != nullptr)
         side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
-  const PreparedContact& first = contacts_.front();
   const ContactRule& rule = options_->rule;
   const bool by_gaps =
       rule.method == ContactMethod::kGapProgram || (rule.method == ContactMethod::kComplementary && !rule.is_convex());
-  give_ = by_gaps && (flexes(first.a) || flexes(first.b))
+  give_ = by_gaps && flexes_
               ? (yields_[0] || yields_[1] ? kGiveBesideResidual : kGive) * step_ * step_ / reduced_mass(states, first)
               : 0.0;
   for (PreparedContact& contact : contacts_) {
     Vec3 dent = Vec3::Zero();
-    for (std::size_t side = 0; side < 2; ++side)
-      if (yields_[side])
+    for (std::size_t i = 0; i < 2; ++i) {
+      const PreparedSide& side = contact.side(i);
+      if (yields_[i])
         dent +=
-            sign(side) *
-            (turn_[side] *
-             side_of(contact, side).turned(dents_->displacement(states, body(contact, side), region(contact, side))));
+            PreparedContact::sign(i) * (turn_[i] * side.turned(dents_->displacement(states, side.body, side.region)));
+    }
     contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
   }
-  caught_ = (flexes(first.a) || flexes(first.b)) && is_caught();
+  caught_ = flexes_ && is_caught();
 }
 
 bool PairContacts::is_caught() const {
@@ -201,33 +211,22 @@ bool PairContacts::is_caught() const {
   return false;
 }
 
-Vec3 PairContacts::point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
-  return share_of_place(contact, 0) * a + share_of_place(contact, 1) * b;
-}
-
-double PairContacts::share_of_place(const PreparedContact& contact, std::size_t side) {
-  if (is_round(contact.a) == is_round(contact.b)) return 0.5;
-  return is_round(side_of(contact, side)) ? 1.0 : 0.0;
-}
-
 /// Of the moments, by where the bodies end: forces keep their directions, and act midway between where the points were
 /// and are.
 void PairContacts::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
                                         ForceDerivative& sum) const {
   using Of = ForceDerivative::Of;
   using By = ForceDerivative::By;
-  std::size_t row = 0;
-  for (const PreparedContact& contact : contacts_) {
-    const Vec3 impulse = impulse_of(contact, impulses.subspan(row));
-    row += static_cast<std::size_t>(row_count(contact));
-    if (impulse.isZero(0.0)) continue;
+  visit_rows([&](const PreparedContact& contact, std::size_t row) {
+    const Vec3 impulse = contact.impulse_of(impulses.subspan(row));
+    if (impulse.isZero(0.0)) return;
     for (std::size_t pressed = 0; pressed < 2; ++pressed) {
-      const Index of = body(contact, pressed);
+      const Index of = contact.side(pressed).body;
       if (states.is_static(of)) continue;
-      const Mat3 half = 0.5 * sign(pressed) * cross_matrix(impulse);
+      const Mat3 half = 0.5 * PreparedContact::sign(pressed) * cross_matrix(impulse);
       sum.add(of, Of::kMoment, of, By::kShift, half);
       for (std::size_t moved = 0; moved < 2; ++moved) {
-        const PreparedSide& side = side_of(contact, moved);
+        const PreparedSide& side = contact.side(moved);
         if (states.is_static(side.body)) continue;
         const Vec3 arm = side.position(states, StepTime::kEnd) - side.rim - states.origin(side.body, StepTime::kEnd);
         const Mat3 by_place = -share_of_place(contact, moved) * half;
@@ -235,23 +234,7 @@ void PairContacts::add_force_derivative(const BodyStates& states, std::span<cons
         sum.add(of, Of::kMoment, side.body, By::kTurn, -by_place * cross_matrix(arm));
       }
     }
-  }
-}
-
-Vec3 PairContacts::impulse_of(const PreparedContact& contact, std::span<const double> impulses) {
-  Vec3 sum = Vec3::Zero();
-  for (Index axis = 0; axis < row_count(contact); ++axis)
-    sum += impulses[static_cast<std::size_t>(axis)] * contact.axes.col(axis);
-  return sum;
-}
-
-Vec3 PairContacts::rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) const {
-  if (when == StepTime::kStart) return Vec3::Zero();
-  return contact.a.rolled(states, step_) - contact.b.rolled(states, step_);
-}
-
-std::span<const VertexShare> PairContacts::region(const PreparedContact& contact, std::size_t side) {
-  return side_of(contact, side).region;
+  });
 }
 
 double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
@@ -282,7 +265,7 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
 
 bool PairContacts::strikes(const BodyStates& states) const {
   const PreparedContact& first = contacts_.front();
-  if (options_->impact == ImpactModel::kAbsorbed || !(flexes(first.a) || flexes(first.b))) return false;
+  if (options_->impact == ImpactModel::kAbsorbed || !flexes_) return false;
   if (lasted_ > 0.0) return lasted_ < std::max(longest_rebound(first.a, first.b), kShortestStrike * step_);
   return std::ranges::any_of(contacts_, [&](const PreparedContact& contact) {
     if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
@@ -308,16 +291,15 @@ void PairContacts::add_give(Index first, ConstraintRows& rows) const {
 
 void PairContacts::add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows) {
   add_give(first, rows);
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (!yields_[side]) continue;
-    const Mat3 R = to_matrix(turn_[side]);
-    Index row = first;
-    for (const PreparedContact& contact : contacts_) {
-      Mat3 axes = sign(side) * (R.transpose() * contact.axes);
-      for (Index axis = 0; axis < 3; ++axis) axes.col(axis) = side_of(contact, side).turned_back(axes.col(axis));
-      dents_->add_rows(states, body(contact, side), {region(contact, side), axes, row, row_count(contact)}, rows);
-      row += row_count(contact);
-    }
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (!yields_[i]) continue;
+    const Mat3 R = to_matrix(turn_[i]);
+    visit_rows([&](const PreparedContact& contact, std::size_t row) {
+      const PreparedSide& side = contact.side(i);
+      Mat3 axes = PreparedContact::sign(i) * (R.transpose() * contact.axes);
+      for (Index axis = 0; axis < 3; ++axis) axes.col(axis) = side.turned_back(axes.col(axis));
+      dents_->add_rows(states, side.body, {side.region, axes, first + static_cast<Index>(row), contact.rows()}, rows);
+    });
   }
 }
 
@@ -326,7 +308,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
   const Vec3 a = place(states, when, contact.a), b = place(states, when, contact.b);
   const Vec3 end = point_of_action(contact, a, b);
   const double tolerance = gap_tolerance(states, when, contact, a, b, part_.share());
-  for (Index axis = 0; axis < row_count(contact); ++axis) {
+  for (Index axis = 0; axis < contact.rows(); ++axis) {
     const Vec3 n = contact.axes.col(axis);
     RowLaw law{.tolerance = tolerance, .contact = true};
     if (axis == 0) {
@@ -341,6 +323,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       if (strikes_ && options_->impact == ImpactModel::kHeldFromTouch) law.lets_go_within = time_to_rebound();
       if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
       law.friction = contact.friction;
+      law.shift = contact.friction * (contact.foreseen ? contact.foreseen_slip : contact.slip);
     } else {
       law.offset = contact.dent[axis];
       law.slides = true;
@@ -351,9 +334,6 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     law.foreseen_force = n.dot(contact.foreseen_force);
     const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
     const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
-    if (axis == 0) {
-      law.shift = contact.friction * (contact.foreseen ? contact.foreseen_slip : contact.slip);
-    }
     rows.add(on_a, on_b, law);
   }
 }
@@ -374,13 +354,6 @@ void PairContacts::make_spring(const BodyStates& states, const PreparedContact& 
 double PairContacts::closes_to(double gap) const {
   const double touching = std::min(gap, part_.clearance);
   return touching + (1.0 - part_.share()) * (gap - touching);
-}
-
-double PairContacts::reduced_mass(const BodyStates& states, const PreparedContact& contact) {
-  double inverse = 0.0;
-  for (const PreparedSide* side : {&contact.a, &contact.b})
-    if (!states.is_static(side->body)) inverse += 1.0 / states.body(side->body).group->frame_constants().mass;
-  return 1.0 / inverse;
 }
 
 }  // namespace limber

@@ -38,27 +38,19 @@ class PairContacts final : public Constraint {
   /// A step, or part of one, starts from here.
   void begin(const BodyStates& states);
 
+  /// @param visit gets each contact and the number of its first row
+  template <class Visit>
+  void visit_rows(Visit&& visit) const {
+    std::size_t row = 0;
+    for (PreparedContact& contact : contacts_) {
+      visit(contact, row);
+      row += static_cast<std::size_t>(contact.rows());
+    }
+  }
+
   /// Whether a part of one body is caught between two of the other: contacts that overlap and push either way. To come
   /// apart they would press against each other without bound.
   bool is_caught() const;
-
-  /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
-  static Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b);
-
-  /// Of the place where both forces act, that of a side's point: the other's is 1 less.
-  static double share_of_place(const PreparedContact& contact, std::size_t side);
-
-  static Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact);
-
-  Vec3 rolled(const BodyStates& states, StepTime when, const PreparedContact& contact) const;
-
-  /// The two sides of a contact by number: a, b. Forces and displacements of b count the other way.
-  static const PreparedSide& side_of(const PreparedContact& contact, std::size_t side) {
-    return side == 0 ? contact.a : contact.b;
-  }
-  static std::span<const VertexShare> region(const PreparedContact& contact, std::size_t side);
-  static Index body(const PreparedContact& contact, std::size_t side) { return side_of(contact, side).body; }
-  static double sign(std::size_t side) { return side == 0 ? 1.0 : -1.0; }
 
   /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.
   double touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact, double within);
@@ -75,11 +67,6 @@ class PairContacts final : public Constraint {
   /// @param first row of the first contact
   void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows);
 
-  /// World, on a. @param impulses of its rows, and more
-  static Vec3 impulse_of(const PreparedContact& contact, std::span<const double> impulses);
-
-  static Index row_count(const PreparedContact& contact) { return contact.friction == 0.0 ? 1 : 3; }
-
   void add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact, ConstraintRows& rows);
 
   /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
@@ -88,14 +75,12 @@ class PairContacts final : public Constraint {
   /// What a gap may close to by the part's end: what is ahead comes to the clearance when all that is ahead has passed.
   double closes_to(double gap) const;
 
-  static double reduced_mass(const BodyStates& states, const PreparedContact& contact);
-
   std::span<PreparedContact> contacts_;
   const ContactOptions* options_ = nullptr;
   ContactDents* dents_ = nullptr;
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
-  bool strikes_ = false, caught_ = false;
+  bool flexes_ = false, strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
   PartOfStep part_;
   double give_ = 0.0;  // of each contact of bodies that flex, m/N

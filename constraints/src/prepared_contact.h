@@ -88,6 +88,22 @@ struct PreparedContact {
   double foreseen_slip = 0.0;
   Vec3 dent = Vec3::Zero();     // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();  // of this step, world, on a
+
+  /// Its rows: along the normal, and along the tangents where it has friction.
+  Index rows() const { return friction == 0.0 ? 1 : 3; }
+  /// Its sides by number. Forces and displacements of b count the other way.
+  const PreparedSide& side(std::size_t number) const { return number == 0 ? a : b; }
+  static double sign(std::size_t side) { return side == 0 ? 1.0 : -1.0; }
+  /// p_a − p_b, world.
+  Vec3 apart(const BodyStates& states, StepTime when) const {
+    return a.position(states, when) - b.position(states, when);
+  }
+  /// World, on a. @param impulses of its rows, and more
+  Vec3 impulse_of(std::span<const double> impulses) const {
+    Vec3 sum = Vec3::Zero();
+    for (Index axis = 0; axis < rows(); ++axis) sum += impulses[static_cast<std::size_t>(axis)] * axes.col(axis);
+    return sum;
+  }
 };
 
 /// @param inwards the normal, into the body

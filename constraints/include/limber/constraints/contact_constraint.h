@@ -114,16 +114,17 @@ struct ContactEvent {
 
 /// What a scene's contacts remember of a step: with the bodies' states it is all that the next step depends on.
 struct ContactMemory {
-  std::uint64_t id = 0;       ///< of the ContactPoint
-  Index a = -1, b = -1;       ///< bodies
-  Vec3 force = Vec3::Zero();  ///< on a, mean over the step, world, N
-  double give = 0.0;          ///< contact compliance, m/N; ½ give F² is stored there
-  double slip = 0.0;          ///< how far the point slid in the step, m
-  Index yielding = -1;        ///< the body that this energy is counted with
+  std::uint64_t id = 0;                                 ///< of the ContactPoint
+  Index a = -1, b = -1;                                 ///< bodies
+  Vec3 force = Vec3::Zero();                            ///< on a, mean over the step, world, N
+  double give = 0.0;                                    ///< contact compliance, m/N; ½ give F² is stored there
+  double slip = 0.0;                                    ///< how far the point slid in the step, m
+  Index yielding = -1;                                  ///< the body that this energy is counted with
+  Vec3 position = Vec3::Zero(), normal = Vec3::Zero();  ///< as in ContactEvent
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.id, s.a, s.b, s.force, s.give, s.slip, s.yielding);
+    return std::tie(s.id, s.a, s.b, s.force, s.give, s.slip, s.yielding, s.position, s.normal);
   }
 };
 
