@@ -12,6 +12,17 @@
 namespace limber {
 namespace {
 
+/// A right-handed frame whose first axis is n; the same for the same n. @param n unit
+Mat3 frame_along(const Vec3& n) {
+  Index least = 0;
+  n.cwiseAbs().minCoeff(&least);
+  Mat3 axes;
+  axes.col(0) = n;
+  axes.col(1) = n.cross(Vec3::Unit(least)).normalized();
+  axes.col(2) = n.cross(axes.col(1));
+  return axes;
+}
+
 /// Constraints that are used anew in every step.
 template <class T>
 class Pool {

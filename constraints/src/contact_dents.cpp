@@ -31,10 +31,6 @@ void ContactDents::reserve(std::size_t bodies) {
   loaded_.reserve(bodies_.size());
 }
 
-bool ContactDents::yields(const BodyStates& states, Index body) {
-  return !states.is_static(body) && states.body(body).group->model().data().residual_compliance.has_value();
-}
-
 Vec3 ContactDents::displacement(const BodyStates& states, Index body, Region region) {
   const Body& b = at(body);
   if (b.loads.empty()) return Vec3::Zero();

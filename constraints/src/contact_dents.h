@@ -52,9 +52,6 @@ class ContactDents {
   /// Room for the bodies of a table. Nothing below allocates for them once warm.
   void reserve(std::size_t bodies);
   std::size_t bodies() const { return bodies_.size(); }
-  /// Whether a body has a residual compliance at all. @pre it is in the table
-  static bool yields(const BodyStates& states, Index body);
-
   /// Mean displacement of a region by the forces remembered, axes of the rest shape.
   Vec3 displacement(const BodyStates& states, Index body, Region region);
   /// Adds a side's rows: they yield to each other and to all those that the body has already in this part of a step;

@@ -175,11 +175,6 @@ Vec3 MaterialFrame::velocity(const BodyStates& states, StepTime when) const {
          X.q * bending;
 }
 
-Vec3 MaterialFrame::angular_velocity(const BodyStates& states, StepTime when) const {
-  if (body_ < 0) return Vec3::Zero();
-  return states.angular_velocity(body_, when) + states.pose(body_, when).q * turn(states.rates(body_, when));
-}
-
 Vec3 MaterialFrame::turn(const BodyStates& states) const {
   if (rotation_.empty()) return states.turn(body_);
   const Vec3 bent = turn(states.amplitudes(body_, StepTime::kEnd)) - turn(states.amplitudes(body_, StepTime::kStart));

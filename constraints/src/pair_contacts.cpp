@@ -270,8 +270,7 @@ bool PairContacts::strikes(const BodyStates& states) const {
   return std::ranges::any_of(contacts_, [&](const PreparedContact& contact) {
     if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
     const Vec3 n = contact.axes.col(0);
-    const double speed =
-        n.dot(contact.a.velocity(states, StepTime::kStart) - contact.b.velocity(states, StepTime::kStart));
+    const double speed = n.dot(contact.a.motion(states).velocity - contact.b.motion(states).velocity);
     return -speed > options_->impact_speed && n.dot(contact.offset) + step_ * speed < 0.0;
   });
 }

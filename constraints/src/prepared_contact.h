@@ -7,13 +7,21 @@
 #include <span>
 #include <vector>
 
-#include "contact_geometry.h"
 #include "limber/constraints/constraint.h"
 #include "limber/dynamics/body_shape.h"
 #include "limber/dynamics/contact_source.h"
 #include "limber/dynamics/exact_motion.h"
 
 namespace limber {
+
+/// By how much a body turns in the step, world, rad, whole turns and all: what it turns by as it turns at the step's
+/// end, and what is left from there to where it is. (From its orientations alone only the shortest turn could be told.)
+inline Vec3 turn_of_step(const BodyStates& states, Index body, double step) {
+  if (states.is_static(body)) return Vec3::Zero();
+  const Vec3 turn = step * states.angular_velocity(body, StepTime::kEnd);
+  const Quaternion turned = states.pose(body, StepTime::kEnd).q * states.pose(body, StepTime::kStart).q.conjugate();
+  return turn + rotation_vector(turned * quaternion_from_rotation_vector(-turn));
+}
 
 /// A material point at the step's start; `bias` is its acceleration if the body keeps its velocities.
 struct PointMotion {
@@ -45,12 +53,6 @@ struct PreparedSide {
   }
   /// How far what is there has come beyond that by rolling, by the end of the step.
   Vec3 rolled(const BodyStates& states, double step) const { return turn_of_step(states, body, step).cross(rim); }
-  Vec3 velocity(const BodyStates& states, StepTime when) const {
-    const RigidTransform& X = states.pose(body, when);
-    Vec3 v = states.velocity(body, when) + states.angular_velocity(body, when).cross(position(states, when) - X.p);
-    if (model != nullptr) v += X.q * deforming(states.amplitudes(body, when), states.rates(body, when));
-    return v;
-  }
   /// Body frame. @param z amplitudes
   Vec3 place(std::span<const double> z) const { return model == nullptr ? rigid_point : shape(z).position(at, shapes); }
   /// Its velocity by the rates ż.

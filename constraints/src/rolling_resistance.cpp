@@ -1,6 +1,6 @@
 #include "rolling_resistance.h"
 
-#include "contact_geometry.h"
+#include "prepared_contact.h"
 
 namespace limber {
 namespace {

@@ -154,7 +154,6 @@ class IslandBodies {
 
   Index count() const { return static_cast<Index>(members_.size()); }
   int degrees_of_freedom() const { return degrees_of_freedom_; }
-  Index member(Index local) const { return members_[static_cast<std::size_t>(local)]; }
   const ConstrainedBody& body(Index local) const { return bodies_[static_cast<std::size_t>(local)]; }
   const ModalStep& modal_step(Index local) const {
     return steps_.empty() ? body(local).group->modal_step() : steps_[static_cast<std::size_t>(local)];

@@ -33,7 +33,6 @@ class JointConstraint final : public Constraint {
   /// @throws InvalidArgument if the spec is not valid
   JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec);
 
-  const JointSpec& spec() const { return spec_; }
   int coordinates() const { return freedoms(spec_.type).rotations + freedoms(spec_.type).translations; }
   void set_actuation(int coordinate, const JointActuation& actuation);
   const JointActuation& actuation(int coordinate) const { return actuation_[static_cast<std::size_t>(coordinate)]; }

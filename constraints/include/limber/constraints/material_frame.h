@@ -77,9 +77,6 @@ class MaterialFrame {
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
   Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
   Vec3 velocity(const BodyStates& states, StepTime when) const;  ///< of the point, world, m/s
-  /// Angular velocity of the frame, deformation included (to first order), world, rad/s.
-  Vec3 angular_velocity(const BodyStates& states, StepTime when) const;
-
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;
 

@@ -69,7 +69,6 @@ class ConvexContactSolver {
   /// u_c + J_c y, after solve().
   const Vec3& end(std::size_t unit) const { return units_[unit].end; }
   ContactPotential& potential(std::size_t unit) { return units_[unit].potential; }
-  std::size_t units() const { return units_.size(); }
 
   /// Before the first solve_on(), once values are there; solve() does it.
   void begin();
