@@ -1,88 +1,28 @@
 #include "limber/solvers/block_factor.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "dense_kernels.h"
 
 namespace limber::internal {
-namespace {
-
-constexpr std::size_t kBits = 64;
-
-void insert(std::uint64_t* set, std::size_t i) { set[i / kBits] |= std::uint64_t{1} << (i % kBits); }
-void erase(std::uint64_t* set, std::size_t i) { set[i / kBits] &= ~(std::uint64_t{1} << (i % kBits)); }
-
-template <class Visit>
-void for_each(const std::uint64_t* set, std::size_t words, Visit&& visit) {
-  for (std::size_t w = 0; w < words; ++w)
-    for (std::uint64_t bits = set[w]; bits != 0; bits &= bits - 1)
-      visit(w * kBits + static_cast<std::size_t>(std::countr_zero(bits)));
-}
-
-}  // namespace
-
-void BlockFactor::begin_pattern(std::span<const std::size_t> widths) {
-  widths_.assign(widths.begin(), widths.end());
-  words_ = (widths_.size() + kBits - 1) / kBits;
-  adjacency_.assign(words_ * widths_.size(), 0);
-  kept_.assign(widths_.size(), false);
-  eliminated_ = widths_.size();
-}
-
-void BlockFactor::keep(std::size_t node) {
-  if (!kept_[node]) --eliminated_;
-  kept_[node] = true;
-}
-
-void BlockFactor::add_edge(std::size_t i, std::size_t j) {
-  if (i == j) return;
-  insert(neighbours(i), j);
-  insert(neighbours(j), i);
-}
 
 void BlockFactor::end_pattern() {
-  find_order();
+  order_.find();
   place_columns();
   runs_.clear();
   for (const Column& column : columns_)
     for (std::size_t e = 0; e < column.entries; ++e) find_runs(column, column.first_entry + e);
 }
 
-/// After this the neighbours of a node are those that it had when it was eliminated.
-void BlockFactor::find_order() {
-  const std::size_t n = widths_.size();
-  const auto width_of = [&](std::size_t node) {
-    std::size_t sum = 0;
-    for_each(neighbours(node), words_, [&](std::size_t j) { sum += widths_[j]; });
-    return sum;
-  };
-  degree_.resize(n), place_.assign(n, n), columns_.clear();
-  for (std::size_t i = 0; i < n; ++i) degree_[i] = width_of(i);
-  for (std::size_t step = 0; step < n; ++step) {
-    std::size_t next = n;
-    for (std::size_t i = 0; i < n; ++i)
-      if (place_[i] == n && kept_[i] == (step >= eliminated_) && (next == n || degree_[i] < degree_[next])) next = i;
-    place_[next] = step;
-    columns_.push_back({.node = next, .width = widths_[next]});
-    const std::uint64_t* around = neighbours(next);
-    for_each(around, words_, [&](std::size_t j) {
-      std::uint64_t* of = neighbours(j);
-      for (std::size_t w = 0; w < words_; ++w) of[w] |= around[w];
-      erase(of, j);
-      erase(of, next);
-    });
-    for_each(around, words_, [&](std::size_t j) { degree_[j] = width_of(j); });
-  }
-}
-
 void BlockFactor::place_columns() {
-  entries_.clear();
+  columns_.clear(), entries_.clear();
   numbers_ = widest_ = longest_ = 0;
+  for (std::size_t place = 0; place < order_.size(); ++place)
+    columns_.push_back({.node = order_.node(place), .width = order_.width(order_.node(place))});
   for (Column& column : columns_) {
     column.first_entry = entries_.size();
-    for_each(neighbours(column.node), words_, [&](std::size_t j) { entries_.push_back({.column = place_[j]}); });
+    order_.later(column.node, [&](std::size_t j) { entries_.push_back({.column = order_.place(j)}); });
     column.entries = entries_.size() - column.first_entry;
     const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(column.first_entry);
     std::sort(begin, entries_.end(), [](const Entry& a, const Entry& b) { return a.column < b.column; });
@@ -97,7 +37,7 @@ void BlockFactor::place_columns() {
     longest_ = std::max(longest_, column.stride);
   }
   upper_.need(numbers_);
-  first_.resize(widths_.size());
+  first_.resize(order_.size());
   size_ = 0;
   for (const Column& column : columns_) {
     first_[column.node] = size_;
@@ -139,10 +79,10 @@ void BlockFactor::find_runs(const Column& column, std::size_t entry) {
 }
 
 BlockFactor::Block BlockFactor::block(std::size_t i, std::size_t j) const {
-  const Column& column = columns_[place_[i]];
+  const Column& column = columns_[order_.place(i)];
   if (i == j) return {column.offset, column.stride};
   const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(column.first_entry);
-  const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(column.entries), place_[j],
+  const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(column.entries), order_.place(j),
                                       [](const Entry& e, std::size_t c) { return e.column < c; });
   return {column.offset + found->at, column.stride};
 }
@@ -157,7 +97,7 @@ bool BlockFactor::factor() {
   double* U = upper_.data();
   const MatrixView memory = inverse_.need(widest_, widest_);
   double* divided_memory = divided_.need(widest_, longest_).values;
-  for (std::size_t c = 0; c < eliminated_; ++c) {
+  for (std::size_t c = 0; c < order_.eliminated(); ++c) {
     const Column& column = columns_[c];
     const std::size_t n = column.width, head = padded(n), tail = column.stride - head;
     const MatrixView inverse{memory.values, head}, divided{divided_memory, column.stride};
@@ -177,7 +117,7 @@ bool BlockFactor::factor() {
 
 double BlockFactor::work() const {
   double sum = 0.0;
-  for (std::size_t c = 0; c < eliminated_; ++c) {
+  for (std::size_t c = 0; c < order_.eliminated(); ++c) {
     const double width = static_cast<double>(columns_[c].width), length = static_cast<double>(columns_[c].stride);
     sum += 0.5 * width * length * length;
   }
@@ -195,7 +135,7 @@ void BlockFactor::times_inverse_pivot(const Column& column, const double* x, dou
 
 void BlockFactor::reduce(double* x) {
   double* y = row_.need(2 * padded(widest_));
-  for (std::size_t c = 0; c < eliminated_; ++c) {
+  for (std::size_t c = 0; c < order_.eliminated(); ++c) {
     const Column& column = columns_[c];
     double* own = x + first_[column.node];
     times_inverse_pivot(column, own, y);
@@ -207,7 +147,7 @@ void BlockFactor::reduce(double* x) {
 
 void BlockFactor::expand(double* x, std::size_t count) {
   double *y = row_.need(2 * padded(widest_)), *part = y + padded(widest_);
-  for (std::size_t c = eliminated_; c-- > 0;) {
+  for (std::size_t c = order_.eliminated(); c-- > 0;) {
     const Column& column = columns_[c];
     for (std::size_t k = 0; k < count; ++k) {
       double* all = x + k * size_;

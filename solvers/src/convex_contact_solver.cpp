@@ -35,11 +35,11 @@ std::size_t ConvexContactSolver::add_side(std::size_t node) {
 
 void ConvexContactSolver::end_structure() {
   // The order of elimination tells in the last bits: it comes from this problem and from none before it.
-  factor_widths_.clear(), factor_pairs_.clear();
+  blocks_.factor_widths.clear(), blocks_.factor_pairs.clear();
   std::fill_n(values_.need(std::max(numbers_, kPad)), padded(numbers_), 0.0);
   // With the units, which grow in large steps: how many press, and with whom, changes within a step.
   products_.reserve(3 * units_.capacity());
-  for (std::vector<Pair>* pairs : {&pairs_, &factor_pairs_}) pairs->reserve(units_.capacity());
+  for (std::vector<Pair>* pairs : {&blocks_.pairs, &blocks_.factor_pairs}) pairs->reserve(units_.capacity());
   for (AlignedBuffer* vector : {&y_, &d_, &gradient_}) std::fill_n(vector->need(std::max(size_, kPad)), size_, 0.0);
 }
 
@@ -140,7 +140,7 @@ ConvexContactReport ConvexContactSolver::solve_on(const ConvexContactOptions& op
     if (report.iterations == options.max_iterations || !std::isfinite(report.residual)) break;
     if (pairs_are_new_) place_pairs();
     assemble();
-    if (!factor_.factor()) break;
+    if (!blocks_.factor.factor()) break;
     double *d = d_.data(), *y = y_.data();
     find_direction(g, d);
     find_seen(d);
@@ -194,43 +194,45 @@ ConvexContactSolver::Pair ConvexContactSolver::pair_of(const Unit& unit) const {
   return std::minmax(node_of_[unit.first_side], node_of_[unit.first_side + 1]);
 }
 
-/// Finds the blocks of all pairs that have pressed in this problem, in a new structure if that at hand lacks one.
+void ConvexContactSolver::Blocks::place() {
+  std::ranges::sort(pairs);
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  if (widths == factor_widths && std::ranges::includes(factor_pairs, pairs)) return;
+  factor_widths = widths, factor_pairs = pairs;
+  factor.begin_pattern(widths);
+  for (const auto& [a, b] : factor_pairs) factor.add_edge(a, b);
+  factor.end_pattern();
+}
+
+/// Finds the blocks of all pairs that have pressed in this problem.
 void ConvexContactSolver::place_pairs() {
-  widths_.clear(), pairs_.clear();
-  for (const Node& node : nodes_) widths_.push_back(node.width);
+  blocks_.widths.clear(), blocks_.pairs.clear();
+  for (const Node& node : nodes_) blocks_.widths.push_back(node.width);
   for (const Unit& unit : units_)
-    if (unit.has_pressed && unit.sides == 2) pairs_.push_back(pair_of(unit));
-  std::ranges::sort(pairs_);
-  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-  if (widths_ != factor_widths_ || !std::ranges::includes(factor_pairs_, pairs_)) {
-    factor_widths_ = widths_;
-    factor_pairs_ = pairs_;
-    factor_.begin_pattern(widths_);
-    for (const auto& [a, b] : factor_pairs_) factor_.add_edge(a, b);
-    factor_.end_pattern();
-  }
+    if (unit.has_pressed && unit.sides == 2) blocks_.pairs.push_back(pair_of(unit));
+  blocks_.place();
   for (Unit& unit : units_) {
     if (!unit.has_pressed || unit.sides < 2) continue;
     const auto [a, b] = pair_of(unit);
-    unit.block = factor_.comes_first(a, b) ? factor_.block(a, b) : factor_.block(b, a);
+    unit.block = blocks_.factor.comes_first(a, b) ? blocks_.factor.block(a, b) : blocks_.factor.block(b, a);
   }
   pairs_are_new_ = false;
 }
 
 /// 1 + Σ Jᵀ ∇²l J
 void ConvexContactSolver::assemble() {
-  factor_.set_identity();
+  blocks_.factor.set_identity();
   products_.clear();
   for (const Unit& unit : units_) {
     if (!unit.acts) continue;
     for (std::size_t s = unit.first_side; s < unit.first_side + unit.sides; ++s)
-      list_product(unit, s, s, factor_.block(node_of_[s], node_of_[s]));
+      list_product(unit, s, s, blocks_.factor.block(node_of_[s], node_of_[s]));
     if (unit.sides < 2) continue;
     std::size_t a = unit.first_side, b = a + 1;
-    if (!factor_.comes_first(node_of_[a], node_of_[b])) std::swap(a, b);
+    if (!blocks_.factor.comes_first(node_of_[a], node_of_[b])) std::swap(a, b);
     list_product(unit, a, b, unit.block);
   }
-  add_congruences(factor_.numbers_of_blocks(), values_.data(), products_.data(), products_.size());
+  add_congruences(blocks_.factor.numbers_of_blocks(), values_.data(), products_.data(), products_.size());
 }
 
 void ConvexContactSolver::list_product(const Unit& unit, std::size_t a, std::size_t b,
@@ -255,12 +257,12 @@ ContactPotential::Slope ConvexContactSolver::slope_at(double step, double yd, do
 
 /// d = −(1 + Σ Jᵀ ∇²l J)⁻¹ g
 void ConvexContactSolver::find_direction(const double* g, double* d) {
-  double* x = ordered_.need(factor_.size());
+  double* x = ordered_.need(blocks_.factor.size());
   for (std::size_t i = 0; i < nodes_.size(); ++i)
-    std::copy_n(g + nodes_[i].first, padded(nodes_[i].width), x + factor_.first(i));
-  factor_.solve(x);
+    std::copy_n(g + nodes_[i].first, padded(nodes_[i].width), x + blocks_.factor.first(i));
+  blocks_.factor.solve(x);
   for (std::size_t i = 0; i < nodes_.size(); ++i)
-    for (std::size_t k = 0; k < nodes_[i].width; ++k) d[nodes_[i].first + k] = -x[factor_.first(i) + k];
+    for (std::size_t k = 0; k < nodes_[i].width; ++k) d[nodes_[i].first + k] = -x[blocks_.factor.first(i) + k];
 }
 
 /// Where (1) is least along d: Newton's method on its slope, within the bracket found so far.

@@ -1,26 +1,26 @@
 // Decomposition of a sparse symmetric positive definite matrix in square blocks: one row and column of blocks for each
-// body of an island, blocks off the diagonal where two bodies touch. The order of elimination is that of least degree
-// (Tinney and Walker 1967; George and Liu, SIAM Review 31 (1989) 1), found once for a pattern.
+// body of an island, blocks off the diagonal where two bodies touch. The order of elimination (elimination_order.h) is
+// found once for a pattern.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "limber/solvers/aligned_buffer.h"
+#include "limber/solvers/elimination_order.h"
 
 namespace limber::internal {
 
 class BlockFactor {
  public:
   /// Forgets the last pattern. @param widths of the blocks, one per node
-  void begin_pattern(std::span<const std::size_t> widths);
+  void begin_pattern(std::span<const std::size_t> widths) { order_.begin(widths); }
   /// Blocks (i, j) and (j, i) may hold numbers; i = j always may.
-  void add_edge(std::size_t i, std::size_t j);
+  void add_edge(std::size_t i, std::size_t j) { order_.add_edge(i, j); }
   /// A node that factor() does not eliminate: what is left of the blocks between such nodes is the Schur complement of
   /// all others. Two of them may hold numbers only if an edge says so, or elimination links them.
-  void keep(std::size_t node);
+  void keep(std::size_t node) { order_.keep(node); }
   /// Finds the order and places the blocks. Memory grows to the largest pattern seen.
   void end_pattern();
 
@@ -28,7 +28,7 @@ class BlockFactor {
   struct Block {
     std::size_t offset = 0, stride = 0;
   };
-  bool comes_first(std::size_t i, std::size_t j) const { return place_[i] < place_[j]; }
+  bool comes_first(std::size_t i, std::size_t j) const { return order_.place(i) < order_.place(j); }
   /// @pre i comes first or i = j, and the pair is an edge
   Block block(std::size_t i, std::size_t j) const;
 
@@ -67,16 +67,13 @@ class BlockFactor {
     std::size_t first_run = 0, runs = 0;
   };
 
-  void find_order();
   void place_columns();
   void find_runs(const Column& column, std::size_t entry);
   void times_inverse_pivot(const Column& column, const double* x, double* out) const;
-  std::uint64_t* neighbours(std::size_t node) { return adjacency_.data() + node * words_; }
 
-  std::vector<std::size_t> widths_, place_, first_, degree_;
-  std::vector<std::uint64_t> adjacency_;  // by node, in bits
-  std::vector<bool> kept_;
-  std::size_t words_ = 0, size_ = 0, numbers_ = 0, eliminated_ = 0;
+  EliminationOrder order_;
+  std::vector<std::size_t> first_;
+  std::size_t size_ = 0, numbers_ = 0;
   std::vector<Column> columns_;
   std::vector<Entry> entries_;
   std::vector<RowRun> runs_;      // from the rows of a node to those of a later one

@@ -96,6 +96,13 @@ class ConvexContactSolver {
     BlockFactor::Block block{};  // of its pair, where it has two sides and has pressed
   };
   using Pair = std::pair<std::size_t, std::size_t>;
+  /// Of Newton's method, one row for each node and a block for each pair that has pressed.
+  struct Blocks {
+    void place();  // in a new structure, if that of the factor lacks a pair
+    BlockFactor factor;
+    std::vector<std::size_t> widths, factor_widths;
+    std::vector<Pair> pairs, factor_pairs;  // sorted
+  };
 
   std::span<double> part_of(AlignedBuffer& vector, std::size_t node) {
     return {vector.data() + nodes_[node].first, nodes_[node].width};
@@ -128,10 +135,8 @@ class ConvexContactSolver {
   std::vector<Congruence> products_;  // of the units that act
   std::size_t numbers_ = 0, size_ = 0;
   AlignedBuffer values_, y_, d_, gradient_, ordered_, by_side_;
-  BlockFactor factor_;
-  std::vector<std::size_t> factor_widths_, widths_;
-  std::vector<Pair> factor_pairs_, pairs_;  // sorted
-  bool pairs_are_new_ = true;               // a unit has pressed whose block has not been looked up
+  Blocks blocks_;
+  bool pairs_are_new_ = true;  // a unit has pressed whose block has not been looked up
 };
 
 }  // namespace limber::internal
