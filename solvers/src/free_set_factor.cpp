@@ -10,10 +10,8 @@ namespace limber::internal {
 
 void FreeSetFactor::reset(std::size_t capacity) {
   size_ = 0;
-  R_ = upper_memory_.need(capacity, capacity);
-  L_ = lower_memory_.need(capacity, capacity);
-  diagonal_ = diagonal_memory_.need(capacity);
-  inverse_ = inverse_memory_.need(capacity);
+  R_ = memory_.need(capacity, capacity);
+  diagonal_.resize(capacity), inverse_.resize(capacity);
 }
 
 bool FreeSetFactor::append(double* column, double diagonal) {
@@ -26,8 +24,6 @@ bool FreeSetFactor::append(double* column, double diagonal) {
       std::numeric_limits<double>::epsilon() * static_cast<double>(std::max<std::size_t>(64, 2 * k));
   if (!(pivot > rounding * diagonal)) return false;
   std::fill_n(R_.row(k), R_.stride, 0.0);
-  std::fill_n(L_.row(k), L_.stride, 0.0);
-  std::copy_n(column, k, L_.row(k));
   for (std::size_t i = 0; i < k; ++i) R_.row(i)[k] = column[i];
   diagonal_[k] = std::sqrt(pivot);
   inverse_[k] = 1.0 / diagonal_[k];
@@ -42,8 +38,8 @@ void FreeSetFactor::remove(std::size_t position) {
     std::copy(row + position + 1, row + last + 1, row + position);
     row[last] = 0.0;
   }
-  for (std::size_t i = position; i < last;
-       ++i) {  // row i + 1 now has its old diagonal left of the new one: turn it away
+  // Row i + 1 now has its old diagonal left of the new one: turn it away.
+  for (std::size_t i = position; i < last; ++i) {
     double* row = R_.row(i);
     const double h = row[i], below = diagonal_[i + 1];
     const double r = std::sqrt(h * h + below * below);
@@ -52,14 +48,6 @@ void FreeSetFactor::remove(std::size_t position) {
     inverse_[i] = 1.0 / r;
     const std::size_t from = i / kPad * kPad;
     rotate(row + from, R_.row(i + 1) + from, h / r, below / r, last - from);
-  }
-  rebuild_lower(position);
-}
-
-void FreeSetFactor::rebuild_lower(std::size_t from) {
-  for (std::size_t j = from; j < size_; ++j) {
-    double* row = L_.row(j);
-    for (std::size_t i = 0; i < j; ++i) row[i] = R_.row(i)[j];
   }
 }
 
@@ -79,8 +67,8 @@ void FreeSetFactor::solve_lower(double* x, std::size_t first) const {
 
 void FreeSetFactor::solve_upper(double* x) const {
   for (std::size_t i = size_; i-- > 0;) {
-    x[i] *= inverse_[i];
-    add_scaled(x, -x[i], L_.row(i), i + 1);
+    const std::size_t from = i / kPad * kPad;
+    x[i] = (x[i] - dot(R_.row(i) + from, x + from, size_ - from)) * inverse_[i];
   }
 }
 

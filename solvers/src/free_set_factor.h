@@ -29,15 +29,12 @@ class FreeSetFactor {
   void solve_upper(double* x) const;
 
  private:
-  void rebuild_lower(std::size_t from);
   void solve_lower(double* x, std::size_t first) const;  // x ← R⁻ᵀx
 
   std::size_t size_ = 0;
-  MatrixBuffer upper_memory_, lower_memory_;
-  MatrixView R_{}, L_{};  // both kept, so that each triangular solve runs along rows; diagonals apart
-  AlignedBuffer diagonal_memory_, inverse_memory_;
-  double* diagonal_ = nullptr;
-  double* inverse_ = nullptr;
+  MatrixBuffer memory_;
+  MatrixView R_{};  // its rows above the diagonal, zero at and below it; the diagonal apart
+  std::vector<double> diagonal_, inverse_;
 };
 
 }  // namespace limber::internal
