@@ -68,11 +68,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
     law.agent_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {
-      const double implicit = step * options_.stiffness + options_.damping;
-      law.compliance = 1.0 / implicit;
-      law.offset = options_.damping / implicit * gap;
-      law.stiffness = options_.stiffness;
-      law.goes_on = true;
+      law.make_spring(options_.stiffness, options_.damping, step, gap);
     } else {
       law.holds = true;
       law.agent_displacement -= gap;  // the hand takes the point to where it is wanted

@@ -282,10 +282,7 @@ RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
   const JointActuation& act = actuation(plan.coordinate);
   RowLaw law{.goes_on = true, .last_force = force_.actuation[actuator(plan)]};
   if (plan.law == Law::kDrive) {
-    const double implicit = step_ * act.drive_stiffness + act.drive_damping;
-    law.compliance = 1.0 / implicit;
-    law.offset = act.drive_damping / implicit * gap;
-    law.stiffness = act.drive_stiffness;
+    law.make_spring(act.drive_stiffness, act.drive_damping, step_, gap);
     return law;
   }
   const bool motor = plan.law == Law::kMotor;

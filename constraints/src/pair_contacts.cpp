@@ -340,13 +340,9 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
 void PairContacts::make_spring(const BodyStates& states, const PreparedContact& contact, double gap,
                                RowLaw& law) const {
   const double mass = reduced_mass(states, contact), omega = 2.0 * std::numbers::pi * options_->penalty_frequency;
-  const double k = mass * omega * omega, d = 2.0 * options_->penalty_damping * mass * omega;
-  law.compliance = 1.0 / (step_ * k + d);
-  law.offset = d * law.compliance * std::min(0.0, gap);
-  law.stiffness = k;
+  law.make_spring(mass * omega * omega, 2.0 * options_->penalty_damping * mass * omega, step_, std::min(0.0, gap));
   law.holds = law.strikes = false;
   law.lets_go_within = 0.0;
-  law.goes_on = true;
   law.agent_displacement = 0.0;
 }
 

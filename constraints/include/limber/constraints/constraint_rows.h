@@ -74,6 +74,15 @@ struct RowLaw {
   double lets_go_within = 0.0;
   /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
   bool slides = false;
+
+  /// Makes it a spring k with a damper c, F = −k x' − c (x' − x)/Δt, x the gap now and x' at the step's end: stable for
+  /// every k and c.
+  void make_spring(double k, double c, double step, double gap) {
+    compliance = 1.0 / (step * k + c);
+    offset = c / (step * k + c) * gap;
+    stiffness = k;
+    goes_on = true;
+  }
 };
 
 /// RowLaw::digits of what is computed from numbers of a size, in some roundings.
