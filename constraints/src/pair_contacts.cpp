@@ -244,8 +244,8 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
   const Vec3 n = contact.axes.col(0);
   Vec3 a, b, velocity_a, velocity_b;
   const auto gap = [&](double time) {
-    passage_a_.find(states, motions, contact.a, time, a, velocity_a);
-    passage_b_.find(states, motions, contact.b, time, b, velocity_b);
+    passage_[0].find(states, motions, contact.a, time, a, velocity_a);
+    passage_[1].find(states, motions, contact.b, time, b, velocity_b);
     return n.dot(a - b);
   };
   double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
@@ -331,8 +331,8 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     law.last_force = n.dot(contact.last_force);
     law.foreseen = contact.foreseen;
     law.foreseen_force = n.dot(contact.foreseen_force);
-    const RowSide on_a = point_row(states, when, contact.a, end, n, modal_a_);
-    const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_b_);
+    const RowSide on_a = point_row(states, when, contact.a, end, n, modal_[0]);
+    const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_[1]);
     rows.add(on_a, on_b, law);
   }
 }

@@ -83,9 +83,9 @@ class PairContacts final : public Constraint {
   bool flexes_ = false, strikes_ = false, caught_ = false;
   double step_ = 0.0, lasted_ = 0.0;
   PartOfStep part_;
-  double give_ = 0.0;  // of each contact of bodies that flex, m/N
-  std::vector<double> modal_a_, modal_b_;
-  Passage passage_a_, passage_b_;
+  double give_ = 0.0;                         // of each contact of bodies that flex, m/N
+  std::array<std::vector<double>, 2> modal_;  // scratch by side, as what follows
+  std::array<Passage, 2> passage_;
 };
 
 }  // namespace limber

@@ -7,9 +7,6 @@
 
 namespace limber::internal {
 
-PivotedCholesky::PivotedCholesky() = default;
-PivotedCholesky::~PivotedCholesky() = default;
-
 void PivotedCholesky::factor(MatrixView S, std::size_t n, double tolerance) {
   n_ = n;
   Lt_ = columns_memory_.need(n, n);

@@ -11,9 +11,10 @@
 /// One step of iterative refinement follows. Cost O(m d min(m, d) + min³) to factor, O(m d) per right-hand side.
 #pragma once
 
-#include <memory>
 #include <span>
+#include <vector>
 
+#include "limber/solvers/pivoted_cholesky.h"
 #include "limber/solvers/solve_status.h"
 
 namespace limber {
@@ -27,11 +28,6 @@ struct LeastSquaresResult {
 /// nothing is allocated. One thread at a time. The same calls give the same bits.
 class LeastSquaresSolver {
  public:
-  LeastSquaresSolver();
-  ~LeastSquaresSolver();
-  LeastSquaresSolver(LeastSquaresSolver&&) noexcept;
-  LeastSquaresSolver& operator=(LeastSquaresSolver&&) noexcept;
-
   /// @param J m × d, row-major. @param metric D, d numbers ≥ 0
   /// @return kInvalidInput if a number is not finite or D has a negative: solve() then gives zero
   /// @throws InvalidArgument if lengths do not fit
@@ -42,8 +38,17 @@ class LeastSquaresSolver {
   SolveStatus solve(std::span<const double> r, std::span<double> f);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  void scale_rows(std::span<const double> J, std::span<const double> metric);
+  void apply(double* r, double* f);
+  void subtract_product(const double* f, double* rest);
+
+  std::size_t m_ = 0, d_ = 0;
+  bool valid_ = false;
+  internal::MatrixBuffer B_memory_, Bt_memory_, S_memory_;
+  internal::MatrixView B_{};         // J D^½, m × d
+  internal::PivotedCholesky small_;  // of S or N
+  std::vector<double> root_;         // D^½
+  internal::AlignedBuffer rest_, work_, found_, product_, motion_;
 };
 
 /// Removes equality rows e from a problem with other rows c, so that a linear program or QP sees the latter alone:
@@ -56,11 +61,6 @@ class LeastSquaresSolver {
 /// is too.
 class EqualityElimination {
  public:
-  EqualityElimination();
-  ~EqualityElimination();
-  EqualityElimination(EqualityElimination&&) noexcept;
-  EqualityElimination& operator=(EqualityElimination&&) noexcept;
-
   /// @param A n × n, symmetric, the e = `equalities` rows first. @param b n
   /// @param A_reduced (n − e) × (n − e), row-major. @param b_reduced n − e
   /// @return kInvalidInput if a number is not finite: outputs are zero then
@@ -69,11 +69,19 @@ class EqualityElimination {
                             std::span<double> A_reduced, std::span<double> b_reduced);
 
   /// The equality forces that go with f_c. @param f_c n − e numbers. @param f_e e numbers
-  void recover(std::span<const double> f_c, std::span<double> f_e) const;
+  void recover(std::span<const double> f_c, std::span<double> f_e);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  void take(std::span<const double> A, std::span<const double> b);
+  internal::MatrixView solve_rows();
+
+  std::size_t e_ = 0, c_ = 0;
+  bool valid_ = false;
+  internal::MatrixBuffer ee_memory_, ec_memory_, Y_memory_, gram_memory_;
+  internal::MatrixView A_ee_{}, A_ec_{};  // scaled
+  internal::PivotedCholesky factor_;
+  std::vector<double> scale_, b_e_, coefficients_;
+  internal::AlignedBuffer x_, rest_;
 };
 
 }  // namespace limber

@@ -13,9 +13,6 @@ namespace limber::internal {
 /// S's order.
 class PivotedCholesky {
  public:
-  PivotedCholesky();
-  ~PivotedCholesky();
-
   /// Pivots of `tolerance` times the largest and less are taken as zero.
   void factor(MatrixView S, std::size_t n, double tolerance);
 
