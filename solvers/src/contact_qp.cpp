@@ -104,87 +104,45 @@ class Operator {
   double* u_ = nullptr;  // Gᵀf
 };
 
-}  // namespace
-
-// A force is free (in the set P, solved for) or held where it is, most often at a bound.
-struct ContactQpSolver::Impl {
-  enum class State : char { kHeld, kFree, kLeft };
-
+// The problem's numbers, copied, and what they are measured by.
+struct BoxProblem {
   std::size_t m = 0;
   Operator A;
-  AlignedBuffer b_memory, w_memory, direction_memory;
+  AlignedBuffer b_memory;
   double* b = nullptr;
-  double* w = nullptr;
-  double* direction = nullptr;                 // of the free forces
-  std::vector<double> lower, upper, f, scale;  // scale: 1/√A_jj
-  std::vector<State> state;
-  std::vector<int> P, wanted, nonzero;  // P in the factor's order; nonzero: forces that are not 0, and
-  std::vector<double> values;           // these
-  FreeSetFactor factor;
-  double largest_b = 0.0, largest_f = 0.0, added_compliance = 0.0;
-  int idle = 0;  // steps of length zero in a row
-  ContactQpResult result;
-
-  template <class Problem>
-  ContactQpResult solve(const Problem& problem, std::span<double> forces) {
-    check(problem, forces);
-    if (take(problem)) return run(forces);
-    std::fill(forces.begin(), forces.end(), 0.0);
-    return {.status = SolveStatus::kInvalidInput};
-  }
+  std::vector<double> lower, upper, scale;  // scale: 1/√A_jj
+  double largest_b = 0.0;
 
   // What both forms of the problem have in common.
-  template <class Problem>
-  void check(const Problem& problem, Numbers forces) {
-    check_option(kQpSolver, "size", problem.size >= 0, problem.size, "0 or more");
-    m = count_of(problem.size);
-    check_length(kQpSolver, "b", problem.b.size(), m);
-    check_optional_length(kQpSolver, "lower", problem.lower.size(), m);
-    check_optional_length(kQpSolver, "upper", problem.upper.size(), m);
+  template <class Given>
+  void check(const Given& given, Numbers forces) {
+    check_option(kQpSolver, "size", given.size >= 0, given.size, "0 or more");
+    m = count_of(given.size);
+    check_length(kQpSolver, "b", given.b.size(), m);
+    check_optional_length(kQpSolver, "lower", given.lower.size(), m);
+    check_optional_length(kQpSolver, "upper", given.upper.size(), m);
     check_length(kQpSolver, "f", forces.size(), m);
   }
 
   // Copies the numbers; false if one is not fit to be solved with.
-  template <class Problem>
-  bool take(const Problem& problem) {
-    if (!A.take(problem) || !all_finite(problem.b.data(), m)) return false;
-    b = copy_padded(b_memory, problem.b, m);
+  template <class Given>
+  bool take(const Given& given) {
+    if (!A.take(given) || !all_finite(given.b.data(), m)) return false;
+    b = copy_padded(b_memory, given.b, m);
     lower.assign(m, 0.0), upper.assign(m, kUnbounded);
-    std::ranges::copy(problem.lower, lower.begin());
-    std::ranges::copy(problem.upper, upper.begin());
+    std::ranges::copy(given.lower, lower.begin());
+    std::ranges::copy(given.upper, upper.begin());
     for (std::size_t j = 0; j < m; ++j)
       if (!(lower[j] <= upper[j]) || lower[j] == kUnbounded || upper[j] == -kUnbounded) return false;
-    return true;
-  }
-
-  ContactQpResult run(std::span<double> forces) {
-    reserve();
     set_scales();
-    start(forces);
-    minimise_over_free();
-    while (result.iterations < limit() && release_one()) minimise_over_free();
-    finish(forces);
-    return result;
-  }
-
-  int limit() const { return 100 + 20 * static_cast<int>(m); }
-
-  void reserve() {
-    w = w_memory.need(m), direction = direction_memory.need(m + 1);
-    f.resize(m), scale.resize(m), values.reserve(m);
-    state.assign(m, State::kHeld);
-    for (std::vector<int>* list : {&P, &wanted, &nonzero}) {
-      list->clear();
-      list->reserve(m);
-    }
-    largest_b = added_compliance = 0.0;
-    idle = 0;
-    result = {};
+    return true;
   }
 
   // √A_jj f_j and w_j/√A_jj have one unit, √J: what is compared between rows is in it. An empty row borrows the mean.
   void set_scales() {
     double sum = 0.0;
+    scale.resize(m);
+    largest_b = 0.0;
     for (std::size_t j = 0; j < m; ++j) sum += A.diagonal(j);
     const double mean_diagonal = sum > 0.0 ? sum / static_cast<double>(m) : 1.0;
     for (std::size_t j = 0; j < m; ++j) {
@@ -193,11 +151,63 @@ struct ContactQpSolver::Impl {
       largest_b = std::max(largest_b, std::abs(b[j]) * scale[j]);
     }
   }
+};
+
+}  // namespace
+
+// A force is free (in the set P, solved for) or held where it is, most often at a bound.
+struct ContactQpSolver::Impl {
+  enum class State : char { kHeld, kFree, kLeft };
+
+  BoxProblem problem;
+  AlignedBuffer w_memory, direction_memory;
+  double* w = nullptr;
+  double* direction = nullptr;  // of the free forces
+  std::vector<double> f;
+  std::vector<State> state;
+  std::vector<int> P, wanted, nonzero;  // P in the factor's order; nonzero: forces that are not 0, and
+  std::vector<double> values;           // these
+  FreeSetFactor factor;
+  double largest_f = 0.0, added_compliance = 0.0;
+  int idle = 0;  // steps of length zero in a row
+  ContactQpResult result;
+
+  template <class Given>
+  ContactQpResult solve(const Given& given, std::span<double> forces) {
+    problem.check(given, forces);
+    if (problem.take(given)) return run(forces);
+    std::fill(forces.begin(), forces.end(), 0.0);
+    return {.status = SolveStatus::kInvalidInput};
+  }
+
+  ContactQpResult run(std::span<double> forces) {
+    reserve();
+    start(forces);
+    minimise_over_free();
+    while (result.iterations < limit() && release_one()) minimise_over_free();
+    finish(forces);
+    return result;
+  }
+
+  int limit() const { return 100 + 20 * static_cast<int>(problem.m); }
+
+  void reserve() {
+    w = w_memory.need(problem.m), direction = direction_memory.need(problem.m + 1);
+    f.resize(problem.m), values.reserve(problem.m);
+    state.assign(problem.m, State::kHeld);
+    for (std::vector<int>* list : {&P, &wanted, &nonzero}) {
+      list->clear();
+      list->reserve(problem.m);
+    }
+    added_compliance = 0.0;
+    idle = 0;
+    result = {};
+  }
 
   void start(Numbers guess) {
-    for (std::size_t j = 0; j < m; ++j) {
-      f[j] = std::clamp(std::isfinite(guess[j]) ? guess[j] : 0.0, lower[j], upper[j]);
-      if (lower[j] < f[j] && f[j] < upper[j]) P.push_back(static_cast<int>(j));
+    for (std::size_t j = 0; j < problem.m; ++j) {
+      f[j] = std::clamp(std::isfinite(guess[j]) ? guess[j] : 0.0, problem.lower[j], problem.upper[j]);
+      if (problem.lower[j] < f[j] && f[j] < problem.upper[j]) P.push_back(static_cast<int>(j));
     }
     factor_free();
   }
@@ -207,15 +217,15 @@ struct ContactQpSolver::Impl {
     wanted.swap(P);
     P.clear();
     std::ranges::replace(state, State::kFree, State::kHeld);
-    factor.reset(m + 1);
+    factor.reset(problem.m + 1);
     for (const int j : wanted) append(static_cast<std::size_t>(j));
     update_w();
   }
 
   // Frees force j unless its row depends on those of P; then direction holds R⁻ᵀA_Pj.
   bool append(std::size_t j) {
-    A.column(j, P, direction);
-    if (!factor.append(direction, A.diagonal(j) + compliance(j))) return false;
+    problem.A.column(j, P, direction);
+    if (!factor.append(direction, problem.A.diagonal(j) + compliance(j))) return false;
     state[j] = State::kFree;
     P.push_back(static_cast<int>(j));
     return true;
@@ -225,38 +235,39 @@ struct ContactQpSolver::Impl {
   void update_w() {
     nonzero.clear(), values.clear();
     largest_f = 0.0;
-    for (std::size_t j = 0; j < m; ++j) {
+    for (std::size_t j = 0; j < problem.m; ++j) {
       if (f[j] == 0.0) continue;
       values.push_back(f[j]);
       nonzero.push_back(static_cast<int>(j));
-      largest_f = std::max(largest_f, std::abs(f[j]) / scale[j]);
+      largest_f = std::max(largest_f, std::abs(f[j]) / problem.scale[j]);
     }
-    A.apply(b, nonzero, values, w);
+    problem.A.apply(problem.b, nonzero, values, w);
     if (added_compliance > 0.0)
-      for (std::size_t j = 0; j < m; ++j) w[j] += compliance(j) * f[j];
+      for (std::size_t j = 0; j < problem.m; ++j) w[j] += compliance(j) * f[j];
   }
 
-  double compliance(std::size_t j) const { return added_compliance / (scale[j] * scale[j]); }
-  double largest() const { return std::max(largest_b, largest_f); }
+  double compliance(std::size_t j) const { return added_compliance / (problem.scale[j] * problem.scale[j]); }
+  double largest() const { return std::max(problem.largest_b, largest_f); }
   double tolerated() const { return kResidualTolerance * largest(); }
 
   // By how much (2) is violated at a force that is not free, scaled; the sign is the way it wants to go.
   double pull(std::size_t j) const {
     const double w_j = w[j];
-    return (w_j < 0.0 && f[j] < upper[j]) || (w_j > 0.0 && f[j] > lower[j]) ? -w_j * scale[j] : 0.0;
+    return (w_j < 0.0 && f[j] < problem.upper[j]) || (w_j > 0.0 && f[j] > problem.lower[j]) ? -w_j * problem.scale[j]
+                                                                                            : 0.0;
   }
 
   // The force to free next: the one pulled hardest; after a run of steps that led nowhere the first (Bland). m if none.
   std::size_t most_pulled() const {
-    std::size_t best = m;
+    std::size_t best = problem.m;
     double most = tolerated();
-    for (std::size_t j = 0; j < m; ++j) {
+    for (std::size_t j = 0; j < problem.m; ++j) {
       if (state[j] != State::kHeld) continue;
       const double p = std::abs(pull(j));
       if (p <= most) continue;
       best = j;
       most = p;
-      if (idle > static_cast<int>(m)) break;
+      if (idle > static_cast<int>(problem.m)) break;
     }
     return best;
   }
@@ -264,7 +275,7 @@ struct ContactQpSolver::Impl {
   // One force more to solve for. False at the solution.
   bool release_one() {
     const std::size_t j = most_pulled();
-    if (j == m) return false;
+    if (j == problem.m) return false;
     ++result.iterations;
     if (!append(j)) slide(j);
     return true;
@@ -272,15 +283,16 @@ struct ContactQpSolver::Impl {
 
   // The largest step ≤ `step` that keeps f_j + step·change within its bounds.
   double clip(std::size_t j, double change, double step) const {
-    if (change < 0.0) return std::min(step, (lower[j] - f[j]) / change);
-    if (change > 0.0) return std::min(step, (upper[j] - f[j]) / change);
+    if (change < 0.0) return std::min(step, (problem.lower[j] - f[j]) / change);
+    if (change > 0.0) return std::min(step, (problem.upper[j] - f[j]) / change);
     return step;
   }
 
   // f_j += step·change; whether it arrived at the bound that clips it.
   bool advance(std::size_t j, double change, double step) {
     const bool at_bound = clip(j, change, kUnbounded) <= step;
-    f[j] = at_bound ? (change < 0.0 ? lower[j] : upper[j]) : std::clamp(f[j] + step * change, lower[j], upper[j]);
+    f[j] = at_bound ? (change < 0.0 ? problem.lower[j] : problem.upper[j])
+                    : std::clamp(f[j] + step * change, problem.lower[j], problem.upper[j]);
     return at_bound;
   }
 
@@ -303,7 +315,7 @@ struct ContactQpSolver::Impl {
       for (std::size_t i = 0; i < k; ++i) {
         const auto j = static_cast<std::size_t>(P[i]);
         direction[i] = -w[j];
-        const double size = std::abs(w[j]) * scale[j];
+        const double size = std::abs(w[j]) * problem.scale[j];
         if (size > 0.01 * tolerated() && most == 0.0) first = i, most = size;
       }
       if (most == 0.0) return;
@@ -360,10 +372,12 @@ struct ContactQpSolver::Impl {
     added_compliance = 0.0;
     update_w();
     double worst = 0.0;
-    for (std::size_t j = 0; j < m; ++j) {
-      const double target = std::clamp(f[j] - w[j] * scale[j] * scale[j], lower[j], upper[j]);
-      worst = std::max(worst, std::abs(f[j] - target) / scale[j]);
-      if (result.status == SolveStatus::kRelaxed) result.slack = std::max(result.slack, std::abs(pull(j)) / scale[j]);
+    for (std::size_t j = 0; j < problem.m; ++j) {
+      const double target =
+          std::clamp(f[j] - w[j] * problem.scale[j] * problem.scale[j], problem.lower[j], problem.upper[j]);
+      worst = std::max(worst, std::abs(f[j] - target) / problem.scale[j]);
+      if (result.status == SolveStatus::kRelaxed)
+        result.slack = std::max(result.slack, std::abs(pull(j)) / problem.scale[j]);
     }
     result.residual = largest() > 0.0 ? worst / largest() : 0.0;
     result.free = static_cast<int>(P.size());
