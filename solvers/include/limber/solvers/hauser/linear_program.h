@@ -4,11 +4,12 @@
 ///   min cᵀf   subject to   A f + b ≥ 0,  f ≥ 0        (c ≥ 0)
 ///
 /// Solved by the primal simplex method on the dual, max −bᵀy with Aᵀy ≤ c, y ≥ 0, whose slack basis is feasible: there
-/// is no first phase. The tableau is condensed, (columns + 1) × (rows + 1). Ratio test after Harris (Math. Programming 5,
-/// 1973); after a run of steps without progress, Bland's rule, which cannot cycle (Math. Oper. Res. 2, 1977).
+/// is no first phase. The tableau is condensed, (columns + 1) × (rows + 1). Ratio test after Harris (Math. Programming
+/// 5, 1973); after a run of steps without progress, Bland's rule, which cannot cycle (Math. Oper. Res. 2, 1977).
 ///
-/// Rows are met to 1e-10 of |b| + |A||f|. Where no f satisfies them, slack t ≥ 0 is bought at a price per unit, 1e6 times
-/// the largest c where rows are scaled to 1: min cᵀf + price·Σt with A f + t + b ≥ 0. Where one does, no slack is bought, whatever the price.
+/// Rows are met to 1e-10 of |b| + |A||f|. Where no f satisfies them, slack t ≥ 0 is bought at a price per unit, 1e6
+/// times the largest c where rows are scaled to 1: min cᵀf + price·Σt with A f + t + b ≥ 0. Where one does, no slack is
+/// bought, whatever the price.
 ///
 /// The minimum is not complementary in general and can add energy: see energy_guard.h.
 #pragma once
