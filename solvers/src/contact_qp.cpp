@@ -216,7 +216,7 @@ struct ContactQpSolver::Impl {
   void factor_free() {
     wanted.swap(P);
     P.clear();
-    std::ranges::replace(state, State::kFree, State::kHeld);
+    std::replace(state.begin(), state.end(), State::kFree, State::kHeld);
     factor.reset(problem.m + 1);
     for (const int j : wanted) append(static_cast<std::size_t>(j));
     update_w();
@@ -298,7 +298,7 @@ struct ContactQpSolver::Impl {
 
   void remove_at(std::size_t position) {
     factor.remove(position);
-    std::ranges::replace(state, State::kLeft, State::kHeld);
+    std::replace(state.begin(), state.end(), State::kLeft, State::kHeld);
     state[static_cast<std::size_t>(P[position])] = State::kHeld;
     P.erase(P.begin() + static_cast<std::ptrdiff_t>(position));
     ++result.iterations;

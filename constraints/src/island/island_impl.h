@@ -73,7 +73,6 @@ struct IslandSolver::Impl {
   void end_at_release(internal::StepPart& part, IslandReport& done);
   double longest_impact() const;
   double last_impact_force() const;
-  bool may_let_go(double length) const;
   double impact_impulse(double length) const;
   double find_release(internal::StepPart part);
 };

@@ -41,7 +41,7 @@ void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
     end_at(latest);
     again();
   }
-  if (!is_quick(done) || !may_let_go(part.options.step)) return;
+  if (!is_quick(done)) return;
   const double length = part.options.step, release = find_release(part);
   if (is_part(release, length, part.whole_step)) end_at(release);
   again();
@@ -60,12 +60,6 @@ double IslandSolver::Impl::last_impact_force() const {
   for (std::size_t i = 0; i < step.size(); ++i)
     if (step.law(i).lets_go_within > 0.0) before += step.law(i).last_force;
   return before;
-}
-
-/// What presses harder than before does not let go.
-bool IslandSolver::Impl::may_let_go(double length) const {
-  const double before = last_impact_force();
-  return before == 0.0 || impact_impulse(length) < length * before;
 }
 
 /// Of all impacts of the island, along their normals.

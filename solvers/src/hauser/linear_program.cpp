@@ -117,7 +117,7 @@ void LinearProgramSolver::Impl::start_cold() {
     std::fill_n(T.row(n + i), T.stride, 0.0);
     T.row(n + i)[i] = 1.0, value(n + i) = kSlackPrice;
   }
-  const double price = inverse_power_of_two(n == 0 ? 0.0 : *std::ranges::max_element(c));
+  const double price = inverse_power_of_two(n == 0 ? 0.0 : *std::max_element(c.begin(), c.end()));
   for (std::size_t j = 0; j < n; ++j) value(j) = c[j] * price;
   std::fill_n(costs(), T.stride, 0.0);
   for (std::size_t i = 0; i < r; ++i) costs()[i] = -b[i];
