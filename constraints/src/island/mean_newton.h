@@ -45,7 +45,7 @@ class MeanNewton {
   std::vector<char> within_;  // by row: whether its impulse is within its bounds
   Vector free_, guess_;       // where bodies would be in free flight, and under the last step's forces
   MeanChange change_;
-  MeanSecants secants_;                     // of the steps by one matrix
+  MeanSecants secants_;  // of the steps by one matrix
   bool bends_ = true;
   bool linear_ = false, repeated_ = false;  // there is a matrix; the last step was by that of an earlier place
 };
