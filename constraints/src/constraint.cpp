@@ -2,23 +2,18 @@
 
 #include <algorithm>
 
+#include "frame_at.h"
 #include "limber/core/cross_matrix.h"
 
 namespace limber {
 
-namespace {
-
-const RigidFrame& frame_at(const ConstrainedBody& body, StepTime when) {
-  return when == StepTime::kStart ? body.group->frame(body.slot) : body.group->predicted_frame(body.slot);
-}
-
-}  // namespace
+using internal::frame_at;
 
 const RigidTransform& BodyStates::pose(Index body, StepTime when) const {
   static const RigidTransform kWorld{};
   if (body < 0) return kWorld;
   const ConstrainedBody& b = this->body(body);
-  return b.group == nullptr ? b.pose : frame_at(b, when).pose();
+  return b.group == nullptr ? b.pose : frame_at(*b.group, b.slot, when).pose();
 }
 
 Vec3 BodyStates::origin(Index body, StepTime when) const {
@@ -62,13 +57,15 @@ const ExactMotion* FreeMotions::of(Index body) const {
 }
 
 Vec3 BodyStates::velocity(Index body, StepTime when) const {
-  return is_static(body) ? Vec3(Vec3::Zero()) : frame_at(this->body(body), when).velocity();
+  if (is_static(body)) return Vec3::Zero();
+  const ConstrainedBody& b = this->body(body);
+  return frame_at(*b.group, b.slot, when).velocity();
 }
 
 Vec3 BodyStates::angular_velocity(Index body, StepTime when) const {
   if (is_static(body)) return Vec3::Zero();
   const ConstrainedBody& b = this->body(body);
-  return frame_at(b, when).angular_velocity(b.group->frame_constants());
+  return frame_at(*b.group, b.slot, when).angular_velocity(b.group->frame_constants());
 }
 
 }  // namespace limber

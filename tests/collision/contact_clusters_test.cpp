@@ -326,7 +326,7 @@ TEST(ContactClusters, WeightsSumToOneAndReproduceLinearFields) {
     for (const double spacing : {kInfinity, 0.3}) {
       auto contacts = samples(region.inside, 0.125);
       ContactClusters clusters;
-      clusters.reduce(contacts, 0, {.share = spacing}, {}, true);
+      clusters.reduce(contacts, 0, {.share = spacing}, {}, ContactShares::kWeights);
       const std::span<const ContactPoint> all = clusters.all();
       std::vector<double> sum(all.size());
       std::vector<Vec3> mean(all.size(), Vec3::Zero());
@@ -350,7 +350,7 @@ TEST(ContactClusters, WeightsSumToOneAndReproduceLinearFields) {
 TEST(ContactClusters, WeightsOfASquareAreThoseOfItsSymmetry) {
   auto contacts = samples(kRegions[0].inside, 0.25);
   ContactClusters clusters;
-  clusters.reduce(contacts, 0, {}, {}, true);
+  clusters.reduce(contacts, 0, {}, {}, ContactShares::kWeights);
   ASSERT_EQ(contacts.size(), 4u);
   std::vector<double> part(clusters.all().size());
   for (const ContactWeight& w : clusters.weights()) part[static_cast<std::size_t>(w.kept)] += w.weight;
@@ -371,7 +371,7 @@ TEST(ContactClusters, TheCellOfAContactIsWhatIsNearerToItThanToAnyOther) {
       return true;
     };
     ContactClusters clusters;
-    clusters.reduce(contacts, 0, {}, {}, true);
+    clusters.reduce(contacts, 0, {}, {}, ContactShares::kWeightsAndCells);
     const std::span<const ContactPoint> all = clusters.all();
     std::vector<double> nearest(all.size(), 0.0);
     for (double x = -2.0 + 0.5 * kSample; x < 2.0; x += kSample)
@@ -396,12 +396,12 @@ TEST(ContactClusters, ContactsUponEachOtherShareTheirCellAndALineHasNone) {
     contacts.back().id += 1000;
   }
   ContactClusters clusters;
-  clusters.reduce(contacts, 0, {}, {}, true);
+  clusters.reduce(contacts, 0, {}, {}, ContactShares::kWeightsAndCells);
   double sum = 0.0;
   for (Index i = 0; i < static_cast<Index>(2 * once); ++i) sum += clusters.cell(i);
   EXPECT_NEAR(sum, 4.0, kRoundOff);
   auto line = samples([](double x, double y) { return std::abs(x) <= 1.0 && y == 0.0; }, 0.25);
-  clusters.reduce(line, 0, {}, {}, true);
+  clusters.reduce(line, 0, {}, {}, ContactShares::kWeightsAndCells);
   for (Index i = 0; i < static_cast<Index>(clusters.all().size()); ++i) EXPECT_TRUE(std::isinf(clusters.cell(i)));
 }
 
@@ -409,7 +409,7 @@ TEST(ContactClusters, WhatIsFartherIsNotPressedWithWhatIsKept) {
   auto contacts = samples(kRegions[0].inside, 0.25);
   for (ContactPoint& c : contacts) c.gap = 0.1 * (1.0 + c.position.x());  // 0 to 0.2 of an extent of 2.8: a tilted face
   ContactClusters clusters;
-  clusters.reduce(contacts, 0, {}, {}, true);
+  clusters.reduce(contacts, 0, {}, {}, ContactShares::kWeights);
   for (const ContactWeight& w : clusters.weights()) {
     const double farther =
         clusters.all()[static_cast<std::size_t>(w.contact)].gap - clusters.all()[static_cast<std::size_t>(w.kept)].gap;

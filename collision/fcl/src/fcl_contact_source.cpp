@@ -287,11 +287,11 @@ void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<Cont
   touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), origin, contacts);
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
-  const bool yields = sides[0].surface != nullptr || sides[1].surface != nullptr;
+  const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
   const auto known = kept.find(pair);
-  clusters.reduce(contacts, first, spacing(pair, yields),
-                  known == kept.end() ? std::span<const std::uint64_t>() : std::span(known->second), yields);
-  if (yields) region_finder.find(clusters, sides, regions);
+  clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone),
+                  known == kept.end() ? std::span<const std::uint64_t>() : std::span(known->second), shares);
+  region_finder.find(clusters, shares, sides, regions);
   regions.counts.resize(contacts.size(), {0, 0});
 }
 

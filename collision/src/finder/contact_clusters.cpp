@@ -76,7 +76,7 @@ struct ContactClusters::Impl {
   ContactSpacing wanted;
   double spacing = 0.0;  ///< of the patch under way, m
 
-  bool weigh = false;
+  ContactShares shares = ContactShares::kNone;
   std::vector<ContactPoint> all;
   std::vector<ContactWeight> weights;
   PatchWeights patch_weights;
@@ -87,6 +87,7 @@ struct ContactClusters::Impl {
   void find_patches();
   void reduce_patch();
   void weigh_patch();
+  void find_cells();
   void project();
   void choose();
   void add_corners();
@@ -236,14 +237,13 @@ void ContactClusters::Impl::reduce_patch() {
   project();
   choose();
   for (const PlanePoint& p : kept) keep[static_cast<std::size_t>(p.item)] = 1;
-  if (weigh) weigh_patch();
+  if (shares != ContactShares::kNone) weigh_patch();
+  if (shares == ContactShares::kWeightsAndCells) find_cells();
 }
 
 void ContactClusters::Impl::weigh_patch() {
   const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
   const double pressed_with = internal::collision_tuning().finder.pressed_with * diameter(all_corners);
-  const std::vector<double>& parts = patch_cells.find(place);
-  for (std::size_t i = 0; i < place.size(); ++i) cells[static_cast<std::size_t>(place[i].item)] = parts[i];
   patch_weights.set(kept);
   for (const PlanePoint& p : place)
     for (const PatchWeights::Weight& w : patch_weights.find(p)) {
@@ -254,24 +254,28 @@ void ContactClusters::Impl::weigh_patch() {
     }
 }
 
+void ContactClusters::Impl::find_cells() {
+  const std::vector<double>& parts = patch_cells.find(place);
+  for (std::size_t i = 0; i < place.size(); ++i) cells[static_cast<std::size_t>(place[i].item)] = parts[i];
+}
+
 ContactClusters::ContactClusters(const ContactClusterOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ContactClusters::~ContactClusters() = default;
 ContactClusters::ContactClusters(ContactClusters&&) noexcept = default;
 ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = default;
 
 void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, const ContactSpacing& spacing,
-                             std::span<const std::uint64_t> previous, bool weigh) {
+                             std::span<const std::uint64_t> previous, ContactShares shares) {
   Impl& m = *impl_;
-  m.weigh = weigh;
+  m.shares = shares;
   m.weights.clear();
   m.contacts = std::span(contacts).subspan(first);
   m.previous = previous;
   m.sort_by_id();
   m.keep.assign(m.contacts.size(), 1);
-  if (weigh) {
-    m.all.assign(m.contacts.begin(), m.contacts.end());
+  if (shares != ContactShares::kNone) m.all.assign(m.contacts.begin(), m.contacts.end());
+  if (shares == ContactShares::kWeightsAndCells)
     m.cells.assign(m.contacts.size(), std::numeric_limits<double>::infinity());
-  }
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
   m.wanted = spacing;
   m.find_patches();

@@ -114,9 +114,9 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
-  const bool yields = sides[0].surface != nullptr || sides[1].surface != nullptr;
-  worker.clusters.reduce(contacts, first, spacing(pair, yields), kept_last_time(pair), yields);
-  if (yields) worker.regions.find(worker.clusters, sides, into.regions);
+  const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
+  worker.clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept_last_time(pair), shares);
+  worker.regions.find(worker.clusters, shares, sides, into.regions);
   into.regions.counts.reserve(contacts.capacity());
   into.regions.counts.resize(contacts.size(), {0, 0});
 }

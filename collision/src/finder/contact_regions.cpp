@@ -47,9 +47,16 @@ void ContactRegions::give_to(std::span<ContactPoint> contacts) const {
   }
 }
 
-void RegionFinder::find(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides,
+ContactShares shares_for(const std::array<RegionSide, 2>& sides, bool itself) {
+  const int yielding = (sides[0].surface != nullptr ? 1 : 0) + (sides[1].surface != nullptr ? 1 : 0);
+  if (yielding == 0) return ContactShares::kNone;
+  return yielding == 2 && !itself ? ContactShares::kWeightsAndCells : ContactShares::kWeights;
+}
+
+void RegionFinder::find(const ContactClusters& clusters, ContactShares shares, const std::array<RegionSide, 2>& sides,
                         ContactRegions& regions) {
-  weigh(clusters, sides);
+  if (shares == ContactShares::kNone) return;
+  weigh(clusters, shares, sides);
   const std::span<const ContactPoint> all = clusters.all();
   std::size_t part = 0;
   for (Index kept = 0; kept < static_cast<Index>(all.size()); ++kept) {
@@ -64,7 +71,9 @@ void RegionFinder::find(const ContactClusters& clusters, const std::array<Region
 }
 
 /// φ a of all weights that have any, by the contact kept.
-void RegionFinder::weigh(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides) {
+void RegionFinder::weigh(const ContactClusters& clusters, ContactShares shares,
+                         const std::array<RegionSide, 2>& sides) {
+  const bool by_cells = shares == ContactShares::kWeightsAndCells;
   const std::span<const ContactPoint> all = clusters.all();
   areas_.assign(all.size(), -1.0);
   parts_.clear();
@@ -72,15 +81,14 @@ void RegionFinder::weigh(const ContactClusters& clusters, const std::array<Regio
     const ContactPoint& contact = all[static_cast<std::size_t>(w.contact)];
     double& area = areas_[static_cast<std::size_t>(w.contact)];
     if (area < 0.0) {
-      const bool both = contact.a.body != contact.b.body && sides[0].surface != nullptr && sides[1].surface != nullptr;
       area = 0.0;
       for (std::size_t side = 0; side < 2; ++side) {
         const ContactSide& at = side_of(contact, side);
-        if (sides[side].surface == nullptr || !(both || is_vertex(at))) continue;
+        if (sides[side].surface == nullptr || !(by_cells || is_vertex(at))) continue;
         const Vec3 outwards = sides[side].turn.conjugate() * (side == 0 ? -contact.normal : contact.normal);
         area += area_about(*sides[side].surface, at, outwards);
       }
-      if (both) area = std::min(area, clusters.cell(w.contact));
+      if (by_cells) area = std::min(area, clusters.cell(w.contact));
     }
     if (area > 0.0) parts_.push_back({.kept = w.kept, .contact = w.contact, .area = w.weight * area});
   }

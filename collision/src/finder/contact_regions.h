@@ -29,6 +29,9 @@ struct RegionSide {
   Quaternion turn{};
 };
 
+/// What regions are found by. @param itself whether the body touches itself
+ContactShares shares_for(const std::array<RegionSide, 2>& sides, bool itself);
+
 /// The contact r of a patch stands for its contacts i with w_i = φ_r(i) a_i / Σ_j φ_r(j) a_j, the integral of φ_r over
 /// what touches. Where one body yields, or touches itself, a_i is what a uniform pressure along the normal gives to the
 /// vertex that touches: a third of the triangles about it, seen along the normal at rest. Where two do, the patch has
@@ -38,14 +41,16 @@ struct RegionSide {
 class RegionFinder {
  public:
   /// Appends the regions of what the clusters have kept last.
-  void find(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides, ContactRegions& regions);
+  /// @param shares as they were reduced with
+  void find(const ContactClusters& clusters, ContactShares shares, const std::array<RegionSide, 2>& sides,
+            ContactRegions& regions);
 
  private:
   struct Part {
     Index kept = 0, contact = 0;
     double area = 0.0;
   };
-  void weigh(const ContactClusters& clusters, const std::array<RegionSide, 2>& sides);
+  void weigh(const ContactClusters& clusters, ContactShares shares, const std::array<RegionSide, 2>& sides);
   void spread(std::span<const ContactPoint> all, std::span<const Part> parts, const CollisionSurface& surface,
               std::size_t side, ContactRegions& regions);
 

@@ -37,7 +37,6 @@ void ConvexRounds::take_again(IslandStep& step) {
 
 SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
   ConvexContactReport done;
-  report.attempts[StepAttempt::kEndedByCap] = 0;  // of a rough look
   for (;; ++report.iterations) {
     take_impulses(step);
     step.predict();

@@ -77,6 +77,7 @@ IslandReport IslandSolver::Impl::foresee_guarded(const StepPart& part) {
 IslandReport IslandSolver::Impl::refine(const StepPart& part, IslandReport done) {
   step.part.options.rough = 0.0;
   done.newton_steps = 0;  // bounded as those of the look were
+  done.attempts[StepAttempt::kEndedByCap] = 0;
   done.status = rounds.go_on(step, done);
   act_at_end();
   return guard(part, done);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "../frame_at.h"
 #include "limber/constraints/island_solver.h"
 #include "limber/solvers/contact_potential.h"
 #include "limber/solvers/secant_iteration.h"
@@ -23,11 +24,6 @@ inline ContactPotential set_of(const RowLaw& first) {
   if (first.radius > 0.0) return {.set = Set::kBall, .bound = first.radius};
   if (first.friction > 0.0) return {.set = Set::kCone, .bound = first.friction};
   return {.set = Set::kInterval, .lower = first.lower, .upper = first.upper};
-}
-
-/// The frame before the step, or as predicted for its end.
-inline const RigidFrame& frame_at(const BodyGroup& group, Index slot, StepTime when) {
-  return when == StepTime::kStart ? group.frame(slot) : group.predicted_frame(slot);
 }
 
 /// Of a body's frame, as its impulses are.

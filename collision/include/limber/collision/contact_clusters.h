@@ -51,6 +51,13 @@ struct ContactWeight {
   double weight = 0.0;
 };
 
+/// What is told of contacts beside which are kept.
+enum class ContactShares {
+  kNone,
+  kWeights,          ///< all() and weights()
+  kWeightsAndCells,  ///< and cell()
+};
+
 /// Holds the scratch of one thread; a warm one allocates nothing.
 class ContactClusters {
  public:
@@ -63,9 +70,8 @@ class ContactClusters {
   /// Thins contacts[first …], all of one pair of bodies, and leaves them ascending in id. The outcome does not depend
   /// on their order before.
   /// @param previous ids that were kept for this pair last time, ascending
-  /// @param weigh whether all() and weights() are wanted
   void reduce(std::vector<ContactPoint>& contacts, std::size_t first, const ContactSpacing& spacing,
-              std::span<const std::uint64_t> previous, bool weigh = false);
+              std::span<const std::uint64_t> previous, ContactShares shares = ContactShares::kNone);
 
   /// What reduce() was given last, ascending in id, and which contacts of it were kept.
   std::span<const ContactPoint> all() const;
