@@ -3,7 +3,7 @@
 //   bar_on_wall [IMPACT [MODES]]    held-from-touch (default), held or absorbed; modes (40)
 // The bar is 0.05 × 0.05 × 1 m of 4 × 4 × 80 cells, E = 1e7 Pa, ν = 0, ρ = 1000 kg/m³: waves run at 100 m/s, and the
 // exact one keeps the bar on the wall for T = 2L/c = 0.02 s. Energy is that of the nodes (energy_meter.h) and, with
-// residual compliance, what the contacts store in it. Figures: docs/reports/bar-on-wall.md.
+// residual compliance, what the contacts store in it. Figures: docs/reports/contact.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

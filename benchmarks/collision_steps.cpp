@@ -3,7 +3,7 @@
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb [alone]]]     part of the names of the scenes wanted ("": all), the asset of the
 //   bunnies ("": without them), alone: without FCL
-// Figures: docs/reports/collision.md.
+// Figures: docs/reports/benchmarks.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -1,6 +1,6 @@
 // Joints, hands and unequal masses beside contacts, through World and ContactFinder at 60 steps a second: whether each
 // step settles, how far joints come apart, and what the energy does. Prints Markdown.
-// Figures: docs/reports/contact-solvers.md.
+// Figures: docs/reports/contact.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -2,7 +2,7 @@
 // energy it adds, what it costs, and how its linear programs compare with the complementary answer. Overlap is that at
 // the steps' ends: of vertices with the ground and with the boxes of other bodies, counted without the finder; and by
 // the finder's contacts between bodies, all of them, edges that cross included. Prints Markdown.
-// Figures: docs/reports/contact-methods.md.
+// Figures: docs/reports/contact.md.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdio>

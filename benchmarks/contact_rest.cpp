@@ -1,6 +1,6 @@
 // How flexible bodies come to rest: a bar, boxes and stacks of boxes, baked with 3 % of critical damping in the first
 // mode, and any body from an asset, dropped on the ground through World and ContactFinder at 60 steps a second. Prints
-// Markdown. Figures: docs/reports/contact-at-rest.md.
+// Markdown. Figures: docs/reports/contact.md.
 //   contact_rest [SECONDS [SCENE [ASSET]]]    seconds per scene (5), part of the names of the scenes wanted, a body
 // Penetration is that of the surfaces that touch, residual displacement included, of all their contacts and not of the
 // few that are kept. Drift is how far a body has moved since the fifth second.

@@ -1,5 +1,5 @@
 // How far a stack of boxes that bend comes down under its own weight, from World at rest, beside K u = f of all nodes
-// of all boxes (box_stack.h), whose faces slide or stick. Prints Markdown. Figures: docs/reports/contact-regions.md.
+// of all boxes (box_stack.h), whose faces slide or stick. Prints Markdown. Figures: docs/reports/contact.md.
 //   stack_sag [BOXES [REFINED [FRICTION]]]    10 boxes of 3 × 2 × 2 cells, so many times as many (1); 0.5
 #include <cmath>
 #include <cstdio>

@@ -3,7 +3,7 @@
 //
 //   build/benchmark/bin/tuning_collision > table.md
 //
-// Prints a Markdown table; docs/reports/tuning-collision.md holds one with its reading.
+// Prints a Markdown table.
 #include <cmath>
 #include <cstdio>
 #include <functional>

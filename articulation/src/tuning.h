@@ -6,8 +6,8 @@
 /// mathematics; and bounds on round-off, which stand beside the sum whose round-off they bound.
 ///
 /// "Case" names the drawn assembly or closed form that a number was set by. "Not measured" means that no measurement
-/// led to the value. docs/reports/tuning-articulation.md tells for every number what moves when it is halved or
-/// doubled (benchmarks/tuning_articulation.cpp).
+/// led to the value. tuning_articulation (benchmarks/) tells for every number how scores change when it is halved and
+/// doubled.
 #pragma once
 
 #include <cstddef>

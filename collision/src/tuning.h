@@ -1,8 +1,7 @@
 /// @file
 /// Numbers of the collision module that choose a path, a tolerance or a preference, all of them and each once. Each has
 /// its meaning, its unit where it has one, a sensible range in brackets and what it rests on.
-/// docs/reports/tuning-collision.md tells what moves when each is halved and doubled; benchmarks/tuning_collision.cpp
-/// measures it. "Steady" below: nothing moves there.
+/// tuning_collision (benchmarks/) halves and doubles each and tells how contacts change. "Steady" below: nothing moves.
 ///
 /// Bounds of round-off, which follow from the arithmetic, and sizes of buffers stand where they are used.
 #pragma once

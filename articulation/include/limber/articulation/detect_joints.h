@@ -16,7 +16,7 @@
 /// Limits stay open; range_of_motion.h finds them. Lengths are in the input's own unit, angles in rad; position,
 /// attitude, scale and the order of parts and faces change no type. The same bits for any thread count.
 ///
-/// Use: docs/joints.md. Method: docs/derivations/slippage.md. How often it is right: docs/reports/joints-accuracy.md.
+/// Use: docs/joints.md. Method: docs/derivations/slippage.md. How often it is right: docs/reports/joints.md.
 #pragma once
 
 #include <functional>

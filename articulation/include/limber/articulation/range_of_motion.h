@@ -16,7 +16,7 @@
 /// A freedom narrower than `min_rotation` or `min_translation` is none, and the joint becomes the type that is left:
 /// cylindrical revolute or prismatic, planar prismatic or revolute, ball revolute, any of them fixed.
 ///
-/// Use: docs/range-of-motion.md. How well: docs/reports/range-of-motion.md.
+/// Use: docs/range-of-motion.md. How well: docs/reports/joints.md.
 #pragma once
 
 #include <functional>

@@ -13,7 +13,7 @@
 /// kVelocityProgram cuts the step at the touch, four times at most, in islands of free bodies with nothing but
 /// contacts. It does not look at the gap otherwise, so what sinks in stays so. Its forces hold the accelerations of the
 /// step's start, which is rough for stiff modes. Programs that are degenerate or have no solution never fail a step:
-/// slack is bought at a price (linear_program.h) and counted as relaxed. Side by side: docs/reports/contact-methods.md.
+/// slack is bought at a price (linear_program.h) and counted as relaxed. Side by side: docs/reports/contact.md.
 ///
 /// J̇v is [H03]'s equation 20: ω × (ω × p) + 2 ω × R U ż of each point; J a has α = I⁻¹(−ω × I ω) of each frame. Where
 /// the normal is that of a face that a vertex or a round body touches, it turns with the frame of the face's body and
