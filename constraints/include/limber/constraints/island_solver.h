@@ -33,7 +33,7 @@
 /// that is not found either they stay where they are, and lose half their velocity.
 ///
 /// Free islands keep their linear and angular momentum. Not guarded: bodies whose parents move. Methods:
-/// docs/contact-solvers.md. Equations and what is guaranteed: docs/derivations/constraints.md.
+/// docs/step.md. Equations and what is guaranteed: docs/derivations/constraints.md.
 #pragma once
 
 #include <memory>
