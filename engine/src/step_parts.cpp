@@ -8,19 +8,6 @@
 namespace limber::internal {
 namespace {
 
-struct ById {
-  static std::uint64_t id(const ContactEvent& event) { return event.id; }
-  template <class Merged>
-  static std::uint64_t id(const Merged& merged) {
-    return merged.event.id;
-  }
-  template <class X, class Y>
-  bool operator()(const X& x, const Y& y) const {
-    return id(x) < id(y);
-  }
-};
-constexpr ById kById;
-
 /// Where a parent is part way through its step: the parabola of its held acceleration through both ends and a constant
 /// turn, as RigidFrame takes it.
 KinematicFrame between(const KinematicFrame& start, const KinematicFrame& target, double part, double step) {
@@ -112,61 +99,6 @@ void StepParts::finish() {
       constraints_->entries()[i].handle->set_target(
           {.position = target.position + step_ * target.velocity, .velocity = target.velocity});
   }
-}
-
-void StepParts::begin_events() {
-  merged_.clear();
-  std::swap(events_, last_events_);
-}
-
-void StepParts::add_events(int part, std::span<const ContactEvent> events) {
-  const std::size_t known = merged_.size();
-  for (const ContactEvent& event : events) {
-    const auto end = merged_.begin() + static_cast<std::ptrdiff_t>(known);
-    const auto found = std::lower_bound(merged_.begin(), end, event, kById);
-    if (found != end && found->event.id == event.id)
-      add_part(event, *found);
-    else
-      merged_.push_back(first_part(event, part));
-  }
-  std::sort(merged_.begin(), merged_.end(), kById);
-}
-
-StepParts::Merged StepParts::first_part(const ContactEvent& event, int part) const {
-  Merged made{event, event.phase != ContactPhase::kEnded, event.phase == ContactPhase::kEnded};
-  if (!made.pressed) return made;
-  const auto last = std::lower_bound(last_events_.begin(), last_events_.end(), event, kById);
-  const bool pressed_before = last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
-  const bool lasting = pressed_before || (part == 0 && event.phase == ContactPhase::kLasting);
-  made.event.phase = lasting ? ContactPhase::kLasting : ContactPhase::kBegun;
-  return made;
-}
-
-void StepParts::add_part(const ContactEvent& event, Merged& merged) {
-  merged.let_go = event.phase == ContactPhase::kEnded;
-  if (merged.let_go) return;
-  const ContactEvent before = merged.event;
-  merged.event = event;
-  merged.event.impulse += before.impulse;
-  merged.event.phase = merged.pressed ? before.phase : ContactPhase::kLasting;
-  merged.pressed = true;
-}
-
-/// What pressed in any part; and what has let go since it was last told to press.
-void StepParts::end_events() {
-  events_.clear();
-  for (const ContactEvent& event : released_)
-    if (!std::binary_search(merged_.begin(), merged_.end(), event, kById)) {
-      events_.push_back(event);
-      events_.back().phase = ContactPhase::kEnded;
-      events_.back().impulse = Vec3::Zero();
-    }
-  released_.clear();
-  for (const Merged& merged : merged_) {
-    events_.push_back(merged.event);
-    if (merged.pressed && merged.let_go) released_.push_back(merged.event);
-  }
-  std::sort(events_.begin(), events_.end(), kById);
 }
 
 }  // namespace limber::internal

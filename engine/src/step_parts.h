@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "constraint_stage.h"
-#include "limber/constraints/contact_constraint.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
 #include "limber/engine/world.h"
@@ -36,19 +35,12 @@ class StepParts {
   /// After the last one.
   void finish();
 
-  /// Events of a step: begin, those of each part in turn, end. Then events() are those of the step: one for each
-  /// contact that pressed in any part, with the sum of its impulses and the place where it pressed last.
-  void begin_events();
-  void add_events(int part, std::span<const ContactEvent> events);
-  void end_events();
-  std::span<const ContactEvent> events() const { return events_; }
-
  private:
   friend struct limber::StateFields;
   /// Between steps.
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.forces_, s.impulses_, s.leads_, s.events_, s.released_);
+    return std::tie(s.forces_, s.impulses_, s.leads_);
   }
 
   struct Load {
@@ -76,15 +68,7 @@ class StepParts {
     Vec3 start;
     HandleTarget target;
   };
-  /// A contact over all parts so far.
-  struct Merged {
-    ContactEvent event;
-    bool pressed;  // in some part
-    bool let_go;   // since it last pressed
-  };
   void lead_handles(int part);
-  Merged first_part(const ContactEvent& event, int part) const;
-  static void add_part(const ContactEvent& event, Merged& merged);
 
   ConstraintStage* constraints_;
   int parts_;
@@ -92,9 +76,6 @@ class StepParts {
   std::vector<Load> forces_, impulses_;
   std::vector<Lead> leads_;
   std::vector<HandlePath> handles_;  // by place, of the step under way
-  std::vector<Merged> merged_;       // by id
-  std::vector<ContactEvent> events_, last_events_;
-  std::vector<ContactEvent> released_;  // told as pressing, but let go before the step's end
 };
 
 }  // namespace limber::internal

@@ -1,0 +1,30 @@
+// The contacts of a step as rows for islands, and what they remember from step to step.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "body_table.h"
+#include "limber/constraints/contact_constraint.h"
+
+namespace limber::internal {
+
+struct ContactRows {
+  ContactSet set;
+  std::vector<double> friction;  // by body
+
+  const ContactOptions& options() const { return set.options(); }
+  /// @param found at the start of the step, ordered as by ContactSource
+  void take(const BodyStates& states, std::span<const ContactPoint> found) {
+    set.update(states, found, Vec3::Zero(), friction);
+  }
+  void note_friction(const BodyTable& bodies) {
+    friction.resize(bodies.size());
+    for (std::size_t i = 0; i < friction.size(); ++i) {
+      const double own = bodies[static_cast<Index>(i)].friction;
+      friction[i] = own >= 0.0 ? own : options().friction;
+    }
+  }
+};
+
+}  // namespace limber::internal
