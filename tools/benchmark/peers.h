@@ -31,7 +31,7 @@ struct RigidPile {
   Vec3 gravity = {0.0, 0.0, -9.80665};       ///< m/s²
 };
 
-/// What one step took and left.
+/// Cost and result of one step.
 struct PileStep {
   double seconds = 0.0;  ///< of this thread
   int contacts = 0;

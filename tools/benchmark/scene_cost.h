@@ -1,5 +1,5 @@
 /// @file scene_cost.h
-/// What the steps of a scene cost, stage by stage.
+/// Cost of a scene's steps, stage by stage.
 #pragma once
 
 #include <cstddef>

@@ -32,7 +32,7 @@ class SceneSource {
   std::unique_ptr<Library> library_;
 };
 
-/// Those of the library that take seconds.
+/// Scenes of the library that take seconds.
 std::vector<std::string> usual_scenes();
 
 /// Null for one thread. @throws InvalidArgument where limber is built without oneTBB

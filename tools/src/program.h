@@ -1,5 +1,5 @@
 /// @file program.h
-/// What limber's command-line programs have in common: options, errors, exit codes, reports, output files, progress.
+/// Common parts of limber's command-line programs: options, errors, exit codes, reports, output files, progress.
 ///
 ///   int main(int argc, char** argv) {
 ///     Program program("limber-inspect", "Tells what is inside an asset.");
@@ -42,7 +42,7 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  /// Where the program declares its own options; give each value's unit as its type_name().
+  /// The program declares its own options here; give each value's unit as its type_name().
   CLI::App& options() { return *options_; }
 
   /// Parses, works, then writes the report and lets every output file appear. @return the exit code
@@ -63,8 +63,8 @@ class Program {
   /// OutputFiles::add()
   void write_file(const std::filesystem::path& path, std::string_view bytes);
 
-  /// The machine-readable report, keys in the order they are set; starts with "program" and "version". What differs
-  /// between equal runs (times) belongs under the key "seconds". "warnings" is added at the end.
+  /// The machine-readable report, keys in the order they are set; starts with "program" and "version". Values that
+  /// differ between equal runs (times) belong under the key "seconds". "warnings" is added at the end.
   nlohmann::ordered_json& report() { return *report_; }
 
   /// Remarks: each becomes a line "NAME: warning: …" on stderr when the work is done, and stands in the report.

@@ -1,14 +1,14 @@
 /// @file limber/articulation/contact_region.h
-/// Where two components touch: the part of each surface that faces the other across a small gap.
+/// Contact of two components: the part of each surface that faces the other across a small gap.
 ///
 ///   const std::vector<ContactRegion> regions = find_contact_regions(assembly, {.samples = 6000});
 ///
-/// Samples are spread evenly by area over what of each surface may lie near the other and face it; each has the nearest
-/// facing point of the other surface. The usual method takes for contact the cluster grown from the smallest
-/// gaps (2.5 times its median gap and what facets add), so that a small hinge is not lost among large faces that run
-/// side by side further apart. Left out are samples whose nearest point lies beside rather than across, that look past
-/// each other while most do not, or behind a third component. Where no surface faces another, one closed component may
-/// lie inside the other: ContactRegion::overlapping.
+/// Samples are spread evenly by area over the parts of each surface that may lie near the other and face it; each has
+/// the nearest facing point of the other surface. The usual method takes for contact the cluster grown from the
+/// smallest gaps (2.5 times its median gap and what facets add), so that a small hinge is not lost among large faces
+/// that run side by side further apart. Left out are samples whose nearest point lies beside rather than across, that
+/// look past each other while most do not, or behind a third component. If no surface faces another, one closed
+/// component may lie inside the other: ContactRegion::overlapping.
 ///
 /// A pair has no contact where fewer than 20 samples a side are left, the median gap is above `largest_gap`, or only
 /// edges look at each other. Points are placed alike on triangles of one shape, so pose, scale and order do not matter.

@@ -11,7 +11,7 @@
 ///
 /// Types are those of [X09] Table 1 and the screw. Geometry does not tell everything: a peg in a blind hole looks like
 /// a drawer at its stop, a puck on a table like the flange of a bearing that is not drawn, and bolts or glue are not
-/// seen. What else a contact may be stands in DetectedJoint::other_hypotheses.
+/// seen. DetectedJoint::other_hypotheses holds the other candidates.
 ///
 /// Limits stay open; range_of_motion.h finds them. Lengths are in the input's own unit, angles in rad; position,
 /// attitude, scale and the order of parts and faces change no type. The same bits for any thread count.

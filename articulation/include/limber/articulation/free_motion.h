@@ -55,7 +55,7 @@ struct FreeMotionOptions {
   void validate() const;        ///< @throws InvalidArgument naming the field
 };
 
-/// Where a motion ends.
+/// The end of a motion.
 struct MotionStop {
   Index body = -1;            ///< of the fixed ones, in the order given; −1: nothing stops
   Vec3 point = Vec3::Zero();  ///< of the moving body, as drawn, that touches (or the fixed point, followed back)

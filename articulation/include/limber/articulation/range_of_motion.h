@@ -41,7 +41,7 @@ struct RangeOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
-/// What moves and what stays when one joint is moved: components, ascending.
+/// The components that move and those that stay when one joint is moved, ascending.
 struct JointSides {
   std::vector<Index> moving, fixed;
   std::vector<Index> left_out;  ///< the rest of a closed chain

@@ -5,8 +5,8 @@
 /// a root: the input's origin), so every coordinate is 0 in the pose as read.
 ///
 /// Both robot formats are trees. The tree has as root the first component of each connected set, and leaves out of a
-/// closed chain the joint that is easiest to close elsewhere: fixed, then ball, then revolute. What is left out stands
-/// in MJCF as an equality constraint, in URDF as a comment. Sets that no joint connects are fixed to the world.
+/// closed chain the joint that is easiest to close elsewhere: fixed, then ball, then revolute. MJCF has
+/// it as an equality constraint, URDF as a comment. Sets that no joint connects are fixed to the world.
 ///
 /// Joints of more than one freedom, where a format has none for them:
 ///
@@ -18,7 +18,7 @@
 ///
 /// A ball's Euler limits are taken as they are; its cone is not a limit either format knows, and is mentioned only. An
 /// open end beside a closed one is written as a number a thousand times the model's size, for which both formats ask.
-/// Where the tree runs against a joint (its parent is b), order and axes are reversed, so the coordinates stay the
+/// If the tree runs against a joint (its parent is b), order and axes are reversed, so the coordinates stay the
 /// same.
 #pragma once
 

@@ -11,7 +11,7 @@
 ///
 /// Each type of joint is a hypothesis: its family of motions is fitted to the contact and is as likely as all its
 /// motions slip, P(μ) = 1/(1 + (μ/τ)²) with τ = threshold + spread of the normals, and all others do not. The shares of
-/// all hypotheses are their confidences. Where two joints touch alike (a stop or the end of a hole, a flange or a
+/// all hypotheses are their confidences. If two joints touch alike (a stop or the end of a hole, a flange or a
 /// puck) the second is added with a share that does not overtake the first.
 ///
 /// Sources: Gelfand and Guibas, "Shape segmentation using local slippage analysis", 2004; [X09] 3.2 and Table 1.

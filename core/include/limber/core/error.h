@@ -1,5 +1,5 @@
 /// @file limber/core/error.h
-/// What limber throws. `assert` is for limber's own slips; these are for what a caller or a file got wrong.
+/// The exceptions that limber throws, for errors of a caller or a file. `assert` is for limber's own slips.
 ///
 /// A message says where, which element, the value seen, what was expected and what to try, in one line.
 #pragma once

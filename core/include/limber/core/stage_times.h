@@ -1,5 +1,5 @@
 /// @file limber/core/stage_times.h
-/// Where the time of a step goes, for those who ask (World::set_stage_times).
+/// Times of the stages of a step, on request (World::set_stage_times).
 ///
 /// A StageClock is laid over a step: each lap gives all the time since the last one to a stage, so that the stages of a
 /// step sum to the step. Without times to add to it reads no clock: a branch on a null pointer per lap is all it costs.

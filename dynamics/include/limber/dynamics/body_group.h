@@ -26,8 +26,8 @@ namespace limber {
 
 class ExactMotion;
 
-/// What constraints do to one body over one step. Forces act on the deformed body; angular quantities are about the
-/// body origin. World axes.
+/// The action of constraints on one body over one step. Forces act on the deformed body; angular quantities are about
+/// the body origin. World axes.
 ///
 /// The frame gets impulses at the step's start (θ = 1: what stands stays, docs/derivations/constraints.md) and held
 /// forces on top (θ = ½). The modes get both as one force held over the step: `modal`/Δt. A mode above the step's
@@ -68,7 +68,7 @@ class BodyGroup {
   Index count() const { return slots() - static_cast<Index>(vacant_.size()); }
   bool occupied(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].occupied; }
 
-  // State of one body. What is set here is its previous state too: nothing is drawn between.
+  // State of one body. Setting it sets its previous state too: nothing is drawn between.
   const RigidFrame& frame(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> amplitudes(Index slot) const { return amplitudes_.modes(slot); }  ///< z
   std::span<const double> rates(Index slot) const { return rates_.modes(slot); }            ///< ż
@@ -83,15 +83,15 @@ class BodyGroup {
   }
   std::span<const double> previous_amplitudes(Index slot) const { return previous_amplitudes_.modes(slot); }
 
-  // Where points of the surface are and how they move with the amplitudes, now, at the predicted end of the step, and
-  // at any amplitudes. Views of what the slot holds.
+  // Points of the surface and their motion with the amplitudes, now, at the predicted end of the step, and at any
+  // amplitudes. Views of the slot's data.
   bool skinned(Index slot) const { return skin(slot) != nullptr; }
   BodyShape shape(Index slot) const { return shape_at(slot, amplitudes(slot)); }
   BodyShape predicted_shape(Index slot) const { return shape_at(slot, predicted_amplitudes(slot)); }
   BodyShape shape_at(Index slot, std::span<const double> z) const { return {*model_, z, skin(slot)}; }
   /// For means over the way between the two. @pre skinned
   std::array<ShapeBetween, kShapesBetween> shapes_between(Index slot) const;
-  /// What a body with a skin remembers of its last shapes; null: none.
+  /// The last shapes of a body with a skin; null: none.
   SkinMemory* skin(Index slot) const;
 
   // Points of the surface, deformed.
@@ -110,7 +110,7 @@ class BodyGroup {
   /// One step of the occupied slots in [begin, end) that are awake. Allocates and throws nothing.
   void advance(Index begin, Index end, const Vec3& gravity);
 
-  /// Whether the steps that follow are parts of one that has begun: previous_pose() and previous_amplitudes() stay
+  /// True: the steps that follow are parts of one that has begun, so previous_pose() and previous_amplitudes() stay
   /// those of its start.
   void set_within_step(bool within) { within_step_ = within; }
 
@@ -118,7 +118,7 @@ class BodyGroup {
   void put_to_sleep(Index slot);
   void wake(Index slot) { body(slot).asleep = false; }
 
-  /// What advance() would do to one body, at any time within the step. The body stays as it is.
+  /// The motion that advance() would give one body, at any time within the step. The body stays as it is.
   void predict_motion(Index slot, const Vec3& gravity, ExactMotion& motion) const {
     predict_motion(slot, gravity, step_length(), motion);
   }
@@ -133,7 +133,7 @@ class BodyGroup {
     predict_motion(slot, gravity, modes.length(), load, modes.velocity_response(), motion);
   }
 
-  /// Whether advance() leaves the body alone: it is predicted and committed by whoever solves its constraints.
+  /// True: advance() leaves the body alone; the solver of its constraints predicts and commits it.
   void set_constrained(Index slot, bool constrained) { body(slot).constrained = constrained; }
 
   // One step in two phases, for bodies under constraints: predict as often as wanted, then commit the last prediction.
@@ -168,7 +168,7 @@ class BodyGroup {
   void apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Lasts for the next step. @param modal k numbers, kg^½·m/s², or none
   void apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque, std::span<const double> modal);
-  /// What apply_force() has summed up for the next step: world, N, and about the body origin, N·m.
+  /// The sum of apply_force() for the next step: world, N, and about the body origin, N·m.
   const Vec3& held_force(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].force; }
   const Vec3& held_torque(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].torque; }
   std::span<const double> held_modal_forces(Index slot) const { return forces_.modes(slot); }
@@ -182,10 +182,10 @@ class BodyGroup {
 
   BodyEnergy energy(Index slot, const Vec3& gravity) const;
   BodyEnergy predicted_energy(Index slot, const Vec3& gravity) const;
-  /// What the modes' damping takes over the predicted step, J: work of the forces held over it less what the modes
-  /// gain.
+  /// Energy that the modes' damping takes over the predicted step, J: work of the forces held over it less what the
+  /// modes gain.
   double predicted_dissipation(Index slot) const;
-  /// Whether something comes part way into the next step: an impulse with a delay.
+  /// True if an impulse with a delay acts part way into the next step.
   bool has_delayed_impulse(Index slot) const { return !bodies_[static_cast<std::size_t>(slot)].delayed.empty(); }
 
   /// Everything that the coming steps of one body depend on, and what is drawn between the last two states.
@@ -198,7 +198,7 @@ class BodyGroup {
   Vec3 predicted_first_moment(Index slot) const;
 
  private:
-  /// Of a body with a skin. Not state: all of it follows from amplitudes.
+  /// Data of a body with a skin. Not state: all of it follows from amplitudes.
   struct Skin {
     explicit Skin(const ModalSkin& of) : memory(of) {}
     SkinMemory memory;

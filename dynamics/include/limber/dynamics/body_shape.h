@@ -1,11 +1,11 @@
 /// @file limber/dynamics/body_shape.h
-/// Where the points of a body's surface are at given amplitudes, how they move with these, and what forces on them do:
-/// the one place that knows whether a body bends by its modes alone or by its modal skin.
+/// Points of a body's surface at given amplitudes, their motion with these, and the modal forces of loads on them: the
+/// one place that knows whether a body bends by its modes alone or by its modal skin.
 ///
 ///   p_BP = r + U z                       J = U          by the modes alone
 ///   p_BP = Σ_c w_c x_c(z)                J = ∂p/∂z      with a skin (skin_pose.h): c corners of the triangle, w weights
 ///
-/// With a skin surfaces stay made of flat triangles, so that what is touched and held is what is drawn.
+/// With a skin surfaces stay made of flat triangles, so bodies are touched and held as they are drawn.
 #pragma once
 
 #include <array>
@@ -62,15 +62,15 @@ class BodyShape {
   const SkinPose& handles() const { return skin_->at(z_); }
   const SkinPose& differentiated() const { return skin_->differentiated(z_); }
 
-  // Of a point; all in the body frame. Where `shapes` are given they take the place of U there, 3 × k, row by row: the
-  // mean of a region about the point.
+  // A point's place and motion, in the body frame. If `shapes` are given they take the place of U there, 3 × k, row by
+  // row: the mean of a region about the point.
   Vec3 position(const SurfacePoint& at, std::span<const double> shapes = {}) const;
   /// J ż, m/s.
   Vec3 velocity(const SurfacePoint& at, std::span<const double> rates, std::span<const double> shapes = {}) const;
   /// g += Jᵀ f. @param f_B force (N) or impulse (N·s)
   void add_force(const SurfacePoint& at, const Vec3& f_B, std::span<double> g,
                  std::span<const double> shapes = {}) const;
-  /// What turns small displacements beside the modes, such as a residual one, from the rest shape: 1 without a skin.
+  /// Rotation of small displacements beside the modes, such as a residual one, from the rest shape: 1 without a skin.
   Mat3 turn(const SurfacePoint& at) const;
 
  private:
@@ -87,7 +87,7 @@ struct ShapeBetween {
   double weight;  ///< of it in the mean; they sum to 1
 };
 constexpr std::size_t kShapesBetween = 3;
-/// Where they are, as parts of the way, and their weights.
+/// Their places, as parts of the way, and their weights.
 constexpr std::array<double, kShapesBetween> kPartsBetween{0.5 - 0.3872983346207417, 0.5, 0.5 + 0.3872983346207417};
 constexpr std::array<double, kShapesBetween> kWeightsBetween{5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 

@@ -22,7 +22,7 @@ namespace limber {
 
 class ExactMotion;
 
-/// What a body shows to others: exactly one of the two.
+/// The geometry that others meet: exactly one of the two.
 struct BodyGeometry {
   std::shared_ptr<const ModalModel> model{};  ///< its collision surface, which deforms with the amplitudes
   std::shared_ptr<const Shape> shape{};       ///< a rigid shape, in the body frame
@@ -38,7 +38,7 @@ struct CollisionFilter {
   friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
 };
 
-/// Where one body is, at one instant.
+/// State of one body at one instant.
 struct BodyState {
   RigidTransform pose{};                 ///< X_WB
   std::span<const double> amplitudes{};  ///< z, k numbers; none for a rigid shape
@@ -52,10 +52,10 @@ struct BodyState {
   /// together beyond is a matter of find_impacts(). m, ≥ 0.
   double look_ahead = std::numeric_limits<double>::infinity();
   /// The motion expected until the next query: of the body origin, m, straight on and evenly; and the rotation vector,
-  /// rad; world. Of two bodies that move on together nothing but their reaches counts. By both a source may choose
+  /// rad; world. For two bodies that move on together only their reaches count. By both a source may choose
   /// normals of what is apart but would be passed; the rotation counts for nothing else.
   Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
-  /// Where it is expected to be at the next query. Its points are expected to go there straight on and evenly, and come
+  /// Its expected state at the next query. Its points are expected to go there straight on and evenly, and come
   /// no farther than `doubt` beside: features that this keeps apart need not be found. m, ≥ 0; infinite: nothing is
   /// expected, and the other two are not read.
   double doubt = std::numeric_limits<double>::infinity();
@@ -94,7 +94,7 @@ struct ImpactQuery {
   std::span<const std::pair<Index, Index>> except{};  ///< (a, b), a < b, ascending: pairs that are not looked at
 };
 
-/// What a vertex of a body's collision surface takes of a contact's force.
+/// The share of a contact's force that a vertex of the collision surface takes.
 struct VertexShare {
   Index vertex = -1;
   double share = 0.0;  ///< > 0
@@ -103,7 +103,7 @@ struct VertexShare {
 /// One body's side of a contact.
 struct ContactSide {
   Index body = -1;
-  /// Of the body's collision surface (SurfacePoint::Surface::kCollision); −1 for a rigid shape, which has no modal row.
+  /// On the body's collision surface (SurfacePoint::Surface::kCollision); −1 for a rigid shape, which has no modal row.
   Index triangle = -1;
   std::array<double, 3> weight{0.0, 0.0, 0.0};  ///< barycentric, sums to 1; zeros for a rigid shape
   Vec3 point_B = Vec3::Zero();                  ///< the point, deformed, in the body frame, m
@@ -111,7 +111,7 @@ struct ContactSide {
   /// body turns, what it touches with is another point of it, always this far from the ball's centre against the
   /// normal.
   double radius = 0.0;
-  /// Of a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
+  /// For a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
   /// force is spread over; shares sum to 1. The frame feels it at the point nevertheless. None: it acts at the
   /// point alone. Kept by the source until its next query of all bodies; of a query of some bodies until its next
   /// query.

@@ -5,12 +5,12 @@
 ///   group.predict_motion(slot, gravity, motion);  // or set_frame() for a mover without modes
 ///   motion.at(0.3 * motion.step(), pose, amplitudes);
 ///
-/// Under the loads that the body has now: forces held, impulses with a delay from their time on. What it says at the
-/// step's end is what BodyGroup::advance() commits (to round-off: 1e-13 of the state); constraints are not part of it.
-/// Frames: FramePath. Modes: the exact flow of each oscillator (oscillator.h) over t, some three ns each; accuracy, in
-/// the norm of (√λ z, ż): 4ε(4 + √λ t) of the state's own size, for any damping and any t; the same bits for any
-/// instruction set that has fused multiply-add. A motion is a copy: the body may change, its model must live. Setting a
-/// motion again allocates nothing once it has held as many modes, parts and impulses; all else never does.
+/// Under the loads that the body has now: forces held, impulses with a delay from their time on. Its state at the
+/// step's end is that which BodyGroup::advance() commits (to round-off: 1e-13 of the state); constraints are not part
+/// of it. Frames: FramePath. Modes: the exact flow of each oscillator (oscillator.h) over t, some three ns each;
+/// accuracy, in the norm of (√λ z, ż): 4ε(4 + √λ t) of the state's own size, for any damping and any t; the same bits
+/// for any instruction set that has fused multiply-add. A motion is a copy: the body may change, its model must live.
+/// Setting a motion again allocates nothing once it has held as many modes, parts and impulses; all else never does.
 #pragma once
 
 #include <span>

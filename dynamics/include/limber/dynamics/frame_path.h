@@ -1,11 +1,11 @@
 /// @file limber/dynamics/frame_path.h
-/// Where a body frame is at any time within one step, in closed form, and how far it can get.
+/// Path of a body frame within one step, in closed form, with bounds on it.
 ///
 ///   p(t) = p₀ + v₀ t + ½ a t²          origin: a free body's flight, or a parent's path through both its poses
 ///   R(t)   free rotation from the step's first kick on (kFree), or from the kick of the part that t lies in (kPoint)
 ///   R(t) = exp(ω_K t) R_K exp(θ(t) e)   carried by a parent that turns steadily; θ linear in each part (kLine)
 ///
-/// This is the motion that RigidFrame steps through: at the step's end it is what RigidFrame commits. Bounds hold to
+/// This is the motion that RigidFrame steps through: at the step's end RigidFrame commits it. Bounds hold to
 /// round-off; derivation: docs/derivations/motion-bounds.md.
 #pragma once
 
@@ -25,7 +25,7 @@ struct RigidMotion {
   Vec3 angular_velocity = Vec3::Zero();  ///< held, world, rad/s
 };
 
-/// What a frame cannot exceed over [t₀, t₁].
+/// Bounds on a frame over [t₀, t₁].
 struct FrameBounds {
   double speed = 0.0;          ///< sup |v(t)|, m/s
   double travel = 0.0;         ///< ≥ sup |p(t) − p(t₀)|, m
@@ -66,7 +66,7 @@ class FramePath {
   void add_free(double begin, const FreeRotation& rotation, double since, const Vec3& momentum_W);
   void start_carried(const RigidMotion& parent, double step, const Vec3& line_axis);
   void add_carried(double begin, double angle, double angle_rate);
-  /// What stands at the end, after the last kick; `motion.acceleration` is not read.
+  /// Sets the state at the end, after the last kick; `motion.acceleration` is not read.
   void finish(const RigidMotion& motion);
 
  private:

@@ -1,6 +1,6 @@
 /// @file limber/dynamics/half_basis.h
 /// Mode shapes in half precision: half the bytes to read, where bodies are drawn one at a time and their bases come
-/// from memory. Where many instances share a basis, or it lies in a cache, single precision is as fast.
+/// from memory. Single precision is as fast if many instances share a basis or it lies in a cache.
 #pragma once
 
 #include <cstdint>

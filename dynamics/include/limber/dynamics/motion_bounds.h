@@ -16,7 +16,7 @@
 
 namespace limber {
 
-/// What one mode cannot exceed over a stretch of time.
+/// Bounds on one mode over a stretch of time.
 struct ModeBound {
   double change = 0.0;        ///< ≥ sup |z(t) − z(t₀)|, kg^½·m
   double size = 0.0;          ///< ≥ sup |z(t)|, kg^½·m
@@ -28,7 +28,7 @@ struct ModeBound {
 /// @param duration ≥ 0. Arguments are finite. Does not allocate or throw.
 ModeBound bound_motion(const Mode& mode, const ModeState& start, double g, double duration);
 
-/// What a body cannot exceed over [t₀, t₁].
+/// Bounds on a body over [t₀, t₁].
 struct MotionBounds {
   FrameBounds frame;
   std::vector<ModeBound> modes;

@@ -54,15 +54,15 @@ struct FrameConstants {
   explicit FrameConstants(const ModalModelData& body);
 };
 
-/// What acts on a frame over one step, held.
+/// Loads on a frame over one step, held.
 struct FrameLoad {
   Vec3 gravity = Vec3::Zero();  ///< world, m/s²
   Vec3 force = Vec3::Zero();    ///< world, N
   Vec3 torque = Vec3::Zero();   ///< about the body origin, world, N·m
 };
 
-/// What the modes of a body with fixed nodes feel of its frame over one step, in body axes: the mean over the step, by
-/// the trapezoidal rule on its parts.
+/// Excitation of the modes of a body with fixed nodes by its frame over one step, in body axes: the mean over the step,
+/// by the trapezoidal rule on its parts.
 struct FrameExcitation {
   Vec3 field = Vec3::Zero();                 ///< Rᵀ(g − a), m/s²
   Vec3 angular_acceleration = Vec3::Zero();  ///< α, rad/s²
@@ -90,25 +90,25 @@ class RigidFrame {
   void set_pose(const RigidTransform& X_WB);
   /// Arguments as in the constructor.
   void set_velocity(const FrameConstants& c, const Vec3& velocity, const Vec3& angular_velocity);
-  /// Where the parent is at the end of the coming step. Without a new one it goes on at its velocity and angular
+  /// Sets the parent at the end of the coming step. Without a new one it goes on at its velocity and angular
   /// velocity.
   void set_parent(const KinematicFrame& at_step_end);
-  /// Whether it has been told where the parent is then.
+  /// True if the parent of the step's end has been set.
   bool has_next_parent() const { return parent_was_set_; }
   /// The parent now.
   const KinematicFrame& parent() const { return parent_; }
 
-  /// Of a free body (kFree): all of its motion, by momentum. @param angular_momentum about the body origin, world,
+  /// Sets all of a free body's motion (kFree), by momentum. @param angular_momentum about the body origin, world,
   /// kg·m²/s
   void set_motion(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_momentum);
 
-  /// Of a body whose origin its parent carries (kPoint, kLine): how it turns, the parent staying where it is.
+  /// Sets the turning of a body whose origin its parent carries (kPoint, kLine); the parent stays where it is.
   /// @param q_WB kLine: a turn about the line as the parent carries it. @param angular_momentum as above; kLine: its
   /// part along the line counts
   void set_turn(const FrameConstants& c, const Quaternion& q_WB, const Vec3& angular_momentum);
 
-  /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. What the fixing takes up has no
-  /// effect.
+  /// @param impulse N·s, world. @param moment about the body origin, N·m·s, world. The part that the
+  /// fixing takes up has no effect.
   void apply_impulse(const FrameConstants& c, const Vec3& impulse, const Vec3& moment);
 
   /// One step is begin_step(), the modes' own step, end_step(): the modes are shaken by what begin_step() returns and

@@ -1,13 +1,13 @@
 /// @file limber/dynamics/skin_extent.h
-/// How far a surface that bends by a modal skin can move while its amplitudes change by so much: what SurfaceExtent is
-/// to surfaces that bend by their modes alone.
+/// Bound on the motion of a surface that bends by a modal skin while its amplitudes change, as SurfaceExtent is for
+/// surfaces that bend by their modes alone.
 ///
 ///   x = p_h + R_h (y − r_h) of each handle h of a vertex, y = r + Ũ z;   |∂_i x| ≤ |t'_hi + Ω_hi × R_h c| + |Ω_hi| ρ + |Ũ_i| now,
 ///   |∂_ij x| ≤ Σ_l [3/2 |Θ_li||Θ_lj||a_lh + D_lh z| + |Θ_li||D_lhj| + |Θ_lj||D_lhi|]
 ///              + 3/2 |Θ_hi||Θ_hj||y − r_h| + |Θ_hi||Ũ_j| + |Θ_hj||Ũ_i|
 /// c and ρ a ball about the vertices of the handle. A vertex moves by at most the most of its handles, as weights are
-/// no less than 0 and sum to 1. Of free bodies the rates now are those in their frame, and what Eckart's rotation adds
-/// to the second derivatives follows from how firmly its condition holds the frame, axis by axis. Derivation:
+/// no less than 0 and sum to 1. The present rates of free bodies are those in their frame; the second derivatives of
+/// Eckart's rotation follow from how firmly its condition holds the frame, axis by axis. Derivation:
 /// docs/derivations/modal-skin.md.
 #pragma once
 
@@ -19,7 +19,7 @@
 
 namespace limber {
 
-/// Of the collision surface of one model. Immutable.
+/// Extent of the collision surface of one model. Immutable.
 class SkinExtent {
  public:
   /// @pre the model has a skin, and outlives this
@@ -52,7 +52,7 @@ class SkinExtent {
   std::vector<Ball> balls_;             // by handle
   std::vector<double> turns_, shifts_;  // |Θ_hi|; |D_lhi|
   std::vector<double> flexing_;         // the largest |Ũ_i|
-  // Of free bodies, with C = Σ m r rᵀ/m and J = (tr C) 1 − C: √C, 1/√J, √(least of J).
+  // For free bodies, with C = Σ m r rᵀ/m and J = (tr C) 1 − C: √C, 1/√J, √(least of J).
   Mat3 root_moment_ = Mat3::Zero(), turned_ = Mat3::Zero();
   double thinnest_ = 0.0;
 };

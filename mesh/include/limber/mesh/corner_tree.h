@@ -44,7 +44,7 @@ class CornerTree {
   const Corners& corners(Index place) const { return corners_[static_cast<std::size_t>(place)]; }
   /// Which one it is of those given.
   Index element(Index place) const { return element_[static_cast<std::size_t>(place)]; }
-  /// Those of the places [first, end).
+  /// Elements at the places [first, end).
   std::span<const Index> elements(Index first, Index end) const {
     return std::span(element_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(end - first));
   }

@@ -1,5 +1,5 @@
 /// @file limber/mesh/grouped_surface.h
-/// A surface with the names that its file gives to parts of it. What a program needs that takes a file apart again.
+/// A surface with the names that its file gives to parts of it. Programs that take a file apart read it.
 #pragma once
 
 #include <filesystem>

@@ -29,11 +29,11 @@ namespace limber {
 
 enum class MeshKind { kTets, kSurface };
 
-/// Whether limber reads the file's format itself; says nothing about whether the content is right.
+/// True if limber reads the file's format itself; the content may still be wrong.
 /// @throws InputError if the file cannot be read
 bool is_known_mesh_format(const std::filesystem::path& path);
 
-/// What is in a file. Formats that can hold both are read whole: to read next, read_mesh() does both at once.
+/// Kind of a file's content. Formats that can hold both are read whole: to read next, read_mesh() does both at once.
 /// @throws InputError if the file cannot be read or its format is not known (the message lists the known ones)
 MeshKind mesh_kind(const std::filesystem::path& path);
 

@@ -26,7 +26,7 @@ class SurfaceLocator {
   SurfaceLocator(SurfaceLocator&&) noexcept;
   SurfaceLocator& operator=(SurfaceLocator&&) noexcept;
 
-  /// Of triangles that are equally near, the one of lowest index. @pre p is finite
+  /// The nearest point; among equally near triangles, that of the lowest index. @pre p is finite
   SurfaceLocation nearest(const Vec3& p) const;
 
  private:

@@ -43,7 +43,7 @@ struct SolidProperties {
 };
 SolidProperties solid_properties(const SurfaceMesh& surface);
 
-/// What keeps a surface from bounding a solid, as counts.
+/// Counts of the defects that keep a surface from bounding a solid.
 struct SurfaceQuality {
   Index boundary_edges = 0;      ///< edges of one triangle
   Index non_manifold_edges = 0;  ///< edges of three or more triangles

@@ -10,14 +10,14 @@
 
 namespace limber {
 
-/// Where a point lies relative to a mesh. Barycentric weights belong to the corners of `tet` in their order and sum
+/// Place of a point relative to a mesh. Barycentric weights belong to the corners of `tet` in their order and sum
 /// to 1.
 struct TetLocation {
   Index tet = 0;
   double distance = 0.0;  ///< to the mesh, m; 0 inside and on the boundary
-  /// Of the point itself: Σ weight·corner is the point; some negative outside, unbounded.
+  /// Weights of the point itself: Σ weight·corner is the point; some negative outside, unbounded.
   std::array<double, 4> weight{};
-  /// Of the mesh's point nearest to it: all ≥ 0; the same as `weight` inside.
+  /// Weights of the mesh's point nearest to it: all ≥ 0; the same as `weight` inside.
   std::array<double, 4> nearest{};
 };
 

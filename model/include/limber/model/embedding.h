@@ -12,7 +12,7 @@
 
 namespace limber {
 
-/// What a vertex moves with.
+/// Tet and weights that a vertex moves with.
 struct EmbeddedVertex {
   Index tet = 0;
   std::array<double, 4> weight{};  ///< sums to 1; size at most kMaxEmbeddingWeight; some negative outside the mesh
@@ -32,7 +32,7 @@ struct Embedding {
 ///
 /// A render surface lies partly outside the tets that approximate it. There the nearest tet's linear displacement field
 /// is continued, not held at its boundary value: a vertex at distance d from the tets must turn with them, and a held
-/// value would err by d times the rotation. Where the tet is too flat or the point too far for that, weights of
+/// value would err by d times the rotation. If the tet is too flat or the point too far for that, weights of
 /// size above kMaxEmbeddingWeight would fling the vertex about: then the field is followed only part of the way, on the
 /// line from the nearest point of the mesh (weights in [0, 1]) to the vertex, as far as the bound allows. So always Σ
 /// weight = 1, hence translations are exact everywhere, and any linear field is exact inside and for every vertex not

@@ -74,7 +74,7 @@ struct GlbNode {
   std::string extras{};                  ///< a JSON object as text, or empty
 };
 
-/// What a channel moves, and with it the number of values per key.
+/// Property that a channel moves; it sets the number of values per key.
 enum class GlbPath {
   kTranslation,  ///< 3, m
   kRotation,     ///< 4, unit quaternion in glTF's order x y z w
@@ -108,7 +108,7 @@ class GlbBuilder {
   int add_vertex_vectors(std::span<const float> xyz);
   /// @param triangles at least one; indices ≥ 0, compared with the vertex count in add_mesh()
   int add_triangles(std::span<const Triangle> triangles);
-  /// What each vertex of a mesh hangs on: JOINTS_0 and WEIGHTS_0. @param influences at least one
+  /// Influences of each vertex of a mesh: JOINTS_0 and WEIGHTS_0. @param influences at least one
   int add_influences(std::span<const SkinInfluences> influences);
   /// Key times of an animation, s. @param seconds at least one; the first ≥ 0, strictly ascending
   int add_times(std::span<const float> seconds);

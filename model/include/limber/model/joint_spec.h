@@ -1,5 +1,5 @@
 /// @file limber/model/joint_spec.h
-/// What a joint between two parts is: its type, where it sits, how far it may go, and what drives it. Shared by
+/// A joint between two parts: its type, place, limits and actuation. Shared by
 /// detection, posing, dynamics, assets and the joints file (docs/formats/joints.md).
 ///
 /// A joint has a right-handed frame J. Part b moves, part a stays; where the parts are as read (the reference pose), J
@@ -91,7 +91,7 @@ struct JointSpec {
   friend bool operator==(const JointSpec&, const JointSpec&) = default;
 };
 
-/// What acts on one coordinate. Forces are N or N·m, velocities m/s or rad/s.
+/// Actuation of one coordinate. Forces are N or N·m, velocities m/s or rad/s.
 struct JointActuation {
   double motor_velocity = 0.0;
   double motor_max_force = 0.0;  ///< ≥ 0; 0: no motor

@@ -54,7 +54,7 @@ struct CapturedLoad {
   double share = 1.0;      ///< c, 0 to 1
 };
 
-/// Where an asset came from; every field may be empty.
+/// Origin of an asset; every field may be empty.
 struct Provenance {
   std::string tool{};        ///< "limber-precompute 0.1.0"
   std::string input{};       ///< file name of the input mesh, without folders
@@ -73,7 +73,7 @@ struct ModalModelData {
   double volume = 0.0;                  ///< m³; > 0
   Vec3 center_of_mass = Vec3::Zero();   ///< body frame, m; zero for kFree and kKinematic
   Vec3 origin_in_input = Vec3::Zero();  ///< body origin in the input mesh's coordinates, m
-  /// Of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite.
+  /// Inertia of the rest shape about the body origin, body axes, kg·m²; symmetric positive definite.
   Mat3 inertia = Mat3::Zero();
 
   std::vector<double> eigenvalues;  ///< λ, rad²/s², ascending, ≥ 0 (0: a mechanism)
@@ -93,8 +93,8 @@ struct ModalModelData {
   std::vector<CapturedLoad> captured;  ///< may be empty
   /// Optional: what shows large bends without swelling.
   std::optional<ModalSkin> skin;
-  /// Whether contacts may act on the collision surface. False, of a body that meets nothing (no part of an asset file):
-  /// the vertex rows are not made; World tells no contact source of it but for a shape in its place.
+  /// True: contacts may act on the collision surface. False, for a body that meets nothing (no part of an asset file):
+  /// the vertex rows are not made, and World tells a contact source of it only by a shape in its place.
   bool touchable = true;
 };
 
@@ -121,7 +121,7 @@ class ModalModel {
   const SurfaceExtent& collision_extent() const { return collision_extent_; }
   const SurfaceExtent& render_extent() const { return data_.collision ? render_extent_ : collision_extent_; }
 
-  /// Of every vertex of collision() the share of what it gives way by statically that the modes show, 0 to 1:
+  /// The share of each collision() vertex's static compliance that the modes show, 0 to 1:
   ///
   ///   c_v = 1 − tr G_vv / tr (G_vv + Σ u_v u_vᵀ/λ),   G the residual compliance
   ///

@@ -22,7 +22,7 @@
 
 namespace limber {
 
-/// What a vertex moves with. Weights are multiples of 2⁻²⁰, so that their sum is 1 exactly, in floats too.
+/// Handles and weights of a vertex. Weights are multiples of 2⁻²⁰, so that their sum is 1 exactly, in floats too.
 struct SkinInfluences {
   static constexpr std::size_t kMost = 4;
   static constexpr double kUnit = 0x1p-20;

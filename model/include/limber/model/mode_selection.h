@@ -14,7 +14,7 @@
 
 namespace limber {
 
-/// What one mode needs to be judged.
+/// Data by which one mode is judged.
 struct ModeStrength {
   double eigenvalue = 0.0;      ///< λ, rad²/s²; ≥ 0
   double decay = 0.0;           ///< ξ, 1/s; ≥ 0
@@ -45,7 +45,7 @@ std::string_view to_string(DropReason reason);
 struct DroppedMode {
   Index mode = 0;
   DropReason reason = DropReason::kTooSmall;
-  /// What was compared, of its cluster: the largest displacement, m; the lowest damped frequency, Hz; or the rank of
+  /// The compared value of its cluster: the largest displacement, m; the lowest damped frequency, Hz; or the rank of
   /// its last mode among the elastic ones that the scene can show, from 1.
   double value = 0.0;
   double limit = 0.0;  ///< with what: min_displacement, half the frame rate or max_modes

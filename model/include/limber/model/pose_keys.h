@@ -10,7 +10,7 @@
 
 namespace limber {
 
-/// Of parts, in turn: linear RGBA.
+/// Colours of parts, in turn: linear RGBA.
 inline constexpr std::array<std::array<float, 4>, 6> kPartColors{{{0.60f, 0.60f, 0.58f, 1.0f},
                                                                   {0.25f, 0.42f, 0.60f, 1.0f},
                                                                   {0.62f, 0.50f, 0.30f, 1.0f},

@@ -1,5 +1,5 @@
 /// @file limber/model/residual_compliance.h
-/// What the modes that are not kept still answer, statically, at the collision surface.
+/// Static response of the modes that are not kept, at the collision surface.
 ///
 ///   G_res = S (K⁺ − Σ_kept w wᵀ/λ) Sᵀ        3V × 3V, m/N, symmetric, positive semidefinite
 ///

@@ -19,7 +19,7 @@ namespace limber {
 /// One body's handles. Made once, then set() as often as one likes: nothing below the constructor allocates.
 class SkinPose {
  public:
-  /// What a handle does to the points that hang on it.
+  /// Motion that a handle gives the points that hang on it.
   struct Handle {
     Mat3 turn = Mat3::Zero();   ///< R_h − 1
     Vec3 shift = Vec3::Zero();  ///< t_h, m
@@ -42,9 +42,9 @@ class SkinPose {
   /// Largest |Θ_h z|, rad: how far the body is bent.
   double largest_angle() const;
 
-  /// Where a point of the surface is, body frame, m. @param rest r_v @param linear U_v z, m
+  /// Position of a point of the surface, body frame, m. @param rest r_v @param linear U_v z, m
   Vec3 position(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
-  /// r_v + Ũ_v z, m: what the handles turn and carry.
+  /// r_v + Ũ_v z, m: the part that the handles turn and carry.
   Vec3 undeformed_part(const SkinInfluences& at, const Vec3& rest, const Vec3& linear) const;
   /// R̄ = Σ_h β_vh R_h: what turns small displacements at the point, such as a residual one.
   Mat3 turn(const SkinInfluences& at) const;

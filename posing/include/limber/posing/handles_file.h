@@ -13,7 +13,7 @@
 
 namespace limber {
 
-/// What of a model stays, and what bends.
+/// Parts of a model that stay, and parts that bend.
 struct PartDivision {
   std::vector<std::string> pinned{};
   std::vector<std::pair<std::string, PartOptions>> parts{};

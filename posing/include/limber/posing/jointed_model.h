@@ -1,5 +1,5 @@
 /// @file limber/posing/jointed_model.h
-/// What is posed: a surface, the parts that its triangles belong to, and the joints between parts.
+/// A model to be posed: a surface, the parts that its triangles belong to, and the joints between parts.
 ///
 /// Parts are sets of triangles. Parts that share vertices are one piece of material cut in two: a joint between them is
 /// a *virtual joint* [X09 4.4] (the ears of a bunny), and the surface goes over smoothly from one to the other. Parts
@@ -25,7 +25,7 @@ struct ModelPart {
 struct ModelJoint {
   Index a = 0, b = 0;  ///< parts; b moves, a stays where the coordinates are told
   JointSpec joint{};
-  /// What moves with the joint as one: cells of a deformable part that it meets share a transformation [X09 4.1]. None:
+  /// Region that moves with the joint as one: cells of a deformable part in it share a transformation [X09 4.1]. None:
   /// the cell nearest to the joint's origin.
   std::optional<OrientedBox> influence{};
 };

@@ -11,7 +11,7 @@
 /// Every change keeps the pose: nothing starts over when a joint becomes another or a rigid part soft. Lengths are in
 /// the model's own unit and frame, angles in rad. Not thread-safe; several sessions may run at the same time.
 ///
-/// What a pose minimises: strain of deformable parts, ½ Σ w |T_a x − T_b x|² over what neighbouring cells share, and
+/// A pose minimises the strain of deformable parts, ½ Σ w |T_a x − T_b x|² over what neighbouring cells share, and
 /// ½ k |y − target|² of every handle's point y; subject to joints, limits and pins. Derivation:
 /// docs/derivations/posing.md.
 #pragma once
@@ -72,9 +72,9 @@ class PosingSession {
   /// Moves of one handle that follow each other are undone together. @throws InvalidArgument if it is not finite
   void move_handle(PoseHandle handle, const Vec3& target);
   void remove_handle(PoseHandle handle);
-  /// Whether there is such a handle: not after it was removed, or taken back.
+  /// True if the handle exists: not after it was removed, or taken back.
   bool contains(PoseHandle handle) const;
-  /// Where a handle's point is, and where it is wanted.
+  /// A handle's point, and its target.
   Vec3 handle_point(PoseHandle handle) const;
   Vec3 handle_target(PoseHandle handle) const;
 
@@ -103,7 +103,7 @@ class PosingSession {
   /// How a part has moved from rest, if all of it moves as one: rigid, and no piece of another part.
   std::optional<RigidTransform> motion(Index part) const;
 
-  /// Where the model's vertices are. @param positions one per vertex. @throws InvalidArgument if there are not
+  /// Positions of the model's vertices. @param positions one per vertex. @throws InvalidArgument if there are not
   void reconstruct(std::span<Vec3> positions) const;
   /// The same with unit normals, area-weighted over the triangles around each vertex.
   void reconstruct(std::span<Vec3> positions, std::span<Vec3> normals) const;

@@ -68,7 +68,7 @@ struct AttachmentPatch {
   double radius = 0.0;         ///< m, ≥ 0
 };
 
-/// What the modes that are not kept still answer, statically (limber/model/residual_compliance.h).
+/// Static response of the modes that are not kept (limber/model/residual_compliance.h).
 struct ResidualOptions {
   /// At these nodes static loads are answered exactly: up to three further modes per node join the basis.
   std::vector<NodeSelector> nodes = {};
@@ -88,7 +88,7 @@ struct SkinOptions {
   bool make = false;
   /// Handles, the ground not among them; 0: the fewest of 8, 12, … 24 with which no node turns by more than 13° apart
   /// from its handles in the mean, when each of the lowest three modes by itself has the energy that turns the softest
-  /// by 120° (free bodies, whose ends turn to both sides: 60°). Where even 24 do not suffice, 24.
+  /// by 120° (free bodies, whose ends turn to both sides: 60°). If even 24 do not suffice, 24.
   Index handles = 0;
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
@@ -113,7 +113,7 @@ struct EmbeddingReport {
   double max_distance = 0.0;  ///< the farthest of these, m
 };
 
-/// What was made of ResidualOptions.
+/// Result of ResidualOptions.
 struct ResidualReport {
   Index modes = 0;                                 ///< joined the basis; among the kept, not among frequencies_hz
   std::vector<CapturedLoad> captured{};            ///< nodes, then patches; input coordinates
@@ -123,7 +123,7 @@ struct ResidualReport {
   double seconds = 0.0;
 };
 
-/// What was made of SkinOptions.
+/// Result of SkinOptions.
 struct SkinReport {
   static constexpr std::array<double, 4> kDegrees{30.0, 60.0, 90.0, 120.0};
   /// A mode by itself, turned so far that some node turns by kDegrees[i].
@@ -139,7 +139,7 @@ struct SkinReport {
   double seconds = 0.0;
 };
 
-/// What was made of one body. Masses in kg, lengths in m, input coordinates.
+/// Result of one body. Masses in kg, lengths in m, input coordinates.
 struct BodyReport {
   std::string name;
   FrameMotion motion = FrameMotion::kFree;

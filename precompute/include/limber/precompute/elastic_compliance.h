@@ -10,7 +10,7 @@
 namespace limber {
 
 /// u = K⁺ f, the static displacement without the zero modes: K⁺ = P K_pin⁻¹ Pᵀ, P = 1 − N NᵀM with N the zero modes.
-/// What a load would do to the rigid motions and mechanisms is balanced by inertia ("inertia relief").
+/// Inertia balances the part of a load on the rigid motions and mechanisms ("inertia relief").
 class ElasticCompliance {
  public:
   virtual ~ElasticCompliance() = default;

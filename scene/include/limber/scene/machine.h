@@ -15,7 +15,7 @@
 
 namespace limber {
 
-/// Where a machine starts, and how.
+/// Start of a machine.
 struct MachinePlacement {
   RigidTransform pose{};                 ///< of the input's coordinate system, in the world
   Vec3 velocity = Vec3::Zero();          ///< of that system's origin, m/s; bodies move with it as one rigid thing
@@ -24,13 +24,13 @@ struct MachinePlacement {
   CollisionFilter filter{};              ///< of all its bodies
 };
 
-/// What a machine consists of in a world.
+/// Bodies and joints of a machine in a world.
 struct Machine {
   std::vector<BodyId> bodies{};   ///< per Asset::bodies
   std::vector<JointId> joints{};  ///< per Asset::joints; JointId{} for those to the world where it is not tied
 };
 
-/// Where a body of an asset is, and how it moves.
+/// Place and motion of a body of an asset.
 BodyPlacement placement_in_machine(const ModalModel& model, const MachinePlacement& placement);
 
 /// Adds all bodies as they stand to each other in the asset, its joints with their motors, drives and friction, and its

@@ -1,5 +1,5 @@
 /// @file limber/scene/manifest.h
-/// What is left out when a scene is played, why, and what that saves: found by playing it with each thing put back.
+/// Parts that are left out when a scene is played, with reason and saving: found by playing it with each put back.
 #pragma once
 
 #include <cstdint>

@@ -27,7 +27,7 @@ struct RecordingOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
-/// What became of one model's modes.
+/// Recorded modes of one model.
 struct RecordedModel {
   std::string name;
   Index modes = 0;              ///< of the model

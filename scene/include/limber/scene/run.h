@@ -45,7 +45,7 @@ struct BodyTrack {
   std::span<const double> rates_at(std::size_t key) const;
 };
 
-/// What stands in a scene without moving.
+/// A shape of a scene that never moves.
 struct StaticShape {
   std::string name;
   std::shared_ptr<const Shape> shape;
@@ -75,7 +75,7 @@ struct Trajectory {
   const std::string& name(std::size_t body) const;  ///< of a body or, from bodies.size() on, of a static shape
 };
 
-/// What a joint does at the end, and the farthest that it was off.
+/// State of a joint at the end, and its largest errors.
 struct JointReport {
   std::string a, b;
   JointView view;                                                  ///< as of the last step
@@ -83,7 +83,7 @@ struct JointReport {
   double largest_limit_excess = 0.0;  ///< how far a coordinate was beyond its limits at the end of a step, m or rad
 };
 
-/// What the constraints of all steps came to.
+/// Sums over the constraints of all steps.
 struct ConstraintSummary {
   std::int64_t unsettled = 0;         ///< steps in which an island did not come to its targets
   double energy_removed = 0.0;        ///< J; see ConstraintReport
@@ -97,7 +97,7 @@ struct RunResult {
   std::uint64_t state_hash = 0;   ///< World::state_hash() at the end
   std::int64_t asleep = 0;        ///< bodies that sleep at the end
   std::int64_t asleep_steps = 0;  ///< Σ over the steps of the bodies that sleep after it
-  /// Those that acted, in the order of the scene's lists (then of the bodies).
+  /// Loads that acted, in the order of the scene's lists (then of the bodies).
   std::vector<LoadReport> strikes, forces;
   std::vector<HandleReport> handles;  ///< the same
   std::vector<JointReport> joints;    ///< in the order of the scene's list

@@ -131,8 +131,8 @@ struct SceneHandle {
   double start = 0.0, duration = 0.0;  ///< s; the duration may be infinite
   SurfacePlace at{};
   HandleOptions options{};
-  /// Of the target, world, in times counted from where the hold begins; orientations are not used. A shake is about the
-  /// place where the point was taken; keys go from there to the positions that they tell.
+  /// Motion of the target, world, in times counted from the start of the hold; orientations are not used. A shake is
+  /// about the place where the point was taken; keys go from there to the positions that they tell.
   FrameMovement movement{};
   std::string where{};
 };

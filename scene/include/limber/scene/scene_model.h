@@ -17,7 +17,7 @@
 
 namespace limber {
 
-/// What a scene may do without, each by itself.
+/// Parts that a scene may do without, each by itself.
 enum class LeftOut {
   kModes,             ///< modes that Scene::limits say nobody can see
   kVolume,            ///< the volume block: only bodies that touch themselves read it
@@ -31,21 +31,21 @@ inline constexpr int kLeftOut = 7;
 /// "modes", "volume", "vertex_rows", "residual_compliance", "modal_skin", "collision_surface", "drawn_surface".
 std::string_view to_string(LeftOut what);
 
-/// What is done with a scene beside what it says itself.
+/// Use of a scene beside its own contents.
 struct SceneUse {
   bool drawn = true;            ///< World::reconstruct, recordings
   bool reached_into = true;     ///< a program or a person uses points of the bodies' surfaces
   std::vector<LeftOut> keep{};  ///< what is not to be left out, though the scene could do without
 };
 
-/// One thing that is left out of a model. What moves, and where, is the same to round-off but for kModes.
+/// One thing that is left out of a model. Motion is the same to round-off but for kModes.
 struct ModelSaving {
   LeftOut what = LeftOut::kModes;
   std::string why;
   std::size_t bytes = 0;  ///< that the lean model would have more of
 };
 
-/// What a scene does without in one model.
+/// Parts that a scene does without in one model.
 struct ModelManifest {
   std::string asset, body;              ///< key of Scene::assets, name of the body in it
   std::string file;                     ///< as the scene names it

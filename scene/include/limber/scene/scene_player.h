@@ -24,7 +24,7 @@
 
 namespace limber {
 
-/// What a load hit.
+/// A load that acted.
 struct LoadReport {
   std::string body;
   std::int64_t step = 0;      ///< 0-based step in which it began
@@ -32,7 +32,7 @@ struct LoadReport {
   Vec3 point = Vec3::Zero();  ///< where it acted, world, m
 };
 
-/// What a handle did.
+/// Record of a handle.
 struct HandleReport {
   std::string body;
   std::int64_t step = 0;       ///< 0-based step in which it took hold
@@ -68,7 +68,7 @@ class ScenePlayer {
   /// All three.
   void step();
 
-  /// Those that the scene's steps reach, in the order of its lists (then of the bodies); filled in as they act.
+  /// Loads and handles reached so far, in the order of the scene's lists (then of the bodies); filled in as they act.
   std::span<const LoadReport> strikes() const;
   std::span<const LoadReport> forces() const;
   std::span<const HandleReport> handles() const;

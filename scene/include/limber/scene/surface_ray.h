@@ -1,5 +1,5 @@
 /// @file limber/scene/surface_ray.h
-/// What a ray meets of a body as it stands, deformed: for picking.
+/// First hit of a ray on a deformed body: for picking.
 #pragma once
 
 #include <optional>

@@ -2,7 +2,7 @@
 /// A scene and all its files as one HTML page (limber-view): engine, drawing and assets inside.
 ///
 /// The page asks nothing of a network and runs nothing but its own script, whose hash its Content-Security-Policy
-/// names. What comes from files is data: bytes as base64, texts as JSON in which no markup can stand.
+/// names. Contents of files are data: bytes as base64, texts as JSON in which no markup can stand.
 #pragma once
 
 #include <filesystem>

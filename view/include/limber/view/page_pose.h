@@ -1,6 +1,6 @@
 /// @file limber/view/page_pose.h
 /// A jointed model as the page poses it: points are pulled, joints edited, parts made rigid or soft, all of it undone.
-/// The page compiles this to WebAssembly (view/engine); it works natively too. What it drives is a PosingSession
+/// The page compiles this to WebAssembly (view/engine); it works natively too. It drives a PosingSession
 /// (limber/posing/posing_session.h); lengths are in the model's unit.
 #pragma once
 

@@ -17,7 +17,7 @@
 
 namespace limber {
 
-/// What a person may set. The first three act at once, the others where the scene starts anew.
+/// Settings for a person. The first three act at once, the others when the scene starts anew.
 struct PageSettings {
   Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s²
   double drag_frequency = 3.0;          ///< Hz, of a body's mass on the spring by which it is dragged; > 0
@@ -57,7 +57,7 @@ class PageWorld {
   explicit PageWorld(const std::filesystem::path& scene);
   ~PageWorld();
 
-  /// What stands where, as JSON: settings, models, bodies (model, name), statics with their triangles, joints. Names
+  /// Contents of the scene as JSON: settings, models, bodies (model, name), statics with their triangles, joints. Names
   /// are text of the scene and its assets: nothing that may become markup.
   std::string description() const;
   const std::vector<PageModel>& models() const;
@@ -78,9 +78,9 @@ class PageWorld {
   /// time (s), kinetic energy of the frames, of the modes, elastic, potential (J), bodies asleep, contacts that press,
   /// rows, iterations, settled (0 or 1).
   std::span<const double> numbers();
-  /// What the stages of the last step took, s, in the order of Stage (limber/core/stage_times.h).
+  /// Times of the stages of the last step, s, in the order of Stage (limber/core/stage_times.h).
   std::span<const double> stage_seconds() const;
-  /// What World::reconstruct() makes of a body: 3 V floats, world.
+  /// Positions of a body as World::reconstruct() makes them: 3 V floats, world.
   void reconstruct(int body, float* positions) const;
   /// Per joint: origin and x axis in the world, coordinates (3).
   std::span<const double> joint_frames();
@@ -111,7 +111,7 @@ class PageWorld {
   std::int64_t kept_step(int key) const;
   /// Back, or forth again, to a kept state, to the bit: a hand that held something then holds it again.
   void go_to(int key);
-  /// What the kept states show, from the first to the last, as an animated GLB (limber/scene/recording.h). A body that
+  /// The kept states, from the first to the last, as an animated GLB (limber/scene/recording.h). A body that
   /// was dropped on the way waits at its place. The world stays where it is.
   std::string recording();
 
