@@ -203,56 +203,5 @@ TEST(ConvexDistance, BoxesCornerToCornerEdgeToEdgeAndFaceToFaceHaveTheirClosedFo
   }
 }
 
-// -- Primitives -------------------------------------------------------------------------------------------------------
-
-template <class S>
-void expect_signed_distance(const S& shape, double size, unsigned seed) {
-  Random random(seed);
-  for (int trial = 0; trial < 2000; ++trial) {
-    const Vec3 p = random.vector(size), q = random.vector(size);
-    const SignedDistance d = signed_distance(p, shape);
-    ASSERT_NEAR(d.normal.norm(), 1.0, 1e-14);
-    ASSERT_NEAR(d.distance, d.normal.dot(p - d.point), 1e-14 * size);
-    ASSERT_NEAR(signed_distance(d.point, shape).distance, 0.0, 1e-14 * size);
-    // No surface point is nearer: the distance changes by at most the way gone.
-    ASSERT_LE(std::abs(signed_distance(q, shape).distance - d.distance), (p - q).norm() + 1e-14);
-  }
-}
-
-TEST(SignedDistance, LeadsToTheSurfaceAndChangesNoFasterThanThePoint) {
-  expect_signed_distance(HalfSpace{Vec3(1, 2, 2) / 3.0, 0.3}, 2.0, 8);
-  expect_signed_distance(Sphere{0.7}, 2.0, 9);
-  expect_signed_distance(Capsule{0.4, 0.6}, 2.0, 10);
-  expect_signed_distance(Box{Vec3(0.5, 0.7, 0.9)}, 2.0, 11);
-}
-
-TEST(SignedDistance, KnownPoints) {
-  EXPECT_NEAR(signed_distance(Vec3(0, 0, 2), Capsule{0.5, 1.0}).distance, 0.5, kLength);
-  EXPECT_NEAR(signed_distance(Vec3(0.2, 0, 0.3), Capsule{0.5, 1.0}).distance, -0.3, kLength);
-  EXPECT_NEAR(signed_distance(Vec3(0.4, 0, 0), Box{Vec3(0.5, 1, 1)}).distance, -0.1, kLength);
-  EXPECT_EQ(signed_distance(Vec3(-0.4, 0, 0), Box{Vec3(0.5, 1, 1)}).normal, Vec3(-1, 0, 0));
-  EXPECT_EQ(signed_distance(Vec3::Zero(), Sphere{0.5}).normal, Vec3(0, 0, 1));
-}
-
-TEST(TriangleAndSolid, AgreeWithTheLeastOverAllActiveSets) {
-  Random random(12);
-  const Sphere ball{0.3};
-  const Capsule capsule{0.2, 0.5};
-  const Box box{Vec3(0.3, 0.4, 0.5)};
-  const SegmentPoints axis{Vec3(0, 0, -0.5), Vec3(0, 0, 0.5)};
-  const Vec3 center = Vec3::Zero();
-  for (int trial = 0; trial < 2000; ++trial) {
-    const TrianglePoints t = troublesome_triangle(random);
-    ASSERT_NEAR(distance(t, ball).distance, hull_distance(t, {&center, 1}).distance - 0.3, 10 * kLength);
-    ASSERT_NEAR(distance(t, capsule).distance, hull_distance(t, axis).distance - 0.2, 10 * kLength);
-    // Along the found normal the triangle is as far from the box as is said.
-    const ConvexDistance d = distance(t, box);
-    if (d.cores_intersect) continue;
-    double least = std::numeric_limits<double>::infinity();
-    for (const Vec3& p : t) least = std::min(least, d.normal.dot(p) - d.normal.cwiseAbs().dot(box.half_extents));
-    ASSERT_NEAR(least, d.distance, 1e-12 / std::max(d.distance, 1e-2));
-  }
-}
-
 }  // namespace
 }  // namespace limber

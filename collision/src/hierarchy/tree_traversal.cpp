@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "hierarchy/branch_and_bound.h"
 #include "hierarchy/deformed_scratch.h"
 #include "limber/collision/closest_features.h"
 #include "limber/core/error.h"
@@ -164,6 +165,31 @@ void find_self_pairs(DeformedSurface& a, double margin, std::vector<TrianglePair
   }
 }
 
+namespace {
+
+// Depth first, first child first: visits each triangle whose nodes' boxes all pass.
+// @param enter (const Aabb& box_B) → bool: whether anything in the box can matter
+// @param visit (Index triangle)
+template <class Enter, class Visit>
+void for_each_triangle(DeformedSurface& a, const Enter& enter, const Visit& visit) {
+  std::array<Index, CollisionSurface::kMaxDepth + 2> stack;
+  std::size_t size = 0;
+  stack[size++] = 0;
+  while (size > 0) {
+    const Index n = stack[--size];
+    if (!enter(a.bounds(n))) continue;
+    const TreeNode& node = a.surface().node(n);
+    if (node.leaf()) {
+      for (const Index t : a.surface().node_triangles(n)) visit(t);
+    } else {
+      stack[size++] = node.child + 1;
+      stack[size++] = node.child;
+    }
+  }
+}
+
+}  // namespace
+
 void find_triangles_in_box(DeformedSurface& a, const Aabb& box_B, std::vector<Index>& triangles) {
   for_each_triangle(
       a, [&](const Aabb& box) { return box.overlaps(box_B); }, [&](Index t) { triangles.push_back(t); });
@@ -179,7 +205,7 @@ void find_triangles_in_half_space(DeformedSurface& a, const Vec3& normal_B, doub
 
 std::optional<SurfaceProximity> nearest_point(DeformedSurface& a, const Vec3& p_B, double max_distance) {
   std::optional<SurfaceProximity> found;
-  branch_and_bound(
+  internal::branch_and_bound(
       a, [&](const Aabb& box) { return distance_to_box(p_B, box); },
       [&](Index t, double best) {
         const SurfaceFoot foot = closest_on_triangle(p_B, a.triangle(t));

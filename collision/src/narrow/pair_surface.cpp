@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hierarchy/branch_and_bound.h"
 #include "limber/collision/tree_traversal.h"
 #include "tuning.h"
 

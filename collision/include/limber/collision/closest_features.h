@@ -61,22 +61,4 @@ struct ConvexDistance {
 /// of size, normal within 1e-12·size/gap.
 ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b);
 
-/// Signed distance of a point to a solid: negative inside, `normal` the unit outward normal at `point`, the nearest
-/// point of its surface.
-struct SignedDistance {
-  double distance = 0.0;  ///< m
-  Vec3 point = Vec3::Zero();
-  Vec3 normal = Vec3::Zero();  ///< distance = normal · (p − point)
-};
-
-SignedDistance signed_distance(const Vec3& p, const HalfSpace& shape);
-SignedDistance signed_distance(const Vec3& p, const Sphere& shape);   ///< at the centre: normal +z
-SignedDistance signed_distance(const Vec3& p, const Capsule& shape);  ///< on the axis: normal across it, along x
-SignedDistance signed_distance(const Vec3& p, const Box& shape);  ///< inside: to the nearest face, x before y before z
-
-/// To a triangle that is part of no solid: nearest points and distance (≥ 0, or negative into the ball or capsule).
-ConvexDistance distance(const TrianglePoints& t, const Sphere& shape);
-ConvexDistance distance(const TrianglePoints& t, const Capsule& shape);
-ConvexDistance distance(const TrianglePoints& t, const Box& shape);
-
 }  // namespace limber

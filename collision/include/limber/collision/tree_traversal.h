@@ -7,7 +7,6 @@
 #include <array>
 #include <limits>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "limber/collision/aabb.h"
@@ -45,55 +44,6 @@ void find_triangles_in_box(DeformedSurface& a, const Aabb& box_B, std::vector<In
 /// … that may reach into normal · x ≤ offset (unit normal); appended.
 void find_triangles_in_half_space(DeformedSurface& a, const Vec3& normal_B, double offset,
                                   std::vector<Index>& triangles);
-
-/// Depth first, first child first: visits each triangle whose nodes' boxes all pass.
-/// @param enter (const Aabb& box_B) → bool: whether anything in the box can matter
-/// @param visit (Index triangle)
-template <class Enter, class Visit>
-void for_each_triangle(DeformedSurface& a, const Enter& enter, const Visit& visit) {
-  std::array<Index, CollisionSurface::kMaxDepth + 2> stack;
-  std::size_t size = 0;
-  stack[size++] = 0;
-  while (size > 0) {
-    const Index n = stack[--size];
-    if (!enter(a.bounds(n))) continue;
-    const TreeNode& node = a.surface().node(n);
-    if (node.leaf()) {
-      for (const Index t : a.surface().node_triangles(n)) visit(t);
-    } else {
-      stack[size++] = node.child + 1;
-      stack[size++] = node.child;
-    }
-  }
-}
-
-/// Branch and bound, nearer child first: visits triangles while a node's lower bound is below what is known.
-/// @param lower_bound (const Aabb& box_B) → double: nothing in the box has less
-/// @param visit (Index triangle, double best) → double: the new best, ≤ best
-/// @param best known from the start; infinity if nothing is
-/// @return the least value
-template <class LowerBound, class Visit>
-double branch_and_bound(DeformedSurface& a, const LowerBound& lower_bound, const Visit& visit,
-                        double best = std::numeric_limits<double>::infinity()) {
-  std::array<std::pair<Index, double>, CollisionSurface::kMaxDepth + 2> stack;
-  std::size_t size = 0;
-  stack[size++] = {0, lower_bound(a.bounds(0))};
-  while (size > 0) {
-    const auto [n, bound] = stack[--size];
-    if (!(bound < best)) continue;
-    const TreeNode& node = a.surface().node(n);
-    if (node.leaf()) {
-      for (const Index t : a.surface().node_triangles(n)) best = visit(t, best);
-      continue;
-    }
-    std::pair<Index, double> near{node.child, lower_bound(a.bounds(node.child))};
-    std::pair<Index, double> far{node.child + 1, lower_bound(a.bounds(node.child + 1))};
-    if (far.second < near.second) std::swap(near, far);
-    stack[size++] = far;
-    stack[size++] = near;
-  }
-  return best;
-}
 
 /// Distance of a point from a box, m; 0 inside.
 double distance_to_box(const Vec3& p, const Aabb& box);
