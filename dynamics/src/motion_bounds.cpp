@@ -75,22 +75,4 @@ ModeBound bound_motion(const Mode& mode, const ModeState& start, double g, doubl
   return b;
 }
 
-double point_speed(const MotionBounds& bounds, double distance, std::span<const double> shape) {
-  double arm = distance, flexing = 0.0;
-  for (std::size_t i = 0; i < bounds.modes.size(); ++i) {
-    arm += shape[i] * bounds.modes[i].size;
-    flexing += shape[i] * bounds.modes[i].rate;
-  }
-  return bounds.frame.speed + bounds.frame.angular_speed * arm + flexing;
-}
-
-double point_travel(const MotionBounds& bounds, double distance, std::span<const double> shape) {
-  double arm = distance, flexing = 0.0;
-  for (std::size_t i = 0; i < bounds.modes.size(); ++i) {
-    arm += shape[i] * bounds.modes[i].size;
-    flexing += shape[i] * bounds.modes[i].change;
-  }
-  return bounds.frame.travel + 2.0 * std::sin(0.5 * bounds.frame.turn) * arm + flexing;
-}
-
 }  // namespace limber

@@ -328,6 +328,21 @@ TEST(MotionBounds, OfAFrameHoldAndAreNeverVacuous) {
   EXPECT_LT(worst_bend, 2.5);
 }
 
+/// What no point with |r| ≤ distance and |U_i| ≤ shape_i exceeds, by the formulas of motion_bounds.h: m/s and m.
+struct PointBounds {
+  double speed, travel;
+};
+PointBounds point_bounds(const MotionBounds& bounds, double distance, std::span<const double> shape) {
+  double arm = distance, rate = 0.0, change = 0.0;
+  for (std::size_t i = 0; i < bounds.modes.size(); ++i) {
+    arm += shape[i] * bounds.modes[i].size;
+    rate += shape[i] * bounds.modes[i].rate;
+    change += shape[i] * bounds.modes[i].change;
+  }
+  return {bounds.frame.speed + bounds.frame.angular_speed * arm + rate,
+          bounds.frame.travel + 2.0 * std::sin(0.5 * bounds.frame.turn) * arm + change};
+}
+
 TEST(MotionBounds, NoPointOfTheSurfaceLeavesItsReachOrBreaksItsSpeedLimit) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -352,8 +367,8 @@ TEST(MotionBounds, NoPointOfTheSurfaceLeavesItsReachOrBreaksItsSpeedLimit) {
     MotionBounds bounds;
     motion.evaluate(0.0, start);
     motion.bounds(start, h, bounds);
-    EXPECT_GE(point_travel(bounds, extent.radius, extent.shape), reach * (1.0 - kSampleError));
-    const double speed = point_speed(bounds, extent.radius, extent.shape);
+    const auto [speed, travel] = point_bounds(bounds, extent.radius, extent.shape);
+    EXPECT_GE(travel, reach * (1.0 - kSampleError));
     double moved = 0.0;
     for (int i = 0; i <= 200; ++i) {
       motion.evaluate(h * i / 200, s);

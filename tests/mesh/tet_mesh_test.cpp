@@ -125,22 +125,6 @@ TEST(Components, TakenOutCarryTheirRegionsAndGroups) {
   EXPECT_THROW(extract_component(mesh, std::vector<Index>(3), 0), InvalidArgument);
 }
 
-TEST(UnusedNodes, AreDroppedAndTheRestStaysAsItWas) {
-  TetMesh mesh = two_cubes();
-  mesh.nodes.insert(mesh.nodes.begin() + 2, Vec3(9, 9, 9));
-  for (Tet& t : mesh.tets)
-    for (Index& n : t) n += n >= 2 ? 1 : 0;
-  mesh.node_groups = {{"floor", {0, 1, 2, 3, 4}}, {"nowhere", {2, 13}}};
-  const auto before = volume_properties(mesh);
-  const auto node_of = drop_unused_nodes(mesh);
-  EXPECT_THAT(node_of, ::testing::ElementsAre(0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
-  TetMesh expected = two_cubes();
-  expected.nodes.pop_back();
-  expected.node_groups = {{"floor", {0, 1, 2, 3}}};
-  expect_same(mesh, expected);
-  EXPECT_EQ(volume_properties(mesh).volume, before.volume);
-}
-
 TEST(Validate, TurnsLeftHandedTetsAndSaysHowMany) {
   TetMesh mesh = two_cubes();
   std::swap(mesh.tets[2][0], mesh.tets[2][1]);

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "limber/mesh/read_mesh.h"
 #include "limber/precompute/modal_analysis.h"
+#include "mesh_files.h"
 
 namespace limber {
 namespace {
@@ -64,7 +64,7 @@ TEST_P(ReferenceFrequencies, AreThoseOfThreeOtherPrograms) {
   ASSERT_TRUE(file) << kFolder;
   const auto reference = nlohmann::json::parse(file);
   Warnings warnings;
-  const TetMesh mesh = read_tet_mesh(kFolder / reference["mesh"].get<std::string>(), warnings);
+  const TetMesh mesh = testing::read_tets(kFolder / reference["mesh"].get<std::string>(), warnings);
   const auto materials = materials_of(reference, mesh);
   ASSERT_EQ(materials.size(), mesh.regions.size());
   std::vector<Index> fixed;

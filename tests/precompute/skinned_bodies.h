@@ -7,6 +7,7 @@
 
 #include "constants.h"
 #include "limber/precompute/modal_analysis.h"
+#include "mesh_files.h"
 #include "skin/bake_skin.h"
 #include "tet_box.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "limber/core/file.h"
-#include "limber/mesh/write_mesh.h"
+#include "mesh_files.h"
 #include "parts.h"
 #include "run_program.h"
 
@@ -39,7 +39,7 @@ class JointsProgram : public ::testing::Test {
     folder_ = fs::path(::testing::TempDir()) / (std::string("limber_joints_") + test->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    write_obj(folder_ / "lever.obj", lever_on_a_pin());
+    testing::write_obj(folder_ / "lever.obj", lever_on_a_pin());
   }
   ~JointsProgram() override { fs::remove_all(folder_); }
 

@@ -8,8 +8,7 @@
 
 #include "assemblies.h"
 #include "limber/core/file.h"
-#include "limber/mesh/read_mesh.h"
-#include "limber/mesh/write_mesh.h"
+#include "mesh_files.h"
 #include "run_program.h"
 #include "true_joints.h"
 
@@ -30,7 +29,7 @@ class PoseProgram : public ::testing::Test {
     fs::create_directories(folder_);
     const auto made = assemblies::make("door", {.segments = 8});
     surface_ = made.surface.surface;
-    write_obj(folder_ / "door.obj", surface_);
+    testing::write_obj(folder_ / "door.obj", surface_);
     write_file(folder_ / "door.json", joints_text(assemblies::true_joints(made)));
     const auto& leaf = made.surface.groups.back();
     grip_ = surface_.vertices[static_cast<std::size_t>(surface_.triangles[static_cast<std::size_t>(leaf.first)][0])];

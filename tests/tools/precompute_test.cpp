@@ -8,8 +8,8 @@
 
 #include "broken_meshes.h"
 #include "limber/core/file.h"
-#include "limber/mesh/write_mesh.h"
 #include "limber/model/asset.h"
+#include "mesh_files.h"
 #include "run_program.h"
 #include "soup.h"
 #include "tet_box.h"
@@ -183,7 +183,7 @@ double worst_embedding(const ModalSurface& surface, const ModalVolume& volume, I
 }
 
 TEST_F(Precompute, SoupIsWrappedBakedAndMoved) {
-  write_obj(folder / "soup.obj", shapes::soup());
+  testing::write_obj(folder / "soup.obj", shapes::soup());
   const Json r =
       report({"soup.obj", "--material", "rubber", "--modes", "6", "--cell-size", "0.25", "--alpha", "0.1", "--volume"});
   ASSERT_TRUE(r.is_object());
@@ -363,7 +363,7 @@ TEST_F(Precompute, SurfaceFarFromTheMeshAndOptionsWithoutEffectAreToldOf) {
   write_gmsh(folder / "cube.msh", testing::tet_box(1, 1.0));
   SurfaceMesh far = boundary_surface(testing::tet_box(1, 1.0)).surface;
   for (Vec3& x : far.vertices) x.x() += 100.0;
-  write_obj(folder / "far.obj", far);
+  testing::write_obj(folder / "far.obj", far);
   std::vector<std::string> arguments = {"cube.msh", "--modes", "3", "--render-surface", "far.obj", "--cell-size", "1"};
   arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
   const Json r = report(arguments);

@@ -136,27 +136,10 @@ bool is_known_mesh_format(const std::filesystem::path& path) {
   return format_of(path, std::string_view(head, static_cast<std::size_t>(file.gcount()))).has_value();
 }
 
-MeshKind mesh_kind(const std::filesystem::path& path) {
-  const auto by_name = format_of_extension(path);
-  if (by_name == Format::kTetgen) {
-    is_known_mesh_format(path);
-    return MeshKind::kTets;
-  }
-  Warnings ignored;
-  return has_tets(read_any(path, ignored)) ? MeshKind::kTets : MeshKind::kSurface;
-}
-
 std::variant<TetMesh, SurfaceMesh> read_mesh(const std::filesystem::path& path, Warnings& warnings) {
   auto file = read_any(path, warnings);
   if (has_tets(file)) return tets_of(std::move(file), shown_path(path), warnings);
   return surface_of(std::move(file), shown_path(path), warnings);
-}
-
-TetMesh read_tet_mesh(const std::filesystem::path& path, Warnings& warnings) {
-  auto file = read_any(path, warnings);
-  if (!has_tets(file) && file.content.polygons.size() > 0)
-    throw InputError(shown_path(path) + ": holds a surface, expected tetrahedra; mesh its inside first");
-  return tets_of(std::move(file), shown_path(path), warnings);
 }
 
 SurfaceMesh read_surface_mesh(const std::filesystem::path& path, Warnings& warnings) {

@@ -126,8 +126,6 @@ std::string obj_text(const SurfaceMesh& surface) {
   return out.str();
 }
 
-void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface) { write_file(path, obj_text(surface)); }
-
 std::string stl_bytes(const SurfaceMesh& surface) {
   for (const Triangle& t : surface.triangles)
     for (const Index v : t) check_index(v, surface.vertices.size(), "vertex of a triangle");

@@ -141,18 +141,6 @@ void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
                        " tetrahedra were left-handed and have been re-oriented");
 }
 
-std::vector<Index> drop_unused_nodes(TetMesh& mesh) {
-  std::vector<Index> new_index(mesh.nodes.size(), -1);
-  for (const Tet& t : mesh.tets)
-    for (const Index n : t) new_index[n] = 0;
-  auto node_of = number_used(new_index);
-  mesh.nodes = picked(mesh.nodes, node_of);
-  mesh.node_groups = renumbered(mesh.node_groups, new_index);
-  for (Tet& t : mesh.tets)
-    for (Index& n : t) n = new_index[n];
-  return node_of;
-}
-
 VolumeProperties volume_properties(const TetMesh& mesh) {
   VolumeProperties p;
   if (mesh.tets.empty()) return p;

@@ -57,8 +57,7 @@ class BodyShape {
       : model_(&model), z_(z), skin_(skin) {}
 
   std::span<const double> amplitudes() const { return z_; }
-  bool has_skin() const { return skin_ != nullptr; }
-  /// The handles here; with what rows and velocities need. @pre has_skin()
+  /// The handles here; with what rows and velocities need. @pre there is a skin
   const SkinPose& handles() const { return skin_->at(z_); }
   const SkinPose& differentiated() const { return skin_->differentiated(z_); }
 

@@ -34,9 +34,4 @@ struct MotionBounds {
   std::vector<ModeBound> modes;
 };
 
-/// Bounds for all points with |r| ≤ distance and |U_i| ≤ shape_i, in any frame axes.
-/// @param distance of the rest position from the body origin, m. @param shape kg^−½, one per mode
-double point_speed(const MotionBounds& bounds, double distance, std::span<const double> shape);   ///< m/s
-double point_travel(const MotionBounds& bounds, double distance, std::span<const double> shape);  ///< m
-
 }  // namespace limber

@@ -27,22 +27,13 @@
 
 namespace limber {
 
-enum class MeshKind { kTets, kSurface };
-
 /// True if limber reads the file's format itself; the content may still be wrong.
 /// @throws InputError if the file cannot be read
 bool is_known_mesh_format(const std::filesystem::path& path);
 
-/// Kind of a file's content. Formats that can hold both are read whole: to read next, read_mesh() does both at once.
-/// @throws InputError if the file cannot be read or its format is not known (the message lists the known ones)
-MeshKind mesh_kind(const std::filesystem::path& path);
-
-/// Whatever the file holds: tets if there are any, else the surface. @throws InputError
+/// Whatever the file holds: tets if there are any, else the surface. Tets come with their regions and node groups;
+/// these are sorted by name, and every region whose name no group has is a group too. @throws InputError
 std::variant<TetMesh, SurfaceMesh> read_mesh(const std::filesystem::path& path, Warnings& warnings);
-
-/// Tetrahedra with their regions and node groups. Node groups come sorted by name; every region whose name no group has
-/// is a group too. @throws InputError, also for a file that holds a surface only
-TetMesh read_tet_mesh(const std::filesystem::path& path, Warnings& warnings);
 
 /// A surface, polygons cut into triangles. Vertices in the order of the file, but for STL, a soup of triangles, which
 /// is welded (see weld()). Other formats: limber::mesh_assimp. @throws InputError, also for a file that holds

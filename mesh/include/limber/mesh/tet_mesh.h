@@ -42,11 +42,6 @@ double signed_volume(const TetMesh& mesh, Index tet);
 /// a flat tet (|6V| ≤ 1e-12 · (longest edge)³: below that its stiffness is round-off), or a tet that stands twice.
 void validate(TetMesh& mesh, const std::string& name, Warnings& warnings);
 
-/// Drops the nodes that no tet uses, from the groups too; groups left empty go. The order of the others stays.
-/// @return per node that stayed, its index before; the number dropped is the difference of the sizes.
-/// @pre mesh is valid
-std::vector<Index> drop_unused_nodes(TetMesh& mesh);
-
 /// Geometry of a solid of density 1.
 struct VolumeProperties {
   double volume = 0.0;                ///< m³

@@ -11,7 +11,7 @@
 namespace limber {
 
 /// Gmsh MSH 2.2, text: regions as physical volumes with their names and tags (a fresh tag where one is 0 or taken),
-/// node groups as physical points. read_tet_mesh() gives the same mesh back, and each region as a node group besides.
+/// node groups as physical points. read_mesh() gives the same mesh back, and each region as a node group besides.
 /// @throws InvalidArgument if an index is out of range or a name holds a quote or a line end. @throws InputError (see
 /// write_file())
 void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
@@ -19,8 +19,6 @@ void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
 /// Wavefront OBJ: positions and triangles; numbers read back to the same bits.
 /// @throws InvalidArgument if an index is out of range
 std::string obj_text(const SurfaceMesh& surface);
-/// The same as a file. @throws InputError (see write_file())
-void write_obj(const std::filesystem::path& path, const SurfaceMesh& surface);
 
 /// Binary STL: three float32 corners and a normal per triangle; vertices are not shared.
 /// @throws InvalidArgument if an index is out of range or there are more than 2³² − 1 triangles
