@@ -1,4 +1,4 @@
-// What finding contacts costs while bodies move: scenes run in a World, every query that it asks is written down, and
+// Cost of finding contacts while bodies move: scenes run in a World, every query that it asks is written down, and
 // then asked again of a fresh ContactFinder and of a fresh FclContactSource, in the same order, on one thread. Prints
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb [alone]]]     part of the names of the scenes wanted ("": all), the asset of the

@@ -1,4 +1,4 @@
-// What each number of collision/src/tuning.h moves when it is halved and doubled, on fixed scenes; of a cosine or sine
+// The effect of each number of collision/src/tuning.h, halved and doubled, on fixed scenes; of a cosine or sine
 // that stands for an angle, the angle. See README.md.
 //
 //   build/benchmark/bin/tuning_collision > table.md

@@ -19,10 +19,10 @@ struct PartsTuning {
   /// rad, 0 … 0.1. Two triangles of a soup that bound a narrower wedge of material, or leave a narrower gap, are two
   /// parts that touch. Case: a pin that fills its hole. Not measured.
   double soup_fold = 0.01;
-  /// Of the surface's area, 0 … 0.05: the largest hole that gets a cap. At 0.01 the winding number is on the right side
-  /// of ½ from 4 % of √area on (docs/joints.md, "Inside and outside"); a bottle's mouth is larger.
+  /// Part of the surface's area, 0 … 0.05: the largest hole that gets a cap. At 0.01 the winding number is on the right
+  /// side of ½ from 4 % of √area on; a bottle's mouth is larger.
   double largest_hole = 0.01;
-  /// Of the surface's area, 0.01 … 0.2: all holes together. Not measured.
+  /// Part of the surface's area, 0.01 … 0.2: all holes together. Not measured.
   double all_holes = 0.05;
 };
 
@@ -36,14 +36,14 @@ struct ContactsTuning {
   /// Pieces, 100 … 10,000: how many there are when NearPart first asks whether most of them matter. A matter of time:
   /// the question costs a search for each piece.
   std::size_t first_look = 512;
-  /// Of the pieces' area, 0.5 … 1: cutting ends when this much of it matters. A matter of time: walls of bricks, whose
-  /// faces touch all over, are cut no further.
+  /// Part of the pieces' area, 0.5 … 1: cutting ends when this much of it matters. A matter of time: walls of bricks,
+  /// whose faces touch all over, are cut no further.
   double matters = 0.8;
   /// A part of the wanted pieces, 4 … 20 as a divisor: by how many too many the pieces of one size may exceed it, since
   /// pieces of one size are halved together. Not measured.
   std::size_t surplus_pieces = 8;
-  /// Of a point's area, 0.5 … 1: a triangle of more has points of its own. Near 1/√2, halfway between no and one point
-  /// by ratio of areas, where larger pieces change from one number of points to the next, too.
+  /// Part of a point's area, 0.5 … 1: a triangle of more has points of its own. Near 1/√2, halfway between no and one
+  /// point by ratio of areas, where larger pieces change from one number of points to the next, too.
   double own_point = 0.7;
   /// Cosine, −1 … 0, of facets' normals in the search for some place that faces. Loose: the smooth normals decide
   /// later. Not measured.
@@ -55,7 +55,7 @@ struct ContactsTuning {
   /// (cluster_gaps). Case: cubes that share
   /// an edge.
   double across = 0.4;
-  /// Of the length at hand (reach or diagonal), 1e-9 … 1e-4: a shorter way has no direction.
+  /// Part of the length at hand (reach or diagonal), 1e-9 … 1e-4: a shorter way has no direction.
   double shortest_way = 1e-6;
   /// Samples, 10 … 100: fewer on a side say nothing about a surface. Not measured.
   std::size_t fewest_samples = 20;
@@ -63,7 +63,7 @@ struct ContactsTuning {
   std::size_t coarse_divisor = 4;
   /// Samples, 50 … 500: the coarse look has no fewer; the least that ContactRegionOptions::samples allows.
   std::size_t coarse_fewest = 100;
-  /// Of the reach of the cluster that the coarse look finds, 1 … 3: how far the fine one looks. Not measured.
+  /// Times the reach of the cluster that the coarse look finds, 1 … 3: how far the fine one looks. Not measured.
   double fine_reach = 1.5;
 
   // The cluster of gaps.
@@ -71,13 +71,13 @@ struct ContactsTuning {
   /// A divisor, 10 … 200: the cluster starts from the nearest 1/50 of the samples, so that a small hinge between large
   /// faces is not swamped. Case: the door. Not measured beside it.
   std::size_t cluster_start = 50;
-  /// Of the median gap, 1.5 … 5: the cluster's limit. Two round surfaces whose centres differ
+  /// Times the median gap, 1.5 … 5: the cluster's limit. Two round surfaces whose centres differ
   /// have gaps from 0 to twice the median; the rest is for noise.
   double cluster_gaps = 2.5;
-  /// Of the median chord error, 1 … 5: what facets add to the limit. Facets on both sides leave up to two; the
+  /// Times the median chord error, 1 … 5: the part of facets in the limit. Facets on both sides leave up to two; the
   /// rest is for noise.
   double cluster_chords = 3.0;
-  /// Of the smaller part's diagonal, 1e-5 … 1e-3: what the limit has at least. Surfaces that touch have gap 0.
+  /// Part of the smaller part's diagonal, 1e-5 … 1e-3: the least limit. Surfaces that touch have gap 0.
   double cluster_least = 1e-4;
   /// Squared sine, 1e-3 … 1e-2. Smooth normals of the two sides that agree less are rough: of noise, not of facets.
   /// Smooth surfaces agree better however coarse their facets (docs/joints.md, "rough").
@@ -85,7 +85,7 @@ struct ContactsTuning {
 
   // What is left out of it.
 
-  /// Of the pairs, 0.5 … 0.9: what holds for this many is noise or curvature and stays.
+  /// Part of the pairs, 0.5 … 0.9: a lean that so many share is noise or curvature and stays.
   double askew_share = 0.75;
   /// 3 … 20, of the squared sine at that share: pairs that look past each other by more are left out.
   double askew_times = 8.0;
@@ -96,7 +96,7 @@ struct ContactsTuning {
   double stray_flat = 0.95;
   /// Middle eigenvalue of the same, 0.03 … 0.3: above it a contact guides; a cylinder has ½. The same case.
   double wider_guides = 0.1;
-  /// Of the nearest contact's area, 2 … 20: the wider one has more. Plates beside a small hinge must not count. The
+  /// Times the nearest contact's area, 2 … 20: the wider one has more. Plates beside a small hinge must not count. The
   /// same case.
   double wider_area = 5.0;
   /// Mean squared sine between facing normals, 0.02 … 0.08: above it surfaces curve away from each other and hold
@@ -107,8 +107,8 @@ struct ContactsTuning {
 
   /// RMS thickness per width, 5e-3 … 0.05: a thinner rough contact takes its plane's normal. Not measured.
   double flat_thickness = 0.02;
-  /// Of the spread, 0.2 … 0.9: means of patches are taken if they bring it below. Noise of vertices halves; the spread
-  /// of curvature does not.
+  /// Part of the spread, 0.2 … 0.9: means of patches are taken if they bring it below. Noise of vertices halves; the
+  /// spread of curvature does not.
   double quieter = 0.5;
   /// Cells that stand for the samples when patches are averaged, 200 … 3,000. A matter of time: each sample looks at
   /// all.
@@ -139,7 +139,7 @@ struct TypesTuning {
   /// Cosine, 0.7 … 0.99: normals that are alike share their weight, so that a wide plate does not drown the peg under
   /// it. Not measured.
   double similar = 0.9;
-  /// Of the whole area, 0.01 … 0.2: keeps normals that are nothing but noise from counting for much.
+  /// Part of the whole area, 0.01 … 0.2: keeps normals that are nothing but noise from counting for much.
   /// Not measured.
   double similar_floor = 0.05;
   /// Samples that stand for all when areas are compared, 200 … 3,000. A matter of time.
@@ -149,9 +149,9 @@ struct TypesTuning {
 
   /// Rounds, 5 … 50, in which an axis' direction and place are improved in turn; it ends sooner at 1e-12.
   std::size_t axis_rounds = 12;
-  /// Of a motion, 1e-9 … 1e-4: one that turns by less is a translation and starts no search for an axis.
+  /// Part of a motion, 1e-9 … 1e-4: one that turns by less is a translation and starts no search for an axis.
   double least_turn = 1e-6;
-  /// Of a motion, 1e-5 … 1e-2: one that turns by less is no screw.
+  /// Part of a motion, 1e-5 … 1e-2: one that turns by less is no screw.
   double screw_least_turn = 1e-3;
   /// Newton steps, 2 … 10, for the pitch over a turn; the start is 3 % off at most.
   std::size_t pitch_rounds = 4;
@@ -161,7 +161,7 @@ struct TypesTuning {
   std::size_t pitch_fewest = 50;
   /// Cosine, 0.8 … 0.99: facets that bend by more (18°) do not come to lie on each other.
   double pitch_alike = 0.95;
-  /// Of the advance of a turn, 0.03 … 0.3: what is further away lies beyond the contact's end.
+  /// Part of the advance of a turn, 0.03 … 0.3: points further away lie beyond the contact's end.
   double pitch_nearest = 0.1;
   /// Relative, 0.03 … 0.3: a pitch that changes by more was no start. Facets' own normals are up to 3 % off.
   double pitch_change = 0.1;
@@ -170,13 +170,13 @@ struct TypesTuning {
 
   /// Probability, 1e-6 … 1e-2: no motion slips more or less surely, so that one measurement does not decide alone.
   double tail = 1e-4;
-  /// Of the contact's RMS radius, 2 … 10: a centre further off is a plane in disguise. Not measured.
+  /// Times the contact's RMS radius, 2 … 10: a centre further off is a plane in disguise. Not measured.
   double far_centre = 4.0;
-  /// Of the same, 5 … 50: an axis further off is a translation in disguise. Not measured.
+  /// Times the same, 5 … 50: an axis further off is a translation in disguise. Not measured.
   double far_axis = 15.0;
   /// Log evidence, 3 … 20, that far centres and axes, and what another method does not name, lose: 5e-5 of the odds.
   double ruled_out = 10.0;
-  /// Of the plain motion's μ, 0.05 … 0.5: a screw must slip better by that much. Plain motions are common.
+  /// Part of the plain motion's μ, 0.05 … 0.5: a screw must slip better by that much. Plain motions are common.
   double screw_clearly = 0.15;
   /// μ, 1e-4 … 1e-3: a plain motion that slips this well needs no screw. Not
   /// measured.
@@ -193,24 +193,24 @@ struct TypesTuning {
   std::size_t stop_compared = 400;
   /// Cosine, 0.8 … 0.99: 18°, one face.
   double stop_alike = 0.95;
-  /// Of the face's area, 0 … 0.1: nothing looks against a stop; a few stray samples may.
+  /// Part of the face's area, 0 … 0.1: nothing looks against a stop; a few stray samples may.
   double stop_against = 0.02;
-  /// Of the contact's area, 0.005 … 0.1: a smaller face is no stop.
+  /// Part of the contact's area, 0.005 … 0.1: a smaller face is no stop.
   double stop_least = 0.02;
   /// Cosine, 0.95 … 1: what would slide does so along the stop's normal.
   double stop_along = 0.99;
   /// Samples, 20 … 200: fewer beside the stop tell no slide.
   std::size_t stop_fewest = 40;
-  /// Of the confidence, 0 … 0.5. A choice: a drawer at its stop and a peg in a blind hole look alike.
+  /// Part of the confidence, 0 … 0.5. A choice: a drawer at its stop and a peg in a blind hole look alike.
   double stop_share = 0.3;
   /// Relative, 0.02 … 0.09: second moments of a round face differ by less. An ellipse of 1.10 has 0.095.
   double round_moments = 0.05;
-  /// Of radii, 0.88 … 0.98: the least of a round face's outline over the most. An octagon has 0.92, a hexagon 0.87, the
-  /// ellipse 0.91.
+  /// Part of radii, 0.88 … 0.98: the least of a round face's outline over the most. An octagon has 0.92, a hexagon
+  /// 0.87, the ellipse 0.91.
   double round_radii = 0.9;
   /// Sectors of the outline, 24 … 96: enough that an octagon's corners and flats fall apart.
   std::size_t round_sectors = 48;
-  /// Of the confidence, 0 … 0.5. A choice: a flange whose bearing is not drawn and a puck on a table look alike.
+  /// Part of the confidence, 0 … 0.5. A choice: a flange whose bearing is not drawn and a puck on a table look alike.
   double round_share = 0.2;
   /// Confidence, 1e-6 … 0.05: hypotheses after the second are told from here on.
   double worth_telling = 1e-3;
@@ -230,16 +230,17 @@ struct TypesTuning {
 
 /// Ranges of motion: where a path is blocked.
 struct RangesTuning {
-  /// Of the smaller body's diagonal, 1e-5 … 1e-3: δ to start with, where the caller gives none.
+  /// Part of the smaller body's diagonal, 1e-5 … 1e-3: δ to start with, where the caller gives none.
   double tolerance = 2e-4;
-  /// Of the smaller body's diagonal, 5e-3 … 0.05: δ at most, where the caller gives none. `limber-joints --overlap`.
+  /// Part of the smaller body's diagonal, 5e-3 … 0.05: δ at most, where the caller gives none. `limber-joints
+  /// --overlap`.
   double largest_overlap = 2e-2;
-  /// Of δ, 1e-4 … 0.1: how far beside a crack an orbit is asked in its place.
+  /// Part of δ, 1e-4 … 0.1: how far beside a crack an orbit is asked in its place.
   double nudge = 1e-2;
   /// Pairs of bodies in either sense that are looked at first, and how many times as many next; 2 … 16. A matter of
   /// time: 900 pins on a plate take 46 s, and 134 s with all at once (docs/range-of-motion.md, "Many parts").
   std::size_t nearest_pairs = 4, pairs_growth = 4;
-  /// Of the contact's box, 0.005 … 0.1: the other part's surface lies beside the contact's points.
+  /// Part of the contact's box, 0.005 … 0.1: the other part's surface lies beside the contact's points.
   double contact_margin = 0.02;
   /// Halvings of the step, 2 … 10, in which the narrowest swing of a cone is sought: 30° / 2⁵ = 1° with 12 directions.
   std::size_t cone_refinements = 4;
@@ -255,7 +256,7 @@ struct RangesTuning {
   double slope = 2.0;
   /// Sine, 0.005 … 0.05: a face that the motion runs against by less than 1° may be noise.
   double one_sided = 0.0175;
-  /// Of a radian, 0.2 … 1: so near to the axis that δ is a larger part of a turn, nothing is told.
+  /// Part of a radian, 0.2 … 1: so near to the axis that δ is a larger part of a turn, nothing is told.
   double near_axis = 0.5;
   /// 1 … 1.5: by what surfaces that curve may exceed what their slope explains. Not measured.
   double slope_margin = 1.1;
@@ -276,9 +277,9 @@ struct RangesTuning {
   std::size_t directions = 6, most_steps = 400;
   /// rad, not a divisor of a turn: from pattern to pattern, so that the directions do not stay the same.
   double pattern_turn = 0.4;
-  /// Of δ, 0.01 … 0.5: the finest step to where an orbit is blocked first.
+  /// Part of δ, 0.01 … 0.5: the finest step to where an orbit is blocked first.
   double finest_blocked = 0.1;
-  /// Of the δ to start with, 0.01 … 0.5: the finest step to where surfaces first meet.
+  /// Part of the δ to start with, 0.01 … 0.5: the finest step to where surfaces first meet.
   double finest_touching = 0.05;
   /// Points from which the ends of the reachable interval are followed, 2 … 20, and those of free intervals behind an
   /// obstacle, 1 … 10, which matter less.

@@ -1,4 +1,4 @@
-// What is played: the scenes, their meshes, bakes and scene files.
+// The scenes that are played: their meshes, bakes and scene files.
 #include "error_scenes.h"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 /// @file error_scenes.h
 /// Scenes that are played twice, by limber and by finite elements of all nodes (benchmarks/reference), and compared.
-/// What `limber-benchmark error` and its tests run.
+/// The scenes of `limber-benchmark error` and its tests.
 ///
 /// limber plays each as a scene file (limber/scene/scene_file.h), so that a setting that is found to do can be written
 /// and run. Bodies are boxes whose meshes are nested: a mesh with half the cells has its nodes among the finer one's.

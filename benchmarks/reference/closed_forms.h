@@ -1,5 +1,5 @@
 /// @file closed_forms.h
-/// What is known without a mesh: bars, beams and plates of a length L, a cross-section A with second moment I,
+/// Closed forms, without a mesh: bars, beams and plates of a length L, a cross-section A with second moment I,
 /// thickness t, Young's modulus E, Poisson's ratio ν, density ρ. SI units.
 #pragma once
 

@@ -1,6 +1,6 @@
 /// @file nodal_elasticity.h
 /// Elastic bodies by the places of all their nodes: linear tetrahedra, total Lagrangian, no modes and no body frame
-/// kept as a state. What limber's motions are judged by. Shares with the library the mesh and the material, nothing
+/// kept as a state. The reference for limber's motions. Shares with the library the mesh and the material, nothing
 /// else.
 ///
 ///   V(x) = Σ_e V_e Ψ(F_e),   F_e = Σ_a x_a ∇φ_aᵀ,   f = −∂V/∂x

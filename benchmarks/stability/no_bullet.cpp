@@ -1,4 +1,4 @@
-// Where Bullet is not found.
+// Stands in if Bullet is not found.
 #include "limber/core/error.h"
 #include "stability_scenes.h"
 

@@ -1,5 +1,5 @@
 /// @file description.h
-/// What the page is told of a scene.
+/// Description of a scene for the page.
 #pragma once
 
 #include <span>

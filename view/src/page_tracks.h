@@ -1,5 +1,5 @@
 /// @file page_tracks.h
-/// What the page's bodies did, key by key.
+/// Motion of the page's bodies, key by key.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 /// @file orbit_index.h
-/// Where the orbits of a one-parameter motion meet a set of surfaces. Private to the articulation module.
+/// Crossings of the orbits of a one-parameter motion with a set of surfaces. Private to the articulation module.
 ///
 /// A triangle can only be met by orbits inside its box in the orbit plane (see path_frame.h), so a tree over these
 /// boxes answers each orbit by a point query.

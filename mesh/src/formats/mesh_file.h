@@ -1,4 +1,4 @@
-/// What the formats that may hold tetrahedra, polygons, or both, are read into, and the readers themselves, one source
+/// The common form of files that may hold tetrahedra, polygons, or both, and the readers, one source
 /// file each. Private to the module.
 #pragma once
 

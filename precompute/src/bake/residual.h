@@ -1,5 +1,5 @@
 /// @file residual.h
-/// What the kept modes leave out of the static compliance: as further modes at chosen nodes, or as blocks between the
+/// The static compliance that the kept modes leave out: as further modes at chosen nodes, or as blocks between the
 /// vertices of a surface (limber/model/residual_compliance.h).
 #pragma once
 

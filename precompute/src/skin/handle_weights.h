@@ -1,5 +1,5 @@
 /// @file handle_weights.h
-/// Where the handles of a modal skin sit and what hangs on them: clusters of nodes that turn alike, diffused along the
+/// Places and influences of the handles of a modal skin: clusters of nodes that turn alike, diffused along the
 /// mesh.
 #pragma once
 

@@ -1,5 +1,5 @@
 /// @file contact_reading.h
-/// What a scene says of contact: its rules, what stands in it without moving, and what a body is like to touch.
+/// Reads contact of a scene: its rules, statics, and the contact properties of bodies.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 /// @file scene_reading.h
-/// What the parts of a scene file are read with: numbers in ranges, words, poses, places and motions. All throw
+/// Readers for the parts of a scene file: numbers in ranges, words, poses, places and motions. All throw
 /// InputError in one line: file, place, what was seen, what was expected.
 #pragma once
 

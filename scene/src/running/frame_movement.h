@@ -1,5 +1,5 @@
 /// @file frame_movement.h
-/// Where a moved frame is at a time: the motions of scene_file.h as functions of time.
+/// Pose of a moved frame at a time: the motions of scene_file.h as functions of time.
 #pragma once
 
 #include "limber/scene/scene_file.h"
