@@ -132,7 +132,7 @@ Json body_report(const ModalModel& model) {
       {"modes", modes}};
 }
 
-/// What a user of the asset should know before it surprises.
+/// Notes that a user of the asset should know.
 void warn(const ModalModel& model, Warnings& warnings) {
   const std::string body = "Body \"" + model.name() + "\"";
   const auto lines = mode_lines(model);

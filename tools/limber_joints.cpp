@@ -177,7 +177,7 @@ ComponentOptions component_options(const Arguments& a) {
   return options;
 }
 
-/// What the program works on.
+/// State of the program's work.
 struct Work {
   GroupedSurface surface;
   JointsFile kept;
@@ -198,7 +198,7 @@ Assembly take_apart(const Arguments& a, const Work& work) {
   return find_components(work.surface, options);
 }
 
-/// Of the percentage shown over detection and limits, which never falls.
+/// Detection's part of the percentage shown over detection and limits, which never falls.
 constexpr double kDetectionShare = 0.3;
 
 DetectionOptions detection_options(const Arguments& a, Program& program) {

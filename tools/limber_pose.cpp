@@ -85,7 +85,7 @@ Json json_of(const PoseResult& r, double time) {
           {"limit_violation", r.limit_violation}};
 }
 
-/// What is pulled, and the file that errors about it name.
+/// The pulled points, and the file that errors about them name.
 struct Pulls {
   HandlesFile handles;
   std::string name;

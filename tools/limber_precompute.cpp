@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// What the user typed, before it means anything.
+/// The user's arguments, uninterpreted.
 struct Arguments {
   std::string mesh, output;
   std::string materials_file, material_name;
@@ -379,7 +379,7 @@ Provenance provenance_of(const Program& program, const Arguments& a, const CLI::
   return p;
 }
 
-/// What the surface weighs as given, beside the mass of its tets.
+/// Mass of the surface as given, beside that of its tets.
 void add_surface_mass(nlohmann::ordered_json& report, const MaterialTable& materials) {
   const auto material = materials.find("*");  // of the one region that a surface's tets have
   if (!report.contains("surface") || material == materials.end()) return;
@@ -396,7 +396,7 @@ std::string stage_line(const nlohmann::ordered_json& seconds) {
   return line + fmt::format(" peak memory {:.0f} MB\n", 1e-6 * peak_memory_bytes());
 }
 
-/// What goes with an assembly alone.
+/// Options for assemblies alone.
 void check_assembly(const Arguments& a) {
   if (a.auto_joints && !a.assembly.joints_file.empty())
     throw InvalidArgument("the joints are given twice: by --joints and by --auto-joints");

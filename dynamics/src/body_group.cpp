@@ -351,7 +351,7 @@ Vec3 BodyGroup::first_moment_at_end(const ExactMotion& motion) const {
   return s;
 }
 
-/// What answered the last step's constraints statically does not vibrate when they let go.
+/// Modes that answered the last step's constraints statically do not vibrate when they let go.
 void BodyGroup::leave_static_answer(Index slot, double* z) const {
   const std::span<const double> answer = static_amplitudes_.modes(slot);
   for (std::size_t i = 0; i < answer.size(); ++i) z[i] -= answer[i];

@@ -77,7 +77,7 @@ HWY_INLINE Circle OnCircle(V x) {
   return {hn::Xor(hn::IfThenElse(odd, s, c), negative_cos), hn::Xor(hn::IfThenElse(odd, c, s), half_turn)};
 }
 
-/// What ModePropagator has.
+/// The members of ModePropagator.
 struct Flow {
   V z_z, S, v_v, H;
 };

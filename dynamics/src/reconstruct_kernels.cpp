@@ -32,7 +32,7 @@ struct Points {
   Vector x, y, z;
 };
 
-// Where shapes come from: single precision, or half, which is widened as it is read.
+// Source of the shapes: single precision, or half, which is widened as it is read.
 struct FloatShapes {
   using Number = float;
   static HWY_INLINE const Number* Start(const TileRange& range) { return range.basis; }
@@ -72,7 +72,7 @@ HWY_INLINE HWY_ATTR Points Added(const Points& a, const Points& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 
-// Where the handles take vertices at rest that the modes move by u: their numbers are blended first, then applied.
+// Places that handles give vertices that the modes move by u: their numbers are blended first, then applied.
 HWY_INLINE HWY_ATTR Points Skinned(const TileRange& range, const InstanceOutput& out, std::size_t vertex,
                                    const Points& rest, const Points& u) {
   const Floats d;

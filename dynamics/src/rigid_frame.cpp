@@ -200,7 +200,7 @@ int RigidFrame::substeps(const FrameConstants& c, const FrameLoad& load, double 
   return static_cast<int>(std::clamp(std::ceil(frequency * h / kSwingPerSubstep), 1.0, kMostSubsteps));
 }
 
-/// Where the parent is part way through a step; exactly at its end for part = 1.
+/// The parent part way through a step; exactly at its end for part = 1.
 void RigidFrame::place_parent_between(const KinematicFrame& before, const KinematicFrame& after, double part) {
   if (part == 1.0) {
     parent_ = after;

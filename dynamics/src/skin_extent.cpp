@@ -23,7 +23,7 @@ double largest_stretch(const Mat3& m) {
 
 Mat3 symmetric_part(const Mat3& m) { return 0.5 * (m + m.transpose()); }
 
-/// What turns a couple into a turn about the mass centre, for C = Σ m r rᵀ: (tr C) 1 − C.
+/// Map of a couple to a turn about the mass centre, for C = Σ m r rᵀ: (tr C) 1 − C.
 Mat3 inertia_of(const Mat3& moment) { return moment.trace() * Mat3::Identity() - moment; }
 
 }  // namespace

@@ -12,7 +12,7 @@ using internal::add_rows;
 using internal::rows_times;
 using internal::SurfaceRows;
 
-/// Whether the rows of a vertex lie together.
+/// True if the rows of a vertex lie together.
 bool has_rows(const ModalModel& model, const SurfacePoint& at) {
   return at.surface == SurfacePoint::Surface::kCollision && model.data().touchable;
 }

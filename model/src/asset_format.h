@@ -1,4 +1,4 @@
-// What the asset's writer and reader share: names, limits, and the content hash. docs/formats/asset.md describes the
+// Shared by the asset's writer and reader: names, limits, and the content hash. docs/formats/asset.md describes the
 // file.
 #pragma once
 

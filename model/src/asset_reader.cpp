@@ -156,7 +156,7 @@ Mat3 matrix_from(std::span<const double> n) {
   return m;
 }
 
-/// What one glTF mesh says about one body.
+/// Data of one body in one glTF mesh.
 class BodyReader {
  public:
   BodyReader(const json& value, const std::string& where, BinaryPieces& pieces)

@@ -119,7 +119,7 @@ OrderedJson json_of(const Mat3& m) {
   return rows;
 }
 
-/// Whether anything stops the joint.
+/// True if anything stops the joint.
 bool limited(const JointSpec& joint) {
   const JointLimits& l = joint.limits;
   if (joint.type == JointType::kBall)

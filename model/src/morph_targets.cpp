@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kVisibleFraction = 0.1;  // of the bounding box's diagonal
 constexpr float kSmallestNormal = std::numeric_limits<float>::min();
-/// Where the area vectors of a vertex cancel to this part of their sum, the normal's direction is round-off.
+/// If the area vectors of a vertex cancel to this part of their sum, the normal's direction is round-off.
 constexpr double kNoArea = 1e-6;
 
 Vec3 vector_at(std::span<const float> xyz, Index vertex) {
@@ -51,7 +51,7 @@ AreaVectors area_vectors(std::span<const float> positions, std::span<const Trian
   return out;
 }
 
-/// What float32 would hold with fewer digits is 0.
+/// Numbers that float32 would hold with fewer digits are 0.
 float whole_digits(float x) { return std::abs(x) >= kSmallestNormal ? x : 0.0f; }
 
 double largest_displacement(const ModalSurface& surface, Index mode) {

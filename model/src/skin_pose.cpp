@@ -269,7 +269,7 @@ void SkinPose::differentiate_places() {
   }
 }
 
-/// What c and Q take away: Qᵀ dQ = [dθ]× with ((tr P) 1 − P) dθ = axial(Qᵀ dA).
+/// The part that c and Q take away: Qᵀ dQ = [dθ]× with ((tr P) 1 − P) dθ = axial(Qᵀ dA).
 void SkinPose::differentiate_frame() {
   const ModalSkin& s = *skin_;
   const auto k = static_cast<std::size_t>(s.modes);

@@ -158,7 +158,7 @@ std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
   return out;
 }
 
-/// Where nothing touches, other rules are the same run again.
+/// Without contact other rules are the same run again.
 bool has_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
   return at.method == a.methods.front() && at.impact == a.impacts.front() && at.contacts == a.contacts.front();
 }
@@ -352,7 +352,7 @@ double share_of(const std::string& text) {
   return rest == "%" ? value / 100.0 : value;
 }
 
-/// What a scene file can say.
+/// Settings that a scene file can hold.
 bool is_told_by_a_scene(const ErrorSetting& at) { return at.modes > 0 && at.contacts == 4 && at.basis == "float"; }
 
 void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, const std::vector<ErrorRow>& rows) {
@@ -380,7 +380,7 @@ void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, 
   program.write_file(a.settings, scene_text(testing::driven(scene, best->at.drive), best->at, file_of));
 }
 
-/// What the assets tell of their own statics.
+/// The assets' own account of their statics.
 void print_capture(Program& program, ErrorRuns& runs, const std::vector<const ErrorScene*>& scenes,
                    const ErrorArguments& a) {
   program.print(

@@ -100,7 +100,7 @@ class LimberPile final : public PileEngine {
   PileStep seen_;
 };
 
-/// Of an engine's pile over a span of time.
+/// Figures of an engine's pile over a span of time.
 struct PileRow {
   std::string scene, engine;
   int from = 0, to = 0;  // s
@@ -320,7 +320,7 @@ std::vector<ReducedRow> run_reduced(Program& program, const PeersArguments& a) {
 // The whole
 // ---------------------------------------------------------------------------------------------------------------
 
-/// Where a peer takes less time than limber, in words.
+/// Cases in which a peer takes less time than limber, in words.
 std::vector<std::string> better_peers(const std::vector<PileRow>& piles, const std::vector<ReducedRow>& reduced) {
   std::vector<std::string> out;
   for (const PileRow& own : piles)

@@ -192,7 +192,7 @@ CaseRow simplest(const CaseRow& bad, int steps) {
   return try_case(testing::simplified(bad.at, is_alike), steps);
 }
 
-/// What became of the cases of one scene.
+/// Tally of the cases of one scene.
 struct SceneTally {
   int cases = 0, refused = 0, good = 0;
   std::array<int, testing::kStabilityFaults> by_fault{};
@@ -224,7 +224,7 @@ std::string head() {
   return out + fmt::format(" {:>9} {:>8}\n", "rise", "seconds");
 }
 
-/// What both engines made of the cases that both can express.
+/// Both engines on the cases that both can express.
 std::string peer_table(const std::vector<CaseRow>& rows) {
   std::string out = fmt::format("\n{:<8} {:<8} {:>6} {:>6} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "scene", "by",
                                 "cases", "good", "not finite", "doubled", "energy", "passed", "overlap");
@@ -288,7 +288,7 @@ std::string svg_of(const std::vector<CaseRow>& rows) {
   return svg_by_gnuplot({820, 60 + 420 * panels}, data, commands);
 }
 
-/// What a change must not make worse.
+/// Figures that a change must not make worse.
 std::vector<Figure> figures_of(const std::map<std::string, SceneTally>& tallies) {
   std::vector<Figure> figures;
   for (const auto& [scene, tally] : tallies) {

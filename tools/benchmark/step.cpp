@@ -31,7 +31,7 @@ struct StepArguments {
   std::string csv, plot, limits;
 };
 
-/// What the unit of a stage is called where one of it has a time.
+/// Name of a stage's unit, if one of it has a time.
 const char* unit_of(Stage stage) {
   switch (stage) {
     case Stage::kBookkeeping:

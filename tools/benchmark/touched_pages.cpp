@@ -10,7 +10,7 @@
 namespace limber::tools {
 namespace {
 
-/// What the processor still remembers of pages it does not mark again: giving back a large mapping makes it forget all.
+/// Makes the processor forget pages that it would not mark again: giving back a large mapping does so.
 void flush_translations() {
   constexpr std::size_t kBytes = std::size_t{4} << 20;
   void* mapped = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -30,7 +30,7 @@ bool forget_touches() {
   return true;
 }
 
-/// Of memory that is no part of a file: code is read in pieces that the kernel chooses.
+/// Touched bytes of memory that is no part of a file: code is read in pieces that the kernel chooses.
 std::optional<std::size_t> touched_since() {
   std::ifstream file("/proc/self/smaps");
   if (!file) return std::nullopt;

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Of a part's diagonal: cells where none were asked for, and the patch that a joint of a file sits on.
+/// Parts of a part's diagonal: cells where none were asked for, and the patch that a joint of a file sits on.
 constexpr double kCell = 1.0 / 20.0, kPatch = 0.15;
 
 struct Joined {

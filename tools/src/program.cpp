@@ -26,7 +26,7 @@ std::string one_line(std::string text) {
   return text;
 }
 
-/// Of the options that may be given: the program's own and those of the subcommand in use.
+/// Options that may be given: the program's own and those of the subcommand in use.
 std::vector<std::string> long_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options())

@@ -1,4 +1,4 @@
-// What the standard library of emscripten 3.1 (libc++ 14) lacks of C++20 and limber uses: included before every source
+// C++20 that limber uses and the standard library of emscripten 3.1 (libc++ 14) lacks: included before every source
 // of the page's engine, and of nothing else.
 #pragma once
 

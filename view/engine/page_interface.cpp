@@ -64,7 +64,7 @@ EMSCRIPTEN_KEEPALIVE const char* page_description() {
   return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";
 }
 
-// What there is of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each).
+// Data of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each).
 EMSCRIPTEN_KEEPALIVE const void* page_model_data(int model, int what) {
   const limber::PageModel& m = page->models()[static_cast<std::size_t>(model)];
   switch (what) {
@@ -111,7 +111,7 @@ EMSCRIPTEN_KEEPALIVE const double* page_cast(double x, double y, double z, doubl
 EMSCRIPTEN_KEEPALIVE int page_grab() { return page->grab(hit) ? 1 : 0; }
 EMSCRIPTEN_KEEPALIVE void page_drag_to(double x, double y, double z) { page->drag_to({x, y, z}); }
 EMSCRIPTEN_KEEPALIVE void page_let_go() { page->let_go(); }
-// Whether something is held, the point, its target, the force on the body, pins.
+// A flag for a held point, the point, its target, the force on the body, pins.
 EMSCRIPTEN_KEEPALIVE const double* page_hand() {
   const limber::HandleView view = page->hand();
   const Vec3 point = page->held_point();

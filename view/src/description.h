@@ -19,7 +19,7 @@ struct PageBody {
   bool dropped = false;  ///< by a person
 };
 
-/// Where a joint's frame sits: on part a, or b where a is the world, which moves rigidly here.
+/// Body of a joint's frame: part a, or b where a is the world, which moves rigidly here.
 struct JointPlace {
   BodyId on{};  ///< none: the world
   Vec3 origin = Vec3::Zero(), axis = Vec3::UnitX();

@@ -11,7 +11,7 @@
 
 namespace limber::internal {
 
-/// What a person holds.
+/// Points that a person holds.
 struct Hands {
   HandleId hand{};
   BodyId body{};

@@ -23,7 +23,7 @@ JointedModel read_model(const std::filesystem::path& model, const std::filesyste
   return jointed_model(surface, read_joints(joints), "\"" + joints.filename().string() + "\"");
 }
 
-/// Where a ray passes a triangle: its parameter and the weights of the second and third corner.
+/// Passage of a ray through a triangle: its parameter and the weights of the second and third corner.
 std::optional<Vec3> ray_triangle(const Vec3& from, const Vec3& along, const Vec3& a, const Vec3& b, const Vec3& c) {
   Mat3 m;
   m << -along, b - a, c - a;
@@ -56,7 +56,7 @@ struct PagePose::Impl {
     place();
   }
 
-  /// Where the vertices are now.
+  /// The vertices' present places.
   void place() {
     posed.resize(session.model().surface.vertices.size());
     session.reconstruct(posed);

@@ -116,7 +116,7 @@ double median(std::vector<double> values) {
 /// Squared sine of the angle by which two surfaces do not look straight at each other.
 double askew(const NearSample& s) { return s.contact.normal.cross(s.contact.facing_normal).squaredNorm(); }
 
-/// What gaps belong to a contact.
+/// Gaps that belong to a contact.
 struct GapLimit {
   double between = 0.0;  ///< the surfaces that the facets stand for
   double facets = 0.0;   ///< what facets add to it in most of the contact
@@ -163,7 +163,7 @@ double normal_spread(const BothSides& sides) {
 }
 
 /// Leaves out pairs that look past each other while most do not: the face at the end of a nut is near the bolt's flank
-/// and leans by 34 degrees from it. What holds for most is noise, curvature or both, and stays.
+/// and leans by 34 degrees from it. A lean that most share is noise, curvature or both, and stays.
 void drop_askew(BothSides& sides) {
   const ContactsTuning& t = tuning().contacts;
   std::vector<double> all;
@@ -176,7 +176,7 @@ void drop_askew(BothSides& sides) {
   for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
-/// What is measured over the samples of both sides.
+/// Measurements over the samples of both sides.
 ContactRegion summarised(const Pair& pair, const BothSides& sides) {
   ContactRegion out;
   out.a = pair.a, out.b = pair.b;
@@ -243,7 +243,7 @@ Vec3 spread_of_directions(const BothSides& sides) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(sum / sum.trace(), Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-/// Those that the limit holds, or the others.
+/// The pairs that the limit holds, or the others.
 BothSides part_of(BothSides sides, const GapLimit& limit, bool held = true) {
   for (auto* side : {&sides.a, &sides.b})
     std::erase_if(*side, [&](const NearSample& s) { return limit.holds(s) != held; });

@@ -17,8 +17,8 @@ Vec3 centre(const SurfaceMesh& surface, Index t) {
   return (corner(surface, t, 0) + corner(surface, t, 1) + corner(surface, t, 2)) / 3.0;
 }
 
-/// How far corners stand out from the planes of triangles at most; a convex surface has 0. Of many, every so-manieth is
-/// looked at.
+/// How far corners stand out from the planes of triangles at most; a convex surface has 0. With many, every so-manieth
+/// is looked at.
 double concavity_of(const SurfaceMesh& surface, std::span<const Index> piece) {
   const std::size_t stride = 1 + piece.size() / tuning().contacts.hull_compared;
   double most = 0.0;

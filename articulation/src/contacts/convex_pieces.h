@@ -17,7 +17,7 @@ class ConvexPieces {
   /// @param concavity length, > 0
   ConvexPieces(const SurfaceMesh& surface, double concavity);
 
-  /// Whether the point lies within `growth` (> 0) of some piece's convex hull.
+  /// True if the point lies within `growth` (> 0) of some piece's convex hull.
   bool hold(const Vec3& p, double growth) const;
 
   std::size_t count() const { return pieces_.size(); }

@@ -21,7 +21,7 @@ struct Piece {
   double distance;             ///< the nearest place that counts is no further from the centre
 
   Vec3 centre() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
-  /// Of the whole triangle's area.
+  /// Share of the whole triangle's area.
   double share() const {
     Mat3 m;
     m << corner[0], corner[1], corner[2];
@@ -100,7 +100,7 @@ class NearPart {
     pieces_.push_back(piece);
   }
 
-  /// Whether a place that counts lies within a limit of the piece's centre. Mostly the bound on the distance tells.
+  /// True if a place that counts lies within a limit of the piece's centre. Mostly the bound on the distance tells.
   bool lies_within(Piece& piece, const Vec3& centre, double limit) const {
     if (piece.distance <= limit) return true;
     const std::optional<double> found = some_place_(piece.triangle, centre, limit);
@@ -108,7 +108,7 @@ class NearPart {
     return found.has_value();
   }
 
-  /// Whether smaller pieces would leave out little more: the centres of most matter themselves.
+  /// True if smaller pieces would leave out little more: the centres of most matter themselves.
   bool mostly_matters() {
     double all = 0.0, matters = 0.0;
     for (const auto& [radius, number] : heap_) {
@@ -163,7 +163,7 @@ Vec3 even_barycentric(const Piece& piece, std::size_t i) {
   return piece.corner[0] + u[0] * (piece.corner[1] - piece.corner[0]) + u[1] * (piece.corner[2] - piece.corner[0]);
 }
 
-/// Whether the way from a point to the nearest one of the other surface leads along a normal rather than along the
+/// True if the way from a point to the nearest one of the other surface leads along a normal rather than along the
 /// surface. Faces side by side in one plane, which meet at an edge, do not face each other.
 /// @param shortest a shorter way has no direction
 bool leads_across(const Vec3& way, double shortest, const Vec3& normal, const Vec3& facing_facet) {
@@ -246,7 +246,7 @@ struct Cell {
   }
 };
 
-/// Each facet is cut alike, wherever it stands in the order of the samples. Of a fine mesh some cells stand for all.
+/// Each facet is cut alike, wherever it stands in the order of the samples. Some cells of a fine mesh stand for all.
 /// @param wanted cells, about; up to twice as many come back
 std::vector<Cell> cells_of(const std::vector<NearSample>& samples, std::size_t wanted) {
   const std::size_t largest = 1 + samples.size() / wanted;  // samples

@@ -55,7 +55,7 @@ struct Mass {
   Mat3 inertia = Mat3::Identity();  // kg·m², about the centre
 };
 
-/// What both formats are written from.
+/// Source of both formats.
 class Robot {
  public:
   Robot(const Assembly& parts, const std::vector<DetectedJoint>& links, const RobotOptions& o)

@@ -61,7 +61,7 @@ std::vector<Rim> rims(std::map<Index, std::vector<Index>> next) {
   return out;
 }
 
-/// Of the fans from each corner of a rim the one with the least area, and that.
+/// The fan of least area among those from each corner of a rim, and that area.
 std::pair<std::vector<Triangle>, double> least_fan(const SurfaceMesh& surface, const Rim& rim) {
   std::pair<std::vector<Triangle>, double> best{{}, std::numeric_limits<double>::infinity()};
   std::vector<Triangle> fan;

@@ -16,7 +16,7 @@ CornerTree<3>::Corners corners_of(const SurfaceMesh& surface, const Triangle& t)
           surface.vertices[static_cast<std::size_t>(t[2])]};
 }
 
-/// Whether some unit normal m in a box may have direction·m ≤ cosine.
+/// True if some unit normal m in a box may have direction·m ≤ cosine.
 bool may_face(const Eigen::AlignedBox3d& normals, const Vec3& direction, double cosine) {
   constexpr double kRounding = 1e-12;
   double least = 0.0;
@@ -24,7 +24,7 @@ bool may_face(const Eigen::AlignedBox3d& normals, const Vec3& direction, double 
   return least <= cosine + kRounding;
 }
 
-/// Whether the line p + t·direction meets the triangle at t in [0, longest]; then `leaving` tells which way.
+/// True if the line p + t·direction meets the triangle at t in [0, longest]; then `leaving` tells which way.
 bool meets(const CornerTree<3>::Corners& triangle, const Vec3& p, const Vec3& direction, double longest,
            bool& leaving) {
   const Vec3 &a = triangle[0], ab = triangle[1] - a, ac = triangle[2] - a, h = direction.cross(ac);

@@ -36,7 +36,7 @@ class TriangleTree {
   /// and answers for surfaces with any holes.
   int winding(const Vec3& p) const;
 
-  /// Whether the surface crosses the segment from p to q, its ends included.
+  /// True if the surface crosses the segment from p to q, its ends included.
   bool crosses(const Vec3& p, const Vec3& q) const;
 
   const Vec3& normal(Index triangle) const { return normals_[static_cast<std::size_t>(triangle)]; }

@@ -10,7 +10,7 @@ namespace {
 
 using Kind = MotionPath::Kind;
 
-/// Of a body, as a path sees it.
+/// A body as a path sees it.
 struct Extent {
   Index body = 0;
   OrbitBox around{};                   ///< of its orbits
@@ -44,7 +44,7 @@ std::vector<Extent> extents(const PathFrame& frame, std::span<const OrbitBody> b
   return out;
 }
 
-/// Where along a line, or about an axis, one comes to the other.
+/// The place along a line, or about an axis, at which one meets the other.
 std::pair<double, double> first_meetings(const PathFrame& frame, const Extent& moving, const Extent& fixed) {
   if (frame.kind() == Kind::kRotation) {
     const double apart = fixed.bearing - moving.bearing, reach = fixed.sector + moving.sector;

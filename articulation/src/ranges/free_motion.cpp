@@ -58,14 +58,14 @@ void FreeMotionOptions::validate() const {
 
 namespace {
 
-/// Whether an interval lies within [low, high], 0 in it; @param period of the path, or 0
+/// True if an interval lies within [low, high], 0 in it; @param period of the path, or 0
 bool lies_within(const Interval& i, double low, double high, double period) {
   for (const double turned : {0.0, period, -period})
     if (i.low + turned >= low && i.high + turned <= high) return true;
   return false;
 }
 
-/// What lies beyond the nearest bodies cannot change where the motion ends: they are looked at alone, and more of them
+/// Bodies beyond the nearest ones cannot change where the motion ends: they are looked at alone, and more of them
 /// only if it does not end among them.
 FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBody> moving,
                                 std::span<const OrbitBody> fixed, const Tolerances& t,

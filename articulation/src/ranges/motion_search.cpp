@@ -19,7 +19,7 @@ namespace {
 /// Up to RangesTuning::slope any surface is a stop; beyond it, those that are one-sided are, such as a screw's collar,
 /// and all others slide.
 bool stands(double slope, bool one_sided) { return slope <= tuning().ranges.slope || one_sided; }
-/// Of the surface where a piece begins or ends; ∞ where it slides.
+/// Slope of the surface where a piece begins or ends; ∞ where it slides.
 double slope_of_end(const OrbitPiece& p, bool low) {
   const double slope = low ? p.slope_low : p.slope_high;
   return stands(slope, low ? p.one_sided_low : p.one_sided_high) ? slope : kInfinity;
@@ -50,7 +50,7 @@ class Search {
   FreeMotion run() {
     find_raw();
     settle_tolerance();
-    // What lies facet on facet as read comes to lie corner on facet.
+    // Facets on facets as read come to lie corner on facet.
     tolerances_.across = std::min(tolerances_.across + tolerances_.facets, tolerances_.largest_overlap);
     collect();
     refine();
@@ -98,7 +98,7 @@ class Search {
   Witness downhill(Witness start, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const;
   Witness first_blocked(const Witness& seed, bool low, const Span& gap) const;
   Witness first_touching(const Witness& blocked, bool low, const Span& gap) const;
-  /// Of the surface at a point, as in OrbitPiece; ∞ where it slides.
+  /// Slope of the surface at a point, as in OrbitPiece; ∞ where it slides.
   double slope_at(const SurfaceSample& at, bool moving) const;
   void refine_end(Span& span, bool low, const Span& gap, std::size_t seeds, Witness& end);
   MotionStop stop_of(const Witness& witness) const;
@@ -229,7 +229,7 @@ bool Search::holds_start(const OrbitPiece& piece, double v) const {
   return piece.sheet == 0 && std::min(-piece.low, piece.high) * v > tolerances_.across;
 }
 
-// What touches as read, or overlaps by less than δ along the motion, blocks the way in and not the way out.
+// Surfaces that touch as read, or overlap by less than δ along the motion, block the way in and not the way out.
 void Search::clip_at_start(std::vector<OrbitPiece>& pieces, double v) const {
   constexpr double kInstant = 1e-12;  // rad or length: above round-off
   for (OrbitPiece& p : pieces) {
@@ -253,7 +253,8 @@ void Search::keep_blocked(const SurfaceSample& at, bool moving, std::vector<Orbi
 }
 
 // Overlap as read is a matter of drawing, not of motion: δ grows until none is left that is wider, as far as it may.
-// What is wide at one δ is wide at all smaller ones, so each point is asked at the δ that those before it left.
+// An overlap that is wide at one δ is wide at all smaller ones, so each point is asked at the δ that those before it
+// left.
 void Search::settle_tolerance() {
   if (tolerances_.across >= tolerances_.largest_overlap) return;
   std::vector<OrbitPiece> pieces;
@@ -365,7 +366,7 @@ Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) co
                   });
 }
 
-// A blocked point has the other body all around it, to a distance δ. What belongs to the same overlap may meet it
+// A blocked point has the other body all around it, to a distance δ. Surfaces of the same overlap may meet it
 // before: the surface within δ of the point, where both surfaces stand against the motion rather than along it.
 Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap) const {
   const double finest = tuning().ranges.finest_touching * tolerances_.least, delta = tolerances_.across;

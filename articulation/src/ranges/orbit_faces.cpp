@@ -59,7 +59,7 @@ class SideOnPath {
     for (const OrbitBody& body : bodies) around_.push_back(frame.box_around(body.box));
   }
 
-  /// Of the bodies that may come within `reach`, by their boxes.
+  /// Box around the bodies that may come within `reach`, by their boxes.
   OrbitBox rough_reach(const OrbitBox& reach) const {
     OrbitBox out;
     for (const OrbitBox& box : around_)
@@ -74,7 +74,7 @@ class SideOnPath {
   void select(const OrbitBox& reach);
   const OrbitBoxTree& tree() const { return *tree_; }
 
-  /// Those of select() that pass, in the order of the tree.
+  /// Faces of select() that pass, in the order of the tree.
   template <class Passes>
   std::vector<OrbitFace> faces(Passes&& passes) {
     std::vector<OrbitFace> out;
@@ -372,7 +372,7 @@ FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
       faces_[static_cast<std::size_t>(next[static_cast<std::size_t>(v)]++)] = static_cast<Index>(f);
 }
 
-/// Of a surface's own triangles and its caps, numbered one after the other.
+/// Tree of a surface's own triangles and its caps, numbered one after the other.
 std::shared_ptr<const CornerTree<3>> tree_of(const SurfaceMesh& surface, std::span<const Triangle> caps) {
   constexpr std::size_t kLeaf = 8;  // triangles: bounds of orbits cost more than boxes
   std::vector<CornerTree<3>::Corners> all;

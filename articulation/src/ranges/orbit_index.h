@@ -49,10 +49,10 @@ class OrbitIndex {
     double offset = 0.0;
     double height(const Vec3& p) const { return normal.dot(p) - offset; }
   };
-  /// What it takes to cross a face; what tells that a circle misses it lies in one line of the cache.
+  /// Data for crossing a face; the part that tells that a circle misses it lies in one line of the cache.
   struct alignas(64) Face {
     Face(const OrbitFace& face, MotionPath::Kind kind);
-    /// Whether a point of the plane lies inside the triangle; on a side counts.
+    /// True if a point of the plane lies inside the triangle; on a side counts.
     bool holds(const Vec3& p) const {
       return (sides[0].height(p) >= 0.0) & (sides[1].height(p) >= 0.0) & (sides[2].height(p) >= 0.0);
     }

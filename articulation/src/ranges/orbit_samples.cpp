@@ -11,7 +11,7 @@
 namespace limber::internal {
 namespace {
 
-/// Of what can touch.
+/// Area that can touch.
 double area(const OrbitFace& f) {
   if (f.cap) return 0.0;
   return 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).norm();

@@ -36,7 +36,7 @@ class PathFrame {
   OrbitBox plane_point(const Vec3& p) const;  ///< p in path coordinates: its place in the orbit plane, no screw's
   OrbitBox box_of(const Orbit& orbit) const;  ///< a point
   OrbitBox box_of(std::span<const Vec3, 3> corners) const;  ///< of the orbits that meet a triangle; no screw's
-  /// Of the box in path coordinates around one in the input's: its centre and half its sizes.
+  /// The box in path coordinates around one in the input's: its centre and half its sizes.
   std::pair<Vec3, Vec3> box_of(const Eigen::AlignedBox3d& box) const;
   /// Holds the orbits that meet a box, given in the input's coordinates; a screw's along x from −1e300 to 1e300.
   OrbitBox box_around(const Eigen::AlignedBox3d& box) const;

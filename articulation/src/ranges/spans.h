@@ -52,7 +52,7 @@ inline Spans intersection(const Spans& a, const Spans& b) {
   return out;
 }
 
-/// Whether one of the spans holds [low, high]. @pre normalised
+/// True if one of the spans holds [low, high]. @pre normalised
 inline bool covers(const Spans& spans, double low, double high) {
   const auto after =
       std::upper_bound(spans.begin(), spans.end(), low, [](double x, const Span& s) { return x < s.low; });

@@ -10,7 +10,7 @@
 namespace limber {
 namespace {
 
-/// Of the time, as progress tells it.
+/// Contacts' share of the time, as progress tells it.
 constexpr double kContactsShare = 0.9;
 
 std::vector<Vec3> points_of(const std::vector<ContactRegion>& regions) {

@@ -40,7 +40,7 @@ Vec3 middle_on_axis(const Vec3& axis, const Vec3& origin, std::span<const Vec3> 
   return origin + 0.5 * (low + high) * axis;
 }
 
-/// Of the two outer principal axes the one whose variance stands further apart: what a ring or a cap is round about.
+/// The outer principal axis whose variance stands further apart: a ring or a cap is round about it.
 Vec3 axis_of_symmetry(const Eigen::SelfAdjointEigenSolver<Mat3>& principal) {
   const Vec3& v = principal.eigenvalues();
   return principal.eigenvectors().col(v[2] - v[1] > v[1] - v[0] ? 2 : 0);

@@ -57,7 +57,7 @@ Index freedom_count(const JointSpec& joint) {
   return free.rotations + free.translations - (joint.pitch != 0.0 ? 1 : 0);
 }
 
-/// The rank, columns of one norm. Of a few by a pivoted QR; of many, by the pivots of AᵀA = L D Lᵀ in an order of
+/// The rank, columns of one norm. Few columns take a pivoted QR; many take the pivots of AᵀA = L D Lᵀ in an order of
 /// little fill-in: without pivoting these are the squares of QR's, and a little on the diagonal keeps dependent columns
 /// from dividing by 0.
 Index rank_of(Eigen::SparseMatrix<double> A) {

@@ -243,7 +243,7 @@ Judged judge(const MotionSpace& space, const Family& family, double threshold) {
   return out;
 }
 
-/// The screw that slips, if plain motions do not. Those are common and screws are not; one must beat them by far.
+/// The screw that slips, if plain motions do not. Plain ones are common and screws are not; one must beat them by far.
 /// @param plain μ of the best rotation or translation
 std::optional<Judged> judged_screw(const MotionSpace& space, double plain, double threshold) {
   const TypesTuning& t = tuning().types;

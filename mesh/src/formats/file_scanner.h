@@ -27,7 +27,7 @@ std::string shown_path(const std::filesystem::path& path);
 
 class FileScanner {
  public:
-  /// What a format's text has besides words and blanks; 0: none.
+  /// Special characters of a format's text; 0: none.
   struct Syntax {
     char comment = 0;       ///< from here to the end of the line nothing is read
     char continuation = 0;  ///< before a line end: the line goes on

@@ -401,7 +401,7 @@ class VtkReader {
     if (encoding_ != Encoding::kText) in_.end_line(after);
   }
 
-  /// Whether a keyword stands where numbers may begin.
+  /// True if a keyword stands where numbers may begin.
   bool next_is(std::string_view keyword) {
     return encoding_ == Encoding::kText ? in_.peek_word() == keyword : in_.starts_with(keyword);
   }

@@ -9,7 +9,7 @@ namespace {
 // Triangles whose height is below this part of their longest edge are segments.
 constexpr double kFlat = 1e-13;
 
-// Where the foot of p falls on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
+// Place of the foot of p on the line through s: 0 at s[0], 1 at s[1]; 0 for a segment without length.
 double line_parameter(const Vec3& p, const SegmentPoints& s) {
   const Vec3 d = s[1] - s[0];
   const double length2 = d.squaredNorm();
@@ -17,7 +17,7 @@ double line_parameter(const Vec3& p, const SegmentPoints& s) {
   return (p - s[0]).dot(d) / length2;
 }
 
-// Of a foot_at() the point alone.
+// The point of foot_at() alone.
 Vec3 point_at(const SegmentPoints& s, double t) {
   if (!(t > 0.0)) return s[0];
   return t >= 1.0 ? s[1] : between(s, t);

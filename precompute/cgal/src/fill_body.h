@@ -14,9 +14,9 @@ struct MeasuredBody {
   const Body* body = nullptr;
   double cell_size = 0.0;  ///< largest, m
   std::vector<ThicknessSample> samples;
-  /// Of a mesh whose cells are not made smaller than `smallest` for what is thin.
+  /// Nodes of a mesh whose cells are not made smaller than `smallest` for thin parts.
   double expected_nodes(double smallest) const;
-  /// Of a mesh with a cell across everything that is thin.
+  /// Nodes of a mesh with a cell across every thin part.
   double nodes_to_resolve() const;
 };
 

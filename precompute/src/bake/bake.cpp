@@ -253,7 +253,7 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
   return columns;
 }
 
-/// What the kept modes show of the static compliance where loads were foreseen, in directions of forces: the columns of
+/// The kept modes' part of the static compliance where loads were foreseen, in directions of forces: the columns of
 /// the loads are three a node, then six a patch.
 std::vector<CapturedLoad> captured_loads(const BodyInput& in, const internal::ResidualModes& modes) {
   std::vector<CapturedLoad> captured;

@@ -146,7 +146,7 @@ Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices,
   Eigen::MatrixXd F = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 6);
   for (const std::size_t v : members) {
     const EmbeddedVertex& at = surface.vertices[v];
-    // What the mean displacement and the rotation take of this vertex's displacement, transposed.
+    // The mean displacement's and rotation's part of this vertex's displacement, transposed.
     Eigen::Matrix<double, 3, 6> load;
     load << Mat3::Identity(), cross_matrix(vertices[v] - mean).transpose() * turns;
     for (int c = 0; c < 4; ++c)

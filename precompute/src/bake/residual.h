@@ -24,7 +24,7 @@ Eigen::MatrixXd node_loads(Index mesh_nodes, std::span<const Index> nodes);
 Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices, const Embedding& surface,
                             const AttachmentPatch& patch);
 
-/// What joined the analysis, and of each load what the kept modes show of fᵀ K⁺ f without it, and what they leave.
+/// Modes that joined the analysis, and the kept modes' part of fᵀ K⁺ f without them, with the rest, for each load.
 struct ResidualModes {
   Index appended = 0;
   Eigen::VectorXd shown, left;  // m/N, of unit loads

@@ -29,7 +29,7 @@ EigenPairs lowest_modes(const ScaledProblem& problem, ElasticInverse& inverse, E
                         LanczosOptions options, Eigen::Index& pairs_to_keep);
 
 /// Makes sure that no eigenvalue below the last pair is missing: counts those below a number in the widest gap at the
-/// end of the list. Where the count says that some are, looks for them orthogonally to those found and counts again.
+/// end of the list. If the count says that some are, looks for them orthogonally to those found and counts again.
 /// @throws ComputationError if the count still differs after that
 void complete(const ScaledProblem& problem, ElasticInverse& inverse, EigenvalueCounter& counter, EigenPairs& pairs,
               Eigen::Index wanted, Eigen::Index& pairs_to_keep);

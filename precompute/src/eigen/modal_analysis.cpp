@@ -56,7 +56,7 @@ class Stopwatch {
   Clock::time_point last_ = Clock::now();
 };
 
-/// What is left of the body after fixing, in units that make it dimensionless.
+/// The body after fixing, in units that make it dimensionless.
 struct Body {
   std::vector<Index> fixed_nodes, free_nodes;  // ascending
   NullSpace null_space;                        // on all nodes

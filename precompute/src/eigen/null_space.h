@@ -15,7 +15,7 @@
 
 namespace limber::internal {
 
-/// What fixed nodes leave of the rigid motions of the whole body.
+/// Rigid motions of the whole body that fixed nodes leave.
 struct RigidFreedom {
   FrameMotion motion = FrameMotion::kFree;
   Vec3 pivot = Vec3::Zero();       ///< kPoint, kLine: a fixed node's place

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kGrain = 512;  // tets or nodes per task: tens of microseconds
 
-/// What a tet's 3 × 3 blocks are made of. Displacement u = Σ_a φ_a u_a with constant gradients g_a = ∇φ_a.
+/// Ingredients of a tet's 3 × 3 blocks. Displacement u = Σ_a φ_a u_a with constant gradients g_a = ∇φ_a.
 struct Element {
   std::array<Vec3, 4> gradient;  // 1/m, summing to zero
   double lambda_volume = 0.0;    // λV, N·m
@@ -124,7 +124,7 @@ void check(const TetMesh& mesh, std::span<const Material> materials, const char*
     if (used[r]) materials[r].validate(std::string(where) + ": region \"" + mesh.regions[r].name + "\"");
 }
 
-/// Where, in the list of a node's neighbours, the corners of one tet stand.
+/// Places of the corners of one tet in the list of a node's neighbours.
 std::array<std::size_t, 4> places(std::span<const Index> neighbours, const Tet& t) {
   std::array<std::size_t, 4> place{};
   for (int a = 0; a < 4; ++a)

@@ -39,7 +39,7 @@ struct NodalSkin {
 /// @param report gets handles, spread and energies. @pre the body is free or held at three points or more, k > 0
 NodalSkin bake_skin(const SkinBody& body, const SkinOptions& options, SkinReport& report);
 
-/// Where the map puts all nodes, from the body's origin. @param z k
+/// Places of all nodes under the map, from the body's origin. @param z k
 std::vector<Vec3> skinned_nodes(const SkinBody& body, const NodalSkin& skin, std::span<const double> z);
 
 /// Elastic energy of the nodes' places by St. Venant–Kirchhoff's law, J.

@@ -42,7 +42,7 @@ std::size_t skin_bytes(const ModalSkin& skin, Index modes) {
          (skin.gauge.weights.size() + skin.gauge.rest.size() + per_mode(skin.gauge.shapes.size())) * sizeof(double);
 }
 
-/// Of a model with so many modes and these parts of its own.
+/// Bytes of a model with so many modes and these parts of its own.
 std::size_t bytes_of(const ModalModelData& data, Index modes, const Parts& parts) {
   const ModalSurface& touched = data.collision ? *data.collision : data.render;
   const bool one_surface = !data.collision || !parts.drawn || !parts.collision;
@@ -194,7 +194,7 @@ std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<
   return std::make_shared<const ModalModel>(std::move(lean));
 }
 
-/// What a scene does with the bodies of one model.
+/// A scene's use of the bodies of one model.
 struct ModelNeeds {
   bool meets = false;   // others, by its own surface
   bool yields = false;  // so that its residual compliance acts

@@ -205,7 +205,7 @@ Extent extent_of(const Trajectory& trajectory) {
   return {0.5 * (low + high), 0.5 * (high - low).norm() + reach};
 }
 
-/// What stands still: a node with a mesh each, all of one grey.
+/// Statics: a node with a mesh each, all of one grey.
 std::vector<int> add_statics(GlbBuilder& glb, const Trajectory& trajectory) {
   std::vector<int> nodes;
   if (trajectory.statics.empty()) return nodes;
@@ -247,7 +247,7 @@ struct BodyNodes {
   std::vector<int> joints{};
 };
 
-/// Where the handles of a body are in its frame. @return [handle][key]
+/// Places of a body's handles in its frame. @return [handle][key]
 std::vector<std::vector<RigidTransform>> joint_poses(const BodyTrack& body) {
   SkinPose pose(*body.model->data().skin);
   std::vector<std::vector<RigidTransform>> out(pose.handles().size());

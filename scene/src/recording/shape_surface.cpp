@@ -42,7 +42,7 @@ TriangleMesh square(const HalfSpace& s, const Vec3& about, double half_side) {
   return mesh;
 }
 
-/// What collision/ touches: flat triangles with corners of their own, so that edges are seen.
+/// The surface that collision/ touches: flat triangles with corners of their own, so that edges are seen.
 TriangleMesh touched(const Shape& shape) {
   const RigidGeometry geometry(shape);
   TriangleMesh mesh;

@@ -15,7 +15,7 @@ struct FrameState {
 /// @param start the body's pose at t = 0, where the movement does not say otherwise @param t s, ≥ 0
 FrameState frame_at(const FrameMovement& movement, const RigidTransform& start, double t);
 
-/// What the frame does in the step from t to t + h: its state at the end, and the mean accelerations, which carry the
+/// Motion of the frame in the step from t to t + h: its state at the end, and the mean accelerations, which carry the
 /// whole change of velocity also where it jumps.
 KinematicFrame frame_over_step(const FrameMovement& movement, const RigidTransform& start, double t, double h);
 

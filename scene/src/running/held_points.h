@@ -15,7 +15,7 @@ class HeldPoints {
  public:
   /// @param handle outlives this
   void plan(const SceneHandle& handle, BodyId body, const std::string& name);
-  /// When all are planned. Those that begin after the last step are forgotten.
+  /// When all are planned. Holds that begin after the last step are forgotten.
   void begin(double step, std::int64_t steps);
 
   /// Before step n: takes hold, lets go, and says where the points are wanted at its end.

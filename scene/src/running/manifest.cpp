@@ -19,7 +19,7 @@ struct Played {
   double seconds() const { return processor_seconds / static_cast<double>(std::max<std::int64_t>(run.steps, 1)); }
 };
 
-/// What is drawn at a key by the modes of `shown`, vertex after vertex: bodies that were played with fewer modes or
+/// The picture at a key by the modes of `shown`, vertex after vertex: bodies that were played with fewer modes or
 /// another surface are put on the asset's.
 std::vector<Vec3> vertices_at(const BodyTrack& track, const ModalModel& shown, std::span<const Index> kept,
                               std::size_t key) {
@@ -33,7 +33,7 @@ std::vector<Vec3> vertices_at(const BodyTrack& track, const ModalModel& shown, s
   return points;
 }
 
-/// Of a model's manifest: the modes of the asset that are there.
+/// The modes of the asset that a model's manifest keeps.
 std::vector<Index> kept_modes(const ModelManifest& manifest) {
   std::vector<Index> kept;
   for (Index i = 0; i < manifest.modes_in_asset; ++i)
@@ -138,7 +138,7 @@ class Comparison {
     out.difference_with_all = difference(with, models_.back());
   }
 
-  /// Of all bodies at all keys, on the surfaces of the assets.
+  /// Difference of all bodies at all keys, on the surfaces of the assets.
   double difference(const Played& with, const SceneModels& models) const {
     double largest = 0.0;
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {

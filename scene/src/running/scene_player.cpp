@@ -228,7 +228,7 @@ void ScenePlayer::step() {
   end_step();
 }
 
-/// What the scene has begun comes last, and how many bytes of the world's are before it at the very end.
+/// The scene's own state follows the world's; the number of the world's bytes stands at the very end.
 void ScenePlayer::save_state(std::vector<std::byte>& state) const {
   impl_->world.save_state(state);
   const auto world_bytes = static_cast<std::uint64_t>(state.size());

@@ -64,7 +64,7 @@ SurfacePoint find(const NearestTo& place, const World& world, BodyId body, const
   return best;
 }
 
-/// Where a ray meets a triangle, seen from either side: its parameter, negative if it does not.
+/// Hit of a ray on a triangle, seen from either side: its parameter, negative if it does not.
 struct Hit {
   double parameter = -1.0;
   Weights weights{};

@@ -25,7 +25,7 @@ JointLimits read_joint_limits(const JsonObject& joint, JointType type);
 /// All but the limits. `axis` wins over `frame`: it is what people edit.
 JointSpec read_joint_kind(const JsonObject& o);
 
-/// What acts on one coordinate: `motor`, `drive`, `friction`.
+/// Actuation of one coordinate: `motor`, `drive`, `friction`.
 JointActuation read_joint_actuation(const nlohmann::json& value, const std::string& where);
 /// The member `coordinates`: of as many coordinates as the type has at most; none where it is not there.
 std::vector<JointActuation> read_joint_coordinates(const JsonObject& o, JointType type);
