@@ -81,7 +81,7 @@ std::vector<double> amplitudes(Index modes, double size) {
   return z;
 }
 
-/// Where two bodies are.
+/// States of two bodies.
 enum Scene { kFar, kNearBalls, kTouchingBalls, kOnePlace, kTenPlaces, kHundredPlaces, kEverywhere };
 constexpr const char* kSceneNames[] = {"far",       "near, gap 2 %", "touching, 1 % deep", "1 place",
                                        "10 places", "100 places",    "everywhere"};

@@ -55,7 +55,7 @@ class Drag {
                                                     displacement(world.model(body_), hand.at, z)});
   }
 
-  /// Of the rows of all hands on the body's freedoms.
+  /// Rank of the rows of all hands on the body's freedoms.
   Eigen::Index rank() const {
     const Index modes = world.model(body_).modes();
     Eigen::MatrixXd rows(3 * static_cast<Eigen::Index>(hands_.size()), 6 + modes);

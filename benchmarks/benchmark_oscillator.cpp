@@ -60,7 +60,7 @@ void table(benchmark::State& state, bool forced) {
             propagators.advance_free(z.of(b), zdot.of(b));
     });
   const double seconds = time.seconds() / (static_cast<double>(modes) * instances * repeats);
-  // What a step must read: the coefficients (once for all instances at best, here from the nearest cache) and the
+  // Bytes that a step must read: the coefficients (once for all instances at best, here from the nearest cache) and the
   // state.
   const double rows = forced ? 3.0 : 2.0, coefficients = forced ? 5.0 : 4.0;
   const double bytes = 8.0 * (rows + coefficients);

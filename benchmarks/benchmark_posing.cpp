@@ -25,7 +25,7 @@ namespace {
 using limber::Index;
 using limber::Vec3;
 
-/// Of this process: the machine may be shared. ms
+/// Time of this process, ms: the machine may be shared.
 double now() { return 1e3 * limber::thread_seconds(); }
 
 double median(std::vector<double> values) {
@@ -133,7 +133,7 @@ void run(const Case& c, limber::PoseFormulation formulation, double tolerance) {
       median(per_iteration), static_cast<double>(iterations) / frames, median(per_frame), median(surface), c.paper);
 }
 
-/// Where the drag's hand is, frame by frame.
+/// Places of the drag's hand, frame by frame.
 struct Drag {
   std::vector<std::pair<Index, Vec3>> grips{};  // part, point at rest; the last is the hand
   std::vector<Vec3> targets{};                  // of the hand

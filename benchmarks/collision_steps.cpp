@@ -122,7 +122,7 @@ struct Phase {
   int steps;
 };
 
-/// Of all queries of each step, µs ascending.
+/// Times of all queries of each step, µs ascending.
 std::vector<double> times_of_steps(std::span<const Recorder::Cost> costs, std::span<const std::size_t> ends) {
   std::vector<double> times;
   std::size_t begin = 0;

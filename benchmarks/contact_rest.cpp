@@ -71,7 +71,7 @@ std::vector<Vec3> places_of(const World& world, const std::vector<BodyId>& bodie
   return places;
 }
 
-/// Where body i of a scene begins: upon each other, or in layers of four.
+/// Start of body i of a scene: upon each other, or in layers of four.
 Vec3 place_of(const Scene& scene, const Extent& extent, int i) {
   const double height = extent.high.z() - extent.low.z(), size = (extent.high - extent.low).maxCoeff();
   if (scene.side_by_side) {

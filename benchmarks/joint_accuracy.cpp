@@ -135,7 +135,7 @@ int run_limits(const DetectionOptions& options, const RangeOptions& ranges, bool
   return 0;
 }
 
-/// What moving, scaling and reordering changes, of the types and axes that are found: against the unmoved variant, and
+/// Changes of types and axes by moving, scaling and reordering: against the unmoved variant, and
 /// not against the truth.
 int run_change(const DetectionOptions& options, const std::string& only) {
   TbbJobs jobs;

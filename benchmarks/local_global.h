@@ -110,7 +110,7 @@ class LocalGlobal {
         double& w = omega_[dof_[b] / 4];
         w = stiffness * std::max(w, std::cbrt(s_.bodies[b].volume) * s_.bodies[b].radius_squared);
         for (int r = 0; r < 3; ++r) triplets_.emplace_back(dof_[b] + r, dof_[b] + r, w);
-        // What nothing holds stays.
+        // Parts that nothing holds stay.
         triplets_.emplace_back(dof_[b] + 3, dof_[b] + 3, 1e-9 * s_.size);
       }
   }

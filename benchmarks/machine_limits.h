@@ -1,4 +1,4 @@
-// What one thread of this machine can do at most, by plain loops.
+// The most that one thread of this machine can do, by plain loops.
 #pragma once
 
 #include <cstddef>

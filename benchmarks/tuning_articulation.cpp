@@ -41,7 +41,7 @@ struct Numbers {
 
 /// How a number is halved and doubled.
 enum class Kind { kPlain, kShare, kCosine, kFactor };
-/// What it is measured by.
+/// The score that judges it.
 enum class Concern { kJoints, kHulls, kRatio, kChains, kRanges };
 
 struct Number {
@@ -189,7 +189,7 @@ std::vector<Number> sheet_of(Tuning& tuning) {
           {"ranges.helix_steps", kPlain, kRanges, &r.helix_steps}};
 }
 
-/// Those of the public options that detection and ranges go by.
+/// Public options of detection and ranges.
 std::vector<Number> options_of(Numbers& n) {
   using enum Kind;
   using enum Concern;
@@ -229,7 +229,7 @@ struct Drawn {
   std::vector<DetectedJoint> joints;
 };
 
-/// Those of a setting, drawn once.
+/// Assemblies of a setting, drawn once.
 std::vector<Drawn> drawn(const Setting& setting, const DetectionOptions& options, Jobs& jobs) {
   std::vector<Drawn> out;
   for (const auto* names : {&tuning_names(), &held_out_names()})
@@ -241,7 +241,7 @@ std::vector<Drawn> drawn(const Setting& setting, const DetectionOptions& options
   return out;
 }
 
-/// What is counted over the assemblies of one setting.
+/// Counts over the assemblies of one setting.
 struct Outcome {
   int all = 0, right = 0, extra = 0;
   double worst_angle = 0.0, worst_length = 0.0;  ///< degrees; 1e-3 of the diagonal
@@ -323,7 +323,7 @@ std::string change_text(const char* format, auto before, auto after) {
   return text;
 }
 
-/// What one change moves, in words.
+/// The effect of one change, in words.
 std::string moved(const Outcomes& before, const Outcomes& after) {
   std::string out;
   const auto differs = [](double x, double y, double least) {

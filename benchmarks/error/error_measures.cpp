@@ -15,7 +15,7 @@ double mean_square(const NodeVectors& d, const Eigen::VectorXd& masses) {
   return masses.dot(d.rowwise().squaredNorm()) / masses.sum();
 }
 
-/// Of a onto b, its best rigid motion taken away.
+/// Distance of a from b, its best rigid motion taken away.
 NodeVectors shape_difference(const NodeVectors& a, const NodeVectors& b, const Eigen::VectorXd& masses) {
   const BestRotation best = best_rotation(a, masses.asDiagonal() * a, b, masses);
   const NodeVectors aligned = (a.rowwise() - best.from.transpose()) * best.rotation.transpose();
@@ -26,7 +26,7 @@ double largest_row(const NodeVectors& d) { return d.rowwise().norm().maxCoeff();
 
 double over(double error, double scale) { return scale > 0.0 ? error / scale : (error > 0.0 ? HUGE_VAL : 0.0); }
 
-/// Of the reference, from one of `seen` to the next.
+/// Samples of the reference from one of `seen` to the next.
 std::size_t samples_between(const NodeMotion& seen, const NodeMotion& reference) {
   if (seen.empty() || reference.empty() || (seen.size() == 1) != (reference.size() == 1) ||
       (seen.size() > 1 && (reference.size() - 1) % (seen.size() - 1) != 0))

@@ -112,7 +112,7 @@ class SceneBakery {
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,
                        const std::function<std::string(const std::string&)>& asset_file);
 
-/// What contacts gave in a step.
+/// Impulses of contacts in a step.
 struct Touch {
   double time = 0.0, impulse = 0.0;  ///< s, at the step's end; N·s
 };
@@ -150,8 +150,8 @@ struct SceneError {
   MotionError motion;
   double tip = 0.0;
   double impulse = 0.0;  ///< of all contacts, relative; 0 without contact
-  /// Of the first impact: the motion until it ends, root mean square over the whole peak; its impulse and its length,
-  /// relative. What follows magnifies what was off here.
+  /// Errors of the first impact: the motion until it ends, root mean square over the whole peak; its impulse and its
+  /// length, relative. Later motion magnifies these errors.
   double first = 0.0, first_impulse = 0.0, first_length = 0.0;
   double momentum = 0.0;  ///< largest difference over the largest of the reference
 };

@@ -77,7 +77,7 @@ Asset baked_body(const ErrorScene& scene, std::size_t i, const ErrorSetting& set
   return asset;
 }
 
-/// Of each compared place the vertex of the render surface.
+/// The render surface's vertex at each compared place.
 std::vector<std::size_t> compared_vertices(const ErrorBody& body, const ModalModel& model) {
   std::vector<std::size_t> out;
   for (const Vec3& at : compared_places(body)) {
@@ -229,7 +229,7 @@ double sum_of(std::span<const Touch> touches) {
   return sum;
 }
 
-/// Of bodies until a time, root mean square, over the peaks of the whole reference; the worst body's.
+/// Error of bodies until a time, root mean square, over the peaks of the whole reference; the worst body's.
 double error_until(const ErrorScene& scene, const PlayedScene& seen, const PlayedScene& reference, double end) {
   double worst = 0.0;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {

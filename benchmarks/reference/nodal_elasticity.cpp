@@ -13,7 +13,7 @@ struct Law {
   ElasticLaw law;
   double lambda, mu;
 
-  // Of kNeoHookean.
+  // Moduli of kNeoHookean.
   double mu_h() const { return 4.0 / 3.0 * mu; }
   double lambda_h() const { return lambda + 5.0 / 6.0 * mu; }
   double alpha() const { return 1.0 + 0.75 * mu_h() / lambda_h(); }

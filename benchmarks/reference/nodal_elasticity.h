@@ -59,12 +59,12 @@ class NodalElasticity {
 
   double energy(const NodeVectors& x) const;       ///< J
   NodeVectors forces(const NodeVectors& x) const;  ///< N
-  /// −∂f/∂x, 3n × 3n, N/m. Of kLinear R K Rᵀ: how R turns with x is left out.
+  /// −∂f/∂x, 3n × 3n, N/m. For kLinear R K Rᵀ, without the turn of R with x.
   SparseDoubles stiffness(const NodeVectors& x) const;
 
  private:
   Mat3 deformation(const NodeVectors& x, std::size_t tet) const;
-  /// Of kLinear: d and the frame it is seen in.
+  /// For kLinear: d and the frame it is seen in.
   struct Turned {
     Mat3 R = Mat3::Identity();
     NodeVectors d;

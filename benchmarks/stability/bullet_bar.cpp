@@ -25,7 +25,7 @@ btVector3 of(const Vec3& v) {
 }
 Vec3 of(const btVector3& v) { return {double{v.x()}, double{v.y()}, double{v.z()}}; }
 
-/// What both engines are told of a bar.
+/// Data of a bar for both engines.
 struct LumpedBar {
   std::shared_ptr<const ModalModel> model;
   TetMesh mesh;
@@ -171,7 +171,7 @@ class BulletWorld {
   }
   double margin() const { return 0.01 * at_.size; }
 
-  /// Of the mesh, from a vertex of the surface.
+  /// Node of the mesh for a vertex of the surface.
   int node_of(Index vertex) const {
     const Vec3 at = bar_.model->render().rest[static_cast<std::size_t>(vertex)].cast<double>();
     const auto nearer = [&](const Vec3& a, const Vec3& b) { return (a - at).norm() < (b - at).norm(); };

@@ -125,7 +125,7 @@ class Scene {
     if (pauses) world_.set_step(at_.step);
   }
 
-  /// What is done to the body before its energy is watched: a blow, or a pull by a hand that then lets go.
+  /// Drives the body before its energy is watched: a blow, or a pull by a hand that then lets go.
   void put_in(std::mt19937& random) {
     const Vec3 along = Vec3(1.0, 0.2, 0.3).normalized();
     if (at_.scene == StabilityScene::kFlight) {
@@ -227,7 +227,7 @@ class Scene {
     return sum;
   }
 
-  /// Where the bodies are, against where they ought to be.
+  /// Compares the bodies' places with their targets.
   void see_places(StabilityResult& result) {
     if (has_ground_) {
       result.rest_overlap = 0.0;

@@ -1,6 +1,6 @@
 /// @file stability_scenes.h
 /// Baked bars that fly, fall, pile up, are held, torn at and joined, over all that could make them gain energy,
-/// explode, sink in or drift. What `limber-benchmark stability`, its tests and the energy tests run.
+/// explode, sink in or drift. `limber-benchmark stability`, its tests and the energy tests run them.
 #pragma once
 
 #include <functional>
@@ -46,7 +46,7 @@ struct StabilityCase {
 };
 inline constexpr int kAllModes = 1000;
 
-/// What was seen. Energies over their scale: the largest of the energy put in and Σ m g size.
+/// Observations of a case. Energies over their scale: the largest of the energy put in and Σ m g size.
 struct StabilityResult {
   double worst_rise = 0.0;     ///< of World::energy in a step
   double total_rise = 0.0;     ///< largest excess over the energy that was put in
@@ -79,7 +79,7 @@ bool bullet_can(const StabilityCase& at);
 StabilityResult run_by_bullet(const StabilityCase& at, int steps);
 bool has_bullet();  ///< whether this build has it; else run_by_bullet() throws InvalidArgument
 
-/// What a case must not do. Energies may rise by round-off alone, and by what changes of inertia the nodes' energy
+/// Faults of a case. Energies may rise by round-off alone, and by what changes of inertia the nodes' energy
 /// knows of; where something recovers from overlap, by the work of that, which is not judged.
 enum class StabilityFault {
   kNotFinite,

@@ -8,7 +8,7 @@ namespace limber::internal {
 /// The cell of a part whose box is nearest to a point at rest; of equal ones the first. @pre the part has a cell
 const PlacedCell& cell_nearest(const PoseStructure& structure, Index part, const Vec3& p);
 
-/// Where new bodies stand best: each takes the motion of the old cells that lie where its own are, exactly if they move
+/// Best places of new bodies: each takes the motion of the old cells that lie where its own are, exactly if they move
 /// as one, else nearest in the mean square of their corners. Joints keep their turns.
 Pose transferred(const PoseStructure& from, const Pose& pose, const PoseStructure& to);
 

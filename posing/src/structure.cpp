@@ -59,7 +59,7 @@ std::vector<Group> take_groups(const JointedModel& model, const std::vector<Inde
   return out;
 }
 
-/// Of several parts in one piece the finest division rules, as the grid is theirs together.
+/// The finest division of several parts in one piece rules, as the grid is theirs together.
 PartOptions group_options(const Group& group, const std::vector<PartOptions>& options) {
   if (group.parts.size() == 1) return options[static_cast<std::size_t>(group.parts.front())];
   PartOptions out{.cells = Subdivision::kUniform};

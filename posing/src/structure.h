@@ -1,4 +1,4 @@
-// What stays the same while handles are dragged: cells, the bodies that move as one, the strain links between them, and
+// The fixed structure while handles are dragged: cells, the bodies that move as one, the strain links between them, and
 // the joints that hold bodies.
 #pragma once
 
@@ -56,7 +56,7 @@ struct PoseStructure {
 PoseStructure build_structure(const JointedModel& model, const std::vector<PartOptions>& options,
                               const std::vector<bool>& pinned, StrainWeights weights);
 
-/// Where a body stands: the place of its centre, and its turn from rest.
+/// Place of a body: the place of its centre, and its turn from rest.
 using BodyPoses = std::vector<RigidTransform>;
 
 /// All bodies at rest.

@@ -1,4 +1,4 @@
-// Whether a box along the axes and a triangle have a point in common.
+// Tells if a box along the axes and a triangle have a point in common.
 #pragma once
 
 #include <array>

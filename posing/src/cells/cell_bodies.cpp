@@ -53,7 +53,7 @@ struct Moments {
   Vec3 first = Vec3::Zero();
   Mat3 second = Mat3::Zero();
 
-  /// Of points with total weight `w` about `mean`, with variances along axes.
+  /// Adds points with total weight `w` about `mean`, with variances along axes.
   void add(double w, const Vec3& mean, const Mat3& axes, const Vec3& variance) {
     weight += w;
     first += w * mean;

@@ -1,4 +1,4 @@
-// What of a handles or mapping file says how a model is divided: "pinned" and "parts".
+// Part of a handles or mapping file that divides a model: "pinned" and "parts".
 #pragma once
 
 #include "limber/internal/strict_json.h"

@@ -58,7 +58,7 @@ std::size_t joint_named(const MotionClip& clip, const std::string& joint, const 
   return static_cast<std::size_t>(found - names.begin());
 }
 
-/// Where a joint is at any time of the clip.
+/// Place of a joint at any time of the clip.
 RigidTransform at_time(const MotionClip& clip, std::size_t joint, double time) {
   const auto after = std::upper_bound(clip.times.begin(), clip.times.end(), time);
   const auto next = static_cast<std::size_t>(std::min(after, clip.times.end() - 1) - clip.times.begin());

@@ -100,7 +100,7 @@ ElasticSystem::ElasticSystem(const PoseStructure& structure, const std::vector<b
   for (Block& block : blocks_) place(block);
 }
 
-/// Where the block's unknowns are.
+/// Places of the block's unknowns.
 void ElasticSystem::number(Block& block, const std::vector<bool>& interface) {
   block.first = dofs_;
   block.interface_first = interface_dofs_;
@@ -177,7 +177,7 @@ void ElasticSystem::assemble(Block& block, const std::vector<Mat3>& rotations,
   for (std::size_t i = 0; i < diagonal.size(); ++i) write(block.own[i], diagonal[i]);
 }
 
-/// What is left at the block's interface, into S.
+/// Schur complement at the block's interface, into S.
 void ElasticSystem::take_interface(Block& block, MatrixX& S) const {
   for (std::size_t i = 0; i < block.interface.size(); ++i)
     for (std::size_t j = 0; j < block.interface.size(); ++j) {

@@ -37,7 +37,7 @@ class ElasticSystem {
   ElasticSystem& operator=(ElasticSystem&&) noexcept;
 
   Index dofs() const { return dofs_; }
-  /// Where a body's six unknowns begin; −1: pinned.
+  /// Start of a body's six unknowns; −1: pinned.
   Index dof(Index body) const { return dof_[static_cast<std::size_t>(body)]; }
 
   /// Assembles and factors H at a pose. @param rotations per body. @param added per body, of what acts on it alone
@@ -46,7 +46,7 @@ class ElasticSystem {
   bool factor(const std::vector<Mat3>& rotations, const std::vector<TwistMatrix>& added,
               const std::vector<PairTerm>& between);
 
-  /// What factor() costs, in steps that only sweep.
+  /// Cost of factor(), in steps that only sweep.
   double factor_cost() const;
 
   /// The first sweep of H⁻¹ f. @param interface out: S⁻¹ of what is left of f there
@@ -58,7 +58,7 @@ class ElasticSystem {
 
   // Twists of the interface: six per body that is in it and not pinned.
   Index interface_dofs() const { return interface_dofs_; }
-  /// Where a body's six are among them; −1: not in it, or pinned.
+  /// Start of a body's six among them; −1: not in it, or pinned.
   Index interface_dof(Index body) const { return interface_dof_[static_cast<std::size_t>(body)]; }
 
   /// J S⁻¹ Jᵀ, which is J H⁻¹ Jᵀ. @param rows on the interface

@@ -10,9 +10,10 @@
 namespace limber::internal {
 namespace {
 
-// Numbers of the method. What a converged pose is depends on none of them.
-// Of the mass matrix, in stiffness · size: small beside all that resists, so that iterations are few, and large enough
-// for round-off. A single body has nothing soft of its own; in a block of many, bending is far softer than its links.
+// Numbers of the method. A converged pose depends on none of them.
+// Factor of the mass matrix, in stiffness · size: small beside all that resists, so that iterations are few, and large
+// enough for round-off. A single body has nothing soft of its own; in a block of many, bending is far softer than its
+// links.
 constexpr double kProximal = 1e-7, kProximalOfLinked = 1e-8;
 constexpr double kLargestTurn = 0.8;  // rad of a body in one step: beyond, rotations are far from their linearisation
 constexpr double kFeasible = 1e-11;   // to which joints and limits are put back; of the size, rad
@@ -215,7 +216,7 @@ bool PoseSolver::make_feasible(Pose& pose, VectorX& correction) {
   return false;
 }
 
-/// What bodies off the interface do when those on it have moved. @param all out: how all have
+/// Response of bodies off the interface when those on it have moved. @param all out: how all have
 void PoseSolver::bring_along(const VectorX& interface, VectorX& all, Pose& pose) {
   system_.follow(interface, all);
   for (std::size_t b = 0; b < pose.bodies.size(); ++b)
@@ -292,7 +293,7 @@ std::vector<PairTerm> PoseSolver::joint_terms(const Pose& pose, const Linearised
   return out;
 }
 
-/// Where a step goes, before it is tried.
+/// The end of a step, before it is tried.
 struct PoseSolver::Direction {
   VectorX residual{};  // gradient + Jᵀλ
   VectorX plain{};     // the step by the matrix alone
@@ -333,7 +334,7 @@ PoseSolver::Direction PoseSolver::direction(const Pose& pose, const Linearised& 
   return out;
 }
 
-/// What the step before tells of the second derivative along the rows that are held: motions along them are all that
+/// The last step's information on the second derivative along the rows that are held: motions along them are all that
 /// pairs say something of.
 void PoseSolver::learn(const Direction& now) {
   if (now.held != last_.held) {
@@ -361,7 +362,7 @@ PoseSolver::Trial PoseSolver::try_step(const Pose& pose, const Direction& way, d
   return out;
 }
 
-/// Whether the steps that are left, at the rate of the last, take longer than a new matrix and Newton's few.
+/// True if the steps that are left, at the rate of the last, take longer than a new matrix and Newton's few.
 bool PoseSolver::matrix_pays(double promised, double value) const {
   if (promised >= factor_.promised) return true;
   const double left = std::log(promised / std::max(options_.energy_tolerance * value, kLeastEnergy * promised)) /
@@ -424,7 +425,7 @@ PoseResult PoseSolver::solve(Pose& pose) {
   factor_.promised = std::numeric_limits<double>::infinity();
   last_.moved.resize(0);
   if (const Feasibility f = feasibility(*structure_, trial); f.joints > kFeasible || f.limits > kSlack) {
-    // What handles resist must not count: joints come first, however far the handles are dragged off by it.
+    // Resistance of handles must not count: joints come first, however far the handles are dragged off by it.
     system_.factor(rotations_of(trial.bodies), std::vector<TwistMatrix>(trial.bodies.size(), TwistMatrix::Zero()), {});
     factor_.age = kAnew;
   }

@@ -15,7 +15,7 @@ namespace limber::internal {
 
 using Twist = Eigen::Matrix<double, 6, 1>;  // ω, v
 
-/// What a turn adds to the second derivative of an energy of points y = p + R s with gradients e:
+/// The part of a turn in the second derivative of an energy of points y = p + R s with gradients e:
 ///   Σ ½ (s eᵀ + e sᵀ) − (s·e) 1, the curvature of the points' arcs: negative where what is turned is pressed.
 Mat3 turning_stiffness(const Mat3& moment);
 
@@ -44,7 +44,7 @@ struct CoordinateRow {
   bool angle = false;  ///< rad; otherwise of the model's size
 };
 
-/// What holds a joint, and what it leaves free. Lengths are told in units of `size`.
+/// Rows that hold a joint, and its freedoms. Lengths are told in units of `size`.
 struct JointRows {
   std::vector<Row> constraints{};
   std::vector<CoordinateRow> coordinates{};

@@ -1,4 +1,4 @@
-// What steps tell of the second derivative since a matrix was made.
+// Second derivative by the steps since a matrix was made.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ namespace limber::internal {
 class SecantPairs {
  public:
   void clear();
-  /// @param s, y, z a step, the gradient's change along it, and H⁻¹y. Where y does not push back, it is no pair of a
+  /// @param s, y, z a step, the gradient's change along it, and H⁻¹y. If y does not push back, it is no pair of a
   /// convex energy and left out.
   void add(const VectorX& s, const VectorX& y, const VectorX& z);
   /// @param u in: −H⁻¹ r; out: −B⁻¹ r
