@@ -96,12 +96,12 @@ void Handle::add_force_derivative(const BodyStates& states, std::span<const doub
 }
 
 void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
-  force_ = Vec3::Zero();
+  if (left_ == whole_) force_ = Vec3::Zero();  // the step's first part
   Vec3 off = Vec3::Zero();
   const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     last_force_[i] = impulses[i] / step_;
-    force_ += last_force_[i] * options_.directions[i];
+    force_ += impulses[i] / whole_ * options_.directions[i];
     off += options_.directions[i].dot(p - then_) * options_.directions[i];
   }
   error_ = off.norm();

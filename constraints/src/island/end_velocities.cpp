@@ -14,6 +14,7 @@ void EndVelocities::meet_rows(IslandStep& step, std::span<const char> active) {
   bool met = true;
   for (std::size_t i = 0; i < step.size(); ++i) {
     const RowLaw& law = step.law(i);
+    if (law.contact) continue;  // they press from the step's start: velocities are what closes their gaps
     if (!is_equality(law) && (active[i] == 0 || step.f[i] == 0.0)) continue;
     const double yields = law.compliance > 0.0 ? compliance_of(step, i) : 0.0;
     if (yields == kUnbounded) continue;
@@ -29,15 +30,50 @@ void EndVelocities::solve(IslandStep& step) {
   J_.assign(rows_.size() * n, 0.0);
   for (std::size_t i = 0; i < rows_.size(); ++i) write_row(step, rows_[i], std::span(J_).subspan(i * n, n));
   equalities_.factor(J_, metric_, compliance_);
-  equalities_.solve(off_);
+  found_ = off_;
+  equalities_.solve(found_);
+  if (!are_within_bounds(step)) solve_within_bounds();
   impulses_.assign(step.size(), 0.0);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowLaw& law = step.law(rows_[i]);
-    impulses_[rows_[i]] = off_[i];
-    step.end_work += off_[i] * law.end_rate;
-    if (!(law.compliance > 0.0)) step.end_impulse[rows_[i]] = off_[i];
+    impulses_[rows_[i]] = found_[i];
+    step.end_work += found_[i] * law.end_rate;
+    if (!(law.compliance > 0.0)) step.end_impulse[rows_[i]] = found_[i];
   }
   give(step, impulses_);
+}
+
+/// With the impulses in the middle of the step: a limited hand, spring or motor, or friction, exerts no more at its
+/// end. Stops keep what came to them within the step, whatever that takes: chains with heavy ends would whip on from
+/// them.
+bool EndVelocities::are_within_bounds(const IslandStep& step) {
+  lower_.clear(), upper_.clear();
+  bool within = true;
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const RowLaw& law = step.law(rows_[i]);
+    const bool stop = law.lower == 0.0;
+    lower_.push_back(stop ? -kUnbounded : law.lower - step.f[rows_[i]]);
+    upper_.push_back(law.upper - step.f[rows_[i]]);
+    within = within && found_[i] >= lower_[i] && found_[i] <= upper_[i];
+  }
+  return within;
+}
+
+void EndVelocities::solve_within_bounds() {
+  const std::size_t n = metric_.size();
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    found_[i] = std::clamp(found_[i], lower_[i], upper_[i]);
+    off_[i] = -off_[i];
+    for (std::size_t k = 0; k < n; ++k) J_[i * n + k] *= std::sqrt(metric_[k]);
+  }
+  qp_.solve(FactoredContactQp{.size = static_cast<int>(rows_.size()),
+                              .dimension = static_cast<int>(n),
+                              .G = J_,
+                              .D = compliance_,
+                              .b = off_,
+                              .lower = lower_,
+                              .upper = upper_},
+            found_);
 }
 
 /// Springs that are stiff yield: with κ = Δt a/c, a what an impulse changes the rate by, c the compliance, by

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "equality_rows.h"
+#include "limber/solvers/contact_qp.h"
 
 namespace limber::internal {
 
@@ -14,6 +15,8 @@ class EndVelocities {
   /// Brings the predicted velocities to J v = RowLaw::end_rate, of all rows that hold: by impulses that can only take
   /// energy but for what drives the rows. Springs and dampers that are stiff over the step take their part of the
   /// motion, those that are not almost nothing.
+  /// Impulses of the step's middle and these together stay within the bounds of hands, springs, motors and friction.
+  /// Contacts take no part.
   /// @param active by row: whether it is within its bounds
   void meet_rows(IslandStep& step, std::span<const char> active);
 
@@ -23,10 +26,14 @@ class EndVelocities {
   static void write_row(const IslandStep& step, std::size_t row, std::span<double> J);
   double compliance_of(const IslandStep& step, std::size_t row);
   void solve(IslandStep& step);
+  bool are_within_bounds(const IslandStep& step);
+  void solve_within_bounds();
 
   std::vector<std::size_t> rows_;  // that hold at the end
   std::vector<double> off_, compliance_, J_, metric_, row_, impulses_;
+  std::vector<double> found_, lower_, upper_;  // by row that holds
   EqualityRows equalities_;
+  ContactQpSolver qp_;
 };
 
 }  // namespace limber::internal

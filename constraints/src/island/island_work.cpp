@@ -23,6 +23,23 @@ double given(const IslandStep& step, std::size_t row) {
   return std::max(0.0, force(step, row) * step.law(row).agent_displacement);
 }
 
+/// A hand, a motor or a spring whose force is at its limit: what it moves does not go where it is wanted.
+bool is_at_limit(const IslandStep& step, std::size_t row) {
+  const RowLaw& law = step.law(row);
+  constexpr double kAlmost = 1.0 - 1e-9;  // reactions and impulses are added up
+  const double impulse = step.f[row] + step.length() * step.reaction[row];
+  return law.lower < 0.0 && (law.agent_displacement != 0.0 || law.stiffness > 0.0) &&
+         (impulse <= kAlmost * law.lower || impulse >= kAlmost * law.upper);
+}
+
+/// The force times the way of its point. RowLaw::agent_displacement is that way where a spring keeps its length, or
+/// where a hard row's gap is met.
+double limited_work(const IslandStep& step, std::size_t row) {
+  const RowLaw& law = step.law(row);
+  const double missed = step.gap[row] - (law.stiffness > 0.0 ? step.start_gap[row] : law.offset);
+  return force(step, row) * (law.agent_displacement + missed);
+}
+
 /// Of what pushes apart what overlaps.
 double recovery_work(const IslandStep& step) {
   double work = 0.0, recovery = 0.0;
@@ -40,6 +57,10 @@ double agent_work(const IslandStep& step) {
   double work = step.rows.stored_energy() + recovery_work(step);
   for (std::size_t i = 0; i < step.size(); ++i) {
     const RowLaw& law = step.law(i);
+    if (is_at_limit(step, i)) {
+      work += limited_work(step, i);
+      continue;
+    }
     if (law.lower != 0.0) work += given(step, i);
     // A spring with one bound pushes on one side alone.
     const double before = law.lower == 0.0 ? std::min(step.start_gap[i], 0.0) : step.start_gap[i];

@@ -6,6 +6,7 @@
 namespace limber::internal {
 
 /// Of what moves the rows: f/Δt times the agents' displacements, what is negative not counted, and what springs give.
+/// Where a force is at its limit: that force times the way of its point.
 double agent_work(const IslandStep& step);
 /// Of the forces that the caller holds over the step.
 double load_work(const IslandStep& step);
