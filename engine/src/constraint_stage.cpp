@@ -9,28 +9,25 @@ void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
   const auto i = static_cast<std::size_t>(body);
   if (i >= table_.size()) {
     table_.resize(i + 1);
-    disturbed_.resize(i + 1);
-    asleep_.resize(i + 1);
-    held_back_.resize(i + 1);
-    surplus_.resize(i + 1);
+    notes_.resize(i + 1);
   }
   table_[i] = at;
-  asleep_[i] = 0;
-  disturbed_[i] = true;
-  surplus_[i] = 0.0;
+  notes_[i].asleep = 0;
+  notes_[i].disturbed = 1;
+  notes_[i].surplus = 0.0;
   stale_ = true;
 }
 
 void ConstraintStage::remove_body(Index body) {
-  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
-    const Constraint* constraint = entries_[i].constraint();
+  for (std::uint32_t i = 0; i < entries().size(); ++i) {
+    const Constraint* constraint = entries()[i].constraint();
     if (constraint == nullptr) continue;
     const std::array<Index, 2> on = constraint->bodies();
     if (on[0] == body || on[1] == body) remove(i);
   }
   release_bodies();
   table_[static_cast<std::size_t>(body)] = {};
-  surplus_[static_cast<std::size_t>(body)] = 0.0;
+  notes_[static_cast<std::size_t>(body)].surplus = 0.0;
   stale_ = true;
 }
 
@@ -47,70 +44,33 @@ std::uint32_t ConstraintStage::add(std::unique_ptr<JointConstraint> joint) {
 }
 
 std::uint32_t ConstraintStage::place(Entry&& entry) {
-  if (vacant_.empty()) {
-    entries_.emplace_back();
-    vacant_.reserve(entries_.size());  // so that remove() cannot fail
-    vacant_.push_back(static_cast<std::uint32_t>(entries_.size() - 1));
-  }
-  const std::uint32_t index = vacant_.back();
-  vacant_.pop_back();
-  entry.generation = entries_[index].generation;
-  entries_[index] = std::move(entry);
+  const std::uint32_t place = constraints_.add(std::move(entry));
   stale_ = true;
-  disturb_bodies_of(index);
-  return index;
+  disturb_bodies_of(place);
+  return place;
 }
 
-void ConstraintStage::remove(std::uint32_t index) {
-  disturb_bodies_of(index);
-  Entry& entry = entries_[index];
-  entry.handle.reset();
-  entry.joint.reset();
+void ConstraintStage::remove(std::uint32_t place) {
+  disturb_bodies_of(place);
+  constraints_.remove(place);
   stale_ = true;
-  // A place whose generations are used up is never given again.
-  if (++entry.generation != 0) vacant_.push_back(index);
-}
-
-ConstraintStage::Kind ConstraintStage::kind_of(const Entry& entry) {
-  return entry.handle ? Kind::kHandle : entry.joint ? Kind::kJoint : Kind::kVacant;
 }
 
 void ConstraintStage::save_state(std::size_t bodies, StateWriter& state) const {
-  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], disturbed_[i], surplus_[i]);
-  state(vacant_, static_cast<std::uint64_t>(entries_.size()));
-  for (const Entry& entry : entries_) {
-    state(entry.generation, kind_of(entry));
-    if (entry.handle) state(*entry.handle);
-    if (entry.joint) state(*entry.joint);
-  }
+  for (std::size_t i = 0; i < bodies; ++i) state(notes_[i].asleep, notes_[i].disturbed, notes_[i].surplus);
+  constraints_.save_state(state);
 }
 
 void ConstraintStage::restore_state(std::size_t bodies, StateReader& state) {
   release_bodies();
   contacts_.clear();
   stale_ = true;
-  for (std::size_t i = 0; i < bodies; ++i) state(asleep_[i], disturbed_[i], surplus_[i]);
-  state(vacant_);
-  entries_.resize(state.read<std::uint64_t>());
-  for (Entry& entry : entries_) {
-    const Kind known = kind_of(entry);
-    entry.generation = state.read<std::uint32_t>();
-    const Kind kind = state.read<Kind>();
-    if (kind != known) entry.handle.reset(), entry.joint.reset();
-    if (kind == Kind::kHandle) {
-      if (!entry.handle) entry.handle = std::make_unique<Handle>(MaterialFrame(JointFrame{}), Vec3::Zero());
-      state(*entry.handle);
-    }
-    if (kind == Kind::kJoint) {
-      const MaterialFrame any(JointFrame{});
-      if (!entry.joint) entry.joint = std::make_unique<JointConstraint>(any, any, JointSpec{});
-      entry.joint->restore_state(state);
-    }
-  }
+  for (std::size_t i = 0; i < bodies; ++i) state(notes_[i].asleep, notes_[i].disturbed, notes_[i].surplus);
+  constraints_.restore_state(state);
 }
 
 void ConstraintStage::disturb_bodies_of(std::uint32_t index) {
-  for (const Index body : entries_[index].constraint()->bodies())
+  for (const Index body : entries()[index].constraint()->bodies())
     if (body >= 0) disturb(body);
 }
 
@@ -120,15 +80,15 @@ void ConstraintStage::set_asleep(Index body, bool asleep) {
     table_[i].group->put_to_sleep(table_[i].slot);
   else
     table_[i].group->wake(table_[i].slot);
-  asleep_[i] = asleep ? 1 : 0;
-  disturbed_[i] = true;
+  notes_[i].asleep = asleep ? 1 : 0;
+  notes_[i].disturbed = 1;
   stale_ = true;
 }
 
 /// Bodies of islands that are no more advance by themselves again.
 void ConstraintStage::release_bodies() {
-  set_constrained(members_, false);
-  members_.clear();
+  set_constrained(islands_.members(), false);
+  islands_.forget_members();
 }
 
 void ConstraintStage::set_constrained(std::span<const Index> bodies, bool constrained) {
@@ -146,116 +106,51 @@ void ConstraintStage::find_islands(std::span<const Index> awake) {
   if (!stale_) return;
   stale_ = false;
   release_bodies();
-  set_constrained(held_bodies_, true);
-  islands_.clear();
-  constraints_.clear();
+  set_constrained(held_.bodies, true);
+  islands_.begin(table_.size());
   reports_.clear();
   all_.clear();
-  for (const Entry& entry : entries_)
+  for (const Entry& entry : entries())
     if (entry.constraint() != nullptr) all_.push_back(entry.constraint());
   all_.insert(all_.end(), contacts_.begin(), contacts_.end());
   if (all_.empty()) return;
 
-  sets_.reset(table_.size());
-  island_of_.assign(table_.size(), -1);
-  for (const Constraint* constraint : all_) {
-    const auto [a, b] = constraint->bodies();
-    if (acts(a) && acts(b)) sets_.join(a, b);
-  }
-  number_islands();
-  list_members(awake);
-  list_constraints();
-  set_constrained(members_, true);
+  for (const Index body : awake)
+    if (acts(body)) islands_.let_act(body);
+  islands_.find(all_);
+  set_constrained(islands_.members(), true);
   if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
   reports_.assign(islands_.size(), {});
 }
 
-/// The root of the island that a constraint acts in; −1: it touches nothing that moves.
-Index ConstraintStage::root_of(const Constraint* constraint) {
-  const auto [a, b] = constraint->bodies();
-  return acts(a) ? sets_.root(a) : acts(b) ? sets_.root(b) : Index{-1};
-}
-
-/// Roots that a constraint touches, in ascending order; an island's root is its first body.
-void ConstraintStage::number_islands() {
-  constexpr Index kTouched = 0;
-  for (const Constraint* constraint : all_)
-    if (const Index root = root_of(constraint); root >= 0) island_of_[static_cast<std::size_t>(root)] = kTouched;
-  Index count = 0;
-  for (Index& island : island_of_)
-    if (island == kTouched) island = count++;
-  islands_.assign(static_cast<std::size_t>(count), {});
-}
-
-/// Members of every island, ascending, one island after the other: counted, then filled in.
-void ConstraintStage::list_members(std::span<const Index> awake) {
-  for (const Index body : awake) {
-    if (!acts(body)) continue;
-    Index& island = island_of_[static_cast<std::size_t>(body)];
-    island = island_of_[static_cast<std::size_t>(sets_.root(body))];  // a root comes before the others
-    if (island >= 0) ++islands_[static_cast<std::size_t>(island)].members;
-  }
-  std::size_t count = 0;
-  for (Island& island : islands_) {
-    island.first_member = count;
-    count += std::exchange(island.members, 0);
-  }
-  members_.resize(count);
-  for (const Index body : awake) {
-    if (!acts(body) || island_of_[static_cast<std::size_t>(body)] < 0) continue;
-    Island& island = islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(body)])];
-    members_[island.first_member + island.members++] = body;
-  }
-}
-
-/// The same for the constraints, each island's in their own order.
-void ConstraintStage::list_constraints() {
-  const auto island_with = [&](const Constraint* constraint) -> Island* {
-    const Index root = root_of(constraint);
-    if (root < 0) return nullptr;
-    return &islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(root)])];
-  };
-  for (const Constraint* constraint : all_)
-    if (Island* island = island_with(constraint)) ++island->constraints;
-  std::size_t count = 0;
-  for (Island& island : islands_) {
-    island.first_constraint = count;
-    count += std::exchange(island.constraints, 0);
-  }
-  constraints_.resize(count);
-  for (Constraint* constraint : all_)
-    if (Island* island = island_with(constraint))
-      constraints_[island->first_constraint + island->constraints++] = constraint;
-}
-
 void ConstraintStage::hold_back(std::span<const Index> bodies) {
-  held_bodies_.assign(bodies.begin(), bodies.end());
-  for (const Index body : bodies) held_back_[static_cast<std::size_t>(body)] = 1;
+  held_.bodies.assign(bodies.begin(), bodies.end());
+  for (const Index body : bodies) notes_[static_cast<std::size_t>(body)].held_back = 1;
   stale_ = stale_ || !bodies.empty();
-  together_report_ = {};
+  held_.report = {};
 }
 
 void ConstraintStage::let_go() {
-  set_constrained(held_bodies_, false);
-  for (const Index body : held_bodies_) held_back_[static_cast<std::size_t>(body)] = 0;
-  held_bodies_.clear();
+  set_constrained(held_.bodies, false);
+  for (const Index body : held_.bodies) notes_[static_cast<std::size_t>(body)].held_back = 0;
+  held_.bodies.clear();
   stale_ = true;
 }
 
 double ConstraintStage::step_together(std::span<const Index> members, std::span<Constraint* const> contacts,
                                       const IslandOptions& options) {
-  together_.clear();
-  for (const Entry& entry : entries_)
+  held_.constraints.clear();
+  for (const Entry& entry : entries())
     if (Constraint* constraint = entry.constraint())
       if (std::ranges::any_of(constraint->bodies(),
                               [&](Index body) { return std::ranges::binary_search(members, body); }))
-        together_.push_back(constraint);
-  together_.insert(together_.end(), contacts.begin(), contacts.end());
+        held_.constraints.push_back(constraint);
+  held_.constraints.insert(held_.constraints.end(), contacts.begin(), contacts.end());
   IslandOptions own = options;
   own.energy_surplus = surplus_of(members);
-  const IslandReport report = together_solver_.step(table_, members, together_, own);
+  const IslandReport report = held_.solver.step(table_, members, held_.constraints, own);
   have_stepped(members, report);
-  add_report(report, together_report_);
+  add_report(report, held_.report);
   return report.taken;
 }
 
@@ -288,13 +183,12 @@ bool ConstraintStage::are_settled() const {
 }
 
 void ConstraintStage::foresee_island(std::size_t island) {
-  const Island& at = islands_[island];
-  const std::span<const Index> members = members_of(at);
+  const std::span<const Index> members = islands_.members(island);
   IslandOptions own = options_;
   own.undisturbed =
-      std::ranges::none_of(members, [&](Index body) { return disturbed_[static_cast<std::size_t>(body)] != 0; });
+      std::ranges::none_of(members, [&](Index body) { return notes_[static_cast<std::size_t>(body)].disturbed != 0; });
   own.energy_surplus = surplus_of(members);
-  solvers_[island].foresee(table_, members, std::span(constraints_).subspan(at.first_constraint, at.constraints), own);
+  solvers_[island].foresee(table_, members, islands_.constraints(island), own);
 }
 
 void ConstraintStage::finish(Jobs& jobs) {
@@ -302,26 +196,27 @@ void ConstraintStage::finish(Jobs& jobs) {
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
     for (std::size_t island = begin; island < end; ++island) {
       reports_[island] = solvers_[island].finish();
-      have_stepped(members_of(islands_[island]), reports_[island]);
+      have_stepped(islands_.members(island), reports_[island]);
     }
   });
 }
 
 double ConstraintStage::surplus_of(std::span<const Index> members) const {
   double sum = 0.0;
-  for (const Index body : members) sum += surplus_[static_cast<std::size_t>(body)];
+  for (const Index body : members) sum += notes_[static_cast<std::size_t>(body)].surplus;
   return sum;
 }
 
 void ConstraintStage::have_stepped(std::span<const Index> members, const IslandReport& report) {
   for (const Index body : members) {
-    disturbed_[static_cast<std::size_t>(body)] = false;
-    surplus_[static_cast<std::size_t>(body)] = report.energy_surplus / static_cast<double>(members.size());
+    Notes& notes = notes_[static_cast<std::size_t>(body)];
+    notes.disturbed = 0;
+    notes.surplus = report.energy_surplus / static_cast<double>(members.size());
   }
 }
 
 IslandReport ConstraintStage::report() const {
-  IslandReport sum = together_report_;
+  IslandReport sum = held_.report;
   for (const IslandReport& r : reports_) add_report(r, sum);
   return sum;
 }

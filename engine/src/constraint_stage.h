@@ -4,25 +4,18 @@
 #include <memory>
 #include <vector>
 
+#include "constraint_table.h"
+#include "island_partition.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/island_solver.h"
 #include "limber/constraints/joint_constraint.h"
-#include "limber/core/disjoint_sets.h"
 #include "limber/core/jobs.h"
 
 namespace limber::internal {
 
 class ConstraintStage {
  public:
-  /// One constraint with its owner's bookkeeping; `constraint` is null where a place is vacant.
-  struct Entry {
-    std::uint32_t generation = 1;
-    std::unique_ptr<Handle> handle;
-    std::unique_ptr<JointConstraint> joint;
-    Constraint* constraint() const {
-      return handle ? static_cast<Constraint*>(handle.get()) : static_cast<Constraint*>(joint.get());
-    }
-  };
+  using Entry = ConstraintTable::Entry;
 
   // Bodies, by number ---------------------------------------------------------------------------------------------
   void set_body(Index body, const ConstrainedBody& at);
@@ -34,13 +27,13 @@ class ConstraintStage {
   /// Stops a body, or lets it go on: one that sleeps is no member of any island.
   void set_asleep(Index body, bool asleep);
   /// Its velocity, place or shape was changed from outside.
-  void disturb(Index body) { disturbed_[static_cast<std::size_t>(body)] = true; }
+  void disturb(Index body) { notes_[static_cast<std::size_t>(body)].disturbed = 1; }
 
   // Constraints, by place -----------------------------------------------------------------------------------------
   std::uint32_t add(std::unique_ptr<Handle> handle);
   std::uint32_t add(std::unique_ptr<JointConstraint> joint);
   void remove(std::uint32_t place);
-  const std::vector<Entry>& entries() const { return entries_; }
+  const std::vector<Entry>& entries() const { return constraints_.entries(); }
   void disturb_bodies_of(std::uint32_t place);
 
   /// Constraints of the coming step alone, beside the others: they stay the caller's.
@@ -60,7 +53,7 @@ class ConstraintStage {
   // Bodies that take the step by themselves.
   /// They and the constraints on them are left alone by what is above. @param bodies ascending by clusters
   void hold_back(std::span<const Index> bodies);
-  bool is_held_back(Index body) const { return held_back_[static_cast<std::size_t>(body)] != 0; }
+  bool is_held_back(Index body) const { return notes_[static_cast<std::size_t>(body)].held_back != 0; }
   /// All of those that were held back take part again.
   void let_go();
   /// Advances some of them, as one problem, by one part of a step. @return its length, s
@@ -82,58 +75,48 @@ class ConstraintStage {
   StageTimes times() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
   /// Of one island, ascending.
-  std::span<const Index> members(int island) const { return members_of(islands_[static_cast<std::size_t>(island)]); }
+  std::span<const Index> members(int island) const { return islands_.members(static_cast<std::size_t>(island)); }
   /// Whether a body is in an island.
-  bool constrained(Index body) const { return !islands_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0; }
-  double energy_surplus(Index body) const { return surplus_[static_cast<std::size_t>(body)]; }
+  bool constrained(Index body) const { return islands_.contains(body); }
+  double energy_surplus(Index body) const { return notes_[static_cast<std::size_t>(body)].surplus; }
 
  private:
-  struct Island {
-    std::size_t first_member = 0, members = 0, first_constraint = 0, constraints = 0;
+  /// What the coming step knows of a body. Those of different bodies are written by different threads.
+  struct Notes {
+    char asleep = 0, held_back = 0;
+    char disturbed = 0;
+    double surplus = 0.0;  // J: its share of its island's
   };
-  enum class Kind : std::uint8_t { kVacant, kHandle, kJoint };
-  static Kind kind_of(const Entry& entry);
+  /// Bodies that take the step by themselves.
+  struct HeldBack {
+    std::vector<Index> bodies;
+    std::vector<Constraint*> constraints;  // of the problem at hand
+    IslandSolver solver;
+    IslandReport report;  // of all their parts
+  };
   std::uint32_t place(Entry&& entry);
-  Index root_of(const Constraint* constraint);
-  void number_islands();
-  void list_members(std::span<const Index> awake);
-  void list_constraints();
   void foresee_island(std::size_t island);
-  std::span<const Index> members_of(const Island& island) const {
-    return std::span(members_).subspan(island.first_member, island.members);
-  }
   void release_bodies();
   double surplus_of(std::span<const Index> members) const;
   void have_stepped(std::span<const Index> members, const IslandReport& report);
   bool acts(Index body) const {
-    return moves(body) && asleep_[static_cast<std::size_t>(body)] == 0 &&
-           held_back_[static_cast<std::size_t>(body)] == 0;
+    const Notes& notes = notes_[static_cast<std::size_t>(body)];
+    return notes.asleep == 0 && notes.held_back == 0;
   }
   void set_constrained(std::span<const Index> bodies, bool constrained);
   static void add_report(const IslandReport& report, IslandReport& sum);
 
   std::vector<ConstrainedBody> table_;
-  std::vector<char> asleep_, held_back_;
-  std::vector<char> disturbed_;  // char: written by different threads
-  std::vector<double> surplus_;  // per body: its share of its island's
-  std::vector<Entry> entries_;
-  std::vector<std::uint32_t> vacant_;
+  std::vector<Notes> notes_;  // as table_
+  ConstraintTable constraints_;
   std::vector<Constraint*> contacts_;
   std::vector<Constraint*> all_;  // entries and contacts, in this order
-
-  bool stale_ = true;  // the islands
-  DisjointSets sets_;
-  std::vector<Index> island_of_;  // per root, and then per body that moves; −1: none
-  std::vector<Island> islands_;
-  std::vector<Index> members_;
-  std::vector<Constraint*> constraints_;
+  IslandPartition islands_;
+  bool stale_ = true;                  // the islands
   std::vector<IslandSolver> solvers_;  // one per island
   std::vector<IslandReport> reports_;
-  std::vector<Index> held_bodies_;
-  std::vector<Constraint*> together_;
-  IslandSolver together_solver_;
-  IslandReport together_report_;  // of all their parts
   IslandOptions options_;
+  HeldBack held_;
 };
 
 }  // namespace limber::internal

@@ -88,8 +88,9 @@ void ContactPipeline::advance_free(const Substep& substep, Jobs& jobs, StageCloc
   const std::span<const Index> awake = sleep_->awake();
   bodies_->advance_free(awake, sleep_->changes(), substep.gravity, jobs);
   if (!clock.runs()) return;
-  const auto constrained = std::ranges::count_if(awake, [&](Index body) { return constraints_->constrained(body); }) +
-                           static_cast<std::ptrdiff_t>(fast_.members().size());
+  const auto constrained =
+      std::count_if(awake.begin(), awake.end(), [&](Index body) { return constraints_->constrained(body); }) +
+      static_cast<std::ptrdiff_t>(fast_.members().size());
   clock.lap(Stage::kAdvance, std::ssize(awake) - constrained);
 }
 

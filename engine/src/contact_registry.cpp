@@ -30,7 +30,7 @@ void ContactRegistry::remove_body(Index body) {
 void ContactRegistry::exclude_for_joint(Index a, Index b, std::uint32_t joint) { exclude({a, b, joint}); }
 
 void ContactRegistry::include_after_joint(std::uint32_t joint) {
-  const auto found = std::ranges::find(pairs_, joint, &Pair::joint);
+  const auto found = std::find_if(pairs_.begin(), pairs_.end(), [&](const Pair& pair) { return pair.joint == joint; });
   if (found != pairs_.end()) include(found);
 }
 

@@ -2,6 +2,9 @@
 //
 //   contact_finder.cpp  the bodies, and what is found in each pair of them
 //   near_pairs.cpp      the states of a query, where they place the bodies, and which of these are near each other
+//
+// Its members are many since a query of contacts and one of impacts share its bodies and pairs, and keep all their
+// lists so that no query allocates.
 #pragma once
 
 #include <algorithm>

@@ -35,6 +35,8 @@ struct PlacedPart {
   float bend = 0.0f;
 };
 
+/// Its members are many since one stretch is looked at from both ends, by three kinds of body (plane, core, surface),
+/// in memory that is kept from pair to pair.
 class MovingSide {
  public:
   void start(const MovingBody& body);

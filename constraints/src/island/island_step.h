@@ -67,6 +67,7 @@ struct IslandLoads {
   }
 };
 
+/// Its members are many since they are all that the solvers of a step hand on to each other.
 struct IslandStep {
   StepPart part;
   IslandBodies bodies;

@@ -46,6 +46,8 @@ struct CollisionSurfaceOptions {
 /// modal skin has it (skin_pose.h); all else that collision/ says about a deformed body is meant to the last bits of
 /// that. Vertices at equal places with equal shapes (a seam of a render surface) are one: canonical_vertex() is the
 /// lowest of them, and triangles name that one only.
+///
+/// Its members are many since each is one array of the same geometry: all are made together and none changes.
 class CollisionSurface {
  public:
   /// The model's collision surface, k modes. @throws InvalidArgument also for a model that is not touchable, and for a
