@@ -1,4 +1,4 @@
-// What arguments of World's functions are to be. Each throws InvalidArgument with the function's name.
+// Checks of the arguments of World's functions. Each throws InvalidArgument with the function's name.
 #pragma once
 
 #include <cstddef>

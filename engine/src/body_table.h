@@ -20,7 +20,7 @@ namespace limber::internal {
 
 class BodyTable {
  public:
-  /// What a BodyId's index names.
+  /// One body; a BodyId's index names it.
   struct Entry {
     std::uint32_t generation = 1;
     bool alive = false;
@@ -64,7 +64,7 @@ class BodyTable {
   const Entry& operator[](Index body) const { return entries_[static_cast<std::size_t>(body)]; }
   Entry& operator[](Index body) { return entries_[static_cast<std::size_t>(body)]; }
 
-  /// Of a body that moves.
+  /// @pre the body moves
   BodyGroup& group(const Entry& e) const { return *model_group(e).bodies; }
   const ModelGroup& model_group(const Entry& e) const { return model_group(e.group); }
   const ModelGroup& model_group(Index group) const { return groups_[static_cast<std::size_t>(group)]; }

@@ -45,7 +45,7 @@ class ConstraintStage {
   void foresee(Jobs& jobs, const IslandOptions& options);
   /// Whether all islands settle, as foreseen.
   bool are_settled() const;
-  /// What of them has been foreseen roughly, to the law.
+  /// Solves to the law what has been foreseen roughly.
   void refine(Jobs& jobs);
   /// Advances them.
   void finish(Jobs& jobs);
@@ -70,18 +70,18 @@ class ConstraintStage {
 
   /// Sums over the islands of the last step.
   IslandReport report() const;
-  /// What its islands' threads spent on stages in foresee() and in finish(), with IslandOptions::timed.
+  /// Time that the islands' threads spent on stages in foresee() and in finish(), with IslandOptions::timed.
   StageTimes foreseen_times() const;
   StageTimes times() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
-  /// Of one island, ascending.
+  /// The bodies of one island, ascending.
   std::span<const Index> members(int island) const { return islands_.members(static_cast<std::size_t>(island)); }
   /// Whether a body is in an island.
   bool constrained(Index body) const { return islands_.contains(body); }
   double energy_surplus(Index body) const { return notes_[static_cast<std::size_t>(body)].surplus; }
 
  private:
-  /// What the coming step knows of a body. Those of different bodies are written by different threads.
+  /// State of a body between steps. Different threads write those of different bodies.
   struct Notes {
     char asleep = 0, held_back = 0;
     char disturbed = 0;

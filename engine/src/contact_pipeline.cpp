@@ -30,7 +30,7 @@ void ContactPipeline::advance(const Substep& substep, StepEvents& events, Jobs& 
   clock.lap(Stage::kFastBodies, waiting);
 }
 
-/// What touches, what that makes islands of, and where these end. Contacts are looked for anew where bodies come
+/// Finds what touches, the islands that it makes, and where these end. Contacts are looked for anew where bodies come
 /// farther than expected, three times at most: each time at least twice as far.
 void ContactPipeline::foresee(const Substep& substep, Jobs& jobs, StageClock& clock) {
   constexpr int kMostLooks = 3;

@@ -1,4 +1,4 @@
-// What a world's contact source is told: which bodies there are, and which pairs never meet.
+// Keeps a world's contact source told of the bodies that there are, and of the pairs that never meet.
 #pragma once
 
 #include <functional>
@@ -30,7 +30,7 @@ class ContactRegistry {
   // Pairs, a < b, that do not meet as long as a joint between them stands, or until someone lets them.
   /// @param joint its place
   void exclude_for_joint(Index a, Index b, std::uint32_t joint);
-  /// What a joint that is removed kept apart.
+  /// A joint is removed: the pair that it kept apart meets again.
   void include_after_joint(std::uint32_t joint);
   /// @return whether that changes anything
   bool set_excluded(Index a, Index b, bool excluded);

@@ -38,7 +38,7 @@ void ContactSearch::find(Jobs& jobs, StageClock& clock) {
   known_.reserve(found_.capacity());
 }
 
-/// What touches in the states as they are.
+/// Finds what touches in the states as they are.
 void ContactSearch::ask_source(Jobs& jobs, StageClock& clock) {
   const bool told_all = forecast_->write_states();
   if (told_all) rows_->note_friction(*bodies_);
@@ -75,7 +75,8 @@ bool ContactSearch::find_again_along_foreseen(Jobs& jobs, StageClock& clock) {
   return false;
 }
 
-/// Those that touched before do again, with the regions of those found now, as the source has forgotten theirs.
+/// Takes the contacts known before again, with the regions of those found now, as the source has forgotten
+/// theirs.
 void ContactSearch::keep_known() {
   for (ContactPoint& contact : known_) {
     const auto found = std::ranges::lower_bound(found_, contact, by_bodies);
@@ -107,7 +108,7 @@ double ContactSearch::gap_at_end(const ContactPoint& contact) {
   return contact.normal.dot(place_at_end(contact.a, contact.normal) - place_at_end(contact.b, -contact.normal));
 }
 
-/// Where a contact's point is in the end, as foreseen. What is round touches with another point of it then.
+/// Where a contact's point is in the end, as foreseen. A round surface touches with another point of it then.
 Vec3 ContactSearch::place_at_end(const ContactSide& side, const Vec3& inwards) {
   const BodyTable::Entry& e = (*bodies_)[side.body];
   if (e.group < 0) return e.pose * side.point_B;
@@ -123,8 +124,8 @@ Vec3 ContactSearch::place_at_end(const ContactSide& side, const Vec3& inwards) {
   return end.pose * Vec3(side.point_B - forecast_->state(side.body).pose.q.conjugate() * rim) + rim;
 }
 
-/// A contact's point as the step begins, of one that was found at its end. What is round touches with another point of
-/// it then.
+/// A contact's point as the step begins, of one that was found at its end. A round surface touches with another point
+/// of it then.
 Vec3 ContactSearch::place_at_start(ContactSide& side, const Vec3& inwards) const {
   const BodyTable::Entry& e = (*bodies_)[side.body];
   if (e.group < 0) return e.pose * side.point_B;

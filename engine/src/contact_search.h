@@ -29,7 +29,7 @@ class ContactSearch {
 
   /// A step of `length` seconds begins. All below: @pre there is a source
   void begin(double length) { length_ = length; }
-  /// What touches, or may within the step. Bodies that are touched wake, fast ones are gathered.
+  /// Finds what touches, or may within the step. Bodies that are touched wake, fast ones are gathered.
   void find(Jobs& jobs, StageClock& clock);
   /// Once the step has been foreseen: looks for contacts anew where a body ends elsewhere than they were looked for, by
   /// a blow or since something lets go of it: along the motion foreseen then. Where none of those that were not known
@@ -38,15 +38,15 @@ class ContactSearch {
   bool find_again_along_foreseen(Jobs& jobs, StageClock& clock);
   /// Looks where the step would end: a contact found ahead is a plane between features, and what moves far over a bumpy
   /// surface gets under another part of it. Points that have gone in deeper by then than recovery would part them
-  /// within the step are contacts too, of the planes that they have there. Those that they have left behind, such as
-  /// the far side of a thin part, are none: seen from there they were deeper before. Nor are those that are in force,
-  /// and that the motion foreseen leaves as deep by their own planes: it is not yet as they ask.
+  /// within the step are contacts too, of the planes that they have there. Planes left behind, such as
+  /// the far side of a thin part, are none: seen from there points were deeper before. Nor are contacts in force that
+  /// the motion foreseen leaves as deep by their own planes: it is not yet as they ask.
   /// @return whether there are any: the step is to be foreseen anew
   bool add_those_of_foreseen_end(Jobs& jobs);
 
-  /// Of all bodies, ordered as by ContactSource.
+  /// Contacts of all bodies, ordered as by ContactSource.
   std::span<const ContactPoint> found() const { return found_; }
-  /// Those that islands answer to in the step of all but the fast: @pre FastBodies::leave_out_contacts()
+  /// Contacts that islands answer to in the step of all but the fast. @pre FastBodies::leave_out_contacts()
   std::vector<ContactPoint>& in_force() { return fast_->any() ? fast_->contacts() : found_; }
   /// How near to the law motions are found that are only looked at, m: to a share of what makes a look, and of the
   /// thinnest body.

@@ -87,7 +87,7 @@ void FastBodies::list_fast() {
     if (forecast_->way(body) > kSlow * forecast_->state(body).look_ahead) fast_.push_back(body);
 }
 
-/// Of the fast, among all that move: what is slow may come to meet them.
+/// First touches of the fast with all that move: what is slow may come to meet them.
 void FastBodies::find_first_touches(std::span<const ContactPoint> found, double length, Jobs& jobs) {
   NearPairs& p = near_;
   p.motions.assign(bodies_->size(), nullptr);
@@ -124,7 +124,7 @@ bool FastBodies::planes_last(Index a, Index b) const {
   return (x.displacement - y.displacement).norm() + beside(a, x) + beside(b, y) <= std::min(x.look_ahead, y.look_ahead);
 }
 
-/// What touches already, and goes on faster than by its fall.
+/// Adds pairs that touch already, and go on faster than by their fall.
 void FastBodies::add_brisk() {
   const auto brisk = [&](Index body) {
     const BodyState& s = forecast_->state(body);
@@ -147,7 +147,7 @@ bool FastBodies::wake_touched() {
   return woke;
 }
 
-/// What touches, and what that is tied to.
+/// Joins what touches and what is tied together.
 void FastBodies::join(std::span<const ContactPoint> found) {
   const auto join = [&](Index a, Index b) {
     if (a >= 0 && b >= 0 && moves(a) && moves(b)) clusters_.sets.join(a, b);
@@ -267,8 +267,8 @@ void FastBodies::advance_cluster(std::span<const Index> members, const Step& ste
   for (const Index member : members) sleep_->wake(member);
 }
 
-/// Of the members among each other and with what never moves: as far as the smallest of them, so that where one part
-/// of it touches the others have their contacts.
+/// Contacts of the members among each other and with what never moves: as far as the smallest of them, so that where
+/// one part of it touches the others have their contacts.
 std::span<const ContactPoint> FastBodies::find_contacts(std::span<const Index> members, bool first, double left,
                                                         std::span<const ContactPoint> found) {
   double smallest = std::numeric_limits<double>::infinity();

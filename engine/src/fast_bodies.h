@@ -34,9 +34,9 @@ namespace limber::internal {
 
 /// Pairs of fast bodies with what they come to: what the watch of a part looks at.
 struct NearPairs {
-  /// Of that part, for those who come after: what came to a touch is apart then.
+  /// Share of a margin that the next cluster takes: what came to a touch is apart then.
   static constexpr double kNearer = 0.45;
-  /// Of that part: so near bodies that touch may come before they are no more looked at.
+  /// Share of the first margin: so near bodies that touch may come before they are no more looked at.
   static constexpr double kLeast = 1e-3;
   /// rad, about which a body may turn while contacts hold it: by then other parts of it would touch.
   static constexpr double kMostTurn = 0.5;
@@ -67,7 +67,7 @@ class PassingWatch final : public MotionWatch {
       : source_(source), states_(states), pairs_(pairs), margin_(pairs.margin) {}
   double clear_until(const FreeMotions& found, double length) override;
   double clearance() const override { return pairs_.first_margin; }
-  /// What ended the last motion shown; none: nothing did.
+  /// The touch that ended the last motion shown; null: nothing did.
   const Impact* touch() const { return touch_.a < 0 ? nullptr : &touch_; }
 
  private:
@@ -92,11 +92,11 @@ class FastBodies {
   /// @return whether contacts are to be found again
   bool gather(std::span<const ContactPoint> found, double length, Jobs& jobs);
   bool any() const { return !clusters_.members.empty(); }
-  /// Of all clusters, one after the other.
+  /// The bodies of all clusters, one after the other.
   std::span<const Index> members() const { return clusters_.members; }
   /// `found` without the contacts of clusters. Then rests() are those that sleep or wait.
   void leave_out_contacts(std::span<const ContactPoint> found);
-  /// Of the others, or of the part at hand.
+  /// Contacts of the others, or of the part at hand.
   std::vector<ContactPoint>& contacts() { return contacts_; }
   /// By body: it is not in the part at hand.
   std::span<const char> rests() const { return rests_; }
@@ -106,11 +106,11 @@ class FastBodies {
                StepAttempts& attempts);
 
  private:
-  /// Part of the smallest look-ahead at hand at which bodies touch.
+  /// Share of the smallest look-ahead at hand, at which bodies touch.
   static constexpr double kTouch = 0.05;
-  /// Of the look-ahead: what moves less far within a step passes nothing.
+  /// Share of the look-ahead: what moves less far within a step passes nothing.
   static constexpr double kSlow = 0.5;
-  /// Of a cluster's step.
+  /// Most parts of a cluster's step.
   static constexpr int kMostParts = 4;
 
   struct Clusters {
@@ -119,7 +119,7 @@ class FastBodies {
     std::vector<Index> members;  // of all clusters, one after the other
     std::vector<std::size_t> ends;
   };
-  /// What a cluster's step is taken with.
+  /// Arguments of a cluster's step.
   struct Step {
     const Substep& substep;
     std::span<const ContactPoint> found;

@@ -23,7 +23,7 @@ class IslandPartition {
   /// Ascending.
   std::span<const Index> members(std::size_t island) const;
   std::span<Constraint* const> constraints(std::size_t island) const;
-  /// Of all islands, one after the other.
+  /// The bodies of all islands, one after the other.
   std::span<const Index> members() const { return members_; }
   void forget_members() { members_.clear(); }
   /// Whether a body is in an island.

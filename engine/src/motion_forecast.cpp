@@ -98,8 +98,8 @@ void MotionForecast::look_farther(std::span<const Index> bodies) {
   for (const Index body : bodies) farther_[static_cast<std::size_t>(body)] = 1;
 }
 
-/// Before anything is known of the step: a body that nothing held in the last step goes on by itself. What held others
-/// holds them on for the most part: a squeezed body does not spring open. So they are expected to go on with their
+/// Before anything is known of the step: a body that nothing held in the last step goes on by itself. Others
+/// are held on for the most part: a squeezed body does not spring open. So they are expected to go on with their
 /// velocities, and modes no farther than they would swing by these.
 void MotionForecast::expect_unconstrained(Index body) {
   const auto i = static_cast<std::size_t>(body);

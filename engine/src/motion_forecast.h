@@ -29,11 +29,11 @@ class MotionForecast {
 
   /// Nothing is known of the step to come. @param length s
   void begin(double length, const Vec3& gravity);
-  /// What the source has been told is forgotten.
+  /// Forgets what the source has been told.
   void tell_all_anew() { told_.changes = 0; }
   /// @return whether those of bodies that sleep were written, too
   bool write_states();
-  /// Of a body that moves. @param length how long it is to be looked ahead, s
+  /// Writes the state of a body that moves. @param length how long it is to be looked ahead, s
   void write_state(Index body, double length);
   /// All stand where they are now.
   void stand_still();
@@ -67,7 +67,7 @@ class MotionForecast {
   double way(Index body) const { return ways_[static_cast<std::size_t>(body)]; }
 
  private:
-  /// What the source has been told of.
+  /// How far the source has been told.
   struct Told {
     std::uint64_t changes = 0;  // SleepStage::changes()
     int left = 0;               // times all states are to be told, sleepers and statics too: as they come to stand, and

@@ -92,7 +92,7 @@ StateReader Snapshot::open(std::span<const std::byte> bytes) {
   return reader;
 }
 
-/// What has to be the same, first: nothing is changed before it has been looked at.
+/// Saves first what has to be the same: nothing is changed before it has been looked at.
 void Snapshot::save_structure(StateWriter& state) const {
   const BodyTable& bodies = rooms_.bodies;
   state(rooms_.options.substeps, rooms_.registry.source() != nullptr, static_cast<std::uint64_t>(bodies.size()));

@@ -59,7 +59,7 @@ void StepEvents::add_to(Merged& merged, const ContactEvent& event) {
   merged.pressed = true;
 }
 
-/// What pressed in any substep; and what has let go since it was last told to press.
+/// Lists what pressed in any substep, and what has let go since it was last told to press.
 void StepEvents::end() {
   events_.clear();
   for (const ContactEvent& event : released_)

@@ -1,4 +1,4 @@
-// What acts over a whole step, while the step is taken in parts (WorldOptions::substeps).
+// Loads that act over a whole step, while the step is taken in parts (WorldOptions::substeps).
 #pragma once
 
 #include <span>

@@ -36,12 +36,12 @@ class StepPath {
 
   /// A body that is removed: what its contacts remember goes with it.
   virtual void forget(Index body) = 0;
-  /// What contacts press a body's collision surface with beyond its modes, as the last substep left it.
+  /// The forces that dent a body's collision surface beyond its modes, as the last substep left them.
   virtual std::span<const DentLoad> dent_loads(Index body) const = 0;
-  /// What its contacts store, beside the energy of its modes, J.
+  /// Energy that a body's contacts store, beside that of its modes, J.
   virtual double stored_energy(Index body) const = 0;
 
-  /// What contacts remember from step to step. Between steps.
+  // The contacts' memory from step to step. Between steps.
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save_state(StateWriter& state) const = 0;
   virtual void restore_state(StateReader& state) = 0;

@@ -1,4 +1,4 @@
-// What a World is made of: six rooms, each of which knows the others only by what it is given.
+// A World's parts: six rooms, each of which knows the others only by what it is given.
 //
 //   BodyTable         bodies by number: ids, shapes, groups of one model
 //   ContactPipeline   from where bodies are to contacts, rows and islands: the path that a step takes (StepPath)
@@ -27,7 +27,7 @@
 namespace limber {
 
 struct World::Impl {
-  /// What a step tells.
+  /// Results that a step tells.
   struct LastStep {
     ConstraintReport report;
     internal::StepEvents events;
