@@ -1,8 +1,9 @@
 // Cost of finding contacts while bodies move: scenes run in a World, every query that it asks is written down, and
 // then asked again of a fresh ContactFinder and of a fresh FclContactSource, in the same order, on one thread. Prints
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
-//   collision_steps [SCENE [BUNNY.glb [alone]]]     part of the names of the scenes wanted ("": all), the asset of the
-//   bunnies ("": without them), alone: without FCL
+//   collision_steps [SCENE [BUNNY.glb [BESIDE]]]     part of the names of the scenes wanted ("": all), the asset of the
+//   bunnies ("": without them); beside ContactFinder: fcl (if nothing is given), alone (nothing), or manifolds
+//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned)
 // Figures: docs/reports/benchmarks.md.
 #include <algorithm>
 #include <cmath>
@@ -16,6 +17,7 @@
 
 #include "cpu_time.h"
 #include "finder_scenes.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/collision_fcl/fcl_contact_source.h"
 #include "limber/model/asset.h"
 #include "limber/precompute/bake.h"
@@ -27,7 +29,8 @@ namespace {
 
 constexpr double kStep = 1.0 / 60.0;
 constexpr int kPasses = 3;
-bool alone = false;  // limber's finder, without FCL's beside it
+enum class Beside { kFcl, kNothing, kManifolds };
+Beside beside = Beside::kFcl;  // whose finder is asked beside ContactFinder
 
 /// A query with copies of all that it points to.
 struct Query {
@@ -92,12 +95,12 @@ class Recorder final : public ContactSource {
     double seconds = 1e30;
     std::size_t contacts = 0;
   };
-  template <class Source>
-  std::vector<Cost> replay() const {
+  template <class Source, class... Options>
+  std::vector<Cost> replay(const Options&... options) const {
     std::vector<Cost> costs(queries_.size());
     std::vector<ContactPoint> contacts;
     for (int pass = 0; pass < kPasses; ++pass) {
-      Source finder;
+      Source finder(options...);
       for (const auto& make : replayed_) make(finder);
       for (std::size_t q = 0; q < queries_.size(); ++q) {
         ContactQuery query = queries_[q].asked();
@@ -147,11 +150,11 @@ double contacts_a_step(std::span<const Recorder::Cost> costs, std::span<const st
 }
 
 void print_row(const std::string& scene, const std::string& phase, std::span<const Recorder::Cost> costs,
-               std::span<const Recorder::Cost> fcl, std::span<const std::size_t> ends) {
+               std::span<const Recorder::Cost> others, std::span<const std::size_t> ends) {
   std::printf("| %s, %s | %zu | %.1f", scene.c_str(), phase.c_str(), ends.size(),
               static_cast<double>(costs.size()) / static_cast<double>(ends.size()));
   std::vector<std::span<const Recorder::Cost>> finders{costs};
-  if (!alone) finders.push_back(fcl);
+  if (beside != Beside::kNothing) finders.push_back(others);
   for (const std::span<const Recorder::Cost> of : finders) {
     const std::vector<double> times = times_of_steps(of, ends);
     const auto last = static_cast<double>(times.size() - 1);
@@ -172,8 +175,12 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
       step();
       ends.push_back(recorder.queries());
     }
-  const std::vector<Recorder::Cost> costs = recorder.replay<ContactFinder>();
-  const std::vector<Recorder::Cost> fcl = alone ? costs : recorder.replay<FclContactSource>();
+  const bool manifolds = beside == Beside::kManifolds;
+  const std::vector<Recorder::Cost> costs =
+      recorder.replay<ContactFinder>(ContactFinderOptions{.clusters = {.max_points = manifolds ? 0 : 4}});
+  const std::vector<Recorder::Cost> others = manifolds                    ? recorder.replay<ManifoldFinder>()
+                                             : beside == Beside::kNothing ? costs
+                                                                          : recorder.replay<FclContactSource>();
   std::size_t first_step = 0, first_query = 0;
   for (const Phase& phase : phases) {
     const auto count = static_cast<std::size_t>(phase.steps);
@@ -184,7 +191,7 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
     const std::size_t queries = end_query - first_query;
     if (!phase.name.empty())
       print_row(name, phase.name, std::span(costs).subspan(first_query, queries),
-                std::span(fcl).subspan(first_query, queries), of_phase);
+                std::span(others).subspan(first_query, queries), of_phase);
     first_step += count, first_query = end_query;
   }
 }
@@ -274,11 +281,14 @@ void stirred_heap() {
 int main(int argc, char** argv) try {
   using namespace limber::testing;
   const std::string wanted = argc > 1 ? argv[1] : "", asset = argc > 2 ? argv[2] : "";
-  alone = argc > 3;
+  const std::string other = argc > 3 ? argv[3] : "fcl";
+  beside = other == "fcl" ? Beside::kFcl : other == "manifolds" ? Beside::kManifolds : Beside::kNothing;
+  const bool alone = beside == Beside::kNothing;
+  const std::string heading = beside == Beside::kFcl ? " FCL" : " manifolds";
   std::printf(
       "| scene | steps | queries a step | contacts | µs a step, p50 | p99 | worst "
       "|%s\n|---|---|---|---|---|---|---|%s\n",
-      alone ? "" : " FCL: contacts | p50 | p99 | worst |", alone ? "" : "---|---|---|---|");
+      alone ? "" : (heading + ": contacts | p50 | p99 | worst |").c_str(), alone ? "" : "---|---|---|---|");
   const std::vector<std::pair<std::string, std::function<void()>>> scenes{
       {"boxes", hundred_boxes},
       {"coarse",

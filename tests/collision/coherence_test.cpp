@@ -12,8 +12,8 @@
 namespace limber::testing {
 namespace {
 
-using internal::ListRoom;
 using internal::PairMemory;
+using internal::TestRoom;
 
 void expect_same_bits(const std::vector<ContactPoint>& a, const std::vector<ContactPoint>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -103,7 +103,7 @@ TEST(Coherence, AListHoldsUntilPointsMayHaveMovedByItsSlack) {
   Random random(11);
   const auto model = lumpy_sphere(1, 4);
   const CollisionSurface a(model), b(model);
-  ListRoom room;
+  TestRoom room;
   int looked = 0, listed = 0, searched = 0;
   for (int trial = 0; trial < 50; ++trial) {
     PairMemory memory(room);

@@ -139,12 +139,25 @@ void add_face(ConvexCore& core, const std::vector<HullFace>& faces, const std::v
   core.faces.push_back(face);
 }
 
+// Numbers the edges, as they come in the loops.
+void number_edges(ConvexCore& core) {
+  std::map<HalfEdge, Index> known;
+  for (const ConvexFace& f : core.faces) {
+    const auto loop = core.loop(f);
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const auto [from, to] = std::minmax(loop[i], loop[(i + 1) % loop.size()]);
+      core.loop_edges.push_back(known.try_emplace({from, to}, static_cast<Index>(known.size())).first->second);
+    }
+  }
+}
+
 ConvexCore hull_of(std::vector<Vec3> points) {
   ConvexCore core{std::move(points)};
   const std::vector<HullFace> faces = HullBuilder(core.points).build();
   const std::vector<Index> group = flat_groups(faces);
   const Index count = 1 + *std::max_element(group.begin(), group.end());
   for (Index label = 0; label < count; ++label) add_face(core, faces, group, label);
+  number_edges(core);
   return core;
 }
 
@@ -168,8 +181,12 @@ ConvexCore convex_core(const Sphere& shape) { return {{Vec3::Zero()}, shape.radi
 
 ConvexCore convex_core(const Capsule& shape) {
   if (shape.half_length == 0.0) return {{Vec3::Zero()}, shape.radius};
-  return {
-      {-shape.half_length * Vec3::UnitZ(), shape.half_length * Vec3::UnitZ()}, shape.radius, {}, {}, {Vec3::UnitZ()}};
+  return {{-shape.half_length * Vec3::UnitZ(), shape.half_length * Vec3::UnitZ()},
+          shape.radius,
+          {},
+          {},
+          {},
+          {Vec3::UnitZ()}};
 }
 
 ConvexCore convex_core(const Box& shape) {
@@ -178,7 +195,9 @@ ConvexCore convex_core(const Box& shape) {
   for (int i = 0; i < 8; ++i)
     corners.push_back(
         shape.half_extents.cwiseProduct(Vec3(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0)));
-  return hull_of(std::move(corners));
+  ConvexCore core = hull_of(std::move(corners));
+  core.half_extents = shape.half_extents;
+  return core;
 }
 
 ConvexCore convex_core(const ConvexHull& shape) { return without_inner_points(hull_of(shape.points)); }

@@ -21,7 +21,9 @@ struct ConvexCore {
   double radius = 0.0;
   std::vector<ConvexFace> faces{};
   std::vector<Index> loops{};
+  std::vector<Index> loop_edges{};      // of each corner of a loop: the edge on to the next, each edge once
   std::vector<Vec3> edge_directions{};  // unit, each once, whichever way round
+  Vec3 half_extents = Vec3::Zero();     // of a box: its points are at ± these; zero for the rest
 
   std::span<const Index> loop(const ConvexFace& f) const {
     return std::span(loops).subspan(static_cast<std::size_t>(f.first), static_cast<std::size_t>(f.count));

@@ -75,7 +75,7 @@ class PairMemories {
     free_.push_back(memory);
   }
 
-  std::unique_ptr<ListRoom> room_ = std::make_unique<ListRoom>();
+  std::unique_ptr<TestRoom> room_ = std::make_unique<TestRoom>();
   std::size_t modes_ = 0;
   std::vector<std::unique_ptr<PairMemory>> all_;
   std::vector<PairMemory*> free_, of_pair_;

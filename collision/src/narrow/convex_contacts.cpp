@@ -11,52 +11,128 @@ namespace {
 // The two nearest points stand for no feature of theirs alone: bits of kind that no feature has.
 constexpr FeatureKey kNearestPoints = 3u << 30;
 
-double lowest(const std::vector<Vec3>& points, const Vec3& n) {
-  double r = std::numeric_limits<double>::infinity();
-  for (const Vec3& p : points) r = std::min(r, n.dot(p));
-  return r;
-}
+ConvexSolid solid(std::span<const Vec3> points) { return {points, 0.0}; }
 
-struct Range {
-  double low, high;
-};
+}  // namespace
 
-Range along(const std::vector<Vec3>& points, const Vec3& axis) {
+ConvexContacts::Range ConvexContacts::along(const Side& side, const Vec3& axis) {
+  if (side.is_box()) {
+    const double middle = axis.dot(side.pose.p), half = side.half_width(axis);
+    return {middle - half, middle + half};
+  }
   Range r{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  for (const Vec3& p : points) {
+  for (const Vec3& p : side.points) {
     const double x = axis.dot(p);
     r.low = std::min(r.low, x), r.high = std::max(r.high, x);
   }
   return r;
 }
 
-ConvexSolid solid(const std::vector<Vec3>& points) { return {points, 0.0}; }
-
-}  // namespace
-
 // @param pose null: at the origin, bit for bit
 void ConvexContacts::load(Side& side, const ConvexCore& core, const RigidTransform* pose) {
-  side.core = &core, side.pose = pose != nullptr ? *pose : RigidTransform{};
-  side.points.assign(core.points.begin(), core.points.end());
-  side.edge_directions.assign(core.edge_directions.begin(), core.edge_directions.end());
-  side.normals.clear();
-  for (const ConvexFace& f : core.faces) side.normals.push_back(f.normal);
+  side.core = &core, side.pose = pose != nullptr ? *pose : RigidTransform{}, side.turned = pose != nullptr;
+  side.points = core.points, side.edge_directions = core.edge_directions;
+  for (int i = 0; i < 3; ++i) side.half_axes[static_cast<std::size_t>(i)] = core.half_extents[i] * Vec3::Unit(i);
   if (pose == nullptr) return;
   const Mat3 R = to_matrix(pose->q);
-  for (Vec3& p : side.points) p = R * p + pose->p;
-  for (Vec3& n : side.normals) n = R * n;
-  for (Vec3& e : side.edge_directions) e = R * e;
+  for (Vec3& axis : side.half_axes) axis = R * axis;
+  side.turned_points.resize(core.points.size());
+  side.turned_normals.resize(core.faces.size());
+  side.turned_edges.resize(core.edge_directions.size());
+  for (std::size_t i = 0; i < core.points.size(); ++i) side.turned_points[i] = R * core.points[i] + pose->p;
+  for (std::size_t i = 0; i < core.faces.size(); ++i) side.turned_normals[i] = R * core.faces[i].normal;
+  for (std::size_t i = 0; i < core.edge_directions.size(); ++i) side.turned_edges[i] = R * core.edge_directions[i];
+  side.points = side.turned_points, side.edge_directions = side.turned_edges;
 }
 
-void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
+void ConvexContacts::load(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
                           std::vector<FeatureContact>& contacts) {
   load(side_[0], a, nullptr), load(side_[1], b, &X_AB);
   contacts_ = &contacts, first_ = contacts.size();
+}
+
+void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
+                          std::vector<FeatureContact>& contacts, const Passing& passing) {
+  load(a, b, X_AB, contacts);
   const std::size_t face_tests = a.faces.size() * b.points.size() + b.faces.size() * a.points.size();
-  if (!a.faces.empty() && !b.faces.empty() && face_tests <= collision_tuning().convex.most_face_tests &&
-      faces_tell(margin))
-    return;
-  find_by_distance(margin);
+  const bool told = !a.faces.empty() && !b.faces.empty() && face_tests <= collision_tuning().convex.most_face_tests &&
+                    faces_tell(margin);
+  if (!told) find_by_distance(margin);
+  if (!stands_in_the_way(passing)) return;
+  const Direction kept = keeping_apart(passing);
+  if (!std::isfinite(kept.depth)) return;
+  contacts.resize(first_);
+  clip_faces(kept.normal, margin);
+}
+
+void ConvexContacts::find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
+                                const Vec3& normal, double margin, std::vector<FeatureContact>& contacts) {
+  load(a, b, X_AB, contacts);
+  if (a.points.size() > 1 && b.points.size() > 1) clip_faces(normal, margin);
+}
+
+void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& triangle, const TriangleQuery& query,
+                                      DirectionFilter& leaves, std::vector<FeatureContact>& contacts) {
+  load(side_[0], a, nullptr), load(side_[1], triangle, nullptr);
+  contacts_ = &contacts, first_ = contacts.size();
+  const ConvexFace& face = triangle.faces.front();
+  const double gap = lowest(side_[0], face.normal) - face.offset - a.radius, touching = query.passing.touching;
+  const Range whole = along(side_[0], face.normal);
+  if (gap > query.margin || 0.5 * (whole.low + whole.high) < face.offset) return;  // in front, or behind
+  if (gap >= -touching || query.face_alone) {
+    clip_faces(face.normal, query.margin);
+    if (!query.rim || least_gap() <= gap + round_off()) return;
+  } else {
+    Direction best{face.normal, -gap - a.radius};
+    if (leave_triangle(best, leaves)) {
+      best.normal == face.normal ? clip_faces(best.normal, query.margin) : touch(best, nullptr, query.margin);
+      return;
+    }
+  }
+  const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
+  if (nearest.cores_intersect || nearest.distance - a.radius > query.margin || !leaves.allows(nearest.normal)) return;
+  const bool kept_apart = std::min(gap, gap + face.normal.dot(query.passing.way)) >= -touching;
+  const bool in_the_way = nearest.distance - a.radius + nearest.normal.dot(query.passing.way) < -touching;
+  if (kept_apart && in_the_way) return;
+  first_ = contacts.size();
+  const Deepest points{nearest.a, nearest.b};
+  touch({nearest.normal, -nearest.distance}, &points, query.margin);
+}
+
+// The direction of least depth of those that are allowed.
+// @return false: the triangle does not reach into the other at all
+bool ConvexContacts::leave_triangle(Direction& best, DirectionFilter& leaves) const {
+  bool apart = false;
+  const auto look = [&](double preference) {
+    return [&, preference](const Vec3& normal, double depth) {
+      apart = apart || depth + side_[0].core->radius < 0.0;
+      if (!apart && depth < preference * best.depth && leaves.allows(normal)) best = {normal, depth};
+    };
+  };
+  for_faces(look(1.0));
+  if (!apart) for_edges(look(collision_tuning().convex.edge_preference));
+  return !apart;
+}
+
+// Whether a contact that is open now would be passed on the way.
+bool ConvexContacts::stands_in_the_way(const Passing& passing) const {
+  if (passing.way.isZero(0.0)) return false;
+  return std::any_of(contacts_->begin() + static_cast<std::ptrdiff_t>(first_), contacts_->end(),
+                     [&](const FeatureContact& c) {
+                       return c.gap >= -passing.touching && c.gap + c.normal.dot(passing.way) < -passing.touching;
+                     });
+}
+
+// Of the faces behind which the other body is, and stays all along the way, the one that keeps it farthest; of infinite
+// depth if there is none.
+ConvexContacts::Direction ConvexContacts::keeping_apart(const Passing& passing) const {
+  Direction best;
+  const double most = passing.touching - side_[0].core->radius - side_[1].core->radius;
+  for_faces([&](const Vec3& normal, double depth) {
+    const double deepest = std::max(depth, depth - normal.dot(passing.way));
+    if (deepest <= most && deepest < best.depth) best = {normal, deepest};
+  });
+  return best;
 }
 
 // Two polytopes that touch with a face, or whose faces keep them apart: what the planes of their faces tell. Where the
@@ -120,29 +196,46 @@ double ConvexContacts::round_off() const {
 
 // -- Direction of two cores that intersect ----------------------------------------------------------------------------
 
+// Calls visit(normal, depth) for the faces of both.
+template <class Visit>
+void ConvexContacts::for_faces(const Visit& visit) const {
+  for (const ConvexFace& f : side_[0].core->faces) {
+    const Vec3& n = side_[0].normal(f);
+    visit(Vec3(-n), side_[0].offset(f) - lowest(side_[1], n));
+  }
+  for (const ConvexFace& f : side_[1].core->faces) {
+    const Vec3& n = side_[1].normal(f);
+    visit(n, side_[1].offset(f) - lowest(side_[0], n));
+  }
+}
+
 // Of the faces of both, the one along which they overlap least.
 ConvexContacts::Direction ConvexContacts::across_faces() const {
   Direction best;
-  for (const ConvexFace& f : side_[0].core->faces)
-    take_shallower(best, -side_[0].normal(f), side_[0].offset(f) - lowest(side_[1].points, side_[0].normal(f)), 1.0);
-  for (const ConvexFace& f : side_[1].core->faces)
-    take_shallower(best, side_[1].normal(f), side_[1].offset(f) - lowest(side_[0].points, side_[1].normal(f)), 1.0);
+  for_faces([&](const Vec3& normal, double depth) { take_shallower(best, normal, depth, 1.0); });
   return best;
+}
+
+// Calls visit(normal, depth) both ways along what is across an edge of each.
+template <class Visit>
+void ConvexContacts::for_edges(const Visit& visit) const {
+  const double least_cross = collision_tuning().convex.least_cross;
+  for (const Vec3& u : side_[0].edge_directions)
+    for (const Vec3& w : side_[1].edge_directions) {
+      const Vec3 axis = u.cross(w);
+      const double length = axis.norm();
+      if (length < least_cross) continue;
+      const Range a = along(side_[0], axis), b = along(side_[1], axis);
+      visit(Vec3(axis / length), (b.high - a.low) / length);
+      visit(Vec3(-axis / length), (a.high - b.low) / length);
+    }
 }
 
 // The separating axis test over all faces and pairs of edges: the nearest face of the difference of the two polytopes.
 ConvexContacts::Direction ConvexContacts::least_penetration() const {
   Direction best = across_faces();
-  const ConvexTuning& tuning = collision_tuning().convex;
-  for (const Vec3& u : side_[0].edge_directions)
-    for (const Vec3& w : side_[1].edge_directions) {
-      const Vec3 axis = u.cross(w);
-      const double length = axis.norm();
-      if (length < tuning.least_cross) continue;
-      const Range a = along(side_[0].points, axis), b = along(side_[1].points, axis);
-      take_shallower(best, axis / length, (b.high - a.low) / length, tuning.edge_preference);
-      take_shallower(best, -axis / length, (a.high - b.low) / length, tuning.edge_preference);
-    }
+  const double preference = collision_tuning().convex.edge_preference;
+  for_edges([&](const Vec3& normal, double depth) { take_shallower(best, normal, depth, preference); });
   if (!std::isfinite(best.depth)) {
     const Vec3 across = across_edges();
     best = {across, depth_along(across)};
@@ -152,7 +245,7 @@ ConvexContacts::Direction ConvexContacts::least_penetration() const {
 
 // How far the cores would have to move apart along the normal; below 0: how far apart they are along it.
 double ConvexContacts::depth_along(const Vec3& normal) const {
-  return -lowest(side_[1].points, -normal) - lowest(side_[0].points, normal);
+  return -lowest(side_[1], -normal) - lowest(side_[0], normal);
 }
 
 void ConvexContacts::take_shallower(Direction& best, const Vec3& normal, double depth, double preference) {
@@ -181,7 +274,7 @@ ConvexContacts::Deepest ConvexContacts::deepest_along(const Direction& d) const 
 
 // Two capsules side by side: where each one's ends are over the other.
 void ConvexContacts::touch_along(const Vec3& normal, double margin) {
-  const auto &p = side_[0].points, &q = side_[1].points;
+  const std::span<const Vec3> p = side_[0].points, q = side_[1].points;
   if (p.size() < 2 || q.size() < 2) return;
   const Vec3 u = p[1] - p[0], w = q[1] - q[0];
   if (u.cross(w).norm() > collision_tuning().convex.side_by_side * u.norm() * w.norm()) return;
@@ -267,7 +360,7 @@ void ConvexContacts::clip_by_edge(const Side& reference, const ConvexFace& face,
     if (in0) clipped_.push_back(from);
     if (in0 == in1) continue;
     Corner cut{from.point + h0 / (h0 - h1) * (to.point - from.point), from.incident, from.reference, from.line};
-    name_cut(cut, from.line, face, edge);
+    name_cut(cut, from.line, reference, face, edge);
     // Where the outline leaves the kept side it goes on along the cut.
     if (in0) cut.line = -1 - edge;
     clipped_.push_back(cut);
@@ -277,16 +370,18 @@ void ConvexContacts::clip_by_edge(const Side& reference, const ConvexFace& face,
 
 // An edge of the incident face over an edge of the reference face; or, where both lines are the reference's, its
 // corner.
-void ConvexContacts::name_cut(Corner& cut, Index line, const ConvexFace& face, Index edge) {
+void ConvexContacts::name_cut(Corner& cut, Index line, const Side& reference, const ConvexFace& face, Index edge) {
+  const auto at = [](Index i) { return static_cast<std::size_t>(i); };
   if (line >= 0) {
-    cut.incident = feature_key(Feature::Kind::kEdge, line);
-    cut.reference = feature_key(Feature::Kind::kEdge, face.first + edge);
+    const ConvexCore& incident = *(&reference == &side_[0] ? side_[1] : side_[0]).core;
+    cut.incident = feature_key(Feature::Kind::kEdge, incident.faces.empty() ? 0 : incident.loop_edges[at(line)]);
+    cut.reference = feature_key(Feature::Kind::kEdge, reference.core->loop_edges[at(face.first + edge)]);
     return;
   }
   cut.incident = feature_key(Feature::Kind::kFace, 0);
   const Index other = -1 - line;  // consecutive edges meet in the corner that the later one starts from
   const bool wraps = (edge + 1) % face.count == other;
-  cut.reference = feature_key(Feature::Kind::kVertex, face.first + (wraps ? other : edge));
+  cut.reference = feature_key(Feature::Kind::kVertex, reference.core->loops[at(face.first + (wraps ? other : edge))]);
 }
 
 }  // namespace limber::internal

@@ -1,7 +1,10 @@
 // Contacts of two rigid convex shapes: one direction, and the faces that meet along it clipped against each other.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "convex/convex_core.h"
@@ -11,22 +14,65 @@
 
 namespace limber::internal {
 
+// How two bodies are expected to pass each other.
+struct Passing {
+  Vec3 way = Vec3::Zero();  // of a against b, straight on and evenly, in the frame of a
+  double touching = 0.0;    // m: faces that overlap by no more keep them apart nevertheless
+};
+
+// Tells which directions lead out of something.
+class DirectionFilter {
+ public:
+  virtual ~DirectionFilter() = default;
+  virtual bool allows(const Vec3& out) = 0;
+};
+
 class ConvexContacts {
  public:
-  // Appends, in the frame of a. @param X_AB frame of b in that of a
+  // Appends, in the frame of a. Where contacts stand in the way of a that a face keeps from b all along it, the
+  // contacts are those with this face: a body that slides over flush boxes does not meet their sides.
+  // @param X_AB frame of b in that of a
   void find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
-            std::vector<FeatureContact>& contacts);
+            std::vector<FeatureContact>& contacts, const Passing& passing = {});
+  // Of the faces that look along a direction which is known to keep the two apart. @param normal unit, out of b into a
+  void find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, const Vec3& normal,
+                  double margin, std::vector<FeatureContact>& contacts);
+  struct TriangleQuery {
+    double margin = 0.0;
+    Passing passing{};
+    bool rim = false;         // its edges and corners may be touched beside its face
+    bool face_alone = false;  // it is touched along its normal however deep
+  };
+  // With a triangle of a surface, one-sided: a polytope of three points and one face, in the frame of a, that is left
+  // along its normal or where the filter lets it.
+  void find_on_triangle(const ConvexCore& a, const ConvexCore& triangle, const TriangleQuery& query,
+                        DirectionFilter& leaves, std::vector<FeatureContact>& contacts);
 
  private:
   // One of the two, in the frame of a.
   struct Side {
     const ConvexCore* core = nullptr;
     RigidTransform pose{};
-    std::vector<Vec3> points{}, normals{}, edge_directions{};  // the second: of the faces
+    std::span<const Vec3> points{}, edge_directions{};
+    std::array<Vec3, 3> half_axes{};  // of a box
+    bool turned = false;              // false: as the core has it, bit for bit
+    std::vector<Vec3> turned_points{}, turned_normals{}, turned_edges{};
 
-    const Vec3& normal(const ConvexFace& f) const { return normals[static_cast<std::size_t>(&f - core->faces.data())]; }
+    bool is_box() const { return core->half_extents[0] > 0.0; }
+    const Vec3& normal(const ConvexFace& f) const {
+      return turned ? turned_normals[static_cast<std::size_t>(&f - core->faces.data())] : f.normal;
+    }
     double offset(const ConvexFace& f) const { return f.offset + normal(f).dot(pose.p); }
+    // How far it extends along an axis to either side of its origin. @pre a box
+    double half_width(const Vec3& axis) const {
+      return std::abs(axis.dot(half_axes[0])) + std::abs(axis.dot(half_axes[1])) + std::abs(axis.dot(half_axes[2]));
+    }
   };
+  struct Range {
+    double low, high;
+  };
+  static Range along(const Side& side, const Vec3& axis);
+  static double lowest(const Side& side, const Vec3& n) { return along(side, n).low; }
   // A direction out of b, into a, and how far the cores overlap along it; negative where they are apart.
   struct Direction {
     Vec3 normal = Vec3::Zero();
@@ -42,17 +88,26 @@ class ConvexContacts {
     Index line;  // ≥ 0: edge of the incident face; < 0: −1 − edge of the reference face
   };
 
+  void load(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
+            std::vector<FeatureContact>& contacts);
   static void load(Side& side, const ConvexCore& core, const RigidTransform* pose);
   void add(const FeatureSide& a, const FeatureSide& b, const Vec3& normal);
   double least_gap() const;
   double round_off() const;
 
+  bool stands_in_the_way(const Passing& passing) const;
+  Direction keeping_apart(const Passing& passing) const;
   bool faces_tell(double margin);
   void find_by_distance(double margin);
   void touch(const Direction& d, const Deepest* known, double margin);
 
+  template <class Visit>
+  void for_faces(const Visit& visit) const;
   Direction across_faces() const;
   Direction least_penetration() const;
+  template <class Visit>
+  void for_edges(const Visit& visit) const;
+  bool leave_triangle(Direction& best, DirectionFilter& leaves) const;
   double depth_along(const Vec3& normal) const;
   static void take_shallower(Direction& best, const Vec3& normal, double depth, double preference);
   Vec3 across_edges() const;
@@ -63,7 +118,7 @@ class ConvexContacts {
   void clip_faces(const Vec3& normal, double margin);
   void load_incident(const Side& side, const Vec3& out);
   void clip_by_edge(const Side& reference, const ConvexFace& face, Index edge);
-  static void name_cut(Corner& cut, Index line, const ConvexFace& face, Index edge);
+  void name_cut(Corner& cut, Index line, const Side& reference, const ConvexFace& face, Index edge);
 
   Side side_[2];
   std::vector<Corner> corners_, clipped_;

@@ -1,42 +1,12 @@
 #include "narrow/pair_memory.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "tuning.h"
 
 namespace limber::internal {
-
-// A larger one will do. Where there is none, some are made at once, as a query more or less crowded is no other scene.
-void ListRoom::exchange(std::vector<ListedTests>& list, std::size_t size) {
-  const auto shelf = [](std::size_t holds) {
-    constexpr std::size_t kLeast = 64;
-    return static_cast<std::size_t>(std::bit_width(std::max(holds, kLeast) - 1));
-  };
-  const std::lock_guard lock(mutex_);
-  if (list.capacity() > 0) put_back(shelf(list.capacity()), std::move(list));
-  list = {};
-  std::size_t from = shelf(size);
-  while (from < free_.size() && free_[from].empty()) ++from;
-  if (from == free_.size()) {
-    from = shelf(size);
-    const std::size_t more = 1 + made_[from] / 4;
-    made_[from] += more;
-    for (std::size_t i = 0; i < more; ++i) {
-      std::vector<ListedTests> fresh;
-      fresh.reserve(std::size_t{1} << from);
-      put_back(from, std::move(fresh));
-    }
-    free_[from].reserve(made_[from]);
-  }
-  list.swap(free_[from].back());
-  free_[from].pop_back();
-  list.clear();
-}
-
-void ListRoom::put_back(std::size_t shelf, std::vector<ListedTests>&& list) { free_[shelf].push_back(std::move(list)); }
 
 void PairMemory::keep(std::span<const ListedTests> list) {
   room_.exchange(list_, list.size());

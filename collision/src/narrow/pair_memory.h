@@ -4,14 +4,13 @@
 // those of a search.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <mutex>
 #include <span>
 #include <vector>
 
 #include "limber/collision/collision_surface.h"
 #include "limber/core/rigid_transform.h"
+#include "narrow/list_room.h"
 
 namespace limber::internal {
 
@@ -29,23 +28,11 @@ struct ListedTests {
   FeatureTests tests;
 };
 
-// Room for lists, by powers of two: what one pair gives back another takes, so that a warm query allocates nothing.
-class ListRoom {
- public:
-  // Exchanges a list for one that holds so many, empty.
-  void exchange(std::vector<ListedTests>& list, std::size_t size);
-
- private:
-  void put_back(std::size_t shelf, std::vector<ListedTests>&& list);
-
-  std::mutex mutex_;
-  std::array<std::vector<std::vector<ListedTests>>, 33> free_;  // by the logarithm of what they hold, rounded up
-  std::array<std::size_t, 33> made_{};
-};
+using TestRoom = ListRoom<ListedTests, 64>;
 
 class PairMemory {
  public:
-  explicit PairMemory(ListRoom& room) : room_(room) {}
+  explicit PairMemory(TestRoom& room) : room_(room) {}
   // The pair as a query finds it, in the frame of a.
   struct State {
     const CollisionSurface &a, &b;
@@ -74,7 +61,7 @@ class PairMemory {
  private:
   double farthest_move(const State& now) const;
 
-  ListRoom& room_;
+  TestRoom& room_;
   bool known_ = false, listed_ = false;
   RigidTransform X_AB_{};
   std::vector<double> z_a_, z_b_;

@@ -1,0 +1,90 @@
+/// @file limber/collision/manifold_finder.h
+/// Finds where bodies touch in bounded time: the ContactSource of game contact. Usable without a world:
+///
+///   ManifoldFinder finder;
+///   finder.add_body(0, {.shape = std::make_shared<Shape>(Box{})}, {});
+///   finder.add_body(1, {.shape = std::make_shared<Shape>(HalfSpace{})}, {});
+///   const std::array states{BodyState{.pose = X_WB}, BodyState{}};
+///   std::vector<ContactPoint> contacts;
+///   finder.find_contacts({.states = states, .margin = 1e-3}, contacts, serial_jobs());
+///
+/// Pairs that the broad phase finds near live on from query to query in a contact graph, each with its *manifold*: the
+/// contacts of the two, at most four to a patch of like normals, each named by its features. A pair that hardly moved
+/// since its manifold was made keeps it, and only the gaps are measured again from the anchors (contact recycling, as
+/// in Box3D, 2026). Manifolds come straight from features: the direction by separating axes (Gottschalk, Lin, Manocha,
+/// *OBBTree*, 1996) or by the nearest points, the faces that meet along it clipped against each other (Ericson,
+/// *Real-Time Collision Detection*, 2005, 5.5).
+///
+/// Contacts are *speculative*: those are found whose gap the motion that BodyState::displacement and reach tell may
+/// close, and a solver gives way to them by their gap. BodyState::look_ahead, doubt and the expected ends are not read.
+///
+/// Where a face keeps two convex shapes apart all along the expected motion, contacts with other faces that would stand
+/// in its way are none: what slides over flush boxes does not meet their sides. Where bodies overlap, convex shapes
+/// leave each other along the direction of least depth. Pairs in which a surface deforms have all contacts of
+/// NarrowPhase.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "limber/collision/narrow_phase.h"
+#include "limber/dynamics/contact_source.h"
+
+namespace limber {
+
+struct ManifoldFinderOptions {
+  /// A manifold is kept until the smaller body of a pair has moved by so much in the frame of the larger one, a share
+  /// of the pair's size, or turned by `recycle_turn`, rad, or bent by as much as it may move. The size is the least
+  /// extent of either body's box at rest. In [0, 0.1] each; 0: a manifold is made anew as soon as anything moves.
+  double recycle_distance = 0.01;
+  double recycle_turn = 0.01;
+  /// Share of a pair's size up to which overlapping faces keep two bodies apart, and by which the faces of neighbours
+  /// may differ in height and still are one. In [0, 0.1].
+  double flush = 5e-3;
+  /// Of pairs in which a surface deforms.
+  NarrowPhaseOptions narrow_phase{};
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
+};
+
+/// Used by one thread at a time; it spreads the work over the Jobs of the query itself.
+///
+/// What find_contacts() refuses, before anything is changed (InvalidArgument naming body and member): a pose that is
+/// not finite or whose quaternion is not of length 1 within 1e-6, a displacement, reach or margin that is not finite or
+/// a negative one of the latter two, another number of amplitudes than the body has modes, amplitudes that are not
+/// finite, and `states` that do not reach to every body. States of bodies that sleep are looked at when they fall
+/// asleep and when something comes near.
+///
+/// Ids: equal for the same features of the same two body indices, whatever happened between; made by mixing 64 bits.
+class ManifoldFinder final : public ContactSource {
+ public:
+  /// Of the last query.
+  struct Counts {
+    std::int64_t pairs = 0;     ///< near each other
+    std::int64_t recycled = 0;  ///< of these, kept their manifold, which may be empty
+  };
+
+  /// @throws InvalidArgument see ManifoldFinderOptions::validate()
+  explicit ManifoldFinder(const ManifoldFinderOptions& options = {});
+  ~ManifoldFinder() override;
+  ManifoldFinder(ManifoldFinder&&) noexcept;
+  ManifoldFinder& operator=(ManifoldFinder&&) noexcept;
+
+  void add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) override;
+  void remove_body(Index body) override;
+  void set_filter(Index body, const CollisionFilter& filter) override;
+  void exclude_pair(Index a, Index b, bool excluded) override;
+  void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
+  /// As ContactFinder does.
+  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
+  /// The graph, with its manifolds.
+  void save_state(StateWriter& state) const override;
+  void restore_state(StateReader& state) override;
+
+  const Counts& counts() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limber

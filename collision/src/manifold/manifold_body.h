@@ -1,0 +1,70 @@
+// A body as the finder of manifolds knows it.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <variant>
+
+#include "convex/convex_core.h"
+#include "finder/geometry_cache.h"
+#include "finder/world_bounds.h"
+#include "limber/collision/narrow_phase.h"
+#include "manifold/mesh_facets.h"
+
+namespace limber::internal {
+
+/// A rigid shape made ready; shared by the bodies that wear it.
+struct ManifoldShape {
+  explicit ManifoldShape(std::shared_ptr<const Shape> s) : shape(std::move(s)), geometry(*shape) {
+    std::visit(
+        [this]<class T>(const T& convex) {
+          if constexpr (requires { convex_core(convex); }) core = convex_core(convex);
+        },
+        *shape);
+    if (core.points.empty() && geometry.surface()) facets.emplace(*geometry.surface());
+  }
+  std::shared_ptr<const Shape> shape;  ///< kept alive, so that its address is not another's
+  RigidGeometry geometry;
+  ConvexCore core{};                   ///< of the convex ones; without points for the rest
+  std::optional<MeshFacets> facets{};  ///< of meshes and height fields
+};
+
+class ManifoldShapes {
+ public:
+  std::shared_ptr<const ManifoldShape> get(const std::shared_ptr<const Shape>& shape) {
+    if (const auto known = map_.find(shape.get()); known != map_.end())
+      if (auto value = known->second.lock()) return value;
+    auto value = std::make_shared<const ManifoldShape>(shape);
+    std::erase_if(map_, [](const auto& entry) { return entry.second.expired(); });
+    map_[shape.get()] = value;
+    return value;
+  }
+
+ private:
+  std::unordered_map<const Shape*, std::weak_ptr<const ManifoldShape>> map_;
+};
+
+struct ManifoldBody {
+  bool present = false;
+  std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
+  std::shared_ptr<const ManifoldShape> rigid{};
+  bool finds_itself = false;
+  double thickness = 0.0, radius = 0.0;  ///< of its box at rest: least extent; farthest point from the origin, m
+
+  // As it was placed for the last query.
+  bool placed_asleep = false;
+  RigidTransform pose{};
+  Mat3 turn = Mat3::Identity();
+  Vec3 displacement = Vec3::Zero();
+  double reach = 0.0;
+
+  Index modes() const { return modal ? modal->surface->modes() : 0; }
+  const ConvexCore* core() const { return rigid && !rigid->core.points.empty() ? &rigid->core : nullptr; }
+  const HalfSpace* half_space() const { return rigid ? std::get_if<HalfSpace>(rigid->shape.get()) : nullptr; }
+  double rounding() const { return core() ? core()->radius : 0.0; }  ///< radius about the core, m
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,531 @@
+#include "limber/collision/manifold_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "finder/contact_id.h"
+#include "limber/collision/broad_phase.h"
+#include "limber/collision/contact_finder.h"
+#include "limber/core/error.h"
+#include "manifold/contact_graph.h"
+#include "manifold/manifold_points.h"
+#include "manifold/pair_finder.h"
+#include "tuning.h"
+
+namespace limber {
+
+using internal::ContactGraph;
+using internal::FeatureContact;
+using internal::FeatureSide;
+using internal::KeptPoint;
+using internal::LivePair;
+using internal::ManifoldBody;
+using internal::PairFinder;
+using internal::PairQuery;
+
+namespace {
+
+[[noreturn]] void refuse_state(Index body, const std::string& seen, const std::string& expected) {
+  throw InvalidArgument("ManifoldFinder: state of body " + std::to_string(body) + ": " + seen + ", expected " +
+                        expected);
+}
+
+void check_body_state(Index index, const ManifoldBody& body, const BodyState& state) {
+  const double unit = internal::collision_tuning().finder.unit_quaternion;
+  if (!state.pose.p.allFinite()) refuse_state(index, "pose.p is not finite", "finite coordinates");
+  if (!(std::abs(state.pose.q.norm() - 1.0) <= unit))
+    refuse_state(index, "pose.q has length " + std::to_string(state.pose.q.norm()), "1");
+  if (!state.displacement.allFinite() || !state.rotation.allFinite())
+    refuse_state(index, "displacement or rotation is not finite", "finite numbers");
+  if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
+    refuse_state(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
+  if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
+    refuse_state(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
+  for (std::size_t i = 0; i < state.amplitudes.size(); ++i)
+    if (!std::isfinite(state.amplitudes[i]))
+      refuse_state(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
+}
+
+/// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
+void bind_body_state(DeformedSurface& surface, Index index, const ManifoldBody& body, const BodyState& state) {
+  try {
+    surface.bind(body.modal->surface, state.amplitudes, BoundsChoice::kAmplitudes);
+  } catch (const InvalidArgument& e) {
+    refuse_state(index, e.what(), "smaller amplitudes");
+  }
+}
+
+/// What one thread works with. Which of them does a task changes nothing but the time.
+struct ManifoldWorker {
+  explicit ManifoldWorker(const NarrowPhaseOptions& options) : pairs(options) {}
+  PairFinder pairs;
+  DeformedSurface root{};  // for boxes of whole bodies
+  std::vector<std::uint64_t> last{};
+};
+
+class ManifoldWorkers {
+ public:
+  void start_query(const NarrowPhaseOptions& options, int concurrency) {
+    while (all_.size() < static_cast<std::size_t>(concurrency))
+      all_.push_back(std::make_unique<ManifoldWorker>(options));
+    free_.clear();
+    for (const auto& worker : all_) worker->pairs.start_query(nullptr), free_.push_back(worker.get());
+  }
+  class Lease {
+   public:
+    explicit Lease(ManifoldWorkers& from) : from_(from), worker_(from.take()) {}
+    ~Lease() {
+      const std::lock_guard lock(from_.mutex_);
+      from_.free_.push_back(worker_);
+    }
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    ManifoldWorker& operator*() const { return *worker_; }
+
+   private:
+    ManifoldWorkers& from_;
+    ManifoldWorker* worker_;
+  };
+
+ private:
+  ManifoldWorker* take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) throw ComputationError("ManifoldFinder: Jobs runs more loop bodies at once than concurrency()");
+    ManifoldWorker* worker = free_.back();
+    free_.pop_back();
+    return worker;
+  }
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<ManifoldWorker>> all_;
+  std::vector<ManifoldWorker*> free_;
+};
+
+}  // namespace
+
+void ManifoldFinderOptions::validate() const {
+  for (const auto& [name, value] : {std::pair("recycle_distance", recycle_distance),
+                                    std::pair("recycle_turn", recycle_turn), std::pair("flush", flush)})
+    if (!(value >= 0.0 && value <= 0.1))
+      throw InvalidArgument("ManifoldFinderOptions: " + std::string(name) + " is " + std::to_string(value) +
+                            ", expected 0 to 0.1");
+}
+
+struct ManifoldFinder::Impl {
+  explicit Impl(const ManifoldFinderOptions& o) : options(o) { options.validate(); }
+
+  ManifoldFinderOptions options;
+  internal::GeometryCache geometries;
+  internal::ManifoldShapes shapes;
+  std::vector<ManifoldBody> bodies;
+  std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
+  BroadPhase broad_phase;
+  ContactGraph graph;
+  ContactFinder impacts;  ///< knows the same bodies
+  ManifoldWorkers workers;
+
+  // Of the query under way.
+  std::span<const BodyState> states;
+  std::span<const Index> some, awake;
+  double margin = 0.0;
+  Vec3 origin = Vec3::Zero();
+  std::vector<Index> to_place, near;
+  std::vector<Aabb> boxes;  ///< by entry of to_place
+  std::vector<BodyPair> pairs, merged_pairs;
+  std::vector<std::uint8_t> recycled;         ///< by pair
+  std::vector<std::size_t> first_of, counts;  ///< by pair: of its contacts, and how many
+  Counts told;
+
+  ManifoldBody& present(Index body, const char* function) {
+    if (!contains(body))
+      throw InvalidArgument("ManifoldFinder::" + std::string(function) + ": index " + std::to_string(body) +
+                            " holds no body, expected one that was added");
+    return at(body);
+  }
+  bool contains(Index body) const {
+    return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).present;
+  }
+  ManifoldBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
+  const ManifoldBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
+  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
+
+  void set_finds_itself(Index body, bool finds);
+  void check_and_list();
+  void make_boxes(Jobs& jobs);
+  void place();
+  void find_near_pairs(Jobs& jobs);
+  void merge_self_pairs();
+  PairQuery query_of(const BodyPair& pair) const;
+  void find_manifolds(Jobs& jobs);
+  bool keeps(const LivePair& pair, const PairQuery& query) const;
+  void make(LivePair& pair, const PairQuery& query, ManifoldWorker& worker);
+  RigidTransform smaller_in_larger(const PairQuery& query) const;
+  double slack(const PairQuery& query) const;
+  void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);
+  std::size_t write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker, ContactPoint* to) const;
+};
+
+// -- Bodies in the broad phase ----------------------------------------------------------------------------------------
+
+void ManifoldFinder::Impl::set_finds_itself(Index body, bool finds) {
+  const auto where = std::lower_bound(self_touching.begin(), self_touching.end(), body);
+  const bool listed = where != self_touching.end() && *where == body;
+  if (finds && !listed) self_touching.insert(where, body);
+  if (!finds && listed) self_touching.erase(where);
+  at(body).finds_itself = finds;
+}
+
+/// Refuses states before anything is changed, and lists the bodies whose place is to be made anew.
+void ManifoldFinder::Impl::check_and_list() {
+  to_place.clear();
+  const auto list = [this](Index index) {
+    if (static_cast<std::size_t>(index) >= states.size())
+      throw InvalidArgument("ManifoldFinder: " + std::to_string(states.size()) + " states, expected one for body " +
+                            std::to_string(index) + " too");
+    if (state(index).asleep && at(index).placed_asleep) return;
+    check_body_state(index, at(index), state(index));
+    to_place.push_back(index);
+  };
+  const std::span<const Index> known = some.empty() ? awake : some;
+  for (std::size_t i = 0; known.empty() && i < bodies.size(); ++i)
+    if (bodies[i].present) list(static_cast<Index>(i));
+  for (const Index index : known)
+    if (contains(index)) list(index);
+}
+
+/// About all that a body may pass through until the next query.
+void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
+  boxes.resize(to_place.size());
+  jobs.parallel_for(to_place.size(), internal::collision_tuning().finder.bodies_per_chunk,
+                    [this](std::size_t begin, std::size_t end) {
+                      const ManifoldWorkers::Lease worker(workers);
+                      for (std::size_t i = begin; i < end; ++i) {
+                        const ManifoldBody& body = at(to_place[i]);
+                        const BodyState& s = state(to_place[i]);
+                        if (body.half_space() != nullptr) continue;
+                        if (body.modal) bind_body_state((*worker).root, to_place[i], body, s);
+                        Aabb& box = boxes[i];
+                        box = body.modal ? internal::world_box((*worker).root.bounds(0), s.pose)
+                                         : internal::world_box(body.rigid->geometry, s.pose);
+                        box.include(Aabb{box.low + s.displacement, box.high + s.displacement});
+                        box = box.grown(s.reach);
+                      }
+                    });
+}
+
+void ManifoldFinder::Impl::place() {
+  for (std::size_t i = 0; i < to_place.size(); ++i) {
+    const Index index = to_place[i];
+    ManifoldBody& body = at(index);
+    const BodyState& s = state(index);
+    if (const HalfSpace* shape = body.half_space()) {
+      HalfSpace plane = internal::world_half_space(*shape, s.pose);
+      plane.offset += s.reach + std::max(0.0, plane.normal.dot(s.displacement));
+      broad_phase.set_half_space(index, plane);
+    } else {
+      broad_phase.set_box(index, boxes[i]);
+    }
+    body.pose = s.pose, body.turn = to_matrix(s.pose.q);
+    body.displacement = s.displacement, body.reach = s.reach;
+    body.placed_asleep = s.asleep;
+    broad_phase.set_asleep(index, s.asleep);
+  }
+}
+
+void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
+  check_and_list();
+  workers.start_query(options.narrow_phase, jobs.concurrency());
+  make_boxes(jobs);
+  place();
+  if (some.empty()) {
+    broad_phase.find_pairs(margin, pairs, jobs);
+  } else {
+    pairs.clear();
+    for (const Index index : to_place) {
+      near.clear();
+      broad_phase.find_near(index, margin, margin, near);
+      for (const Index other : near)
+        if (index < other || !asked_for(other)) pairs.push_back({std::min(index, other), std::max(index, other)});
+    }
+    std::sort(pairs.begin(), pairs.end());
+  }
+  for (const auto& [a, b] : pairs)
+    for (const Index index : {a, b})
+      if (state(index).asleep) check_body_state(index, at(index), state(index));
+}
+
+/// Bodies that find themselves and are awake, among the pairs in their order.
+void ManifoldFinder::Impl::merge_self_pairs() {
+  if (self_touching.empty()) return;
+  merged_pairs.clear();
+  auto next = pairs.begin();
+  for (const Index body : self_touching) {
+    if (state(body).asleep || !asked_for(body)) continue;
+    const BodyPair self{body, body};
+    for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
+    merged_pairs.push_back(self);
+  }
+  merged_pairs.insert(merged_pairs.end(), next, pairs.end());
+  pairs.swap(merged_pairs);
+}
+
+// -- Manifolds --------------------------------------------------------------------------------------------------------
+
+PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
+  const ManifoldBody &a = at(pair.a), &b = at(pair.b);
+  PairQuery q{.index_a = pair.a, .index_b = pair.b, .a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
+  const Quaternion to_a = a.pose.q.conjugate();
+  q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
+  q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
+  q.reach = margin + a.reach + b.reach + q.passing.way.norm();
+  return q;
+}
+
+RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q) const {
+  return q.a.radius <= q.b.radius ? q.X_AB.inverse() : q.X_AB;
+}
+
+/// How far points of the smaller body may come while a manifold is kept.
+double ManifoldFinder::Impl::slack(const PairQuery& q) const {
+  return options.recycle_distance * std::min(q.a.thickness, q.b.thickness) +
+         options.recycle_turn * std::min(q.a.radius, q.b.radius);
+}
+
+bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
+  const double farthest = options.recycle_distance * std::min(q.a.thickness, q.b.thickness);
+  if (!pair.known || q.reach > pair.reach + farthest) return false;
+  const RigidTransform X_LS = smaller_in_larger(q);
+  if (!((X_LS.p - pair.X_LS.p).norm() <= farthest)) return false;
+  if (!(2.0 * (X_LS.q * pair.X_LS.q.conjugate()).vector().norm() <= options.recycle_turn)) return false;
+  double bent = 0.0;
+  const double* z = pair.amplitudes.data();
+  for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
+    for (std::size_t i = 0; i < amplitudes.size(); ++i) {
+      const double change = std::abs(amplitudes[i] - *z++);
+      if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
+      bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
+    }
+  return bent <= farthest;
+}
+
+namespace {
+
+bool is_face(const FeatureSide& side) { return internal::kind_of(side.key) == Feature::Kind::kFace; }
+
+}  // namespace
+
+/// Contacts with a face turn with the body that has it.
+void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWorker& worker) {
+  worker.last.clear();
+  for (const KeptPoint& point : pair.points)
+    worker.last.push_back(static_cast<std::uint64_t>(point.a.key) << 32 | point.b.key);
+  PairQuery farther = q;
+  farther.reach += slack(q);
+  const RigidTransform X_BA = q.X_AB.inverse();
+  const BodyPair bodies_of{q.index_a, q.index_b};
+  const std::span<const FeatureContact> found = worker.pairs.find(farther, worker.last);
+  graph.make_room(pair, found.size());
+  for (const FeatureContact& c : found) {
+    KeptPoint point{.id = internal::contact_id(bodies_of, internal::feature_pair(c)), .a = c.a, .b = c.b};
+    point.a.point += q.a.rounding() * c.normal;
+    point.b.point = X_BA * (c.b.point - q.b.rounding() * c.normal);
+    point.turns_with_b = is_face(c.b) && !is_face(c.a);
+    point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
+    pair.points.push_back(point);
+  }
+  std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
+  pair.known = true;
+  pair.X_LS = smaller_in_larger(q);
+  pair.reach = q.reach;
+  pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
+  pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
+}
+
+void ManifoldFinder::Impl::find_manifolds(Jobs& jobs) {
+  graph.match(pairs, some.empty());
+  recycled.resize(pairs.size());
+  jobs.parallel_for(pairs.size(), internal::collision_tuning().finder.pairs_per_chunk,
+                    [this](std::size_t begin, std::size_t end) {
+                      const ManifoldWorkers::Lease worker(workers);
+                      for (std::size_t p = begin; p < end; ++p) {
+                        const PairQuery q = query_of(pairs[p]);
+                        recycled[p] = keeps(graph.at(p), q) ? 1 : 0;
+                        if (recycled[p] == 0) make(graph.at(p), q, *worker);
+                      }
+                    });
+  told = {static_cast<std::int64_t>(pairs.size()), std::count(recycled.begin(), recycled.end(), std::uint8_t{1})};
+}
+
+// -- Contacts ---------------------------------------------------------------------------------------------------------
+
+namespace {
+
+/// Where a kept point of a body is now, in the body's frame.
+Vec3 place_of(const FeatureSide& side, Index index, const ManifoldBody& body, const BodyState& state,
+              PairFinder& finder) {
+  if (!body.modal) return side.point;
+  DeformedSurface& surface = finder.surface(index, body, state);
+  const Triangle& t = body.modal->surface->triangle(side.triangle);
+  Vec3 p = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c)
+    if (side.weight[c] != 0.0) p += side.weight[c] * surface.vertex(t[c]);
+  return p;
+}
+
+ContactSide side_of(const FeatureSide& kept, Index index, const ManifoldBody& body, const Vec3& point_B) {
+  ContactSide side{.body = index, .point_B = point_B, .radius = body.rounding()};
+  if (body.modal) side.triangle = kept.triangle, side.weight = kept.weight;
+  return side;
+}
+
+}  // namespace
+
+/// The contacts that the expected motion may close, with gaps as they are now. The point of the body that the normal
+/// turns with is the foot of the other's point, as both slide along each other.
+std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker,
+                                        ContactPoint* to) const {
+  const ManifoldBody &a = at(pair.a), &b = at(pair.b);
+  const double radius_a = a.rounding(), radius_b = b.rounding(), near_enough = margin + a.reach + b.reach;
+  const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - origin;
+  std::size_t count = 0;
+  for (const KeptPoint& point : live.points) {
+    const Vec3 normal = (point.turns_with_b ? b.turn : a.turn) * point.normal;
+    Vec3 p_a = a.turn * place_of(point.a, pair.a, a, state(pair.a), worker.pairs) - radius_a * normal;
+    Vec3 p_b = b.turn * place_of(point.b, pair.b, b, state(pair.b), worker.pairs) + between + radius_b * normal;
+    const double gap = normal.dot(p_a - p_b);
+    if (gap > near_enough + std::max(0.0, -normal.dot(way))) continue;
+    if (point.turns_with_b && !b.modal) p_b = p_a - gap * normal;
+    if (!point.turns_with_b && !a.modal) p_a = p_b + gap * normal;
+    to[count++] = {side_of(point.a, pair.a, a, a.turn.transpose() * p_a),
+                   side_of(point.b, pair.b, b, b.turn.transpose() * (p_b - between)),
+                   normal,
+                   base + 0.5 * (p_a + p_b),
+                   gap,
+                   point.id};
+  }
+  return count;
+}
+
+void ManifoldFinder::Impl::write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs) {
+  first_of.resize(pairs.size() + 1);
+  counts.resize(pairs.size());
+  first_of[0] = 0;
+  for (std::size_t p = 0; p < pairs.size(); ++p) first_of[p + 1] = first_of[p] + graph.at(p).points.size();
+  contacts.resize(first_of.back());
+  jobs.parallel_for(pairs.size(), internal::collision_tuning().finder.pairs_per_chunk,
+                    [this, &contacts](std::size_t begin, std::size_t end) {
+                      const ManifoldWorkers::Lease worker(workers);
+                      for (std::size_t p = begin; p < end; ++p)
+                        counts[p] = write(graph.at(p), pairs[p], *worker, contacts.data() + first_of[p]);
+                    });
+  std::size_t count = 0;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    if (first_of[p] != count)
+      std::copy_n(contacts.begin() + static_cast<std::ptrdiff_t>(first_of[p]), counts[p],
+                  contacts.begin() + static_cast<std::ptrdiff_t>(count));
+    count += counts[p];
+  }
+  contacts.resize(count);
+}
+
+// -- The finder -------------------------------------------------------------------------------------------------------
+
+ManifoldFinder::ManifoldFinder(const ManifoldFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ManifoldFinder::~ManifoldFinder() = default;
+ManifoldFinder::ManifoldFinder(ManifoldFinder&&) noexcept = default;
+ManifoldFinder& ManifoldFinder::operator=(ManifoldFinder&&) noexcept = default;
+
+void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Impl& m = *impl_;
+  m.impacts.add_body(body, geometry, filter);  // which checks
+  ManifoldBody fresh{.present = true};
+  if (geometry.model) {
+    fresh.modal = m.geometries.get(geometry.model, geometry.skin);
+  } else {
+    fresh.rigid = m.shapes.get(geometry.shape);
+  }
+  const Aabb box = fresh.modal ? fresh.modal->surface->rest_bounds() : fresh.rigid->geometry.bounds();
+  fresh.thickness = fresh.half_space() ? kInfinity : 2.0 * box.half_extents().minCoeff();
+  fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
+  m.broad_phase.add(body, filter);
+  if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
+  m.graph.reserve(fresh.modes());
+  m.at(body) = std::move(fresh);
+  m.set_finds_itself(body, filter.self && m.at(body).modal);
+}
+
+void ManifoldFinder::remove_body(Index body) {
+  impl_->present(body, "remove_body");
+  impl_->set_finds_itself(body, false);
+  impl_->graph.forget(body);
+  impl_->broad_phase.remove(body);
+  impl_->impacts.remove_body(body);
+  impl_->at(body) = {};
+}
+
+void ManifoldFinder::set_filter(Index body, const CollisionFilter& filter) {
+  const ManifoldBody& known = impl_->present(body, "set_filter");
+  impl_->broad_phase.set_filter(body, filter);
+  impl_->impacts.set_filter(body, filter);
+  impl_->set_finds_itself(body, filter.self && known.modal);
+}
+
+void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) {
+  impl_->present(a, "exclude_pair");
+  impl_->present(b, "exclude_pair");
+  impl_->broad_phase.exclude_pair(a, b, excluded);
+  impl_->impacts.exclude_pair(a, b, excluded);
+}
+
+void ManifoldFinder::save_state(StateWriter& state) const {
+  state(static_cast<std::uint64_t>(impl_->graph.living()));
+  impl_->graph.for_each([&](const BodyPair& pair, const LivePair& live) { state(pair.a, pair.b, live); });
+}
+
+void ManifoldFinder::restore_state(StateReader& state) {
+  impl_->graph.forget_all();
+  for (auto left = state.read<std::uint64_t>(); left > 0; --left) {
+    const auto a = state.read<Index>();
+    const auto b = state.read<Index>();
+    state(impl_->graph.append({a, b}));
+  }
+  for (ManifoldBody& body : impl_->bodies) body.placed_asleep = false;
+}
+
+void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
+  Impl& m = *impl_;
+  if (!(query.margin >= 0.0 && std::isfinite(query.margin)))
+    throw InvalidArgument("ManifoldFinder: margin is " + std::to_string(query.margin) +
+                          ", expected a finite number of at least 0");
+  if (!query.origin.allFinite())
+    throw InvalidArgument("ManifoldFinder: origin is not finite, expected finite coordinates");
+  m.states = query.states, m.some = query.bodies, m.awake = query.awake;
+  m.margin = query.margin, m.origin = query.origin;
+  StageClock clock(query.times);
+  m.find_near_pairs(jobs);
+  m.merge_self_pairs();
+  clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
+  m.find_manifolds(jobs);
+  m.write_contacts(contacts, jobs);
+  clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
+}
+
+/// The places that it knows may be old where it is asked for a few bodies: it makes all of them anew.
+void ManifoldFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) {
+  ImpactQuery all = query;
+  all.bodies = {};
+  impl_->impacts.find_impacts(all, impacts, jobs);
+  if (query.bodies.empty()) return;
+  const auto asked = [&](Index body) { return std::ranges::binary_search(query.bodies, body); };
+  std::erase_if(impacts, [&](const Impact& impact) { return !asked(impact.a) && !asked(impact.b); });
+}
+
+const ManifoldFinder::Counts& ManifoldFinder::counts() const { return impl_->told; }
+
+}  // namespace limber

@@ -1,0 +1,178 @@
+#include "manifold/mesh_contacts.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "limber/collision/tree_traversal.h"
+
+namespace limber::internal {
+namespace {
+
+// Sine by which what meets at a feature may lean out of its Voronoi cone.
+constexpr double kLeaning = 1e-3;
+constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+
+bool below(PairSurface& mesh, Index t, const SupportPlane& plane) {
+  const TrianglePoints x = mesh.corners(t);
+  return std::ranges::all_of(x, [&](const Vec3& p) { return plane.normal.dot(p) - plane.offset <= plane.tolerance; });
+}
+
+/// Whether a contact along a direction goes: all that meets at the feature is below a plane that the body rests on.
+bool is_beneath(const MeshContacts::Query& q, FeatureKey feature, const Vec3& out) {
+  return std::ranges::any_of(q.planes, [&](const SupportPlane& plane) {
+    if ((out - plane.normal).norm() <= kSameNormal) return false;
+    bool all = true;
+    q.mesh.for_faces_at(feature, [&](Index t) { all = all && below(q.mesh, t, plane); });
+    return all;
+  });
+}
+
+}  // namespace
+
+/// The vertices that reach farthest along the direction are a vertex or an edge; nothing beside it may reach farther.
+bool MeshContacts::Cone::allows(const Vec3& out) {
+  const PairSurface::Face& face = mesh->face(triangle);
+  if (face.normal.dot(out) < -kLeaning) return false;
+  std::array<double, 3> height;
+  for (std::size_t c = 0; c < 3; ++c) height[c] = out.dot(face.x[c]);
+  const auto top = static_cast<std::size_t>(std::max_element(height.begin(), height.end()) - height.begin());
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::size_t d = (c + 1) % 3;
+    const double level = kLeaning * (face.x[d] - face.x[c]).norm();
+    if (std::min(height[c], height[d]) < height[top] - level) continue;
+    nearest = feature_key(Feature::Kind::kEdge, mesh->surface().edge_of(triangle, static_cast<int>(c)));
+    FeatureSide edge;
+    edge.key = nearest;
+    if (mesh->behind(edge, out, kLeaning)) return true;
+  }
+  FeatureSide vertex;
+  vertex.key = nearest = feature_key(Feature::Kind::kVertex, mesh->surface().triangle(triangle)[top]);
+  return mesh->behind(vertex, out, kLeaning);
+}
+
+void MeshContacts::find(const Query& q, std::vector<FeatureContact>& found) {
+  found_ = &found;
+  if (q.core.faces.empty())
+    find_rounded(q);
+  else if (!leave_as_a_whole(q))
+    find_polytope(q);
+}
+
+// -- Balls and capsules -----------------------------------------------------------------------------------------------
+
+/// The local minima of the distance.
+void MeshContacts::find_rounded(const Query& q) {
+  const std::size_t first = found_->size();
+  core_contacts_.find(q.mesh, {{q.core.points.front(), q.core.points.back()}, q.core.points.size() == 2, q.core.radius},
+                      q.reach, *found_);
+  const auto goes = [&](const FeatureContact& c) {
+    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q, c.a.key, -c.normal);
+  };
+  found_->erase(std::remove_if(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), goes),
+                found_->end());
+  for (std::size_t i = first; i < found_->size(); ++i) {
+    FeatureContact& c = (*found_)[i];
+    c = {c.b, c.a, -c.normal, c.gap};
+    c.b.key = named(q.facets, c.b.key);
+  }
+}
+
+// -- Boxes and hulls --------------------------------------------------------------------------------------------------
+
+/// A body whose middle is inside of what the mesh bounds goes out along one direction, to the nearest point of it.
+bool MeshContacts::leave_as_a_whole(const Query& q) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : q.core.points) middle += p;
+  middle /= static_cast<double>(q.core.points.size());
+  if (!q.mesh.may_hold(middle)) return false;
+  const PairSurface::Nearest nearest = q.mesh.nearest(middle, std::numeric_limits<double>::infinity());
+  if (!nearest.inside) return false;
+  const Vec3 out = nearest.distance > q.mesh.directionless() ? Vec3((nearest.foot.point - middle) / nearest.distance)
+                                                             : unit_or(nearest.outward, Vec3::UnitZ());
+  const FeatureKey facet = feature_key(Feature::Kind::kFace, q.facets.facet(nearest.triangle));
+  for (std::size_t v = 0; v < q.core.points.size(); ++v) {
+    const Vec3& p = q.core.points[v];
+    const double gap = out.dot(p - nearest.foot.point);
+    found_->push_back({{feature_key(Feature::Kind::kVertex, static_cast<Index>(v)), -1, {}, p},
+                       {facet, -1, {}, p - gap * out},
+                       out,
+                       gap});
+  }
+  return true;
+}
+
+void MeshContacts::find_polytope(const Query& q) {
+  const RigidTransform X_SP = q.mesh.pose().inverse();
+  Aabb box, box_S;
+  for (const Vec3& p : q.core.points) box.include(p), box_S.include(X_SP * p);
+  box = box.grown(q.reach);
+  triangles_.clear();
+  find_triangles_in_box(q.mesh.deformed(), box_S.grown(q.reach), triangles_);
+  for (const Index t : triangles_)
+    if (box.overlaps(q.mesh.face(t).box)) on_triangle(q, t);
+}
+
+void MeshContacts::on_triangle(const Query& q, Index t) {
+  const PairSurface::Face& face = q.mesh.face(t);
+  if (face.normal.isZero(0.0)) return;
+  const double offset = face.normal.dot(face.x[0]);
+  const std::size_t first = found_->size();
+  if (triangle_.faces.empty()) {
+    triangle_.points.resize(3), triangle_.edge_directions.resize(3);
+    triangle_.loops = triangle_.loop_edges = {0, 1, 2};
+    triangle_.faces.resize(1);
+  }
+  triangle_.faces[0] = {face.normal, offset, 0, 3};
+  for (std::size_t c = 0; c < 3; ++c) {
+    triangle_.points[c] = face.x[c];
+    triangle_.edge_directions[c] = (face.x[(c + 1) % 3] - face.x[c]).normalized();
+  }
+  cone_.mesh = &q.mesh, cone_.triangle = t;
+  bool flush = false;
+  for (const SupportPlane& plane : q.planes) {
+    if (!below(q.mesh, t, plane)) continue;
+    if ((face.normal - plane.normal).norm() > kSameNormal) return;
+    flush = true;
+  }
+  convex_.find_on_triangle(q.core, triangle_, {q.reach, q.passing, q.facets.has_active_edge(t) && !flush, flush}, cone_,
+                           *found_);
+  name(q, t, first);
+}
+
+/// Features of the triangle become those of the mesh. Cuts along an edge within a facet, and its vertices there, are no
+/// corners of what touches.
+void MeshContacts::name(const Query& q, Index t, std::size_t first) {
+  std::size_t kept = first;
+  for (std::size_t i = first; i < found_->size(); ++i) {
+    FeatureContact c = (*found_)[i];
+    const Index local = index_of(c.b.key);
+    switch (c.b.key >> 30) {
+      case static_cast<FeatureKey>(Feature::Kind::kFace):
+        c.b.key = feature_key(Feature::Kind::kFace, q.facets.facet(t));
+        break;
+      case static_cast<FeatureKey>(Feature::Kind::kEdge):
+        c.b.key = feature_key(Feature::Kind::kEdge, q.mesh.surface().edge_of(t, static_cast<int>(local)));
+        if (q.facets.around_edge(index_of(c.b.key)) >= 0) continue;
+        break;
+      case static_cast<FeatureKey>(Feature::Kind::kVertex):
+        c.b.key = feature_key(Feature::Kind::kVertex, q.mesh.surface().triangle(t)[static_cast<std::size_t>(local)]);
+        if (q.facets.around_vertex(index_of(c.b.key)) >= 0) continue;
+        break;
+      default:  // nearest points
+        c.b.key = cone_.nearest;
+    }
+    (*found_)[kept++] = c;
+  }
+  found_->resize(kept);
+}
+
+/// What is within a facet is called by it.
+FeatureKey MeshContacts::named(const MeshFacets& facets, FeatureKey key) {
+  const Index index = index_of(key);
+  const Index facet = kind_of(key) == Feature::Kind::kFace   ? facets.facet(index)
+                      : kind_of(key) == Feature::Kind::kEdge ? facets.around_edge(index)
+                                                             : facets.around_vertex(index);
+  return facet >= 0 ? feature_key(Feature::Kind::kFace, facet) : key;
+}
+
+}  // namespace limber::internal

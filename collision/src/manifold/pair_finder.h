@@ -1,0 +1,81 @@
+// What finds the contacts of one pair, by the kinds of its two bodies.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "finder/surface_pool.h"
+#include "limber/dynamics/contact_source.h"
+#include "manifold/manifold_body.h"
+#include "manifold/mesh_contacts.h"
+#include "narrow/convex_contacts.h"
+
+namespace limber::internal {
+
+/// A pair as it is asked for. Contacts are told in the frame of a, by feature, each pair of features once.
+struct PairQuery {
+  Index index_a = -1, index_b = -1;  ///< equal: a body with itself
+  const ManifoldBody &a, &b;
+  const BodyState &state_a, &state_b;
+  RigidTransform X_AB{};
+  double reach = 0.0;  ///< m: gaps up to here are wanted
+  Passing passing{};
+  /// Planes that a, or b, rests on beside the other: what of the other reaches no farther is touched along these alone.
+  /// In the frame of a, or of b.
+  std::span<const SupportPlane> planes_a{}, planes_b{};
+};
+
+/// Finds the contacts of pairs in which a surface deforms: what may take the place of NarrowPhase there. Calls of
+/// find() come from many threads at once.
+class DeformingPairs {
+ public:
+  virtual ~DeformingPairs() = default;
+  virtual void add_body(Index index, const ManifoldBody& body) = 0;
+  virtual void remove_body(Index index) = 0;
+  /// Once a query, before any pair: all states are checked. @param awake bodies whose state may be another than in the
+  /// last query, ascending
+  virtual void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
+                           std::span<const Index> awake, Jobs& jobs) = 0;
+  /// Whether it finds the contacts of two bodies, of which one deforms at least.
+  virtual bool takes(const ManifoldBody& a, const ManifoldBody& b) const = 0;
+  /// Appends.
+  virtual void find(const PairQuery& query, std::vector<FeatureContact>& found) = 0;
+};
+
+/// Finds the contacts of all pairs; the scratch of one thread.
+class PairFinder {
+ public:
+  explicit PairFinder(const NarrowPhaseOptions& options) : narrow_(options) {}
+
+  void start_query(DeformingPairs* deforming) { pool_.start_query(), deforming_ = deforming; }
+  /// Until the next call. Of rigid pairs at most kManifoldPoints to a patch.
+  /// @param last feature_pair() of those of the last manifold
+  std::span<const FeatureContact> find(const PairQuery& query, std::span<const std::uint64_t> last);
+
+  /// A body that deforms, in its state of this query.
+  DeformedSurface& surface(Index index, const ManifoldBody& body, const BodyState& state) {
+    return pool_.get(index, SurfacePool::Instant::kNow, body.modal->surface, state.amplitudes,
+                     BoundsChoice::kAutomatic);
+  }
+
+ private:
+  void between_convex(const PairQuery& query, const ConvexCore& a, const ConvexCore& b);
+  void against_ground(const PairQuery& query, const ManifoldBody& body, const ManifoldBody& ground,
+                      const RigidTransform& X_BG, const Vec3& way);
+  void on_half_space(const ConvexCore& core, const RigidTransform& X_BH, const HalfSpace& shape, double reach);
+  void keep_each_once();
+  void by_narrow_phase(const PairQuery& query);
+  CollisionBody collision_body(Index index, const ManifoldBody& body, const BodyState& state);
+
+  ConvexContacts convex_;
+  MeshContacts mesh_contacts_;
+  DeformedSurface rigid_;  // that does not
+  PairSurface mesh_;
+  NarrowPhase narrow_;
+  SurfacePool pool_;
+  DeformingPairs* deforming_ = nullptr;
+  std::vector<ContactPoint> contacts_;
+  std::vector<FeatureContact> found_;
+};
+
+}  // namespace limber::internal
