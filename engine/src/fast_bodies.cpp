@@ -13,8 +13,7 @@ void NearPairs::list_touching(std::span<const ContactPoint> in_force, double wit
     if (c.gap <= within || std::ranges::find(crept, pair) != crept.end()) touching.push_back(pair);
   }
   std::ranges::sort(touching);
-  const auto [begin, end] = std::ranges::unique(touching);
-  touching.erase(begin, end);
+  touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
 }
 
 /// Half-spaces are planes for good.
