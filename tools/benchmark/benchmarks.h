@@ -22,7 +22,7 @@ std::function<void(Program&)> add_stability(CLI::App& programs);
 /// `error`: scenes beside finite elements of all their nodes, error against time.
 std::function<void(Program&)> add_error(CLI::App& programs);
 
-/// `peers`: the same work in Bullet and MuJoCo.
+/// `peers`: the same work in Box3D, Bullet and MuJoCo.
 std::function<void(Program&)> add_peers(CLI::App& programs);
 
 }  // namespace limber::tools

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 #if LIMBER_HAS_PRECOMPUTE
   benchmarks.push_back(add_stability(program.options()));
   benchmarks.push_back(add_error(program.options()));
-#if LIMBER_HAS_BULLET || LIMBER_HAS_MUJOCO
+#if LIMBER_HAS_BOX3D || LIMBER_HAS_BULLET || LIMBER_HAS_MUJOCO
   benchmarks.push_back(add_peers(program.options()));
 #endif
 #endif

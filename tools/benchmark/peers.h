@@ -1,6 +1,6 @@
 /// @file peers.h
-/// The same work in other engines: piles of rigid bodies in Bullet and MuJoCo, and Bullet's reduced deformable body on
-/// limber's own modes. Built only where the engines are found; for limber-benchmark alone.
+/// The same work in other engines: piles of rigid bodies in Box3D, Bullet and MuJoCo, and Bullet's reduced deformable
+/// body on limber's own modes. Built only where the engines are found; for limber-benchmark alone.
 #pragma once
 
 #include <memory>
@@ -38,12 +38,19 @@ struct PileStep {
   double deepest = 0.0;  ///< overlap, m
 };
 
+/// Motion of a body, in the world.
+struct PileMotion {
+  RigidTransform pose{};
+  Vec3 velocity = Vec3::Zero();          ///< of the body origin, m/s
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s
+};
+
 /// A pile in one engine. Nothing sleeps.
 class PileEngine {
  public:
   virtual ~PileEngine() = default;
   virtual PileStep step() = 0;
-  virtual Vec3 place(std::size_t body) const = 0;
+  virtual PileMotion motion(std::size_t body) const = 0;
 };
 
 /// Nodes with lumped masses and modes that are orthonormal in them.
@@ -69,6 +76,9 @@ struct ReducedCost {
   bool is_finite = true;
 };
 
+#if LIMBER_HAS_BOX3D
+std::unique_ptr<PileEngine> box3d_pile(const RigidPile& pile);
+#endif
 #if LIMBER_HAS_BULLET
 std::unique_ptr<PileEngine> bullet_pile(const RigidPile& pile);
 ReducedCost run_bullet(const ReducedBody& body, const ReducedRun& run);

@@ -21,6 +21,9 @@ btVector3 bullet(const Vec3& v) {
   return {static_cast<btScalar>(v.x()), static_cast<btScalar>(v.y()), static_cast<btScalar>(v.z())};
 }
 btScalar bullet(double x) { return static_cast<btScalar>(x); }
+Vec3 vector(const btVector3& v) {
+  return {static_cast<double>(v.x()), static_cast<double>(v.y()), static_cast<double>(v.z())};
+}
 
 std::unique_ptr<btCollisionShape> bullet_shape(const Shape& shape) {
   if (const auto* box = std::get_if<Box>(&shape)) return std::make_unique<btBoxShape>(bullet(box->half_extents));
@@ -65,9 +68,14 @@ class BulletPile final : public PileEngine {
     }
     return out;
   }
-  Vec3 place(std::size_t body) const override {
-    const btVector3& p = moving_[body]->getWorldTransform().getOrigin();
-    return {static_cast<double>(p.x()), static_cast<double>(p.y()), static_cast<double>(p.z())};
+  PileMotion motion(std::size_t body) const override {
+    const btRigidBody& b = *moving_[body];
+    const btQuaternion q = b.getWorldTransform().getRotation();
+    return {.pose = {{static_cast<double>(q.w()), static_cast<double>(q.x()), static_cast<double>(q.y()),
+                      static_cast<double>(q.z())},
+                     vector(b.getWorldTransform().getOrigin())},
+            .velocity = vector(b.getLinearVelocity()),
+            .angular_velocity = vector(b.getAngularVelocity())};
   }
 
  private:

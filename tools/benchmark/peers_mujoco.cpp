@@ -65,9 +65,13 @@ class MujocoPile final : public PileEngine {
     for (int i = 0; i < data_->ncon; ++i) out.deepest = std::max(out.deepest, -data_->contact[i].dist);
     return out;
   }
-  Vec3 place(std::size_t body) const override {
+  PileMotion motion(std::size_t body) const override {
     const mjtNum* p = data_->qpos + 7 * body;
-    return {p[0], p[1], p[2]};
+    const mjtNum* v = data_->qvel + 6 * body;
+    const Quaternion q{p[3], p[4], p[5], p[6]};
+    return {.pose = {q, Vec3(p[0], p[1], p[2])},
+            .velocity = Vec3(v[0], v[1], v[2]),
+            .angular_velocity = q * Vec3(v[3], v[4], v[5])};  // of free joints: in the body's axes
   }
 
  private:

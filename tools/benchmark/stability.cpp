@@ -16,6 +16,7 @@
 
 #include "../cpu_time.h"
 #include "figures.h"
+#include "growing_table.h"
 #include "limber/constraints/contact_constraint.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -302,6 +303,25 @@ std::vector<Figure> figures_of(const std::map<std::string, SceneTally>& tallies)
   return figures;
 }
 
+/// The cases of a grid that are asked for.
+std::vector<StabilityCase> cases_of(const std::vector<StabilityCase>& grid, const StabilityArguments& a) {
+  std::vector<StabilityCase> cases;
+  for (std::size_t i = static_cast<std::size_t>(a.first); i < grid.size(); i += static_cast<std::size_t>(a.every))
+    if (a.scenes.empty() || std::ranges::find(a.scenes, testing::name(grid[i].scene)) != a.scenes.end())
+      cases.push_back(grid[i]);
+  return cases;
+}
+
+/// A line of a case at fault, and of the simplest one like it where that is asked for.
+void tell_if_bad(Program& program, const CaseRow& row, const StabilityArguments& a) {
+  if (row.faults == 0 && row.seen) return;
+  program.print(verdict(row) + ": " + testing::text(row.at) + "\n");
+  if (!a.simplify || !row.seen) return;
+  program.progress().stage("simplifying " + testing::text(row.at));
+  const CaseRow simple = simplest(row, a.steps);
+  program.print("    as in " + verdict(simple) + ": " + testing::text(simple.at) + "\n");
+}
+
 void benchmark_stability(Program& program, const StabilityArguments& a) {
   if (!a.peer.empty() && !testing::has_bullet())
     throw InvalidArgument("--peer: this build found no Bullet (apt-get install libbullet-dev, then configure anew)");
@@ -309,31 +329,28 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
                                               ? testing::energy_grid(a.recovers ? ContactOptions{}.recovery_speed : 0.0)
                                               : testing::extreme_cases(a.random);
   const KnownRows known = read_known(program, a.known);
+  const std::vector<StabilityCase> cases = cases_of(grid, a);
+  GrowingTable csv(a.csv, csv_head());
   std::vector<CaseRow> rows;
   std::map<std::string, SceneTally> tallies;
-  for (std::size_t i = static_cast<std::size_t>(a.first); i < grid.size(); i += static_cast<std::size_t>(a.every)) {
-    if (!a.scenes.empty() &&
-        std::find(a.scenes.begin(), a.scenes.end(), testing::name(grid[i].scene)) == a.scenes.end())
-      continue;
-    program.progress().stage(testing::text(grid[i]));
-    rows.push_back(try_case(grid[i], a.steps, !a.peer.empty(), known));
-    tallies[testing::name(grid[i].scene)].add(rows.back());
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    program.progress().stage(fmt::format("case {} of {}: {}", i + 1, cases.size(), testing::text(cases[i])));
+    rows.push_back(try_case(cases[i], a.steps, !a.peer.empty(), known));
+    csv.add(csv_of(rows.back()));
+    tell_if_bad(program, rows.back(), a);
+    SceneTally& tally = tallies[testing::name(cases[i].scene)];
+    tally.add(rows.back());
     tallies["all"].add(rows.back());
+    if (i + 1 == cases.size() || cases[i + 1].scene != cases[i].scene)
+      program.print(fmt::format("{}: {} of {} cases good, {} of {} done\n", testing::name(cases[i].scene), tally.good,
+                                tally.cases, i + 1, cases.size()));
   }
-  program.print(head());
+  program.print("\n" + head());
   for (const auto& [scene, tally] : tallies)
     if (scene != "all") program.print(line(scene, tally));
   const SceneTally& all = tallies["all"];
   program.print(line("all", all));
   if (!a.peer.empty()) program.print(peer_table(rows));
-  for (const CaseRow& row : rows) {
-    if (row.faults == 0 && row.seen) continue;
-    program.print(verdict(row) + ": " + testing::text(row.at) + "\n");
-    if (!a.simplify || !row.seen) continue;
-    program.progress().stage("simplifying " + testing::text(row.at));
-    const CaseRow simple = simplest(row, a.steps);
-    program.print("    as in " + verdict(simple) + ": " + testing::text(simple.at) + "\n");
-  }
 
   Json& report = program.report();
   report["benchmark"] = "stability";
@@ -346,13 +363,9 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   report["steps"] = all.steps;
   report["unsettled_steps"] = all.unsettled;
   report["worst_rise"] = all.worst_rise;
-  if (!a.csv.empty()) {
-    std::string csv = csv_head() + "\n";
-    for (const CaseRow& row : rows) csv += csv_of(row) + "\n";
-    program.write_file(a.csv, csv);
-  }
   if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows));
   if (!a.limits.empty()) hold_to_limits(program, figures_of(tallies), a.limits);
+  csv.finish(program);
 }
 
 void declare(CLI::App& app, StabilityArguments& a) {
@@ -394,7 +407,7 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->delimiter(',');
   app.add_option("--check", a.limits, "hold the counts of faults to these limits, and fail beyond them")
       ->type_name("FILE.json");
-  app.add_option("--csv", a.csv, "write the table")->type_name("FILE.csv");
+  app.add_option("--csv", a.csv, "write the table; rows stand in FILE.csv.part as they come")->type_name("FILE.csv");
   app.add_option("--plot", a.plot, "plot the share of faults over stiffness and step (needs gnuplot)")
       ->type_name("FILE.svg");
 }

@@ -89,6 +89,7 @@ int Program::run(int argc, const char* const* argv, const std::function<void()>&
 void Program::print(std::string_view text) {
   progress_.clear();
   std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);  // finish() looks whether it failed
 }
 
 void Program::write_file(const std::filesystem::path& path, std::string_view bytes) {

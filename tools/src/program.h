@@ -52,7 +52,7 @@ class Program {
   /// "limber-inspect 0.1.0"
   std::string name_and_version() const;
 
-  /// Text for people on stdout.
+  /// Text for people on stdout, there at once.
   void print(std::string_view text);
 
   /// Tells of a file that the work reads: no output may take its place.
