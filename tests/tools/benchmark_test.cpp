@@ -39,6 +39,21 @@ class BenchmarkProgram : public ::testing::Test {
   const std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "limber_benchmark_test";
 };
 
+TEST_F(BenchmarkProgram, SoakTellsOfEachSeedWhichLawsItsStepsKept) {
+  const ProgramResult r = run({"soak", "--steps", "20", "--seed", "1,2", "--csv", "s.csv", "--report", "s.json"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const auto report = json("s.json");
+  ASSERT_EQ(report.at("seeds").size(), 2u);
+  long broken = 0;
+  for (const auto& seed : report.at("seeds")) {
+    EXPECT_EQ(seed.at("steps"), 20);
+    EXPECT_EQ(seed.at("laws").at("finite").at("broken"), 0);
+    for (const auto& law : seed.at("laws")) broken += law.at("broken").get<long>();
+  }
+  EXPECT_EQ(lines("s.csv"), 1 + broken);
+  EXPECT_FALSE(exists("s.csv.part"));
+}
+
 TEST_F(BenchmarkProgram, StabilityTellsEachSceneAndWritesEachCase) {
   const ProgramResult r = run({"stability", "--random", "0", "--scene", "flight,handle", "--every", "40", "--steps",
                                "2", "--csv", "s.csv", "--report", "s.json"});

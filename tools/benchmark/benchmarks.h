@@ -19,6 +19,9 @@ std::function<void(Program&)> add_step(CLI::App& programs);
 /// `stability`: cases driven to the ends of every axis, each with a verdict.
 std::function<void(Program&)> add_stability(CLI::App& programs);
 
+/// `soak`: hands that drag bodies for hours, every step held to laws.
+std::function<void(Program&)> add_soak(CLI::App& programs);
+
 /// `error`: scenes beside finite elements of all their nodes, error against time.
 std::function<void(Program&)> add_error(CLI::App& programs);
 

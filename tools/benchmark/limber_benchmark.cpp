@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   std::vector<std::function<void(Program&)>> benchmarks{add_step(program.options())};
 #if LIMBER_HAS_PRECOMPUTE
   benchmarks.push_back(add_stability(program.options()));
+  benchmarks.push_back(add_soak(program.options()));
   benchmarks.push_back(add_error(program.options()));
 #if LIMBER_HAS_BOX3D || LIMBER_HAS_BULLET || LIMBER_HAS_MUJOCO
   benchmarks.push_back(add_peers(program.options()));
