@@ -163,7 +163,9 @@ Json joints(const std::vector<JointReport>& reports) {
 }
 
 Json constraints(const ConstraintSummary& sum) {
-  return {{"unsettled_steps", sum.unsettled},
+  return {{"limit_steps", sum.limit_steps},
+          {"failed_steps", sum.failed_steps},
+          {"largest_residual", sum.largest_residual},
           {"energy_removed", sum.energy_removed},
           {"contacts_begun", sum.begun},
           {"contacts_ended", sum.ended},
@@ -275,12 +277,14 @@ void record(Program& program, const Arguments& a, const Trajectory& trajectory) 
                             trajectory.key_interval, 1e-6 * static_cast<double>(recording.glb.size())));
 }
 
-void warn_of_unsettled(Program& program, const RunResult& r) {
-  if (r.constraints.unsettled == 0) return;
-  program.warnings().push_back(fmt::format(
-      "in {} of {} steps contacts, joints or handles did not come to their targets; try \"substeps\" or a smaller "
-      "\"step\"",
-      r.constraints.unsettled, r.steps));
+void warn_of_limits(Program& program, const RunResult& r) {
+  const ConstraintSummary& sum = r.constraints;
+  if (sum.limit_steps + sum.failed_steps == 0) return;
+  program.warnings().push_back(
+      fmt::format("of {} steps {} ended at a limit of the solver and {} failed: contacts, joints or handles are off by "
+                  "up to {:.3g} "
+                  "tolerances; try \"substeps\" or a smaller \"step\"",
+                  r.steps, sum.limit_steps, sum.failed_steps, sum.largest_residual));
 }
 
 /// Without what differs between equal runs, and that.
@@ -345,7 +349,7 @@ void simulate(Program& program, const Arguments& a) {
   if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
   if (!a.contacts.empty()) program.write_file(a.contacts, contacts_csv(result.trajectory));
   write_manifest(program, a, scene, use);
-  warn_of_unsettled(program, result);
+  warn_of_limits(program, result);
   program.report()["seconds"] = {
       {"total", std::chrono::duration<double>(Clock::now() - began).count()},
       {"advance", result.seconds_advance},

@@ -93,7 +93,7 @@ class Scene {
       result.total_rise = std::max(result.total_rise, (now - first) / scale_);
       result.node_worst_rise = std::max(result.node_worst_rise, (node_now - node_before) / scale_);
       result.node_total_rise = std::max(result.node_total_rise, (node_now - node_first) / scale_);
-      if (!world_.constraint_report().solved) ++result.unsettled;
+      if (world_.constraint_report().statuses.worst() == IslandStatus::kFailed) ++result.unsettled;
       result.energy_digits = std::max(result.energy_digits, energy_digits());
       result.largest_turn = std::max(result.largest_turn, largest_turn());
       result.removed += world_.constraint_report().energy_removed / scale_;

@@ -66,7 +66,7 @@ struct StabilityResult {
   double largest_turn = 0.0;     ///< by which a body turned in a step, rad
   double off_target = 0.0;       ///< of the held point or the joints, over the bar's length
   double momentum_error = 0.0;   ///< of the mass centre's parabola and of the angular momentum, relative; kFlight
-  int steps = 0, unsettled = 0;  ///< steps; those in which some island did not come to its targets
+  int steps = 0, unsettled = 0;  ///< steps; those in which some island failed (IslandStatus::kFailed)
 };
 
 /// Runs a case. @throws InputError if the bake does not take the material or the mesh

@@ -177,9 +177,9 @@ void ConstraintStage::refine(Jobs& jobs) {
   });
 }
 
-bool ConstraintStage::are_settled() const {
+bool ConstraintStage::are_accepted() const {
   return std::all_of(solvers_.begin(), solvers_.begin() + static_cast<std::ptrdiff_t>(islands_.size()),
-                     [](const IslandSolver& solver) { return solver.foreseen().status == SolveStatus::kSolved; });
+                     [](const IslandSolver& solver) { return solver.foreseen().accepted; });
 }
 
 void ConstraintStage::foresee_island(std::size_t island) {
@@ -234,7 +234,9 @@ StageTimes ConstraintStage::times() const {
 }
 
 void ConstraintStage::add_report(const IslandReport& r, IslandReport& sum) {
-  if (r.status != SolveStatus::kSolved) sum.status = r.status;
+  sum.status = std::max(sum.status, r.status);
+  sum.statuses.add(r.statuses);
+  sum.accepted = sum.accepted && r.accepted;
   sum.bodies += r.bodies;
   sum.rows += r.rows;
   sum.attempts.add(r.attempts);

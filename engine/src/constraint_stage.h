@@ -43,8 +43,8 @@ class ConstraintStage {
   void find_islands(std::span<const Index> awake);
   /// Finds where the step takes all islands, BodyGroup::predicted_frame() and the like; nothing moves yet.
   void foresee(Jobs& jobs, const IslandOptions& options);
-  /// Whether all islands settle, as foreseen.
-  bool are_settled() const;
+  /// Whether all islands take the step as they are foreseen (IslandReport::accepted).
+  bool are_accepted() const;
   /// Solves to the law what has been foreseen roughly.
   void refine(Jobs& jobs);
   /// Advances them.

@@ -70,7 +70,7 @@ bool ContactSearch::find_again_along_foreseen(Jobs& jobs, StageClock& clock) {
   std::swap(found_, known_);
   find(jobs, clock);
   const bool others_move = waited || fast_->any() || sleep_->wakings() != wakings;
-  if (others_move || !constraints_->are_settled() || are_met(known_)) return true;
+  if (others_move || !constraints_->are_accepted() || are_met(known_)) return true;
   keep_known();
   return false;
 }

@@ -162,7 +162,8 @@ void World::Impl::add_to_report(const IslandReport& substep) {
   sum.bodies = substep.bodies;
   sum.rows = substep.rows;
   sum.energy_removed += substep.energy_removed;
-  sum.solved = sum.solved && substep.status == SolveStatus::kSolved;
+  sum.statuses.add(substep.statuses);
+  sum.solved = sum.statuses.worst() == IslandStatus::kSolved;
   sum.iterations = std::max(sum.iterations, substep.iterations);
   sum.newton_steps = std::max(sum.newton_steps, substep.newton_steps);
   sum.residual = std::max(sum.residual, substep.change);

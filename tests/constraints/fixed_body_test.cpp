@@ -43,7 +43,7 @@ Vec3 carried_point(FrameMotion motion, int steps, bool in_an_island) {
   for (int i = 0; i < steps; ++i) {
     island.group.set_parent(body, turntable((i + 1) * h, (i + 0.5) * h));
     if (in_an_island)
-      EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+      EXPECT_EQ(island.step().status, IslandStatus::kSolved);
     else
       island.group.advance(0, 1, {0.0, 0.0, -testing::kGravity});
   }
@@ -74,7 +74,7 @@ double largest_rise(FrameMotion motion, double hz, double step, bool guard) {
   const double scale = island.energy_scale();
   double before = kUnbounded, rise = -kUnbounded;  // the first step brings the blow to rest at the held point
   for (int i = 0; i < 60; ++i) {
-    EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+    EXPECT_EQ(island.step().status, IslandStatus::kSolved);
     EXPECT_LT(held.error(), 1e-10);
     rise = std::max(rise, (island.energy() - before) / scale);
     before = island.energy();
@@ -100,7 +100,7 @@ TEST(FixedBodies, SwingAboutTheirLinesAlone) {
   hand.set_target({.position = island.group.position(body, kMarked) + Vec3(0.4, 0.2, 0.3)});
   double turned = 0.0;
   for (int i = 0; i < 60; ++i) {
-    EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+    EXPECT_EQ(island.step().status, IslandStatus::kSolved);
     const RigidTransform& pose = island.group.frame(body).pose();
     EXPECT_EQ(pose.p, Vec3::Zero());
     EXPECT_LT(pose.q.vector().tail<2>().norm(), 1e-15);

@@ -42,7 +42,7 @@ TEST(Joint, EveryTypeLeavesItsFreedomsAndLocksTheOthers) {
       const JointSpec spec{.type = type};
       add_chain(island, 2, spec, false);
       island.group.apply_generalized_impulse(1, {0.3, -0.2, 0.4}, {0.05, 0.08, -0.06}, {});
-      for (int step = 0; step < 60; ++step) EXPECT_EQ(island.step().status, SolveStatus::kSolved);
+      for (int step = 0; step < 60; ++step) EXPECT_EQ(island.step().status, IslandStatus::kSolved);
       EXPECT_LT(island.joint_error(), 1e-9) << to_string(type);
       const JointFreedoms free = freedoms(type);
       for (int i = 0; i < free.rotations + free.translations; ++i)
@@ -143,7 +143,7 @@ Unguarded run_without_guard(const JointSpec& spec, const SampleOptions& sample, 
   const double first = island.energy();
   double before = first, scale = island.energy_scale();
   for (double time = 0.0; time < seconds; time += step) {
-    if (island.step().status != SolveStatus::kSolved) ++seen.unsettled;
+    if (island.step().status != IslandStatus::kSolved) ++seen.unsettled;
     scale = std::max(scale, island.energy_scale());  // what slides freely falls far
     const double now = island.energy();
     seen.rise = std::max(seen.rise, (now - before) / scale);

@@ -152,7 +152,8 @@ TEST_F(Programs, SimulateTellsWhatTouchedHungAndWasHeld) {
   EXPECT_EQ(report.at("contact").at("method"), "complementary");
   EXPECT_EQ(report.at("contact").at("friction_model"), "cone");
   EXPECT_GT(report.at("constraints").at("contacts_begun"), 0);
-  EXPECT_EQ(report.at("constraints").at("unsettled_steps"), 0);
+  EXPECT_EQ(report.at("constraints").at("limit_steps"), 0);
+  EXPECT_EQ(report.at("constraints").at("failed_steps"), 0);
   EXPECT_EQ(report.at("joints").at(0).at("position").size(), 3u);
   EXPECT_TRUE(report.at("joints").at(0).at("a").is_null());
   EXPECT_LT(report.at("joints").at(0).at("largest_distance_error"), 1e-9);

@@ -95,7 +95,7 @@ class Measurement {
     const ConstraintReport report = world.constraint_report();
     cost_.iterations += report.iterations;
     cost_.newton_steps += report.newton_steps;
-    cost_.unsettled += report.solved ? 0 : 1;
+    cost_.unsettled += report.statuses.worst() == IslandStatus::kFailed ? 1 : 0;
   }
 
   void draw() {

@@ -75,9 +75,9 @@ export class Engine {
   hash() { return this.module.UTF8ToString(this.module._page_hash()); }
   frame() { return this.floats(this.module._page_frame(), this.frameSize); }
   numbers() {
-    const [time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, settled] =
+    const [time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, solved] =
       this.doubles(this.module._page_numbers(), 10);
-    return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, settled };
+    return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, solved };
   }
   /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
   stages() { return [...this.doubles(this.module._page_stage_seconds(), 9)]; }

@@ -117,7 +117,7 @@ export class Panel {
     const force = Math.hypot(...hand.force);
     this.state.textContent = (hand.holds ? `hand pulls ${force.toPrecision(3)} N; ` : '') +
       `${app.engine.scene.bodies.length} bodies, ${numbers.asleep} asleep, ${hand.pins} pins, state ${app.engine.hash()}` +
-      (numbers.settled ? '' : '; some contacts not settled');
+      (numbers.solved ? '' : '; some islands ended at a limit');
     this.showJoints();
   }
 

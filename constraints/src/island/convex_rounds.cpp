@@ -20,14 +20,14 @@ constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
 
 /// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
 /// meet the rows' law at the true gaps: the method of multipliers, in which a row's spring yields from what it exerted.
-SolveStatus ConvexRounds::solve(IslandStep& step, IslandReport& report) {
+void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   place_units(step);
   fill_units(step);
   begin_units(step);
   secants_.begin(step.size());
   loads_change_ = !begun_;
   report.iterations = 1;
-  return go_on(step, report);
+  go_on(step, report);
 }
 
 void ConvexRounds::take_again(IslandStep& step) {
@@ -35,8 +35,8 @@ void ConvexRounds::take_again(IslandStep& step) {
   step.predict();
 }
 
-SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
-  ConvexContactReport done;
+void ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
+  report.accepted = true;
   for (;; ++report.iterations) {
     take_impulses(step);
     step.predict();
@@ -44,14 +44,13 @@ SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
-    if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0)))
-      return SolveStatus::kSolved;
+    if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return;
     report.rough = step.contacts_alone && begun_ && !loads_change_ && left.off < step.part.options.rough;
-    if (report.rough) return SolveStatus::kSolved;
+    if (report.rough) return;
     const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
     const ConvexContactOptions within{.tolerance = kLeft, .max_iterations = kMostNewtonSteps - report.newton_steps};
-    done = begun_ ? contacts_.solve_on(within) : contacts_.solve(within);
+    const ConvexContactReport done = begun_ ? contacts_.solve_on(within) : contacts_.solve(within);
     begun_ = true;
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
@@ -60,32 +59,31 @@ SolveStatus ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
     if (loads_change_) secants_.begin(step.size());
     advance_units(step);
   }
-  return end_unsettled(done.status, step, report);
+  end_at_limit(step, report);
 }
 
-/// Where rounds end before the rows' law is met: contacts alone stay as the last round left them. What Newton's method
-/// left unsolved in the first of them is the motion that it found.
-SolveStatus ConvexRounds::end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report) {
+/// Where rounds end before the rows' law is met: contacts alone stay as the last round left them, and are accepted.
+/// What Newton's method left unsolved in the first of them is the motion that it found.
+void ConvexRounds::end_at_limit(IslandStep& step, IslandReport& report) {
+  report.accepted = step.contacts_alone && report.iterations > 1;
   if (!step.contacts_alone) return take_best(step, report);
-  report.attempts[StepAttempt::kEndedByCap] = 1;
-  if (report.iterations > 1) {
+  if (report.accepted) {
     report.rough = step.part.options.rough > 0.0;
-    return SolveStatus::kSolved;
+    return;
   }
   for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = contacts_.impulse(u);
   take_impulses(step);
   take_motion(step);
-  return last;
+  report.change = largest_distance(step);
 }
 
-SolveStatus ConvexRounds::take_best(IslandStep& step, IslandReport& report) {
+void ConvexRounds::take_best(IslandStep& step, IslandReport& report) {
   if (!(report.change <= secants_.best())) {
-    report.change = secants_.best();
     take_whole(secants_.best_iterate());
     take_impulses(step);
     step.predict();
+    report.change = largest_distance(step);
   }
-  return SolveStatus::kIterationLimit;
 }
 
 /// Each contact a unit of its rows; what a body yields beyond its modes are further degrees of freedom of unit weight.
@@ -211,10 +209,7 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
     const RowLaw& law = step.law(unit.first);
-    Vec3 open = Vec3::Zero();
-    for (std::size_t r = 0; r < unit.rows; ++r)
-      open[static_cast<int>(r)] =
-          step.gap[unit.first + r] - step.law(unit.first + r).offset + dent_of(step, unit.first + r);
+    Vec3 open = open_gap(step, unit);
     distance.moved = first_round ? kUnbounded : std::max(distance.moved, (open - unit.end).norm() / law.tolerance);
     unit.end = open;
     if (law.friction > 0.0 && !first_round) unit.shift = law.friction * open.tail<2>().norm();
@@ -230,6 +225,27 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
     if (first_round) contacts_.impulse(u) = unit.anchor;
   }
   return distance;
+}
+
+/// Less what the rows ask for.
+Vec3 ConvexRounds::open_gap(const IslandStep& step, const Unit& unit) {
+  Vec3 open = Vec3::Zero();
+  for (std::size_t r = 0; r < unit.rows; ++r)
+    open[static_cast<int>(r)] =
+        step.gap[unit.first + r] - step.law(unit.first + r).offset + dent_of(step, unit.first + r);
+  return open;
+}
+
+/// By tolerance, of the impulses at hand from the rows' law at the gaps as they are.
+double ConvexRounds::largest_distance(const IslandStep& step) {
+  double largest = 0.0;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const RowLaw& law = step.law(units_[u].first);
+    Vec3 open = open_gap(step, units_[u]);
+    if (law.friction > 0.0) open[0] += law.friction * open.tail<2>().norm();
+    largest = std::max(largest, distance_from_law(units_[u], law, contacts_.potential(u), open) / law.tolerance);
+  }
+  return largest;
 }
 
 /// Springs become stiffer where impulses changed by as much as in the round before, and by more than the law leaves

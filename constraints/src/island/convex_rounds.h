@@ -15,10 +15,11 @@ namespace limber::internal {
 
 class ConvexRounds {
  public:
-  /// Finds step.f, with the step predicted and measured under it.
-  SolveStatus solve(IslandStep& step, IslandReport& report);
+  /// Finds step.f, with the step predicted and measured under it; how far that is from the law, and whether the step
+  /// is to go on from it (IslandReport::change, accepted).
+  void solve(IslandStep& step, IslandReport& report);
   /// From where it ended, roughly, to the law. @pre step.part.options.rough has been taken back
-  SolveStatus go_on(IslandStep& step, IslandReport& report);
+  void go_on(IslandStep& step, IslandReport& report);
   /// What was found last, after something else has been tried in the step. @pre its loads are as they were
   void take_again(IslandStep& step);
   /// Of contacts that press, where the next step is to begin with it, in their normal rows. @param slip by row
@@ -46,13 +47,15 @@ class ConvexRounds {
   void take_impulses(IslandStep& step);
   static double distance_from_law(const Unit& unit, const RowLaw& law, const ContactPotential& potential, Vec3 gap);
   Distance find_starts(const IslandStep& step, bool first_round);
+  double largest_distance(const IslandStep& step);
+  Vec3 open_gap(const IslandStep& step, const Unit& unit);
   double dent_of(const IslandStep& step, std::size_t row);
   void stiffen(const IslandStep& step);
   bool press_early(IslandStep& step) const;
   void advance_units(const IslandStep& step);
   void take_whole(std::span<const double> impulses);
-  SolveStatus end_unsettled(SolveStatus last, IslandStep& step, IslandReport& report);
-  SolveStatus take_best(IslandStep& step, IslandReport& report);
+  void end_at_limit(IslandStep& step, IslandReport& report);
+  void take_best(IslandStep& step, IslandReport& report);
   void take_motion(IslandStep& step);
 
   ConvexContactSolver contacts_;

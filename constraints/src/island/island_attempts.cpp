@@ -4,6 +4,16 @@
 #include "island_impl.h"
 
 namespace limber {
+namespace {
+
+/// Of a part that ends as it is.
+IslandStatus status_of(const IslandReport& done) {
+  if (done.attempts[StepAttempt::kRefused] > 0 || !std::isfinite(done.change)) return IslandStatus::kFailed;
+  return done.accepted && done.change <= 1.0 ? IslandStatus::kSolved : IslandStatus::kLimit;
+}
+
+}  // namespace
+
 using internal::StepPart;
 
 /// What becomes of the members by the end, all but the energy.
@@ -19,8 +29,11 @@ IslandReport IslandSolver::Impl::foresee(const StepPart& part) {
   }
   if (step.holds_contact_forces()) touch.solve(step, reaction, done.programs);
   reaction.find(step, StepTime::kStart);
-  done.status = step.convex ? rounds.solve(step, done) : newton.solve(step, done);
-  if (done.status != SolveStatus::kSolved && foresee_middle(done)) return done;
+  if (step.convex)
+    rounds.solve(step, done);
+  else
+    done.accepted = newton.solve(step, done) == SolveStatus::kSolved;
+  if (!done.accepted && foresee_middle(done)) return done;
   if (part.options.watch != nullptr) step.trace(motions);
   act_at_end();
   return done;
@@ -35,9 +48,9 @@ bool IslandSolver::Impl::foresee_middle(IslandReport& done) {
   const bool all_early = step.loads.all_early;
   IslandReport middle;
   step.take_middle(true);
-  middle.status = mean.solve(step, middle, true);
+  middle.accepted = mean.solve(step, middle, true) == SolveStatus::kSolved;
   middle.attempts[StepAttempt::kInTheMiddle] = 1;
-  if (middle.status == SolveStatus::kSolved) {
+  if (middle.accepted) {
     done = middle;
     return true;
   }
@@ -51,8 +64,8 @@ bool IslandSolver::Impl::foresee_middle(IslandReport& done) {
 /// Of bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the
 /// oddest rows; then they stay, and are slower.
 void IslandSolver::Impl::foresee_mean(IslandReport& done) {
-  done.status = mean.solve(step, done, true);
-  if (done.status == SolveStatus::kSolved || !step.part.last_resort) return;
+  done.accepted = mean.solve(step, done, true) == SolveStatus::kSolved;
+  if (done.accepted || !step.part.last_resort) return;
   if (mean.solve(step, done, false) != SolveStatus::kSolved) mean.stay(step);
   done.attempts[StepAttempt::kRefused] = 1;
 }
@@ -69,30 +82,33 @@ void IslandSolver::Impl::act_at_end() {
 /// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
 /// start, if all rows came together, or impulses are refused.
 IslandReport IslandSolver::Impl::foresee_guarded(const StepPart& part) {
-  const IslandReport done = foresee(part);
-  return done.rough ? done : guard(part, done);
+  IslandReport done = foresee(part);
+  if (!done.rough) done = guard(part, done);
+  done.status = status_of(done);
+  return done;
 }
 
 /// What has been foreseen roughly, to the law, and guarded.
 IslandReport IslandSolver::Impl::refine(const StepPart& part, IslandReport done) {
   step.part.options.rough = 0.0;
   done.newton_steps = 0;  // bounded as those of the look were
-  done.attempts[StepAttempt::kEndedByCap] = 0;
-  done.status = rounds.go_on(step, done);
+  rounds.go_on(step, done);
   act_at_end();
-  return guard(part, done);
+  done = guard(part, done);
+  done.status = status_of(done);
+  return done;
 }
 
 IslandReport IslandSolver::Impl::guard(StepPart part, IslandReport done) {
   constexpr int kSlowings = 3;
   const ContactRule& rule = part.options.contact;
-  if (step.mean && done.status != SolveStatus::kSolved && !part.last_resort) return done;
+  if (step.mean && !done.accepted && !part.last_resort) return done;
   if (!part.options.guard_energy || (rule.is_program() && rule.guard == ProgramGuard::kNone)) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = energy.close(step, done);
     if (!(left > 0.0)) return done;
-    const bool settled = done.status == SolveStatus::kSolved && !step.holds_contact_forces() && std::isfinite(left);
-    if (!settled || slowing == kSlowings || !energy.slow_start(step, left, part)) break;
+    const bool may_slow = done.accepted && !step.holds_contact_forces() && std::isfinite(left);
+    if (!may_slow || slowing == kSlowings || !energy.slow_start(step, left, part)) break;
     done = foresee(part);
     done.attempts[StepAttempt::kSlowed] = 1;
   }
@@ -105,7 +121,7 @@ IslandReport IslandSolver::Impl::guard(StepPart part, IslandReport done) {
 /// alone act, as little less as will do: half of what holds a pile would be half a fall.
 void IslandSolver::Impl::refuse_impulses(IslandReport& report) {
   constexpr double kLeast = 4e-4;
-  report.status = SolveStatus::kIterationLimit;
+  report.accepted = false;
   report.attempts[StepAttempt::kRefused] = 1;
   const double first = step.contacts_alone ? 0.01 : 0.5;
   for (double refused = first, accepted = 1.0; accepted > 0.0; refused = std::min(2.0 * refused, 0.5)) {

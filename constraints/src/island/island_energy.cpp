@@ -84,8 +84,7 @@ void IslandEnergy::begin(const IslandStep& step) {
 
 double IslandEnergy::close(const IslandStep& step, IslandReport& report) {
   const double slowed = step.part.slowed;
-  const bool settled = report.status == SolveStatus::kSolved;
-  const bool give_back = step.part.options.undisturbed && settled && slowed == 0.0 && is_workless(step);
+  const bool give_back = step.part.options.undisturbed && report.accepted && slowed == 0.0 && is_workless(step);
   const Change done = guard(step, give_back);
   report.energy_removed = done.removed + (slowed > 0.0 ? start_energy_ * slowed * (2.0 - slowed) : 0.0);
   report.energy_surplus = done.surplus;

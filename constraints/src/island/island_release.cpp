@@ -8,10 +8,10 @@ namespace {
 
 using internal::StepPart;
 
-/// A part that settles, and soon: it may be done ten times more.
+/// A part that is accepted, and soon: it may be done ten times more.
 bool is_quick(const IslandReport& done) {
   constexpr int kQuick = 100;  // of Newton's steps
-  return done.status == SolveStatus::kSolved && done.newton_steps <= kQuick;
+  return done.accepted && done.newton_steps <= kQuick;
 }
 
 }  // namespace

@@ -64,6 +64,7 @@ IslandReport IslandSolver::step(std::span<const ConstrainedBody> table, std::spa
   impl_->begin_times(options.timed);
   impl_->take_watched(whole_step(table, members, constraints, options), report);
   impl_->clock.lap(Stage::kSolve);
+  report.statuses[report.status] = 1;
   report.times = impl_->times;
   return report;
 }
@@ -109,6 +110,7 @@ IslandReport IslandSolver::finish() {
     impl_->foresee_next();
   }
   impl_->clock.lap(Stage::kSolve);
+  at.report.statuses[at.report.status] = 1;
   at.report.times = impl_->times;
   return at.report;
 }
@@ -173,7 +175,7 @@ void IslandSolver::Impl::foresee_divided() {
     part.ends = parts.length == parts.left;
     part.last_resort = parts.gives_up;
     parts.done = foresee_guarded(part);
-    if (parts.done.status != SolveStatus::kIterationLimit || parts.gives_up) break;
+    if (parts.done.accepted || parts.gives_up) break;
     parts.gives_up = parts.length < 1.5 * kShortest * part.whole_step;
   }
   parts.done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
@@ -221,7 +223,8 @@ void IslandSolver::Impl::commit(const StepPart& part, const IslandReport& done, 
   }
   report.programs.add(done.programs);
   report.attempts.add(done.attempts);
-  if (done.status != SolveStatus::kSolved) report.status = done.status;
+  report.status = std::max(report.status, done.status);
+  report.accepted = report.accepted && done.accepted;
   report.rows = step.rows.size();
   report.iterations = std::max(report.iterations, done.iterations);
   report.newton_steps = std::max(report.newton_steps, done.newton_steps);

@@ -18,7 +18,9 @@ SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends
   bends_ = bends;
   begin(step);
   const SolveStatus status = iterate(step, report);
-  if (status == SolveStatus::kSolved) finish(step);
+  if (status != SolveStatus::kSolved) return status;
+  report.change = problem_.largest_distance(step, impulses_);
+  finish(step);
   return status;
 }
 

@@ -8,13 +8,7 @@ namespace limber::internal {
 bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
   motion.take_rows(step, now_);
   bool met = motion.find_residual(now_, impulses, residual_, modal_residual_);
-  off_.resize(static_cast<Eigen::Index>(now_.size()));
-  for (std::size_t i = 0; i < now_.size(); ++i)
-    off_[static_cast<Eigen::Index>(i)] = step.gap[i] - step.law(i).offset + step.law(i).compliance * impulses[i];
-  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
-    off_[g.i] += g.value / step.length() * impulses[static_cast<std::size_t>(g.j)];
-    if (g.i != g.j) off_[g.j] += g.value / step.length() * impulses[static_cast<std::size_t>(g.i)];
-  }
+  find_off(step, impulses);
   gap_change_.setZero(off_.size());
   find_responses(step, motion);
   worst_contact_ = 0.0;
@@ -23,22 +17,51 @@ bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<
   return met;
 }
 
-/// Whether the law is met, with the modes where they are wanted.
-bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
-                         const MeanMotion& motion) {
+void MeanProblem::find_off(const IslandStep& step, std::span<const double> impulses) {
+  off_.resize(static_cast<Eigen::Index>(now_.size()));
+  for (std::size_t i = 0; i < now_.size(); ++i)
+    off_[static_cast<Eigen::Index>(i)] = step.gap[i] - step.law(i).offset + step.law(i).compliance * impulses[i];
+  for (const ConstraintRows::Flexibility& g : step.rows.flexibility()) {
+    off_[g.i] += g.value / step.length() * impulses[static_cast<std::size_t>(g.j)];
+    if (g.i != g.j) off_[g.j] += g.value / step.length() * impulses[static_cast<std::size_t>(g.i)];
+  }
+}
+
+/// By responses as they were measured last.
+double MeanProblem::largest_distance(const IslandStep& step, std::span<const double> impulses) {
+  find_off(step, impulses);
+  double largest = 0.0;
+  step.for_units([&](std::size_t first, std::size_t count) {
+    const RowLaw& law = step.law(first);
+    largest = std::max(largest, distance_from_law(step, first, count, impulses) / std::max(law.tolerance, law.digits));
+  });
+  return largest;
+}
+
+/// The natural residual, a distance, as in rounds.
+double MeanProblem::distance_from_law(const IslandStep& step, std::size_t first, std::size_t count,
+                                      std::span<const double> impulses) const {
   const RowLaw& law = step.law(first);
-  const double least = std::max(law.digits, kMetTo * law.tolerance), response = response_[first];
   Vec3 impulse = Vec3::Zero(), open = Vec3::Zero();
-  bool bent_as_wanted = true;
   for (std::size_t r = 0; r < count; ++r) {
-    bent_as_wanted = bent_as_wanted && std::abs(bent(motion, now_[first + r], modal_residual_)) <= least;
     impulse[static_cast<int>(r)] = impulses[first + r];
     open[static_cast<int>(r)] = off_[static_cast<Eigen::Index>(first + r)];
   }
   if (law.friction > 0.0) open[0] += law.friction * open.tail<2>().norm();
   ContactPotential natural = set_of(law);
-  natural.compliance = response;
-  const double left = response * (natural.natural(open, impulse) - impulse).norm();
+  natural.compliance = response_[first];
+  return response_[first] * (natural.natural(open, impulse) - impulse).norm();
+}
+
+/// Whether the law is met, with the modes where they are wanted.
+bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
+                         const MeanMotion& motion) {
+  const RowLaw& law = step.law(first);
+  const double least = std::max(law.digits, kMetTo * law.tolerance);
+  bool bent_as_wanted = true;
+  for (std::size_t r = 0; r < count; ++r)
+    bent_as_wanted = bent_as_wanted && std::abs(bent(motion, now_[first + r], modal_residual_)) <= least;
+  const double left = distance_from_law(step, first, count, impulses);
   if (law.contact) worst_contact_ = std::max(worst_contact_, left / law.tolerance);
   return bent_as_wanted && left <= least;
 }

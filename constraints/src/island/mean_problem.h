@@ -30,6 +30,8 @@ class MeanProblem {
 
   /// Whether contacts meet their law to their tolerance, as measured last.
   bool touches_law() const { return worst_contact_ <= 1.0; }
+  /// How far the worst of all rows is from its law where the bodies have been placed, by tolerance.
+  double largest_distance(const IslandStep& step, std::span<const double> impulses);
 
   /// gap − offset + compliance × impulse, of all rows
   const Vector& off() const { return off_; }
@@ -38,6 +40,9 @@ class MeanProblem {
   const Vector& gap_change() const { return gap_change_; }  // of all rows, without their compliance
 
  private:
+  void find_off(const IslandStep& step, std::span<const double> impulses);
+  double distance_from_law(const IslandStep& step, std::size_t first, std::size_t count,
+                           std::span<const double> impulses) const;
   void find_responses(const IslandStep& step, const MeanMotion& motion);
   bool is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
               const MeanMotion& motion);

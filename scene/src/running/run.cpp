@@ -125,7 +125,10 @@ class Run {
   void note_contacts(std::int64_t n) {
     ConstraintSummary& sum = result_.constraints;
     const ConstraintReport report = world_.constraint_report();
-    if (!report.solved) ++sum.unsettled;
+    const IslandStatus worst = report.statuses.worst();
+    if (worst == IslandStatus::kLimit) ++sum.limit_steps;
+    if (worst == IslandStatus::kFailed) ++sum.failed_steps;
+    sum.largest_residual = std::max(sum.largest_residual, report.residual);
     sum.energy_removed += report.energy_removed;
     for (const ContactEvent& e : world_.contact_events()) {
       if (e.phase == ContactPhase::kBegun) ++sum.begun;

@@ -24,13 +24,13 @@
 /// place of 2.
 ///
 /// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 100 Newton steps for contacts,
-/// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that does not settle
-/// keeps the best impulses found, or the motion found where there are none, and its status is kIterationLimit.
+/// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that ends by one of
+/// these limits keeps the best impulses found, or the motion found where there are none: IslandStatus::kLimit.
 ///
 /// A step is taken in parts where impacts begin and end, if asked for (Constraint::next_cut, RowLaw::lets_go_within;
 /// four times at most), and in halves down to 64ths where joints and handles alone act on free bodies and it does not
 /// settle. If that does not help, bodies turn and shift as the rows ask but do not bend in the rest of the step; if
-/// that is not found either they stay where they are, and lose half their velocity.
+/// that is not found either they stay where they are, and lose half their velocity: IslandStatus::kFailed.
 ///
 /// Free islands keep their linear and angular momentum. Not guarded: bodies whose parents move. Methods:
 /// docs/step.md. Equations and what is guaranteed: docs/derivations/constraints.md.
@@ -41,9 +41,9 @@
 
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
+#include "limber/constraints/island_status.h"
 #include "limber/constraints/step_attempts.h"
 #include "limber/core/stage_times.h"
-#include "limber/solvers/solve_status.h"
 
 namespace limber {
 
@@ -72,15 +72,21 @@ struct IslandOptions {
 };
 
 struct IslandReport {
-  SolveStatus status = SolveStatus::kSolved;  ///< kIterationLimit: the gaps were still changing
+  IslandStatus status = IslandStatus::kSolved;  ///< of the worst part of the step
+  IslandStatusCounts statuses{};                ///< the island's status; in sums, those of all islands
+  /// Whether the step is taken as it is: solved, or contacts alone at a limit. What is not is tried in another way
+  /// first (StepAttempt).
+  bool accepted = true;
   int bodies = 0, rows = 0;
   double taken = 0.0;  ///< s, where there is a watch
   StepAttempts attempts{};
-  ProgramReport programs{};     ///< of the contact rule, if it has any
-  int iterations = 0;           ///< predictions made, in the part of the step that needed most
-  int newton_steps = 0;         ///< for the contacts with friction, in the part that needed most
-  double change = 0.0;          ///< of the worst gap in the last iteration, in units of its tolerance; with contacts:
-                                ///< how far the impulses are from the rows' law
+  ProgramReport programs{};  ///< of the contact rule, if it has any
+  int iterations = 0;        ///< predictions made, in the part of the step that needed most
+  int newton_steps = 0;      ///< for the contacts with friction, in the part that needed most
+  /// How far the worst row is from its law, in units of its tolerance: ≤ 1 where the island is solved. It counts the
+  /// signs and cones of impulses as a distance, by what an impulse moves its own gap by. Of an island that failed: of
+  /// what was found before it was given up.
+  double change = 0.0;
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
   StageTimes times{};           ///< kRows, kSolve and kCommit, with IslandOptions::timed

@@ -16,8 +16,7 @@ enum class StepAttempt {
   kCutAtFirstTouch,  ///< where fast bodies come to what they would have passed (docs/contact.md)
   kHeldAtTouch,      ///< and stay for the rest of the step
   kLookedFarther,    ///< contacts were found anew: bodies came farther than they had been looked for
-  kRefused,          ///< impulses or bending were given up: the step is unsettled
-  kEndedByCap,       ///< contacts took the motion found before their law was met (IslandReport::change)
+  kRefused,          ///< impulses or bending were given up: the step has failed (IslandStatus::kFailed)
   kInTheMiddle,      ///< joints beside contacts by rows of the middle of the step, after rounds did not settle
 };
 /// How many parts of steps were taken so.
@@ -35,7 +34,7 @@ class StepAttempts {
   }
 
  private:
-  std::array<int, 10> counts_{};
+  std::array<int, 9> counts_{};
 };
 
 }  // namespace limber

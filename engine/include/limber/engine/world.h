@@ -15,8 +15,9 @@
 ///
 /// Handles, joints and contacts tie bodies together into islands, each one problem per step, solved at the step's end:
 /// held points and joints are where they should be to round-off, and the island's energy does not rise but by the work
-/// of what drives it (limber/constraints/island_solver.h). Where an island does not settle, ConstraintReport::solved is
-/// false. Bodies without constraints cost what they cost without. Contact: docs/contact.md.
+/// of what drives it (limber/constraints/island_solver.h). An island that a limit of work ends, as piles of contacts
+/// often do, may miss that: ConstraintReport counts such islands and tells how far they are from their rows' law.
+/// Bodies without constraints cost what they cost without. Contact: docs/contact.md.
 ///
 /// All functions throw InvalidArgument, and then change nothing, for an id that names no body, for numbers that are not
 /// finite, and for arrays of the wrong length.
@@ -32,6 +33,7 @@
 
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
+#include "limber/constraints/island_status.h"
 #include "limber/constraints/joint_constraint.h"
 #include "limber/constraints/manipulation.h"
 #include "limber/constraints/step_attempts.h"
@@ -162,12 +164,12 @@ struct ConstraintReport {
   int newton_steps = 0;  ///< the same, of the contacts with friction: bounded (island_solver.h)
   /// What is left where the solver ended, of the island that is farthest from its rows' law, in units of what rows are
   /// met to (3e-9 of the arms of a contact's points, 1e-11 of those of joints and hands): at most 1 where all is met.
-  /// Contacts alone may count as solved with more: StepAttempt::kEndedByCap counts such islands.
   double residual = 0.0;
-  ProgramReport programs{};     ///< linear programs of the contact rule
-  StepAttempts attempts{};      ///< how many islands' steps, or parts of them, were cut or tried in another way
-  bool solved = true;           ///< false: the gaps of some island were still changing; it did not reach its targets
-  double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)
+  ProgramReport programs{};       ///< linear programs of the contact rule
+  StepAttempts attempts{};        ///< how many islands' steps, or parts of them, were cut or tried in another way
+  IslandStatusCounts statuses{};  ///< islands by how their steps ended; of a step in parts, those of all parts
+  bool solved = true;             ///< every row of every island is within its tolerance: all are kSolved
+  double energy_removed = 0.0;    ///< J; negative: given back (island_solver.h)
 };
 
 enum class Axes { kWorld, kBody };

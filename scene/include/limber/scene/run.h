@@ -85,7 +85,9 @@ struct JointReport {
 
 /// Sums over the constraints of all steps.
 struct ConstraintSummary {
-  std::int64_t unsettled = 0;         ///< steps in which an island did not come to its targets
+  std::int64_t limit_steps = 0;       ///< steps in which some island ended at a limit, and none failed (IslandStatus)
+  std::int64_t failed_steps = 0;      ///< steps in which some island failed
+  double largest_residual = 0.0;      ///< ConstraintReport::residual of the worst step
   double energy_removed = 0.0;        ///< J; see ConstraintReport
   std::int64_t begun = 0, ended = 0;  ///< contacts
   double largest_impulse = 0.0;       ///< of a contact in a step, N·s

@@ -1,6 +1,6 @@
 /// @file limber/solvers/solve_status.h
-/// How a dense solve ended. No solver of this module throws for what a scene can bring about in a step: a problem
-/// without a solution, or with one that is hard to reach, is a result.
+/// How a dense solve ended. No solver of this module throws for what a scene can bring about in a step. The step of an
+/// island may take several solves: limber/constraints/island_status.h tells how it ended, kRelaxed as a limit.
 #pragma once
 
 namespace limber {

@@ -76,7 +76,7 @@ class PageWorld {
   /// Per body its pose (position, then quaternion w, x, y, z) and its amplitudes; bodies in order.
   std::span<const float> frame();
   /// time (s), kinetic energy of the frames, of the modes, elastic, potential (J), bodies asleep, contacts that press,
-  /// rows, iterations, settled (0 or 1).
+  /// rows, iterations, solved (0 or 1, ConstraintReport::solved).
   std::span<const double> numbers();
   /// Times of the stages of the last step, s, in the order of Stage (limber/core/stage_times.h).
   std::span<const double> stage_seconds() const;
