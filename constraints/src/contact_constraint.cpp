@@ -47,6 +47,7 @@ void ContactOptions::validate() const {
       throw InvalidArgument(std::string("ContactOptions: ") + name + " is " + std::to_string(value) +
                             ", expected a finite number of at least 0");
   };
+  small_steps.validate();
   number(friction, "friction");
   number(rolling_friction, "rolling_friction");
   number(recovery_speed, "recovery_speed");
@@ -211,6 +212,23 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
   resistance.set(a, b, largest, last != nullptr ? last->moment : Vec3(Vec3::Zero()),
                  known != nullptr ? &known->moment : nullptr);
   constraints.push_back(&resistance);
+}
+
+std::span<PreparedContact> ContactSet::prepared() { return impl_->contacts; }
+
+void ContactSet::press_dents(const BodyStates& states) {
+  if (!impl_->options.residual_compliance) return;
+  for (const PreparedContact& contact : impl_->contacts)
+    for (std::size_t s = 0; s < 2; ++s)
+      if (yields(contact.side(s))) impl_->dents.renew(contact.side(s).body);
+  for (const PreparedContact& contact : impl_->contacts)
+    for (std::size_t s = 0; s < 2; ++s) {
+      const PreparedSide& side = contact.side(s);
+      if (!yields(side)) continue;
+      const Quaternion q_BW = states.pose(side.body, StepTime::kStart).q.conjugate();
+      impl_->dents.press(side.body, side.region,
+                         side.turned_back(q_BW * (PreparedContact::sign(s) * contact.last_force)));
+    }
 }
 
 std::span<Constraint* const> ContactSet::constraints() const { return impl_->constraints; }

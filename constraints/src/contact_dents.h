@@ -57,6 +57,8 @@ class ContactDents {
   /// Adds a side's rows: they yield to each other and to all those that the body has already in this part of a step;
   /// with the body's first, what it has stored.
   void add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows);
+  /// What is pressed from here on takes the place of the last step's.
+  void renew(Index body) { at(body).gathers = true; }
   /// Takes the force of a side in the place of those of the last step, or part of one. @param force body frame, N
   void press(Index body, Region region, const Vec3& force);
 

@@ -304,15 +304,46 @@ void BodyGroup::advance_modes(Index slot, const ModeArrays& modes, bool loaded, 
     step.table().advance(modes.z, modes.rates, modes.forces);
   else
     step.table().advance_free(modes.z, modes.rates);
+  for (const DelayedImpulse& impulse : body(slot).delayed) add_delayed(impulse, modes, step.length() - impulse.time);
+}
+
+/// As it shows so long after.
+void BodyGroup::add_delayed(const DelayedImpulse& impulse, const ModeArrays& modes, double remaining) const {
   const ModalModelData& data = model_->data();
+  for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
+    const Mode mode{data.eigenvalues[i], data.decays[i]};
+    const ModeState change = impulse_response(mode, remaining, modal_impulse(impulse, i));
+    modes.z[i] += change.z;
+    modes.rates[i] += change.zdot;
+  }
+}
+
+void BodyGroup::begin_parts(Index slot) {
+  keep_previous_state(slot);
+  Body& b = body(slot);
+  if (b.modes_static) {
+    leave_static_answer(slot, amplitudes_.row(slot));
+    forget_static_answer(slot);
+  }
+  b.held = false;
+}
+
+void BodyGroup::advance_modes(Index slot, const ModalStep& part, int number, int count,
+                              const FrameExcitation& excitation) {
+  if (part.table().modes() == 0) return;
+  ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
+  if (!couplings_.empty()) {
+    predicted_forces_.copy_from(forces_, slot);
+    modes.forces = predicted_forces_.row(slot);
+    excite_modes(modes.forces, excitation);
+  }
+  if (body(slot).modes_loaded || !couplings_.empty())
+    part.table().advance(modes.z, modes.rates, modes.forces);
+  else
+    part.table().advance_free(modes.z, modes.rates);
   for (const DelayedImpulse& impulse : body(slot).delayed)
-    for (std::size_t i = 0; i < data.eigenvalues.size(); ++i) {
-      const double j = modal_impulse(impulse, i);
-      const Mode mode{data.eigenvalues[i], data.decays[i]};
-      const ModeState change = impulse_response(mode, step.length() - impulse.time, j);
-      modes.z[i] += change.z;
-      modes.rates[i] += change.zdot;
-    }
+    if (std::min(static_cast<int>(impulse.time / part.length()), count - 1) == number)
+      add_delayed(impulse, modes, std::max(0.0, (number + 1) * part.length() - impulse.time));
 }
 
 double BodyGroup::modal_impulse(const DelayedImpulse& impulse, std::size_t mode) const {

@@ -26,6 +26,19 @@ double swing_per_field(const ModalModelData& body) {
 
 }  // namespace
 
+KinematicFrame between(const KinematicFrame& start, const KinematicFrame& target, double part, double step) {
+  KinematicFrame at = target;
+  if (part >= 1.0) return at;
+  const double t = part * step;
+  const Vec3& a = target.acceleration;
+  const Vec3 velocity = (target.pose.p - start.pose.p) / step - 0.5 * step * a;
+  at.pose.p = start.pose.p + t * velocity + 0.5 * t * t * a;
+  at.pose.q = slerp(start.pose.q, target.pose.q, part);
+  at.velocity = velocity + t * a;
+  at.angular_velocity = (1.0 - part) * start.angular_velocity + part * target.angular_velocity;
+  return at;
+}
+
 FrameConstants::FrameConstants(const ModalModelData& body)
     : motion(body.motion),
       mass(body.mass),

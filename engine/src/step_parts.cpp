@@ -6,24 +6,6 @@
 #include "limber/dynamics/body_group.h"
 
 namespace limber::internal {
-namespace {
-
-/// Where a parent is part way through its step: the parabola of its held acceleration through both ends and a constant
-/// turn, as RigidFrame takes it.
-KinematicFrame between(const KinematicFrame& start, const KinematicFrame& target, double part, double step) {
-  KinematicFrame at = target;
-  if (part >= 1.0) return at;
-  const double t = part * step;
-  const Vec3& a = target.acceleration;
-  const Vec3 velocity = (target.pose.p - start.pose.p) / step - 0.5 * step * a;
-  at.pose.p = start.pose.p + t * velocity + 0.5 * t * t * a;
-  at.pose.q = slerp(start.pose.q, target.pose.q, part);
-  at.velocity = velocity + t * a;
-  at.angular_velocity = (1.0 - part) * start.angular_velocity + part * target.angular_velocity;
-  return at;
-}
-
-}  // namespace
 
 void StepParts::hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W) {
   if (parts_ > 1) forces_.push_back({body, at, newtons_W, 0, 0.0});

@@ -40,6 +40,7 @@
 
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/contact_method.h"
+#include "limber/constraints/small_steps.h"
 #include "limber/dynamics/contact_source.h"
 #include "limber/dynamics/surface_point.h"
 
@@ -62,7 +63,16 @@ enum class ImpactModel {
   kHeldFromTouch,
 };
 
+/// Who answers contacts, and with them all handles and joints.
+enum class ContactSolver {
+  kGame,   ///< by small steps (small_steps.h): bounded work
+  kExact,  ///< as one convex problem an island (island_solver.h): to the law, in the time that it takes
+};
+constexpr ContactSolver kDefaultContactSolver = ContactSolver::kExact;
+
 struct ContactOptions {
+  ContactSolver solver = kDefaultContactSolver;
+  SmallSteps small_steps{};  ///< of kGame
   double friction = 0.5;  ///< μ of bodies without their own; ≥ 0
   /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
   /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
@@ -86,7 +96,7 @@ struct ContactOptions {
 template <class Self>
 requires std::is_same_v<std::remove_const_t<Self>, ContactOptions>
 auto state_fields(Self& s) {
-  return std::tie(s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance, s.rule.method,
+  return std::tie(s.solver, s.small_steps, s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance, s.rule.method,
                   s.rule.friction, s.rule.guard, s.penalty_frequency, s.penalty_damping, s.impact, s.impact_speed);
 }
 
@@ -161,6 +171,8 @@ struct DentLoad {
   }
 };
 
+struct PreparedContact;
+
 /// All contacts of one scene, remembered from step to step. In every step: update(), then the island solver with
 /// constraints() among the others, then finish(). Once warm nothing allocates.
 class ContactSet {
@@ -178,6 +190,10 @@ class ContactSet {
               std::span<const double> friction = {});
   /// One for each pair of bodies that have contacts, ordered as they are. Valid until the next update().
   std::span<Constraint* const> constraints() const;
+
+  /// What small steps answer, and what they press: for SmallStepSolver.
+  std::span<PreparedContact> prepared();
+  void press_dents(const BodyStates& states);
 
   /// Books what the step did: after the islands' steps, before the next update().
   /// @param asleep by body: whether it sleeps. Its contacts were not given to update(): they are remembered as they

@@ -163,6 +163,18 @@ class BodyGroup {
   /// Ends a step whose last part was committed without an end: the loads are cleared.
   void end_step(Index slot) { clear_loads(slot); }
 
+  // One step in equal parts, taken by whoever solves the body's constraints (small_steps.h): begin_parts(); for each
+  // part the frame and what constraints do to the modes are the caller's; end_parts(). Nothing allocates or throws.
+  void begin_parts(Index slot);
+  /// The modes go freely through one part, under what is held on them and the delayed impulses that come within it.
+  /// @param part how they go. @param number of the part, 0 … count − 1. @param excitation what bodies with fixed nodes
+  /// feel of their frame over it
+  void advance_modes(Index slot, const ModalStep& part, int number, int count, const FrameExcitation& excitation);
+  RigidFrame& frame_in_parts(Index slot) { return body(slot).frame; }
+  std::span<double> amplitudes_in_parts(Index slot) { return amplitudes_.modes(slot); }
+  std::span<double> rates_in_parts(Index slot) { return rates_.modes(slot); }
+  void end_parts(Index slot) { clear_loads(slot); }
+
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
   /// N·m·s, world. @param modal k numbers, kg^½·m/s, or none
   void apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
@@ -277,6 +289,7 @@ class BodyGroup {
   void predict_motion(Index slot, const Vec3& gravity, double length, const ConstraintLoad& load,
                       std::span<const double> answers, ExactMotion& motion) const;
   void advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const;
+  void add_delayed(const DelayedImpulse& impulse, const ModeArrays& modes, double remaining) const;
   void excite_modes(double* forces, const FrameExcitation& excitation) const;
   void leave_static_answer(Index slot, double* z) const;
   void forget_static_answer(Index slot);

@@ -41,6 +41,10 @@ auto state_fields(Self& s) {
   return std::tie(s.pose, s.velocity, s.acceleration, s.angular_velocity, s.angular_acceleration);
 }
 
+/// Where a parent is part way through a step: on the parabola of its held acceleration through both ends, in a steady
+/// turn. @param part in [0, 1]. @param step s
+KinematicFrame between(const KinematicFrame& start, const KinematicFrame& target, double part, double step);
+
 /// The part of a model that its frame needs; never changes, shared by all instances.
 struct FrameConstants {
   FrameMotion motion = FrameMotion::kFree;
@@ -95,6 +99,8 @@ class RigidFrame {
   void set_parent(const KinematicFrame& at_step_end);
   /// True if the parent of the step's end has been set.
   bool has_next_parent() const { return parent_was_set_; }
+  /// Where it is told to be. @pre has_next_parent()
+  const KinematicFrame& next_parent() const { return next_parent_; }
   /// The parent now.
   const KinematicFrame& parent() const { return parent_; }
 

@@ -1,0 +1,250 @@
+#include "game_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limber/constraints/constraint.h"
+
+namespace limber::internal {
+namespace {
+
+bool is_free(const GameBody& body) { return body.group->frame_constants().motion == FrameMotion::kFree; }
+
+/// About the axis of a body on a line, kg·m².
+double line_inertia(const FrameConstants& c) { return c.line_axis.dot(c.inertia * c.line_axis); }
+
+void write_matrix(const Mat3& m, float* to) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) to[3 * i + j] = static_cast<float>(m(i, j));
+}
+
+void write_vector(const Vec3& v, float* to) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
+}
+
+Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
+
+}  // namespace
+
+SubstepModes& GameBodies::modes_of(const ModalModel& model) {
+  for (const auto& known : modes_)
+    if (known->model() == &model) return *known;
+  return *modes_.emplace_back(std::make_unique<SubstepModes>());
+}
+
+void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                            const SubstepPlan& plan) {
+  plan_ = plan;
+  bodies_.clear();
+  led_.clear();
+  by_number_.assign(table.size(), -1);
+  std::int32_t blocks = 0;
+  for (const Index member : members) {
+    const ConstrainedBody& at = table[static_cast<std::size_t>(member)];
+    GameBody body{.number = member, .group = at.group, .slot = at.slot, .first = blocks};
+    const ModalModel& model = at.group->model();
+    if (model.modes() > 0) {
+      SubstepModes& modes = modes_of(model);
+      modes.set(model, plan.length());
+      body.modes = &modes;
+      body.blocks = 1 + static_cast<std::int32_t>(modes.roots().size() / 8);
+    }
+    blocks += body.blocks;
+    at.group->begin_parts(at.slot);
+    const RigidFrame& frame = at.group->frame(at.slot);
+    place_frame(body, frame);
+    if (!is_free(body)) {
+      body.led = static_cast<std::int32_t>(led_.size());
+      led_.push_back({frame.parent(), frame.next_parent(), frame.has_next_parent(), frame});
+    }
+    by_number_[static_cast<std::size_t>(member)] = static_cast<std::int32_t>(bodies_.size());
+    bodies_.push_back(body);
+  }
+  const auto count = static_cast<std::size_t>(blocks);
+  for (std::vector<Block8>* all : {&motion_, &free_, &impulses_, &shapes_}) all->assign(count, {});
+  pushes_.assign(bodies_.size(), {});
+  shifts_.assign(bodies_.size(), {});
+  for (const GameBody& body : bodies_)
+    if (body.modes != nullptr) write_modes(body, shapes_);
+}
+
+/// Its inertia is that of the step's middle, as far as can be told from how it turns now.
+void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
+  const FrameConstants& c = body.group->frame_constants();
+  body.start = frame.pose();
+  body.q = frame.pose().q;
+  body.R_start = to_matrix(body.q);
+  body.v = frame.velocity();
+  if (c.motion == FrameMotion::kKinematic) return;
+  if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
+  const Quaternion middle =
+      quaternion_from_rotation_vector(0.5 * plan_.step * frame.angular_velocity(c)) * frame.pose().q;
+  if (c.motion == FrameMotion::kLine) {
+    const Vec3 axis = middle * c.line_axis;
+    const double root = std::sqrt(line_inertia(c));
+    body.turn_scale.row(0) = axis.transpose() / root;
+    body.momentum_scale.col(0) = axis * root;
+    return;
+  }
+  const Mat3 axes = to_matrix(middle * c.principal.q_BP);
+  const Vec3 roots = c.principal.moments.cwiseSqrt();
+  body.turn_scale = roots.cwiseInverse().asDiagonal() * axes.transpose();
+  body.momentum_scale = axes * roots.asDiagonal();
+  body.turn = body.turn_scale * frame.angular_momentum(c);
+}
+
+void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
+  const double h = plan_.length();
+  row = {};
+  if (body.root_mass > 0.0) write_vector(h / body.root_mass * linear, row.v);
+  write_vector(h * (body.turn_scale * moment), row.v + 3);
+}
+
+FrameLoad GameBodies::load_of(const GameBody& body) const {
+  return {plan_.gravity, body.group->held_force(body.slot), body.group->held_torque(body.slot)};
+}
+
+void GameBodies::begin_substep(int number) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    GameBody& body = bodies_[i];
+    FrameExcitation excitation;
+    if (body.led < 0)
+      fall(body);
+    else
+      excitation = lead(body, number, shifts_[i]);
+    if (body.modes != nullptr) {
+      write_modes(body, shapes_);
+      body.group->advance_modes(body.slot, body.modes->flow(), number, plan_.count, excitation);
+      write_modes(body, free_);
+    }
+    if (body.led >= 0) swing(body);
+    Block8& frame = free_[static_cast<std::size_t>(body.first)];
+    write_vector(body.root_mass * body.v, frame.v);
+    write_vector(body.turn, frame.v + 3);
+  }
+  for (std::size_t i = 0; i < motion_.size(); ++i)
+    for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + impulses_[i].v[l];
+}
+
+/// Held forces come at the substep's start, so that what rests has no velocity.
+void GameBodies::fall(GameBody& body) const {
+  const double h = plan_.length();
+  const FrameLoad load = load_of(body);
+  body.v += h * (load.gravity + load.force / body.group->frame_constants().mass);
+  if (!load.torque.isZero(0.0)) body.turn += h * (body.turn_scale * load.torque);
+}
+
+/// A body with fixed nodes: its parent goes through the substep, and it begins to swing there as it would by itself.
+FrameExcitation GameBodies::lead(GameBody& body, int number, FrameShift& shift) {
+  const FrameConstants& c = body.group->frame_constants();
+  const RigidFrame& now = body.group->frame(body.slot);
+  LedBody& led = led_[static_cast<std::size_t>(body.led)];
+  led.free = now;
+  if (led.told)
+    led.free.set_parent(between(led.start, led.target, static_cast<double>(number + 1) / plan_.count, plan_.step));
+  const FrameExcitation excitation =
+      led.free.begin_step(c, load_of(body), body.group->first_moment(body.slot), plan_.length());
+  shift.is_carried = true;
+  write_vector(led.free.pose().p - now.pose().p, shift.carried);
+  const Vec3 turn = rotation_vector(led.free.parent().pose.q * now.parent().pose.q.conjugate());
+  write_vector(c.motion == FrameMotion::kPoint ? Vec3(Vec3::Zero()) : turn, shift.carried_turn);
+  return excitation;
+}
+
+/// To the end of the substep.
+void GameBodies::swing(GameBody& body) {
+  const FrameConstants& c = body.group->frame_constants();
+  RigidFrame& free = led_[static_cast<std::size_t>(body.led)].free;
+  free.end_step(c, load_of(body), body.group->first_moment(body.slot), plan_.length());
+  if (c.motion == FrameMotion::kPoint) body.turn = body.turn_scale * free.angular_momentum(c);
+  if (c.motion == FrameMotion::kLine)
+    body.turn.x() = std::sqrt(line_inertia(c)) *
+                    (free.pose().q * c.line_axis).dot(free.angular_velocity(c) - free.parent().angular_velocity);
+}
+
+void GameBodies::write_modes(const GameBody& body, std::vector<Block8>& to) const {
+  const std::span<const double> z = body.group->amplitudes(body.slot);
+  const std::vector<float>& inverse = body.modes->inverse_roots();
+  Block8* blocks = &to[static_cast<std::size_t>(body.first + 1)];
+  for (std::size_t i = 0; i < z.size(); ++i) blocks[i / 8].v[i % 8] = static_cast<float>(z[i]) * inverse[i];
+}
+
+void GameBodies::end_substep(bool pushed) {
+  for (std::size_t i = 0; i < motion_.size(); ++i)
+    for (int l = 0; l < 8; ++l) impulses_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (bodies_[i].modes != nullptr) move_modes(bodies_[i]);
+    move_frame(i, pushed);
+  }
+}
+
+void GameBodies::move_modes(GameBody& body) {
+  const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
+  const Block8* q = &impulses_[static_cast<std::size_t>(body.first + 1)];
+  const std::vector<float>&roots = body.modes->roots(), &by = body.modes->rates();
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double change = static_cast<double>(q[i / 8].v[i % 8]);
+    z[i] += static_cast<double>(roots[i]) * change;
+    rates[i] += static_cast<double>(by[i]) * change;
+  }
+}
+
+void GameBodies::move_frame(std::size_t at, bool pushed) {
+  GameBody& body = bodies_[at];
+  const double h = plan_.length();
+  const Block8 &q = impulses_[static_cast<std::size_t>(body.first)], &push = pushes_[at];
+  body.turn += read_vector(q.v + 3);
+  Vec3 turn = h * (body.turn_scale.transpose() * body.turn);
+  if (pushed) turn += h * (body.turn_scale.transpose() * read_vector(push.v + 3));
+  const Quaternion turned = quaternion_from_rotation_vector(turn);
+  if (body.led < 0) {
+    body.v += read_vector(q.v) / body.root_mass;
+    body.shift += h * body.v;
+    if (pushed) body.shift += h / body.root_mass * read_vector(push.v);
+    body.q = normalized(turned * body.q);
+    body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v,
+                                                     body.momentum_scale * body.turn);
+  } else {
+    turn_led(body, turned);
+  }
+  FrameShift& shift = shifts_[at];
+  write_vector(body.shift, shift.shift);
+  write_matrix(to_matrix(body.q) - body.R_start, shift.turned);
+}
+
+/// Where its parent has brought it, turned as constraints have it.
+void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
+  const FrameConstants& c = body.group->frame_constants();
+  RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
+  if (c.motion == FrameMotion::kPoint) {
+    body.q = normalized(turned * body.q);
+    end.set_turn(c, body.q, body.momentum_scale * body.turn);
+  } else if (c.motion == FrameMotion::kLine) {
+    const Quaternion carried =
+        end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate();
+    body.q = normalized(carried * turned * body.q);
+    const Vec3 omega =
+        end.parent().angular_velocity + body.turn.x() / std::sqrt(line_inertia(c)) * (body.q * c.line_axis);
+    end.set_turn(c, body.q, body.q * (c.inertia * (body.q.conjugate() * omega)));
+  } else {
+    body.q = end.pose().q;
+  }
+  body.group->frame_in_parts(body.slot) = end;
+  body.shift = end.pose().p - body.start.p;
+  body.v = end.velocity();
+}
+
+void GameBodies::end_step() {
+  for (GameBody& body : bodies_) body.group->end_parts(body.slot);
+}
+
+bool GameBodies::all_finite() const {
+  return std::ranges::all_of(bodies_, [](const GameBody& body) {
+    const std::span<const double> z = body.group->amplitudes(body.slot), rates = body.group->rates(body.slot);
+    const auto finite = [](double x) { return std::isfinite(x); };
+    return body.shift.allFinite() && body.v.allFinite() && body.turn.allFinite() && std::ranges::all_of(z, finite) &&
+           std::ranges::all_of(rates, finite);
+  });
+}
+
+}  // namespace limber::internal

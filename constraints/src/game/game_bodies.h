@@ -1,0 +1,108 @@
+// The bodies of a step by small steps: their state, in double, and the coordinates of the rows, in single precision.
+//
+//   y = y_free + q,   q = Σ Jᵀf
+//
+// Coordinates of a frame: h-independent √m v (three) and I^½ ω about the principal axes as they are in the middle of
+// the step (three; one for a body on a line); of a mode z/√ρ (substep_modes.h). A unit of a row's impulse moves each by
+// the row again: rows are h M^-½ n for frames and √ρ U for modes, so that J y is a displacement over the substep, and
+// the effective mass 1/(J Jᵀ).
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limber/constraints/body_response.h"
+#include "limber/dynamics/surface_point.h"
+#include "substep_modes.h"
+#include "sweep_kernels.h"
+
+namespace limber::internal {
+
+/// A step, and how it is divided.
+struct SubstepPlan {
+  double step = 0.0;  ///< s, the whole step
+  int count = 1;      ///< substeps
+  Vec3 gravity = Vec3::Zero();
+  double length() const { return step / count; }
+};
+
+/// A led or hung body: its parent at the step's two ends, and where it would be at the substep's end by itself.
+struct LedBody {
+  KinematicFrame start, target;
+  bool told = false;  // where the parent goes; else it goes on as it does
+  RigidFrame free;
+};
+
+struct GameBody {
+  Index number = -1;  // in the table
+  BodyGroup* group = nullptr;
+  Index slot = 0;
+  const SubstepModes* modes = nullptr;  // null: none
+  std::int32_t first = 0, blocks = 1;   // of its coordinates
+  std::int32_t led = -1;                // its number among those that are
+  double root_mass = 0.0;               // √m; 0: its origin is carried
+  Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
+  Mat3 momentum_scale = Mat3::Zero();   // L = momentum_scale coordinates
+  RigidTransform start{};               // pose at the step's start
+  Mat3 R_start = Mat3::Identity();
+  Vec3 shift = Vec3::Zero();  // of the origin since then
+  Quaternion q{};             // attitude now
+  Vec3 v = Vec3::Zero();      // of the origin
+  Vec3 turn = Vec3::Zero();   // coordinates of the turn
+};
+
+class GameBodies {
+ public:
+  /// The bodies of a step as it begins. @param members ascending, all that move
+  void begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members, const SubstepPlan& plan);
+  /// Free motion of all, and with the impulses of the substep before. @param number 0 …
+  void begin_substep(int number);
+  /// Moves them by what the sweeps found, and by pushes.
+  void end_substep(bool pushed);
+  /// Their groups take over.
+  void end_step();
+
+  /// −1: does not move.
+  std::int32_t of(Index number) const {
+    return number < 0 ? -1 : by_number_[static_cast<std::size_t>(number)];
+  }
+  std::span<const GameBody> bodies() const { return bodies_; }
+  const GameBody& body(std::int32_t at) const { return bodies_[static_cast<std::size_t>(at)]; }
+  const SubstepPlan& plan() const { return plan_; }
+
+  std::vector<Block8>& motion() { return motion_; }  ///< y
+  const std::vector<Block8>& motion() const { return motion_; }
+  std::vector<Block8>& impulses() { return impulses_; }    ///< q, of what keeps its rows for the step
+  const std::vector<Block8>& shapes() const { return shapes_; }  ///< modes at the substep's start
+  std::vector<Block8>& pushes() { return pushes_; }        ///< by body: displacements of frames that leave no speed
+  const std::vector<FrameShift>& shifts() const { return shifts_; }
+
+  /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
+  void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
+  /// Whether all that moves has numbers.
+  bool all_finite() const;
+
+ private:
+  void place_frame(GameBody& body, const RigidFrame& frame);
+  void fall(GameBody& body) const;
+  FrameExcitation lead(GameBody& body, int number, FrameShift& shift);
+  void swing(GameBody& body);
+  void turn_led(GameBody& body, const Quaternion& turned);
+  FrameLoad load_of(const GameBody& body) const;
+  void write_modes(const GameBody& body, std::vector<Block8>& to) const;
+  void advance_modes(GameBody& body, int number, const FrameExcitation& excitation);
+  void move_modes(GameBody& body);
+  void move_frame(std::size_t at, bool pushed);
+  SubstepModes& modes_of(const ModalModel& model);
+
+  SubstepPlan plan_;
+  std::vector<GameBody> bodies_;
+  std::vector<std::int32_t> by_number_;
+  std::vector<std::unique_ptr<SubstepModes>> modes_;  // by model
+  std::vector<LedBody> led_;
+  std::vector<Block8> motion_, free_, impulses_, shapes_, pushes_;
+  std::vector<FrameShift> shifts_;
+};
+
+}  // namespace limber::internal

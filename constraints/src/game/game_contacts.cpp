@@ -1,0 +1,249 @@
+#include "game_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limber/model/vertex_rows.h"
+
+namespace limber::internal {
+namespace {
+
+// What of an overlap beyond the slop is undone in a substep.
+constexpr float kPushShare = 0.2f;
+
+float dot(const Block8& a, const Block8& b) {
+  float sum = 0.0f;
+  for (int i = 0; i < 8; ++i) sum += a.v[i] * b.v[i];
+  return sum;
+}
+
+void write_axis(const Vec3& v, float* to) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
+}
+
+/// nᵀG n of a side's region: what it yields to a force along n alone, m/N.
+double yield_of(const PreparedSide& side, const Vec3& n) {
+  const ResidualCompliance& compliance = *side.model->data().residual_compliance;
+  const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
+  Mat3 sum = Mat3::Zero();
+  for (const VertexShare& v : side.region)
+    for (const VertexShare& w : side.region)
+      if (!local || v.vertex == w.vertex) sum += v.share * w.share * compliance.block(v.vertex, w.vertex);
+  return n.dot(sum * n);
+}
+
+}  // namespace
+
+void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
+                              const Options& options) {
+  contacts_ = contacts;
+  rows_.clear();
+  blocks_.clear();
+  rolling_.clear();
+  sums_.assign(contacts.size(), Vec3::Zero());
+  for (const PreparedContact& contact : contacts) add(states, bodies, contact, options);
+}
+
+void GameContacts::add(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                       const Options& options) {
+  ContactRow row;
+  double thinnest = std::numeric_limits<double>::infinity(), yields = 0.0;
+  for (int i = 0; i < 3; ++i) write_axis(contact.axes.col(i), row.axes[i]);
+  for (std::size_t s = 0; s < 2; ++s) {
+    add_side(states, bodies, contact, s, row);
+    const PreparedSide& side = contact.side(s);
+    const auto number = static_cast<std::size_t>(side.body);
+    if (!states.is_static(side.body) && number < options.thickness.size())
+      thinnest = std::min(thinnest, options.thickness[number]);
+    if (options.residual_compliance && !side.region.empty())
+      yields += yield_of(side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() *
+                                                contact.axes.col(0)));
+  }
+  if (contact.a.body == contact.b.body) join_sides(row);
+  const double h = bodies.plan().length();
+  row.friction = static_cast<float>(contact.friction);
+  row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
+  row.compliance = static_cast<float>(yields / h);
+  find_masses(bodies, row, contact.axes.col(0).dot(contact.apart(states, StepTime::kStart)));
+  const Vec3 last = h * (contact.axes.transpose() * contact.last_force);
+  for (int i = 0; i < 3; ++i) row.impulse[i] = static_cast<float>(last[i]);
+  row.impulse[0] = std::max(0.0f, row.impulse[0]);
+  rows_.push_back(row);
+  if (options.rolling_friction > 0.0 && (is_round(contact.a) || is_round(contact.b)))
+    add_rolling(states, bodies, contact, options);
+}
+
+void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                            std::size_t s, ContactRow& row) {
+  const PreparedSide& side = contact.side(s);
+  ContactSideRows& at = row.side[s];
+  at.frame = bodies.of(side.body);
+  if (at.frame < 0) return;
+  const GameBody& body = bodies.body(at.frame);
+  at.body = body.first;
+  at.blocks = body.blocks;
+  at.rows = static_cast<std::int32_t>(blocks_.size());
+  const Vec3 carried = body.R_start * side.place(states.amplitudes(side.body, StepTime::kStart)),
+             arm = carried + side.rim;
+  write_axis(carried, at.arm);
+  blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * body.blocks));
+  const Mat3 axes = PreparedContact::sign(s) * contact.axes;
+  for (Index i = 0; i < 3; ++i)
+    bodies.write_frame_row(body, axes.col(i), arm.cross(axes.col(i)),
+                           blocks_[static_cast<std::size_t>(at.rows + i)]);
+  if (body.modes != nullptr && side.model != nullptr)
+    add_modes(states, body, side, axes, static_cast<std::size_t>(at.rows));
+}
+
+/// √ρ n·R U of each mode, from the rows of the three corners where the body bends by its modes alone.
+void GameContacts::add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side,
+                             const Mat3& axes, std::size_t rows) {
+  const std::vector<float>& roots = body.modes->roots();
+  const auto at = [&](Index axis, std::size_t mode) -> float& {
+    return blocks_[rows + 3 * (1 + mode / 8) + static_cast<std::size_t>(axis)].v[mode % 8];
+  };
+  const Mat3 axes_B = body.R_start.transpose() * axes;
+  const auto modes = static_cast<std::size_t>(side.model->modes());
+  if (side.skin == nullptr && side.shapes.empty()) {
+    const VertexRows& vertices = side.model->collision_rows();
+    const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
+    const Eigen::Matrix3f directions = axes_B.cast<float>();
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (side.at.weight[c] == 0.0) continue;
+      const auto weight = static_cast<float>(side.at.weight[c]);
+      for (int x = 0; x < 3; ++x) {
+        const float* u = vertices.row(corners[c], x);
+        for (Index axis = 0; axis < 3; ++axis) {
+          const float by = weight * directions(x, axis);
+          for (std::size_t m = 0; m < modes; ++m) at(axis, m) += by * u[m] * roots[m];
+        }
+      }
+    }
+    return;
+  }
+  for (Index axis = 0; axis < 3; ++axis) {
+    modal_.assign(modes, 0.0);
+    side.shape(states.amplitudes(side.body, StepTime::kStart))
+        .add_force(side.at, axes_B.col(axis), modal_, side.shapes);
+    for (std::size_t m = 0; m < modes; ++m) at(axis, m) = static_cast<float>(modal_[m]) * roots[m];
+  }
+}
+
+/// A body that touches itself: its frame feels nothing of that, and its modes both sides.
+void GameContacts::join_sides(ContactRow& row) {
+  ContactSideRows &a = row.side[0], &b = row.side[1];
+  for (std::int32_t i = 0; i < 3 * a.blocks; ++i)
+    for (int l = 0; l < 8; ++l)
+      blocks_[static_cast<std::size_t>(a.rows + i)].v[l] += blocks_[static_cast<std::size_t>(b.rows + i)].v[l];
+  for (std::int32_t i = 0; i < 3; ++i) blocks_[static_cast<std::size_t>(a.rows + i)] = {};
+  a.frame = b.frame = -1;
+  b.blocks = 0;
+}
+
+/// Effective masses, and what the gap is without the modes.
+void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row, double gap) {
+  float nn = 0.0f, nt[2] = {}, tt[3] = {}, frames = 0.0f, bent = 0.0f;
+  for (const ContactSideRows& side : row.side)
+    for (std::int32_t k = 0; k < side.blocks; ++k) {
+      const Block8* rows = &blocks_[static_cast<std::size_t>(side.rows + 3 * k)];
+      const float own = dot(rows[0], rows[0]);
+      nn += own;
+      nt[0] += dot(rows[0], rows[1]), nt[1] += dot(rows[0], rows[2]);
+      tt[0] += dot(rows[1], rows[1]), tt[1] += dot(rows[1], rows[2]), tt[2] += dot(rows[2], rows[2]);
+      if (k == 0)
+        frames += own;
+      else
+        bent += dot(rows[0], bodies.shapes()[static_cast<std::size_t>(side.body + k)]);
+    }
+  row.rest = static_cast<float>(gap) - bent;
+  nn += row.compliance;
+  // One step for both tangents, the block's largest eigenvalue: what slides is braked against its slip.
+  const float largest = 0.5f * (tt[0] + tt[2]) + std::sqrt(0.25f * (tt[0] - tt[2]) * (tt[0] - tt[2]) + tt[1] * tt[1]);
+  const auto inverse = [](float x) { return x > 0.0f ? 1.0f / x : 0.0f; };
+  row.inverse_normal = inverse(nn);
+  row.inverse_tangent = inverse(largest);
+  row.inverse_push = inverse(frames);
+  for (int t = 0; t < 2; ++t) row.coupling[t] = nt[t];
+}
+
+void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                               const Options& options) {
+  RollingRow rolling{.contact = static_cast<std::int32_t>(rows_.size() - 1),
+                     .radius = static_cast<float>(options.rolling_friction * shorter_arm(states, contact))};
+  float trace = 0.0f;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const std::int32_t frame = bodies.of(contact.side(s).body);
+    if (frame < 0) continue;
+    rolling.rows[s] = static_cast<std::int32_t>(blocks_.size());
+    for (int i = 0; i < 3; ++i) {
+      Block8 row;
+      bodies.write_frame_row(bodies.body(frame), Vec3::Zero(), PreparedContact::sign(s) * Vec3::Unit(i), row);
+      trace += dot(row, row);
+      blocks_.push_back(row);
+    }
+  }
+  if (!(trace > 0.0f)) return;
+  rolling.inverse = 1.0f / trace;  // at most that of the largest eigenvalue
+  const auto known = std::ranges::lower_bound(rolling_memory_, contact.id, {}, &Rolling::id);
+  if (known != rolling_memory_.end() && known->id == contact.id)
+    for (int i = 0; i < 3; ++i)
+      rolling.moment[i] = static_cast<float>(bodies.plan().length() * known->moment[i]);
+  rolling_.push_back(rolling);
+}
+
+void GameContacts::apply_last_impulses(GameBodies& bodies) {
+  apply_impulses(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(),
+                 {blocks_.data(), bodies.impulses().data()});
+}
+
+bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps) {
+  return measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(), bodies.shifts().data(),
+                          kPushShare, static_cast<float>(steps.push_speed * bodies.plan().length()));
+}
+
+void GameContacts::sweep(GameBodies& bodies, bool backward) {
+  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward,
+                 {blocks_.data(), bodies.motion().data()});
+}
+
+void GameContacts::push_apart(GameBodies& bodies, bool backward) {
+  push_contacts(rows_.data(), rows_.size(), backward, blocks_.data(), bodies.pushes().data());
+}
+
+void GameContacts::end_substep() {
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].impulse[axis]);
+}
+
+void GameContacts::end_step(double h) {
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const float* last = rows_[i].impulse;
+    contacts_[i].impulse = contacts_[i].axes * sums_[i];
+    contacts_[i].last_force = contacts_[i].axes * Vec3(last[0], last[1], last[2]) / h;
+    contacts_[i].give = contacts_[i].slip = 0.0;
+  }
+  rolling_memory_.clear();
+  for (const RollingRow& rolling : rolling_) {
+    const float* moment = rolling.moment;
+    rolling_memory_.push_back({contacts_[static_cast<std::size_t>(rolling.contact)].id,
+                               Vec3(moment[0], moment[1], moment[2]) / h});
+  }
+  std::ranges::sort(rolling_memory_, {}, &Rolling::id);
+}
+
+double GameContacts::residual(GameBodies& bodies) const {
+  return static_cast<double>(
+      residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), bodies.motion().data()}));
+}
+
+bool GameContacts::meet_law() const {
+  constexpr float kRounded = 1e-5f;  // of a force, in single precision
+  return std::ranges::all_of(rows_, [](const ContactRow& row) {
+    const float* f = row.impulse;
+    if (!(std::isfinite(f[0]) && std::isfinite(f[1]) && std::isfinite(f[2]) && f[0] >= 0.0f)) return false;
+    return f[0] == 0.0f ? f[1] == 0.0f && f[2] == 0.0f
+                        : std::hypot(f[1], f[2]) <= row.friction * f[0] * (1.0f + kRounded);
+  });
+}
+
+}  // namespace limber::internal

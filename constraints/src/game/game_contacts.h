@@ -1,0 +1,76 @@
+// All contacts of a step by small steps: their rows, made once from where the bodies are, and the sweeps over them.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "../prepared_contact.h"
+#include "game_bodies.h"
+#include "limber/constraints/small_steps.h"
+
+namespace limber::internal {
+
+class GameContacts {
+ public:
+  /// What resists rolling, from step to step.
+  struct Rolling {
+    std::uint64_t id = 0;  // of the contact
+    Vec3 moment = Vec3::Zero();  // on a, world, N·m
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.id, s.moment);
+    }
+  };
+  struct Options {
+    SmallSteps steps;
+    double rolling_friction = 0.0;
+    bool residual_compliance = true;
+    std::span<const double> thickness{};  // by body number
+  };
+
+  /// Rows of contacts between bodies that move, or with what stands. They begin with the forces that contacts had in
+  /// the last step. @param contacts kept by reference
+  void begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
+                  const Options& options);
+  /// What the bodies of a substep get of the forces of the last step. @pre the first substep has not begun
+  void apply_last_impulses(GameBodies& bodies);
+  /// Measures gaps. @return whether something is to be pushed apart
+  bool begin_substep(const GameBodies& bodies, const SmallSteps& steps);
+  void sweep(GameBodies& bodies, bool backward);
+  void push_apart(GameBodies& bodies, bool backward);
+  /// Adds up impulses.
+  void end_substep();
+  /// Tells the contacts what acted on them.
+  void end_step(double h);
+
+  /// m: how far from their law the last sweep left the rows.
+  double residual(GameBodies& bodies) const;
+  /// Whether no force pulls, is outside its cone, or is not finite.
+  bool meet_law() const;
+  std::size_t size() const { return rows_.size(); }
+
+  std::vector<Rolling>& rolling_memory() { return rolling_memory_; }
+  const std::vector<Rolling>& rolling_memory() const { return rolling_memory_; }
+
+ private:
+  void add(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, const Options& options);
+  void add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, std::size_t side,
+                ContactRow& row);
+  void add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
+                 std::size_t rows);
+  void join_sides(ContactRow& row);
+  void find_masses(const GameBodies& bodies, ContactRow& row, double gap);
+  void add_rolling(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                   const Options& options);
+
+  std::span<PreparedContact> contacts_;
+  std::vector<ContactRow> rows_;  // one for each
+  std::vector<Block8> blocks_;    // of the rows
+  std::vector<RollingRow> rolling_;
+  std::vector<Vec3> sums_;  // impulses over the step along each contact's axes, N·s
+  std::vector<Rolling> rolling_memory_;
+  std::vector<double> modal_;  // scratch
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,99 @@
+#include "limber/constraints/small_steps.h"
+
+#include <cmath>
+#include <string>
+
+#include "game_bodies.h"
+#include "game_constraints.h"
+#include "game_contacts.h"
+#include "limber/constraints/contact_constraint.h"
+#include "limber/core/error.h"
+
+namespace limber {
+
+using internal::GameBodies;
+using internal::GameConstraints;
+using internal::GameContacts;
+
+void SmallSteps::validate() const {
+  if (substeps < 1)
+    throw InvalidArgument("SmallSteps: substeps is " + std::to_string(substeps) + ", expected at least 1");
+  const auto number = [](double value, const char* name) {
+    if (!(value >= 0.0) || std::isinf(value))
+      throw InvalidArgument(std::string("SmallSteps: ") + name + " is " + std::to_string(value) +
+                            ", expected a finite number of at least 0");
+  };
+  number(slop, "slop");
+  number(push_speed, "push_speed");
+}
+
+struct SmallStepSolver::Impl {
+  GameBodies bodies;
+  GameContacts contacts;
+  GameConstraints constraints;
+
+  void take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number);
+  void push_apart(bool contacts_overlap);
+};
+
+SmallStepSolver::SmallStepSolver() : impl_(std::make_unique<Impl>()) {}
+SmallStepSolver::~SmallStepSolver() = default;
+SmallStepSolver::SmallStepSolver(SmallStepSolver&&) noexcept = default;
+SmallStepSolver& SmallStepSolver::operator=(SmallStepSolver&&) noexcept = default;
+
+SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
+  Impl& m = *impl_;
+  const BodyStates states(problem.table);
+  const SmallSteps steps = problem.contacts != nullptr ? problem.contacts->options().small_steps : SmallSteps{};
+  m.bodies.begin_step(problem.table, problem.members,
+                      {.step = problem.step, .count = steps.substeps, .gravity = problem.gravity});
+  GameContacts::Options options{.steps = steps, .thickness = problem.thickness};
+  std::span<PreparedContact> contacts;
+  if (problem.contacts != nullptr) {
+    options.rolling_friction = problem.contacts->options().rolling_friction;
+    options.residual_compliance = problem.contacts->options().residual_compliance;
+    contacts = problem.contacts->prepared();
+  }
+  m.contacts.begin_step(states, m.bodies, contacts, options);
+  m.contacts.apply_last_impulses(m.bodies);
+  for (int number = 0; number < steps.substeps; ++number) m.take_substep(problem, steps, number);
+  SmallStepReport report{.rows = static_cast<int>(3 * m.contacts.size() + m.constraints.size()),
+                         .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual(m.bodies))};
+  report.solved = m.contacts.meet_law() && m.constraints.all_finite() && m.bodies.all_finite();
+  m.contacts.end_step(m.bodies.plan().length());
+  if (problem.contacts != nullptr) problem.contacts->press_dents(states);
+  m.bodies.end_step();
+  return report;
+}
+
+void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number) {
+  const BodyStates states(problem.table);
+  bodies.begin_substep(number);
+  constraints.begin_substep(states, bodies, problem.constraints, number);
+  const bool overlap = contacts.begin_substep(bodies, steps);
+  for (const bool backward : {false, true}) {
+    constraints.sweep(bodies, backward);
+    contacts.sweep(bodies, backward);
+  }
+  const bool pushed = overlap || constraints.wants_push();
+  if (pushed) push_apart(overlap);
+  bodies.end_substep(pushed);
+  contacts.end_substep();
+  constraints.end_substep(states, bodies);
+}
+
+void SmallStepSolver::Impl::push_apart(bool contacts_overlap) {
+  std::ranges::fill(bodies.pushes(), internal::Block8{});
+  for (const bool backward : {false, true}) {
+    constraints.push_apart(bodies, backward);
+    if (contacts_overlap) contacts.push_apart(bodies, backward);
+  }
+}
+
+void SmallStepSolver::clear() { impl_->contacts.rolling_memory().clear(); }
+
+void SmallStepSolver::save_state(StateWriter& state) const { state(impl_->contacts.rolling_memory()); }
+
+void SmallStepSolver::restore_state(StateReader& state) { state(impl_->contacts.rolling_memory()); }
+
+}  // namespace limber

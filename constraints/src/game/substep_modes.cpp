@@ -1,0 +1,45 @@
+#include "substep_modes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limber/dynamics/oscillator.h"
+
+namespace limber::internal {
+namespace {
+
+/// The end-of-substep answer to a unit of contact force over the substep.
+struct ModeAnswer {
+  double displacement = 0.0, rate = 0.0;
+};
+
+// H comes to nothing at ω h = 2πn. A coordinate scaled by √ρ has a size there all the same: this share of the static
+// displacement, or of that of a free mass.
+constexpr double kLeastAnswer = 1e-4;
+
+ModeAnswer answer_of(const Mode& mode, double h) {
+  const ModePropagator p = propagator(mode, h);
+  const double held = std::min(1.0, 0.25 * mode.lambda * h * h), struck = 1.0 - held;
+  const double least = kLeastAnswer * (mode.lambda * h * h > 1.0 ? 1.0 / mode.lambda : h * h);
+  return {std::max(struck * h * p.z_zdot + held * p.z_g, least), struck * h * p.zdot_zdot + held * p.zdot_g};
+}
+
+}  // namespace
+
+void SubstepModes::set(const ModalModel& model, double h) {
+  if (model_ == &model && flow_.length() == h) return;
+  model_ = &model;
+  const ModalModelData& data = model.data();
+  flow_.set(data.eigenvalues, data.decays, h, ModalStep::kNone);
+  const std::size_t modes = data.eigenvalues.size(), padded = (modes + 7) / 8 * 8;
+  for (std::vector<float>* numbers : {&roots_, &inverse_roots_, &rates_}) numbers->assign(padded, 0.0f);
+  for (std::size_t i = 0; i < modes; ++i) {
+    const ModeAnswer answer = answer_of({data.eigenvalues[i], data.decays[i]}, h);
+    const double root = std::sqrt(answer.displacement);
+    roots_[i] = static_cast<float>(root);
+    inverse_roots_[i] = static_cast<float>(1.0 / root);
+    rates_[i] = static_cast<float>(answer.rate / root);
+  }
+}
+
+}  // namespace limber::internal

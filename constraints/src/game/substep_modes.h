@@ -1,0 +1,41 @@
+// How the modes of one model go through a substep, freely and under a contact's impulse.
+//
+// A mode answers an impulse f in the substep by ρ f in its displacement and σ f in its rate at the substep's end:
+//
+//   ρ = (1 − b) h S + b H,   σ h = (1 − b) h Ṡ + b h S/… ,   b = min(1, (ω h/2)²)
+//
+// per unit of f/h: as an impulse at the substep's start where it is slow, as a force held over it from ω h = 2 on
+// (oscillator.h has S and H). Held, the work of contacts on it in a substep is at most 0; the blend's spectral radius
+// with a contact is at most 1 for all ω h (tests/constraints/game_modes_test.cpp). Static answers are exact for any ρ,
+// as fixed points do not depend on it.
+#pragma once
+
+#include <vector>
+
+#include "limber/dynamics/modal_step.h"
+#include "limber/model/modal_model.h"
+
+namespace limber::internal {
+
+class SubstepModes {
+ public:
+  /// Nothing where they are those already. @param h length of a substep, s
+  void set(const ModalModel& model, double h);
+
+  const ModalModel* model() const { return model_; }
+  /// Freely.
+  const ModalStep& flow() const { return flow_; }
+  /// √ρ, m per √(N·s) and the like, one per mode, padded with zeros to whole blocks of eight.
+  const std::vector<float>& roots() const { return roots_; }
+  /// 1/√ρ, padded likewise.
+  const std::vector<float>& inverse_roots() const { return inverse_roots_; }
+  /// What a mode's rate changes by per unit of its scaled coordinate: σ/√ρ.
+  const std::vector<float>& rates() const { return rates_; }
+
+ private:
+  const ModalModel* model_ = nullptr;
+  ModalStep flow_;
+  std::vector<float> roots_, inverse_roots_, rates_;
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,83 @@
+// The vector loops of contact by small steps. Plain data only: the file that implements them is compiled for several
+// instruction sets, so neither Eigen nor a header that includes it may reach it.
+//
+// A body has blocks of eight coordinates: its frame first, then its modes. Coordinates are scaled so that what a row
+// moves them by, per unit of impulse, is the row again (small_steps.h). A contact has three rows a side, along the
+// normal and two tangents, block by block: rows of block k at rows + 3 k, + 1, + 2.
+//
+// Every result is the same bits on every instruction set that has fused multiply-add.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace limber::internal {
+
+struct alignas(32) Block8 {
+  float v[8] = {};
+};
+
+/// How a frame has moved since the rows were made: a point at r (world axes of then) has come by shift + turned r.
+struct FrameShift {
+  float shift[3] = {}, turned[9] = {};          // row by row
+  float carried[3] = {}, carried_turn[3] = {};  // what a led body is moved by in the substep at hand, whatever acts
+  bool is_carried = false;
+};
+
+struct ContactSideRows {
+  std::int32_t rows = 0;    // first block
+  std::int32_t body = 0;    // first block of its coordinates
+  std::int32_t blocks = 0;  // 0: the side does not move
+  std::int32_t frame = 0;   // its number
+  float arm[3] = {};        // of the point that the body carries along, world axes at the step's start
+};
+
+/// One contact as the sweeps see it. Lengths in m, impulses in N·s, of one substep.
+struct ContactRow {
+  ContactSideRows side[2];
+  float axes[3][3] = {};  // normal, tangents; world
+  float rest = 0.0f;      // the gap at the step's start less what the modes give it
+  float friction = 0.0f, slop = 0.0f;
+  float compliance = 0.0f;                                                            // m per N·s
+  float inverse_normal = 0.0f, inverse_tangent = 0.0f, inverse_push = 0.0f;           // effective masses
+  float coupling[2] = {};                                                             // of the normal with the tangents
+  float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap
+  float now = 0.0f;                               // the gap at the substep's start
+  float impulse[3] = {}, before = 0.0f;           // the latter: along the normal in the last substep
+  float push = 0.0f, part = 0.0f;                 // displacement impulse; how far it is to part in the substep, m
+};
+
+/// Resistance of a round contact to rolling and spinning: a moment up to `radius` times the contact's normal impulse.
+struct RollingRow {
+  std::int32_t contact = 0;
+  std::int32_t rows[2] = {};  // three blocks a side that moves
+  float radius = 0.0f, inverse = 0.0f;
+  float moment[3] = {};  // N·m·s
+};
+
+struct SweepArrays {
+  const Block8* rows = nullptr;
+  Block8* motion = nullptr;  // coordinates at the substep's end, as found so far
+};
+
+/// Gaps at the substep's start, and what their rows are to add up to. @param shapes the modes at the substep's start,
+/// by block. @param share of an overlap beyond the slop that is undone in the substep. @param most m
+/// @return whether any is to be pushed apart
+bool measure_contacts(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* shapes,
+                      const FrameShift* frames, float share, float most);
+
+/// One sweep of Gauss–Seidel: each contact's normal, then both tangents by one step.
+void sweep_contacts(ContactRow* contacts, std::size_t count, RollingRow* rolling, std::size_t rolling_count,
+                    bool backward, const SweepArrays& arrays);
+
+/// One sweep over displacements of the frames alone that part what overlaps. @param pushes by frame
+void push_contacts(ContactRow* contacts, std::size_t count, bool backward, const Block8* rows, Block8* pushes);
+
+/// The largest approach that the rows still show, m: how far from their law the sweeps ended.
+float residual_of_contacts(const ContactRow* contacts, std::size_t count, const SweepArrays& arrays);
+
+/// motion += rows · impulse, of all contacts: what they begin the step with.
+void apply_impulses(const ContactRow* contacts, std::size_t count, const RollingRow* rolling,
+                    std::size_t rolling_count, const SweepArrays& arrays);
+
+}  // namespace limber::internal
