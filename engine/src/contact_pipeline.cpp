@@ -106,19 +106,4 @@ IslandReport ContactPipeline::report() const {
   return report;
 }
 
-void ContactPipeline::add_to(StateHash& hash) const {
-  const ContactSet& contacts = rows_.set;
-  for (const std::span<const ContactMemory> known : {contacts.memory(), contacts.resting()})
-    for (const ContactMemory& contact : known) {
-      hash.add(contact.id);
-      hash.add(contact.force);
-      hash.add(contact.give);
-      hash.add(contact.slip);
-    }
-  for (const RollingMemory& rolling : contacts.rolling()) hash.add(rolling.moment);
-  for (const StrikeMemory& strike : contacts.strikes()) hash.add(strike.since);
-  for (std::size_t body = 0; body < bodies_->size(); ++body)
-    for (const DentLoad& load : contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);
-}
-
 }  // namespace limber::internal

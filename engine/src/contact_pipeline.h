@@ -8,6 +8,7 @@
 
 #include <cstdint>
 
+#include "contact_rows.h"
 #include "contact_search.h"
 #include "step_path.h"
 
@@ -32,7 +33,7 @@ class ContactPipeline final : public StepPath {
   void forget(Index body) override { rows_.set.forget(body); }
   std::span<const DentLoad> dent_loads(Index body) const override { return rows_.set.dent_loads(body); }
   double stored_energy(Index body) const override { return rows_.set.dent_energy(constraints_->states(), body); }
-  void add_to(StateHash& hash) const override;
+  void add_to(StateHash& hash) const override { add_memory_to(hash, rows_.set, bodies_->size()); }
   void save_state(StateWriter& state) const override { rows_.set.save_state(state); }
   void restore_state(StateReader& state) override { rows_.set.restore_state(state); }
 

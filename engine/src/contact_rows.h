@@ -6,6 +6,7 @@
 
 #include "body_table.h"
 #include "limber/constraints/contact_constraint.h"
+#include "state_hash.h"
 
 namespace limber::internal {
 
@@ -26,5 +27,20 @@ struct ContactRows {
     }
   }
 };
+
+/// What contacts remember of their last step. @param bodies how many there may be
+inline void add_memory_to(StateHash& hash, const ContactSet& contacts, std::size_t bodies) {
+  for (const std::span<const ContactMemory> known : {contacts.memory(), contacts.resting()})
+    for (const ContactMemory& contact : known) {
+      hash.add(contact.id);
+      hash.add(contact.force);
+      hash.add(contact.give);
+      hash.add(contact.slip);
+    }
+  for (const RollingMemory& rolling : contacts.rolling()) hash.add(rolling.moment);
+  for (const StrikeMemory& strike : contacts.strikes()) hash.add(strike.since);
+  for (std::size_t body = 0; body < bodies; ++body)
+    for (const DentLoad& load : contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);
+}
 
 }  // namespace limber::internal

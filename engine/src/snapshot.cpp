@@ -95,7 +95,8 @@ StateReader Snapshot::open(std::span<const std::byte> bytes) {
 /// Saves first what has to be the same: nothing is changed before it has been looked at.
 void Snapshot::save_structure(StateWriter& state) const {
   const BodyTable& bodies = rooms_.bodies;
-  state(rooms_.options.substeps, rooms_.registry.source() != nullptr, static_cast<std::uint64_t>(bodies.size()));
+  state(rooms_.options.substeps, rooms_.solver, rooms_.registry.source() != nullptr,
+        static_cast<std::uint64_t>(bodies.size()));
   for (const BodyTable::Entry& e : bodies.entries()) {
     state(e.generation, e.alive);
     if (e.alive) state(e.group >= 0 ? fingerprint(bodies.group(e).model()) : std::uint64_t{0});
@@ -106,6 +107,8 @@ std::vector<BodyId> Snapshot::check_structure(StateReader& state) const {
   const auto substeps = state.read<int>();
   if (substeps != rooms_.options.substeps)
     refuse(std::to_string(substeps) + " substeps, expected " + std::to_string(rooms_.options.substeps));
+  if (state.read<ContactSolver>() != rooms_.solver)
+    refuse("saved with another contact solver than this world's");
   const bool has_source = rooms_.registry.source() != nullptr;
   if (state.read<bool>() != has_source)
     refuse(std::string("saved ") + (has_source ? "without" : "with") + " a contact source, expected one " +

@@ -31,6 +31,7 @@ class Snapshot {
     StepEvents& events;
     ContactRegistry& registry;
     StepPath& path;
+    ContactSolver solver;  // that of the path
     Drawing& drawing;
   };
   explicit Snapshot(const Rooms& rooms) : rooms_(rooms) {}

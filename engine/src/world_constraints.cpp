@@ -185,6 +185,8 @@ ConstraintReport World::constraint_report() const { return impl_->last.report; }
 void World::set_contact_source(ContactSource* source, const ContactOptions& options) {
   Impl& m = *impl_;
   m.contacts.reset(options);
+  m.game.reset(options);
+  m.solver = options.solver;
   m.drawing.forget_all();
   m.sleep.wake_all();
   m.registry.set_source(source);

@@ -1,7 +1,8 @@
-// A World's parts: six rooms, each of which knows the others only by what it is given.
+// A World's parts: seven rooms, each of which knows the others only by what it is given.
 //
 //   BodyTable         bodies by number: ids, shapes, groups of one model
-//   ContactPipeline   from where bodies are to contacts, rows and islands: the path that a step takes (StepPath)
+//   ContactPipeline   from where bodies are to contacts, rows and islands: the exact path of a step (StepPath)
+//   GamePath          the path by small steps
 //   ConstraintStage   handles and joints, and the islands that they and contacts make
 //   SleepStage        who is at rest
 //   Drawing           surfaces between two steps
@@ -17,6 +18,7 @@
 #include "contact_pipeline.h"
 #include "contact_registry.h"
 #include "drawing.h"
+#include "game_path.h"
 #include "limber/engine/world.h"
 #include "sleep_stage.h"
 #include "snapshot.h"
@@ -40,13 +42,18 @@ struct World::Impl {
         sleep(constraints),
         registry(bodies),
         contacts(bodies, constraints, sleep, registry),
+        game(bodies, constraints, sleep, registry),
         drawing(bodies),
         parts(constraints, wanted.substeps, wanted.step) {}
 
-  internal::StepPath& path() { return contacts; }
+  /// That of the contact solver in force.
+  internal::StepPath& path() {
+    if (solver == ContactSolver::kGame) return game;
+    return contacts;
+  }
   internal::Snapshot snapshot() {
     return internal::Snapshot(
-        {options, time, bodies, constraints, sleep, parts, last.events, registry, path(), drawing});
+        {options, time, bodies, constraints, sleep, parts, last.events, registry, path(), solver, drawing});
   }
   void add_to_report(const IslandReport& substep);
 
@@ -57,6 +64,8 @@ struct World::Impl {
   internal::SleepStage sleep;
   internal::ContactRegistry registry;
   internal::ContactPipeline contacts;
+  internal::GamePath game;
+  ContactSolver solver = kDefaultContactSolver;
   internal::Drawing drawing;
   internal::StepParts parts;
   internal::WorldTime time;

@@ -1,0 +1,52 @@
+// What a contact source is asked with before a step by small steps: where bodies are, and how far they may come within
+// it. What is touched goes on as it does, for the most part; by a fall from rest and a speculative margin beside that
+// everything that is not is found as well.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "body_table.h"
+#include "limber/dynamics/contact_source.h"
+#include "limber/dynamics/exact_motion.h"
+#include "sleep_stage.h"
+
+namespace limber::internal {
+
+class GameForecast {
+ public:
+  GameForecast(BodyTable& bodies, SleepStage& sleep) : bodies_(&bodies), sleep_(&sleep) {}
+
+  /// What the source has been told is forgotten.
+  void tell_all_anew() { told_ = {}; }
+  /// @param length of the step, s. @return whether those of bodies that sleep were written, too
+  bool write_states(double length, const Vec3& gravity);
+
+  /// By body.
+  std::span<const BodyState> states() const { return states_; }
+  std::span<const double> thickness() const { return thickness_; }
+
+ private:
+  struct Told {
+    std::uint64_t changes = 0;  // SleepStage::changes()
+    int left = 0;               // times that all states are to be told, sleepers and statics too
+  };
+  void write_all();
+  void write_awake(Index body);
+  void expect_steady(Index body, BodyState& state);
+  void expect_exact(Index body, BodyState& state);
+
+  BodyTable* bodies_;
+  SleepStage* sleep_;
+  double length_ = 0.0;
+  Vec3 gravity_ = Vec3::Zero();
+  Told told_;
+  // By body.
+  std::vector<BodyState> states_;
+  std::vector<std::vector<double>> end_amplitudes_;
+  std::vector<double> thickness_;  // m; infinite for what stands
+  ExactMotion motion_;             // scratch
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,106 @@
+#include "game_path.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace limber::internal {
+
+void GamePath::reset(const ContactOptions& options) {
+  ContactSet contacts(options);
+  constraints_->set_contacts({});
+  rows_.set = std::move(contacts);
+  solver_.clear();
+  forecast_.tell_all_anew();
+}
+
+void GamePath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, StageClock& clock) {
+  constraints_->hold_back({});
+  if (registry_->source() != nullptr) {
+    find_contacts(substep, jobs, clock);
+    rows_.take(constraints_->states(), found_);
+    constraints_->set_contacts(rows_.set.constraints());
+  }
+  constraints_->find_islands(sleep_->awake());
+  list_members();
+  list_constraints();
+  clock.lap(Stage::kRows, static_cast<std::int64_t>(found_.size()));
+  bodies_->advance_free(sleep_->awake(), sleep_->changes(), substep.gravity, jobs);
+  clock.lap(Stage::kAdvance, std::ssize(sleep_->awake()) - std::ssize(members_));
+  solve(substep);
+  clock.lap(Stage::kSolve, report_.rows);
+  if (registry_->source() == nullptr) return;
+  rows_.set.finish(sleep_->asleep(), std::exchange(wakings_, sleep_->wakings()) != sleep_->wakings());
+  events.add(substep.index, rows_.set.events());
+  clock.lap(Stage::kBookkeeping);
+}
+
+/// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.
+void GamePath::find_contacts(const Substep& substep, Jobs& jobs, StageClock& clock) {
+  do {
+    const bool told_all = forecast_.write_states(substep.length, substep.gravity);
+    if (told_all) rows_.note_friction(*bodies_);
+    clock.lap(Stage::kLookAhead, std::ssize(sleep_->awake()));
+    StageTimes theirs;
+    registry_->source()->find_contacts({.states = forecast_.states(),
+                                        .awake = told_all ? std::span<const Index>() : sleep_->awake(),
+                                        .times = clock.runs() ? &theirs : nullptr},
+                                       found_, jobs);
+    if (registry_->has_veto())
+      std::erase_if(found_, [this](const ContactPoint& contact) { return !registry_->acts(contact); });
+    clock.lap(theirs, Stage::kNarrowPhase);
+  } while (wake_touched());
+}
+
+bool GamePath::wake_touched() {
+  bool woke = false;
+  for (const ContactPoint& contact : found_)
+    for (const Index body : {contact.a.body, contact.b.body})
+      if (sleep_->asleep(body)) {
+        sleep_->wake(body);
+        woke = true;
+      }
+  return woke;
+}
+
+void GamePath::list_members() {
+  members_.clear();
+  for (const Index body : sleep_->awake())
+    if (constraints_->constrained(body)) members_.push_back(body);
+}
+
+void GamePath::list_constraints() {
+  const auto acts = [&](Index body) { return body >= 0 && constraints_->constrained(body); };
+  constraining_.clear();
+  for (const ConstraintStage::Entry& entry : constraints_->entries()) {
+    Constraint* constraint = entry.constraint();
+    if (constraint == nullptr) continue;
+    const auto [a, b] = constraint->bodies();
+    if (acts(a) || acts(b)) constraining_.push_back(constraint);
+  }
+}
+
+void GamePath::solve(const Substep& substep) {
+  const SmallStepReport report = solver_.step({.table = constraints_->table(),
+                                               .members = members_,
+                                               .contacts = &rows_.set,
+                                               .constraints = constraining_,
+                                               .thickness = forecast_.thickness(),
+                                               .step = substep.length,
+                                               .gravity = substep.gravity});
+  report_ = {.status = report.solved ? SolveStatus::kSolved : SolveStatus::kInvalidInput,
+             .bodies = static_cast<int>(members_.size()),
+             .rows = report.rows,
+             .change = report.residual};
+}
+
+void GamePath::save_state(StateWriter& state) const {
+  rows_.set.save_state(state);
+  solver_.save_state(state);
+}
+
+void GamePath::restore_state(StateReader& state) {
+  rows_.set.restore_state(state);
+  solver_.restore_state(state);
+}
+
+}  // namespace limber::internal
