@@ -48,7 +48,7 @@ void ContactOptions::validate() const {
                             ", expected a finite number of at least 0");
   };
   small_steps.validate();
-  number(friction, "friction");
+  if (!(solver == ContactSolver::kGame && friction >= 0.0)) number(friction, "friction");
   number(rolling_friction, "rolling_friction");
   number(recovery_speed, "recovery_speed");
   number(impact_speed, "impact_speed");
@@ -106,7 +106,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   add_region(contact.a, point.a);
   add_region(contact.b, point.b);
   contact.axes = frame_along(point.normal);
-  contact.friction = std::sqrt(of(point.a.body) * of(point.b.body));
+  const double smaller = std::min(of(point.a.body), of(point.b.body));
+  contact.friction = smaller > 0.0 ? std::sqrt(of(point.a.body) * of(point.b.body)) : 0.0;
   contact.offset = contact.apart(states, StepTime::kStart);
   contact.start_position = point.position + origin;
   contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;

@@ -22,11 +22,7 @@ namespace limber::internal {
 class GamePath final : public StepPath {
  public:
   GamePath(BodyTable& bodies, ConstraintStage& constraints, SleepStage& sleep, ContactRegistry& registry)
-      : bodies_(&bodies),
-        constraints_(&constraints),
-        sleep_(&sleep),
-        registry_(&registry),
-        forecast_(bodies, sleep) {}
+      : bodies_(&bodies), constraints_(&constraints), sleep_(&sleep), registry_(&registry), forecast_(bodies, sleep) {}
 
   /// For another source: forgets all contacts. @throws InvalidArgument, and then changes nothing
   void reset(const ContactOptions& options);
@@ -55,9 +51,9 @@ class GamePath final : public StepPath {
   GameForecast forecast_;
   SmallStepSolver solver_;
   std::vector<ContactPoint> found_;
-  std::vector<Index> members_;            // all that rows touch and that move, ascending
+  std::vector<Index> members_;             // all that rows touch and that move, ascending
   std::vector<Constraint*> constraining_;  // handles and joints that act
-  std::uint64_t wakings_ = 0;             // SleepStage::wakings() of the last substep
+  std::uint64_t wakings_ = 0;              // SleepStage::wakings() of the last substep
   IslandReport report_;
 };
 

@@ -107,8 +107,7 @@ std::vector<BodyId> Snapshot::check_structure(StateReader& state) const {
   const auto substeps = state.read<int>();
   if (substeps != rooms_.options.substeps)
     refuse(std::to_string(substeps) + " substeps, expected " + std::to_string(rooms_.options.substeps));
-  if (state.read<ContactSolver>() != rooms_.solver)
-    refuse("saved with another contact solver than this world's");
+  if (state.read<ContactSolver>() != rooms_.solver) refuse("saved with another contact solver than this world's");
   const bool has_source = rooms_.registry.source() != nullptr;
   if (state.read<bool>() != has_source)
     refuse(std::string("saved ") + (has_source ? "without" : "with") + " a contact source, expected one " +

@@ -16,11 +16,12 @@ using internal::require_count;
 using internal::require_finite;
 using internal::require_pose;
 
-double checked(std::optional<double> friction, const char* function) {
+double checked(std::optional<double> friction, ContactSolver solver, const char* function) {
   constexpr double kNotGiven = -1.0;
-  if (friction && !(*friction >= 0.0 && std::isfinite(*friction)))
+  const bool may_be_infinite = solver == ContactSolver::kGame;
+  if (friction && !(*friction >= 0.0 && (may_be_infinite || std::isfinite(*friction))))
     throw InvalidArgument(std::string("World::") + function + ": friction is " + std::to_string(*friction) +
-                          ", expected a finite number of at least 0");
+                          ", expected at least 0, and finite but for ContactSolver::kGame");
   return friction.value_or(kNotGiven);
 }
 
@@ -63,7 +64,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_pose(placement.pose, "add_body");
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
-  const double friction = checked(placement.friction, "add_body");
+  const double friction = checked(placement.friction, impl_->solver, "add_body");
   if (placement.shape) {
     validate(*placement.shape);
     if (std::holds_alternative<HalfSpace>(*placement.shape))
@@ -93,7 +94,7 @@ BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransfor
   if (!shape) throw InvalidArgument("World::add_static: the shape is null");
   validate(*shape);
   require_pose(pose, "add_static");
-  const double mu = checked(friction, "add_static");
+  const double mu = checked(friction, impl_->solver, "add_static");
   Impl& m = *impl_;
   const BodyId id =
       m.bodies.add({.group = -1, .shape = std::move(shape), .pose = pose, .filter = filter, .friction = mu});

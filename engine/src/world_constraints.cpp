@@ -184,6 +184,9 @@ ConstraintReport World::constraint_report() const { return impl_->last.report; }
 
 void World::set_contact_source(ContactSource* source, const ContactOptions& options) {
   Impl& m = *impl_;
+  const auto sticks = [](const Entry& e) { return e.alive && std::isinf(e.friction); };
+  if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), sticks))
+    throw InvalidArgument("World::set_contact_source: a body has infinite friction, expected ContactSolver::kGame");
   m.contacts.reset(options);
   m.game.reset(options);
   m.solver = options.solver;

@@ -22,12 +22,18 @@ inline std::shared_ptr<const ModalModel> damped_box(int modes, double hz) {
 struct GroundedWorld {
   explicit GroundedWorld(const ContactOptions& options = {}, const WorldOptions& world_options = {},
                          Jobs& jobs = serial_jobs())
-      : world(world_options, jobs) {
+      : finder(finder_options(options)), world(world_options, jobs) {
     world.set_contact_source(&finder, options);
     ground = world.add_static(std::make_shared<Shape>(HalfSpace{}));
   }
   void step(int count) {
     for (int i = 0; i < count; ++i) world.step();
+  }
+  /// Small steps take all contacts that there are.
+  static ContactFinderOptions finder_options(const ContactOptions& options) {
+    ContactFinderOptions finder;
+    if (options.solver == ContactSolver::kGame) finder.clusters.max_points = 0;
+    return finder;
   }
   ContactFinder finder;
   World world;

@@ -61,7 +61,7 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
     bodies_.push_back(body);
   }
   const auto count = static_cast<std::size_t>(blocks);
-  for (std::vector<Block8>* all : {&motion_, &free_, &impulses_, &shapes_}) all->assign(count, {});
+  for (std::vector<Block8>* all : {&motion_, &free_, &answers_, &shapes_}) all->assign(count, {});
   pushes_.assign(bodies_.size(), {});
   shifts_.assign(bodies_.size(), {});
   for (const GameBody& body : bodies_)
@@ -113,7 +113,6 @@ void GameBodies::begin_substep(int number) {
     else
       excitation = lead(body, number, shifts_[i]);
     if (body.modes != nullptr) {
-      write_modes(body, shapes_);
       body.group->advance_modes(body.slot, body.modes->flow(), number, plan_.count, excitation);
       write_modes(body, free_);
     }
@@ -123,7 +122,7 @@ void GameBodies::begin_substep(int number) {
     write_vector(body.turn, frame.v + 3);
   }
   for (std::size_t i = 0; i < motion_.size(); ++i)
-    for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + impulses_[i].v[l];
+    for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
 }
 
 /// Held forces come at the substep's start, so that what rests has no velocity.
@@ -145,6 +144,7 @@ FrameExcitation GameBodies::lead(GameBody& body, int number, FrameShift& shift) 
   const FrameExcitation excitation =
       led.free.begin_step(c, load_of(body), body.group->first_moment(body.slot), plan_.length());
   shift.is_carried = true;
+  write_matrix(to_matrix(now.pose().q), shift.attitude);
   write_vector(led.free.pose().p - now.pose().p, shift.carried);
   const Vec3 turn = rotation_vector(led.free.parent().pose.q * now.parent().pose.q.conjugate());
   write_vector(c.motion == FrameMotion::kPoint ? Vec3(Vec3::Zero()) : turn, shift.carried_turn);
@@ -171,7 +171,7 @@ void GameBodies::write_modes(const GameBody& body, std::vector<Block8>& to) cons
 
 void GameBodies::end_substep(bool pushed) {
   for (std::size_t i = 0; i < motion_.size(); ++i)
-    for (int l = 0; l < 8; ++l) impulses_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
+    for (int l = 0; l < 8; ++l) answers_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     if (bodies_[i].modes != nullptr) move_modes(bodies_[i]);
     move_frame(i, pushed);
@@ -180,19 +180,20 @@ void GameBodies::end_substep(bool pushed) {
 
 void GameBodies::move_modes(GameBody& body) {
   const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
-  const Block8* q = &impulses_[static_cast<std::size_t>(body.first + 1)];
+  const Block8* q = &answers_[static_cast<std::size_t>(body.first + 1)];
   const std::vector<float>&roots = body.modes->roots(), &by = body.modes->rates();
   for (std::size_t i = 0; i < z.size(); ++i) {
     const double change = static_cast<double>(q[i / 8].v[i % 8]);
     z[i] += static_cast<double>(roots[i]) * change;
     rates[i] += static_cast<double>(by[i]) * change;
   }
+  write_modes(body, shapes_);
 }
 
 void GameBodies::move_frame(std::size_t at, bool pushed) {
   GameBody& body = bodies_[at];
   const double h = plan_.length();
-  const Block8 &q = impulses_[static_cast<std::size_t>(body.first)], &push = pushes_[at];
+  const Block8 &q = answers_[static_cast<std::size_t>(body.first)], &push = pushes_[at];
   body.turn += read_vector(q.v + 3);
   Vec3 turn = h * (body.turn_scale.transpose() * body.turn);
   if (pushed) turn += h * (body.turn_scale.transpose() * read_vector(push.v + 3));
@@ -220,8 +221,7 @@ void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
     body.q = normalized(turned * body.q);
     end.set_turn(c, body.q, body.momentum_scale * body.turn);
   } else if (c.motion == FrameMotion::kLine) {
-    const Quaternion carried =
-        end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate();
+    const Quaternion carried = end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate();
     body.q = normalized(carried * turned * body.q);
     const Vec3 omega =
         end.parent().angular_velocity + body.turn.x() / std::sqrt(line_inertia(c)) * (body.q * c.line_axis);

@@ -2,10 +2,10 @@
 //
 //   y = y_free + q,   q = Σ Jᵀf
 //
-// Coordinates of a frame: h-independent √m v (three) and I^½ ω about the principal axes as they are in the middle of
-// the step (three; one for a body on a line); of a mode z/√ρ (substep_modes.h). A unit of a row's impulse moves each by
-// the row again: rows are h M^-½ n for frames and √ρ U for modes, so that J y is a displacement over the substep, and
-// the effective mass 1/(J Jᵀ).
+// Coordinates of a frame: √m v (three) and I^½ ω about the principal axes as they are in the middle of
+// the step (three; one for a body on a line); of a mode z/√ρ (substep_modes.h). f are forces held over the substep; a
+// unit of one moves each by the row again: rows are h M^-½ n for frames and √ρ U for modes, so that J y is a
+// displacement over the substep, and the effective mass 1/(J Jᵀ).
 #pragma once
 
 #include <memory>
@@ -56,7 +56,7 @@ class GameBodies {
  public:
   /// The bodies of a step as it begins. @param members ascending, all that move
   void begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members, const SubstepPlan& plan);
-  /// Free motion of all, and with the impulses of the substep before. @param number 0 …
+  /// Free motion of all, and with the forces of the substep before. @param number 0 …
   void begin_substep(int number);
   /// Moves them by what the sweeps found, and by pushes.
   void end_substep(bool pushed);
@@ -64,18 +64,16 @@ class GameBodies {
   void end_step();
 
   /// −1: does not move.
-  std::int32_t of(Index number) const {
-    return number < 0 ? -1 : by_number_[static_cast<std::size_t>(number)];
-  }
+  std::int32_t of(Index number) const { return number < 0 ? -1 : by_number_[static_cast<std::size_t>(number)]; }
   std::span<const GameBody> bodies() const { return bodies_; }
   const GameBody& body(std::int32_t at) const { return bodies_[static_cast<std::size_t>(at)]; }
   const SubstepPlan& plan() const { return plan_; }
 
   std::vector<Block8>& motion() { return motion_; }  ///< y
   const std::vector<Block8>& motion() const { return motion_; }
-  std::vector<Block8>& impulses() { return impulses_; }    ///< q, of what keeps its rows for the step
+  std::vector<Block8>& answers() { return answers_; }            ///< q, of what keeps its rows for the step
   const std::vector<Block8>& shapes() const { return shapes_; }  ///< modes at the substep's start
-  std::vector<Block8>& pushes() { return pushes_; }        ///< by body: displacements of frames that leave no speed
+  std::vector<Block8>& pushes() { return pushes_; }  ///< by body: displacements of frames that leave no speed
   const std::vector<FrameShift>& shifts() const { return shifts_; }
 
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
@@ -101,7 +99,7 @@ class GameBodies {
   std::vector<std::int32_t> by_number_;
   std::vector<std::unique_ptr<SubstepModes>> modes_;  // by model
   std::vector<LedBody> led_;
-  std::vector<Block8> motion_, free_, impulses_, shapes_, pushes_;
+  std::vector<Block8> motion_, free_, answers_, shapes_, pushes_;
   std::vector<FrameShift> shifts_;
 };
 

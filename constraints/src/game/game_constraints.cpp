@@ -22,8 +22,8 @@ double dot(const Block8& a, const Block8& b) {
 
 }  // namespace
 
-void GameConstraints::begin_substep(const BodyStates& states, GameBodies& bodies,
-                                    std::span<Constraint* const> constraints, int number) {
+void GameConstraints::make_rows(const BodyStates& states, const GameBodies& bodies,
+                                std::span<Constraint* const> constraints, int number) {
   rows_.clear(), groups_.clear(), blocks_.clear();
   wants_push_ = false;
   const SubstepPlan& plan = bodies.plan();
@@ -32,13 +32,16 @@ void GameConstraints::begin_substep(const BodyStates& states, GameBodies& bodies
     constraint->begin_part({.length = h, .left = left, .whole = plan.step, .ahead = h});
     add_rows(states, bodies, constraint, h);
   }
+}
+
+void GameConstraints::begin_substep(GameBodies& bodies) {
   for (const GameRow& row : rows_) {
-    apply(row, row.impulse, bodies.motion());
+    apply(row, row.force, bodies.motion());
     wants_push_ = wants_push_ || row.error != 0.0;
   }
 }
 
-void GameConstraints::add_rows(const BodyStates& states, GameBodies& bodies, Constraint* constraint, double h) {
+void GameConstraints::add_rows(const BodyStates& states, const GameBodies& bodies, Constraint* constraint, double h) {
   made_.clear();
   constraint->add_rows(states, StepTime::kStart, h, made_);
   const auto count = static_cast<std::size_t>(made_.size());
@@ -46,7 +49,7 @@ void GameConstraints::add_rows(const BodyStates& states, GameBodies& bodies, Con
   constraint->gaps(states, StepTime::kStart, gaps_);
   yields_.assign(count, 0.0);
   for (const ConstraintRows::Flexibility& f : made_.flexibility())
-    if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value / h;
+    if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value;
   Group group{.constraint = constraint, .first = rows_.size(), .count = count};
   for (std::size_t i = 0; i < count; ++i) {
     add_row(bodies, made_.row(static_cast<Index>(i)), gaps_[i], yields_[i]);
@@ -59,14 +62,14 @@ void GameConstraints::add_rows(const BodyStates& states, GameBodies& bodies, Con
   groups_.push_back(group);
 }
 
-void GameConstraints::add_row(GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields) {
+void GameConstraints::add_row(const GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields) {
   GameRow row{.sides = {}, .law = from.law};
   for (std::size_t s = 0; s < 2; ++s) add_side(bodies, from.sides[s], row.sides[s]);
   find_target(bodies, row, gap, yields);
   rows_.push_back(row);
 }
 
-void GameConstraints::add_side(GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side) {
+void GameConstraints::add_side(const GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side) {
   side.frame = bodies.of(from.body);
   if (side.frame < 0) return;
   const GameBody& body = bodies.body(side.frame);
@@ -81,7 +84,7 @@ void GameConstraints::add_side(GameBodies& bodies, const ConstraintRows::Side& f
     to[1 + m / 8].v[m % 8] = static_cast<float>(modal[m]) * body.modes->roots()[m];
 }
 
-void GameConstraints::find_target(GameBodies& bodies, GameRow& row, double gap, double yields) const {
+void GameConstraints::find_target(const GameBodies& bodies, GameRow& row, double gap, double yields) const {
   const double h = bodies.plan().length();
   const RowLaw& law = row.law;
   double frames = 0.0, modes = 0.0, bent = 0.0;
@@ -93,7 +96,7 @@ void GameConstraints::find_target(GameBodies& bodies, GameRow& row, double gap, 
       if (k > 0) bent += dot(part, bodies.shapes()[static_cast<std::size_t>(side.body + k)]);
     }
   }
-  row.compliance = law.compliance + yields;
+  row.compliance = h * law.compliance + yields;
   row.mass = frames + modes + row.compliance > 0.0 ? 1.0 / (frames + modes + row.compliance) : 0.0;
   row.push_mass = frames > 0.0 ? 1.0 / frames : 0.0;
   row.wanted = bent + h * law.end_rate;
@@ -101,7 +104,7 @@ void GameConstraints::find_target(GameBodies& bodies, GameRow& row, double gap, 
     row.wanted += law.offset - gap;
     return;
   }
-  row.impulse = h * law.last_force;
+  row.force = law.last_force;
   if (!keeps_place(law)) return;
   const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0;
   if (from_below || from_above) {
@@ -122,8 +125,8 @@ void GameConstraints::lock_together(Group& group) const {
   Together products(n, n);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j)
-      products(i, j) = products(j, i) = coupling(rows_[group.equal[static_cast<std::size_t>(i)]],
-                                                 rows_[group.equal[static_cast<std::size_t>(j)]]);
+      products(i, j) = products(j, i) =
+          coupling(rows_[group.equal[static_cast<std::size_t>(i)]], rows_[group.equal[static_cast<std::size_t>(j)]]);
   products.diagonal() *= 1.0 + kRounded;
   group.inverse = products.ldlt().solve(Together::Identity(n, n));
 }
@@ -134,8 +137,8 @@ double GameConstraints::coupling(const GameRow& row, const GameRow& other) const
     for (const GameRow::Side& of_other : other.sides) {
       if (side.frame < 0 || side.frame != of_other.frame) continue;
       for (std::int32_t k = 0; k < side.blocks; ++k)
-        sum += dot(blocks_[static_cast<std::size_t>(side.rows + k)],
-                   blocks_[static_cast<std::size_t>(of_other.rows + k)]);
+        sum +=
+            dot(blocks_[static_cast<std::size_t>(side.rows + k)], blocks_[static_cast<std::size_t>(of_other.rows + k)]);
     }
   return sum;
 }
@@ -148,8 +151,8 @@ double GameConstraints::read(const GameRow& row, const std::vector<Block8>& x) c
   return sum;
 }
 
-void GameConstraints::apply(const GameRow& row, double impulse, std::vector<Block8>& x) const {
-  const auto by = static_cast<float>(impulse);
+void GameConstraints::apply(const GameRow& row, double force, std::vector<Block8>& x) const {
+  const auto by = static_cast<float>(force);
   if (by == 0.0f) return;
   for (const GameRow::Side& side : row.sides)
     for (std::int32_t k = 0; k < side.blocks; ++k) {
@@ -161,7 +164,7 @@ void GameConstraints::apply(const GameRow& row, double impulse, std::vector<Bloc
 
 /// What is left to be moved.
 double GameConstraints::open(const GameRow& row, const GameBodies& bodies) const {
-  return row.wanted - read(row, bodies.motion()) - row.compliance * row.impulse;
+  return row.wanted - read(row, bodies.motion()) - row.compliance * row.force;
 }
 
 void GameConstraints::sweep(GameBodies& bodies, bool backward) {
@@ -187,7 +190,7 @@ void GameConstraints::solve_together(Group& group, GameBodies& bodies) {
   const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostTogether, 1> change = group.inverse * left;
   for (int i = 0; i < n; ++i) {
     GameRow& row = rows_[group.equal[static_cast<std::size_t>(i)]];
-    row.impulse += change[i];
+    row.force += change[i];
     apply(row, change[i], bodies.motion());
   }
 }
@@ -195,34 +198,35 @@ void GameConstraints::solve_together(Group& group, GameBodies& bodies) {
 /// @return how many rows were solved for
 std::size_t GameConstraints::solve_bounded(std::size_t at, GameBodies& bodies) {
   GameRow& row = rows_[at];
+  const double h = bodies.plan().length();
   if (row.law.radius > 0.0) {
-    solve_vector(at, 3, row.law.radius, bodies);
+    solve_vector(at, 3, row.law.radius / h, bodies);
     return 3;
   }
-  const double wanted = row.impulse + open(row, bodies) * row.mass;
-  const double change = std::clamp(wanted, row.law.lower, row.law.upper) - row.impulse;
-  row.impulse += change;
+  const double wanted = row.force + open(row, bodies) * row.mass;
+  const double change = std::clamp(wanted, row.law.lower / h, row.law.upper / h) - row.force;
+  row.force += change;
   apply(row, change, bodies.motion());
   if (!(row.law.friction > 0.0)) return 1;
-  solve_vector(at + 1, 2, row.law.friction * row.impulse, bodies);
+  solve_vector(at + 1, 2, row.law.friction * row.force, bodies);
   return 3;
 }
 
-/// Rows whose impulses are a vector no longer than `radius`, by one step for all.
+/// Rows whose forces are a vector no longer than `radius`, by one step for all.
 void GameConstraints::solve_vector(std::size_t first, std::size_t count, double radius, GameBodies& bodies) {
   double trace = 0.0, square = 0.0;
   std::array<double, 3> wanted{};
   for (std::size_t i = 0; i < count; ++i) trace += rows_[first + i].mass > 0.0 ? 1.0 / rows_[first + i].mass : 0.0;
   if (!(trace > 0.0)) return;
   for (std::size_t i = 0; i < count; ++i) {
-    wanted[i] = rows_[first + i].impulse + open(rows_[first + i], bodies) / trace;
+    wanted[i] = rows_[first + i].force + open(rows_[first + i], bodies) / trace;
     square += wanted[i] * wanted[i];
   }
   const double share = square > radius * radius ? radius / std::sqrt(square) : 1.0;
   for (std::size_t i = 0; i < count; ++i) {
     GameRow& row = rows_[first + i];
-    const double change = share * wanted[i] - row.impulse;
-    row.impulse += change;
+    const double change = share * wanted[i] - row.force;
+    row.force += change;
     apply(row, change, bodies.motion());
   }
 }
@@ -235,7 +239,8 @@ void GameConstraints::push_apart(GameBodies& bodies, bool backward) {
     double moved = 0.0;
     for (const GameRow::Side& side : row.sides)
       if (side.frame >= 0)
-        moved += dot(blocks_[static_cast<std::size_t>(side.rows)], bodies.pushes()[static_cast<std::size_t>(side.frame)]);
+        moved +=
+            dot(blocks_[static_cast<std::size_t>(side.rows)], bodies.pushes()[static_cast<std::size_t>(side.frame)]);
     const double change = (std::clamp(-row.error, -most, most) - moved) * row.push_mass;
     row.push += change;
     for (const GameRow::Side& side : row.sides)
@@ -246,15 +251,16 @@ void GameConstraints::push_apart(GameBodies& bodies, bool backward) {
 }
 
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies) {
-  for (const GameRow& row : rows_) apply(row, -row.impulse, bodies.impulses());
+  for (const GameRow& row : rows_) apply(row, -row.force, bodies.answers());
   for (const Group& group : groups_) {
     impulses_.clear();
-    for (std::size_t i = 0; i < group.count; ++i) impulses_.push_back(rows_[group.first + i].impulse);
+    for (std::size_t i = 0; i < group.count; ++i)
+      impulses_.push_back(bodies.plan().length() * rows_[group.first + i].force);
     group.constraint->accept(states, impulses_);
   }
 }
 
-double GameConstraints::residual(GameBodies& bodies) const {
+double GameConstraints::residual(const GameBodies& bodies) const {
   double largest = 0.0;
   for (const GameRow& row : rows_)
     if (is_unbounded(row.law)) largest = std::max(largest, std::abs(open(row, bodies)));
@@ -262,7 +268,7 @@ double GameConstraints::residual(GameBodies& bodies) const {
 }
 
 bool GameConstraints::all_finite() const {
-  return std::ranges::all_of(rows_, [](const GameRow& row) { return std::isfinite(row.impulse); });
+  return std::ranges::all_of(rows_, [](const GameRow& row) { return std::isfinite(row.force); });
 }
 
 }  // namespace limber::internal

@@ -1,5 +1,5 @@
-// Handles, joints and other Constraints in a step by small steps: their rows are made anew in each substep, as they turn
-// with the bodies, and take part in its sweeps.
+// Handles, joints and other Constraints in a step by small steps: their rows are made anew in each substep, as they
+// turn with the bodies, and take part in its sweeps.
 //
 // Rows without compliance ask for velocities, J Δy = h end_rate; what is left of their gaps is undone by displacements
 // of the frames that leave no speed, and where frames cannot move, by the modes. Rows with compliance ask for
@@ -23,17 +23,19 @@ struct GameRow {
   std::array<Side, 2> sides;
   RowLaw law;
   double wanted = 0.0;      // what J y is to be, with what the modes had at the substep's start
-  double compliance = 0.0;  // gap per impulse
+  double compliance = 0.0;  // gap per force
   double mass = 0.0, push_mass = 0.0;
-  double error = 0.0;  // of its gap, that frames undo
-  double impulse = 0.0, push = 0.0;
+  double error = 0.0;              // of its gap, that frames undo
+  double force = 0.0, push = 0.0;  // held over the substep; what displaces frames
 };
 
 class GameConstraints {
  public:
-  /// Makes the rows of a substep and gives the bodies the forces that go on.
-  void begin_substep(const BodyStates& states, GameBodies& bodies, std::span<Constraint* const> constraints,
-                     int number);
+  /// The rows of a substep, from where it begins. @param number of the substep, 0 …
+  void make_rows(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
+                 int number);
+  /// Gives the bodies the forces that go on.
+  void begin_substep(GameBodies& bodies);
   void sweep(GameBodies& bodies, bool backward);
   /// @return whether any gap is to be undone
   bool wants_push() const { return wants_push_; }
@@ -43,7 +45,7 @@ class GameConstraints {
 
   std::size_t size() const { return rows_.size(); }
   /// The largest change that a hard row's velocity law still asks for, m or rad of the last substep.
-  double residual(GameBodies& bodies) const;
+  double residual(const GameBodies& bodies) const;
   bool all_finite() const;
 
  private:
@@ -58,17 +60,17 @@ class GameConstraints {
     Together inverse{};
   };
 
-  void add_rows(const BodyStates& states, GameBodies& bodies, Constraint* constraint, double h);
-  void add_row(GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields);
-  void add_side(GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side);
-  void find_target(GameBodies& bodies, GameRow& row, double gap, double yields) const;
+  void add_rows(const BodyStates& states, const GameBodies& bodies, Constraint* constraint, double h);
+  void add_row(const GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields);
+  void add_side(const GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side);
+  void find_target(const GameBodies& bodies, GameRow& row, double gap, double yields) const;
   void lock_together(Group& group) const;
   void solve(Group& group, GameBodies& bodies);
   void solve_together(Group& group, GameBodies& bodies);
   std::size_t solve_bounded(std::size_t at, GameBodies& bodies);
   void solve_vector(std::size_t first, std::size_t count, double radius, GameBodies& bodies);
   double read(const GameRow& row, const std::vector<Block8>& x) const;
-  void apply(const GameRow& row, double impulse, std::vector<Block8>& x) const;
+  void apply(const GameRow& row, double force, std::vector<Block8>& x) const;
   double coupling(const GameRow& row, const GameRow& other) const;
   double open(const GameRow& row, const GameBodies& bodies) const;
 

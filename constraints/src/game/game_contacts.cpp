@@ -56,18 +56,17 @@ void GameContacts::add(const BodyStates& states, const GameBodies& bodies, const
     if (!states.is_static(side.body) && number < options.thickness.size())
       thinnest = std::min(thinnest, options.thickness[number]);
     if (options.residual_compliance && !side.region.empty())
-      yields += yield_of(side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() *
-                                                contact.axes.col(0)));
+      yields += yield_of(
+          side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() * contact.axes.col(0)));
   }
   if (contact.a.body == contact.b.body) join_sides(row);
-  const double h = bodies.plan().length();
   row.friction = static_cast<float>(contact.friction);
   row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
-  row.compliance = static_cast<float>(yields / h);
+  row.compliance = static_cast<float>(yields);
   find_masses(bodies, row, contact.axes.col(0).dot(contact.apart(states, StepTime::kStart)));
-  const Vec3 last = h * (contact.axes.transpose() * contact.last_force);
-  for (int i = 0; i < 3; ++i) row.impulse[i] = static_cast<float>(last[i]);
-  row.impulse[0] = std::max(0.0f, row.impulse[0]);
+  const Vec3 last = contact.axes.transpose() * contact.last_force;
+  for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
+  row.force[0] = std::max(0.0f, row.force[0]);
   rows_.push_back(row);
   if (options.rolling_friction > 0.0 && (is_round(contact.a) || is_round(contact.b)))
     add_rolling(states, bodies, contact, options);
@@ -83,21 +82,20 @@ void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, 
   at.body = body.first;
   at.blocks = body.blocks;
   at.rows = static_cast<std::int32_t>(blocks_.size());
-  const Vec3 carried = body.R_start * side.place(states.amplitudes(side.body, StepTime::kStart)),
-             arm = carried + side.rim;
-  write_axis(carried, at.arm);
+  const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart)),
+             arm = body.R_start * carried_B + side.rim;
+  write_axis(carried_B, at.arm);
   blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * body.blocks));
   const Mat3 axes = PreparedContact::sign(s) * contact.axes;
   for (Index i = 0; i < 3; ++i)
-    bodies.write_frame_row(body, axes.col(i), arm.cross(axes.col(i)),
-                           blocks_[static_cast<std::size_t>(at.rows + i)]);
+    bodies.write_frame_row(body, axes.col(i), arm.cross(axes.col(i)), blocks_[static_cast<std::size_t>(at.rows + i)]);
   if (body.modes != nullptr && side.model != nullptr)
     add_modes(states, body, side, axes, static_cast<std::size_t>(at.rows));
 }
 
 /// √ρ n·R U of each mode, from the rows of the three corners where the body bends by its modes alone.
-void GameContacts::add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side,
-                             const Mat3& axes, std::size_t rows) {
+void GameContacts::add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
+                             std::size_t rows) {
   const std::vector<float>& roots = body.modes->roots();
   const auto at = [&](Index axis, std::size_t mode) -> float& {
     return blocks_[rows + 3 * (1 + mode / 8) + static_cast<std::size_t>(axis)].v[mode % 8];
@@ -186,14 +184,12 @@ void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodie
   rolling.inverse = 1.0f / trace;  // at most that of the largest eigenvalue
   const auto known = std::ranges::lower_bound(rolling_memory_, contact.id, {}, &Rolling::id);
   if (known != rolling_memory_.end() && known->id == contact.id)
-    for (int i = 0; i < 3; ++i)
-      rolling.moment[i] = static_cast<float>(bodies.plan().length() * known->moment[i]);
+    for (int i = 0; i < 3; ++i) rolling.moment[i] = static_cast<float>(known->moment[i]);
   rolling_.push_back(rolling);
 }
 
-void GameContacts::apply_last_impulses(GameBodies& bodies) {
-  apply_impulses(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(),
-                 {blocks_.data(), bodies.impulses().data()});
+void GameContacts::apply_last_forces(GameBodies& bodies) {
+  apply_forces(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), {blocks_.data(), bodies.answers().data()});
 }
 
 bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps) {
@@ -212,21 +208,21 @@ void GameContacts::push_apart(GameBodies& bodies, bool backward) {
 
 void GameContacts::end_substep() {
   for (std::size_t i = 0; i < rows_.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].impulse[axis]);
+    for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);
 }
 
 void GameContacts::end_step(double h) {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const float* last = rows_[i].impulse;
-    contacts_[i].impulse = contacts_[i].axes * sums_[i];
-    contacts_[i].last_force = contacts_[i].axes * Vec3(last[0], last[1], last[2]) / h;
+    const float* last = rows_[i].force;
+    contacts_[i].impulse = h * (contacts_[i].axes * sums_[i]);
+    contacts_[i].last_force = contacts_[i].axes * Vec3(last[0], last[1], last[2]);
     contacts_[i].give = contacts_[i].slip = 0.0;
   }
   rolling_memory_.clear();
   for (const RollingRow& rolling : rolling_) {
     const float* moment = rolling.moment;
-    rolling_memory_.push_back({contacts_[static_cast<std::size_t>(rolling.contact)].id,
-                               Vec3(moment[0], moment[1], moment[2]) / h});
+    rolling_memory_.push_back(
+        {contacts_[static_cast<std::size_t>(rolling.contact)].id, Vec3(moment[0], moment[1], moment[2])});
   }
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
 }
@@ -239,7 +235,7 @@ double GameContacts::residual(GameBodies& bodies) const {
 bool GameContacts::meet_law() const {
   constexpr float kRounded = 1e-5f;  // of a force, in single precision
   return std::ranges::all_of(rows_, [](const ContactRow& row) {
-    const float* f = row.impulse;
+    const float* f = row.force;
     if (!(std::isfinite(f[0]) && std::isfinite(f[1]) && std::isfinite(f[2]) && f[0] >= 0.0f)) return false;
     return f[0] == 0.0f ? f[1] == 0.0f && f[2] == 0.0f
                         : std::hypot(f[1], f[2]) <= row.friction * f[0] * (1.0f + kRounded);

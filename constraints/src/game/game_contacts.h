@@ -14,7 +14,7 @@ class GameContacts {
  public:
   /// What resists rolling, from step to step.
   struct Rolling {
-    std::uint64_t id = 0;  // of the contact
+    std::uint64_t id = 0;        // of the contact
     Vec3 moment = Vec3::Zero();  // on a, world, N·m
 
     template <class Self>
@@ -34,12 +34,12 @@ class GameContacts {
   void begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
                   const Options& options);
   /// What the bodies of a substep get of the forces of the last step. @pre the first substep has not begun
-  void apply_last_impulses(GameBodies& bodies);
+  void apply_last_forces(GameBodies& bodies);
   /// Measures gaps. @return whether something is to be pushed apart
   bool begin_substep(const GameBodies& bodies, const SmallSteps& steps);
   void sweep(GameBodies& bodies, bool backward);
   void push_apart(GameBodies& bodies, bool backward);
-  /// Adds up impulses.
+  /// Adds up forces.
   void end_substep();
   /// Tells the contacts what acted on them.
   void end_step(double h);
@@ -68,7 +68,7 @@ class GameContacts {
   std::vector<ContactRow> rows_;  // one for each
   std::vector<Block8> blocks_;    // of the rows
   std::vector<RollingRow> rolling_;
-  std::vector<Vec3> sums_;  // impulses over the step along each contact's axes, N·s
+  std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;
   std::vector<double> modal_;  // scratch
 };

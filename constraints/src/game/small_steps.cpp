@@ -55,7 +55,7 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
     contacts = problem.contacts->prepared();
   }
   m.contacts.begin_step(states, m.bodies, contacts, options);
-  m.contacts.apply_last_impulses(m.bodies);
+  m.contacts.apply_last_forces(m.bodies);
   for (int number = 0; number < steps.substeps; ++number) m.take_substep(problem, steps, number);
   SmallStepReport report{.rows = static_cast<int>(3 * m.contacts.size() + m.constraints.size()),
                          .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual(m.bodies))};
@@ -68,8 +68,9 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
 
 void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number) {
   const BodyStates states(problem.table);
+  constraints.make_rows(states, bodies, problem.constraints, number);
   bodies.begin_substep(number);
-  constraints.begin_substep(states, bodies, problem.constraints, number);
+  constraints.begin_substep(bodies);
   const bool overlap = contacts.begin_substep(bodies, steps);
   for (const bool backward : {false, true}) {
     constraints.sweep(bodies, backward);

@@ -1,13 +1,12 @@
 // How the modes of one model go through a substep, freely and under a contact's impulse.
 //
-// A mode answers an impulse f in the substep by ρ f in its displacement and σ f in its rate at the substep's end:
+// A mode answers a force f, per unit, by ρ in its displacement and σ in its rate at the substep's end:
 //
-//   ρ = (1 − b) h S + b H,   σ h = (1 − b) h Ṡ + b h S/… ,   b = min(1, (ω h/2)²)
+//   ρ = (1 − b) h S + b H,   σ = (1 − b) h Ṡ + b S,   b = min(1, (ω h/2)²)
 //
-// per unit of f/h: as an impulse at the substep's start where it is slow, as a force held over it from ω h = 2 on
+// as to an impulse h f at the substep's start where it is slow, as to a force held over it from ω h = 2 on
 // (oscillator.h has S and H). Held, the work of contacts on it in a substep is at most 0; the blend's spectral radius
-// with a contact is at most 1 for all ω h (tests/constraints/game_modes_test.cpp). Static answers are exact for any ρ,
-// as fixed points do not depend on it.
+// with a contact is at most 1 for all ω h. Static answers are exact for any ρ, as fixed points do not depend on it.
 #pragma once
 
 #include <vector>

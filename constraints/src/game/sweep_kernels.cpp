@@ -42,13 +42,48 @@ HWY_INLINE HWY_ATTR void AddProducts(const Block8* rows, const Block8* x, std::s
     }
 }
 
-/// Eight lanes added in one order whatever the vector's length.
+// Eight lanes are added in one order whatever the vector's length: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)).
+#if HWY_TARGET == HWY_SCALAR
 HWY_INLINE HWY_ATTR float SumOfBlock(const Vector* parts) {
   const Floats d;
-  HWY_ALIGN float p[8];
-  for (std::size_t v = 0; v < kVectors; ++v) hn::Store(parts[v], d, p + v * kLanes);
+  float p[8];
+  for (std::size_t v = 0; v < kVectors; ++v) hn::StoreU(parts[v], d, p + v * kLanes);
   return ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]));
 }
+
+/// @param sums four numbers
+HWY_INLINE HWY_ATTR void SumRows(const Products& p, float* sums) {
+  for (int row = 0; row < 3; ++row) sums[row] = SumOfBlock(p.sum[row]);
+}
+#else
+using Halves = hn::CappedTag<float, 4>;
+using Half = hn::Vec<Halves>;
+
+/// Lanes i and i + 4.
+template <class Part>
+HWY_INLINE HWY_ATTR Half Fold(const Part* parts) {
+  if constexpr (kVectors == 1)
+    return hn::Add(hn::LowerHalf(Halves(), parts[0]), hn::UpperHalf(Halves(), parts[0]));
+  else
+    return hn::Add(parts[0], parts[1]);
+}
+
+/// @param sums four numbers
+HWY_INLINE HWY_ATTR void SumRows(const Products& p, float* sums) {
+  const Halves d;
+  const Half a = Fold(p.sum[0]), b = Fold(p.sum[1]), c = Fold(p.sum[2]), none = hn::Zero(d);
+  const Half ab = hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b));
+  const Half c0 = hn::Add(hn::InterleaveLower(d, c, none), hn::InterleaveUpper(d, c, none));
+  hn::StoreU(hn::Add(hn::ConcatLowerLower(d, c0, ab), hn::ConcatUpperUpper(d, c0, ab)), d, sums);
+}
+
+HWY_INLINE HWY_ATTR float SumOfBlock(const Vector* parts) {
+  const Halves d;
+  float s[4];
+  hn::StoreU(Fold(parts), d, s);
+  return (s[0] + s[2]) + (s[1] + s[3]);
+}
+#endif
 
 HWY_INLINE HWY_ATTR void AddScaledRows(const Block8* rows, const float* by, std::size_t blocks, Block8* x) {
   const Floats d;
@@ -61,13 +96,13 @@ HWY_INLINE HWY_ATTR void AddScaledRows(const Block8* rows, const float* by, std:
     }
 }
 
-/// The rows' numbers for the coordinates as they are.
+/// The rows' numbers for the coordinates as they are. @param u four numbers
 HWY_INLINE HWY_ATTR void ReadContact(const ContactRow& contact, const SweepArrays& arrays, float* u) {
   Products p;
   Clear(p);
   for (const ContactSideRows& side : contact.side)
     AddProducts(arrays.rows + side.rows, arrays.motion + side.body, static_cast<std::size_t>(side.blocks), p);
-  for (std::size_t row = 0; row < 3; ++row) u[row] = SumOfBlock(p.sum[row]);
+  SumRows(p, u);
 }
 
 HWY_INLINE HWY_ATTR void MoveContact(const ContactRow& contact, const float* by, const SweepArrays& arrays) {
@@ -76,29 +111,32 @@ HWY_INLINE HWY_ATTR void MoveContact(const ContactRow& contact, const float* by,
 }
 
 /// How much is left open along the normal: at most 0 where the law is met.
-HWY_INLINE HWY_ATTR float Approach(const ContactRow& c, float normal_impulse, float u) {
-  return c.target - (u + c.gap) - c.compliance * (normal_impulse - c.before);
+HWY_INLINE HWY_ATTR float Approach(const ContactRow& c, float normal_force, float u) {
+  return c.target - (u + c.gap) - c.compliance * (normal_force - c.before);
 }
 
-HWY_INLINE HWY_ATTR float Largest(float friction, float normal_impulse) {
-  return normal_impulse > 0.0f ? friction * normal_impulse : 0.0f;
+HWY_INLINE HWY_ATTR float Largest(float friction, float normal_force) {
+  return normal_force > 0.0f ? friction * normal_force : 0.0f;
 }
 
 HWY_INLINE HWY_ATTR void SolveContact(ContactRow& c, const SweepArrays& arrays) {
-  float u[3], change[3];
+  float u[4], change[3];
   ReadContact(c, arrays, u);
-  const float normal = std::max(0.0f, c.impulse[0] + Approach(c, c.impulse[0], u[0]) * c.inverse_normal);
-  change[0] = normal - c.impulse[0];
+  const float normal = std::max(0.0f, c.force[0] + Approach(c, c.force[0], u[0]) * c.inverse_normal);
+  change[0] = normal - c.force[0];
   float wanted[2], square = 0.0f;
   for (int t = 0; t < 2; ++t) {
-    wanted[t] = c.impulse[1 + t] - c.inverse_tangent * (u[1 + t] + c.slip[t] + c.coupling[t] * change[0]);
+    wanted[t] = c.force[1 + t] - c.inverse_tangent * (u[1 + t] + c.slip[t] + c.coupling[t] * change[0]);
     square += wanted[t] * wanted[t];
   }
   const float most = Largest(c.friction, normal);
   const float share = square > most * most ? most / std::sqrt(square) : 1.0f;
-  for (int t = 0; t < 2; ++t) change[1 + t] = share * wanted[t] - c.impulse[1 + t];
-  for (int i = 0; i < 3; ++i) c.impulse[i] += change[i];
-  c.impulse[0] = normal;
+  for (int t = 0; t < 2; ++t) {
+    const float tangent = share * wanted[t];
+    change[1 + t] = tangent - c.force[1 + t];
+    c.force[1 + t] = tangent;
+  }
+  c.force[0] = normal;
   MoveContact(c, change, arrays);
 }
 
@@ -107,16 +145,18 @@ HWY_INLINE HWY_ATTR void SolveRolling(RollingRow& r, const ContactRow& c, const 
   Clear(p);
   for (int s = 0; s < 2; ++s)
     if (c.side[s].blocks > 0) AddProducts(arrays.rows + r.rows[s], arrays.motion + c.side[s].body, 1, p);
-  float wanted[3], change[3], square = 0.0f;
+  float u[4], wanted[3], change[3], square = 0.0f;
+  SumRows(p, u);
   for (int i = 0; i < 3; ++i) {
-    wanted[i] = r.moment[i] - r.inverse * SumOfBlock(p.sum[i]);
+    wanted[i] = r.moment[i] - r.inverse * u[i];
     square += wanted[i] * wanted[i];
   }
-  const float most = r.radius * c.impulse[0];
+  const float most = r.radius * c.force[0];
   const float share = square > most * most ? most / std::sqrt(square) : 1.0f;
   for (int i = 0; i < 3; ++i) {
-    change[i] = share * wanted[i] - r.moment[i];
-    r.moment[i] += change[i];
+    const float moment = share * wanted[i];
+    change[i] = moment - r.moment[i];
+    r.moment[i] = moment;
   }
   for (int s = 0; s < 2; ++s)
     if (c.side[s].blocks > 0) AddScaledRows(arrays.rows + r.rows[s], change, 1, arrays.motion + c.side[s].body);
@@ -134,7 +174,7 @@ HWY_INLINE HWY_ATTR float Travel(const FrameShift& frame, const float* arm, cons
 /// What it is carried by in the substep at hand.
 HWY_INLINE HWY_ATTR float Carried(const FrameShift& frame, const float* arm, const float* axis) {
   float r[3];
-  for (int i = 0; i < 3; ++i) r[i] = arm[i] + Dot3(frame.turned + 3 * i, arm);
+  for (int i = 0; i < 3; ++i) r[i] = Dot3(frame.attitude + 3 * i, arm);
   const float* w = frame.carried_turn;
   const float by[3] = {frame.carried[0] + w[1] * r[2] - w[2] * r[1], frame.carried[1] + w[2] * r[0] - w[0] * r[2],
                        frame.carried[2] + w[0] * r[1] - w[1] * r[0]};
@@ -159,10 +199,10 @@ HWY_INLINE HWY_ATTR void MeasureContact(ContactRow& c, const Block8* rows, const
     bends = true;
     AddProducts(rows + side.rows + 3, shapes + side.body + 1, static_cast<std::size_t>(side.blocks - 1), p);
   }
-  float bent[3] = {};
-  for (int row = 0; row < 3 && bends; ++row) bent[row] = SumOfBlock(p.sum[row]);
+  float bent[4] = {};
+  if (bends) SumRows(p, bent);
   c.now = gap + bent[0];
-  const float yields = c.compliance * c.impulse[0];
+  const float yields = c.compliance * c.force[0];
   c.target = std::min(c.now + yields, 0.0f) - yields;
   c.gap = gap + carried[0];
   for (int t = 0; t < 2; ++t) c.slip[t] = carried[1 + t] - bent[1 + t];
@@ -174,8 +214,8 @@ HWY_ATTR bool MeasureContacts(ContactRow* contacts, std::size_t count, const Blo
   for (std::size_t i = 0; i < count; ++i) {
     ContactRow& c = contacts[i];
     MeasureContact(c, rows, shapes, frames);
-    const float overlap = -(c.now + c.compliance * c.impulse[0]) - c.slop;
-    c.before = c.impulse[0];
+    const float overlap = -(c.now + c.compliance * c.force[0]) - c.slop;
+    c.before = c.force[0];
     c.push = 0.0f;
     c.part = std::min(share * overlap, most);
     any = any || c.part > 0.0f;
@@ -196,8 +236,7 @@ HWY_ATTR void SweepContacts(ContactRow* contacts, std::size_t count, RollingRow*
   }
 }
 
-HWY_ATTR void PushContacts(ContactRow* contacts, std::size_t count, bool backward, const Block8* rows,
-                           Block8* pushes) {
+HWY_ATTR void PushContacts(ContactRow* contacts, std::size_t count, bool backward, const Block8* rows, Block8* pushes) {
   const Floats d;
   for (std::size_t i = 0; i < count; ++i) {
     ContactRow& c = contacts[backward ? count - 1 - i : i];
@@ -224,18 +263,18 @@ HWY_ATTR void PushContacts(ContactRow* contacts, std::size_t count, bool backwar
 HWY_ATTR float ResidualOfContacts(const ContactRow* contacts, std::size_t count, const SweepArrays& arrays) {
   float largest = 0.0f;
   for (std::size_t i = 0; i < count; ++i) {
-    float u[3];
+    float u[4];
     ReadContact(contacts[i], arrays, u);
-    const float approach = Approach(contacts[i], contacts[i].impulse[0], u[0]);
-    largest = std::max(largest, contacts[i].impulse[0] > 0.0f ? std::abs(approach) : approach);
+    const float approach = Approach(contacts[i], contacts[i].force[0], u[0]);
+    largest = std::max(largest, contacts[i].force[0] > 0.0f ? std::abs(approach) : approach);
   }
   return largest;
 }
 
-HWY_ATTR void ApplyImpulses(const ContactRow* contacts, std::size_t count, const RollingRow* rolling,
-                            std::size_t rolling_count, const SweepArrays& arrays) {
+HWY_ATTR void ApplyForces(const ContactRow* contacts, std::size_t count, const RollingRow* rolling,
+                          std::size_t rolling_count, const SweepArrays& arrays) {
   for (std::size_t i = 0; i < count; ++i)
-    if (contacts[i].impulse[0] > 0.0f) MoveContact(contacts[i], contacts[i].impulse, arrays);
+    if (contacts[i].force[0] > 0.0f) MoveContact(contacts[i], contacts[i].force, arrays);
   for (std::size_t i = 0; i < rolling_count; ++i) {
     const ContactRow& c = contacts[rolling[i].contact];
     for (int s = 0; s < 2; ++s)
@@ -254,7 +293,7 @@ HWY_EXPORT(MeasureContacts);
 HWY_EXPORT(SweepContacts);
 HWY_EXPORT(PushContacts);
 HWY_EXPORT(ResidualOfContacts);
-HWY_EXPORT(ApplyImpulses);
+HWY_EXPORT(ApplyForces);
 
 bool measure_contacts(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* shapes,
                       const FrameShift* frames, float share, float most) {
@@ -274,9 +313,9 @@ float residual_of_contacts(const ContactRow* contacts, std::size_t count, const 
   return HWY_DYNAMIC_DISPATCH(ResidualOfContacts)(contacts, count, arrays);
 }
 
-void apply_impulses(const ContactRow* contacts, std::size_t count, const RollingRow* rolling,
-                    std::size_t rolling_count, const SweepArrays& arrays) {
-  HWY_DYNAMIC_DISPATCH(ApplyImpulses)(contacts, count, rolling, rolling_count, arrays);
+void apply_forces(const ContactRow* contacts, std::size_t count, const RollingRow* rolling, std::size_t rolling_count,
+                  const SweepArrays& arrays) {
+  HWY_DYNAMIC_DISPATCH(ApplyForces)(contacts, count, rolling, rolling_count, arrays);
 }
 
 }  // namespace limber::internal

@@ -2,8 +2,8 @@
 // instruction sets, so neither Eigen nor a header that includes it may reach it.
 //
 // A body has blocks of eight coordinates: its frame first, then its modes. Coordinates are scaled so that what a row
-// moves them by, per unit of impulse, is the row again (small_steps.h). A contact has three rows a side, along the
-// normal and two tangents, block by block: rows of block k at rows + 3 k, + 1, + 2.
+// moves them by, per unit of a force held over the substep, is the row again (small_steps.h). A contact has three rows
+// a side, along the normal and two tangents, block by block: rows of block k at rows + 3 k, + 1, + 2.
 //
 // Every result is the same bits on every instruction set that has fused multiply-add.
 #pragma once
@@ -17,9 +17,11 @@ struct alignas(32) Block8 {
   float v[8] = {};
 };
 
-/// How a frame has moved since the rows were made: a point at r (world axes of then) has come by shift + turned r.
+/// How a frame has moved since the rows were made: a point at r in the body has come by shift + turned r, turned the
+/// change of the attitude R.
 struct FrameShift {
   float shift[3] = {}, turned[9] = {};          // row by row
+  float attitude[9] = {};                       // R at the substep's start, row by row; of led bodies alone
   float carried[3] = {}, carried_turn[3] = {};  // what a led body is moved by in the substep at hand, whatever acts
   bool is_carried = false;
 };
@@ -29,30 +31,30 @@ struct ContactSideRows {
   std::int32_t body = 0;    // first block of its coordinates
   std::int32_t blocks = 0;  // 0: the side does not move
   std::int32_t frame = 0;   // its number
-  float arm[3] = {};        // of the point that the body carries along, world axes at the step's start
+  float arm[3] = {};        // of the point that the body carries along, body axes
 };
 
-/// One contact as the sweeps see it. Lengths in m, impulses in N·s, of one substep.
+/// One contact as the sweeps see it. Lengths in m, forces in N, held over the substep.
 struct ContactRow {
   ContactSideRows side[2];
   float axes[3][3] = {};  // normal, tangents; world
   float rest = 0.0f;      // the gap at the step's start less what the modes give it
   float friction = 0.0f, slop = 0.0f;
-  float compliance = 0.0f;                                                            // m per N·s
-  float inverse_normal = 0.0f, inverse_tangent = 0.0f, inverse_push = 0.0f;           // effective masses
-  float coupling[2] = {};                                                             // of the normal with the tangents
+  float compliance = 0.0f;                                                   // m/N
+  float inverse_normal = 0.0f, inverse_tangent = 0.0f, inverse_push = 0.0f;  // effective masses, N/m
+  float coupling[2] = {};                                                    // of the normal with the tangents
   float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap
   float now = 0.0f;                               // the gap at the substep's start
-  float impulse[3] = {}, before = 0.0f;           // the latter: along the normal in the last substep
-  float push = 0.0f, part = 0.0f;                 // displacement impulse; how far it is to part in the substep, m
+  float force[3] = {}, before = 0.0f;             // the latter: along the normal in the last substep
+  float push = 0.0f, part = 0.0f;                 // what displaces frames; how far they are to part in the substep, m
 };
 
-/// Resistance of a round contact to rolling and spinning: a moment up to `radius` times the contact's normal impulse.
+/// Resistance of a round contact to rolling and spinning: a moment up to `radius` times the contact's normal force.
 struct RollingRow {
   std::int32_t contact = 0;
   std::int32_t rows[2] = {};  // three blocks a side that moves
   float radius = 0.0f, inverse = 0.0f;
-  float moment[3] = {};  // N·m·s
+  float moment[3] = {};  // N·m
 };
 
 struct SweepArrays {
@@ -76,8 +78,8 @@ void push_contacts(ContactRow* contacts, std::size_t count, bool backward, const
 /// The largest approach that the rows still show, m: how far from their law the sweeps ended.
 float residual_of_contacts(const ContactRow* contacts, std::size_t count, const SweepArrays& arrays);
 
-/// motion += rows · impulse, of all contacts: what they begin the step with.
-void apply_impulses(const ContactRow* contacts, std::size_t count, const RollingRow* rolling,
-                    std::size_t rolling_count, const SweepArrays& arrays);
+/// motion += rows · force, of all contacts: what they begin the step with.
+void apply_forces(const ContactRow* contacts, std::size_t count, const RollingRow* rolling, std::size_t rolling_count,
+                  const SweepArrays& arrays);
 
 }  // namespace limber::internal

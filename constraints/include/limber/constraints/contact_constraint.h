@@ -73,7 +73,7 @@ constexpr ContactSolver kDefaultContactSolver = ContactSolver::kExact;
 struct ContactOptions {
   ContactSolver solver = kDefaultContactSolver;
   SmallSteps small_steps{};  ///< of kGame
-  double friction = 0.5;  ///< μ of bodies without their own; ≥ 0
+  double friction = 0.5;     ///< μ of bodies without their own; ≥ 0; infinite, with kGame: what touches sticks
   /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
   /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
   /// C g/(1 + ⅖), and stays on slopes of less than atan C. A tyre on asphalt has 0.01, a ball on grass 0.1. Spinning is
@@ -96,8 +96,9 @@ struct ContactOptions {
 template <class Self>
 requires std::is_same_v<std::remove_const_t<Self>, ContactOptions>
 auto state_fields(Self& s) {
-  return std::tie(s.solver, s.small_steps, s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance, s.rule.method,
-                  s.rule.friction, s.rule.guard, s.penalty_frequency, s.penalty_damping, s.impact, s.impact_speed);
+  return std::tie(s.solver, s.small_steps, s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance,
+                  s.rule.method, s.rule.friction, s.rule.guard, s.penalty_frequency, s.penalty_damping, s.impact,
+                  s.impact_speed);
 }
 
 /// What became of a contact in the last step.

@@ -5,7 +5,7 @@
 ///   1. all bodies move freely, modes in closed form,
 ///   2. gaps are measured again from the contacts' anchors,
 ///   3. one sweep of Gauss–Seidel forward and one backward over all rows, each contact's normal and then both its
-///      tangents, begins with the impulses of the substep before,
+///      tangents, begins with the forces of the substep before,
 ///   4. what overlaps is parted by displacements of frames that leave no speed.
 ///
 ///   y = y_free + q,   q = Σ Jᵀf,   0 ≤ f_n ⊥ gap + J_n y − min(gap, 0) ≥ 0,   |f_t| ≤ μ f_n
@@ -13,7 +13,7 @@
 /// Work is substeps × rows, known before the step. The sweeps do not end where the law is met: what they leave acts
 /// like a spring whose stiffness grows with n². A force never pulls and stays in its cone whatever is left.
 ///
-/// Both sweeps are needed: in one direction their spectrum is complex, and the impulses that a substep begins with make
+/// Both sweeps are needed: in one direction their spectrum is complex, and the forces that a substep begins with make
 /// such a sweep unstable. Modes answer as SubstepModes says, so that contact gives them no energy. Rows of contacts are
 /// those of the step's start; those of handles and joints are made anew in each substep.
 /// Derivation: docs/derivations/small-steps.md.
@@ -45,8 +45,8 @@ auto state_fields(Self& s) { return std::tie(s.substeps, s.slop, s.push_speed); 
 /// One step of all bodies that contacts or constraints touch.
 struct SmallStepProblem {
   std::span<const ConstrainedBody> table{};
-  std::span<const Index> members{};  ///< ascending: every body that rows touch and that moves
-  ContactSet* contacts = nullptr;    ///< updated for the step; null: none
+  std::span<const Index> members{};            ///< ascending: every body that rows touch and that moves
+  ContactSet* contacts = nullptr;              ///< updated for the step; null: none
   std::span<Constraint* const> constraints{};  ///< but for those of `contacts`
   std::span<const double> thickness{};         ///< by body, m: what the slop is a share of; none: no slop
   double step = 1.0 / 60.0;                    ///< s

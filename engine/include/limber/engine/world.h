@@ -108,7 +108,8 @@ struct BodyPlacement {
   /// rad/s; kLine: its part along the line counts; kKinematic: of what carries it
   Vec3 angular_velocity = Vec3::Zero();
   CollisionFilter filter{};  ///< whom it meets, where the world has a contact source
-  /// μ, ≥ 0; that of two bodies is √(μ_a μ_b). Not given: ContactOptions::friction.
+  /// μ, ≥ 0; that of two bodies is √(μ_a μ_b). Infinite, with ContactSolver::kGame: what touches it sticks. Not given:
+  /// ContactOptions::friction.
   std::optional<double> friction{};
   /// What others meet in place of the model's collision surface: it moves with the frame and does not deform, and
   /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.

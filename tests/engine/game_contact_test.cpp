@@ -1,0 +1,213 @@
+// Contact by small steps (ContactSolver::kGame): what rests, slides, rebounds and piles up.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "bar_model.h"
+#include "pile.h"
+
+namespace limber::testing {
+namespace {
+
+constexpr double kSize = 0.3;
+const Vec3 kHalf = Vec3(0.5, 0.4, 0.3) * kSize;
+
+ContactOptions game(int substeps = 8, double friction = 0.5) {
+  return {.solver = ContactSolver::kGame, .small_steps = {.substeps = substeps}, .friction = friction};
+}
+
+std::shared_ptr<const ModalModel> rigid_box(double factor = 1.0) {
+  ModalModelData data = sample_model_data({.modes = 0, .half_extent = kHalf});
+  data.mass *= factor;
+  data.inertia *= factor;
+  return std::make_shared<const ModalModel>(std::move(data));
+}
+
+/// Bricks by their shape, on the ground or wherever they are put.
+struct Bricks : GroundedWorld {
+  explicit Bricks(const ContactOptions& options = game(), const WorldOptions& world_options = {})
+      : GroundedWorld(options, world_options), shape(std::make_shared<const Shape>(Box{.half_extents = kHalf})) {}
+  BodyId add(const BodyPlacement& placement, double factor = 1.0) {
+    BodyPlacement at = placement;
+    at.shape = shape;
+    bodies.push_back(world.add_body(rigid_box(factor), at));
+    return bodies.back();
+  }
+  double scale() const {
+    double mass = 0.0;
+    for (const BodyId body : bodies) mass += world.model(body).data().mass;
+    return mass * kGravity * kSize;
+  }
+  std::shared_ptr<const Shape> shape;
+  std::vector<BodyId> bodies;
+};
+
+TEST(GameContact, AStackOfTenStandsAndComesToRest) {
+  Bricks scene;
+  for (int i = 0; i < 10; ++i)
+    scene.add({.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}),
+                        {0.03 * kSize * (i % 2), 0.025 * kSize * (i % 3), kHalf.z() + i * (2.0 * kHalf.z() + 1e-4)}}});
+  scene.step(asked("LIMBER_STEPS", 600));
+  const RigidTransform before = scene.world.body(scene.bodies.back()).pose;
+  scene.step(60);
+  const RigidTransform after = scene.world.body(scene.bodies.back()).pose;
+  EXPECT_LT((after.p - before.p).norm(), 1e-3 * kSize) << "its bending comes to rest slowly";
+  EXPECT_NEAR(after.p.z(), kHalf.z() * 19.0, 10 * 2e-3 * kSize);
+  EXPECT_TRUE(scene.world.constraint_report().solved);
+}
+
+TEST(GameContact, ASlopeBelowTheAngleOfFrictionHoldsAndAboveItSlidesByCoulombsLaw) {
+  for (const double share : {0.9, 1.05}) {
+    const double angle = std::atan(share * 0.5);
+    Bricks scene(game(), {.gravity = kGravity * Vec3(std::sin(angle), 0.0, -std::cos(angle))});
+    const BodyId box = scene.add({.pose = {{}, {0.0, 0.0, kHalf.z() + 1e-6}}});
+    scene.step(60);
+    const BodyView at = scene.world.body(box);
+    const double x = at.pose.p.x(), v = at.velocity.x();
+    scene.step(120);
+    const double slid = scene.world.body(box).pose.p.x() - x, gained = scene.world.body(box).velocity.x() - v;
+    if (share < 1.0)
+      EXPECT_LT(std::abs(slid) / 2.0, 1e-6 * kSize);
+    else
+      EXPECT_NEAR(gained / 2.0, kGravity * (std::sin(angle) - 0.5 * std::cos(angle)), 1e-3 * kGravity * 0.02236);
+  }
+}
+
+TEST(GameContact, ContactsPushWhateverTheirFriction) {
+  for (const double friction : {0.0, 1.0, 1e4, 1e6, std::numeric_limits<double>::infinity()}) {
+    Bricks scene(game(8, friction));
+    const BodyId box = scene.add(
+        {.pose = {quaternion_from_rotation_vector({0.2, 0.3, 0.0}), {0.0, 0.0, 0.3}}, .velocity = {1.0, 0.5, 0.0}});
+    double energy = total_energy(scene.world, scene.bodies), lowest = 1.0;
+    for (int i = 0; i < 120; ++i) {
+      scene.step(1);
+      const double now = total_energy(scene.world, scene.bodies);
+      EXPECT_LE(now, energy + 1e-2 * scene.scale()) << friction;
+      energy = now;
+      lowest = std::min(lowest, scene.world.body(box).pose.p.z());
+      EXPECT_TRUE(scene.world.constraint_report().solved) << friction;
+    }
+    EXPECT_GT(lowest, kHalf.z() - 0.02 * kSize) << friction;
+  }
+}
+
+TEST(GameContact, WhatSlidesWithoutFrictionKeepsItsSpeed) {
+  Bricks scene(game(8, 0.0));
+  const BodyId box = scene.add({.pose = {{}, {0.0, 0.0, kHalf.z()}}, .velocity = {2.0, 0.0, 0.0}});
+  scene.step(300);
+  EXPECT_NEAR(scene.world.body(box).velocity.x(), 2.0, 1e-6);
+}
+
+TEST(GameContact, TwoBodiesThatMeetInFlightKeepTheirMomenta) {
+  for (const int modes : {0, 6}) {
+    GroundedWorld scene(game(), {.gravity = Vec3::Zero()});
+    const auto model = sample_model({.modes = modes, .lowest_hz = 60.0});
+    std::vector<BodyId> bodies;
+    bodies.push_back(scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, 5.0}}, .angular_velocity = {1.0, 0.5, 0.0}}));
+    bodies.push_back(scene.world.add_body(
+        model, {.pose = {quaternion_from_rotation_vector({0.3, 0.2, 0.1}), {0.9, 0.1, 5.1}}, .velocity = {-3, 0, 0}}));
+    const auto momentum = [&] {
+      Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+      for (const BodyId body : bodies) {
+        linear += scene.world.linear_momentum(body);
+        angular +=
+            scene.world.angular_momentum(body) + scene.world.body(body).pose.p.cross(scene.world.linear_momentum(body));
+      }
+      return std::pair(linear, angular);
+    };
+    const auto before = momentum();
+    const double energy = total_energy(scene.world, bodies);
+    bool met = false;
+    for (int i = 0; i < 40; ++i) {
+      scene.step(1);
+      met = met || !scene.world.contact_events().empty();
+    }
+    EXPECT_TRUE(met);
+    const auto after = momentum();
+    EXPECT_LT((after.first - before.first).norm(), 1e-5 * before.first.norm());
+    // Of the turn it is kept to the gap at which the points of a contact face each other.
+    EXPECT_LT((after.second - before.second).norm(), 1e-2 * before.second.norm());
+    EXPECT_LT(total_energy(scene.world, bodies), energy * 1.001);
+  }
+}
+
+/// Its speed after it struck a wall end on, for one before of 1.
+double rebound(int steps_of_contact, int substeps, double phase) {
+  const double step = kBarContactTime / steps_of_contact, speed = 0.01;
+  GroundedWorld scene(game(substeps, 0.0), {.step = step, .gravity = Vec3::Zero()});
+  scene.world.add_static(std::make_shared<Shape>(HalfSpace{.normal = Vec3::UnitX()}));
+  const BodyId bar = scene.world.add_body(
+      bar_model(20, false), {.pose = {{}, {0.5 + (1.3 + phase) * step * speed, 0.0, 2.0}}, .velocity = {-speed, 0, 0}});
+  const double energy = scene.world.energy(bar).total();
+  for (int i = 0; i < 8 * steps_of_contact / 5 + 6; ++i) {
+    scene.step(1);
+    EXPECT_LT(scene.world.energy(bar).total(), 1.0001 * energy);
+  }
+  return scene.world.body(bar).velocity.x() / speed;
+}
+
+TEST(GameContact, ABarReturnsFromAWallAsFastAsSubstepsShowItsWave) {
+  double least_coarse = 1.0, least_fine = 1.0;
+  for (int phase = 0; phase < 8; ++phase) {
+    least_coarse = std::min(least_coarse, rebound(5, 8, phase / 8.0));
+    least_fine = std::min(least_fine, rebound(10, 8, phase / 8.0));
+  }
+  EXPECT_GT(least_coarse, 0.9);
+  EXPECT_GT(least_fine, 0.93);
+}
+
+TEST(GameContact, AFallingPileGainsNoEnergyAndDoesNotOverlapForLong) {
+  Pile pile(kPileBoxes, -1, false, game());
+  double energy = total_energy(pile.world, pile.bodies), rise = 0.0, falling = 0.0, resting = 0.0, mass = 0.0;
+  for (const BodyId body : pile.bodies) mass += pile.world.model(body).data().mass;
+  for (int i = 0; i < 150; ++i) {
+    pile.step_once();
+    (i < 120 ? falling : resting) = std::max(i < 120 ? falling : resting, -pile.deepest);
+    const double now = total_energy(pile.world, pile.bodies);
+    rise = std::max(rise, now - energy);
+    energy = now;
+    EXPECT_TRUE(pile.world.constraint_report().solved);
+  }
+  EXPECT_LT(falling, 0.1 * kPileSize);
+  EXPECT_LT(resting, 3e-3 * kPileSize);
+  EXPECT_LT(rise, 1e-2 * mass * kGravity * kPileSize);
+}
+
+TEST(GameContact, FlexibleBoxesOnEachOtherComeToRest) {
+  GroundedWorld scene(game());
+  const auto model = sample_model({.modes = 12, .lowest_hz = 60.0, .decay = 12.0});
+  std::vector<BodyId> boxes;
+  for (int i = 0; i < 4; ++i)
+    boxes.push_back(
+        scene.world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.1 * i}),
+                                              {0.02 * (i % 2), 0.01 * i, depth_below_origin(*model) + 0.21 * i}}}));
+  scene.step(180);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const BodyView at = scene.world.body(boxes[i]);
+    EXPECT_LT(at.velocity.norm(), 0.02);
+    EXPECT_NEAR(at.pose.p.z(), depth_below_origin(*model) + 0.2 * static_cast<double>(i), 5e-3);
+  }
+}
+
+TEST(GameContact, RollingResistanceSlowsABallByItsCoefficient) {
+  ContactOptions options = game(8, 0.8);
+  options.rolling_friction = 0.05;
+  GroundedWorld scene(options);
+  ModalModelData data = sample_model_data({.modes = 0});
+  data.inertia = 0.4 * data.mass * 0.04 * Mat3::Identity();
+  const BodyId ball = scene.world.add_body(std::make_shared<const ModalModel>(std::move(data)),
+                                           {.pose = {{}, {0.0, 0.0, 0.2}},
+                                            .velocity = {2.0, 0.0, 0.0},
+                                            .angular_velocity = {0.0, 10.0, 0.0},
+                                            .shape = std::make_shared<const Shape>(Sphere{0.2})});
+  scene.step(6);
+  const double before = scene.world.body(ball).velocity.x();
+  scene.step(60);
+  const double slowing = 0.05 * kGravity / 1.4;
+  EXPECT_NEAR(before - scene.world.body(ball).velocity.x(), slowing, 0.01 * slowing);
+}
+
+}  // namespace
+}  // namespace limber::testing
