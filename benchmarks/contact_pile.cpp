@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cpu_time.h"
+#include "limber/collision/manifold_finder.h"
 #include "pile.h"
 
 namespace {
@@ -17,25 +18,28 @@ using namespace limber;
 
 constexpr int kStepsOfSecond = 60;
 constexpr const char* kUsage =
-    "contact_pile [--solver game|exact] [--substeps n] [bodies] [seconds] [modes, -1: all rigid] [boxes | rolling "
+    "contact_pile [--solver game|exact] [--finder exact|manifolds] [--substeps n] [bodies] [seconds] [modes, -1: all "
+    "rigid] [boxes | rolling "
     "friction]\n";
 
 struct Arguments {
   ContactOptions options;
   int count = 100, seconds = 8, modes = 6;
-  bool rolls = true;
+  bool rolls = true, manifolds = false;
 };
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
   int place = 0;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "--solver" || word == "--substeps") {
+    if (word == "--solver" || word == "--substeps" || word == "--finder") {
       if (++i == argc) return false;
       const std::string_view value = argv[i];
-      if (word == "--substeps")
+      if (word == "--finder" && (value == "exact" || value == "manifolds"))
+        arguments.manifolds = value == "manifolds";
+      else if (word == "--substeps")
         arguments.options.small_steps.substeps = std::atoi(argv[i]);
-      else if (value == "game" || value == "exact")
+      else if (word == "--solver" && (value == "game" || value == "exact"))
         arguments.options.solver = value == "game" ? ContactSolver::kGame : ContactSolver::kExact;
       else
         return false;
@@ -117,6 +121,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   testing::Pile pile(arguments.count, arguments.modes, arguments.rolls, arguments.options);
+  ManifoldFinder manifolds;
+  if (arguments.manifolds) pile.world.set_contact_source(&manifolds, arguments.options);
   const bool game = arguments.options.solver == ContactSolver::kGame;
   std::printf("%d bodies, %d of them flexible (%d modes); %s", arguments.count,
               arguments.modes < 0 ? 0 : arguments.count / 10, std::max(arguments.modes, 0), game ? "game" : "exact");

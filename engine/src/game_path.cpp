@@ -87,10 +87,12 @@ void GamePath::solve(const Substep& substep) {
                                                .thickness = forecast_.thickness(),
                                                .step = substep.length,
                                                .gravity = substep.gravity});
-  report_ = {.status = report.solved ? SolveStatus::kSolved : SolveStatus::kInvalidInput,
-             .bodies = static_cast<int>(members_.size()),
-             .rows = report.rows,
-             .change = report.residual};
+  report_ = {};
+  report_.status = report.solved ? IslandStatus::kSolved : IslandStatus::kFailed;
+  report_.statuses[report_.status] = 1;
+  report_.bodies = static_cast<int>(members_.size());
+  report_.rows = report.rows;
+  report_.change = report.residual;
 }
 
 void GamePath::save_state(StateWriter& state) const {

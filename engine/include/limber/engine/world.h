@@ -165,12 +165,15 @@ struct ConstraintReport {
   int newton_steps = 0;  ///< the same, of the contacts with friction: bounded (island_solver.h)
   /// What is left where the solver ended, of the island that is farthest from its rows' law, in units of what rows are
   /// met to (3e-9 of the arms of a contact's points, 1e-11 of those of joints and hands): at most 1 where all is met.
+  /// By ContactSolver::kGame: the largest motion that a row's law still forbids in the last of the small steps, m.
   double residual = 0.0;
   ProgramReport programs{};       ///< linear programs of the contact rule
   StepAttempts attempts{};        ///< how many islands' steps, or parts of them, were cut or tried in another way
   IslandStatusCounts statuses{};  ///< islands by how their steps ended; of a step in parts, those of all parts
-  bool solved = true;             ///< every row of every island is within its tolerance: all are kSolved
-  double energy_removed = 0.0;    ///< J; negative: given back (island_solver.h)
+  /// Every row of every island is within its tolerance: all are kSolved. By kGame, which solves all islands as one: no
+  /// force pulls, is outside its cone or is not finite; kFailed otherwise.
+  bool solved = true;
+  double energy_removed = 0.0;  ///< J; negative: given back (island_solver.h)
 };
 
 enum class Axes { kWorld, kBody };
