@@ -3,7 +3,8 @@
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb [BESIDE]]]     part of the names of the scenes wanted ("": all), the asset of the
 //   bunnies ("": without them); beside ContactFinder: fcl (if nothing is given), alone (nothing), or manifolds
-//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned)
+//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned, and only queries of all bodies: what game
+//   contact asks, once a step)
 // Figures: docs/reports/benchmarks.md.
 #include <algorithm>
 #include <cmath>
@@ -80,7 +81,7 @@ class Recorder final : public ContactSource {
     replayed_.emplace_back([=](ContactSource& to) { to.exclude_pair(a, b, excluded); });
   }
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override {
-    queries_.emplace_back(query);
+    if (beside != Beside::kManifolds || query.bodies.empty()) queries_.emplace_back(query);
     finder_.find_contacts(query, contacts, jobs);
   }
   void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override {

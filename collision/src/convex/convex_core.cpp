@@ -158,6 +158,7 @@ ConvexCore hull_of(std::vector<Vec3> points) {
   const Index count = 1 + *std::max_element(group.begin(), group.end());
   for (Index label = 0; label < count; ++label) add_face(core, faces, group, label);
   number_edges(core);
+  for (const Vec3& p : core.points) core.extent = std::max(core.extent, p.norm());
   return core;
 }
 

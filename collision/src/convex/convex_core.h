@@ -24,6 +24,7 @@ struct ConvexCore {
   std::vector<Index> loop_edges{};      // of each corner of a loop: the edge on to the next, each edge once
   std::vector<Vec3> edge_directions{};  // unit, each once, whichever way round
   Vec3 half_extents = Vec3::Zero();     // of a box: its points are at ± these; zero for the rest
+  double extent = 0.0;                  // largest distance of a point of a polytope from the origin
 
   std::span<const Index> loop(const ConvexFace& f) const {
     return std::span(loops).subspan(static_cast<std::size_t>(f.first), static_cast<std::size_t>(f.count));

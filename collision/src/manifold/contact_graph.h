@@ -51,6 +51,7 @@ class ContactGraph {
   void match(std::span<const BodyPair> pairs, bool all);
   std::size_t size() const { return matched_.size(); }
   LivePair& at(std::size_t i) { return slots_[matched_[i]]; }  ///< of the i-th of the last match()
+  const LivePair& at(std::size_t i) const { return slots_[matched_[i]]; }
   void forget(Index body);
   void forget_all();
   /// Room in a pair's manifold, which is emptied. From any thread.

@@ -47,12 +47,19 @@ class ManifoldShapes {
   std::unordered_map<const Shape*, std::weak_ptr<const ManifoldShape>> map_;
 };
 
+/// The size that motions are measured by: of solids and sheets the least extent, but a hundredth of the largest; of
+/// meshes that others stand on the largest.
+inline double thickness_of(const Aabb& box, bool ground) {
+  const Vec3 extents = 2.0 * box.half_extents();
+  return ground ? extents.maxCoeff() : std::max(extents.minCoeff(), 0.01 * extents.maxCoeff());
+}
+
 struct ManifoldBody {
   bool present = false;
   std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
   std::shared_ptr<const ManifoldShape> rigid{};
   bool finds_itself = false;
-  double thickness = 0.0, radius = 0.0;  ///< of its box at rest: least extent; farthest point from the origin, m
+  double thickness = 0.0, radius = 0.0;  ///< thickness_of() its box at rest; farthest point from the origin, m
 
   // As it was placed for the last query.
   bool placed_asleep = false;

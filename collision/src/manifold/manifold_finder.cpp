@@ -30,6 +30,8 @@ using internal::PairQuery;
 
 namespace {
 
+constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+
 [[noreturn]] void refuse_state(Index body, const std::string& seen, const std::string& expected) {
   throw InvalidArgument("ManifoldFinder: state of body " + std::to_string(body) + ": " + seen + ", expected " +
                         expected);
@@ -70,11 +72,11 @@ struct ManifoldWorker {
 
 class ManifoldWorkers {
  public:
-  void start_query(const NarrowPhaseOptions& options, int concurrency) {
+  void start_query(const NarrowPhaseOptions& options, internal::DeformingPairs* deforming, int concurrency) {
     while (all_.size() < static_cast<std::size_t>(concurrency))
       all_.push_back(std::make_unique<ManifoldWorker>(options));
     free_.clear();
-    for (const auto& worker : all_) worker->pairs.start_query(nullptr), free_.push_back(worker.get());
+    for (const auto& worker : all_) worker->pairs.start_query(deforming), free_.push_back(worker.get());
   }
   class Lease {
    public:
@@ -125,7 +127,8 @@ struct ManifoldFinder::Impl {
   std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
   BroadPhase broad_phase;
   ContactGraph graph;
-  ContactFinder impacts;  ///< knows the same bodies
+  ContactFinder impacts;                                ///< knows the same bodies
+  std::unique_ptr<internal::DeformingPairs> deforming;  ///< null: NarrowPhase finds all contacts of what deforms
   ManifoldWorkers workers;
 
   // Of the query under way.
@@ -136,7 +139,9 @@ struct ManifoldFinder::Impl {
   std::vector<Index> to_place, near;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
-  std::vector<std::uint8_t> recycled;         ///< by pair
+  std::vector<std::uint8_t> recycled;                ///< by pair
+  std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
+  std::vector<internal::SupportPlane> planes_a, planes_b;
   std::vector<std::size_t> first_of, counts;  ///< by pair: of its contacts, and how many
   Counts told;
 
@@ -164,6 +169,17 @@ struct ManifoldFinder::Impl {
   void find_manifolds(Jobs& jobs);
   bool keeps(const LivePair& pair, const PairQuery& query) const;
   void make(LivePair& pair, const PairQuery& query, ManifoldWorker& worker);
+  struct Measured {
+    Vec3 normal, p_a, p_b;  ///< world; points from the origin of a
+    double gap;
+  };
+  Measured measure(const KeptPoint& point, const BodyPair& pair, ManifoldWorker& worker) const;
+  void level_seams();
+  Vec3 out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const;
+  bool touches_along(std::size_t pair, Index body, const Vec3& out) const;
+  void list_pairs_of_bodies();
+  void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes, ManifoldWorker& worker);
+  bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
   RigidTransform smaller_in_larger(const PairQuery& query) const;
   double slack(const PairQuery& query) const;
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);
@@ -239,7 +255,7 @@ void ManifoldFinder::Impl::place() {
 
 void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   check_and_list();
-  workers.start_query(options.narrow_phase, jobs.concurrency());
+  workers.start_query(options.narrow_phase, deforming.get(), jobs.concurrency());
   make_boxes(jobs);
   place();
   if (some.empty()) {
@@ -257,6 +273,7 @@ void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   for (const auto& [a, b] : pairs)
     for (const Index index : {a, b})
       if (state(index).asleep) check_body_state(index, at(index), state(index));
+  if (deforming) deforming->start_query(bodies, states, to_place, jobs);
 }
 
 /// Bodies that find themselves and are awake, among the pairs in their order.
@@ -385,27 +402,36 @@ ContactSide side_of(const FeatureSide& kept, Index index, const ManifoldBody& bo
 
 }  // namespace
 
-/// The contacts that the expected motion may close, with gaps as they are now. The point of the body that the normal
-/// turns with is the foot of the other's point, as both slide along each other.
+/// The point of the body that the normal turns with is the foot of the other's point, as both slide along each other.
+ManifoldFinder::Impl::Measured ManifoldFinder::Impl::measure(const KeptPoint& point, const BodyPair& pair,
+                                                             ManifoldWorker& worker) const {
+  const ManifoldBody &a = at(pair.a), &b = at(pair.b);
+  Measured m;
+  m.normal = (point.turns_with_b ? b.turn : a.turn) * point.normal;
+  m.p_a = a.turn * place_of(point.a, pair.a, a, state(pair.a), worker.pairs) - a.rounding() * m.normal;
+  m.p_b = b.turn * place_of(point.b, pair.b, b, state(pair.b), worker.pairs) + (b.pose.p - a.pose.p) +
+          b.rounding() * m.normal;
+  m.gap = m.normal.dot(m.p_a - m.p_b);
+  if (point.turns_with_b && !b.modal) m.p_b = m.p_a - m.gap * m.normal;
+  if (!point.turns_with_b && !a.modal) m.p_a = m.p_b + m.gap * m.normal;
+  return m;
+}
+
+/// The contacts that the expected motion may close, with gaps as they are now.
 std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker,
                                         ContactPoint* to) const {
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
-  const double radius_a = a.rounding(), radius_b = b.rounding(), near_enough = margin + a.reach + b.reach;
+  const double near_enough = margin + a.reach + b.reach;
   const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - origin;
   std::size_t count = 0;
   for (const KeptPoint& point : live.points) {
-    const Vec3 normal = (point.turns_with_b ? b.turn : a.turn) * point.normal;
-    Vec3 p_a = a.turn * place_of(point.a, pair.a, a, state(pair.a), worker.pairs) - radius_a * normal;
-    Vec3 p_b = b.turn * place_of(point.b, pair.b, b, state(pair.b), worker.pairs) + between + radius_b * normal;
-    const double gap = normal.dot(p_a - p_b);
-    if (gap > near_enough + std::max(0.0, -normal.dot(way))) continue;
-    if (point.turns_with_b && !b.modal) p_b = p_a - gap * normal;
-    if (!point.turns_with_b && !a.modal) p_a = p_b + gap * normal;
-    to[count++] = {side_of(point.a, pair.a, a, a.turn.transpose() * p_a),
-                   side_of(point.b, pair.b, b, b.turn.transpose() * (p_b - between)),
-                   normal,
-                   base + 0.5 * (p_a + p_b),
-                   gap,
+    const Measured m = measure(point, pair, worker);
+    if (m.gap > near_enough + std::max(0.0, -m.normal.dot(way))) continue;
+    to[count++] = {side_of(point.a, pair.a, a, a.turn.transpose() * m.p_a),
+                   side_of(point.b, pair.b, b, b.turn.transpose() * (m.p_b - between)),
+                   m.normal,
+                   base + 0.5 * (m.p_a + m.p_b),
+                   m.gap,
                    point.id};
   }
   return count;
@@ -433,6 +459,94 @@ void ManifoldFinder::Impl::write_contacts(std::vector<ContactPoint>& contacts, J
   contacts.resize(count);
 }
 
+// -- Seams between bodies ---------------------------------------------------------------------------------------------
+
+/// Where a body rests on one thing and comes to another one that reaches to the same plane and no farther, the plane is
+/// what both touch along. Manifolds made in this query are made again so, one after the other.
+void ManifoldFinder::Impl::level_seams() {
+  bool listed = false;
+  const ManifoldWorkers::Lease worker(workers);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const BodyPair& pair = pairs[p];
+    if (recycled[p] != 0 || graph.at(p).points.empty() || at(pair.a).modal || at(pair.b).modal) continue;
+    if (!listed) list_pairs_of_bodies();
+    listed = true;
+    find_planes(p, pair.a, planes_a, *worker);
+    find_planes(p, pair.b, planes_b, *worker);
+    if (planes_a.empty() && planes_b.empty()) continue;
+    PairQuery q = query_of(pair);
+    q.planes_a = planes_a, q.planes_b = planes_b;
+    make(graph.at(p), q, *worker);
+  }
+}
+
+void ManifoldFinder::Impl::list_pairs_of_bodies() {
+  first_pair_of.assign(bodies.size() + 1, 0);
+  for (const auto& [a, b] : pairs)
+    ++first_pair_of[static_cast<std::size_t>(a) + 1], ++first_pair_of[static_cast<std::size_t>(b) + 1];
+  for (std::size_t i = 1; i < first_pair_of.size(); ++i) first_pair_of[i] += first_pair_of[i - 1];
+  pairs_of.resize(2 * pairs.size());
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (const Index body : {pairs[p].a, pairs[p].b}) pairs_of[first_pair_of[static_cast<std::size_t>(body)]++] = p;
+  for (std::size_t i = first_pair_of.size() - 1; i > 0; --i) first_pair_of[i] = first_pair_of[i - 1];
+  first_pair_of[0] = 0;
+}
+
+/// Planes, in the frame of a convex body of a pair, that it rests on beside the other one, to which that one reaches,
+/// and along which not all of the pair's contacts are.
+void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes,
+                                       ManifoldWorker& worker) {
+  planes.clear();
+  const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
+  const ManifoldBody& me = at(body);
+  if (me.core() == nullptr || at(other).half_space() != nullptr) return;
+  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
+  const auto i = static_cast<std::size_t>(body);
+  for (std::size_t k = first_pair_of[i]; k < first_pair_of[i + 1]; ++k) {
+    const std::size_t beside = pairs_of[k];
+    if (beside == p) continue;
+    Vec3 last = Vec3::Zero();
+    for (const KeptPoint& point : graph.at(beside).points) {
+      const Vec3 out = out_of_other(point, pairs[beside], body);
+      if ((out - last).norm() <= kSameNormal) continue;  // contacts of a face
+      const Measured m = measure(point, pairs[beside], worker);
+      if (m.gap > tolerance) continue;
+      last = out;
+      if (touches_along(p, body, out)) continue;
+      const double offset =
+          pairs[beside].a == body ? out.dot(m.p_b) : out.dot(m.p_a + at(pairs[beside].a).pose.p - me.pose.p);
+      if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
+        planes.push_back({me.turn.transpose() * out, offset, tolerance});
+    }
+  }
+}
+
+/// The normal of a contact, into a body of the pair, world.
+Vec3 ManifoldFinder::Impl::out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const {
+  const Vec3 normal = at(point.turns_with_b ? pair.b : pair.a).turn * point.normal;
+  return pair.a == body ? normal : Vec3(-normal);
+}
+
+bool ManifoldFinder::Impl::touches_along(std::size_t p, Index body, const Vec3& out) const {
+  return std::ranges::all_of(graph.at(p).points, [&](const KeptPoint& point) {
+    return (out_of_other(point, pairs[p], body) - out).norm() <= kSameNormal;
+  });
+}
+
+/// Whether a convex body reaches to normal · x = offset, x from its origin, and no farther; of meshes each triangle is
+/// looked at by itself.
+bool ManifoldFinder::Impl::reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const {
+  const internal::ConvexCore* core = at(body).core();
+  if (core == nullptr) return at(body).half_space() == nullptr;
+  const Vec3 normal_B = at(body).turn.transpose() * normal;
+  double highest = -std::numeric_limits<double>::infinity();
+  if (core->half_extents[0] > 0.0)
+    highest = normal_B.cwiseAbs().dot(core->half_extents);
+  else
+    for (const Vec3& p : core->points) highest = std::max(highest, normal_B.dot(p));
+  return std::abs(highest + core->radius - offset) <= tolerance;
+}
+
 // -- The finder -------------------------------------------------------------------------------------------------------
 
 ManifoldFinder::ManifoldFinder(const ManifoldFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -451,13 +565,14 @@ void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const Co
     fresh.rigid = m.shapes.get(geometry.shape);
   }
   const Aabb box = fresh.modal ? fresh.modal->surface->rest_bounds() : fresh.rigid->geometry.bounds();
-  fresh.thickness = fresh.half_space() ? kInfinity : 2.0 * box.half_extents().minCoeff();
+  fresh.thickness = fresh.half_space() ? kInfinity : internal::thickness_of(box, fresh.rigid && !fresh.core());
   fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
   m.broad_phase.add(body, filter);
   if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
   m.graph.reserve(fresh.modes());
   m.at(body) = std::move(fresh);
   m.set_finds_itself(body, filter.self && m.at(body).modal);
+  if (m.deforming) m.deforming->add_body(body, m.at(body));
 }
 
 void ManifoldFinder::remove_body(Index body) {
@@ -466,6 +581,7 @@ void ManifoldFinder::remove_body(Index body) {
   impl_->graph.forget(body);
   impl_->broad_phase.remove(body);
   impl_->impacts.remove_body(body);
+  if (impl_->deforming) impl_->deforming->remove_body(body);
   impl_->at(body) = {};
 }
 
@@ -512,6 +628,7 @@ void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<Contac
   m.merge_self_pairs();
   clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
   m.find_manifolds(jobs);
+  m.level_seams();
   m.write_contacts(contacts, jobs);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
 }

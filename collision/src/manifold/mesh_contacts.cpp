@@ -10,19 +10,22 @@ namespace {
 
 // Sine by which what meets at a feature may lean out of its Voronoi cone.
 constexpr double kLeaning = 1e-3;
-constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+constexpr double kFlushNormal = 1e-3;  // length of the difference of a face's normal and that of what it is flush with
 
-bool below(PairSurface& mesh, Index t, const SupportPlane& plane) {
+/// Whether it reaches to the plane and no farther.
+bool reaches_to(PairSurface& mesh, Index t, const SupportPlane& plane) {
   const TrianglePoints x = mesh.corners(t);
-  return std::ranges::all_of(x, [&](const Vec3& p) { return plane.normal.dot(p) - plane.offset <= plane.tolerance; });
+  double highest = -std::numeric_limits<double>::infinity();
+  for (const Vec3& p : x) highest = std::max(highest, plane.normal.dot(p) - plane.offset);
+  return std::abs(highest) <= plane.tolerance;
 }
 
-/// Whether a contact along a direction goes: all that meets at the feature is below a plane that the body rests on.
+/// Whether a contact along a direction goes: all that meets at the feature reaches to a plane that the body rests on.
 bool is_beneath(const MeshContacts::Query& q, FeatureKey feature, const Vec3& out) {
   return std::ranges::any_of(q.planes, [&](const SupportPlane& plane) {
-    if ((out - plane.normal).norm() <= kSameNormal) return false;
+    if ((out - plane.normal).norm() <= kFlushNormal) return false;
     bool all = true;
-    q.mesh.for_faces_at(feature, [&](Index t) { all = all && below(q.mesh, t, plane); });
+    q.mesh.for_faces_at(feature, [&](Index t) { all = all && reaches_to(q.mesh, t, plane); });
     return all;
   });
 }
@@ -121,6 +124,7 @@ void MeshContacts::on_triangle(const Query& q, Index t) {
     triangle_.points.resize(3), triangle_.edge_directions.resize(3);
     triangle_.loops = triangle_.loop_edges = {0, 1, 2};
     triangle_.faces.resize(1);
+    triangle_.extent = std::numeric_limits<double>::infinity();
   }
   triangle_.faces[0] = {face.normal, offset, 0, 3};
   for (std::size_t c = 0; c < 3; ++c) {
@@ -130,12 +134,18 @@ void MeshContacts::on_triangle(const Query& q, Index t) {
   cone_.mesh = &q.mesh, cone_.triangle = t;
   bool flush = false;
   for (const SupportPlane& plane : q.planes) {
-    if (!below(q.mesh, t, plane)) continue;
-    if ((face.normal - plane.normal).norm() > kSameNormal) return;
+    if (!reaches_to(q.mesh, t, plane)) continue;
+    if ((face.normal - plane.normal).norm() > kFlushNormal) return;
     flush = true;
   }
-  convex_.find_on_triangle(q.core, triangle_, {q.reach, q.passing, q.facets.has_active_edge(t) && !flush, flush}, cone_,
-                           *found_);
+  ConvexContacts::TriangleQuery query{q.reach, q.passing, q.facets.has_active_edge(t) && !flush, flush};
+  for (int c = 0; c < 3; ++c) {
+    const Index next = q.facets.active(t, c) ? q.mesh.surface().neighbour(t, c) : -1;
+    if (next < 0) continue;
+    const PairSurface::Face& beyond = q.mesh.face(next);
+    query.beyond[query.beyond_count++] = {beyond.normal, beyond.normal.dot(beyond.x[0])};
+  }
+  convex_.find_on_triangle(q.core, triangle_, query, cone_, *found_);
   name(q, t, first);
 }
 

@@ -62,7 +62,7 @@ void MeshFacets::grow_facets(const CollisionSurface& s) {
   }
 }
 
-bool MeshFacets::active(const CollisionSurface& s, Index edge) const {
+bool MeshFacets::is_active(const CollisionSurface& s, Index edge) const {
   const auto triangles = s.edge_triangles(edge);
   if (triangles.size() != 2) return true;
   if (facet(triangles[0]) == facet(triangles[1])) return false;
@@ -80,8 +80,10 @@ void MeshFacets::look_around(const CollisionSurface& s) {
   for (Index e = 0; e < s.edges(); ++e) {
     const auto triangles = s.edge_triangles(e);
     around_edge_.push_back(triangles.size() == 2 ? common_facet(triangles, *this) : -1);
-    if (!triangles.empty() && active(s, e))
-      for (const Index t : triangles) rim_[static_cast<std::size_t>(t)] = 1;
+    if (triangles.empty() || !is_active(s, e)) continue;
+    for (const Index t : triangles)
+      for (int c = 0; c < 3; ++c)
+        if (s.edge_of(t, c) == e) rim_[static_cast<std::size_t>(t)] |= static_cast<std::uint8_t>(1 << c);
   }
   std::vector<std::uint8_t> at_end(static_cast<std::size_t>(s.vertices()), 0);
   for (Index e = 0; e < s.edges(); ++e)

@@ -32,10 +32,10 @@ class DeformingPairs {
   virtual ~DeformingPairs() = default;
   virtual void add_body(Index index, const ManifoldBody& body) = 0;
   virtual void remove_body(Index index) = 0;
-  /// Once a query, before any pair: all states are checked. @param awake bodies whose state may be another than in the
-  /// last query, ascending
+  /// Once a query, before any pair: all states are checked. @param changed bodies whose state may be another than in
+  /// the last query, ascending
   virtual void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
-                           std::span<const Index> awake, Jobs& jobs) = 0;
+                           std::span<const Index> changed, Jobs& jobs) = 0;
   /// Whether it finds the contacts of two bodies, of which one deforms at least.
   virtual bool takes(const ManifoldBody& a, const ManifoldBody& b) const = 0;
   /// Appends.

@@ -58,11 +58,21 @@ void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidT
   const bool told = !a.faces.empty() && !b.faces.empty() && face_tests <= collision_tuning().convex.most_face_tests &&
                     faces_tell(margin);
   if (!told) find_by_distance(margin);
-  if (!stands_in_the_way(passing)) return;
+  if (!passing.way.isZero(0.0)) let_pass(passing, margin);
+}
+
+// Where a face keeps the two apart all along the way, contacts that close on it are none, but those with that face.
+void ConvexContacts::let_pass(const Passing& passing, double margin) {
+  const auto closes = [&](const FeatureContact& c) { return c.gap >= -passing.touching && passing.closes(c.normal); };
+  const auto first = contacts_->begin() + static_cast<std::ptrdiff_t>(first_);
+  if (std::none_of(first, contacts_->end(), closes)) return;
   const Direction kept = keeping_apart(passing);
-  if (!std::isfinite(kept.depth)) return;
-  contacts.resize(first_);
-  clip_faces(kept.normal, margin);
+  const auto stands_in_the_way = [&](const FeatureContact& c) {
+    return closes(c) && c.normal.dot(kept.normal) < collision_tuning().convex.face_alignment;
+  };
+  if (!std::isfinite(kept.depth) || std::none_of(first, contacts_->end(), stands_in_the_way)) return;
+  contacts_->resize(first_);
+  if (side_[0].points.size() > 1 && side_[1].points.size() > 1) clip_faces(kept.normal, margin);
 }
 
 void ConvexContacts::find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
@@ -85,6 +95,11 @@ void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& tri
   } else {
     Direction best{face.normal, -gap - a.radius};
     if (leave_triangle(best, leaves)) {
+      const auto end = query.beyond.begin() + static_cast<std::ptrdiff_t>(query.beyond_count);
+      if (std::any_of(query.beyond.begin(), end, [&](const TriangleQuery::Plane& plane) {
+            return plane.offset - lowest(side_[0], plane.normal) < best.depth;
+          }))
+        return;
       best.normal == face.normal ? clip_faces(best.normal, query.margin) : touch(best, nullptr, query.margin);
       return;
     }
@@ -92,8 +107,7 @@ void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& tri
   const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
   if (nearest.cores_intersect || nearest.distance - a.radius > query.margin || !leaves.allows(nearest.normal)) return;
   const bool kept_apart = std::min(gap, gap + face.normal.dot(query.passing.way)) >= -touching;
-  const bool in_the_way = nearest.distance - a.radius + nearest.normal.dot(query.passing.way) < -touching;
-  if (kept_apart && in_the_way) return;
+  if (kept_apart && query.passing.closes(nearest.normal)) return;
   first_ = contacts.size();
   const Deepest points{nearest.a, nearest.b};
   touch({nearest.normal, -nearest.distance}, &points, query.margin);
@@ -112,15 +126,6 @@ bool ConvexContacts::leave_triangle(Direction& best, DirectionFilter& leaves) co
   for_faces(look(1.0));
   if (!apart) for_edges(look(collision_tuning().convex.edge_preference));
   return !apart;
-}
-
-// Whether a contact that is open now would be passed on the way.
-bool ConvexContacts::stands_in_the_way(const Passing& passing) const {
-  if (passing.way.isZero(0.0)) return false;
-  return std::any_of(contacts_->begin() + static_cast<std::ptrdiff_t>(first_), contacts_->end(),
-                     [&](const FeatureContact& c) {
-                       return c.gap >= -passing.touching && c.gap + c.normal.dot(passing.way) < -passing.touching;
-                     });
 }
 
 // Of the faces behind which the other body is, and stays all along the way, the one that keeps it farthest; of infinite
@@ -303,14 +308,17 @@ const ConvexFace* ConvexContacts::facing(const Side& side, const Vec3& out) {
   });
 }
 
-// The face that the normal fits better is the reference; the other's face, or its segment, is clipped to what lies over
+// The face that the normal fits better is the reference, of faces that fit alike that of the larger body: what lies on
+// it is not pushed along by its own tilt. The other's face, or its segment, is clipped to what lies over
 // it (Ericson 2005, 5.5).
 void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
   const ConvexFace *on_a = facing(side_[0], -normal), *on_b = facing(side_[1], normal);
   const double fit_a = on_a == nullptr ? -1.0 : -side_[0].normal(*on_a).dot(normal);
   const double fit_b = on_b == nullptr ? -1.0 : side_[1].normal(*on_b).dot(normal);
   const ConvexTuning& tuning = collision_tuning().convex;
-  const int reference = fit_a > fit_b + tuning.reference_preference ? 0 : 1;
+  const double preference =
+      side_[0].core->extent > side_[1].core->extent ? -tuning.reference_preference : tuning.reference_preference;
+  const int reference = fit_a > fit_b + preference ? 0 : 1;
   if (std::max(fit_a, fit_b) < tuning.face_alignment) return;
   const Side &side = side_[reference], &other = side_[1 - reference];
   const ConvexFace* best = reference == 0 ? on_a : on_b;

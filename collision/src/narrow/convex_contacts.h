@@ -18,6 +18,9 @@ namespace limber::internal {
 struct Passing {
   Vec3 way = Vec3::Zero();  // of a against b, straight on and evenly, in the frame of a
   double touching = 0.0;    // m: faces that overlap by no more keep them apart nevertheless
+
+  // Whether it brings a nearer to b along a direction, by more than what is at rest may stir.
+  bool closes(const Vec3& normal) const { return normal.dot(way) < -1e-3 * touching; }
 };
 
 // Tells which directions lead out of something.
@@ -42,6 +45,13 @@ class ConvexContacts {
     Passing passing{};
     bool rim = false;         // its edges and corners may be touched beside its face
     bool face_alone = false;  // it is touched along its normal however deep
+    // Faces beyond its convex edges: what is less deep in one of these leaves there.
+    struct Plane {
+      Vec3 normal = Vec3::Zero();
+      double offset = 0.0;
+    };
+    std::array<Plane, 3> beyond{};
+    std::size_t beyond_count = 0;
   };
   // With a triangle of a surface, one-sided: a polytope of three points and one face, in the frame of a, that is left
   // along its normal or where the filter lets it.
@@ -95,7 +105,7 @@ class ConvexContacts {
   double least_gap() const;
   double round_off() const;
 
-  bool stands_in_the_way(const Passing& passing) const;
+  void let_pass(const Passing& passing, double margin);
   Direction keeping_apart(const Passing& passing) const;
   bool faces_tell(double margin);
   void find_by_distance(double margin);

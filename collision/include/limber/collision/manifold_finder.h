@@ -18,10 +18,12 @@
 /// Contacts are *speculative*: those are found whose gap the motion that BodyState::displacement and reach tell may
 /// close, and a solver gives way to them by their gap. BodyState::look_ahead, doubt and the expected ends are not read.
 ///
-/// Where a face keeps two convex shapes apart all along the expected motion, contacts with other faces that would stand
-/// in its way are none: what slides over flush boxes does not meet their sides. Where bodies overlap, convex shapes
-/// leave each other along the direction of least depth. Pairs in which a surface deforms have all contacts of
-/// NarrowPhase.
+/// No seam shows. Where a face keeps two convex shapes apart all along the expected motion, contacts with other faces
+/// that close on the way are none; where a body rests on one thing and comes to another that reaches to the same plane
+/// and no farther, that plane's normal is the contacts'; of meshes and height fields only edges and vertices where the
+/// surface is convex or ends are touched otherwise than along a face's normal. Where bodies overlap, convex shapes
+/// leave each other along the direction of least depth, and what has its middle in a mesh goes out to the nearest
+/// point. Pairs in which a surface deforms have all contacts of NarrowPhase.
 #pragma once
 
 #include <cstdint>
