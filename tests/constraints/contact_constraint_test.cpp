@@ -141,14 +141,17 @@ TEST(Contact, BodiesThatBendComeToRestInOneLargeIslandAndGainNoEnergy) {
     island.add_body({quaternion_from_rotation_vector({0.05 * i, 0.1, 0.05 * i}), {2.0 * i, 0.0, 0.35}});
   const double scale = island.energy_scale();
   double before = island.energy(), worst = 0.0;
+  IslandStatusCounts statuses;
   for (int n = 0; n < kSteps; ++n) {
     const IslandReport report = island.step();
-    EXPECT_EQ(report.status, IslandStatus::kSolved) << n;
+    EXPECT_TRUE(report.accepted) << n;
+    statuses.add(report.statuses);
     EXPECT_GT(report.rows, 150);
     const double after = island.energy();
     worst = std::max(worst, (after - before) / scale);
     before = after;
   }
+  EXPECT_LE(statuses[IslandStatus::kLimit], 5);  // as all of them land: the limit of contact solves
   EXPECT_LT(worst, kRise);
   if (testing::kSanitized) return;
   EXPECT_GT(island.lowest_gap(), -kPenetration);

@@ -27,13 +27,16 @@ void MeanProblem::find_off(const IslandStep& step, std::span<const double> impul
   }
 }
 
-/// By responses as they were measured last.
+/// By responses as they were measured last. Of a soft row with compliance c the force is off, too: the share a/(a + c)
+/// of its distance is that of the gap, with a what an impulse moves the gap by.
 double MeanProblem::largest_distance(const IslandStep& step, std::span<const double> impulses) {
   find_off(step, impulses);
   double largest = 0.0;
   step.for_units([&](std::size_t first, std::size_t count) {
     const RowLaw& law = step.law(first);
-    largest = std::max(largest, distance_from_law(step, first, count, impulses) / std::max(law.tolerance, law.digits));
+    const double moved = 1.0 - law.compliance / response_[first];
+    largest = std::max(largest,
+                       moved * distance_from_law(step, first, count, impulses) / std::max(law.tolerance, law.digits));
   });
   return largest;
 }
