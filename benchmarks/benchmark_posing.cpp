@@ -17,6 +17,7 @@
 #include "cpu_time.h"
 #include "limber/mesh/read_mesh.h"
 #include "limber/posing/posing_session.h"
+#include "limber/posing_penalty/penalty_poses.h"
 #include "local_global.h"
 #include "true_joints.h"
 
@@ -97,8 +98,8 @@ Vec3 extreme(const limber::JointedModel& model, Index part, const Vec3& way) {
   return best;
 }
 
-void run(const Case& c, limber::PoseFormulation formulation, double tolerance) {
-  limber::PosingSession session(c.model, {.formulation = formulation, .tolerance = tolerance});
+void run(const Case& c, bool paper, double tolerance) {
+  limber::PosingSession session(c.model, {.tolerance = tolerance}, paper ? limber::penalty_poses() : nullptr);
   for (const Index p : c.soft) session.set_part(p, {.cells = limber::Subdivision::kUniform, .cell_size = c.cell});
   if (c.pinned >= 0) session.set_pinned(c.pinned, true);
   const Vec3 grip = furthest(c.model, c.pulled);
@@ -109,7 +110,6 @@ void run(const Case& c, limber::PoseFormulation formulation, double tolerance) {
     for (const auto& [x, z] : {std::pair(-1, -1), std::pair(-1, 1), std::pair(1, -1), std::pair(1, 1)})
       session.add_handle(0, extreme(c.model, 0, Vec3(x, -3, z)));
   const limber::PoseHandle hand = session.add_handle(c.pulled, grip);
-  const bool paper = formulation == limber::PoseFormulation::kPenalty;
   const int frames = paper ? 3 : 10;
   std::vector<double> per_iteration, per_frame, surface;
   int iterations = 0;
@@ -293,7 +293,7 @@ int main(int argc, char** argv) {
       for (const int budget : {1, 2, 3}) keep_time(c, budget);
       continue;
     }
-    for (const double tolerance : {1e-8, 1e-4}) run(c, limber::PoseFormulation::kConstrained, tolerance);
-    if (only != nullptr || std::strcmp(c.name, "bunny") != 0) run(c, limber::PoseFormulation::kPenalty, 1e-8);
+    for (const double tolerance : {1e-8, 1e-4}) run(c, false, tolerance);
+    if (only != nullptr || std::strcmp(c.name, "bunny") != 0) run(c, true, 1e-8);
   }
 }

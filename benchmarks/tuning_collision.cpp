@@ -19,6 +19,7 @@
 #include "limber/collision/time_of_impact.h"
 #include "limber/collision/tree_traversal.h"
 #include "limber/dynamics/body_group.h"
+#include "limber/tet_overlap/tet_overlap_normals.h"
 #include "narrow_phase_reference.h"
 #include "random_states.h"
 #include "scoped_value.h"
@@ -179,9 +180,7 @@ class Scenes {
     Contacts contacts;
     CollisionBody a = pair.a->body(0);
     a.displacement = pair.ahead;
-    NarrowPhase& narrow = pair.overlap == OverlapMethod::kNearestPoint ? nearest_
-                          : pair.overlap == OverlapMethod::kTetOverlap ? tets_
-                                                                       : rest_;
+    NarrowPhase& narrow = pair.by_tets ? tets_ : pair.overlap == OverlapMethod::kNearestPoint ? nearest_ : rest_;
     narrow.find_contacts(a, pair.b->body(1), pair.margin, Vec3::Zero(), contacts);
     return contacts;
   }
@@ -290,7 +289,7 @@ class Scenes {
   const std::shared_ptr<const CollisionSurface> spheres_[2] = {
       std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 8)),
       std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 32))};
-  NarrowPhase nearest_{{.overlap = OverlapMethod::kNearestPoint}}, tets_{{.overlap = OverlapMethod::kTetOverlap}},
+  NarrowPhase nearest_{{.overlap = OverlapMethod::kNearestPoint}}, tets_{{.normals = tet_overlap_normals}},
       rest_{{.overlap = OverlapMethod::kRestDepth}};
   const RigidGeometry ball_{Sphere{0.01}};
   const std::shared_ptr<const ModalModel> sheet_ = testing::sheet_model(16, 4);

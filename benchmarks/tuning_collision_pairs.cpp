@@ -116,7 +116,7 @@ void add_solids(std::vector<TuningPair>& pairs) {
   const auto bar = testing::solid(testing::solid_box({0.75, 0.25, 0.25}, {6, 2, 2}), 4);
   const auto ball = testing::solid(testing::tet_ball(0.4, 4), 3);
   for (int i = 0; i < 40; ++i) {
-    TuningPair pair{modal(bar), modal(ball), 0.02, i % 2 == 0 ? OverlapMethod::kRestDepth : OverlapMethod::kTetOverlap};
+    TuningPair pair{modal(bar), modal(ball), 0.02, OverlapMethod::kRestDepth, i % 2 == 1};
     pair.a->use_volume(), pair.b->use_volume();
     pair.a->place(random.pose(1.0), random.amplitudes(4, i % 4 < 2 ? 0.05 : 0.25));
     pair.b->place({random.pose(1.0).q, pair.a->pose.p + 0.5 * random.vector(1.0).normalized()},

@@ -16,6 +16,7 @@ struct TuningPair {
   std::unique_ptr<testing::Body> a, b;
   double margin;
   OverlapMethod overlap = OverlapMethod::kRestDepth;
+  bool by_tets = false;                                 // the normals of tet_overlap_normals() in its place
   Vec3 ahead = Vec3::Zero();                            // expected motion of a
   std::unique_ptr<testing::PairReference> reference{};  // all contacts
   std::optional<double> upright{};                      // all normals are ±z, by as much of it

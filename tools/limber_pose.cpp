@@ -18,6 +18,9 @@
 #include "limber/posing/pose_recording.h"
 #include "limber/posing/posed_model.h"
 #include "limber/posing/retarget.h"
+#if LIMBER_HAS_POSING_PENALTY
+#include "limber/posing_penalty/penalty_poses.h"
+#endif
 #include "program.h"
 
 namespace limber::tools {
@@ -29,6 +32,7 @@ struct Arguments {
   std::string model, joints, handles, clip, mapping, output, obj, rest;
   double scale = 1.0;
   PosingOptions options;
+  bool penalty = false;
 };
 
 void declare(CLI::App& options, Arguments& a) {
@@ -71,8 +75,19 @@ void declare(CLI::App& options, Arguments& a) {
       "--unweighted-strain", [&a] { a.options.strain = StrainWeights::kUnweighted; },
       "the strain energy without weights of volume, as in the paper");
   options.add_flag_callback(
-      "--penalty", [&a] { a.options.formulation = PoseFormulation::kPenalty; },
+      "--penalty", [&a] { a.penalty = true; },
       "rigidity, joints and limits as energies with large weights, as in the paper, instead of constraints");
+}
+
+/// Null: the session's own.
+std::shared_ptr<const PoseMethod> method_of(const Arguments& a) {
+  if (!a.penalty) return nullptr;
+#if LIMBER_HAS_POSING_PENALTY
+  return penalty_poses();
+#else
+  throw InputError("--penalty: this build of limber has no limber::posing_penalty, expected one with " +
+                   std::string("LIMBER_BUILD_PAPERS=ON"));
+#endif
 }
 
 Json json_of(const PoseResult& r, double time) {
@@ -111,7 +126,7 @@ void pose(Program& program, const Arguments& a) {
   const auto [handles, handles_name] = read_pulls(a);
   const GroupedSurface surface = read_any_grouped_surface(a.model, program.warnings());
   const JointsFile joints = read_joints(a.joints);
-  PosingSession session(jointed_model(surface, joints, in_quotes(a.joints)), a.options);
+  PosingSession session(jointed_model(surface, joints, in_quotes(a.joints)), a.options, method_of(a));
   const std::vector<PoseHandle> ids = apply_handles(handles, handles_name, session);
 
   PoseRecording recording(session, a.scale);

@@ -116,19 +116,21 @@ Json loads(const std::vector<LoadReport>& reports) {
   return all;
 }
 
-Json contact(const ContactOptions& c, SceneFinder finder) {
-  return {{"finder", to_string(finder)},
-          {"method", to_string(c.rule.method)},
-          {"friction_model", to_string(c.rule.friction)},
-          {"guard", to_string(c.rule.guard)},
+Json contact(const Scene& scene) {
+  const ContactOptions& c = *scene.contact;
+  const SceneContactRule& rule = scene.contact_rule;
+  return {{"finder", to_string(scene.finder)},
+          {"method", to_string(rule.method)},
+          {"friction_model", to_string(rule.friction)},
+          {"guard", to_string(rule.guard)},
           {"friction", c.friction},
           {"rolling_friction", c.rolling_friction},
           {"impact", to_string(c.impact)},
           {"impact_speed", c.impact_speed},
           {"recovery_speed", c.recovery_speed},
           {"residual_compliance", c.residual_compliance},
-          {"penalty_frequency", c.penalty_frequency},
-          {"penalty_damping", c.penalty_damping}};
+          {"penalty_frequency", rule.penalty_frequency},
+          {"penalty_damping", rule.penalty_damping}};
 }
 
 Json handles(const std::vector<HandleReport>& reports) {
@@ -203,7 +205,7 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["forces"] = loads(result.forces);
   report["handles"] = handles(result.handles);
   report["joints"] = joints(result.joints);
-  report["contact"] = scene.contact ? contact(*scene.contact, scene.finder) : Json();
+  report["contact"] = scene.contact ? contact(scene) : Json();
   report["constraints"] = constraints(result.constraints);
   report["energy_before"] = result.energy_before;
   report["energy_after"] = result.energy_after;

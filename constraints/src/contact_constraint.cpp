@@ -52,9 +52,7 @@ void ContactOptions::validate() const {
   number(rolling_friction, "rolling_friction");
   number(recovery_speed, "recovery_speed");
   number(impact_speed, "impact_speed");
-  number(penalty_frequency, "penalty_frequency");
-  number(penalty_damping, "penalty_damping");
-  if (penalty_frequency == 0.0) throw InvalidArgument("ContactOptions: penalty_frequency is 0, expected more");
+  number(compliance, "compliance");
 }
 
 struct ContactSet::Impl {
@@ -197,9 +195,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
 
 /// With the forces of the last step, where there were any.
 void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair) {
-  if (options.rolling_friction == 0.0 || options.rule.method != ContactMethod::kComplementary ||
-      options.rule.friction != FrictionModel::kCone)
-    return;
+  if (options.rolling_friction == 0.0) return;
   double largest = 0.0;
   for (const PreparedContact& contact : pair)
     if (is_round(contact.a) || is_round(contact.b))

@@ -13,11 +13,8 @@ namespace {
 constexpr double kRelativeTolerance = 3e-9;
 // Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
 constexpr double kRecovery = 0.2;
-// Of what a force moves the reduced mass of two bodies within a step: so far each contact of bodies that flex yields by
-// itself, in place of what the modes do not show, or beside it where the model knows (residual compliance). Loads that
-// many contacts could share in many ways then have one answer that changes little where gaps change by a picometre;
-// what rests sinks by less than this part of g Δt², 8e-6 m and 3e-7 m at 60 steps a second.
-constexpr double kGive = 3e-3, kGiveBesideResidual = 1e-4;
+// So much of ContactOptions::compliance is left beside a residual compliance, which shares loads by itself.
+constexpr double kGiveBesideResidual = 1.0 / 30.0;
 // Steps that an impact may last in any case.
 constexpr double kShortestStrike = 2.0;
 
@@ -136,7 +133,10 @@ void PairContacts::bias_accelerations(const BodyStates& states, std::span<double
 
 double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motions, double within) {
   const bool struck = options_->impact == ImpactModel::kHeldFromTouch && flexes_;
-  if (!struck && options_->rule.method != ContactMethod::kVelocityProgram) return within;
+  return struck ? next_touch(states, motions, within) : within;
+}
+
+double PairContacts::next_touch(const BodyStates& states, const FreeMotions& motions, double within) {
   for (const PreparedContact& contact : contacts_) within = touch(states, motions, contact, within);
   return within;
 }
@@ -181,12 +181,7 @@ void PairContacts::begin(const BodyStates& states) {
     for (PreparedSide* side : {&contact.a, &contact.b})
       if (side->skin != nullptr)
         side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
-  const ContactRule& rule = options_->rule;
-  const bool by_gaps =
-      rule.method == ContactMethod::kGapProgram || (rule.method == ContactMethod::kComplementary && !rule.is_convex());
-  give_ = by_gaps && flexes_
-              ? (yields_[0] || yields_[1] ? kGiveBesideResidual : kGive) * step_ * step_ / reduced_mass(states, first)
-              : 0.0;
+  give_ = options_->compliance > 0.0 && flexes_ ? give(states) : 0.0;
   for (PreparedContact& contact : contacts_) {
     Vec3 dent = Vec3::Zero();
     for (std::size_t i = 0; i < 2; ++i) {
@@ -198,6 +193,11 @@ void PairContacts::begin(const BodyStates& states) {
     contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
   }
   caught_ = flexes_ && is_caught();
+}
+
+double PairContacts::give(const BodyStates& states) const {
+  const double share = yields_[0] || yields_[1] ? kGiveBesideResidual : 1.0;
+  return share * options_->compliance * step_ * step_ / reduced_mass(states, contacts_.front());
 }
 
 bool PairContacts::is_caught() const {
@@ -320,7 +320,6 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.holds = true;
       law.strikes = strikes_;
       if (strikes_ && options_->impact == ImpactModel::kHeldFromTouch) law.lets_go_within = time_to_rebound();
-      if (options_->rule.method == ContactMethod::kPenalty) make_spring(states, contact, gap, law);
       law.friction = contact.friction;
       law.shift = contact.friction * (contact.foreseen ? contact.foreseen_slip : contact.slip);
     } else {
@@ -335,15 +334,6 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_[1]);
     rows.add(on_a, on_b, law);
   }
-}
-
-void PairContacts::make_spring(const BodyStates& states, const PreparedContact& contact, double gap,
-                               RowLaw& law) const {
-  const double mass = reduced_mass(states, contact), omega = 2.0 * std::numbers::pi * options_->penalty_frequency;
-  law.make_spring(mass * omega * omega, 2.0 * options_->penalty_damping * mass * omega, step_, std::min(0.0, gap));
-  law.holds = law.strikes = false;
-  law.lets_go_within = 0.0;
-  law.agent_displacement = 0.0;
 }
 
 double PairContacts::closes_to(double gap) const {

@@ -25,6 +25,7 @@ class PairContacts final : public Constraint {
   bool is_contact() const override { return true; }
   void begin_part(const PartOfStep& part) override { part_ = part; }
   double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
+  double next_touch(const BodyStates& states, const FreeMotions& motions, double within) override;
   void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
@@ -48,6 +49,9 @@ class PairContacts final : public Constraint {
     }
   }
 
+  /// What each contact yields by itself in the coming step, m/N.
+  double give(const BodyStates& states) const;
+
   /// Whether a part of one body is caught between two of the other: contacts that overlap and push either way. To come
   /// apart they would press against each other without bound.
   bool is_caught() const;
@@ -68,9 +72,6 @@ class PairContacts final : public Constraint {
   void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows);
 
   void add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact, ConstraintRows& rows);
-
-  /// F = −k x' − c (x' − min(0, x))/Δt ≥ 0, x' the gap at the step's end.
-  void make_spring(const BodyStates& states, const PreparedContact& contact, double gap, RowLaw& law) const;
 
   /// What a gap may close to by the part's end: what is ahead comes to the clearance when all that is ahead has passed.
   double closes_to(double gap) const;

@@ -18,6 +18,13 @@ void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
   stale_ = true;
 }
 
+void ConstraintStage::set_island_solver(IslandSolverFactory make) {
+  make_solver_ = std::move(make);
+  solvers_.clear();
+  held_.solver = make_solver_();
+  stale_ = true;
+}
+
 void ConstraintStage::remove_body(Index body) {
   for (std::uint32_t i = 0; i < entries().size(); ++i) {
     const Constraint* constraint = entries()[i].constraint();
@@ -119,7 +126,7 @@ void ConstraintStage::find_islands(std::span<const Index> awake) {
     if (acts(body)) islands_.let_act(body);
   islands_.find(all_);
   set_constrained(islands_.members(), true);
-  if (solvers_.size() < islands_.size()) solvers_.resize(islands_.size());
+  while (solvers_.size() < islands_.size()) solvers_.push_back(make_solver_());
   reports_.assign(islands_.size(), {});
 }
 
@@ -148,7 +155,7 @@ double ConstraintStage::step_together(std::span<const Index> members, std::span<
   held_.constraints.insert(held_.constraints.end(), contacts.begin(), contacts.end());
   IslandOptions own = options;
   own.energy_surplus = surplus_of(members);
-  const IslandReport report = held_.solver.step(table_, members, held_.constraints, own);
+  const IslandReport report = held_.solver->step(table_, members, held_.constraints, own);
   have_stepped(members, report);
   add_report(report, held_.report);
   return report.taken;
@@ -173,13 +180,13 @@ void ConstraintStage::foresee(Jobs& jobs, const IslandOptions& options) {
 void ConstraintStage::refine(Jobs& jobs) {
   if (islands_.empty()) return;
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island) solvers_[island].refine();
+    for (std::size_t island = begin; island < end; ++island) solvers_[island]->refine();
   });
 }
 
 bool ConstraintStage::are_accepted() const {
   return std::all_of(solvers_.begin(), solvers_.begin() + static_cast<std::ptrdiff_t>(islands_.size()),
-                     [](const IslandSolver& solver) { return solver.foreseen().accepted; });
+                     [](const auto& solver) { return solver->foreseen().accepted; });
 }
 
 void ConstraintStage::foresee_island(std::size_t island) {
@@ -188,14 +195,14 @@ void ConstraintStage::foresee_island(std::size_t island) {
   own.undisturbed =
       std::ranges::none_of(members, [&](Index body) { return notes_[static_cast<std::size_t>(body)].disturbed != 0; });
   own.energy_surplus = surplus_of(members);
-  solvers_[island].foresee(table_, members, islands_.constraints(island), own);
+  solvers_[island]->foresee(table_, members, islands_.constraints(island), own);
 }
 
 void ConstraintStage::finish(Jobs& jobs) {
   if (islands_.empty()) return;
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
     for (std::size_t island = begin; island < end; ++island) {
-      reports_[island] = solvers_[island].finish();
+      reports_[island] = solvers_[island]->finish();
       have_stepped(islands_.members(island), reports_[island]);
     }
   });
@@ -223,7 +230,7 @@ IslandReport ConstraintStage::report() const {
 
 StageTimes ConstraintStage::foreseen_times() const {
   StageTimes sum;
-  for (std::size_t island = 0; island < islands_.size(); ++island) sum.add(solvers_[island].times());
+  for (std::size_t island = 0; island < islands_.size(); ++island) sum.add(solvers_[island]->times());
   return sum;
 }
 
@@ -240,7 +247,6 @@ void ConstraintStage::add_report(const IslandReport& r, IslandReport& sum) {
   sum.bodies += r.bodies;
   sum.rows += r.rows;
   sum.attempts.add(r.attempts);
-  sum.programs.add(r.programs);
   sum.iterations = std::max(sum.iterations, r.iterations);
   sum.newton_steps = std::max(sum.newton_steps, r.newton_steps);
   sum.change = std::max(sum.change, r.change);

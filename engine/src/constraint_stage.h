@@ -26,6 +26,8 @@ class ConstraintStage {
   bool moves(Index body) const { return body >= 0 && table_[static_cast<std::size_t>(body)].group != nullptr; }
   /// Stops a body, or lets it go on: one that sleeps is no member of any island.
   void set_asleep(Index body, bool asleep);
+  /// How the islands' steps are taken from now on. Between steps.
+  void set_island_solver(IslandSolverFactory make);
   /// Its velocity, place or shape was changed from outside.
   void disturb(Index body) { notes_[static_cast<std::size_t>(body)].disturbed = 1; }
 
@@ -91,7 +93,7 @@ class ConstraintStage {
   struct HeldBack {
     std::vector<Index> bodies;
     std::vector<Constraint*> constraints;  // of the problem at hand
-    IslandSolver solver;
+    std::unique_ptr<IslandSolver> solver = make_island_solver();
     IslandReport report;  // of all their parts
   };
   std::uint32_t place(Entry&& entry);
@@ -112,8 +114,9 @@ class ConstraintStage {
   std::vector<Constraint*> contacts_;
   std::vector<Constraint*> all_;  // entries and contacts, in this order
   IslandPartition islands_;
-  bool stale_ = true;                  // the islands
-  std::vector<IslandSolver> solvers_;  // one per island
+  bool stale_ = true;  // the islands
+  IslandSolverFactory make_solver_ = make_island_solver;
+  std::vector<std::unique_ptr<IslandSolver>> solvers_;  // one per island
   std::vector<IslandReport> reports_;
   IslandOptions options_;
   HeldBack held_;

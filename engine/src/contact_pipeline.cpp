@@ -48,7 +48,6 @@ void ContactPipeline::foresee(const Substep& substep, Jobs& jobs, StageClock& cl
     clock.lap(Stage::kRows);
     constraints_->foresee(jobs, {.step = substep.length,
                                  .gravity = substep.gravity,
-                                 .contact = rows_.options().rule,
                                  .timed = clock.runs(),
                                  .rough = look < kMostLooks ? rough : 0.0});
     if (clock.runs()) clock.lap(constraints_->foreseen_times(), Stage::kSolve);

@@ -237,8 +237,7 @@ void FastBodies::advance_cluster(std::span<const Index> members, const Step& ste
   for (const Index member : members) rests_[static_cast<std::size_t>(member)] = 0;
   ContactSet& contacts = step.rows.set;
   const double whole = step.substep.length;
-  IslandOptions options{
-      .step = whole, .gravity = step.substep.gravity, .contact = contacts.options().rule, .whole_step = whole};
+  IslandOptions options{.step = whole, .gravity = step.substep.gravity, .whole_step = whole};
   for (int count = 1;; ++count, options.begins = false) {
     const std::span<const ContactPoint> found = find_contacts(members, count == 1, options.step, step.found);
     step.rows.take(constraints_->states(), found);

@@ -169,7 +169,6 @@ void World::Impl::add_to_report(const IslandReport& substep) {
   sum.newton_steps = std::max(sum.newton_steps, substep.newton_steps);
   sum.residual = std::max(sum.residual, substep.change);
   sum.attempts.add(substep.attempts);
-  sum.programs.add(substep.programs);
 }
 
 void World::set_stage_times(StageTimes* times) { impl_->stage_times = times; }

@@ -85,6 +85,10 @@ void World::set_handle_target(HandleId id, const HandleTarget& target) {
   e.handle->set_target(target);
 }
 
+void World::set_island_solver(IslandSolverFactory make) {
+  impl_->constraints.set_island_solver(make ? std::move(make) : make_island_solver);
+}
+
 HandleView World::handle(HandleId id) const {
   const Handle& h = *named(impl_->constraints, id, "handle").handle;
   return {.target = h.target(), .force = h.force(), .error = h.error()};

@@ -17,8 +17,6 @@ void PosingOptions::validate() const {
   if (!(energy_tolerance >= 0.0) || !std::isfinite(energy_tolerance))
     throw InvalidArgument("PosingOptions.energy_tolerance: is " + std::to_string(energy_tolerance) +
                           ", expected a finite number >= 0");
-  positive("rigidity_weight", rigidity_weight);
-  positive("joint_weight", joint_weight);
   if (max_iterations < 1)
     throw InvalidArgument("PosingOptions.max_iterations: is " + std::to_string(max_iterations) + ", expected >= 1");
 }

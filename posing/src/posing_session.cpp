@@ -8,7 +8,7 @@
 #include "limber/core/error.h"
 #include "limber/internal/strict_json.h"
 #include "limber/mesh/surface_locator.h"
-#include "paper/penalty_energy.h"
+#include "pose_problem.h"
 #include "pose_transfer.h"
 #include "skin/skin.h"
 #include "solver/pose_solver.h"
@@ -37,7 +37,7 @@ struct State {
   std::vector<Handle> handles{};
   std::shared_ptr<const Built> built{};
   Pose pose{};
-  std::vector<BodyMap> affine{};  // of the penalty form; else empty
+  std::vector<BodyMap> affine{};  // where a method of its own finds poses; else empty
 };
 
 void require_finite(const Vec3& p, const char* what) {
@@ -49,6 +49,7 @@ void require_finite(const Vec3& p, const char* what) {
 struct PosingSession::Impl {
   JointedModel model;
   PosingOptions options;
+  std::shared_ptr<const PoseMethod> method{};  // null: PoseSolver
   State now{};
   std::vector<State> before{};
   Index next_handle = 0;
@@ -131,12 +132,12 @@ struct PosingSession::Impl {
     return terms;
   }
 
-  /// [X09]'s form. What it leaves of joints and limits is told of the nearest rotations.
-  PoseResult solve_by_penalties() {
+  /// What the method leaves of joints and limits is told of the nearest rotations.
+  PoseResult solve_by_method() {
     const PoseStructure& s = now.built->structure;
-    PenaltyEnergy energy(s, options, handle_terms());
-    now.affine = maps();
-    PoseResult result = solve_penalty(energy, s, options, now.affine, now.pose.turns);
+    AffinePose pose{maps(), now.pose.turns};
+    PoseResult result = method->solve({s, options, handle_terms()}, pose);
+    now.affine = std::move(pose.maps), now.pose.turns = std::move(pose.turns);
     for (std::size_t b = 0; b < now.affine.size(); ++b)
       now.pose.bodies[b] = {normalized(quaternion_from_matrix(nearest_rotation(now.affine[b].A))), now.affine[b].p};
     const Feasibility f = feasibility(s, now.pose);
@@ -154,11 +155,13 @@ struct PosingSession::Impl {
   }
 };
 
-PosingSession::PosingSession(JointedModel model, const PosingOptions& options) : impl_(std::make_unique<Impl>()) {
+PosingSession::PosingSession(JointedModel model, const PosingOptions& options, std::shared_ptr<const PoseMethod> method)
+    : impl_(std::make_unique<Impl>()) {
   options.validate();
   model.validate();
   impl_->model = std::move(model);
   impl_->options = options;
+  impl_->method = std::move(method);
   impl_->now.joints = impl_->model.joints;
   impl_->now.parts.resize(impl_->model.parts.size());
   impl_->now.pinned.assign(impl_->model.parts.size(), false);
@@ -255,7 +258,7 @@ bool PosingSession::undo() {
 }
 
 PoseResult PosingSession::solve() {
-  if (impl_->options.formulation == PoseFormulation::kPenalty) return impl_->solve_by_penalties();
+  if (impl_->method != nullptr) return impl_->solve_by_method();
   if (!impl_->solver) impl_->solver.emplace(impl_->now.built->structure, impl_->options, impl_->handle_terms());
   std::vector<Vec3> targets;
   for (const Handle& h : impl_->now.handles) targets.push_back(h.target);

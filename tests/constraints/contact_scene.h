@@ -38,9 +38,7 @@ class GroundedIsland : public Island {
       : GroundedIsland(sample_model(sample), step, options, normal, gravity) {}
   GroundedIsland(std::shared_ptr<const ModalModel> body, double step, const ContactOptions& options = {},
                  const Vec3& normal = Vec3::UnitZ(), const Vec3& gravity = {0.0, 0.0, -kGravity})
-      : Island(std::move(body), step, gravity), contacts(options), normal_(normal) {
-    rule = options.rule;
-  }
+      : Island(std::move(body), step, gravity), contacts(options), normal_(normal) {}
 
   /// One step: contacts of all corners with the ground, and what is in `others`.
   IslandReport step() {

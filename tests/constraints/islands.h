@@ -61,18 +61,17 @@ class Island {
     return finish();
   }
   void foresee() {
-    solver.foresee(table, members, constraints,
+    solver->foresee(table, members, constraints,
                    {.step = step_,
                     .gravity = gravity_,
                     .max_iterations = max_iterations,
                     .guard_energy = guard_energy,
-                    .contact = rule,
                     .undisturbed = steps > 0,
                     .energy_surplus = surplus});
   }
   IslandReport finish() {
     ++steps;
-    const IslandReport report = solver.finish();
+    const IslandReport report = solver->finish();
     surplus = report.energy_surplus;
     return report;
   }
@@ -122,8 +121,7 @@ class Island {
   std::vector<std::unique_ptr<Constraint>> owned;
   std::vector<Constraint*> constraints;
   std::vector<JointConstraint*> joints;
-  IslandSolver solver;
-  ContactRule rule;
+  std::unique_ptr<IslandSolver> solver = make_island_solver();
   int max_iterations = IslandOptions{}.max_iterations;
   bool guard_energy = true;
   int steps = 0;

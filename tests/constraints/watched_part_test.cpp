@@ -31,7 +31,7 @@ struct FallingBox : GroundedIsland {
   }
   double take(Lets& watch) {
     foresee_contacts();
-    return solver.step(table, members, constraints, {.step = kFrame, .gravity = Vec3::Zero(), .watch = &watch}).taken;
+    return solver->step(table, members, constraints, {.step = kFrame, .gravity = Vec3::Zero(), .watch = &watch}).taken;
   }
   double velocity() const { return group.frame(0).velocity().z(); }
 };

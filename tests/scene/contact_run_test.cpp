@@ -174,6 +174,7 @@ TEST(ContactRun, ABodyThatWearsAShapeLiesOnThat) {
   EXPECT_NEAR(end_of(r, "round").z(), 0.9, 1e-6);
 }
 
+#if LIMBER_HAS_HAUSER
 TEST(ContactRun, TheMethodOfTheFileIsTheOneThatActs) {
   // The penalty's springs give way under the weight: n of them by m g/(n k), k = m (2πν)².
   const std::string soft = R"("contact": {"method": "penalty", "penalty_frequency": 5, "recovery_speed": 0},)" +
@@ -181,6 +182,7 @@ TEST(ContactRun, TheMethodOfTheFileIsTheOneThatActs) {
   const double dent = kGravity / (4.0 * std::pow(2.0 * std::numbers::pi * 5.0, 2));
   EXPECT_NEAR(end_of(play(rigid(soft)), "b").z(), 0.5 - dent, 1e-3 * dent);
 }
+#endif
 
 TEST(ContactRun, AHandleLeadsItsPointAlongTheKeysAndLetsGo) {
   const std::string led = R"("handles": [{"body": "b", "start": 0.2, "duration": 1, "at": {"nearest": [1, 0.5, 0.5]},

@@ -77,29 +77,47 @@ TEST(SceneFile, ABodyTouchesItselfIfToldSoAndIfItDeforms) {
                InputError);
 }
 
+/// [H03]'s rules are read where limber::hauser is built; elsewhere they are refused by name.
+TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
+  const std::string told = scene_with(R"({"name": "bell", "asset": "bell"})",
+                                      R"("contact": {"method": "gap_program", "friction_model": "heuristic_no_slip"})");
+#if LIMBER_HAS_HAUSER
+  const Scene s = parse(told);
+  EXPECT_EQ(s.contact_rule.method, SceneContactRule::Method::kGapProgram);
+  EXPECT_EQ(s.contact_rule.friction, SceneContactRule::Friction::kHeuristicNoSlip);
+  EXPECT_FALSE(s.contact_rule.is_own());
+#else
+  try {
+    parse(told);
+    FAIL() << "expected an InputError";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("contact.method: is \"gap_program\", and this build"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("LIMBER_BUILD_PAPERS=ON"));
+  }
+#endif
+}
+
 TEST(SceneFile, ContactIsReadWhereItBelongs) {
   const Scene s = parse(scene_with(
       R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},
           "layers": [0, 2], "meets": [1], "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
-      R"("contact": {"method": "gap_program", "friction": 0.7, "friction_model": "heuristic_no_slip", "guard": "none",
-                     "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2, "rolling_friction": 0.04,
+      R"("contact": {"friction": 0.7, "guard": "none", "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2, "rolling_friction": 0.04,
                      "residual_compliance": true, "penalty_frequency": 30, "penalty_damping": 0.5},
          "statics": [{"name": "ground", "shape": {"half_space": {"normal": [0, 3, 4], "offset": 2}}, "friction": 0,
                       "position": [1, 2, 3]},
                      {"name": "hill", "shape": {"height_field": {"spacing": [2, 3], "heights": [[0, 1, 2], [3, 4, 5]]}}},
                      {"name": "rock", "shape": {"mesh": {"file": "rock.obj", "scale": 0.1}}}])"));
   ASSERT_TRUE(s.contact);
-  EXPECT_EQ(s.contact->rule.method, ContactMethod::kGapProgram);
-  EXPECT_EQ(s.contact->rule.friction, FrictionModel::kHeuristicNoSlip);
-  EXPECT_EQ(s.contact->rule.guard, ProgramGuard::kNone);
+  EXPECT_TRUE(s.contact_rule.is_own());
+  EXPECT_EQ(s.contact_rule.guard, SceneContactRule::Guard::kNone);
   EXPECT_EQ(s.contact->impact, ImpactModel::kHeldFromTouch);
   EXPECT_EQ(s.contact->friction, 0.7);
   EXPECT_EQ(s.contact->rolling_friction, 0.04);
   EXPECT_EQ(s.contact->impact_speed, 0.5);
   EXPECT_EQ(s.contact->recovery_speed, 0.2);
   EXPECT_TRUE(s.contact->residual_compliance);
-  EXPECT_EQ(s.contact->penalty_frequency, 30.0);
-  EXPECT_EQ(s.contact->penalty_damping, 0.5);
+  EXPECT_EQ(s.contact_rule.penalty_frequency, 30.0);
+  EXPECT_EQ(s.contact_rule.penalty_damping, 0.5);
   ASSERT_EQ(s.statics.size(), 3u);
   const auto shape_of = [&](int i) { return *std::get<std::shared_ptr<const Shape>>(s.statics[i].shape); };
   EXPECT_LT((std::get<HalfSpace>(shape_of(0)).normal - Vec3(0, 0.6, 0.8)).norm(), kRoundOff);

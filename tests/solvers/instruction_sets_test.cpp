@@ -9,7 +9,6 @@
 #include "instruction_sets.h"
 #include "limber/solvers/contact_qp.h"
 #include "limber/solvers/convex_contact_solver.h"
-#include "limber/solvers/hauser/linear_program.h"
 #include "limber/solvers/least_squares.h"
 
 namespace limber {
@@ -52,8 +51,6 @@ TEST(ConstraintSolvers, SameBitsOnEveryInstructionSet) {
     qp.solve(ContactQp{.size = s.contacts, .A = s.A, .b = s.b}, f), keep(f);
     f.assign(f.size(), 0.0);
     qp.solve(FactoredContactQp{.size = s.contacts, .dimension = s.dimension, .G = s.G, .b = s.b}, f), keep(f);
-    LinearProgramSolver lp;
-    lp.solve({.rows = s.contacts, .columns = s.contacts, .A = s.A, .b = s.b}, f), keep(f);
     LeastSquaresSolver least_squares;
     least_squares.factor(s.G, metric, s.contacts);
     least_squares.solve(s.b, f), keep(f);

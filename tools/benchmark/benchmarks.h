@@ -28,4 +28,7 @@ std::function<void(Program&)> add_error(CLI::App& programs);
 /// `peers`: the same work in Box3D, Bullet and MuJoCo.
 std::function<void(Program&)> add_peers(CLI::App& programs);
 
+/// `methods`: contact methods of papers/ beside limber's own.
+std::function<void(Program&)> add_methods(CLI::App& programs);
+
 }  // namespace limber::tools

@@ -12,6 +12,9 @@ int main(int argc, char** argv) {
   Program program("limber-benchmark", "Measures limber on this machine, in one thread.");
   program.options().require_subcommand(1)->fallthrough();  // so that --report may follow the subcommand
   std::vector<std::function<void(Program&)>> benchmarks{add_step(program.options())};
+#if LIMBER_HAS_PAPERS
+  benchmarks.push_back(add_methods(program.options()));
+#endif
 #if LIMBER_HAS_PRECOMPUTE
   benchmarks.push_back(add_stability(program.options()));
   benchmarks.push_back(add_soak(program.options()));

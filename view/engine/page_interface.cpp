@@ -48,7 +48,7 @@ PageSettings settings_of(const double* n) {
   s.modes = static_cast<limber::Index>(n[7]);
   s.damping = n[8];
   s.friction = n[9];
-  s.method = static_cast<limber::ContactMethod>(static_cast<int>(n[10]));
+  s.method = static_cast<limber::SceneContactRule::Method>(static_cast<int>(n[10]));
   return s;
 }
 

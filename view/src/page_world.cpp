@@ -45,7 +45,7 @@ struct PageWorld::Impl {
     settings.gravity = told.gravity;
     settings.step = told.step;
     settings.substeps = told.substeps;
-    if (told.contact) settings.friction = told.contact->friction, settings.method = told.contact->rule.method;
+    if (told.contact) settings.friction = told.contact->friction, settings.method = told.contact_rule.method;
   }
 
   void start();
@@ -83,7 +83,7 @@ void PageWorld::Impl::start() {
   scene.step = settings.step;
   scene.substeps = settings.substeps;
   scene.gravity = settings.gravity;
-  if (scene.contact) scene.contact->friction = settings.friction, scene.contact->rule.method = settings.method;
+  if (scene.contact) scene.contact->friction = settings.friction, scene.contact_rule.method = settings.method;
   models = baked;
   std::map<const ModalModel*, int> kind_of;
   kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();

@@ -15,11 +15,9 @@
 #include "narrow/primitive_contacts.h"
 #include "narrow/rest_depth.h"
 #include "narrow/surface_contacts.h"
-#include "narrow/tet_overlap.h"
 
 namespace limber {
 
-using internal::boundary_faces;
 using internal::convex_core;
 using internal::ConvexContacts;
 using internal::ConvexCore;
@@ -36,8 +34,6 @@ using internal::RestDepth;
 using internal::RestDepthRule;
 using internal::RoundedCore;
 using internal::SurfaceContacts;
-using internal::TetOverlap;
-using internal::TetOverlapRule;
 using internal::triangulated;
 
 // -- Rigid shapes -----------------------------------------------------------------------------------------------------
@@ -128,9 +124,7 @@ const std::shared_ptr<const CollisionSurface>& RigidGeometry::surface() const { 
 // -- Pairs ------------------------------------------------------------------------------------------------------------
 
 struct RestVolume::Impl : RestDepth {
-  explicit Impl(std::shared_ptr<const ModalModel> model)
-      : RestDepth(std::move(model)), boundary(boundary_faces(volume())) {}
-  std::vector<Triangle> boundary;
+  using RestDepth::RestDepth;
 };
 
 RestVolume::RestVolume(std::shared_ptr<const ModalModel> model)
@@ -138,6 +132,28 @@ RestVolume::RestVolume(std::shared_ptr<const ModalModel> model)
 RestVolume::~RestVolume() = default;
 RestVolume::RestVolume(RestVolume&&) noexcept = default;
 RestVolume& RestVolume::operator=(RestVolume&&) noexcept = default;
+
+namespace {
+
+// A way out along a normal that is given.
+class NormalRule final : public OverlapRule {
+ public:
+  void bind(OverlapNormals& normals, int of) { normals_ = &normals, of_ = of; }
+  bool exit(PairSurface& surface, const Vec3& p, const PairSurface::Nearest&, Exit& exit) override {
+    exit.normal = normals_->normal(of_, p);
+    if (exit.normal.isZero()) return false;
+    const PairSurface::WayOut way = surface.way_out(p, exit.normal);
+    if (way.triangle < 0) return false;
+    exit.at = surface.on_face(way.triangle, p + way.distance * exit.normal);
+    return true;
+  }
+
+ private:
+  OverlapNormals* normals_ = nullptr;
+  int of_ = 0;
+};
+
+}  // namespace
 
 struct NarrowPhase::Impl {
   NarrowPhaseOptions options;
@@ -147,8 +163,8 @@ struct NarrowPhase::Impl {
   CoreContacts core_contacts;
   ConvexContacts convex_contacts;
   RestDepthRule rest_depth[2];
-  TetOverlap tet_overlap;
-  TetOverlapRule tet_rule[2];
+  std::unique_ptr<OverlapNormals> normals;  // null: the options' overlap says
+  NormalRule normal_rule[2];
   std::vector<Index> triangles;
   std::vector<FeatureContact> found;
   struct Place {
@@ -237,22 +253,21 @@ std::array<OverlapRule*, 2> NarrowPhase::Impl::rules(const CollisionBody& a, con
   std::array<OverlapRule*, 2> chosen{nullptr, nullptr};
   const CollisionBody* body[2] = {&a, &b};
   const RigidTransform X_PB[2] = {{}, X_AB};
-  if (options.overlap == OverlapMethod::kRestDepth) {
+  if (normals != nullptr && a.volume != nullptr && b.volume != nullptr) {
+    const auto overlapping = [&](std::size_t i) {
+      return OverlapNormals::Body{body[i]->volume->impl_->model(), body[i]->surface->amplitudes(),
+                                  body[i]->surface->skin(), X_PB[i]};
+    };
+    normals->bind(overlapping(0), overlapping(1), surface[0].tolerance());
+    for (std::size_t i = 0; i < 2; ++i) {
+      normal_rule[i].bind(*normals, static_cast<int>(i));
+      chosen[i] = &normal_rule[i];
+    }
+  } else if (options.overlap == OverlapMethod::kRestDepth) {
     for (std::size_t i = 0; i < 2; ++i) {
       if (body[i]->volume == nullptr) continue;
       rest_depth[i].bind(*body[i]->volume->impl_, *body[i]->surface, X_PB[i]);
       chosen[i] = &rest_depth[i];
-    }
-  } else if (options.overlap == OverlapMethod::kTetOverlap && a.volume != nullptr && b.volume != nullptr) {
-    const auto overlapping = [&](std::size_t i) {
-      const RestVolume::Impl& volume = *body[i]->volume->impl_;
-      return TetOverlap::Body{&volume.volume(), volume.boundary, body[i]->surface->amplitudes(),
-                              body[i]->surface->skin(), X_PB[i]};
-    };
-    tet_overlap.bind(overlapping(0), overlapping(1), surface[0].tolerance());
-    for (std::size_t i = 0; i < 2; ++i) {
-      tet_rule[i].bind(tet_overlap, static_cast<int>(i));
-      chosen[i] = &tet_rule[i];
     }
   }
   return chosen;
@@ -347,6 +362,7 @@ void NarrowPhase::Impl::deliver(const CollisionBody& a, const RigidTransform& X_
 
 NarrowPhase::NarrowPhase(const NarrowPhaseOptions& options) : impl_(std::make_unique<Impl>()) {
   impl_->options = options;
+  if (options.normals) impl_->normals = options.normals();
 }
 NarrowPhase::~NarrowPhase() = default;
 NarrowPhase::NarrowPhase(NarrowPhase&&) noexcept = default;

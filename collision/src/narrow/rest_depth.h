@@ -22,6 +22,7 @@ class RestDepth {
   explicit RestDepth(std::shared_ptr<const ModalModel> model);
   const ModalVolume& volume() const { return *model_->data().volume_block; }
   const TetLocator& locator() const { return locator_; }
+  const std::shared_ptr<const ModalModel>& model() const { return model_; }
 
  private:
   std::shared_ptr<const ModalModel> model_;

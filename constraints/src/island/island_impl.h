@@ -3,19 +3,17 @@
 //   island_solver.cpp   the step, its parts, and what is told when one has been taken
 //   island_attempts.cpp one part, and what is tried where its energy would rise
 //   island_release.cpp  where within a part an impact lets go
+//
+// How the impulses of one part are found is a solver's own: default_island_solver.cpp is limber's.
 #pragma once
 
 #include <vector>
 
-#include "convex_rounds.h"
 #include "held_reaction.h"
 #include "island_energy.h"
 #include "island_step.h"
-#include "mean_newton.h"
-#include "row_newton.h"
-#include "touch_program.h"
 
-namespace limber {
+namespace limber::internal {
 
 /// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
 inline bool is_part(double time, double left, double whole_step) {
@@ -25,56 +23,82 @@ inline bool is_part(double time, double left, double whole_step) {
 
 /// How far a step has come.
 struct StepInParts {
-  internal::StepPart part;  // foreseen and not yet taken
-  IslandReport done;        // what is to be told of it
-  IslandReport report;      // of the parts taken
-  double left = 0.0;        // s, with the part
-  double length = 0.0;      // s, of a part, where the step is divided
+  StepPart part;        // foreseen and not yet taken
+  IslandReport done;    // what is to be told of it
+  IslandReport report;  // of the parts taken
+  double left = 0.0;    // s, with the part
+  double length = 0.0;  // s, of a part, where the step is divided
   bool may_cut = false, cuts = false, divides = false, gives_up = false;
 };
 
-struct IslandSolver::Impl {
-  internal::IslandStep step;  // the part at hand
-  internal::HeldReaction reaction;
-  internal::TouchProgram touch;
-  internal::ConvexRounds rounds;
-  internal::RowNewton newton;
-  internal::MeanNewton mean;
-  internal::IslandEnergy energy;
-  std::vector<ExactMotion> motions;    // of the members, where a step may be cut or is watched
-  std::vector<double> slip, impulses;  // by row
-  StepInParts parts;                   // the step at hand
-  StageTimes times;                    // of the step at hand
-  StageClock clock;
+/// All of a step but how the impulses of one part are found.
+class IslandParts : public IslandSolver {
+ public:
+  IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                    std::span<Constraint* const> constraints, const IslandOptions& options) override;
+  void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
+               std::span<Constraint* const> constraints, const IslandOptions& options) override;
+  const IslandReport& foreseen() const override { return parts_.done; }
+  void refine() override;
+  const StageTimes& times() const override { return times_; }
+  IslandReport finish() override;
 
+ protected:
+  /// What becomes of the members by the end of a part, all but the energy; from begin() to act_at_end().
+  virtual IslandReport find(const StepPart& part) = 0;
+  /// What find() found roughly, to the law.
+  virtual void go_on(IslandReport&) {}
+  /// What find() found last happens.
+  virtual void taken() {}
+  /// @param slip by row, zero
+  virtual void write_slip(std::span<double>) const {}
+  /// Whether find() may be asked for the same part begun more slowly, or ended sooner.
+  virtual bool may_repeat() const { return true; }
+  /// When within the rest of a step a constraint wants that cut, s from now.
+  virtual double wanted_cut(Constraint& constraint, const BodyStates& states, const FreeMotions& free, double within) {
+    return constraint.next_cut(states, free, within);
+  }
+
+  /// Makes step_ the part at hand. @param contacts_react as IslandStep::begin()
+  void begin(const StepPart& part, bool contacts_react);
+  /// The frames' second half of what holds them, and of what strikes them.
+  void act_at_end();
+
+  IslandStep step_;  // the part at hand
+  HeldReaction reaction_;
+  std::vector<ExactMotion> motions_;  // of the members, where a step may be cut or is watched
+
+ private:
   // The step in parts.
-  void take_watched(internal::StepPart part, IslandReport& report);
+  void take_watched(StepPart part, IslandReport& report);
   void begin_times(bool timed);
   void foresee_next();
   void foresee_cut();
   void end_cut();
   void foresee_divided();
-  double next_cut(const internal::StepPart& part);
+  double next_cut(const StepPart& part);
   void find_impulses();
   void tell_foreseen();
-  void commit(const internal::StepPart& part, const IslandReport& done, IslandReport& report);
+  void commit(const StepPart& part, const IslandReport& done, IslandReport& report);
 
   // A part.
-  IslandReport foresee(const internal::StepPart& part);
-  bool foresee_middle(IslandReport& done);
-  IslandReport foresee_guarded(const internal::StepPart& part);
-  IslandReport refine(const internal::StepPart& part, IslandReport done);
-  IslandReport guard(internal::StepPart part, IslandReport done);
-  void foresee_mean(IslandReport& done);
-  void act_at_end();
+  IslandReport find_guarded(const StepPart& part);
+  IslandReport refined(const StepPart& part, IslandReport done);
+  IslandReport guard(StepPart part, IslandReport done);
   void refuse_impulses(IslandReport& report);
 
   // Where it ends, if an impact lets go within it.
-  void end_at_release(internal::StepPart& part, IslandReport& done);
+  void end_at_release(StepPart& part, IslandReport& done);
   double longest_impact() const;
   double last_impact_force() const;
   double impact_impulse(double length) const;
-  double find_release(internal::StepPart part);
+  double find_release(StepPart part);
+
+  IslandEnergy energy_;
+  std::vector<double> slip_, impulses_;  // by row
+  StepInParts parts_;                    // the step at hand
+  StageTimes times_;                     // of the step at hand
+  StageClock clock_;
 };
 
-}  // namespace limber
+}  // namespace limber::internal

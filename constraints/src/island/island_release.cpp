@@ -3,10 +3,8 @@
 
 #include "island_impl.h"
 
-namespace limber {
+namespace limber::internal {
 namespace {
-
-using internal::StepPart;
 
 /// A part that is accepted, and soon: it may be done ten times more.
 bool is_quick(const IslandReport& done) {
@@ -23,9 +21,9 @@ bool is_quick(const IslandReport& done) {
 /// where they let go. The exact wave in a bar has I = F s up to the release at T, F (2T − s) after it in steps that
 /// began before, and F s²/(3s − 2T) in one that begins with the impact. It grows again later, after 4T/3 there: the
 /// release is its first maximum.
-void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
+void IslandParts::end_at_release(StepPart& part, IslandReport& done) {
   const double latest = longest_impact();
-  if (latest == 0.0 || step.theta == 1.0 || step.holds_contact_forces()) return;
+  if (latest == 0.0 || step_.theta == 1.0 || !may_repeat()) return;
   const auto end_at = [&](double time) {
     part.options.step = time;
     part.ends = false;
@@ -34,7 +32,7 @@ void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
   };
   const auto again = [&] {
     const StepAttempts cut = done.attempts;
-    done = foresee_guarded(part);
+    done = find_guarded(part);
     done.attempts.add(cut);
   };
   if (is_part(latest, part.options.step, part.whole_step)) {
@@ -48,31 +46,31 @@ void IslandSolver::Impl::end_at_release(StepPart& part, IslandReport& done) {
 }
 
 /// By when those have let go that are to be cut there, s; 0: there are none.
-double IslandSolver::Impl::longest_impact() const {
+double IslandParts::longest_impact() const {
   double longest = 0.0;
-  for (std::size_t i = 0; i < step.size(); ++i) longest = std::max(longest, step.law(i).lets_go_within);
+  for (std::size_t i = 0; i < step_.size(); ++i) longest = std::max(longest, step_.law(i).lets_go_within);
   return longest;
 }
 
 /// Of all impacts of the island in the last step; 0: they begin.
-double IslandSolver::Impl::last_impact_force() const {
+double IslandParts::last_impact_force() const {
   double before = 0.0;
-  for (std::size_t i = 0; i < step.size(); ++i)
-    if (step.law(i).lets_go_within > 0.0) before += step.law(i).last_force;
+  for (std::size_t i = 0; i < step_.size(); ++i)
+    if (step_.law(i).lets_go_within > 0.0) before += step_.law(i).last_force;
   return before;
 }
 
 /// Of all impacts of the island, along their normals.
-double IslandSolver::Impl::impact_impulse(double length) const {
+double IslandParts::impact_impulse(double length) const {
   double sum = 0.0;
-  for (std::size_t i = 0; i < step.size(); ++i)
-    if (step.law(i).lets_go_within > 0.0) sum += step.f[i] + length * step.reaction[i];
+  for (std::size_t i = 0; i < step_.size(); ++i)
+    if (step_.law(i).lets_go_within > 0.0) sum += step_.f[i] + length * step_.reaction[i];
   return sum;
 }
 
 /// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there. Where the
 /// impact begins with the part, the first such end: between ends of which each is a quarter later than the one before.
-double IslandSolver::Impl::find_release(StepPart part) {
+double IslandParts::find_release(StepPart part) {
   constexpr int kTrials = 8;  // places the release to a thirtieth of the part; what is left of it may be cut again
   constexpr double kAlmost = 0.98;                      // of the part
   constexpr double kNoticeable = 1e-6;                  // of the impulse
@@ -84,7 +82,7 @@ double IslandSolver::Impl::find_release(StepPart part) {
     if (!quick) return 0.0;
     if (end == length) return whole;
     part.options.step = end;
-    quick = is_quick(foresee(part));
+    quick = is_quick(find(part));
     return impact_impulse(end);
   };
   double begin = 0.0, end = length, at_end = whole;
@@ -116,4 +114,4 @@ double IslandSolver::Impl::find_release(StepPart part) {
   return std::max(at_first, at_second) > at_end ? (at_first < at_second ? second : first) : length;
 }
 
-}  // namespace limber
+}  // namespace limber::internal

@@ -34,7 +34,7 @@ void IslandLoads::add(const IslandBodies& bodies, const ConstraintRows& rows, st
   }
 }
 
-void IslandStep::begin(const StepPart& of) {
+void IslandStep::begin(const StepPart& of, bool contacts_react) {
   part = of;
   bodies.set(part.table, part.members);
   rows.clear();
@@ -57,7 +57,7 @@ void IslandStep::begin(const StepPart& of) {
   for (std::vector<double>* impulses : {&f, &reaction, &end_reaction, &touch_impulse, &end_impulse})
     impulses->assign(m, 0.0);
   end_work = end_modal_gain = 0.0;
-  find_kind();
+  find_kind(contacts_react);
   begin_early();
   measure(StepTime::kStart, start_gap);
   gap = start_gap;
@@ -80,11 +80,11 @@ bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
 }
 
 /// Forces are truly held, θ = ½, while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
-void IslandStep::find_kind() {
+void IslandStep::find_kind(bool contacts_react) {
   contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
   touches = any_law([](const RowLaw& law) { return law.contact; });
-  mean = part.options.watch == nullptr && !touches;
-  convex = !mean && (rule().is_convex() || !touches);
+  mean = !contacts_react && part.options.watch == nullptr && !touches;
+  convex = !contacts_react && !mean;
   skinned = false;
   for (Index local = 0; local < bodies.count(); ++local)
     skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);

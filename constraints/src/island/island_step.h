@@ -73,7 +73,7 @@ struct IslandStep {
   IslandBodies bodies;
   ConstraintRows rows, end_rows, mean_rows;  // linearised at the start, at the predicted end and in the middle
   std::vector<Index> first_row;              // per constraint, and the end
-  bool convex = false;                       // in rounds: with contacts by a rule for that, or watched
+  bool convex = false;                       // in rounds: with contacts, or watched
   bool contacts_alone = false;               // among the rows
   bool skinned = false;                      // some bodies bend by their modal skins
   bool mean = false;                         // joints and the like: impulses act by the rows of the middle of the step
@@ -88,12 +88,12 @@ struct IslandStep {
   double end_modal_gain = 0.0;                 // J, what they give the modes
   IslandLoads loads;
 
-  /// Linearises the rows. All impulses are zero.
-  void begin(const StepPart& of);
+  /// Linearises the rows. All impulses are zero. @param contacts_react contacts answer to held forces as other rows
+  /// that hold do (held_reaction.h), and no row comes in rounds or in the middle of the step
+  void begin(const StepPart& of, bool contacts_react);
   /// Joints beside contacts: to be solved by the rows of the middle of the step, or in rounds.
   void take_middle(bool middle);
   double length() const { return part.options.step; }
-  const ContactRule& rule() const { return part.options.contact; }
   std::size_t size() const { return f.size(); }
   const RowLaw& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
   /// Those of its rows.
@@ -119,13 +119,10 @@ struct IslandStep {
   /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
   void load_end();
 
-  /// Of joints, and of contacts by other rules than the convex one: what rows answer to held forces by themselves.
+  /// Of joints, and of contacts that react: what rows answer to held forces by themselves.
   bool answers_to_loads() const { return !(convex && (contacts_alone || loads.all_early)); }
   /// All loads and impulses come at the start; nothing is left for the end.
   bool takes_loads_early() const { return !answers_to_loads() && theta == 1.0; }
-  /// Contacts get the forces that [H03]'s velocity program has found, and nothing else.
-  bool holds_contact_forces() const { return rule().method == ContactMethod::kVelocityProgram; }
-
   /// act(side, local, again) for the bodies of a row; again: the one before was the same body.
   template <class Action>
   void for_bodies(std::size_t row, Action&& act) const;
@@ -145,7 +142,7 @@ struct IslandStep {
   void move_under_loads();
   void follow_bending();
   void bend_rows();
-  void find_kind();
+  void find_kind(bool contacts_react);
   void begin_early();
   void set_modal_steps();
 

@@ -8,7 +8,7 @@
 
 namespace limber::internal {
 
-/// Body poses as affine maps x ↦ A (x − centre) + p: rigid motions, or what the penalty form makes of cells.
+/// Body poses as affine maps x ↦ A (x − centre) + p: rigid motions, or what a PoseMethod makes of cells.
 struct BodyMap {
   Mat3 A = Mat3::Identity();
   Vec3 p = Vec3::Zero();

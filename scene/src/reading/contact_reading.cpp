@@ -9,17 +9,17 @@
 
 namespace limber {
 
-std::string_view to_string(ContactMethod method) {
+std::string_view to_string(SceneContactRule::Method method) {
   constexpr std::array kWords{"penalty", "velocity_program", "gap_program", "complementary"};
   return kWords[static_cast<std::size_t>(method)];
 }
 
-std::string_view to_string(FrictionModel model) {
+std::string_view to_string(SceneContactRule::Friction model) {
   constexpr std::array kWords{"cone", "heuristic", "heuristic_no_slip"};
   return kWords[static_cast<std::size_t>(model)];
 }
 
-std::string_view to_string(ProgramGuard guard) {
+std::string_view to_string(SceneContactRule::Guard guard) {
   constexpr std::array kWords{"none", "clamp", "complementary"};
   return kWords[static_cast<std::size_t>(guard)];
 }
@@ -64,15 +64,26 @@ CollisionFilter read_filter(const JsonObject& o) {
   return {.layers = read_layers(o, "layers", all.layers), .mask = read_layers(o, "meets", all.mask)};
 }
 
-ContactRule read_rule(const JsonObject& o) {
-  using enum ContactMethod;
-  using enum FrictionModel;
-  const ContactRule rule;
-  return {.method = choice_of(o, "method", {kPenalty, kVelocityProgram, kGapProgram, ContactMethod::kComplementary},
-                              rule.method),
-          .friction = choice_of(o, "friction_model", {kCone, kHeuristic, kHeuristicNoSlip}, rule.friction),
-          .guard = choice_of(o, "guard", {ProgramGuard::kNone, ProgramGuard::kClamp, ProgramGuard::kComplementary},
-                             rule.guard)};
+SceneContactRule read_rule(const JsonObject& o) {
+  using Method = SceneContactRule::Method;
+  using Friction = SceneContactRule::Friction;
+  using Guard = SceneContactRule::Guard;
+  SceneContactRule rule;
+  rule.method =
+      choice_of(o, "method", {Method::kPenalty, Method::kVelocityProgram, Method::kGapProgram, Method::kComplementary},
+                rule.method);
+  rule.friction = choice_of(o, "friction_model", {Friction::kCone, Friction::kHeuristic, Friction::kHeuristicNoSlip},
+                            rule.friction);
+  rule.guard = choice_of(o, "guard", {Guard::kNone, Guard::kClamp, Guard::kComplementary}, rule.guard);
+  rule.penalty_frequency = positive(o, "penalty_frequency", rule.penalty_frequency);
+  rule.penalty_damping = non_negative(o, "penalty_damping", rule.penalty_damping);
+  if (rule.is_own() || LIMBER_HAS_HAUSER) return rule;
+  const bool method = rule.method != Method::kComplementary;
+  refuse(o.where(method ? "method" : "friction_model"),
+         in_quotes(std::string(method ? to_string(rule.method) : to_string(rule.friction))) +
+             ", and this build of limber has no limber::hauser",
+         method ? "\"complementary\", or a build with LIMBER_BUILD_PAPERS=ON"
+                : "\"cone\", or a build with LIMBER_BUILD_PAPERS=ON");
 }
 
 SceneFinder read_finder(const JsonObject& o) {
@@ -86,13 +97,10 @@ SceneFinder read_finder(const JsonObject& o) {
 ContactOptions read_contact_options(const JsonObject& o) {
   using enum ImpactModel;
   ContactOptions c;
-  c.rule = read_rule(o);
   c.friction = non_negative(o, "friction", c.friction);
   c.rolling_friction = non_negative(o, "rolling_friction", c.rolling_friction);
   c.recovery_speed = non_negative(o, "recovery_speed", c.recovery_speed);
   c.residual_compliance = o.boolean("residual_compliance", c.residual_compliance);
-  c.penalty_frequency = positive(o, "penalty_frequency", c.penalty_frequency);
-  c.penalty_damping = non_negative(o, "penalty_damping", c.penalty_damping);
   c.impact = choice_of(o, "impact", {kAbsorbed, kHeld, kHeldFromTouch}, c.impact);
   c.impact_speed = non_negative(o, "impact_speed", c.impact_speed);
   o.finish();
@@ -106,6 +114,7 @@ void read_contact(const JsonObject& o, Scene& scene) {
   if (o.has("contact")) {
     const JsonObject contact(o.at("contact"), o.where("contact"));
     scene.finder = read_finder(contact);
+    scene.contact_rule = read_rule(contact);
     scene.contact = read_contact_options(contact);
   } else if (o.has("statics")) {
     scene.contact.emplace();

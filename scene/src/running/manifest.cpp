@@ -124,9 +124,10 @@ class Comparison {
   }
 
   void add_methods(SceneManifest& out) const {
-    for (const ContactMethod method : {ContactMethod::kComplementary, ContactMethod::kGapProgram,
-                                       ContactMethod::kVelocityProgram, ContactMethod::kPenalty})
-      if (!scene_.contact || scene_.contact->rule.method != method) out.unused_methods.emplace_back(to_string(method));
+    using Method = SceneContactRule::Method;
+    for (const Method method :
+         {Method::kComplementary, Method::kGapProgram, Method::kVelocityProgram, Method::kPenalty})
+      if (!scene_.contact || scene_.contact_rule.method != method) out.unused_methods.emplace_back(to_string(method));
   }
 
   void compare_with_all(SceneManifest& out) {

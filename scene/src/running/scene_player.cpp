@@ -10,6 +10,9 @@
 #endif
 #include "limber/core/error.h"
 #include "limber/core/state_archive.h"
+#if LIMBER_HAS_HAUSER
+#include "limber/hauser/hauser_method.h"
+#endif
 #include "running/frame_movement.h"
 #include "running/held_points.h"
 #include "running/step_times.h"
@@ -59,6 +62,25 @@ std::unique_ptr<ContactSource> make_finder(SceneFinder which) {
   return std::make_unique<FclContactSource>();
 #else
   throw InvalidArgument("ScenePlayer: finder is kFcl, and this build has no FCL, expected kLimber");
+#endif
+}
+
+/// [H03]'s way for the islands of a scene that asks for it. @return the options of its contacts
+ContactOptions take_rule(const Scene& scene, World& world) {
+  const SceneContactRule& told = scene.contact_rule;
+  if (told.is_own()) return *scene.contact;
+#if LIMBER_HAS_HAUSER
+  // The same constants in the same order.
+  const HauserMethod method({.method = static_cast<ContactMethod>(told.method),
+                             .friction = static_cast<FrictionModel>(told.friction),
+                             .guard = static_cast<ProgramGuard>(told.guard),
+                             .penalty_frequency = told.penalty_frequency,
+                             .penalty_damping = told.penalty_damping});
+  world.set_island_solver(method.islands());
+  return method.contacts(*scene.contact);
+#else
+  (void)world;
+  throw InvalidArgument("ScenePlayer: contact_rule is one of [H03]'s, and this build has no limber::hauser");
 #endif
 }
 
@@ -116,7 +138,7 @@ struct ScenePlayer::Impl {
 };
 
 void ScenePlayer::Impl::add_bodies() {
-  if (scene.contact) world.set_contact_source(finder.get(), *scene.contact);
+  if (scene.contact) world.set_contact_source(finder.get(), take_rule(scene, world));
   if (models.of_body.size() != scene.bodies.size())
     throw InvalidArgument("ScenePlayer: there are " + std::to_string(models.of_body.size()) +
                           " models, expected one per body, " + std::to_string(scene.bodies.size()));

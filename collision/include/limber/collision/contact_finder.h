@@ -29,8 +29,7 @@ struct ContactFinderOptions {
   /// Whether two surfaces that hardly move against each other are looked at by a list made before: changes the time,
   /// not the contacts.
   bool coherence = true;
-  /// Depth and normal of overlaps. kTetOverlap costs all nodes of both volumes for each overlapping pair, and works
-  /// between modal bodies with a volume block only; kRestDepth asks for one of the body that a vertex is in.
+  /// Depth and normal of overlaps. kRestDepth needs a volume block of the body that a vertex is in.
   NarrowPhaseOptions narrow_phase{};
   /// How contacts are thinned; {.max_points = 0} gives all.
   ContactClusterOptions clusters{};

@@ -37,14 +37,18 @@
 /// other.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "limber/collision/aabb.h"
 #include "limber/core/rigid_transform.h"
 #include "limber/dynamics/contact_source.h"
+#include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
+#include "limber/model/skin_pose.h"
 
 namespace limber {
 
@@ -122,22 +126,31 @@ enum class OverlapMethod {
   /// nearest point of the rest surface forward again, n ∝ F⁻ᵀN. As steady as the rest shape allows however deep the
   /// overlap; bodies without a volume block take kNearestPoint.
   kRestDepth,
-  /// From the tetrahedra of both bodies that overlap, as in [H03], which gives no formula: out of B into A
-  ///   n ∝ ∮_{∂B∩A} n_B dA = −∮_{∂A∩B} n_A dA,
-  /// over each connected part (patch) of the region A ∩ B. Moving A by d changes the region's volume by
-  /// −d · ∮_{∂B∩A} n_B dA, so n is the way that frees the bodies fastest; it does not change sides in the middle of a
-  /// body. All vertices inside, of A and of B, have their patch's normal; each leaves the other body where the line
-  /// along n first goes out of its surface: gap = −that length = n · (p_a − p_b). Both bodies need a volume block; such
-  /// pairs without one, and patches whose area vectors cancel (a body inside another, a bar right through a wall), take
-  /// kNearestPoint. Costs O(nodes · modes) for each pair that overlaps.
-  ///
-  /// For compact overlaps. Where a patch wraps around (a ball in a close cup) one normal cannot free all of it, and
-  /// depths along it are long at the sides: there kRestDepth is the better choice.
-  kTetOverlap,
+};
+
+/// Normals of overlaps found in another way, for two modal bodies with volume blocks. Vertices of each inside the other
+/// leave it where the line along the normal first goes out of its surface: gap = −that length.
+class OverlapNormals {
+ public:
+  struct Body {
+    std::shared_ptr<const ModalModel> model{};  ///< with a volume block
+    std::span<const double> amplitudes{};
+    const SkinPose* skin = nullptr;  ///< null: the body bends by its modes alone
+    RigidTransform X_PB{};           ///< pose in the frame of the pair
+  };
+  virtual ~OverlapNormals() = default;
+  /// The pair that normal() is asked about until the next call; a surface's amplitudes last until then. Called for
+  /// every pair that is near, so work belongs into normal(). @param tolerance a length that is round-off here, m
+  virtual void bind(const Body& a, const Body& b, double tolerance) = 0;
+  /// Unit, out of one body (0: a, 1: b) towards the other, for a point of the other that is inside; the frame of the
+  /// pair. Zero: not known, and the nearest point serves.
+  virtual Vec3 normal(int out_of, const Vec3& p) = 0;
 };
 
 struct NarrowPhaseOptions {
   OverlapMethod overlap = OverlapMethod::kRestDepth;
+  /// Makes what gives the normals of overlaps in place of `overlap`, once for each thread; empty: nothing does.
+  std::function<std::unique_ptr<OverlapNormals>()> normals{};
 };
 
 /// Finds contacts; holds the scratch of one thread, and allocates nothing once warm. Contacts are appended, in an order

@@ -114,8 +114,7 @@ class Constraint {
   /// along without where forces are small. @param impulses of the rows
   virtual void add_force_derivative(const BodyStates&, std::span<const double> /*impulses*/, ForceDerivative&) const {}
   /// J̇v of the rows at the step's start, in their order: what the gaps' rates change by while the bodies keep their
-  /// velocities. For [H03]'s acceleration program (contact_method.h), which sees contacts alone. @param bias as many
-  /// numbers
+  /// velocities. For solvers that work with accelerations; contacts alone have it. @param bias as many numbers
   virtual void bias_accelerations(const BodyStates&, std::span<double> bias) const { std::ranges::fill(bias, 0.0); }
   /// Whether it is contact: an island of nothing else may have its step cut where bodies strike and let go. Each part
   /// is then a step for the functions here.
@@ -125,6 +124,8 @@ class Constraint {
   virtual bool may_be_divided() const { return false; }
   /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
   virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
+  /// When within the rest of a step it comes to touch, faster than what counts as an impact; `within`: not at all.
+  virtual double next_touch(const BodyStates&, const FreeMotions&, double within) { return within; }
   /// After the step has been foreseen, which may be done again with more rows beside these. @param impulses, slip as
   /// for accept() and slid()
   virtual void foreseen(std::span<const double> /*impulses*/, std::span<const double> /*slip*/) {}

@@ -17,9 +17,8 @@
 /// residual displacement is a state of the body: what its last step pressed its vertices with, in its own frame
 /// (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
-/// *Contact compliance* (`give`): by rules other than the complementary one with its cone, contacts of bodies that flex
-/// yield by 3e-3 of what a force moves the reduced mass of the two within a step, 1e-4 beside a residual compliance. It
-/// makes the shares of a load among redundant contacts unique.
+/// *Contact compliance* (`give`): contacts of bodies that flex may yield by themselves, which makes the shares of a
+/// load among redundant contacts unique for island solvers that need it (ContactOptions::compliance).
 ///
 /// *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press at more than
 /// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
@@ -39,7 +38,6 @@
 #include <vector>
 
 #include "limber/constraints/constraint.h"
-#include "limber/constraints/contact_method.h"
 #include "limber/constraints/small_steps.h"
 #include "limber/dynamics/contact_source.h"
 #include "limber/dynamics/surface_point.h"
@@ -77,17 +75,16 @@ struct ContactOptions {
   /// C ≥ 0, the coefficient of rolling resistance: spheres and capsules are braked where they roll by a moment of up to
   /// C R F_n, R from the contact to the nearer of their origins. A ball on a plane feels C F_n at its rim: it slows by
   /// C g/(1 + ⅖), and stays on slopes of less than atan C. A tyre on asphalt has 0.01, a ball on grass 0.1. Spinning is
-  /// braked likewise; bodies with corners are not. 0: round bodies roll on for ever. Works with
-  /// ContactMethod::kComplementary and FrictionModel::kCone.
+  /// braked likewise; bodies with corners are not. 0: round bodies roll on for ever.
   double rolling_friction = 0.0;
   double recovery_speed = 0.05;  ///< m/s, ≥ 0: bodies that overlap are pushed apart at most this fast
   /// Used where the models have it.
   bool residual_compliance = true;
-  ContactRule rule{};  ///< how forces are found; goes to the island solver too (IslandOptions::contact)
-  /// kPenalty: frequency and share of critical damping of each contact's spring under the bodies' reduced mass, Hz, >
-  /// 0, and ≥ 0. k = m (2πν)², c = 2ζ m 2πν.
-  double penalty_frequency = 15.0, penalty_damping = 1.0;
-  ImpactModel impact = ImpactModel::kAbsorbed;  ///< by kGapProgram and kComplementary
+  /// ≥ 0: so much of what a force moves the reduced mass of two bodies within a step each contact of bodies that flex
+  /// yields by itself, a thirtieth of that beside a residual compliance. Island solvers of other methods ask for it;
+  /// limber's own (make_island_solver()) needs none and leaves it out of its rows.
+  double compliance = 0.0;
+  ImpactModel impact = ImpactModel::kAbsorbed;
   /// m/s, ≥ 0: bodies that come together more slowly do not rebound, so that bouncing ends (θ = 1).
   double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
@@ -97,8 +94,7 @@ template <class Self>
 requires std::is_same_v<std::remove_const_t<Self>, ContactOptions>
 auto state_fields(Self& s) {
   return std::tie(s.solver, s.small_steps, s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance,
-                  s.rule.method, s.rule.friction, s.rule.guard, s.penalty_frequency, s.penalty_damping, s.impact,
-                  s.impact_speed);
+                  s.compliance, s.impact, s.impact_speed);
 }
 
 /// What became of a contact in the last step.

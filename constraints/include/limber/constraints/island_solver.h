@@ -36,11 +36,11 @@
 /// docs/step.md. Equations and what is guaranteed: docs/derivations/constraints.md.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 
 #include "limber/constraints/constraint.h"
-#include "limber/constraints/contact_method.h"
 #include "limber/constraints/island_status.h"
 #include "limber/constraints/step_attempts.h"
 #include "limber/core/stage_times.h"
@@ -51,8 +51,7 @@ struct IslandOptions {
   double step = 1.0 / 60.0;     ///< s; that of all groups
   Vec3 gravity = Vec3::Zero();  ///< m/s², world
   int max_iterations = 30;      ///< of Newton's method on true gaps; ≥ 1
-  bool guard_energy = true;     ///< 4 above; ProgramGuard::kNone switches it off as well
-  ContactRule contact{};        ///< how contacts are solved for
+  bool guard_energy = true;     ///< 4 above
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
   /// are the same: what joints alone lose to the method is then given back.
   bool undisturbed = false;
@@ -80,7 +79,6 @@ struct IslandReport {
   int bodies = 0, rows = 0;
   double taken = 0.0;  ///< s, where there is a watch
   StepAttempts attempts{};
-  ProgramReport programs{};  ///< of the contact rule, if it has any
   int iterations = 0;        ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;      ///< for the contacts with friction, in the part that needed most
   /// How far the worst row is from its law, in units of its tolerance: ≤ 1 where the island is solved. It counts the
@@ -93,37 +91,36 @@ struct IslandReport {
   bool rough = false;           ///< foreseen as IslandOptions::rough asks, and not to the law
 };
 
-/// The solver and its memory, which grows to the largest island seen; after that a step allocates nothing. One thread
-/// at a time. The same call gives the same bits.
+/// Takes the steps of islands, one at a time, and holds the memory for that, which grows to the largest island seen;
+/// after that a step allocates nothing. One thread at a time. The same call gives the same bits. make_island_solver()
+/// makes limber's own; World is given others by World::set_island_solver().
 class IslandSolver {
  public:
-  IslandSolver();
-  ~IslandSolver();
-  IslandSolver(IslandSolver&&) noexcept;
-  IslandSolver& operator=(IslandSolver&&) noexcept;
+  virtual ~IslandSolver() = default;
 
-  /// Advances the members by one step: foresee() and finish().
+  /// Advances the members by one step: foresee() and finish(), or one part of a step under a watch.
   /// @param table the bodies that rows name. @param members indices into it, ascending: every body the rows touch
-  IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                    std::span<Constraint* const> constraints, const IslandOptions& options);
+  virtual IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                            std::span<Constraint* const> constraints, const IslandOptions& options) = 0;
 
   /// Finds where the step, or the first of its parts, takes the members (BodyGroup::predicted_frame() and the like).
   /// They stay where they are; another call in place of finish() forgets this one. Arguments as for step(); they are
   /// to last until finish(). @pre no watch
-  void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-               std::span<Constraint* const> constraints, const IslandOptions& options);
+  virtual void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
+                       std::span<Constraint* const> constraints, const IslandOptions& options) = 0;
   /// Of foresee().
-  const IslandReport& foreseen() const;
+  virtual const IslandReport& foreseen() const = 0;
   /// What has been foreseen roughly, to the law; nothing where it is not rough. @pre foresee()
-  void refine();
+  virtual void refine() = 0;
   /// What foresee() or refine() took, with IslandOptions::timed; finish() tells of itself.
-  const StageTimes& times() const;
+  virtual const StageTimes& times() const = 0;
   /// Moves them there, and through the parts that are left. @pre foresee(), not rough
-  IslandReport finish();
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  virtual IslandReport finish() = 0;
 };
+
+using IslandSolverFactory = std::function<std::unique_ptr<IslandSolver>()>;
+
+/// The solver that the head of this file describes.
+std::unique_ptr<IslandSolver> make_island_solver();
 
 }  // namespace limber

@@ -33,6 +33,7 @@
 
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
+#include "limber/constraints/island_solver.h"
 #include "limber/constraints/island_status.h"
 #include "limber/constraints/joint_constraint.h"
 #include "limber/constraints/manipulation.h"
@@ -167,7 +168,6 @@ struct ConstraintReport {
   /// met to (3e-9 of the arms of a contact's points, 1e-11 of those of joints and hands): at most 1 where all is met.
   /// By ContactSolver::kGame: the largest motion that a row's law still forbids in the last of the small steps, m.
   double residual = 0.0;
-  ProgramReport programs{};       ///< linear programs of the contact rule
   StepAttempts attempts{};        ///< how many islands' steps, or parts of them, were cut or tried in another way
   IslandStatusCounts statuses{};  ///< islands by how their steps ended; of a step in parts, those of all parts
   /// Every row of every island is within its tolerance: all are kSolved. By kGame, which solves all islands as one: no
@@ -294,6 +294,10 @@ class World {
   JointView joint(JointId id) const;
 
   ConstraintReport constraint_report() const;
+
+  /// Makes what takes the steps of islands from now on; empty: limber's own (make_island_solver()). Solvers keep
+  /// nothing from step to step, so they are no part of the state that is saved.
+  void set_island_solver(IslandSolverFactory make);
 
   /// What steps and reconstruct() spend on their stages from here on is added to `times`, which outlives the world or
   /// the next call; null, the default: no clock is read. The stages of a step sum to it; what many threads do at once

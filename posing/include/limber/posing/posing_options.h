@@ -17,23 +17,12 @@ enum class StrainWeights {
   kUnweighted,
 };
 
-/// How cells, joints and limits are expressed.
-enum class PoseFormulation {
-  /// Cells are rotations and translations; joints and limits are constraints. Cells stay rigid and never flip.
-  kConstrained,
-  /// [X09]: cells are affine maps; rigidity, joints and limits are energies with large weights.
-  kPenalty,
-};
-
 struct PosingOptions {
-  PoseFormulation formulation = PoseFormulation::kConstrained;
   StrainWeights strain = StrainWeights::kVolume;
   double handle_stiffness = 10.0;  ///< of a handle, in units of material stiffness times the model's diagonal; > 0
   double tolerance = 1e-8;         ///< of the diagonal: converged when a step moves no point further; > 0
   double energy_tolerance = 1e-7;  ///< of the energy: or when it promises to lower it by no more; ≥ 0
   int max_iterations = 200;        ///< of one solve(); ≥ 1
-  double rigidity_weight = 1e5;    ///< kPenalty: of rigid parts' and cells' rigidity, [X09]; > 0
-  double joint_weight = 1e5;       ///< kPenalty: of joints and limits, [X09]; > 0
   void validate() const;           ///< @throws InvalidArgument naming the field and its value
 };
 

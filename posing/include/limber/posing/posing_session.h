@@ -24,6 +24,7 @@
 #include "limber/core/rigid_transform.h"
 #include "limber/posing/cells.h"
 #include "limber/posing/jointed_model.h"
+#include "limber/posing/pose_method.h"
 #include "limber/posing/posing_options.h"
 
 namespace limber {
@@ -34,7 +35,8 @@ struct PoseHandle {
   friend bool operator==(PoseHandle, PoseHandle) = default;
 };
 
-/// A cell as it stands: x at rest is at rotation · (x − centre) + place. Orthonormal but in the penalty form.
+/// A cell as it stands: x at rest is at rotation · (x − centre) + place. Orthonormal but where a PoseMethod finds
+/// poses.
 struct PosedCell {
   Index part = 0;
   Index body = 0;  ///< cells of equal number share their transformation
@@ -54,8 +56,10 @@ struct PosedJoint {
 
 class PosingSession {
  public:
-  /// All parts rigid, nothing pinned, no handle. @throws InvalidArgument from model.validate() and options.validate()
-  explicit PosingSession(JointedModel model, const PosingOptions& options = {});
+  /// All parts rigid, nothing pinned, no handle. @param method finds the poses; null: the session itself, as above
+  /// @throws InvalidArgument from model.validate() and options.validate()
+  explicit PosingSession(JointedModel model, const PosingOptions& options = {},
+                         std::shared_ptr<const PoseMethod> method = nullptr);
   ~PosingSession();
   PosingSession(PosingSession&&) noexcept;
   PosingSession& operator=(PosingSession&&) noexcept;

@@ -154,6 +154,25 @@ enum class SceneFinder {
 };
 std::string_view to_string(SceneFinder finder);
 
+/// How the forces of contacts are found: limber's own way, or one of [H03]'s in builds with limber::hauser, whose
+/// contact_rule.h says what the words mean.
+struct SceneContactRule {
+  enum class Method { kPenalty, kVelocityProgram, kGapProgram, kComplementary };
+  enum class Friction { kCone, kHeuristic, kHeuristicNoSlip };
+  enum class Guard { kNone, kClamp, kComplementary };
+  Method method = Method::kComplementary;
+  Friction friction = Friction::kCone;
+  Guard guard = Guard::kClamp;
+  double penalty_frequency = 15.0, penalty_damping = 1.0;  ///< Hz, > 0, and ≥ 0
+
+  bool is_own() const { return method == Method::kComplementary && friction == Friction::kCone; }
+};
+// Words of scene files and reports: the last part of the constant's name, such as "gap_program".
+std::string_view to_string(SceneContactRule::Method method);
+std::string_view to_string(SceneContactRule::Friction friction);
+std::string_view to_string(SceneContactRule::Guard guard);
+std::string_view to_string(ImpactModel model);
+
 struct Scene {
   std::string name{};                                     ///< the file's name without folder and extension
   double step = 1.0 / 60.0;                               ///< s
@@ -165,6 +184,7 @@ struct Scene {
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
   std::optional<ContactOptions> contact{};                ///< absent: bodies pass through each other
   SceneFinder finder = SceneFinder::kLimber;              ///< of contacts
+  SceneContactRule contact_rule{};                        ///< of contacts
   std::vector<SceneStatic> statics{};                     ///< none without contact
   std::vector<SceneBody> bodies{};                        ///< those of machines last
   std::vector<Strike> strikes{};
@@ -178,12 +198,6 @@ struct Scene {
 
 /// All files that a scene names: assets, and shapes of bodies and statics; each once.
 std::vector<std::filesystem::path> files_of(const Scene& scene);
-
-// Words of scene files and reports: the last part of the constant's name, such as "gap_program" or "heuristic_no_slip".
-std::string_view to_string(ContactMethod method);
-std::string_view to_string(FrictionModel model);
-std::string_view to_string(ProgramGuard guard);
-std::string_view to_string(ImpactModel model);
 
 /// Reads and checks everything that can be checked without the assets and the files of shapes. Assets of machines are
 /// read: their bodies, joints and pairs stand among the scene's own, each body as "MACHINE/BODY". Unknown keys are

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "limber/engine/world.h"
+#include "limber/scene/scene_file.h"
 
 namespace limber {
 
@@ -27,7 +28,7 @@ struct PageSettings {
   Index modes = 256;                    ///< of each model at most; ≥ 0
   double damping = 1.0;                 ///< factor on the decay of every mode; ≥ 0
   double friction = 0.5;                ///< ≥ 0, where the scene has contact
-  ContactMethod method = ContactMethod::kComplementary;
+  SceneContactRule::Method method = SceneContactRule::Method::kComplementary;
 };
 
 /// A model once for all its bodies, made for a vertex shader.

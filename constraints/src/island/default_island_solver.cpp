@@ -1,0 +1,84 @@
+#include "convex_rounds.h"
+#include "island_impl.h"
+#include "mean_newton.h"
+
+namespace limber {
+namespace internal {
+namespace {
+
+/// Joints and the like in the middle of the step, islands with contacts in rounds.
+class DefaultIslandSolver final : public IslandParts {
+ protected:
+  IslandReport find(const StepPart& part) override;
+  void go_on(IslandReport& done) override;
+  void write_slip(std::span<double> slip) const override;
+
+ private:
+  bool find_middle(IslandReport& done);
+  void find_mean(IslandReport& done);
+
+  ConvexRounds rounds_;
+  MeanNewton mean_;
+};
+
+IslandReport DefaultIslandSolver::find(const StepPart& part) {
+  begin(part, false);
+  IslandReport done;
+  if (step_.mean) {
+    find_mean(done);
+    return done;
+  }
+  reaction_.find(step_, StepTime::kStart);
+  rounds_.solve(step_, done);
+  if (!done.accepted && find_middle(done)) return done;
+  if (part.options.watch != nullptr) step_.trace(motions_);
+  act_at_end();
+  return done;
+}
+
+void DefaultIslandSolver::go_on(IslandReport& done) {
+  rounds_.go_on(step_, done);
+  act_at_end();
+}
+
+void DefaultIslandSolver::write_slip(std::span<double> slip) const {
+  step_.mean ? mean_.write_slip(step_, slip) : rounds_.write_slip(step_, slip);
+}
+
+/// Joints beside contacts that rounds have not found: by rows of the middle of the step and true derivatives. @return
+/// whether that is found; else what the rounds came to stays
+bool DefaultIslandSolver::find_middle(IslandReport& done) {
+  if (!step_.touches || step_.contacts_alone || step_.part.options.watch != nullptr) return false;
+  constexpr std::size_t kMostRows = 80;  // matrices are dense
+  if (step_.size() > kMostRows) return false;
+  const bool all_early = step_.loads.all_early;
+  IslandReport middle;
+  step_.take_middle(true);
+  middle.accepted = mean_.solve(step_, middle, true) == SolveStatus::kSolved;
+  middle.attempts[StepAttempt::kInTheMiddle] = 1;
+  if (middle.accepted) {
+    done = middle;
+    return true;
+  }
+  step_.take_middle(false);
+  if (all_early) step_.loads.take_all_early();
+  reaction_.find(step_, StepTime::kStart);
+  rounds_.take_again(step_);
+  return false;
+}
+
+/// Of bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the
+/// oddest rows; then they stay, and are slower.
+void DefaultIslandSolver::find_mean(IslandReport& done) {
+  done.accepted = mean_.solve(step_, done, true) == SolveStatus::kSolved;
+  if (done.accepted || !step_.part.last_resort) return;
+  if (mean_.solve(step_, done, false) != SolveStatus::kSolved) mean_.stay(step_);
+  done.attempts[StepAttempt::kRefused] = 1;
+}
+
+}  // namespace
+}  // namespace internal
+
+std::unique_ptr<IslandSolver> make_island_solver() { return std::make_unique<internal::DefaultIslandSolver>(); }
+
+}  // namespace limber
