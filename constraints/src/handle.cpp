@@ -7,12 +7,10 @@
 
 #include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-// Positions are met to this part of the distances at hand: Newton's method ends where round-off begins.
-constexpr double kHandleTolerance = 1e-11;
 
 std::vector<Vec3> all_directions() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
 
@@ -62,7 +60,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
     const double gap = n.dot(p - target);
     RowLaw law{.lower = -step * options_.max_force,
                .upper = step * options_.max_force,
-               .tolerance = distance_tolerance(kHandleTolerance, arm, p),
+               .tolerance = distance_tolerance(internal::kConstraintsTuning.rows.hand_tolerance, arm, p),
                .digits = digits_of(arm + p.norm() + target.norm()),
                .last_force = last_force_[i]};
     law.agent_displacement = n.dot(then_ - target);

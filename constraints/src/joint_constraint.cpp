@@ -9,16 +9,10 @@
 
 #include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-// Newton's method ends here: angles in rad, distances as a part of the joint's arms.
-constexpr double kJointTolerance = 1e-11;
-// Parts out of place come together at this speed, m/s and rad/s.
-constexpr double kLimitRecoverySpeed = 1.0;
-// Euler angles are singular at ±90° of the second; closer than this to it their rows keep a finite size.
-constexpr double kLeastEulerDeterminant = 1e-3;
 
 Vec3 euler_xyz(const Mat3& Q) {
   return {std::atan2(-Q(1, 2), Q(2, 2)), std::asin(std::clamp(Q(0, 2), -1.0, 1.0)), std::atan2(-Q(0, 1), Q(0, 0))};
@@ -30,7 +24,7 @@ Vec3 euler_rate(const Mat3& Q, int i) {
   const Vec3 x = Vec3::UnitX();
   const Vec3 y(0.0, std::cos(angles.x()), std::sin(angles.x()));
   const Vec3 z = Q.col(2);
-  const double determinant = std::max(x.dot(y.cross(z)), kLeastEulerDeterminant);
+  const double determinant = std::max(x.dot(y.cross(z)), internal::kConstraintsTuning.rows.least_euler_determinant);
   const Vec3 dual = i == 0 ? y.cross(z) : i == 1 ? z.cross(x) : x.cross(y);
   return dual / determinant;
 }
@@ -42,7 +36,7 @@ Vec3 euler_rate_change(const Mat3& Q, const Mat3& dQ, int i) {
   const Vec3 x = Vec3::UnitX(), y(0.0, std::cos(alpha), std::sin(alpha)), z = Q.col(2),
              dy = dalpha * Vec3(0.0, -std::sin(alpha), std::cos(alpha)), dz = dQ.col(2);
   const double determinant = x.dot(y.cross(z));
-  if (!(determinant > kLeastEulerDeterminant)) return Vec3::Zero();
+  if (!(determinant > internal::kConstraintsTuning.rows.least_euler_determinant)) return Vec3::Zero();
   const Vec3 dual = i == 0   ? y.cross(z)
                     : i == 1 ? z.cross(x)
                              : x.cross(y),
@@ -271,7 +265,7 @@ JointConstraint::Direction JointConstraint::mean_direction(const Placement& star
 
 RowLaw JointConstraint::law_of(const RowPlan& plan, double gap) const {
   if (plan.law >= Law::kMotor) return actuation_law(plan, gap);
-  const double recovery = kLimitRecoverySpeed * step_;
+  const double recovery = internal::kConstraintsTuning.rows.joint_recovery_speed * step_;
   RowLaw law{.holds = true};
   law.offset = gap - std::clamp(gap, -recovery, recovery);
   if (plan.law == Law::kLimit) law.lower = 0.0, law.offset = std::min(0.0, gap + recovery);
@@ -332,13 +326,13 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   }
   const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.place.o_b - part.origin).norm(); };
   const double length = std::max(arm(at.a), arm(at.b)),
-               nearest = distance_tolerance(kJointTolerance, length, at.place.o_b);
+               nearest = distance_tolerance(internal::kConstraintsTuning.rows.joint_tolerance, length, at.place.o_b);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const bool distance = is_distance(plan);
     const double gap = this->gap(at.place, plan);
     RowLaw law = law_of(plan, gap);
-    law.tolerance = distance ? nearest : kJointTolerance;
+    law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
     law.digits = digits_of(distance ? length + at.place.o_b.norm() : 1.0 + std::abs(gap));
     if (i < force_.plan.size()) law.last_force = force_.plan[i];
     FrameMeasure of_a, of_b;

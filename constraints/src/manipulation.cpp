@@ -7,14 +7,10 @@
 #include <vector>
 
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-// Directions of the matrix below this part of its largest are not in its range.
-constexpr double kRankTolerance = 1e-11;
-// Positions are met when they change by less than this part of the distances at hand.
-constexpr double kTolerance = 1e-13;
 
 void require(bool good, const std::string& what) {
   if (!good) throw InvalidArgument("manipulate: " + what);
@@ -122,7 +118,7 @@ class Manipulation {
     const Eigen::MatrixXd A =
         jacobian(measured_) * metric(bodies_, options_.level).asDiagonal() * jacobian(forced_).transpose();
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
-    decomposition.setThreshold(kRankTolerance);
+    decomposition.setThreshold(internal::kConstraintsTuning.rows.manipulation_rank);
     decomposition.compute(A);
     std::fill(impulses.begin(), impulses.end(), 0.0);
     const bool positions =
@@ -133,7 +129,7 @@ class Manipulation {
       apply(f);
       for (std::size_t j = 0; j < impulses.size(); ++j) impulses[j] += f[static_cast<Eigen::Index>(j)];
       missing = wanted_less_coming();
-      if ((A * f).lpNorm<Eigen::Infinity>() < kTolerance * scale_) break;
+      if ((A * f).lpNorm<Eigen::Infinity>() < internal::kConstraintsTuning.rows.manipulation_tolerance * scale_) break;
     }
     return {.rank = static_cast<int>(decomposition.rank()),
             .residual = missing.size() > 0 ? missing.lpNorm<Eigen::Infinity>() : 0.0};

@@ -6,12 +6,10 @@
 
 #include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-/// Directions in which a patch extends less than this part of its largest second moment do not tell a rotation.
-constexpr double kThinPatch = 1e-6;
 
 Vec3 rest_point(const ModalModel& model, const SurfacePoint& at) { return deformed_point(model, at, {}); }
 
@@ -20,7 +18,7 @@ Mat3 pseudo_inverse(const Mat3& inertia) {
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(inertia);
   Mat3 inverse = Mat3::Zero();
   for (int i = 0; i < 3; ++i)
-    if (eigen.eigenvalues()[i] > kThinPatch * eigen.eigenvalues()[2])
+    if (eigen.eigenvalues()[i] > internal::kConstraintsTuning.rows.thin_patch * eigen.eigenvalues()[2])
       inverse += eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose() / eigen.eigenvalues()[i];
   return inverse;
 }

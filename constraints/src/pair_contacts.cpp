@@ -5,18 +5,10 @@
 #include <numbers>
 
 #include "limber/core/cross_matrix.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
-
-// Gaps are met to this part of the arms at hand.
-constexpr double kRelativeTolerance = 3e-9;
-// Overlap left over is reduced by this part in a step, or less (ContactOptions::recovery_speed).
-constexpr double kRecovery = 0.2;
-// So much of ContactOptions::compliance is left beside a residual compliance, which shares loads by itself.
-constexpr double kGiveBesideResidual = 1.0 / 30.0;
-// Steps that an impact may last in any case.
-constexpr double kShortestStrike = 2.0;
 
 /// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
 double longest_rebound(const PreparedSide& a, const PreparedSide& b) {
@@ -55,7 +47,7 @@ double gap_tolerance(const BodyStates& states, StepTime when, const PreparedCont
   double arms = 0.0;
   if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
   if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
-  return distance_tolerance(share * kRelativeTolerance, arms, a);
+  return distance_tolerance(share * internal::kConstraintsTuning.rows.contact_tolerance, arms, a);
 }
 
 /// Of the place where both forces act, that of a side's point: the other's is 1 less.
@@ -196,16 +188,16 @@ void PairContacts::begin(const BodyStates& states) {
 }
 
 double PairContacts::give(const BodyStates& states) const {
-  const double share = yields_[0] || yields_[1] ? kGiveBesideResidual : 1.0;
+  const double share = yields_[0] || yields_[1] ? internal::kConstraintsTuning.rows.compliance_beside_residual : 1.0;
   return share * options_->compliance * step_ * step_ / reduced_mass(states, contacts_.front());
 }
 
 bool PairContacts::is_caught() const {
-  constexpr double kOpposed = -0.5;
   const auto overlaps = [](const PreparedContact& c) { return c.axes.col(0).dot(c.offset) < 0.0; };
   for (const PreparedContact& contact : contacts_)
     if (overlaps(contact) && std::ranges::any_of(contacts_, [&](const PreparedContact& other) {
-          return overlaps(other) && contact.axes.col(0).dot(other.axes.col(0)) < kOpposed;
+          return overlaps(other) &&
+                 contact.axes.col(0).dot(other.axes.col(0)) < internal::kConstraintsTuning.rows.opposed_normals;
         }))
       return true;
   return false;
@@ -239,8 +231,7 @@ void PairContacts::add_force_derivative(const BodyStates& states, std::span<cons
 
 double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
                            double within) {
-  constexpr int kMostHalvings = 60;
-  constexpr double kClosed = 1e-12;  // of the way through the step
+  constexpr const internal::ImpactTuning& tuning = internal::kConstraintsTuning.impacts;
   const Vec3 n = contact.axes.col(0);
   Vec3 a, b, velocity_a, velocity_b;
   const auto gap = [&](double time) {
@@ -251,9 +242,11 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
   double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
   const double least = gap_tolerance(states, StepTime::kStart, contact, a, b, 1.0);
   if (!(gap_open > least && gap_closed < 0.0)) return within;
-  for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
+  for (int i = 0; i < tuning.touch_halvings && closed - open > tuning.touch_closed * within; ++i) {
     // Secants from both ends close in from one side alone: every third step halves.
-    const double part = i % 3 == 2 ? 0.5 : std::clamp(gap_open / (gap_open - gap_closed), 1e-3, 1.0 - 1e-3);
+    const double part = i % 3 == 2 ? 0.5
+                                   : std::clamp(gap_open / (gap_open - gap_closed), tuning.touch_least_part,
+                                                1.0 - tuning.touch_least_part);
     const double between = open + part * (closed - open), seen = gap(between);
     (seen > 0.0 ? open : closed) = between;
     (seen > 0.0 ? gap_open : gap_closed) = seen;
@@ -266,7 +259,9 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
 bool PairContacts::strikes(const BodyStates& states) const {
   const PreparedContact& first = contacts_.front();
   if (options_->impact == ImpactModel::kAbsorbed || !flexes_) return false;
-  if (lasted_ > 0.0) return lasted_ < std::max(longest_rebound(first.a, first.b), kShortestStrike * step_);
+  if (lasted_ > 0.0)
+    return lasted_ <
+           std::max(longest_rebound(first.a, first.b), internal::kConstraintsTuning.impacts.shortest_strike * step_);
   return std::ranges::any_of(contacts_, [&](const PreparedContact& contact) {
     if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
     const Vec3 n = contact.axes.col(0);
@@ -276,9 +271,8 @@ bool PairContacts::strikes(const BodyStates& states) const {
 }
 
 double PairContacts::time_to_rebound() const {
-  constexpr double kMargin = 0.25;  // of the longest time: its end is to be seen
   const double longest = longest_rebound(contacts_.front().a, contacts_.front().b);
-  return kMargin * longest + std::max(0.0, longest - lasted_);
+  return internal::kConstraintsTuning.impacts.longest_margin * longest + std::max(0.0, longest - lasted_);
 }
 
 void PairContacts::add_give(Index first, ConstraintRows& rows) const {
@@ -312,8 +306,10 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     RowLaw law{.tolerance = tolerance, .contact = true};
     if (axis == 0) {
       const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
-      const double recovery =
-          caught_ ? 0.0 : std::min(kRecovery * std::max(0.0, -gap), step_ * options_->recovery_speed);
+      const double recovery = caught_
+                                  ? 0.0
+                                  : std::min(internal::kConstraintsTuning.rows.overlap_recovery * std::max(0.0, -gap),
+                                             step_ * options_->recovery_speed);
       law.offset = (when == StepTime::kStart ? closes_to(gap) : std::min(0.0, gap)) + recovery;
       law.agent_displacement = recovery;
       law.lower = 0.0;

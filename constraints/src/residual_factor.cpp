@@ -1,16 +1,9 @@
 #include "residual_factor.h"
+#include "tuning.h"
 
 #include <algorithm>
 
 namespace limber {
-namespace {
-
-// Pivots that count, as part of the largest: many rows press on few nodes. What is cut is far below what each contact
-// yields by itself.
-constexpr double kCut = 1e-10;
-
-}  // namespace
-
 void ResidualFactor::set(const IslandBodies& bodies, const ConstraintRows& rows, double step) {
   const auto count = static_cast<std::size_t>(bodies.count());
   if (bodies_.size() < count) bodies_.resize(count), pairs_.resize(count);
@@ -48,7 +41,7 @@ void ResidualFactor::factor(Body& body, std::span<const ConstraintRows::Flexibil
     S.row(i)[j] += g.value;
     if (i != j) S.row(j)[i] += g.value;
   }
-  cholesky_.factor(S, n, kCut);
+  cholesky_.factor(S, n, internal::kConstraintsTuning.rows.dent_pivot);
   body.rank = cholesky_.rank();
   body.values.resize(n * body.rank);
   for (std::size_t c = 0; c < body.rank; ++c)

@@ -1,15 +1,9 @@
 #include "rolling_resistance.h"
 
 #include "prepared_contact.h"
+#include "tuning.h"
 
 namespace limber {
-namespace {
-
-// Turns are braked to this, rad.
-constexpr double kTurnTolerance = 1e-9;
-
-}  // namespace
-
 void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, const Vec3* foreseen) {
   a_ = a, b_ = b, largest_ = largest, moment_ = last;
   is_foreseen_ = foreseen != nullptr;
@@ -28,7 +22,7 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
     rows.add(side(a_, 1.0), side(b_, -1.0),
              {.lower = -radius,
               .upper = radius,
-              .tolerance = kTurnTolerance,
+              .tolerance = internal::kConstraintsTuning.rows.rolling_tolerance,
               .goes_on = true,
               .last_force = moment_[i],
               .foreseen = is_foreseen_,

@@ -4,13 +4,12 @@
 #include <string>
 
 #include "limber/core/error.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
 
 // Bodies advanced as one job: about 10 µs of work, so that handing it out costs little.
-constexpr Index kBodiesPerJob = 64;
-
 }  // namespace
 
 Index BodyTable::group_of(std::shared_ptr<const ModalModel> model, double step) {
@@ -107,7 +106,8 @@ void BodyTable::make_ranges(std::span<const Index> awake, std::uint64_t changes)
   ranges.clear();
   for (const auto& [group, slot] : awake_.slots) {
     Range* last = ranges.empty() ? nullptr : &ranges.back();
-    if (last != nullptr && last->group == group && last->end == slot && slot - last->begin < kBodiesPerJob)
+    if (last != nullptr && last->group == group && last->end == slot &&
+        slot - last->begin < kEngineTuning.bodies_per_job)
       ++last->end;
     else
       ranges.push_back({group, slot, slot + 1});

@@ -1,4 +1,5 @@
 #include "contact_pipeline.h"
+#include "tuning.h"
 
 #include <algorithm>
 #include <utility>
@@ -33,7 +34,6 @@ void ContactPipeline::advance(const Substep& substep, StepEvents& events, Jobs& 
 /// Finds what touches, the islands that it makes, and where these end. Contacts are looked for anew where bodies come
 /// farther than expected, three times at most: each time at least twice as far.
 void ContactPipeline::foresee(const Substep& substep, Jobs& jobs, StageClock& clock) {
-  constexpr int kMostLooks = 3;
   forecast_.begin(substep.length, substep.gravity);
   double rough = 0.0;
   if (registry_->source() != nullptr) {
@@ -49,9 +49,9 @@ void ContactPipeline::foresee(const Substep& substep, Jobs& jobs, StageClock& cl
     constraints_->foresee(jobs, {.step = substep.length,
                                  .gravity = substep.gravity,
                                  .timed = clock.runs(),
-                                 .rough = look < kMostLooks ? rough : 0.0});
+                                 .rough = look < kEngineTuning.looks.most ? rough : 0.0});
     if (clock.runs()) clock.lap(constraints_->foreseen_times(), Stage::kSolve);
-    if (registry_->source() == nullptr || look == kMostLooks || !look_again(jobs, clock)) break;
+    if (registry_->source() == nullptr || look == kEngineTuning.looks.most || !look_again(jobs, clock)) break;
     ++attempts_[StepAttempt::kLookedFarther];
   }
   clock.lap(Stage::kLookAhead);

@@ -1,4 +1,5 @@
 #include "contact_search.h"
+#include "tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,12 +20,11 @@ const auto by_bodies = [](const ContactPoint& p, const ContactPoint& q) {
 double ContactSearch::sinking() const { return rows_->options().recovery_speed * length_; }
 
 double ContactSearch::roughness() {
-  constexpr double kOfSinking = 0.25, kOfThickness = 1e-4;
   double thinnest = std::numeric_limits<double>::infinity();
   for (const Index body : sleep_->awake())
     if (const BodyTable::Entry& e = (*bodies_)[body]; bodies_->shows(e))
       thinnest = std::min(thinnest, e.extent.thickness);
-  return std::min(kOfSinking * sinking(), kOfThickness * thinnest);
+  return std::min(kEngineTuning.looks.rough_of_recovery * sinking(), kEngineTuning.looks.rough_of_thickness * thinnest);
 }
 
 void ContactSearch::find(Jobs& jobs, StageClock& clock) {
@@ -90,10 +90,9 @@ void ContactSearch::keep_known() {
 /// Whether a contact that touches, and is not known, closes in the motion that is foreseen.
 /// @param before ordered as `found_`, by bodies and id
 bool ContactSearch::are_met(std::span<const ContactPoint> before) {
-  constexpr double kRounded = 1e-9;  // of the way to the bodies
   return std::ranges::any_of(found_, [&](const ContactPoint& contact) {
     return !std::ranges::binary_search(before, contact, by_bodies) &&
-           gap_at_end(contact) < std::min(contact.gap, 0.0) - kRounded * contact.position.norm();
+           gap_at_end(contact) < std::min(contact.gap, 0.0) - kEngineTuning.looks.rounded * contact.position.norm();
   });
 }
 

@@ -49,7 +49,7 @@ double PassingWatch::clear_until(const FreeMotions& found, double length) {
   if (pairs_.touches.empty()) return until;
   touch_ = pairs_.touches.front();
   if (touch_.resting) pairs_.crept.emplace_back(touch_.a, touch_.b);
-  margin_ *= NearPairs::kNearer;
+  margin_ *= kEngineTuning.fast.nearer;
   return touch_.time;
 }
 
@@ -61,7 +61,7 @@ double PassingWatch::first_turned(const FreeMotions& found, double length) const
       const ExactMotion* motion = found.of(body);
       if (motion == nullptr || pairs_.turns[static_cast<std::size_t>(body)] == 0) continue;
       const double speed = motion->path().bounds(0.0, until).angular_speed;
-      if (speed * until > NearPairs::kMostTurn) until = NearPairs::kMostTurn / speed;
+      if (speed * until > kEngineTuning.fast.most_turn) until = kEngineTuning.fast.most_turn / speed;
     }
   return until;
 }
@@ -83,7 +83,7 @@ bool FastBodies::gather(std::span<const ContactPoint> found, double length, Jobs
 void FastBodies::list_fast() {
   fast_.clear();
   for (const Index body : sleep_->awake())
-    if (forecast_->way(body) > kSlow * forecast_->state(body).look_ahead) fast_.push_back(body);
+    if (forecast_->way(body) > kEngineTuning.fast.slow * forecast_->state(body).look_ahead) fast_.push_back(body);
 }
 
 /// First touches of the fast with all that move: what is slow may come to meet them.
@@ -97,7 +97,8 @@ void FastBodies::find_first_touches(std::span<const ContactPoint> found, double 
   }
   p.first_margin = std::numeric_limits<double>::infinity();
   for (const Index body : sleep_->awake()) p.motions[static_cast<std::size_t>(body)] = &forecast_->motion(body);
-  for (const Index body : fast_) p.first_margin = std::min(p.first_margin, kTouch * forecast_->state(body).look_ahead);
+  for (const Index body : fast_)
+    p.first_margin = std::min(p.first_margin, kEngineTuning.fast.touch * forecast_->state(body).look_ahead);
   p.margin = p.first_margin;
   p.crept.clear();
   p.list_touching(found, p.first_margin);
@@ -223,7 +224,7 @@ void FastBodies::advance(const Substep& substep, std::span<const ContactPoint> f
   std::size_t begin = 0;
   for (const std::size_t end : clusters_.ends) {
     advance_cluster(std::span(clusters_.members).subspan(begin, end - begin), step);
-    near_.margin *= NearPairs::kNearer;
+    near_.margin *= kEngineTuning.fast.nearer;
     begin = end;
   }
   constraints_->let_go();
@@ -256,7 +257,7 @@ void FastBodies::advance_cluster(std::span<const Index> members, const Step& ste
       return rests_[static_cast<std::size_t>(body)] != 0 && constraints_->moves(body);
     };
     const bool met_another = touch != nullptr && (stands(touch->a) || stands(touch->b));
-    if (met_another || count == kMostParts) {
+    if (met_another || count == kEngineTuning.fast.most_parts) {
       ++step.attempts[StepAttempt::kHeldAtTouch];
       break;
     }

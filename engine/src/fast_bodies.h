@@ -29,18 +29,12 @@
 #include "motion_forecast.h"
 #include "sleep_stage.h"
 #include "step_path.h"
+#include "tuning.h"
 
 namespace limber::internal {
 
 /// Pairs of fast bodies with what they come to: what the watch of a part looks at.
 struct NearPairs {
-  /// Share of a margin that the next cluster takes: what came to a touch is apart then.
-  static constexpr double kNearer = 0.45;
-  /// Share of the first margin: so near bodies that touch may come before they are no more looked at.
-  static constexpr double kLeast = 1e-3;
-  /// rad, about which a body may turn while contacts hold it: by then other parts of it would touch.
-  static constexpr double kMostTurn = 0.5;
-
   std::vector<Impact> touches;                    // first ones of the fast
   std::vector<std::pair<Index, Index>> touching;  // pairs too near to be looked at: their contacts are in force
   std::vector<std::pair<Index, Index>> crept;     // of the cluster: so near for long that it took no end
@@ -55,7 +49,7 @@ struct NearPairs {
   /// @param in_force ordered by pairs. @param within m: of those, the pairs that are so near
   void list_touching(std::span<const ContactPoint> in_force, double within);
   /// m: nearer pairs are not looked at.
-  double least_margin() const { return kLeast * first_margin; }
+  double least_margin() const { return kEngineTuning.fast.least * first_margin; }
 };
 
 /// Ends a part where a pair without a contact first touches; and where a body of a pair that touches, and is not looked
@@ -106,13 +100,6 @@ class FastBodies {
                StepAttempts& attempts);
 
  private:
-  /// Share of the smallest look-ahead at hand, at which bodies touch.
-  static constexpr double kTouch = 0.05;
-  /// Share of the look-ahead: what moves less far within a step passes nothing.
-  static constexpr double kSlow = 0.5;
-  /// Most parts of a cluster's step.
-  static constexpr int kMostParts = 4;
-
   struct Clusters {
     DisjointSets sets;
     std::vector<char> waits;     // by body: it is in a cluster

@@ -10,6 +10,7 @@
 #include "free_set_factor.h"
 #include "limber/core/types.h"
 #include "limber/solvers/aligned_buffer.h"
+#include "tuning.h"
 
 namespace limber {
 using namespace internal;  // kernels and checks
@@ -17,14 +18,6 @@ using namespace internal;  // kernels and checks
 namespace {
 
 using Numbers = std::span<const double>;
-
-// A row that differs from those of the free forces by a part σ has a pivot of σ², taken as zero below about 1e-14, and
-// is pulled by at most σ. A larger pull is no rounding.
-constexpr double kNearlyDependent = 1e-6;
-// Of ContactQpResult::residual.
-constexpr double kResidualTolerance = 1e-11;
-// Added to the diagonal, as a part of it, where there is no solution.
-constexpr double kInfeasibleCompliance = 1e-6;
 
 constexpr const char* kQpSolver = "ContactQpSolver::solve";
 
@@ -248,7 +241,7 @@ struct ContactQpSolver::Impl {
 
   double compliance(std::size_t j) const { return added_compliance / (problem.scale[j] * problem.scale[j]); }
   double largest() const { return std::max(problem.largest_b, largest_f); }
-  double tolerated() const { return kResidualTolerance * largest(); }
+  double tolerated() const { return kSolversTuning.qp.residual * largest(); }
 
   // By how much (2) is violated at a force that is not free, scaled; the sign is the way it wants to go.
   double pull(std::size_t j) const {
@@ -347,7 +340,7 @@ struct ContactQpSolver::Impl {
     double step = clip(j, way, kUnbounded);
     for (std::size_t i = 0; i < k; ++i) step = clip(static_cast<std::size_t>(P[i]), direction[i], step);
     if (step == kUnbounded) {
-      if (std::abs(pull(j)) > kNearlyDependent * largest())
+      if (std::abs(pull(j)) > kSolversTuning.qp.nearly_dependent * largest())
         add_compliance();
       else
         state[j] = State::kLeft;
@@ -361,7 +354,8 @@ struct ContactQpSolver::Impl {
   }
 
   void add_compliance() {
-    added_compliance = std::max(10.0 * added_compliance, kInfeasibleCompliance);
+    added_compliance =
+        std::max(kSolversTuning.qp.more_compliance * added_compliance, kSolversTuning.qp.infeasible_compliance);
     factor_free();
   }
 

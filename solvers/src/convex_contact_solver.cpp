@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "dense_kernels.h"
+#include "tuning.h"
 
 namespace limber::internal {
 
@@ -267,17 +268,16 @@ void ConvexContactSolver::find_direction(const double* g, double* d) {
 
 /// Where (1) is least along d: Newton's method on its slope, within the bracket found so far.
 double ConvexContactSolver::best_step(double slope_at_start) const {
-  // Of the slope at the start; the full step is worth less of a search, as most are near enough.
-  constexpr double kEnoughOfFullStep = 1e-2, kEnough = 1e-3;
-  constexpr int kMost = 30;
+  constexpr const ConvexSolverTuning& tuning = kSolversTuning.convex;
   const double yd = dot(y_.data(), d_.data(), size_), dd = dot(d_.data(), d_.data(), size_);
   double step = 1.0, low = 0.0, high = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kMost; ++i) {
+  for (int i = 0; i < tuning.most_searches; ++i) {
     const ContactPotential::Slope slope = slope_at(step, yd, dd);
-    if (std::abs(slope.first) <= (i == 0 ? kEnoughOfFullStep : kEnough) * std::abs(slope_at_start)) break;
+    if (std::abs(slope.first) <= (i == 0 ? tuning.enough_of_full_step : tuning.enough) * std::abs(slope_at_start))
+      break;
     (slope.first < 0.0 ? low : high) = step;
     const double next = step - slope.first / slope.second;
-    if (next > low && next < std::min(high, 4.0 * step))
+    if (next > low && next < std::min(high, tuning.longest_jump * step))
       step = next;
     else
       step = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * step;

@@ -5,6 +5,7 @@
 
 #include "argument_checks.h"
 #include "dense_kernels.h"
+#include "tuning.h"
 
 namespace limber {
 using namespace internal;  // kernels and checks
@@ -12,9 +13,6 @@ using namespace internal;  // kernels and checks
 namespace {
 
 using Numbers = std::span<const double>;
-
-// Pivots below this part of the largest are taken as zero: (singular value ratio)².
-constexpr double kRankTolerance = 1e-11;
 
 double* zeros(AlignedBuffer& memory, std::size_t n) {
   double* to = memory.need(n);
@@ -77,7 +75,7 @@ LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int row
   } else {
     gram(S, B_, m_, d_);
   }
-  small_.factor(S, n, kRankTolerance);
+  small_.factor(S, n, kSolversTuning.least_squares.rank);
   return {.status = SolveStatus::kSolved, .rank = static_cast<int>(small_.rank())};
 }
 
@@ -104,13 +102,14 @@ SolveStatus LeastSquaresSolver::solve(Numbers r, std::span<double> f) {
 // A_ee with rows and columns, A_ec and b_e with rows, scaled to a unit diagonal: joints mix metres and radians, and the
 // rank cut compares pivots. Rows that nothing moves are left small.
 void EqualityElimination::take(Numbers A, Numbers b) {
-  constexpr double kLeastMobility = 1e-13;
   const std::size_t n = e_ + c_;
   double largest = 0.0;
   for (std::size_t i = 0; i < e_; ++i) largest = std::max(largest, A[i * n + i]);
   scale_.resize(e_), b_e_.resize(e_);
   for (std::size_t i = 0; i < e_; ++i)
-    scale_[i] = largest > 0.0 ? 1.0 / std::sqrt(std::max(A[i * n + i], kLeastMobility * largest)) : 1.0;
+    scale_[i] = largest > 0.0
+                    ? 1.0 / std::sqrt(std::max(A[i * n + i], kSolversTuning.least_squares.least_mobility * largest))
+                    : 1.0;
   A_ee_ = ee_memory_.need(e_, e_);
   A_ec_ = ec_memory_.need(e_, c_);
   for (std::size_t i = 0; i < e_; ++i) {
@@ -152,7 +151,7 @@ LeastSquaresResult EqualityElimination::reduce(Numbers A, Numbers b, int equalit
     return {.status = SolveStatus::kInvalidInput};
   }
   take(A, b);
-  factor_.factor(A_ee_, e_, kRankTolerance);
+  factor_.factor(A_ee_, e_, kSolversTuning.least_squares.rank);
 
   const MatrixView YtY = gram_memory_.need(c_, c_);
   gram(YtY, solve_rows(), factor_.rank(), c_);

@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "dense_kernels.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
-
-// Of what an impulse moves its own unit by, what the unit yields to a change of it in a round.
-constexpr double kYield = 1e-5;
-// Pivots that count, as part of the largest; what is cut is made up for by all of W.
-constexpr double kCut = 1e-7;
-constexpr double kMetTo = 1e-3;  // of tolerances
 
 Vec3 part_of(std::span<const double> v, std::size_t first, std::size_t rows) {
   Vec3 part = Vec3::Zero();
@@ -34,7 +29,7 @@ void RowEquilibrium::factor(std::span<const double> W) {
     std::fill(S.row(i) + size_, S.row(i) + S.stride, 0.0);
     for (std::size_t j = 0; j < size_; ++j) S.row(i)[j] = 0.5 * (W_[i * size_ + j] + W_[j * size_ + i]);
   }
-  cholesky_.factor(S, size_, kCut);
+  cholesky_.factor(S, size_, kSolversTuning.equilibrium.pivot);
   convex_.begin_structure();
   convex_.add_node(std::max<std::size_t>(1, cholesky_.rank()));
   for (const Unit& unit : units_) {
@@ -56,7 +51,7 @@ void RowEquilibrium::to_scale(std::span<const double> W) {
   for (Unit& unit : units_) {
     unit.scale = inverse_power_of_two(std::sqrt(unit.set.compliance));  // bounds stay what they are, to the bit
     unit.tolerance *= unit.scale;
-    unit.set.compliance = kYield;
+    unit.set.compliance = kSolversTuning.equilibrium.yield;
     unit.set.lower /= unit.scale, unit.set.upper /= unit.scale;
     if (unit.set.set == ContactPotential::Set::kBall) unit.set.bound /= unit.scale;
     for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r)
@@ -65,25 +60,23 @@ void RowEquilibrium::to_scale(std::span<const double> W) {
 }
 
 double RowEquilibrium::solve(std::span<const double> b, std::span<double> f) {
-  constexpr int kMostSteps = 60;  // of Newton's method
-  // What is asked for follows gaps linearly to no more than this part of what is left at first.
-  constexpr double kEnough = 0.03;
+  constexpr const EquilibriumTuning& tuning = kSolversTuning.equilibrium;
   b_.resize(size_), f_.resize(size_), gap_.resize(size_);
   for (const Unit& unit : units_)
     for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r)
       b_[r] = unit.scale * b[r], f_[r] = f[r] / unit.scale;
-  double best = kUnbounded, enough = kMetTo;
+  double best = kUnbounded, enough = tuning.met;
   for (int steps = 0, round = 0;; ++round) {
     find_gaps();
     const double left = take_starts();
-    if (round == 0) enough = std::max(enough, kEnough * left);
+    if (round == 0) enough = std::max(enough, tuning.enough * left);
     if (!(left >= best)) {
       best = left;
       for (const Unit& unit : units_)
         for (std::size_t r = unit.first; r < unit.first + unit.rows; ++r) f[r] = unit.scale * f_[r];
     }
-    if (left <= enough || steps >= kMostSteps || !std::isfinite(left)) return best;
-    steps += 1 + improve(kMostSteps - steps);
+    if (left <= enough || steps >= tuning.most_newton_steps || !std::isfinite(left)) return best;
+    steps += 1 + improve(tuning.most_newton_steps - steps);
   }
 }
 
@@ -114,7 +107,8 @@ double RowEquilibrium::take_starts() {
 }
 
 int RowEquilibrium::improve(int most) {
-  const ConvexContactReport done = convex_.solve_on({.tolerance = kMetTo, .max_iterations = most});
+  const ConvexContactReport done =
+      convex_.solve_on({.tolerance = kSolversTuning.equilibrium.met, .max_iterations = most});
   for (std::size_t u = 0; u < units_.size(); ++u)
     for (std::size_t r = 0; r < units_[u].rows; ++r) f_[units_[u].first + r] = convex_.impulse(u)[static_cast<int>(r)];
   return done.iterations;

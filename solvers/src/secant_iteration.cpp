@@ -1,4 +1,5 @@
 #include "limber/solvers/secant_iteration.h"
+#include "tuning.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -64,9 +65,9 @@ void SecantIteration::remember(std::span<const double> x, std::span<const double
 
 /// min |residual − Σ weight dresidual|, by normal equations with a ridge that round-off needs.
 std::array<double, SecantIteration::kDepth> SecantIteration::secant_weights(std::span<const double> residual) const {
-  constexpr double kRidge = 1e-12;
   std::array<double, kDepth> weights{}, scale{};
-  Eigen::Matrix<double, kDepth, kDepth> N = Eigen::Matrix<double, kDepth, kDepth>::Identity() * (1.0 + kRidge);
+  Eigen::Matrix<double, kDepth, kDepth> N =
+      Eigen::Matrix<double, kDepth, kDepth>::Identity() * (1.0 + kSolversTuning.secant_ridge);
   Eigen::Vector<double, kDepth> r = Eigen::Vector<double, kDepth>::Zero();
   for (std::size_t i = 0; i < known_; ++i) {
     const Column secant = column(dresidual_[i]);

@@ -62,12 +62,12 @@ class Island {
   }
   void foresee() {
     solver->foresee(table, members, constraints,
-                   {.step = step_,
-                    .gravity = gravity_,
-                    .max_iterations = max_iterations,
-                    .guard_energy = guard_energy,
-                    .undisturbed = steps > 0,
-                    .energy_surplus = surplus});
+                    {.step = step_,
+                     .gravity = gravity_,
+                     .max_iterations = max_iterations,
+                     .guard_energy = guard_energy,
+                     .undisturbed = steps > 0,
+                     .energy_surplus = surplus});
   }
   IslandReport finish() {
     ++steps;

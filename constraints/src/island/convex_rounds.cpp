@@ -1,23 +1,11 @@
 #include "convex_rounds.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace limber::internal {
-namespace {
-
-// Of what an impulse moves its own row by within the step, what the row yields to it by in the first round; and the
-// least that it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
-constexpr double kYield = 1e-3, kStiffest = 1e-6;
-// What Newton's method may leave of a round, by what moves a gap by so much of its tolerance.
-constexpr double kLeft = 0.03;
-// Newton's steps in a step; and contacts solved for, each counted in each of them, after which rounds among contacts
-// end: a few milliseconds.
-constexpr int kMostNewtonSteps = 100, kMostSolved = 12000;
-
-}  // namespace
-
 /// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
 /// meet the rows' law at the true gaps: the method of multipliers, in which a row's spring yields from what it exerted.
 void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
@@ -47,9 +35,11 @@ void ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
     if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return;
     report.rough = step.contacts_alone && begun_ && !loads_change_ && left.off < step.part.options.rough;
     if (report.rough) return;
-    const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kMostSolved;
+    const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kConstraintsTuning.rounds.most_solved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
-    const ConvexContactOptions within{.tolerance = kLeft, .max_iterations = kMostNewtonSteps - report.newton_steps};
+    const ConvexContactOptions within{
+        .tolerance = kConstraintsTuning.rounds.newton_left,
+        .max_iterations = kConstraintsTuning.rounds.most_newton_steps - report.newton_steps};
     const ConvexContactReport done = begun_ ? contacts_.solve_on(within) : contacts_.solve(within);
     begun_ = true;
     report.newton_steps += done.iterations;
@@ -133,8 +123,10 @@ void ConvexRounds::fill_units(const IslandStep& step) {
     const double moved = law.radius > 0.0 ? response.mean() : response[0];
     units_[u].response = moved;
     contacts_.potential(u).compliance =
-        law.compliance > 0.0 ? law.compliance
-                             : std::max((law.contact ? kYield : kStiffest) * moved, std::numeric_limits<double>::min());
+        law.compliance > 0.0
+            ? law.compliance
+            : std::max((law.contact ? kConstraintsTuning.rounds.yield : kConstraintsTuning.rounds.stiffest) * moved,
+                       std::numeric_limits<double>::min());
   }
   fill_values(step, [&](const ConstraintRows::Side&, Index local, std::size_t row, double* to) {
     std::ranges::copy(residual_.row(local, row), to + bodies.response(local).size());
@@ -251,15 +243,15 @@ double ConvexRounds::largest_distance(const IslandStep& step) {
 /// Springs become stiffer where impulses changed by as much as in the round before, and by more than the law leaves
 /// them; beside joints, where secants follow such changes, where springs yielded by that.
 void ConvexRounds::stiffen(const IslandStep& step) {
-  constexpr double kSlow = 0.25, kStiffer = 0.1;
+  constexpr const RoundsTuning& tuning = kConstraintsTuning.rounds;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
     const RowLaw& law = step.law(unit.first);
     if (law.compliance > 0.0) continue;
     double& c = contacts_.potential(u).compliance;
     const double changed = (step.contacts_alone ? unit.response : c) * (contacts_.impulse(u) - unit.anchor).norm();
-    if (changed > kSlow * unit.changed && changed > law.tolerance)
-      c = std::max(kStiffer * c, std::min(c, kStiffest * unit.response));
+    if (changed > tuning.slow * unit.changed && changed > law.tolerance)
+      c = std::max(tuning.stiffer * c, std::min(c, tuning.stiffest * unit.response));
     unit.changed = changed;
   }
 }

@@ -1,3 +1,4 @@
+#include "../tuning.h"
 #include "convex_rounds.h"
 #include "island_impl.h"
 #include "mean_newton.h"
@@ -49,8 +50,7 @@ void DefaultIslandSolver::write_slip(std::span<double> slip) const {
 /// whether that is found; else what the rounds came to stays
 bool DefaultIslandSolver::find_middle(IslandReport& done) {
   if (!step_.touches || step_.contacts_alone || step_.part.options.watch != nullptr) return false;
-  constexpr std::size_t kMostRows = 80;  // matrices are dense
-  if (step_.size() > kMostRows) return false;
+  if (step_.size() > kConstraintsTuning.parts.most_rows_in_the_middle) return false;
   const bool all_early = step_.loads.all_early;
   IslandReport middle;
   step_.take_middle(true);

@@ -1,4 +1,5 @@
 #include "held_reaction.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,9 +22,8 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
 
 /// Whether bodies lie still on a row of one sign: closed, and slower than what held forces make of rest in a step.
 bool rests(const RowLaw& law, double gap, const HeldReaction::Motion& held) {
-  const double open = gap - law.offset;
-  const bool closed =
-      (law.lower < 0.0 || open <= 2.0 * law.tolerance) && (law.upper > 0.0 || open >= -2.0 * law.tolerance);
+  const double open = gap - law.offset, within = kConstraintsTuning.rows.rests_within * law.tolerance;
+  const bool closed = (law.lower < 0.0 || open <= within) && (law.upper > 0.0 || open >= -within);
   return closed && std::abs(held.speed) <= held.speed_of_a_step;
 }
 

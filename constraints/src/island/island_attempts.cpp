@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
 #include "island_impl.h"
 
 namespace limber::internal {
@@ -48,14 +49,14 @@ IslandReport IslandParts::refined(const StepPart& part, IslandReport done) {
 }
 
 IslandReport IslandParts::guard(StepPart part, IslandReport done) {
-  constexpr int kSlowings = 3;
   if (step_.mean && !done.accepted && !part.last_resort) return done;
   if (!part.options.guard_energy) return done;
   for (int slowing = 0;; ++slowing) {
     const double left = energy_.close(step_, done);
     if (!(left > 0.0)) return done;
     const bool may_slow = done.accepted && may_repeat() && std::isfinite(left);
-    if (!may_slow || slowing == kSlowings || !energy_.slow_start(step_, left, part)) break;
+    if (!may_slow || slowing == kConstraintsTuning.energy.most_slowings || !energy_.slow_start(step_, left, part))
+      break;
     done = find(part);
     done.attempts[StepAttempt::kSlowed] = 1;
   }
@@ -67,13 +68,14 @@ IslandReport IslandParts::guard(StepPart part, IslandReport done) {
 /// filled first: less of the impulses, in the end none. The free step has the energy it began with. Where contacts
 /// alone act, as little less as will do: half of what holds a pile would be half a fall.
 void IslandParts::refuse_impulses(IslandReport& report) {
-  constexpr double kLeast = 4e-4;
+  constexpr const EnergyTuning& tuning = kConstraintsTuning.energy;
   report.accepted = false;
   report.attempts[StepAttempt::kRefused] = 1;
-  const double first = step_.contacts_alone ? 0.01 : 0.5;
-  for (double refused = first, accepted = 1.0; accepted > 0.0; refused = std::min(2.0 * refused, 0.5)) {
+  const double first = step_.contacts_alone ? tuning.refused_of_contacts : tuning.refused_of_joints;
+  for (double refused = first, accepted = 1.0; accepted > 0.0;
+       refused = std::min(2.0 * refused, tuning.refused_at_most)) {
     accepted *= 1.0 - refused;
-    if (accepted < kLeast) accepted = 0.0;
+    if (accepted < tuning.least_accepted) accepted = 0.0;
     for (std::size_t i = 0; i < step_.size(); ++i) {
       // not times 0: they need not be finite
       step_.f[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * step_.f[i];

@@ -3,20 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
 #include "island_work.h"
 
 namespace limber::internal {
 namespace {
-
-// Energy is given back, and where little of it is too much is taken, at most at this part of the relative kinetic
-// energy in a step: a pendulum that turns round is not to stop there.
-constexpr double kLargestChange = 0.1;
-// This part of the energies at hand may wait for the next step.
-constexpr double kPatience = 1e-7;
-// A gain above this many times the energies at hand is nonsense, not motion to be slowed: digits would not be left.
-constexpr double kNonsense = 10.0;
-// m/s: joints and stops that are out of place bring even resting bodies together about this fast.
-constexpr double kRecoverySpeed = 1.0;
 
 /// A body whose parent moves gets work from it that nobody books.
 bool carried(const BodyGroup& group, Index slot) {
@@ -75,7 +66,7 @@ void IslandEnergy::begin(const IslandStep& step) {
     const FrameConstants& c = group->frame_constants();
     const BodyEnergy energy = group->energy(slot, gravity);
     before_ += energy.total();
-    recovery_ += c.mass * kRecoverySpeed * kRecoverySpeed;
+    recovery_ += c.mass * kConstraintsTuning.energy.recovery_speed * kConstraintsTuning.energy.recovery_speed;
     scale_ += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
               gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
     driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
@@ -105,13 +96,14 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
   const double gain = after - before_ - work + step.part.options.energy_surplus;
   // Of what there was, never of what came out: that may be any number where the rows did not come together.
   const double at_hand = scale_ + std::max(0.0, work);
-  const double patience = kPatience * (at_hand > 0.0 ? at_hand : recovery_);
+  const double patience = kConstraintsTuning.energy.patience * (at_hand > 0.0 ? at_hand : recovery_);
   const double excess = gain > 0.0 ? gain : give_back ? std::min(0.0, gain + damped) : 0.0;
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
-  if (!step.mean && excess > kNonsense * std::max(at_hand, recovery_)) return {.left = excess};
+  if (!step.mean && excess > kConstraintsTuning.energy.nonsense * std::max(at_hand, recovery_)) return {.left = excess};
   const CommonMotion common = common_motion(step, StepTime::kEnd);
-  const double removed = remove_relative_energy(step.bodies, common, excess, excess < patience ? kLargestChange : 1.0);
+  const double removed = remove_relative_energy(step.bodies, common, excess,
+                                                excess < patience ? kConstraintsTuning.energy.largest_change : 1.0);
   const double left = excess - removed;
   if (step.mean) return {removed, 0.0, std::clamp(left, 0.0, patience)};
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
@@ -145,12 +137,11 @@ CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) 
 }
 
 bool IslandEnergy::slow_start(const IslandStep& step, double left, StepPart& next) {
-  constexpr double kMore = 1.5;    // of what is left is taken, as the motion taken would not have gone all into height
-  constexpr double kLeast = 0.01;  // of the energy: what is slower may as well rest
+  constexpr const EnergyTuning& tuning = kConstraintsTuning.energy;
   if (next.slowed == 0.0) start_energy_ = start_motion(step);
   if (next.slowed == 1.0 || !(start_energy_ > 0.0)) return false;
-  const double moving = (1.0 - next.slowed) * (1.0 - next.slowed) - kMore * left / start_energy_;
-  next.slowed = moving > kLeast ? 1.0 - std::sqrt(moving) : 1.0;
+  const double moving = (1.0 - next.slowed) * (1.0 - next.slowed) - tuning.slowed_by * left / start_energy_;
+  next.slowed = moving > tuning.slowest ? 1.0 - std::sqrt(moving) : 1.0;
   next.relative = momenta_;
   return true;
 }
@@ -180,7 +171,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
     for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
   }
   if (!(kinetic > 0.0)) return 0.0;
-  excess = std::clamp(excess, -kLargestChange * kinetic, largest_part * kinetic);
+  excess = std::clamp(excess, -kConstraintsTuning.energy.largest_change * kinetic, largest_part * kinetic);
   const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);

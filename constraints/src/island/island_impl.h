@@ -9,6 +9,7 @@
 
 #include <vector>
 
+#include "../tuning.h"
 #include "held_reaction.h"
 #include "island_energy.h"
 #include "island_step.h"
@@ -17,8 +18,7 @@ namespace limber::internal {
 
 /// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
 inline bool is_part(double time, double left, double whole_step) {
-  constexpr double kShortest = 1e-3;
-  return time > kShortest * whole_step && left - time > kShortest * whole_step;
+  return std::min(time, left - time) > kConstraintsTuning.impacts.shortest_part * whole_step;
 }
 
 /// How far a step has come.

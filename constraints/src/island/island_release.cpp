@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "../tuning.h"
 #include "island_impl.h"
 
 namespace limber::internal {
@@ -8,8 +9,7 @@ namespace {
 
 /// A part that is accepted, and soon: it may be done ten times more.
 bool is_quick(const IslandReport& done) {
-  constexpr int kQuick = 100;  // of Newton's steps
-  return done.accepted && done.newton_steps <= kQuick;
+  return done.accepted && done.newton_steps <= kConstraintsTuning.impacts.quick_newton_steps;
 }
 
 }  // namespace
@@ -71,10 +71,7 @@ double IslandParts::impact_impulse(double length) const {
 /// The end of the part with the largest impulse, by golden section; the part's own end if it grows to there. Where the
 /// impact begins with the part, the first such end: between ends of which each is a quarter later than the one before.
 double IslandParts::find_release(StepPart part) {
-  constexpr int kTrials = 8;  // places the release to a thirtieth of the part; what is left of it may be cut again
-  constexpr double kAlmost = 0.98;                      // of the part
-  constexpr double kNoticeable = 1e-6;                  // of the impulse
-  constexpr double kSoonest = 1.0 / 16, kLater = 1.25;  // of the part; of the end before
+  constexpr const ImpactTuning& tuning = kConstraintsTuning.impacts;
   const double length = part.options.step, golden = 1.0 / std::numbers::phi, whole = impact_impulse(length);
   const bool begins = last_impact_force() == 0.0;
   bool quick = true;
@@ -87,19 +84,19 @@ double IslandParts::find_release(StepPart part) {
   };
   double begin = 0.0, end = length, at_end = whole;
   if (begins) {
-    end = kSoonest * length, at_end = impulse_until(end);
+    end = tuning.release_soonest * length, at_end = impulse_until(end);
     double between = 0.0, at_between = 0.0;
     while (quick && at_end >= at_between && end < length) {
       begin = between, between = end, at_between = at_end;
-      end = std::min(kLater * end, length), at_end = impulse_until(end);
+      end = std::min(tuning.release_later * end, length), at_end = impulse_until(end);
     }
     if (!quick || at_end >= at_between) return length;
-  } else if (whole > 0.0 && impulse_until(kAlmost * length) < (1.0 + kNoticeable) * whole) {
+  } else if (whole > 0.0 && impulse_until(tuning.release_almost * length) < (1.0 + tuning.release_noticeable) * whole) {
     return length;
   }
   double first = end - golden * (end - begin), second = begin + golden * (end - begin);
   double at_first = impulse_until(first), at_second = impulse_until(second);
-  for (int trial = 2; trial < kTrials && quick; ++trial) {
+  for (int trial = 2; trial < tuning.release_trials && quick; ++trial) {
     if (at_first < at_second) {
       begin = first, first = second, at_first = at_second;
       second = begin + golden * (end - begin);

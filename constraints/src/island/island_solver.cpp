@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "../tuning.h"
 #include "island_impl.h"
 
 namespace limber::internal {
@@ -45,7 +46,7 @@ StepPart whole_step(std::span<const ConstrainedBody> table, std::span<const Inde
 }  // namespace
 
 IslandReport IslandParts::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                                std::span<Constraint* const> constraints, const IslandOptions& options) {
+                               std::span<Constraint* const> constraints, const IslandOptions& options) {
   if (options.watch == nullptr) {
     foresee(table, members, constraints, options);
     const StageTimes foreseen = times_;
@@ -63,7 +64,7 @@ IslandReport IslandParts::step(std::span<const ConstrainedBody> table, std::span
 }
 
 void IslandParts::foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                           std::span<Constraint* const> constraints, const IslandOptions& options) {
+                          std::span<Constraint* const> constraints, const IslandOptions& options) {
   StepInParts& at = parts_;
   at.part = whole_step(table, members, constraints, options);
   at.report = {.bodies = static_cast<int>(members.size())};
@@ -116,16 +117,14 @@ void IslandParts::foresee_next() { parts_.divides ? foresee_divided() : foresee_
 /// shorter part of the same step (PartOfStep::ahead), it moves as the longer one would have until then, but for how
 /// bodies bend; so the last one is not looked at again. However short, its impulses act.
 void IslandParts::take_watched(StepPart part, IslandReport& report) {
-  constexpr int kMostLooks = 3;
-  constexpr double kShortest = 1e-9;  // of the whole step
   IslandOptions& options = part.options;
   if (options.whole_step > 0.0) part.whole_step = options.whole_step;
   part.begins = options.begins, part.ends = false;
   IslandReport done = find_guarded(part);
-  for (int looks = 0; looks < kMostLooks; ++looks) {
+  for (int looks = 0; looks < kConstraintsTuning.parts.most_watched_looks; ++looks) {
     const double clear = options.watch->clear_until({part.members, motions_}, options.step);
     if (!(clear < options.step)) break;
-    options.step = std::max(clear, kShortest * part.whole_step);
+    options.step = std::max(clear, kConstraintsTuning.parts.shortest_watched * part.whole_step);
     done = find_guarded(part);
   }
   report.taken = options.step;
@@ -134,10 +133,9 @@ void IslandParts::take_watched(StepPart part, IslandReport& report) {
 
 /// What is left, or up to where an impact begins or lets go.
 void IslandParts::foresee_cut() {
-  constexpr int kMostCuts = 4;
   StepPart& part = parts_.part;
   part.last_resort = true;
-  parts_.cuts = parts_.may_cut && parts_.report.attempts.cuts() < kMostCuts;
+  parts_.cuts = parts_.may_cut && parts_.report.attempts.cuts() < kConstraintsTuning.impacts.most_cuts;
   part.options.step = part.left = parts_.left;
   const double time = parts_.cuts ? next_cut(part) : parts_.left;
   if (is_part(time, parts_.left, part.whole_step)) part.options.step = time;
@@ -156,17 +154,18 @@ void IslandParts::end_cut() {
 /// step's start bring joints together at its end only where bodies turn by less than a radian or so in between. Where
 /// the shortest part does not settle either, what is left is taken as it comes.
 void IslandParts::foresee_divided() {
-  constexpr double kShortest = 1.0 / 64.0;  // of the step
   StepPart& part = parts_.part;
   for (;; parts_.length *= 0.5) {
-    if (parts_.gives_up || parts_.left < 1.5 * parts_.length) parts_.length = parts_.left;  // the last, however rounded
+    if (parts_.gives_up || parts_.left < kConstraintsTuning.parts.last_part * parts_.length)
+      parts_.length = parts_.left;  // the last, however rounded
     part.options.step = parts_.length;
     part.left = parts_.left;
     part.ends = parts_.length == parts_.left;
     part.last_resort = parts_.gives_up;
     parts_.done = find_guarded(part);
     if (parts_.done.accepted || parts_.gives_up) break;
-    parts_.gives_up = parts_.length < 1.5 * kShortest * part.whole_step;
+    parts_.gives_up = parts_.length <
+                      kConstraintsTuning.parts.last_part * kConstraintsTuning.parts.shortest_divided * part.whole_step;
   }
   parts_.done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
 }

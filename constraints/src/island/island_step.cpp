@@ -1,4 +1,5 @@
 #include "island_step.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -162,8 +163,6 @@ void IslandStep::move_under_loads() {
 /// modal loads to themselves, which the impulses stiffen and soften (by f · ∂²x/∂z²). Its fixed point is one answer to
 /// the impulses; a rows' way that lags behind would be another for every way to come to them.
 void IslandStep::follow_bending() {
-  constexpr int kMost = 20;
-  constexpr double kMet = 1e-11;  // of what bends the bodies
   const std::size_t n = loads.modes.size();
   for (std::vector<double>* v : {&borne_change_, &bent_}) v->resize(n);
   bending_.begin(n);
@@ -180,7 +179,7 @@ void IslandStep::follow_bending() {
       all = std::max(all, weight * std::abs(loads.modes[k]));
       left = std::max(left, std::abs(bent_[k]));
     }
-    if (!(left > kMet * all) || i == kMost) return;
+    if (!(left > kConstraintsTuning.parts.bending_met * all) || i == kConstraintsTuning.parts.most_bending) return;
     bending_.advance(borne_, borne_change_, bent_);
     loads.modes.assign(borne_.begin(), borne_.end());
   }

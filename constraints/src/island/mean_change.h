@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "../tuning.h"
 #include "mean_motion.h"
 
 namespace limber::internal {
@@ -37,7 +38,7 @@ class MeanSecants {
   void remember(const MeanChange& step) { steps_[count_++] = step; }
 
  private:
-  static constexpr std::size_t kMost = 10;
+  static constexpr std::size_t kMost = kConstraintsTuning.midpoint.most_secants;
   double along(std::size_t j, const MeanChange& step) const {
     return steps_[j].size.dot(step.size) / steps_[j].size.squaredNorm();
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
 #include "limber/core/cross_matrix.h"
 
 namespace limber::internal {
@@ -18,11 +19,10 @@ Mat3 end_turn(const Vec3& turn) {
 
 /// τ of free flight: (1 + ½[τ]) I τ = Δt L.
 Vec3 free_turn(const Mat3& inertia, const Vec3& momentum, double length) {
-  constexpr int kMost = 30;
   Vec3 turn = length * inertia.inverse() * momentum;
   // What is far from a sphere and turns fast is approached from the side of no turn.
   if (turn.norm() > 1.0) turn /= turn.norm();
-  for (int i = 0; i < kMost; ++i) {
+  for (int i = 0; i < kConstraintsTuning.midpoint.most_free_turn; ++i) {
     const Vec3 spin = inertia * turn;
     const Vec3 residual = spin + 0.5 * turn.cross(spin) - length * momentum;
     const Mat3 slope = inertia + 0.5 * (cross_matrix(turn) * inertia - cross_matrix(spin));
@@ -34,8 +34,6 @@ Vec3 free_turn(const Mat3& inertia, const Vec3& momentum, double length) {
   }
   return turn;
 }
-
-constexpr double kTolerance = 1e-11;  // rad, and of a length
 
 /// Of three rows, what a projection leaves.
 template <class Rows>
@@ -281,7 +279,8 @@ bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const do
   bool met = true;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
-    const double least = kMetTo * (kTolerance + b.far / b.size) / length_;
+    const double least =
+        kConstraintsTuning.midpoint.met * (kConstraintsTuning.midpoint.length_tolerance + b.far / b.size) / length_;
     met = met &&
           part(residual, local, 0).norm() <=
               std::max(digits_of(terms_[2 * local]), least * b.mass * (b.size + b.shift.norm())) &&
@@ -486,7 +485,7 @@ double MeanMotion::size_of(const Vector& change) const {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const double turn = (end_turn(b.turn) * part(change, local, 1)).norm();
     const double shift = part(change, local, 0).norm() / (b.size + b.shift.norm());
-    const double tolerance = kTolerance + b.far / b.size;
+    const double tolerance = kConstraintsTuning.midpoint.length_tolerance + b.far / b.size;
     largest = std::isfinite(turn + shift) ? std::max(largest, std::max(turn, shift) / tolerance) : kUnbounded;
   }
   return largest;

@@ -28,9 +28,6 @@ namespace limber::internal {
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
 
-/// Equations that are met to this part of their tolerances are met: gaps and impulses are to do no work to 1e-12.
-inline constexpr double kMetTo = 1e-2;
-
 inline std::span<double> numbers(Vector& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 inline std::span<double> numbers(Matrix& m) { return {m.data(), static_cast<std::size_t>(m.size())}; }
 
@@ -82,7 +79,7 @@ class MeanMotion {
   void take_rows(const IslandStep& step, std::vector<MeanRow>& rows) const;
   /// What impulses leave of the equations above, six numbers a body, N·s and N·m·s; and of the modal loads.
   /// @param impulses by row
-  /// @return whether the bodies' are met, to their digits or kMetTo of the tolerance of places
+  /// @return whether the bodies' are met, to their digits or MidpointTuning::met of the tolerance of places
   bool find_residual(std::span<const MeanRow> rows, std::span<const double> impulses, Vector& residual, Vector& modal);
   /// Its derivative by (d, τ) of all bodies; and how moments follow bending, modal loads turning, by body: bend and
   /// turned, 3 × modes.

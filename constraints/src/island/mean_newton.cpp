@@ -1,19 +1,11 @@
 #include "mean_newton.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace limber::internal {
-namespace {
-
-constexpr double kLengths = 1e11;  // tolerances
-// What is left of a step by the matrix of an earlier place, or that is made anew.
-constexpr double kShrinks = 0.25;
-constexpr double kOfForces = 1.0 / 32.0;
-
-}  // namespace
-
 SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
   bends_ = bends;
   begin(step);
@@ -25,9 +17,8 @@ SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends
 }
 
 SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
-  constexpr int kMost = 40;
   bool first = report.iterations == 0;
-  for (int i = 0; i < kMost;) {
+  for (int i = 0; i < kConstraintsTuning.midpoint.most_iterations;) {
     motion_.place(step);
     if (problem_.measure(step, motion_, impulses_)) return SolveStatus::kSolved;
     ++i, ++report.iterations;
@@ -115,7 +106,7 @@ void MeanNewton::forget_forces(const IslandStep& step) {
 /// Bodies that whip would be led to other motions than those that are next to free flight, which break up later.
 bool MeanNewton::free_is_nearer() const {
   const auto first = change_.size.head(free_.size());
-  return !(first.norm() <= kOfForces * (guess_ + first - free_).norm());
+  return !(first.norm() <= kConstraintsTuning.midpoint.forces_lead * (guess_ + first - free_).norm());
 }
 
 void MeanNewton::finish(IslandStep& step) {
@@ -155,7 +146,7 @@ bool MeanNewton::repeat(const IslandStep& step) {
   const bool same = answer_.solve_again(step, impulses_, problem_, motion_);
   take(step);
   if (!same || answer_.extend(step, impulses_, problem_) || !secants_.correct(change_)) return false;
-  if (!(change_.size.norm() < kShrinks * secants_.size())) return false;
+  if (!(change_.size.norm() < kConstraintsTuning.midpoint.shrinks * secants_.size())) return false;
   secants_.remember(change_);
   return true;
 }
@@ -167,13 +158,15 @@ void MeanNewton::take(const IslandStep& step) {
   change_.size.resize(n + gaps.size());
   motion_.write_relative(change_.motion, change_.size.head(n));
   for (Eigen::Index i = 0; i < gaps.size(); ++i)
-    change_.size[n + i] = gaps[i] / (kLengths * step.law(static_cast<std::size_t>(i)).tolerance);
+    change_.size[n + i] =
+        gaps[i] / (kConstraintsTuning.midpoint.lengths * step.law(static_cast<std::size_t>(i)).tolerance);
 }
 
 /// By tolerances.
 double MeanNewton::size() const {
   const Eigen::Index gaps = change_.size.size() - change_.motion.size();
-  return std::max(motion_.size_of(change_.motion), kLengths * change_.size.tail(gaps).cwiseAbs().maxCoeff());
+  return std::max(motion_.size_of(change_.motion),
+                  kConstraintsTuning.midpoint.lengths * change_.size.tail(gaps).cwiseAbs().maxCoeff());
 }
 
 }  // namespace limber::internal

@@ -1,4 +1,5 @@
 #include "mean_problem.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -60,7 +61,7 @@ double MeanProblem::distance_from_law(const IslandStep& step, std::size_t first,
 bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
                          const MeanMotion& motion) {
   const RowLaw& law = step.law(first);
-  const double least = std::max(law.digits, kMetTo * law.tolerance);
+  const double least = std::max(law.digits, kConstraintsTuning.midpoint.met * law.tolerance);
   bool bent_as_wanted = true;
   for (std::size_t r = 0; r < count; ++r)
     bent_as_wanted = bent_as_wanted && std::abs(bent(motion, now_[first + r], modal_residual_)) <= least;

@@ -1,4 +1,5 @@
 #include "row_answer.h"
+#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -73,21 +74,20 @@ bool RowAnswer::solve_again(const IslandStep& step, std::span<const double> impu
 /// Beside contacts rows yield to a change of their impulses by as much, so that what no motion gives, as a hand in the
 /// ground, is left with them.
 void RowAnswer::factor(const IslandStep& step) {
-  constexpr double kOfGaps = 1e-3, kLeast = 1e-9, kMost = 1e-2, kLeastBesideContacts = 1e-6;
-  constexpr double kLengths = 1e11;  // tolerances
+  constexpr const MidpointTuning& tuning = kConstraintsTuning.midpoint;
   const auto m = static_cast<Eigen::Index>(equalities_);
   double off = 0.0;
   for (Eigen::Index i = 0; i < m; ++i) {
     const RowLaw& law = step.law(static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]));
-    off = std::max(off, std::abs(open_[i]) / (kLengths * law.tolerance));
+    off = std::max(off, std::abs(open_[i]) / (tuning.lengths * law.tolerance));
   }
-  const double damping = std::clamp(kOfGaps * off, kLeast, kMost);
+  const double damping = std::clamp(tuning.damping_of_gaps * off, tuning.least_damping, tuning.most_damping);
   const auto A = A_.view();
   auto factored = factored_.resize(m, m);
   for (Eigen::Index i = 0; i < m; ++i)
     for (Eigen::Index j = 0; j < m; ++j) factored(i, j) = scale_[i] * A(i, j) * scale_[j];
-  if (step.touches) factored.diagonal().array() += std::max(damping, kLeastBesideContacts);
-  least_squares_.factor(factored_.numbers(), equalities_, step.touches ? kLeast : damping);
+  if (step.touches) factored.diagonal().array() += std::max(damping, tuning.least_damping_beside_contacts);
+  least_squares_.factor(factored_.numbers(), equalities_, step.touches ? tuning.least_damping : damping);
 }
 
 /// x ← A⁺ x of the equalities.
@@ -148,7 +148,6 @@ void RowAnswer::meet(std::span<const double> impulses) {
 
 /// @return whether rows are within their bounds now that were not, or the other way round
 bool RowAnswer::find_within(const IslandStep& step) {
-  constexpr double kInside = 1.0 - 1e-9;  // of a cone or a ball
   bool changed = false;
   for (std::size_t i = equalities_, count = 1; i < rows_.size(); i += count) {
     const auto first = static_cast<std::size_t>(rows_[i]);
@@ -156,8 +155,8 @@ bool RowAnswer::find_within(const IslandStep& step) {
     count = static_cast<std::size_t>(contact_rows(law));
     Vec3 f = Vec3::Zero();
     for (std::size_t r = 0; r < count; ++r) f[static_cast<int>(r)] = bounded_[i - equalities_ + r];
-    const bool stuck =
-        law.radius > 0.0 ? f.norm() < kInside * law.radius : f.tail<2>().norm() < kInside * law.friction * f[0];
+    const bool stuck = law.radius > 0.0 ? f.norm() < kConstraintsTuning.midpoint.inside * law.radius
+                                        : f.tail<2>().norm() < kConstraintsTuning.midpoint.inside * law.friction * f[0];
     for (std::size_t r = 0; r < count; ++r) {
       const bool alone = law.radius == 0.0 && r == 0;
       const char within = alone ? f[0] > law.lower && f[0] < law.upper : stuck;

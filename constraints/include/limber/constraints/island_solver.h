@@ -79,8 +79,8 @@ struct IslandReport {
   int bodies = 0, rows = 0;
   double taken = 0.0;  ///< s, where there is a watch
   StepAttempts attempts{};
-  int iterations = 0;        ///< predictions made, in the part of the step that needed most
-  int newton_steps = 0;      ///< for the contacts with friction, in the part that needed most
+  int iterations = 0;    ///< predictions made, in the part of the step that needed most
+  int newton_steps = 0;  ///< for the contacts with friction, in the part that needed most
   /// How far the worst row is from its law, in units of its tolerance: ≤ 1 where the island is solved. It counts the
   /// signs and cones of impulses as a distance, by what an impulse moves its own gap by. Of an island that failed: of
   /// what was found before it was given up.

@@ -1,0 +1,136 @@
+/// @file
+/// Numbers of the constraints module that choose a path, end an iteration or set a tolerance, all of them and each
+/// once. Each has its meaning, its unit where it has one, and what it rests on. [path] marks those that choose a path
+/// or cap one: scripts/count counts them.
+///
+/// Bounds of round-off, which follow from the arithmetic, stand where they are used.
+#pragma once
+
+#include <cstddef>
+
+namespace limber::internal {
+
+/// Rows: how closely they are met, and how what is out of place comes back.
+struct RowTuning {
+  /// Of the arms of a joint, and rad: round-off begins there.
+  double joint_tolerance = 1e-11;
+  double hand_tolerance = 1e-11;  ///< of the distances at hand; the same
+  /// Of the arms of a contact's points. By judgement.
+  double contact_tolerance = 3e-9;
+  double rolling_tolerance = 1e-9;  ///< rad, to which rolling is braked. By judgement
+  /// m/s and rad/s: joints and stops out of place come together at this speed. By judgement.
+  double joint_recovery_speed = 1.0;
+  /// Part of the overlap of contacts that is left over which a step takes away; ContactOptions::recovery_speed bounds
+  /// it.
+  double overlap_recovery = 0.2;
+  /// Euler angles are singular at ±90° of the second: closer to it, by the determinant, their rows keep a finite size.
+  /// [path]
+  double least_euler_determinant = 1e-3;
+  /// Part of a patch's largest second moment below which a direction tells no rotation. [path]
+  double thin_patch = 1e-6;
+  /// Cosine of two normals below which contacts that overlap hold a part from both sides. [path] By judgement: 120°.
+  double opposed_normals = -0.5;
+  /// Part of ContactOptions::compliance left beside a residual compliance, which shares loads by itself.
+  double compliance_beside_residual = 1.0 / 30.0;
+  /// Part of the largest pivot below which dents of different contacts are one. Far below what each contact yields.
+  double dent_pivot = 1e-10;
+  /// manipulate(): directions of the matrix below this part of its largest are not in its range. [path]
+  double manipulation_rank = 1e-11;
+  double manipulation_tolerance = 1e-13;  ///< places are met when they change by less of the distances at hand
+  /// Tolerances of a gap by which a row that lies still may be open. [path]
+  double rests_within = 2.0;
+};
+
+/// Impacts that are held, and steps cut where they begin and end (ImpactModel).
+struct ImpactTuning {
+  double shortest_strike = 2.0;    ///< steps that an impact may last in any case. [path]
+  double longest_margin = 0.25;    ///< of the longest impact: its end is to be seen
+  int most_cuts = 4;               ///< of a step; what strikes more often is held over the rest. [path] Bounds the work
+  double shortest_part = 1e-3;     ///< of the step: no cut makes a part that is shorter. [path]
+  int touch_halvings = 60;         ///< of the search for a touch: more than the digits of a double. [path]
+  double touch_closed = 1e-12;     ///< of the way through the step: where that search ends
+  double touch_least_part = 1e-3;  ///< of the bracket, from either end, that a secant may come to
+  int quick_newton_steps = 100;  ///< a part that settles in so many may be done ten times more. [path] Bounds the work
+  int release_trials = 8;        ///< place the release to a thirtieth of the part. [path]
+  double release_almost = 0.98;  ///< of the part: an impulse that still grows there lasts the part. [path]
+  double release_noticeable = 1e-6;     ///< of the impulse: growth by less is none. [path]
+  double release_soonest = 1.0 / 16.0;  ///< of the part: the first end that is tried where the impact begins
+  double release_later = 1.25;          ///< each end of the scan over that before it
+};
+
+/// The parts that a step is taken in.
+struct PartTuning {
+  int most_watched_looks = 3;  ///< parts shortened by the watch before the last one is taken. [path] Bounds the work
+  double shortest_watched = 1e-9;  ///< of the step: however short, its impulses act. [path]
+  /// Of the step: parts are halved down to this where joints do not come together. [path] By judgement: below, what is
+  /// left is taken as it comes.
+  double shortest_divided = 1.0 / 64.0;
+  /// Parts longer than what is left by less than this factor take all of it, so that round-off leaves no last crumb.
+  double last_part = 1.5;
+  /// Rows up to which joints beside contacts are tried in the middle of the step: its matrices are dense. [path]
+  std::size_t most_rows_in_the_middle = 80;
+  int most_bending = 20;       ///< steps of the fixed point of bending. [path]
+  double bending_met = 1e-11;  ///< of what bends the bodies
+};
+
+/// Augmented Lagrangian of contacts and what is beside them.
+struct RoundsTuning {
+  /// Of what an impulse moves its own row by within the step, what the row yields to it by in the first round, and the
+  /// least it ever does, so that 1/c stays within the digits of the factor. The answer does not depend on them.
+  double yield = 1e-3, stiffest = 1e-6;
+  double slow = 0.25;           ///< an impulse that changes by more of its last change makes its row stiffer. [path]
+  double stiffer = 0.1;         ///< and by this factor
+  double newton_left = 0.03;    ///< of a tolerance, what Newton's method may leave of a round
+  int most_newton_steps = 100;  ///< in a step. [path] Bounds the work
+  /// Contacts solved for, each counted in each Newton step, after which rounds among contacts end. [path] Bounds the
+  /// work to a few milliseconds.
+  int most_solved = 12'000;
+};
+
+/// Newton's method on the midpoint of a step: joints, hands and limits.
+struct MidpointTuning {
+  int most_iterations = 40;         ///< [path] Bounds the work
+  double met = 1e-2;                ///< of tolerances: gaps and impulses are then to do no work to 1e-12
+  double lengths = 1e11;            ///< tolerances in a length at hand
+  double length_tolerance = 1e-11;  ///< rad, and of a length
+  double shrinks = 0.25;  ///< a step by an old matrix that is longer than this part of the last makes a new one. [path]
+  std::size_t most_secants = 10;  ///< of Broyden's update, then a new matrix. [path]
+  /// Part of what the last step's forces do above which Newton's first step begins from free flight. [path] Bodies that
+  /// whip would be led to motions that break up later.
+  double forces_lead = 1.0 / 32.0;
+  int most_free_turn = 30;  ///< Newton steps for the turn of free flight. [path] Bounds the work
+  /// Damping of redundant equalities: of what gaps are off by, the least and the largest, and the least beside
+  /// contacts.
+  double damping_of_gaps = 1e-3, least_damping = 1e-9, most_damping = 1e-2, least_damping_beside_contacts = 1e-6;
+  double inside = 1.0 - 1e-9;  ///< of a cone or ball: an impulse below sticks. [path]
+};
+
+/// The guard of an island's energy.
+struct EnergyTuning {
+  /// Part of the relative kinetic energy that a step may give back, or take where little is too much: a pendulum that
+  /// turns round is not to stop.
+  double largest_change = 0.1;
+  double patience = 1e-7;  ///< part of the energies at hand that may wait for the next step. [path]
+  /// Gains above so many energies at hand are nonsense, not motion to be slowed: no digits would be left. [path]
+  double nonsense = 10.0;
+  double recovery_speed = 1.0;  ///< m/s: what is out of place brings even bodies at rest together about this fast
+  int most_slowings = 3;        ///< slower starts of a step. [path] Bounds the work
+  double slowed_by = 1.5;       ///< of what is left is taken, as not all motion taken would have gone into height
+  double slowest = 0.01;        ///< of the energy: what would be slower rests. [path]
+  /// Part of the impulses that is refused at first: of contacts alone, as half of what holds a pile would be half a
+  /// fall; of others. Each refusal is twice the one before, up to the most.
+  double refused_of_contacts = 0.01, refused_of_joints = 0.5, refused_at_most = 0.5;
+  double least_accepted = 4e-4;  ///< of the impulses; less is none. [path] Ends the refusals
+};
+
+struct ConstraintsTuning {
+  RowTuning rows{};
+  ImpactTuning impacts{};
+  PartTuning parts{};
+  RoundsTuning rounds{};
+  MidpointTuning midpoint{};
+  EnergyTuning energy{};
+};
+inline constexpr ConstraintsTuning kConstraintsTuning{};
+
+}  // namespace limber::internal
