@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "bar_model.h"
+#include "limber/collision/manifold_finder.h"
 #include "pile.h"
 
 namespace limber::testing {
@@ -192,6 +193,34 @@ TEST(GameContact, FlexibleBoxesOnEachOtherComeToRest) {
     EXPECT_LT(at.velocity.norm(), 0.02);
     EXPECT_NEAR(at.pose.p.z(), depth_below_origin(*model) + 0.2 * static_cast<double>(i), 5e-3);
   }
+}
+
+TEST(GameContact, ResidualComplianceYieldsByItsForce) {
+  GroundedWorld scene(game());
+  const auto model = sample_model({.modes = 4, .dropped = 8, .lowest_hz = 30.0, .decay = 20.0});
+  const BodyId box = scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model) + 0.05}}});
+  for (int i = 0; i < 240; ++i) {
+    scene.step(1);
+    for (const ContactEvent& event : scene.world.contact_events()) EXPECT_GE(event.impulse.dot(event.normal), 0.0);
+  }
+  Vec3 impulse = Vec3::Zero();
+  double dent = 0.0;
+  for (const ContactEvent& event : scene.world.contact_events()) impulse += event.impulse;
+  for (Index t = 0; t < 12; ++t) dent = std::max(dent, scene.world.dent(box, {.triangle = t}).norm());
+  const double weight = model->data().mass * kGravity;
+  EXPECT_NEAR(impulse.z() * 60.0, weight, 0.01 * weight);
+  EXPECT_GT(dent, 0.0);
+  EXPECT_LT(dent, 0.5 * kSize);
+  EXPECT_LT(scene.world.body(box).velocity.norm(), 1e-3);
+}
+
+TEST(GameContact, ManifoldsOfFourCarryAPile) {
+  const ContactOptions options = game();
+  ManifoldFinder manifolds;
+  Pile pile(kPileBoxes, -1, false, options);
+  pile.world.set_contact_source(&manifolds, options);
+  for (int i = 0; i < 150; ++i) pile.step_once();
+  EXPECT_LT(-pile.deepest, 5e-3 * kPileSize);
 }
 
 TEST(GameContact, RollingResistanceSlowsABallByItsCoefficient) {
