@@ -28,7 +28,8 @@ using limber::testing::SoakStep;
 using Json = nlohmann::ordered_json;
 
 struct SoakArguments {
-  int steps = 100'000;
+  int steps = 100'000, substeps = SmallSteps{}.substeps;
+  std::string solver = "game";
   std::vector<unsigned> seeds{1, 2, 3};
   std::string csv;
   bool check = false;
@@ -76,8 +77,9 @@ double resident_bytes() {
 /// Plays one seed and tells what breaks a law as it does.
 class SoakRun {
  public:
-  SoakRun(Program& program, GrowingTable& csv, const SoakBodies& bodies, unsigned seed, int steps)
-      : program_(program), csv_(csv), scene_(bodies, seed), times_(static_cast<std::size_t>(steps), 0.0) {
+  SoakRun(Program& program, GrowingTable& csv, const SoakBodies& bodies, unsigned seed, int steps,
+          const ContactOptions& options)
+      : program_(program), csv_(csv), scene_(bodies, seed, options), times_(static_cast<std::size_t>(steps), 0.0) {
     row_.seed = seed, row_.steps = steps;
   }
   SoakRow play() {
@@ -165,11 +167,15 @@ void benchmark_soak(Program& program, const SoakArguments& a) {
   const SoakBodies bodies = testing::bake_soak_bodies();
   Json& report = program.report();
   report["benchmark"] = "soak";
+  report["solver"] = a.solver;
+  ContactOptions options;
+  options.solver = a.solver == "game" ? ContactSolver::kGame : ContactSolver::kExact;
+  options.small_steps.substeps = a.substeps;
   program.print(
       "15 bodies, two hands; of each law: steps that broke it @ the first (the largest share of what it allows)\n");
   bool all_good = true;
   for (const unsigned seed : a.seeds) {
-    const SoakRow row = SoakRun(program, csv, bodies, seed, a.steps).play();
+    const SoakRow row = SoakRun(program, csv, bodies, seed, a.steps, options).play();
     program.print((seed == a.seeds.front() ? soak_head() : "") + text_of(row));
     report["seeds"].push_back(json_of(row));
     report["seconds"]["seeds"].push_back(times_of(row));
@@ -192,6 +198,14 @@ std::function<void(Program&)> add_soak(CLI::App& programs) {
   app->add_option("--seed", a->seeds, "runs, by the seed of what the hands do")
       ->type_name("N,...")
       ->delimiter(',')
+      ->capture_default_str();
+  app->add_option("--solver", a->solver, "who answers contacts, hands and joints: game, exact")
+      ->type_name("NAME")
+      ->check(CLI::IsMember({"game", "exact"}))
+      ->capture_default_str();
+  app->add_option("--substeps", a->substeps, "of game")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app->add_flag("--check", a->check, "fail where a step breaks a law, one takes five medians, or memory grows");
   app->add_option("--csv", a->csv, "write every breach; rows stand in FILE.csv.part as they come")
