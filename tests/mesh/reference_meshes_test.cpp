@@ -48,7 +48,7 @@ TEST_P(ReferenceMesh, HasItsNodesTetsVolumeBodiesAndFixedNodes) {
     EXPECT_EQ(group->nodes, fixed["nodes_index0"].get<std::vector<Index>>());
   }
 
-  testing::drop_unused_nodes(mesh);
+  drop_unused_nodes(mesh);
   EXPECT_EQ(mesh.nodes.size(), expected["nodes_used"].get<std::size_t>());
 }
 

@@ -51,7 +51,7 @@ constexpr ElementType kElementTypes[] = {
     {19, 3, 13, "13-node pyramid"},
 };
 
-constexpr int kTriangle = 2, kQuadrangle = 3, kTetrahedron = 4;
+constexpr int kTriangle = 2, kQuadrangle = 3, kTetrahedron = 4, kTenNodeTetrahedron = 11;
 constexpr int kPhysical = 0, kElementary = 1;  // kinds of region
 
 class GmshReader {
@@ -269,22 +269,25 @@ class GmshReader {
   }
 
   void push_element(const ElementType& type, std::int64_t number, std::span<const int> physical, int elementary) {
-    if (type.dim == 3 && type.type != kTetrahedron)
+    const bool tet = type.type == kTetrahedron || type.type == kTenNodeTetrahedron;
+    if (type.dim == 3 && !tet)
       in_.fail("element " + std::to_string(number) + " is a " + type.name +
-               "; of solids only 4-node tetrahedra are read: mesh with first-order tetrahedra (gmsh -3 -order 1)");
-    std::array<Index, 4> corners{};
+               "; of solids only tetrahedra of 4 or 10 nodes are read: mesh with tetrahedra (gmsh -3 -order 1 or 2)");
+    std::array<Index, 10> nodes{};
     for (int a = 0; a < type.nodes; ++a) {
       const auto node = node_index(number);
       for (const int tag : physical)
         if (type.dim < 3) groups_.nodes(type.dim, tag).push_back(node);
-      if (a < 4) corners[a] = node;
+      if (a < 10) nodes[a] = node;
     }
-    if (type.type == kTetrahedron) push_tet(corners, physical, elementary);
-    if (type.dim == 2) push_face(type, corners, physical.empty() ? 0 : physical[0]);
+    if (tet) push_solid(std::span(nodes).first(static_cast<std::size_t>(type.nodes)), number, physical, elementary);
+    if (type.dim == 2) push_face(type, nodes, physical.empty() ? 0 : physical[0]);
   }
 
-  void push_tet(const Tet& tet, std::span<const int> physical, int elementary) {
-    mesh_.tets.tets.push_back(tet);
+  void push_solid(std::span<const Index> tet, std::int64_t number, std::span<const int> physical, int elementary) {
+    if (!push_tet(mesh_.tets, tet, kGmshMidEdges))
+      in_.fail("element " + std::to_string(number) + " has " + std::to_string(tet.size()) +
+               " nodes; tetrahedra of 4 and of 10 nodes in one file, expected one kind");
     if (physical.empty()) {
       regions_.push(kElementary, elementary, [&](int tag) { return "entity " + std::to_string(tag); });
       return;
@@ -296,10 +299,10 @@ class GmshReader {
     }
   }
 
-  void push_face(const ElementType& type, const std::array<Index, 4>& corners, int physical) {
+  void push_face(const ElementType& type, const std::array<Index, 10>& nodes, int physical) {
     const bool flat = type.type == kTriangle || type.type == kQuadrangle;
     if (!flat && curved_face_ == nullptr) curved_face_ = type.name;
-    mesh_.polygons.push(std::span(corners).first(flat ? static_cast<std::size_t>(type.nodes) : 3));
+    mesh_.polygons.push(std::span(nodes).first(flat ? static_cast<std::size_t>(type.nodes) : 3));
     face_groups_.insert(physical);
   }
 
@@ -312,7 +315,10 @@ class GmshReader {
     return index;
   }
 
-  static void push_all(std::vector<Index>& list, const Tet& tet) { list.insert(list.end(), tet.begin(), tet.end()); }
+  template <class Nodes>
+  static void push_all(std::vector<Index>& list, const Nodes& tet) {
+    list.insert(list.end(), tet.begin(), tet.end());
+  }
 
   // --- after the last section
 
@@ -330,13 +336,15 @@ class GmshReader {
     for (std::size_t i = 0; i < first.size(); ++i) {
       if (first[i] != i) {
         ++in_several_;
-        push_all(groups_.nodes(3, mesh.regions[mesh.tet_region[i]].tag), mesh.tets[i]);
+        push_all(groups_.nodes(3, mesh.regions[mesh.tet_region[i]].tag), TetNodes(mesh, i));
         continue;
       }
       mesh.tets[kept] = mesh.tets[i];
+      if (mesh.has_mid_edge_nodes()) mesh.mid_edge_nodes[kept] = mesh.mid_edge_nodes[i];
       mesh.tet_region[kept++] = mesh.tet_region[i];
     }
     mesh.tets.resize(kept);
+    if (mesh.has_mid_edge_nodes()) mesh.mid_edge_nodes.resize(kept);
     mesh.tet_region.resize(kept);
     drop_unused_regions();
   }

@@ -20,6 +20,8 @@ class MeditReader {
     bool ended = false;
     while (!ended && !in_.at_end()) ended = read_section();
     if (!has_vertices_) in_.fail("the file ends, expected a section Vertices");
+    if (mesh_.tets.tets.empty() && curved_faces_)
+      in_.fail("the surface is of 6-node triangles, expected 3-node ones: mesh with first-order elements");
     if (!ended) warnings_.push_back(in_.name() + ": the file ends without the keyword End; it may have been cut short");
     groups_.finish(mesh_.tets);
     return std::move(mesh_);
@@ -52,13 +54,19 @@ class MeditReader {
     if (keyword == "Vertices")
       read_vertices();
     else if (keyword == "Edges")
-      read_elements<2>("number of edges");
+      read_elements<2, 1>("number of edges");
     else if (keyword == "Triangles")
-      read_elements<3>("number of triangles");
+      read_elements<3, 2>("number of triangles");
     else if (keyword == "Quadrilaterals")
-      read_elements<4>("number of quadrilaterals");
+      read_elements<4, 2>("number of quadrilaterals");
     else if (keyword == "Tetrahedra")
-      read_tetrahedra();
+      read_tetrahedra<4>();
+    else if (keyword == "TetrahedraP2")
+      read_tetrahedra<10>();
+    else if (keyword == "EdgesP2")
+      read_elements<3, 1>("number of edges");
+    else if (keyword == "TrianglesP2")
+      read_elements<6, 2>("number of triangles");
     else if (is_other_solid(keyword))
       refuse_solids(std::string(keyword));
     else
@@ -68,14 +76,14 @@ class MeditReader {
 
   static bool is_other_solid(std::string_view keyword) {
     for (const char* name : {"Hexahedra", "Hexaedra", "Prisms", "Pentahedra", "Pentaedra", "Pyramids", "TetrahedraP"})
-      if (keyword.starts_with(name)) return true;
+      if (keyword.starts_with(name) && !keyword.ends_with("Ordering")) return true;
     return false;
   }
 
   void refuse_solids(const std::string& keyword) {
     if (in_.integer("a count") == 0) return;
     in_.fail("seen " + shown(keyword) +
-             "; of solids only 4-node tetrahedra are read: mesh with first-order tetrahedra");
+             "; of solids only tetrahedra of 4 or 10 nodes are read: mesh with first-order tetrahedra");
   }
 
   /// The numbers of a section that means nothing here, such as Ridges.
@@ -104,24 +112,28 @@ class MeditReader {
     return c;
   }
 
-  template <int n>
+  /// Curves and faces: of curved ones the first three corners make the polygon.
+  template <int n, int dim>
   void read_elements(const char* items) {
     const auto count = counted_elements(n, items);
+    curved_faces_ = curved_faces_ || (n == 6 && count > 0);
     for (Index i = 0; i < count; ++i) {
       const auto c = corners<n>();
-      if constexpr (n > 2) mesh_.polygons.push(c);
+      if constexpr (dim == 2) mesh_.polygons.push(std::span(c).first(n == 6 ? 3 : n));
       if (const int tag = reference(); tag != 0) {
-        auto& group = groups_.nodes(n == 2 ? 1 : 2, tag);
+        auto& group = groups_.nodes(dim, tag);
         group.insert(group.end(), c.begin(), c.end());
       }
     }
   }
 
+  template <int n>
   void read_tetrahedra() {
-    const auto count = counted_elements(4, "number of tetrahedra");
+    const auto count = counted_elements(n, "number of tetrahedra");
     mesh_.tets.tets.reserve(mesh_.tets.tets.size() + static_cast<std::size_t>(count));
     for (Index i = 0; i < count; ++i) {
-      mesh_.tets.tets.push_back(corners<4>());
+      if (!push_tet(mesh_.tets, corners<n>(), kMeditMidEdges))
+        in_.fail("tetrahedra of 4 and of 10 nodes in one file, expected one kind");
       regions_.push(0, reference(), [](int tag) { return std::to_string(tag); });
     }
   }
@@ -141,7 +153,7 @@ class MeditReader {
   MeshFile mesh_;
   RegionTable regions_;
   GroupCollector groups_;
-  bool has_vertices_ = false;
+  bool has_vertices_ = false, curved_faces_ = false;
 };
 
 }  // namespace

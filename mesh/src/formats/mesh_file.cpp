@@ -25,12 +25,23 @@ std::vector<std::vector<Index>> nodes_by_region(const TetMesh& mesh) {
   std::vector<std::vector<Index>> nodes(mesh.regions.size());
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     auto& list = nodes[static_cast<std::size_t>(mesh.tet_region[i])];
-    list.insert(list.end(), mesh.tets[i].begin(), mesh.tets[i].end());
+    const TetNodes tet(mesh, i);
+    list.insert(list.end(), tet.begin(), tet.end());
   }
   return nodes;
 }
 
 }  // namespace
+
+bool push_tet(TetMesh& mesh, std::span<const Index> nodes, const MidEdgeOrder& order) {
+  const bool ten = nodes.size() == 10;
+  if (!mesh.tets.empty() && ten != mesh.has_mid_edge_nodes()) return false;
+  mesh.tets.push_back({nodes[0], nodes[1], nodes[2], nodes[3]});
+  if (!ten) return true;
+  MidEdgeNodes& middles = mesh.mid_edge_nodes.emplace_back();
+  for (std::size_t e = 0; e < middles.size(); ++e) middles[e] = nodes[4 + order[e]];
+  return true;
+}
 
 std::string GroupCollector::name(int dim, int tag) const {
   const auto found = names_.find({dim, tag});

@@ -2,9 +2,11 @@
 /// file each. Private to the module.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -36,6 +38,17 @@ struct FileBytes {
   std::string name;
   std::string_view bytes;
 };
+
+/// A format's ten-node tet: for each of kTetEdges the place of its middle among the six that follow the corners.
+using MidEdgeOrder = std::array<std::size_t, 6>;
+inline constexpr MidEdgeOrder kVtkMidEdges{0, 1, 2, 3, 4, 5};
+inline constexpr MidEdgeOrder kMeditMidEdges{0, 1, 2, 3, 4, 5};
+inline constexpr MidEdgeOrder kGmshMidEdges{0, 1, 2, 3, 5, 4};
+inline constexpr MidEdgeOrder kTetgenMidEdges{2, 3, 5, 1, 4, 0};
+
+/// Appends a tet of four or ten nodes as its format orders them. @param nodes 4 or 10
+/// @return false, and nothing is appended, where tets of the other kind are there already
+bool push_tet(TetMesh& mesh, std::span<const Index> nodes, const MidEdgeOrder& order);
 
 MeshFile read_gmsh(const FileBytes& file, Warnings& warnings);
 MeshFile read_medit(const FileBytes& file, Warnings& warnings);

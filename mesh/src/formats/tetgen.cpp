@@ -53,17 +53,17 @@ class TetgenReader {
   void read_elements() {
     FileScanner in(ele_bytes_, shown_path(ele_path_), kSyntax);
     const auto count = in.count(9, "number of tetrahedra");
-    if (const auto corners = in.integer("nodes per tetrahedron"); corners != 4)
-      in.fail("seen " + std::to_string(corners) +
-              " nodes per tetrahedron; only 4-node tetrahedra are read: run tetgen without -o2");
+    const auto per_tet = in.integer("nodes per tetrahedron");
+    if (per_tet != 4 && per_tet != 10)
+      in.fail("seen " + std::to_string(per_tet) + " nodes per tetrahedron, expected 4, or 10 of tetgen -o2");
     const auto attributes = in.integer(0, 1'000'000, "a number of attributes");
     const auto nodes = static_cast<std::int64_t>(mesh_.tets.nodes.size());
     mesh_.tets.tets.reserve(static_cast<std::size_t>(count));
+    std::vector<Index> tet(static_cast<std::size_t>(per_tet));
     for (Index i = 0; i < count; ++i) {
       read_number(in, i, "a tetrahedron's number");
-      Tet tet{};
       for (Index& n : tet) n = static_cast<Index>(in.integer(first_, first_ + nodes - 1, "a node") - first_);
-      mesh_.tets.tets.push_back(tet);
+      push_tet(mesh_.tets, tet, kTetgenMidEdges);
       push_region(in, attributes);
     }
     refuse_more(in, "tetrahedra");

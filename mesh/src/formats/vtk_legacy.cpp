@@ -18,7 +18,8 @@ enum CellType : int {
   kPolygonCell = 7,
   kPixelCell = 8,
   kQuadCell = 9,
-  kTetCell = 10
+  kTetCell = 10,
+  kQuadraticTetCell = 24
 };
 
 /// Types 11 to 14 are first-order solids; the quadratic and higher ones of a surface or a solid lie from 22 on.
@@ -191,6 +192,7 @@ class VtkReader {
   void check_cell(Index cell, int type) const {
     const auto size = cells_[cell].size();
     const std::size_t wanted = type == kTriangleCell                                         ? 3
+                               : type == kQuadraticTetCell                                   ? 10
                                : type == kTetCell || type == kQuadCell || type == kPixelCell ? 4
                                                                                              : 0;
     if (wanted != 0 && size != wanted)
@@ -198,7 +200,7 @@ class VtkReader {
                " points, expected " + std::to_string(wanted));
     if (wanted == 0 && type != kStripCell && type != kPolygonCell && !is_curve_or_point(type))
       in_.fail("cell " + std::to_string(cell) + " has type " + std::to_string(type) +
-               "; of cells only 4-node tetrahedra (10) and flat polygons (5, 6, 7, 8, 9) are read: remesh with "
+               "; of cells only tetrahedra (10, 24) and flat polygons (5, 6, 7, 8, 9) are read: remesh with "
                "first-order tetrahedra");
   }
 
@@ -206,8 +208,9 @@ class VtkReader {
     const CellField* field = region_field();
     for (std::size_t i = 0; i < types_.size(); ++i) {
       const auto c = cells_[i];
-      if (types_[i] == kTetCell) {
-        mesh_.tets.tets.push_back({c[0], c[1], c[2], c[3]});
+      if (types_[i] == kTetCell || types_[i] == kQuadraticTetCell) {
+        if (!push_tet(mesh_.tets, c, kVtkMidEdges))
+          in_.fail("tetrahedra of 4 and of 10 nodes in one file, expected one kind");
         regions_.push(0, field ? field->values[i] : 0, [](int tag) { return std::to_string(tag); });
       } else if (types_[i] == kPixelCell) {
         mesh_.polygons.push(std::array{c[0], c[1], c[3], c[2]});

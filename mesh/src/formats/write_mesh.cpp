@@ -9,6 +9,9 @@
 namespace limber {
 namespace {
 
+/// Of kTetEdges, in the order in which Gmsh's ten-node tet has their middles.
+constexpr std::size_t kEdgesOfGmsh[] = {0, 1, 2, 3, 5, 4};
+
 /// Text that grows by numbers, each the shortest that reads back to the same bits.
 class Text {
  public:
@@ -43,8 +46,11 @@ void check_name(const std::string& name) {
 }
 
 void check(const TetMesh& mesh) {
-  for (const Tet& t : mesh.tets)
-    for (const Index n : t) check_index(n, mesh.nodes.size(), "node of a tetrahedron");
+  if (mesh.has_mid_edge_nodes() && mesh.mid_edge_nodes.size() != mesh.tets.size())
+    throw InvalidArgument("write_gmsh: mid-edge nodes of " + std::to_string(mesh.mid_edge_nodes.size()) + " of " +
+                          std::to_string(mesh.tets.size()) + " tetrahedra");
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
+    for (const Index n : TetNodes(mesh, i)) check_index(n, mesh.nodes.size(), "node of a tetrahedron");
   if (mesh.tet_region.size() != mesh.tets.size())
     throw InvalidArgument("write_gmsh: " + std::to_string(mesh.tet_region.size()) + " region indices for " +
                           std::to_string(mesh.tets.size()) + " tetrahedra");
@@ -94,8 +100,10 @@ void put_elements(Text& out, const TetMesh& mesh, const std::vector<int>& tags) 
       out << ++number << " 15 2 " << g + 1 << " " << n + 1 << " " << n + 1 << "\n";
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     const int tag = tags[mesh.tet_region[i]];
-    out << ++number << " 4 2 " << tag << " " << tag;
+    out << ++number << (mesh.has_mid_edge_nodes() ? " 11" : " 4") << " 2 " << tag << " " << tag;
     for (const Index n : mesh.tets[i]) out << " " << n + 1;
+    if (mesh.has_mid_edge_nodes())
+      for (const std::size_t e : kEdgesOfGmsh) out << " " << mesh.mid_edge_nodes[i][e] + 1;
     out << "\n";
   }
   out << "$EndElements\n";

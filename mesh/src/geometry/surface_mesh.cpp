@@ -7,6 +7,7 @@
 
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "limber/mesh/ten_node_tet.h"
 
 namespace limber {
 namespace {
@@ -95,6 +96,7 @@ Index weld(SurfaceMesh& surface) {
 }
 
 BoundarySurface boundary_surface(const TetMesh& mesh) {
+  if (mesh.has_mid_edge_nodes()) return boundary_surface(split_into_eight(mesh));
   // A face's key is its sorted nodes; a face that stands once is on the boundary.
   struct Face {
     Triangle key, outward;

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <cstdio>
+#include <utility>
 
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "limber/mesh/ten_node_tet.h"
 
 namespace limber {
 namespace {
@@ -82,6 +85,102 @@ void check_doubles(const TetMesh& mesh, const std::string& name) {
                      " again, expected each once; remove one");
 }
 
+// Mid-edge nodes ----------------------------------------------------------------------------------------------------
+
+constexpr double kInTheMiddle = 1e-6;  // of an edge's length
+
+void check_mid_edge_nodes(const TetMesh& mesh, const std::string& name, std::size_t tet) {
+  const auto nodes = static_cast<Index>(mesh.nodes.size());
+  for (const Index n : mesh.mid_edge_nodes[tet])
+    if (n < 0 || n >= nodes)
+      throw InputError(described(name, tet, mesh.tets[tet]) + " names mid-edge node " + std::to_string(n) +
+                       ", expected 0 to " + std::to_string(nodes - 1));
+}
+
+/// The edges of the same corners have the same mid-edge node, and no other edge or corner has it.
+void check_sharing(const TetMesh& mesh, const std::string& name) {
+  struct Middle {
+    std::pair<Index, Index> edge;
+    Index node;
+    auto operator<=>(const Middle&) const = default;
+  };
+  std::vector<Middle> middles;
+  std::vector<char> is_corner(mesh.nodes.size(), 0);
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    for (const Index n : mesh.tets[t]) is_corner[n] = 1;
+    for (std::size_t e = 0; e < kTetEdges.size(); ++e)
+      middles.push_back(
+          {std::minmax({mesh.tets[t][kTetEdges[e][0]], mesh.tets[t][kTetEdges[e][1]]}), mesh.mid_edge_nodes[t][e]});
+  }
+  std::sort(middles.begin(), middles.end());
+  middles.erase(std::unique(middles.begin(), middles.end()), middles.end());
+  std::vector<std::size_t> edge_of(mesh.nodes.size(), middles.size());
+  for (std::size_t m = 0; m < middles.size(); ++m) {
+    const auto& [edge, node] = middles[m];
+    const std::string at = name + ": the edge of nodes " + std::to_string(edge.first) + " and " +
+                           std::to_string(edge.second) + " (counted from 0) has mid-edge node " + std::to_string(node);
+    if (m > 0 && middles[m - 1].edge == edge)
+      throw InputError(at + " in one tetrahedron and " + std::to_string(middles[m - 1].node) +
+                       " in another, expected one");
+    if (is_corner[node]) throw InputError(at + ", which is a corner elsewhere, expected a node of its own");
+    if (edge_of[node] < middles.size())
+      throw InputError(at + ", which the edge of nodes " + std::to_string(middles[edge_of[node]].edge.first) + " and " +
+                       std::to_string(middles[edge_of[node]].edge.second) + " has too, expected one of its own");
+    edge_of[node] = m;
+  }
+}
+
+/// The quadratic map from the straight tet keeps its orientation at each of its ten nodes.
+void refuse_folded(const TetMesh& mesh, const std::string& name, std::size_t tet) {
+  const TetNodes nodes(mesh, tet);
+  const double straight = 6.0 * signed_volume(corners(mesh, mesh.tets[tet]));
+  for (std::size_t at = 0; at < 10; ++at) {
+    Barycentric L{};
+    if (at < 4)
+      L[at] = 1.0;
+    else
+      L[kTetEdges[at - 4][0]] = L[kTetEdges[at - 4][1]] = 0.5;
+    const auto slopes = quadratic_shape_slopes(L);
+    Mat3 J = Mat3::Zero();
+    for (std::size_t a = 0; a < 10; ++a)
+      for (std::size_t c = 0; c < 3; ++c) J.col(c) += (slopes[a][c + 1] - slopes[a][0]) * mesh.nodes[nodes[a]];
+    if (!(J.determinant() > 0.0))
+      throw InputError(described(name, tet, mesh.tets[tet]) + " is folded: at its node " + std::to_string(nodes[at]) +
+                       " its Jacobian is " + in_short(J.determinant() / straight) +
+                       " of that with straight edges, expected above 0; move its mid-edge nodes to the middles");
+  }
+}
+
+/// Moves mid-edge nodes to the middles. @return the farthest that one was off, in lengths of its edge
+double straighten(TetMesh& mesh, std::size_t& moved) {
+  double farthest = 0.0;
+  std::vector<char> done(mesh.nodes.size(), 0);
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (std::size_t e = 0; e < kTetEdges.size(); ++e) {
+      const Index n = mesh.mid_edge_nodes[t][e];
+      if (std::exchange(done[n], 1)) continue;
+      const Vec3 &a = mesh.nodes[mesh.tets[t][kTetEdges[e][0]]], &b = mesh.nodes[mesh.tets[t][kTetEdges[e][1]]];
+      const Vec3 middle = 0.5 * (a + b);
+      const double off = (mesh.nodes[n] - middle).norm() / (b - a).norm();
+      farthest = std::max(farthest, off);
+      moved += off > kInTheMiddle ? 1 : 0;
+      mesh.nodes[n] = middle;
+    }
+  return farthest;
+}
+
+void validate_mid_edge_nodes(TetMesh& mesh, const std::string& name, Warnings& warnings) {
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) refuse_folded(mesh, name, t);
+  check_sharing(mesh, name);
+  std::size_t moved = 0;
+  const double farthest = straighten(mesh, moved);
+  if (moved > 0)
+    warnings.push_back(name + ": " + std::to_string(moved) + " mid-edge nodes lie off the middles of their edges, by " +
+                       "up to " + in_short(farthest) + " of an edge, and have been moved there: sides are straight");
+}
+
+// Renumbering -------------------------------------------------------------------------------------------------------
+
 /// Turns marks (negative: unused) into new indices in the old order. @return the old index of each new one
 std::vector<Index> number_used(std::vector<Index>& mark) {
   std::vector<Index> old_index;
@@ -111,18 +210,46 @@ std::vector<Vec3> picked(const std::vector<Vec3>& points, const std::vector<Inde
   return out;
 }
 
+/// Numbers nodes anew in all tets.
+void renumber_tets(TetMesh& mesh, const std::vector<Index>& new_index) {
+  for (Tet& t : mesh.tets)
+    for (Index& n : t) n = new_index[n];
+  for (MidEdgeNodes& m : mesh.mid_edge_nodes)
+    for (Index& n : m) n = new_index[n];
+}
+
+/// Left-handed to right-handed: the last two corners change places, and with them edges 12, 13 and edges 02, 03.
+void turn(TetMesh& mesh, std::size_t tet) {
+  std::swap(mesh.tets[tet][2], mesh.tets[tet][3]);
+  if (!mesh.has_mid_edge_nodes()) return;
+  MidEdgeNodes& m = mesh.mid_edge_nodes[tet];
+  std::swap(m[1], m[4]);
+  std::swap(m[2], m[3]);
+}
+
 }  // namespace
+
+TetNodes::TetNodes(const TetMesh& mesh, std::size_t tet) {
+  std::copy(mesh.tets[tet].begin(), mesh.tets[tet].end(), nodes_.begin());
+  if (!mesh.has_mid_edge_nodes()) return;
+  std::copy(mesh.mid_edge_nodes[tet].begin(), mesh.mid_edge_nodes[tet].end(), nodes_.begin() + 4);
+  size_ = 10;
+}
 
 double signed_volume(const TetMesh& mesh, Index tet) { return signed_volume(corners(mesh, mesh.tets[tet])); }
 
 void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
   if (mesh.tets.empty()) throw InputError(name + ": holds no tetrahedra");
+  if (mesh.has_mid_edge_nodes() && mesh.mid_edge_nodes.size() != mesh.tets.size())
+    throw InputError(name + ": mid-edge nodes of " + std::to_string(mesh.mid_edge_nodes.size()) + " of " +
+                     std::to_string(mesh.tets.size()) + " tetrahedra, expected of all or of none");
   check_nodes(mesh, name);
   check_regions_and_groups(mesh, name);
   std::size_t turned = 0;
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     check_indices(mesh, name, i);
-    Tet& t = mesh.tets[i];
+    if (mesh.has_mid_edge_nodes()) check_mid_edge_nodes(mesh, name, i);
+    const Tet& t = mesh.tets[i];
     const auto x = corners(mesh, t);
     const double volume = signed_volume(x);
     const double longest = longest_edge(x);
@@ -131,14 +258,26 @@ void validate(TetMesh& mesh, const std::string& name, Warnings& warnings) {
       throw InputError(described(name, i, t) + " is flat: volume " + in_short(volume) + " m^3 with a longest edge of " +
                        in_short(longest) + " m, expected more; remove it or remesh");
     if (volume < 0.0) {
-      std::swap(t[2], t[3]);
+      turn(mesh, i);
       ++turned;
     }
   }
   check_doubles(mesh, name);
+  if (mesh.has_mid_edge_nodes()) validate_mid_edge_nodes(mesh, name, warnings);
   if (turned > 0)
     warnings.push_back(name + ": " + std::to_string(turned) + " of " + std::to_string(mesh.tets.size()) +
                        " tetrahedra were left-handed and have been re-oriented");
+}
+
+std::vector<Index> drop_unused_nodes(TetMesh& mesh) {
+  std::vector<Index> new_index(mesh.nodes.size(), -1);
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (const Index n : TetNodes(mesh, t)) new_index[n] = 0;
+  auto node_of = number_used(new_index);
+  mesh.nodes = picked(mesh.nodes, node_of);
+  mesh.node_groups = renumbered(mesh.node_groups, new_index);
+  renumber_tets(mesh, new_index);
+  return node_of;
 }
 
 VolumeProperties volume_properties(const TetMesh& mesh) {
@@ -210,16 +349,17 @@ SubMesh extract_component(const TetMesh& mesh, std::span<const Index> component,
   std::vector<Index> new_index(mesh.nodes.size(), -1);
   for (std::size_t i = 0; i < mesh.tets.size(); ++i)
     if (component[i] == which)
-      for (const Index n : mesh.tets[i]) new_index[n] = 0;
+      for (const Index n : TetNodes(mesh, i)) new_index[n] = 0;
   sub.node_of = number_used(new_index);
   sub.mesh.nodes = picked(mesh.nodes, sub.node_of);
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     if (component[i] != which) continue;
-    const Tet& t = mesh.tets[i];
-    sub.mesh.tets.push_back({new_index[t[0]], new_index[t[1]], new_index[t[2]], new_index[t[3]]});
+    sub.mesh.tets.push_back(mesh.tets[i]);
+    if (mesh.has_mid_edge_nodes()) sub.mesh.mid_edge_nodes.push_back(mesh.mid_edge_nodes[i]);
     sub.mesh.tet_region.push_back(mesh.tet_region[i]);
     sub.tet_of.push_back(static_cast<Index>(i));
   }
+  renumber_tets(sub.mesh, new_index);
   sub.mesh.node_groups = renumbered(mesh.node_groups, new_index);
   return sub;
 }

@@ -25,7 +25,8 @@ void validate(SurfaceMesh& surface, const std::string& name, Warnings& warnings)
 /// order. Unused vertices stay unless they are joined. @return how many vertices went. @pre indices are in range
 Index weld(SurfaceMesh& surface);
 
-/// The boundary of a tetrahedral mesh: faces that belong to one tet, seen from outside.
+/// The boundary of a tetrahedral mesh: faces that belong to one tet, seen from outside; of ten-node tets each is four
+/// triangles over its six nodes.
 struct BoundarySurface {
   SurfaceMesh surface;         ///< vertices in ascending order of their node
   std::vector<Index> node_of;  ///< per vertex, its node in the tet mesh

@@ -10,8 +10,9 @@
 
 namespace limber {
 
-/// Gmsh MSH 2.2, text: regions as physical volumes with their names and tags (a fresh tag where one is 0 or taken),
-/// node groups as physical points. read_mesh() gives the same mesh back, and each region as a node group besides.
+/// Gmsh MSH 2.2, text: tets of 4 or 10 nodes, regions as physical volumes with their names and tags (a fresh tag where
+/// one is 0 or taken), node groups as physical points. read_mesh() gives the same mesh back, and each region as a
+/// node group besides.
 /// @throws InvalidArgument if an index is out of range or a name holds a quote or a line end. @throws InputError (see
 /// write_file())
 void write_gmsh(const std::filesystem::path& path, const TetMesh& mesh);
