@@ -5,6 +5,7 @@
 #include <string>
 
 #include "limber/core/error.h"
+#include "limber/mesh/ten_node_tet.h"
 #include "limber/mesh/tet_locator.h"
 
 namespace limber {
@@ -48,13 +49,18 @@ Embedding embed(std::span<const Vec3> points, const TetMesh& mesh) {
 
 Embedding embed_nodes(std::span<const Index> nodes, const TetMesh& mesh) {
   std::vector<EmbeddedVertex> at_node(mesh.nodes.size(), {-1, {}});
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    for (int a = 0; a < 4; ++a) {
-      EmbeddedVertex& vertex = at_node[mesh.tets[t][a]];
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    const TetNodes tet(mesh, t);
+    for (std::size_t a = 0; a < tet.size(); ++a) {
+      EmbeddedVertex& vertex = at_node[tet[a]];
       if (vertex.tet >= 0) continue;
       vertex.tet = static_cast<Index>(t);
-      vertex.weight[a] = 1.0;
+      if (a < 4)
+        vertex.weight[a] = 1.0;
+      else
+        for (const int end : kTetEdges[a - 4]) vertex.weight[end] = 0.5;
     }
+  }
   Embedding out;
   out.vertices.reserve(nodes.size());
   for (const Index n : nodes) {
@@ -64,6 +70,26 @@ Embedding embed_nodes(std::span<const Index> nodes, const TetMesh& mesh) {
                             std::to_string(static_cast<std::int64_t>(at_node.size()) - 1));
     out.vertices.push_back(at_node[n]);
   }
+  return out;
+}
+
+NodeShares node_shares(const TetMesh& mesh, const EmbeddedVertex& vertex) {
+  const TetNodes tet(mesh, static_cast<std::size_t>(vertex.tet));
+  NodeShares out{.count = tet.size()};
+  std::copy(tet.begin(), tet.end(), out.node.begin());
+  if (tet.size() == 4) {
+    std::copy(vertex.weight.begin(), vertex.weight.end(), out.share.begin());
+    return out;
+  }
+  Barycentric inside{};
+  double sum = 0.0;
+  for (std::size_t c = 0; c < 4; ++c) sum += inside[c] = std::max(vertex.weight[c], 0.0);
+  for (double& L : inside) L /= sum;
+  out.share = quadratic_shape(inside);
+  if (inside == vertex.weight) return out;
+  const auto slopes = quadratic_shape_slopes(inside);
+  for (std::size_t a = 0; a < 10; ++a)
+    for (std::size_t c = 0; c < 4; ++c) out.share[a] += slopes[a][c] * (vertex.weight[c] - inside[c]);
   return out;
 }
 

@@ -118,6 +118,7 @@ Json json(const BodyReport& b) {
           {"motion", to_string(b.motion)},
           {"nodes", b.nodes},
           {"tets", b.tets},
+          {"nodes_per_tet", b.nodes_per_tet},
           {"mass", b.mass},
           {"volume", b.volume},
           {"center_of_mass", json(b.center_of_mass)},
@@ -206,8 +207,8 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
     for (const DroppedMode& d : b.selection.dropped) ++reasons[to_string(d.reason)];
     std::string why;
     for (const auto& [reason, count] : reasons) why += fmt::format(", {} {}", count, reason);
-    text += fmt::format("{}: {} nodes, {} tets, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.nodes, b.tets, b.mass,
-                        to_string(b.motion), b.zero_modes);
+    text += fmt::format("{}: {} nodes, {} tets of {}, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.nodes, b.tets,
+                        b.nodes_per_tet, b.mass, to_string(b.motion), b.zero_modes);
     if (!b.frequencies_hz.empty())
       text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
                           b.frequencies_hz.front(), b.frequencies_hz.back(),

@@ -7,8 +7,10 @@
 
 #include "bake/residual.h"
 #include "bake/simplify_surface.h"
+#include "fem/locking.h"
 #include "fem/mass_properties.h"
 #include "limber/core/error.h"
+#include "limber/mesh/ten_node_tet.h"
 #include "limber/model/embedding.h"
 #include "skin/bake_skin.h"
 
@@ -138,15 +140,22 @@ Vec3 at_node(std::span<const double> shapes, Index nodes, Index mode, Index node
   return Eigen::Map<const Vec3>(shapes.data() + 3 * (static_cast<std::size_t>(mode) * nodes + node));
 }
 
-Vec3 at_vertex(const ModalAnalysis& a, const TetMesh& mesh, Index mode, const EmbeddedVertex& v) {
+Vec3 at_vertex(const ModalAnalysis& a, Index mode, const NodeShares& v) {
   Vec3 u = Vec3::Zero();
-  for (int c = 0; c < 4; ++c) u += v.weight[c] * at_node(a.shapes, a.nodes, mode, mesh.tets[v.tet][c]);
+  for (std::size_t c = 0; c < v.count; ++c) u += v.share[c] * at_node(a.shapes, a.nodes, mode, v.node[c]);
   return u;
 }
 
-double largest_displacement(const ModalAnalysis& a, const TetMesh& mesh, Index mode, const Embedding& e) {
+std::vector<NodeShares> shares_of(const Embedding& embedding, const TetMesh& mesh) {
+  std::vector<NodeShares> shares;
+  shares.reserve(embedding.vertices.size());
+  for (const EmbeddedVertex& v : embedding.vertices) shares.push_back(node_shares(mesh, v));
+  return shares;
+}
+
+double largest_displacement(const ModalAnalysis& a, Index mode, std::span<const NodeShares> vertices) {
   double largest = 0.0;
-  for (const EmbeddedVertex& v : e.vertices) largest = std::max(largest, at_vertex(a, mesh, mode, v).norm());
+  for (const NodeShares& v : vertices) largest = std::max(largest, at_vertex(a, mode, v).norm());
   return largest;
 }
 
@@ -156,9 +165,10 @@ ModalSurface modal_surface(const PlacedSurface& placed, const ModalAnalysis& a, 
   s.triangles = placed.surface.triangles;
   for (const Vec3& x : placed.surface.vertices) s.rest.push_back((x - origin).cast<float>());
   s.basis = ModalBasis(s.vertices(), static_cast<Index>(kept.size()));
+  const std::vector<NodeShares> shares = shares_of(placed.embedding, mesh);
   for (Index v = 0; v < s.vertices(); ++v)
     for (std::size_t m = 0; m < kept.size(); ++m)
-      s.basis.set(v, static_cast<Index>(m), at_vertex(a, mesh, kept[m], placed.embedding.vertices[v]).cast<float>());
+      s.basis.set(v, static_cast<Index>(m), at_vertex(a, kept[m], shares[v]).cast<float>());
   return s;
 }
 
@@ -173,7 +183,7 @@ ModalBasis basis_at_nodes(std::span<const double> shapes, Index nodes, std::span
 ModalVolume modal_volume(const ModalAnalysis& a, const TetMesh& mesh, std::span<const Index> kept, const Vec3& origin) {
   ModalVolume volume;
   for (const Vec3& x : mesh.nodes) volume.rest.push_back(x - origin);
-  volume.tets = mesh.tets;
+  volume.tets = mesh.has_mid_edge_nodes() ? split_into_eight(mesh).tets : mesh.tets;
   volume.basis = basis_at_nodes(a.shapes, a.nodes, kept);
   volume.mass_times_basis = basis_at_nodes(a.mass_times_shapes, a.nodes, kept);
   return volume;
@@ -234,11 +244,13 @@ double decay_of(const RayleighDamping& d, double lambda) {
 /// Strikes and forces act on the render surface, contacts on the collision surface: a mode counts by the larger.
 std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, const BodySurfaces& surfaces,
                                 const BakeOptions& options, BodyReport& report) {
+  const std::vector<NodeShares> render = shares_of(surfaces.render.embedding, mesh),
+                                touching = shares_of(surfaces.touching().embedding, mesh);
   std::vector<ModeStrength> strengths;
   for (Index mode = a.mechanisms; mode < static_cast<Index>(a.eigenvalues.size()); ++mode) {
     const double lambda = a.eigenvalues[mode];
-    const double shown = largest_displacement(a, mesh, mode, surfaces.render.embedding);
-    const double touched = largest_displacement(a, mesh, mode, surfaces.touching().embedding);
+    const double shown = largest_displacement(a, mode, render);
+    const double touched = largest_displacement(a, mode, touching);
     strengths.push_back({.eigenvalue = lambda,
                          .decay = decay_of(options.damping, lambda),
                          .max_observable = shown,
@@ -332,6 +344,7 @@ void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, con
   r.motion = a.motion;
   r.nodes = a.nodes;
   r.tets = static_cast<Index>(in.part.mesh.tets.size());
+  r.nodes_per_tet = in.part.mesh.has_mid_edge_nodes() ? 10 : 4;
   r.mass = p.mass;
   r.volume = p.volume;
   r.center_of_mass = p.center;
@@ -346,6 +359,28 @@ void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, con
   r.certified = a.certified;
   r.solves = a.solves;
   r.seconds = a.seconds;
+}
+
+/// Of the lowest elastic mode, where its linear tets lock.
+void warn_of_locking(const BodyInput& in, std::span<const Material> materials, const ModalAnalysis& a,
+                     Warnings& warnings) {
+  constexpr double kNearHalf = 0.4, kWorthTelling = 0.05;
+  const TetMesh& mesh = in.part.mesh;
+  double largest = 0.0;
+  for (const Index r : mesh.tet_region) largest = std::max(largest, materials[r].poisson_ratio);
+  const auto lowest = static_cast<std::size_t>(a.mechanisms);
+  if (mesh.has_mid_edge_nodes() || largest < kNearHalf || a.eigenvalues.size() <= lowest) return;
+  const std::span<const double> shapes(a.shapes);
+  const double share = internal::dilatation_share(
+      mesh, materials, shapes.subspan(lowest * 3 * mesh.nodes.size(), 3 * mesh.nodes.size()), a.eigenvalues[lowest]);
+  const double error = internal::locking_error(share, largest);
+  if (error < kWorthTelling) return;
+  warnings.push_back(
+      "body \"" + in.name +
+      "\": its linear tetrahedra lock near nu = 1/2: " + std::to_string(std::lround(100.0 * share)) +
+      " % of the energy of its lowest mode goes into changes of volume, which makes its frequency about " +
+      std::to_string(std::lround(100.0 * error)) +
+      " % too high; quadratic elements (--elements quadratic) hardly lock");
 }
 
 std::size_t bytes_of(const ModalSkin& skin) {
@@ -387,6 +422,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   wanted.keep_compliance = options.residual.surface || in.answers_loads();
   ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
   fill_report(report, in, a, mass);
+  warn_of_locking(in, materials, a, warnings);
 
   const auto start = Clock::now();
   const BodySurfaces surfaces = place_surfaces(in, options, report);
@@ -432,6 +468,27 @@ std::vector<char> selected_flags(const TetMesh& mesh, std::span<const NodeSelect
   return selected;
 }
 
+/// Makes the mesh's tets those that are asked for, and flags of nodes those of its new nodes: a middle that is added is
+/// held where both ends of its edge are, as a four-node tet would hold it, and loaded nowhere.
+void use_elements(Elements elements, TetMesh& mesh, std::vector<char>& fixed, std::vector<char>& loaded) {
+  if (elements == Elements::kLinear && mesh.has_mid_edge_nodes()) {
+    const std::vector<Index> node_of = drop_mid_edge_nodes(mesh);
+    for (std::vector<char>* flags : {&fixed, &loaded}) {
+      for (std::size_t n = 0; n < node_of.size(); ++n) (*flags)[n] = (*flags)[static_cast<std::size_t>(node_of[n])];
+      flags->resize(node_of.size());
+    }
+  }
+  if (elements == Elements::kQuadratic && !mesh.has_mid_edge_nodes()) {
+    add_mid_edge_nodes(mesh);
+    fixed.resize(mesh.nodes.size(), 0);
+    loaded.resize(mesh.nodes.size(), 0);
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+      for (std::size_t e = 0; e < kTetEdges.size(); ++e)
+        fixed[mesh.mid_edge_nodes[t][e]] =
+            static_cast<char>(fixed[mesh.tets[t][kTetEdges[e][0]]] && fixed[mesh.tets[t][kTetEdges[e][1]]]);
+  }
+}
+
 /// A node that does not move answers no load.
 void warn_of_fixed_loads(std::span<const char> loaded, std::span<const char> fixed, Warnings& warnings) {
   std::size_t chosen = 0, idle = 0;
@@ -458,8 +515,8 @@ Index body_of(const AttachmentPatch& patch, const TetMesh& mesh, std::span<const
 
 void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warnings& warnings) {
   std::vector<char> used(mesh.nodes.size(), 0);
-  for (const Tet& t : mesh.tets)
-    for (const Index n : t) used[n] = 1;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (const Index n : TetNodes(mesh, t)) used[n] = 1;
   std::size_t unused = 0, to_be_fixed = 0;
   for (std::size_t n = 0; n < used.size(); ++n) {
     if (used[n]) continue;
@@ -525,22 +582,24 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
   if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
   const auto materials = materials_by_region(input.mesh, options.materials);
   warn_of_unknown_regions(input.mesh, options.materials, warnings);
-  const auto fixed = selected_flags(input.mesh, options.fixed);
-  const auto loaded = selected_flags(input.mesh, options.residual.nodes);
+  auto fixed = selected_flags(input.mesh, options.fixed);
+  auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);
   warn_of_fixed_loads(loaded, fixed, warnings);
 
-  const auto component = connected_components(input.mesh);
+  TetMesh mesh = input.mesh;
+  use_elements(options.elements, mesh, fixed, loaded);
+  const auto component = connected_components(mesh);
   const Index bodies = 1 + *std::max_element(component.begin(), component.end());
-  auto render = deal_if_any(input.render, input.mesh, component, bodies, "render");
-  auto collision = deal_if_any(input.collision, input.mesh, component, bodies, "collision");
+  auto render = deal_if_any(input.render, mesh, component, bodies, "render");
+  auto collision = deal_if_any(input.collision, mesh, component, bodies, "collision");
 
   BakeResult result;
   result.asset.provenance = input.provenance;
   for (Index b = 0; b < bodies; ++b) {
     BodyInput body;
     body.name = bodies == 1 ? input.name : input.name + "_" + std::to_string(b + 1);
-    body.part = extract_component(input.mesh, component, b);
+    body.part = extract_component(mesh, component, b);
     for (std::size_t n = 0; n < body.part.node_of.size(); ++n) {
       if (fixed[body.part.node_of[n]])
         body.fixed.push_back(static_cast<Index>(n));
@@ -548,7 +607,7 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
         body.residual_nodes.push_back(static_cast<Index>(n));
     }
     for (const AttachmentPatch& patch : options.residual.patches)
-      if (body_of(patch, input.mesh, component) == b) body.patches.push_back(patch);
+      if (body_of(patch, mesh, component) == b) body.patches.push_back(patch);
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
     result.asset.bodies.push_back(bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));

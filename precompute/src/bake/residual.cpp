@@ -79,17 +79,17 @@ Ritz ritz_modes(const ElasticCompliance& compliance, const Eigen::MatrixXd& Y) {
 Eigen::MatrixXd unit_loads(const TetMesh& mesh, const Embedding& surface, Index first, Index last) {
   Eigen::MatrixXd F = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 3 * (last - first));
   for (Index v = first; v < last; ++v) {
-    const EmbeddedVertex& at = surface.vertices[v];
-    for (int c = 0; c < 4; ++c)
-      F.block<3, 3>(3 * mesh.tets[at.tet][c], 3 * (v - first)) += at.weight[c] * Mat3::Identity();
+    const NodeShares at = node_shares(mesh, surface.vertices[v]);
+    for (std::size_t c = 0; c < at.count; ++c)
+      F.block<3, 3>(3 * at.node[c], 3 * (v - first)) += at.share[c] * Mat3::Identity();
   }
   return F;
 }
 
 /// S U at one vertex.
-Mat3 at_vertex(const TetMesh& mesh, const EmbeddedVertex& at, const Eigen::MatrixXd& U, Eigen::Index column) {
+Mat3 at_vertex(const NodeShares& at, const Eigen::MatrixXd& U, Eigen::Index column) {
   Mat3 block = Mat3::Zero();
-  for (int c = 0; c < 4; ++c) block += at.weight[c] * U.block<3, 3>(3 * mesh.tets[at.tet][c], column);
+  for (std::size_t c = 0; c < at.count; ++c) block += at.share[c] * U.block<3, 3>(3 * at.node[c], column);
   return block;
 }
 
@@ -145,13 +145,11 @@ Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices,
   const Mat3 turns = std::sqrt(largest) * eigen.eigenvectors() * inverse.asDiagonal();  // about the principal axes
   Eigen::MatrixXd F = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 6);
   for (const std::size_t v : members) {
-    const EmbeddedVertex& at = surface.vertices[v];
+    const NodeShares at = node_shares(mesh, surface.vertices[v]);
     // The mean displacement's and rotation's part of this vertex's displacement, transposed.
     Eigen::Matrix<double, 3, 6> load;
     load << Mat3::Identity(), cross_matrix(vertices[v] - mean).transpose() * turns;
-    for (int c = 0; c < 4; ++c)
-      F.middleRows<3>(3 * mesh.tets[static_cast<std::size_t>(at.tet)][static_cast<std::size_t>(c)]) +=
-          weight * at.weight[static_cast<std::size_t>(c)] * load;
+    for (std::size_t c = 0; c < at.count; ++c) F.middleRows<3>(3 * at.node[c]) += weight * at.share[c] * load;
   }
   return F;
 }
@@ -183,15 +181,17 @@ ResidualCompliance residual_compliance(const ModalAnalysis& analysis, std::span<
   const auto vertices = static_cast<Index>(surface.vertices.size());
   const StaticModes modes(analysis, kept);
   ResidualCompliance residual(form, vertices);
+  std::vector<NodeShares> shares;
+  for (const EmbeddedVertex& vertex : surface.vertices) shares.push_back(node_shares(mesh, vertex));
   for (Index first = 0; first < vertices; first += kVerticesPerSolve) {
     const Index last = std::min(first + kVerticesPerSolve, vertices);
     const Eigen::MatrixXd U =
         residual_displacements(*analysis.compliance, modes, unit_loads(mesh, surface, first, last));
     for (Index b = first; b < last; ++b) {
       const Eigen::Index column = 3 * (b - first);
-      residual.set(b, b, yielding(at_vertex(mesh, surface.vertices[b], U, column)));
+      residual.set(b, b, yielding(at_vertex(shares[b], U, column)));
       if (form == ResidualCompliance::Form::kLocal) continue;
-      for (Index a = b + 1; a < vertices; ++a) residual.set(a, b, at_vertex(mesh, surface.vertices[a], U, column));
+      for (Index a = b + 1; a < vertices; ++a) residual.set(a, b, at_vertex(shares[a], U, column));
     }
   }
   return residual;

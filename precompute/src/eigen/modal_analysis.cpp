@@ -79,8 +79,8 @@ std::vector<Index> checked_fixed_nodes(const TetMesh& mesh, std::span<const Inde
 void check_body(const TetMesh& mesh) {
   if (mesh.tets.empty()) throw InvalidArgument("analyse_modes: the mesh has no tetrahedra");
   std::vector<bool> used(mesh.nodes.size(), false);
-  for (const Tet& t : mesh.tets)
-    for (const Index node : t) used[node] = true;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (const Index node : TetNodes(mesh, t)) used[node] = true;
   const auto unused = std::find(used.begin(), used.end(), false);
   if (unused != used.end())
     throw InvalidArgument("analyse_modes: no tetrahedron uses node " + std::to_string(unused - used.begin()) +

@@ -62,7 +62,7 @@ Span span_of(std::span<const Vec3> places) {
 std::vector<std::vector<Index>> parts_of_nodes(const TetMesh& mesh, const std::vector<Index>& part) {
   std::vector<std::vector<Index>> parts(mesh.nodes.size());
   for (std::size_t e = 0; e < mesh.tets.size(); ++e)
-    for (const Index node : mesh.tets[e])
+    for (const Index node : TetNodes(mesh, e))
       if (std::find(parts[node].begin(), parts[node].end(), part[e]) == parts[node].end())
         parts[node].push_back(part[e]);
   for (auto& p : parts) std::sort(p.begin(), p.end());
@@ -177,6 +177,12 @@ Eigen::MatrixXd at_nodes(const TetMesh& mesh, const Scaled& scaled, const Parts&
   Eigen::MatrixXd N(3 * mesh.nodes.size(), motions.cols());
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node)
     N.middleRows<3>(3 * node) = motion_at(scaled(mesh.nodes[node])) * motions.middleRows<6>(6 * parts.of_node[node][0]);
+  // The middle of an edge moves as the mean of its ends to the bit, wherever rounding put it.
+  for (std::size_t t = 0; t < mesh.mid_edge_nodes.size(); ++t)
+    for (std::size_t e = 0; e < kTetEdges.size(); ++e) {
+      const Index a = mesh.tets[t][kTetEdges[e][0]], b = mesh.tets[t][kTetEdges[e][1]];
+      N.middleRows<3>(3 * mesh.mid_edge_nodes[t][e]) = 0.5 * (N.middleRows<3>(3 * a) + N.middleRows<3>(3 * b));
+    }
   for (const Index node : fixed_nodes) N.middleRows<3>(3 * node).setZero();
   return N;
 }

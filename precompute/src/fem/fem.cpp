@@ -4,20 +4,31 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "limber/core/error.h"
+#include "limber/mesh/ten_node_tet.h"
 
 namespace limber {
 namespace {
 
 constexpr std::size_t kGrain = 512;  // tets or nodes per task: tens of microseconds
 
-/// Ingredients of a tet's 3 × 3 blocks. Displacement u = Σ_a φ_a u_a with constant gradients g_a = ∇φ_a.
+/// Ingredients of a tet's 3 × 3 blocks: gradients of its barycentric coordinates, which are constant.
 struct Element {
   std::array<Vec3, 4> gradient;  // 1/m, summing to zero
   double lambda_volume = 0.0;    // λV, N·m
   double mu_volume = 0.0;        // μV, N·m
 };
+
+/// Gradients of a tet's shape functions at one point, where a rule of integration has this part of the volume.
+template <std::size_t n>
+using Gradients = std::array<Vec3, n>;
+
+/// Points at which products of gradients are summed up: linear functions integrate exactly at the centroid, products of
+/// two linear functions at four points.
+template <std::size_t n>
+inline constexpr std::size_t kPoints = n == 4 ? 1 : 4;
 
 Element make_element(const std::array<Vec3, 4>& x, const Material& material) {
   const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], e3 = x[3] - x[0];
@@ -32,10 +43,44 @@ Element make_element(const std::array<Vec3, 4>& x, const Material& material) {
   return e;
 }
 
+/// The four-point rule, of degree 2: one coordinate far, three near.
+constexpr double kFar = 0.58541019662496845446, kNear = 0.13819660112501051518;  // (5 + 3√5)/20, (5 − √5)/20
+
+using SlopesAtPoints = std::array<std::array<std::array<double, 4>, 10>, 4>;
+
+const SlopesAtPoints& slopes_at_points() {
+  static const SlopesAtPoints kSlopes = [] {
+    SlopesAtPoints slopes{};
+    for (std::size_t q = 0; q < 4; ++q) {
+      Barycentric L{kNear, kNear, kNear, kNear};
+      L[q] = kFar;
+      slopes[q] = quadratic_shape_slopes(L);
+    }
+    return slopes;
+  }();
+  return kSlopes;
+}
+
+/// At every point of the rule.
+template <std::size_t n>
+std::array<Gradients<n>, kPoints<n>> shape_gradients(const Element& e) {
+  if constexpr (n == 4) {
+    return {e.gradient};
+  } else {
+    const SlopesAtPoints& slopes = slopes_at_points();
+    std::array<Gradients<n>, kPoints<n>> at;
+    for (std::size_t q = 0; q < at.size(); ++q)
+      for (std::size_t a = 0; a < n; ++a) {
+        at[q][a] = Vec3::Zero();
+        for (std::size_t c = 0; c < 4; ++c) at[q][a] += slopes[q][a][c] * e.gradient[c];
+      }
+    return at;
+  }
+}
+
 // K_ab = V (λ g_a g_bᵀ + μ g_b g_aᵀ + μ (g_a·g_b) I). Each product has the same factors in K_ba, so K_baᵀ = K_ab to the
 // bit; the order of the sums below keeps that.
-Mat3 stiffness_block(const Element& e, int a, int b) {
-  const Vec3 &ga = e.gradient[a], &gb = e.gradient[b];
+Mat3 stiffness_block(const Element& e, const Vec3& ga, const Vec3& gb) {
   const double isotropic = e.mu_volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
   Mat3 block;
   for (int p = 0; p < 3; ++p)
@@ -46,6 +91,30 @@ Mat3 stiffness_block(const Element& e, int a, int b) {
 
 std::array<Vec3, 4> corners(const TetMesh& mesh, const Tet& t) {
   return {mesh.nodes[t[0]], mesh.nodes[t[1]], mesh.nodes[t[2]], mesh.nodes[t[3]]};
+}
+
+/// K_ab summed up over the points.
+template <std::size_t n>
+Mat3 stiffness_block(const Element& e, const std::array<Gradients<n>, kPoints<n>>& at, std::size_t a, std::size_t b) {
+  if constexpr (n == 4) return stiffness_block(e, at[0][a], at[0][b]);
+  Mat3 block = Mat3::Zero();
+  for (const Gradients<n>& g : at) block += stiffness_block(e, g[a], g[b]);
+  return block / static_cast<double>(kPoints<n>);
+}
+
+template <std::size_t n>
+std::array<double, 9 * n * n> element_stiffness(const std::array<Vec3, 4>& x, const Material& material) {
+  const Element e = make_element(x, material);
+  const auto at = shape_gradients<n>(e);
+  std::array<double, 9 * n * n> K{};
+  for (std::size_t a = 0; a < n; ++a)
+    for (std::size_t b = 0; b < n; ++b) {
+      const Mat3 block = stiffness_block<n>(e, at, a, b);
+      for (std::size_t p = 0; p < 3; ++p)
+        for (std::size_t q = 0; q < 3; ++q)
+          K[3 * n * (3 * a + p) + 3 * b + q] = block(static_cast<int>(p), static_cast<int>(q));
+    }
+  return K;
 }
 
 /// The tets around each node and its neighbours, itself among them, both ascending.
@@ -74,18 +143,21 @@ void accumulate(std::vector<Index>& start, const char* what) {
 
 void list_tets_of_nodes(const TetMesh& mesh, NodeGraph& graph) {
   graph.tet_start.assign(mesh.nodes.size() + 1, 0);
-  for (const Tet& t : mesh.tets)
-    for (const Index node : t) ++graph.tet_start[node + 1];
-  accumulate(graph.tet_start, "corners of tetrahedra");
-  graph.tet.resize(4 * mesh.tets.size());
+  for (std::size_t e = 0; e < mesh.tets.size(); ++e)
+    for (const Index node : TetNodes(mesh, e)) ++graph.tet_start[node + 1];
+  accumulate(graph.tet_start, "nodes of tetrahedra");
+  graph.tet.resize(graph.tet_start.back());
   std::vector<Index> next(graph.tet_start.begin(), graph.tet_start.end() - 1);
   for (std::size_t e = 0; e < mesh.tets.size(); ++e)
-    for (const Index node : mesh.tets[e]) graph.tet[next[node]++] = static_cast<Index>(e);
+    for (const Index node : TetNodes(mesh, e)) graph.tet[next[node]++] = static_cast<Index>(e);
 }
 
 void find_neighbours(const TetMesh& mesh, const NodeGraph& graph, Index node, std::vector<Index>& found) {
   found.clear();
-  for (const Index e : graph.tets_of(node)) found.insert(found.end(), mesh.tets[e].begin(), mesh.tets[e].end());
+  for (const Index e : graph.tets_of(node)) {
+    const TetNodes t(mesh, static_cast<std::size_t>(e));
+    found.insert(found.end(), t.begin(), t.end());
+  }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
 }
@@ -124,22 +196,21 @@ void check(const TetMesh& mesh, std::span<const Material> materials, const char*
     if (used[r]) materials[r].validate(std::string(where) + ": region \"" + mesh.regions[r].name + "\"");
 }
 
-/// Places of the corners of one tet in the list of a node's neighbours.
-std::array<std::size_t, 4> places(std::span<const Index> neighbours, const Tet& t) {
-  std::array<std::size_t, 4> place{};
-  for (int a = 0; a < 4; ++a)
-    place[a] = std::lower_bound(neighbours.begin(), neighbours.end(), t[a]) - neighbours.begin();
-  return place;
+/// Place of another node in the list of a node's neighbours.
+std::size_t place_of(Index node, std::span<const Index> neighbours) {
+  return static_cast<std::size_t>(std::lower_bound(neighbours.begin(), neighbours.end(), node) - neighbours.begin());
 }
 
 /// Adds what one node's tets give to its three columns. @param blocks one per neighbour, zero on entry
+template <std::size_t n>
 void add_stiffness(const TetMesh& mesh, std::span<const Element> elements, const NodeGraph& graph, Index node,
                    std::vector<Mat3>& blocks) {
   for (const Index e : graph.tets_of(node)) {
-    const Tet& t = mesh.tets[e];
-    const auto place = places(graph.neighbours_of(node), t);
-    const int own = static_cast<int>(std::find(t.begin(), t.end(), node) - t.begin());
-    for (int a = 0; a < 4; ++a) blocks[place[a]] += stiffness_block(elements[e], a, own);
+    const TetNodes t(mesh, static_cast<std::size_t>(e));
+    const auto at = shape_gradients<n>(elements[e]);
+    const auto own = static_cast<std::size_t>(std::find(t.begin(), t.end(), node) - t.begin());
+    for (std::size_t a = 0; a < n; ++a)
+      blocks[place_of(t[a], graph.neighbours_of(node))] += stiffness_block<n>(elements[e], at, a, own);
   }
 }
 
@@ -158,7 +229,24 @@ SparseMatrix stiffness_pattern(const NodeGraph& graph) {
   return K;
 }
 
-/// ρV/20 or ρV/4 of each tet, kg: the unit its mass block is written in.
+/// Whole numbers whose ratio to `whole` is M_ab/m.
+int mass_share(std::size_t a, std::size_t b, std::size_t n) {
+  if (n == 4) return a == b ? 2 : 1;
+  if (a > b) std::swap(a, b);
+  if (b < 4) return a == b ? 6 : 1;
+  const auto ends = [](std::size_t edge, std::size_t corner) {
+    return static_cast<std::size_t>(kTetEdges[edge - 4][0]) == corner ||
+           static_cast<std::size_t>(kTetEdges[edge - 4][1]) == corner;
+  };
+  if (a < 4) return ends(b, a) ? -4 : -6;
+  if (a == b) return 32;
+  const bool meet =
+      ends(b, static_cast<std::size_t>(kTetEdges[a - 4][0])) || ends(b, static_cast<std::size_t>(kTetEdges[a - 4][1]));
+  return meet ? 16 : 8;
+}
+double whole_mass(std::size_t n) { return n == 4 ? 20.0 : 420.0; }
+
+/// A part of each tet's mass, kg: the unit its mass block is written in.
 std::vector<double> mass_units(const TetMesh& mesh, std::span<const Material> materials, double share) {
   std::vector<double> unit(mesh.tets.size());
   for (std::size_t e = 0; e < unit.size(); ++e)
@@ -170,9 +258,12 @@ SparseMatrix lumped_mass(const TetMesh& mesh, std::span<const Material> material
   SparseMatrix M;
   M.size = static_cast<Index>(mesh.nodes.size());
   M.value.assign(mesh.nodes.size(), 0.0);
-  const auto quarter = mass_units(mesh, materials, 1.0 / 4.0);
+  const bool ten = mesh.has_mid_edge_nodes();
+  const auto at_corner = mass_units(mesh, materials, ten ? 1.0 / 36.0 : 1.0 / 4.0);
   for (std::size_t e = 0; e < mesh.tets.size(); ++e)
-    for (const Index node : mesh.tets[e]) M.value[node] += quarter[e];
+    for (const Index node : mesh.tets[e]) M.value[node] += at_corner[e];
+  for (std::size_t e = 0; e < mesh.mid_edge_nodes.size(); ++e)
+    for (const Index node : mesh.mid_edge_nodes[e]) M.value[node] += 16.0 / 3.0 * at_corner[e];
   for (Index i = 0; i <= M.size; ++i) M.column_start.push_back(i);
   M.row.assign(M.column_start.begin(), M.column_start.end() - 1);
   return M;
@@ -183,14 +274,16 @@ SparseMatrix consistent_mass(const TetMesh& mesh, std::span<const Material> mate
   SparseMatrix M;
   M.size = static_cast<Index>(mesh.nodes.size());
   M.value.assign(graph.neighbour.size(), 0.0);
-  const auto twentieth = mass_units(mesh, materials, 1.0 / 20.0);
+  const std::size_t per_tet = mesh.has_mid_edge_nodes() ? 10 : 4;
+  const auto unit = mass_units(mesh, materials, 1.0 / whole_mass(per_tet));
   jobs.parallel_for(mesh.nodes.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (Index node = static_cast<Index>(begin); node < static_cast<Index>(end); ++node) {
       double* column = M.value.data() + graph.neighbour_start[node];
       for (const Index e : graph.tets_of(node)) {
-        const Tet& t = mesh.tets[e];
-        const auto place = places(graph.neighbours_of(node), t);
-        for (int a = 0; a < 4; ++a) column[place[a]] += t[a] == node ? 2.0 * twentieth[e] : twentieth[e];
+        const TetNodes t(mesh, static_cast<std::size_t>(e));
+        const auto own = static_cast<std::size_t>(std::find(t.begin(), t.end(), node) - t.begin());
+        for (std::size_t a = 0; a < per_tet; ++a)
+          column[place_of(t[a], graph.neighbours_of(node))] += mass_share(a, own, per_tet) * unit[e];
       }
     }
   });
@@ -199,19 +292,35 @@ SparseMatrix consistent_mass(const TetMesh& mesh, std::span<const Material> mate
   return M;
 }
 
+/// One tet's part of K u, from differences to its first node.
+template <std::size_t n>
+void add_forces(const TetNodes& t, const Element& e, std::span<const double> displacements, std::span<double> forces) {
+  const auto u = [&](Index node) { return Eigen::Map<const Vec3>(displacements.data() + 3 * node); };
+  const auto f = [&](Index node) { return Eigen::Map<Vec3>(forces.data() + 3 * node); };
+  for (const Gradients<n>& g : shape_gradients<n>(e)) {
+    Mat3 gradient = Mat3::Zero();
+    for (std::size_t a = 1; a < n; ++a) gradient += (u(t[a]) - u(t[0])) * g[a].transpose();
+    const Mat3 stress_volume =
+        (e.lambda_volume * gradient.trace() * Mat3::Identity() + e.mu_volume * (gradient + gradient.transpose())) /
+        static_cast<double>(kPoints<n>);
+    for (std::size_t a = 1; a < n; ++a) {
+      const Vec3 force = stress_volume * g[a];
+      f(t[a]) += force;
+      f(t[0]) -= force;
+    }
+  }
+}
+
 }  // namespace
 
 std::array<double, 144> tet_stiffness(const std::array<Vec3, 4>& x, const Material& material) {
   material.validate("tet_stiffness");
-  const Element e = make_element(x, material);
-  std::array<double, 144> K{};
-  for (int a = 0; a < 4; ++a)
-    for (int b = 0; b < 4; ++b) {
-      const Mat3 block = stiffness_block(e, a, b);
-      for (int p = 0; p < 3; ++p)
-        for (int q = 0; q < 3; ++q) K[12 * (3 * a + p) + 3 * b + q] = block(p, q);
-    }
-  return K;
+  return element_stiffness<4>(x, material);
+}
+
+std::array<double, 900> ten_node_stiffness(const std::array<Vec3, 4>& x, const Material& material) {
+  material.validate("ten_node_stiffness");
+  return element_stiffness<10>(x, material);
 }
 
 SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> materials, Jobs& jobs) {
@@ -228,7 +337,10 @@ SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> m
     for (Index node = static_cast<Index>(begin); node < static_cast<Index>(end); ++node) {
       const auto neighbours = graph.neighbours_of(node);
       blocks.assign(neighbours.size(), Mat3::Zero());
-      add_stiffness(mesh, elements, graph, node, blocks);
+      if (mesh.has_mid_edge_nodes())
+        add_stiffness<10>(mesh, elements, graph, node, blocks);
+      else
+        add_stiffness<4>(mesh, elements, graph, node, blocks);
       for (int axis = 0; axis < 3; ++axis) {
         Index entry = K.column_start[3 * node + axis];
         for (std::size_t i = 0; i < neighbours.size(); ++i)
@@ -250,20 +362,12 @@ void elastic_forces(const TetMesh& mesh, std::span<const Material> materials, st
                           std::to_string(forces.size()) + " forces, expected three each for " +
                           std::to_string(mesh.nodes.size()) + " nodes");
   std::fill(forces.begin(), forces.end(), 0.0);
-  const auto u = [&](Index node) { return Eigen::Map<const Vec3>(displacements.data() + 3 * node); };
-  const auto f = [&](Index node) { return Eigen::Map<Vec3>(forces.data() + 3 * node); };
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    const Tet& t = mesh.tets[i];
-    const Element e = make_element(corners(mesh, t), materials[mesh.tet_region[i]]);
-    Mat3 gradient = Mat3::Zero();
-    for (int a = 1; a < 4; ++a) gradient += (u(t[a]) - u(t[0])) * e.gradient[a].transpose();
-    const Mat3 stress_volume =
-        e.lambda_volume * gradient.trace() * Mat3::Identity() + e.mu_volume * (gradient + gradient.transpose());
-    for (int a = 1; a < 4; ++a) {
-      const Vec3 force = stress_volume * e.gradient[a];
-      f(t[a]) += force;
-      f(t[0]) -= force;
-    }
+    const Element e = make_element(corners(mesh, mesh.tets[i]), materials[mesh.tet_region[i]]);
+    if (mesh.has_mid_edge_nodes())
+      add_forces<10>(TetNodes(mesh, i), e, displacements, forces);
+    else
+      add_forces<4>(TetNodes(mesh, i), e, displacements, forces);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "limber/mesh/ten_node_tet.h"
 #include "limber/model/skin_pose.h"
 #include "skin/handle_weights.h"
 
@@ -225,7 +226,7 @@ ModalSkin make_handles(const Bake& b) {
 
 /// μ: (M 1, M r)/m per node, 4 × N.
 Matrix frame_moments(const Bake& b) {
-  const SparseMatrix M = assemble_mass(b.body.mesh, b.body.materials, b.body.mass);
+  const SparseMatrix& M = b.body.node_mass;
   Matrix ones_and_places(4, b.places.rows());
   ones_and_places.row(0).setOnes();
   ones_and_places.bottomRows(3) = b.places.transpose();
@@ -309,12 +310,12 @@ SkinBody skin_body(const ModalAnalysis& analysis, std::span<const Index> kept, c
                    std::span<const Material> materials, std::span<const Index> fixed, const ModalAnalysisOptions& made,
                    const Vec3& origin) {
   const auto k = static_cast<Eigen::Index>(kept.size());
-  SkinBody body{.mesh = mesh,
+  SkinBody body{.mesh = mesh.has_mid_edge_nodes() ? split_into_eight(mesh) : mesh,
                 .materials = materials,
                 .fixed = fixed,
                 .motion = analysis.motion,
                 .origin = origin,
-                .mass = made.mass,
+                .node_mass = assemble_mass(mesh, materials, made.mass),
                 .W = Matrix(3 * k, columns(mesh.nodes)),
                 .eigenvalues = {}};
   for (Eigen::Index m = 0; m < k; ++m) {
@@ -392,10 +393,13 @@ std::vector<SkinInfluences> surface_influences(const NodalSkin& skin, const TetM
   std::vector<double> row(static_cast<std::size_t>(skin.skin.handles));
   for (const EmbeddedVertex& vertex : surface.vertices) {
     std::fill(row.begin(), row.end(), 0.0);
+    const TetNodes tet(mesh, static_cast<std::size_t>(vertex.tet));
+    PointInEighth at{.corner = {0, 1, 2, 3}, .L = vertex.weight};
+    if (mesh.has_mid_edge_nodes()) at = point_in_eighth(vertex.weight);
     for (std::size_t a = 0; a < 4; ++a) {
-      const SkinInfluences& node = skin.nodes[mesh.tets[vertex.tet][a]];
+      const SkinInfluences& node = skin.nodes[tet[at.corner[a]]];
       for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
-        row[node.handle[i]] += std::max(0.0, vertex.weight[a]) * static_cast<double>(node.weight[i]);
+        row[node.handle[i]] += std::max(0.0, at.L[a]) * static_cast<double>(node.weight[i]);
     }
     out.push_back(skin_influences(row));
   }

@@ -15,12 +15,12 @@ namespace limber::internal {
 
 /// A body as the skin is made of it. Rest positions are from the body's origin.
 struct SkinBody {
-  const TetMesh& mesh;
+  TetMesh mesh;                         ///< four-node tets: the body's own, or the eighths of its ten-node ones
   std::span<const Material> materials;  ///< one per region
   std::span<const Index> fixed;         ///< nodes
   FrameMotion motion = FrameMotion::kFree;
-  Vec3 origin = Vec3::Zero();  ///< in the mesh's coordinates
-  MassKind mass = MassKind::kLumped;
+  Vec3 origin = Vec3::Zero();       ///< in the mesh's coordinates
+  SparseMatrix node_mass;           ///< of the body's own tets
   Eigen::MatrixXd W;                ///< 3k × N: modes at the nodes, [axis][mode] down
   std::vector<double> eigenvalues;  ///< k
 };
@@ -45,7 +45,8 @@ std::vector<Vec3> skinned_nodes(const SkinBody& body, const NodalSkin& skin, std
 /// Elastic energy of the nodes' places by St. Venant–Kirchhoff's law, J.
 double shape_energy(const SkinBody& body, std::span<const Vec3> places);
 
-/// Influences of an embedded surface: those of its tets' nodes by its weights (none below 0), the four largest of them.
+/// Influences of an embedded surface: those of its tets' nodes, of ten-node tets the corners of their eighths, by its
+/// weights there (none below 0), the four largest of them. @param mesh the body's own
 std::vector<SkinInfluences> surface_influences(const NodalSkin& skin, const TetMesh& mesh, const Embedding& surface);
 
 }  // namespace limber::internal

@@ -1,6 +1,8 @@
 /// @file limber/model/embedding.h
-/// A surface embedded in a tetrahedral mesh: each vertex gets a tet and four weights, so that its modal displacement is
-/// u = Σ_a weight[a] · u(node a of the tet): inside, the finite elements' own interpolation ([H03] section 3.5).
+/// A surface embedded in a tetrahedral mesh: each vertex gets a tet and four weights, its barycentric coordinates
+/// there. Its modal displacement is then a sum over the tet's nodes, Σ_a weight[a] · u(node a) with four of them:
+/// inside, the finite elements' own interpolation ([H03] section 3.5). node_shares() is that sum, for ten-node tets
+/// too.
 #pragma once
 
 #include <array>
@@ -40,8 +42,21 @@ struct Embedding {
 /// @throws InvalidArgument if a point is not finite, or if the mesh has no tets. @pre the mesh is validated
 Embedding embed(std::span<const Vec3> points, const TetMesh& mesh);
 
-/// Nodes of the mesh as embedded vertices: each has weight 1 in the first tet that uses it.
+/// Nodes of the mesh as embedded vertices: each lies in the first tet that uses it, at a corner (weight 1) or in the
+/// middle of an edge (twice ½).
 /// @throws InvalidArgument naming a node that is out of range or in no tet
 Embedding embed_nodes(std::span<const Index> nodes, const TetMesh& mesh);
+
+/// Parts that a vertex takes of the displacements of a tet's nodes: u = Σ share[i] · u(node[i]). Sum 1; any linear
+/// field is exact.
+struct NodeShares {
+  std::array<Index, 10> node{};
+  std::array<double, 10> share{};
+  std::size_t count = 0;  ///< 4 or 10
+};
+
+/// Of a four-node tet the weights themselves. Of a ten-node tet the quadratic shape functions; outside, the field goes
+/// on linearly from the point in the tet whose weights are the vertex's positive ones: a parabola would run away.
+NodeShares node_shares(const TetMesh& mesh, const EmbeddedVertex& vertex);
 
 }  // namespace limber

@@ -93,9 +93,18 @@ struct SkinOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
+/// Nodes per tet (limber/precompute/fem.h). Ten bend where four are far too stiff, at three to four times the work per
+/// tet.
+enum class Elements {
+  kAsGiven,    ///< as the mesh has them
+  kLinear,     ///< four: mid-edge nodes that the mesh has are left out
+  kQuadratic,  ///< ten: edges get nodes in their middles, which are held where both ends of the edge are
+};
+
 struct BakeOptions {
   MaterialTable materials = {};          ///< by region; "*" is the rest
   std::vector<NodeSelector> fixed = {};  ///< their union is held
+  Elements elements = Elements::kAsGiven;
   RayleighDamping damping = {};
   ModalAnalysisOptions analysis = {};
   SceneLimits limits = {};
@@ -144,6 +153,7 @@ struct BodyReport {
   std::string name;
   FrameMotion motion = FrameMotion::kFree;
   Index nodes = 0, tets = 0;
+  Index nodes_per_tet = 4;  ///< 4 or 10
   double mass = 0.0, volume = 0.0;
   Vec3 center_of_mass = Vec3::Zero();
   Mat3 inertia = Mat3::Zero();  ///< about the centre of mass, input axes, kg·m²
