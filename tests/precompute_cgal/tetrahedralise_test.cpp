@@ -35,6 +35,24 @@ double surface_area(const SurfaceMesh& s) {
   return sum;
 }
 
+/// A closed band around the z axis, of quadrilaterals cut in two, seen from outside.
+SurfaceMesh ring(double radius, double thickness, double height, int sides) {
+  SurfaceMesh s;
+  const double r[] = {radius - thickness / 2.0, radius + thickness / 2.0}, z[] = {0.0, height};
+  for (int i = 0; i < sides; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / sides;
+    for (const auto& [in, up] : {std::pair(0, 0), std::pair(1, 0), std::pair(1, 1), std::pair(0, 1)})
+      s.vertices.emplace_back(r[in] * std::cos(angle), r[in] * std::sin(angle), z[up]);
+    const Index here = 4 * i, next = 4 * ((i + 1) % sides);
+    for (Index k = 0; k < 4; ++k) {
+      const Index l = (k + 1) % 4;
+      s.triangles.push_back({here + k, next + k, next + l});
+      s.triangles.push_back({here + k, next + l, here + l});
+    }
+  }
+  return s;
+}
+
 template <class Exception>
 std::string message_of(const auto& action) {
   try {
@@ -198,6 +216,35 @@ TEST(Tetrahedralise, WrongOptionsAndImpossibleSizesAreOneLineEach) {
   EXPECT_THAT(message_of<ComputationError>([&] { tetrahedralise(open, {.alpha = 1e-5}, warnings); }),
               HasSubstr("try alpha"));
   EXPECT_THAT(message_of<InputError>([&] { tetrahedralise(SurfaceMesh{}, {}, warnings); }), HasSubstr("no triangles"));
+}
+
+// Refinement makes cells no wider than a plate is thick.
+TEST(Tetrahedralise, ThinPartsGetWideCellsForQuadraticElements) {
+  const SurfaceMesh plate = shapes::box({0, 0, 0}, {0.2, 0.1, 0.004});
+  Warnings warnings;
+  const auto narrow = tetrahedralise(plate, {.cell_size = 0.02}, warnings);
+  const auto wide = tetrahedralise(plate, {.cell_size = 0.02, .quadratic = true}, warnings);
+  EXPECT_LT(4 * wide.mesh.nodes.size(), narrow.mesh.nodes.size());
+  EXPECT_NEAR(wide.volume_after, wide.volume_before, kRoundOff * wide.volume_before) << "sides and edges stay";
+  EXPECT_TRUE(surface_quality(boundary_surface(wide.mesh).surface).closed_manifold());
+  EXPECT_EQ(bodies(wide.mesh), 1);
+  EXPECT_THAT(warnings, IsEmpty());
+  const auto again = tetrahedralise(plate, {.cell_size = 0.02, .quadratic = true}, warnings);
+  EXPECT_EQ(again.mesh.nodes, wide.mesh.nodes);
+  EXPECT_EQ(again.mesh.tets, wide.mesh.tets);
+}
+
+TEST(Tetrahedralise, WideCellsStayNearACurvedSurface) {
+  const double radius = 0.05, thickness = 0.002, height = 0.02;
+  const SurfaceMesh ring = ring(radius, thickness, height, 128);
+  Warnings warnings;
+  const auto r = tetrahedralise(ring, {.quadratic = true}, warnings);
+  for (const Vec3& x : r.mesh.nodes) {
+    const double off = std::abs(std::hypot(x[0], x[1]) - radius) - thickness / 2.0;
+    EXPECT_LT(off, 0.05 * thickness);
+  }
+  EXPECT_NEAR(r.volume_after, r.volume_before, 5e-3 * r.volume_before);
+  EXPECT_TRUE(surface_quality(boundary_surface(r.mesh).surface).closed_manifold());
 }
 
 }  // namespace

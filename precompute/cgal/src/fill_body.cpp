@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cgal_steps.h"
+#include "coarsen.h"
 #include "flat_tets.h"
 #include "pinched_edges.h"
 
@@ -13,18 +14,22 @@ namespace {
 // docs/tetrahedralisation.md has the measurements behind these.
 constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many cells gets smaller ones
 constexpr double kSamplesPerCell = 2.0;     ///< along a side
-constexpr double kFacetDistancePerCell = 0.1;
+constexpr double kFacetDistancePerCell = 0.1, kFacetDistancePerWideCell = 0.05;
 /// Refinement that makes this many times the nodes expected is running away.
 constexpr double kRunaway = 2.5;
-constexpr std::size_t kFewNodes = 2000;  ///< are never too many
-constexpr double kWorstShape = 0.01;     ///< flatter tets (see worst_shape) spoil the stiffness
-constexpr double kFiner = 0.8;           ///< cells of the next try
-constexpr int kTries = 4;                ///< with smaller and smaller cells
-constexpr int kFailures = 2;             ///< tries without a mesh, after which smaller cells are no hope
-constexpr double kStrayPart = 0.01;      ///< of its body's volume: a smaller loose piece is dropped
-constexpr double kWorstVolume = 0.1;     ///< of the body's: a worse error is not good
-constexpr double kUselessVolume = 0.5;   ///< a worse error is no mesh of the body
-constexpr double kLeastSize = 1e-3;      ///< of the cell size: nothing is made smaller for what is thin
+constexpr std::size_t kFewNodes = 2000;            ///< are never too many
+constexpr double kWorstShape = 0.01;               ///< flatter tets (see worst_shape) spoil the stiffness
+constexpr double kFiner = 0.8;                     ///< cells of the next try
+constexpr int kTries = 4;                          ///< with smaller and smaller cells
+constexpr int kFailures = 2;                       ///< tries without a mesh, after which smaller cells are no hope
+constexpr double kStrayPart = 0.01;                ///< of its body's volume: a smaller loose piece is dropped
+constexpr double kWorstVolume = 0.1;               ///< of the body's: a worse error is not good
+constexpr double kUselessVolume = 0.5;             ///< a worse error is no mesh of the body
+constexpr double kWidth = 2.5;                     ///< of wide cells, over the thickness
+constexpr double kShortest = 1.0, kLongest = 1.8;  ///< edges of wide cells, over their size
+constexpr double kDeviation = 0.03;       ///< of the boundary by widening, of the cell size that fits the thickness
+constexpr double kLeastWideShape = 0.05;  ///< a wide cell across a thin part is flat
+constexpr double kLeastSize = 1e-3;       ///< of the cell size: nothing is made smaller for what is thin
 
 /// How good a mesh is, best first.
 enum class Grade { kGood, kInaccurate, kFlat, kNone };
@@ -87,16 +92,33 @@ Judged judge(MeshedBody meshed, const Body& body) {
 struct Attempt {
   double cell_size = 0.0;
   bool keep_sharp_edges = false;
+  bool wide_cells = false;
 };
+
+/// Widens cells where the body is thin. A mesh that is not good is left as it is.
+void widen_cells(const MeasuredBody& body, double smallest_cell, Judged& judged) {
+  if (judged.grade != Grade::kGood) return;
+  std::vector<ThicknessSample> samples = body.samples;
+  const SizeField narrow(samples, body.cell_size, smallest_cell);
+  for (ThicknessSample& s : samples) s.thickness = kWidth * std::max(s.thickness, smallest_cell);
+  const SizeField wide(samples, body.cell_size, smallest_cell);
+  coarsen(judged.filled.mesh,
+          {.shortest = [&](const Vec3& x) { return kShortest * kWidth / (kWidth - 1.0) * (wide(x) - narrow(x)); },
+           .longest = [&](const Vec3& x) { return kLongest * wide(x); },
+           .deviation = [&](const Vec3& x) { return kDeviation * narrow(x); },
+           .least_shape = kLeastWideShape});
+}
 
 Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
   const SizeField size(body.samples, how.cell_size, smallest_cell);
   const double expected = expected_nodes(body.samples, body.body->volume, how.cell_size, smallest_cell);
+  // Half the distance to a curved side asks for twice as many nodes on it.
+  const double runaway = kRunaway * (how.wide_cells ? kFacetDistancePerCell / kFacetDistancePerWideCell : 1.0);
   Judged j = judge(mesh_body(body.body->boundary, body.body->seeds,
                              {.cell_size = size,
-                              .facet_distance = kFacetDistancePerCell,
+                              .facet_distance = how.wide_cells ? kFacetDistancePerWideCell : kFacetDistancePerCell,
                               .keep_sharp_edges = how.keep_sharp_edges,
-                              .max_nodes = static_cast<std::size_t>(kRunaway * expected) + kFewNodes}),
+                              .max_nodes = static_cast<std::size_t>(runaway * expected) + kFewNodes}),
                    *body.body);
   j.filled.sharp_edges_kept = how.keep_sharp_edges;
   return j;
@@ -132,7 +154,7 @@ double smallest_affordable_cell(const std::vector<MeasuredBody>& bodies, double 
   return high;
 }
 
-FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_edges) {
+FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& filling) {
   Judged best;
   int tries = 0;
   const auto attempt = [&](const Attempt& how) {
@@ -142,7 +164,8 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
     if (tries == 1 || grade < best.grade) best = std::move(j);
     return grade;
   };
-  Attempt how{.cell_size = body.cell_size, .keep_sharp_edges = keep_sharp_edges};
+  Attempt how{
+      .cell_size = body.cell_size, .keep_sharp_edges = filling.keep_sharp_edges, .wide_cells = filling.wide_cells};
   int failures = 0;
   for (int i = 0; i < kTries && failures < kFailures && best.grade != Grade::kGood; ++i, how.cell_size *= kFiner) {
     bool failed = attempt(how) == Grade::kNone;
@@ -152,7 +175,9 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_
     }
     failures += failed ? 1 : 0;
   }
-  if (best.grade != Grade::kGood && how.keep_sharp_edges) attempt({.cell_size = body.cell_size});
+  if (best.grade != Grade::kGood && how.keep_sharp_edges)
+    attempt({.cell_size = body.cell_size, .wide_cells = filling.wide_cells});
+  if (filling.wide_cells) widen_cells(body, smallest_cell, best);
   best.filled.tries = tries;
   return best.filled;
 }

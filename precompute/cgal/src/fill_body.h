@@ -35,9 +35,14 @@ struct FilledBody {
   Index dropped_tets = 0;  ///< of stray pieces
 };
 
+struct Filling {
+  bool keep_sharp_edges = false;
+  bool wide_cells = false;  ///< where the body is thin, wider than it is thick: what ten-node tets need
+};
+
 /// The first good mesh, or else the best; if that is less than half of the body's volume, none. Good is: without flat
 /// tets, in one piece and within a tenth of the body's volume. A mesh that is not good is made again with smaller
 /// cells, a few times, and without the sharp edges where it cannot be made with them.
-FilledBody fill(const MeasuredBody& body, double smallest_cell, bool keep_sharp_edges);
+FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& how);
 
 }  // namespace limber::internal

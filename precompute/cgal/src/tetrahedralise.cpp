@@ -21,7 +21,7 @@ using internal::FilledBody;
 using internal::MeasuredBody;
 
 // Defaults and bounds; docs/tetrahedralisation.md has the measurements behind them.
-constexpr double kCellsPerDiagonal = 40.0;
+constexpr double kCellsPerDiagonal = 40.0, kQuadraticCellsPerDiagonal = 16.0;
 constexpr double kAlphasPerDiagonal = 50.0;
 constexpr double kOffsetPerAlpha = 1.0 / 30.0;
 constexpr double kTetsPerCubicCell = 6.0;  ///< tets in a volume of cell_size³
@@ -186,9 +186,9 @@ void append(const TetMesh& body, TetMesh& mesh) {
 }
 
 /// Fills one body and adds its tets to the whole.
-void add_body(const MeasuredBody& body, const std::string& which, bool keep_sharp_edges, Tetrahedralisation& result,
-              Warnings& warnings) {
-  const FilledBody filled = internal::fill(body, result.smallest_cell, keep_sharp_edges);
+void add_body(const MeasuredBody& body, const std::string& which, const internal::Filling& how,
+              Tetrahedralisation& result, Warnings& warnings) {
+  const FilledBody filled = internal::fill(body, result.smallest_cell, how);
   result.tries += filled.tries;
   result.sharp_edges_kept = result.sharp_edges_kept && filled.sharp_edges_kept;
   const std::string sized = "tetrahedralise: " + which + " (diagonal " + text(body.body->diagonal) + " m, cells of " +
@@ -220,7 +220,7 @@ void fill_bodies(const Bodies& bodies, double cell_size, const Tetrahedralisatio
   result.sharp_edges_kept = !result.wrapped;
   for (std::size_t b = 0; b < measured.size(); ++b) {
     tell(options, "meshing body " + std::to_string(b + 1) + " of " + std::to_string(measured.size()));
-    add_body(measured[b], "body " + std::to_string(b), !result.wrapped, result, warnings);
+    add_body(measured[b], "body " + std::to_string(b), {!result.wrapped, options.quadratic}, result, warnings);
     result.volume_before += bodies.bodies[b].volume;
   }
   result.seconds_mesh = seconds_since(start);
@@ -247,7 +247,9 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
   if (!(diagonal > 0.0 && std::isfinite(diagonal)))
     throw InputError("tetrahedralise: the surface's bounding box has diagonal " + text(diagonal) +
                      " m, expected a finite length above 0");
-  const double cell_size = options.cell_size > 0.0 ? options.cell_size : diagonal / kCellsPerDiagonal;
+  const double cell_size = options.cell_size > 0.0
+                               ? options.cell_size
+                               : diagonal / (options.quadratic ? kQuadraticCellsPerDiagonal : kCellsPerDiagonal);
   const double alpha = options.alpha > 0.0 ? options.alpha : diagonal / kAlphasPerDiagonal;
 
   Tetrahedralisation result;

@@ -26,6 +26,10 @@ struct TetrahedralisationOptions {
   /// Nodes that may be spent on parts and gaps thinner than the cell size, whose cells are made as small as they are
   /// thin; a mesh of cells of one size is made whatever it takes. ≥ 1
   int max_nodes = 60'000;
+  /// For ten-node tets, which bend where four-node ones are too stiff: cells are 1/16 of the diagonal by default, and
+  /// where parts are thin 2.5 times as wide as they are thick. Smaller ones go by edge collapse, which keeps flat sides
+  /// and sharp edges. max_nodes is then of the mesh before, and about as many as the ten-node tets have.
+  bool quadratic = false;
   /// Told each stage as it begins, in the thread that calls.
   std::function<void(const std::string&)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
