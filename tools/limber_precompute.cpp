@@ -34,7 +34,8 @@ struct Arguments {
   std::vector<std::string> fixes, residuals;
   double residual_megabytes = 32.0;
   int collision_triangles = 0;
-  std::string mass = "lumped";
+  std::string mass;
+  std::string elements;
   std::vector<double> rayleigh;
   std::string damping_ratio;
   std::string render_surface, collision_surface, skin;
@@ -82,9 +83,12 @@ void declare_mode_options(CLI::App& app, Arguments& a) {
       ->type_name("HZ")
       ->check(positive_number());
   app.add_flag("--keep-all", a.limits.keep_all, "switches off the limits on force and frame rate");
-  app.add_option("--mass", a.mass, "mass matrix")
-      ->check(CLI::IsMember({"lumped", "consistent"}))
-      ->capture_default_str();
+  app.add_option("--mass", a.mass, "mass matrix; default: lumped of linear elements, consistent of quadratic ones")
+      ->check(CLI::IsMember({"lumped", "consistent"}));
+  app.add_option("--elements", a.elements,
+                 "four nodes a tet (linear) or ten (quadratic), which bend as they should; default: quadratic for tets "
+                 "made from a surface, else as the file has them; parts of an assembly: linear")
+      ->check(CLI::IsMember({"linear", "quadratic"}));
   app.add_option("--rayleigh", a.rayleigh, "damping a1 K + a2 M: a1 in s, a2 in 1/s")
       ->type_name("A1,A2")
       ->delimiter(',')
@@ -233,6 +237,7 @@ BakeOptions options_of(const Arguments& a) {
   BakeOptions o;
   o.materials = materials_of(a);
   for (const std::string& text : a.fixes) o.fixed.push_back(parse_node_selector(text));
+  if (!a.elements.empty()) o.elements = a.elements == "linear" ? Elements::kLinear : Elements::kQuadratic;
   o.damping = damping_of(a);
   o.analysis = {.modes = a.modes,
                 .mass = a.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
@@ -307,6 +312,7 @@ nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahed
 /// Fills a surface with tets; it stays what is drawn.
 void fill_with_tets(Program& program, const Arguments& a, BakeInput& input, Stopwatch& stopwatch) {
   TetrahedralisationOptions options = a.tets;
+  options.quadratic = a.elements != "linear";
   options.progress = [&](const std::string& stage) { program.progress().stage(stage); };
   Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
     try {
@@ -415,6 +421,7 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
   AssemblyOptions assembly = a.assembly;
   assembly.scale = a.scale;
   assembly.tets = a.tets;
+  assembly.tets.quadratic = a.elements == "quadratic";
   assembly.components = a.components == "groups"      ? ComponentRule::kGroups
                         : a.components == "materials" ? ComponentRule::kMaterials
                                                       : ComponentRule::kConnectivity;
@@ -437,12 +444,23 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
                                             fs::absolute(a.output).lexically_relative(folder).string()));
 }
 
+/// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
+void choose_elements(const Arguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options) {
+  if (a.elements.empty() && made_here) options.elements = Elements::kQuadratic;
+  const bool quadratic =
+      options.elements == Elements::kQuadratic || (options.elements == Elements::kAsGiven && has_mid_edge_nodes);
+  if (a.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
+}
+
 void precompute(Program& program, const Arguments& a) {
   if (a.list_materials) return print_materials(program);
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
   check_assembly(a);
-  const BakeOptions options = options_of(a);
-  if (a.auto_joints || !a.assembly.joints_file.empty()) return precompute_assembly(program, a, options);
+  BakeOptions options = options_of(a);
+  if (a.auto_joints || !a.assembly.joints_file.empty()) {
+    choose_elements(a, false, false, options);
+    return precompute_assembly(program, a, options);
+  }
   nlohmann::ordered_json seconds;
   Stopwatch stopwatch(seconds);
 
@@ -451,6 +469,7 @@ void precompute(Program& program, const Arguments& a) {
   program.progress().stage("reading");
   BakeInput input = read_input(program, a, stopwatch);
   input.provenance = provenance_of(program, a, program.options());
+  choose_elements(a, program.report().contains("surface"), input.mesh.has_mid_edge_nodes(), options);
 
   program.progress().stage("modes");
   TbbJobs jobs;
