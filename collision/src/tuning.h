@@ -133,12 +133,35 @@ struct FinderTuning {
   double worth_a_look = 0.9;
 };
 
+/// Contacts by samples of one surface in the distance field of another.
+struct FieldTuning {
+  int cells = 48;  ///< of the grid of distances, along its longest side [24 to 96]
+  /// Part of a surface's area that may bound walls thinner than two cells [0 to 0.2]; with more the body is left to
+  /// triangles.
+  double thin_area = 0.1;
+  int lattice_cells = 8,
+      least_lattice_cells = 3;   ///< of displacements, along the longest side and the others [4 to 16]
+  double lattice_beyond = 0.04;  ///< by which part of the longest side the lattice goes beyond the surface [0 to 0.2]
+  /// Sine of the angle at which the surface turns outwards at an edge, up to which the edge touches no other [0 to
+  /// 0.1].
+  double least_turn = 1e-3;
+  /// Displacements up to this part of a cell are not undone before the field is asked [0.25 to 1]; up to that of the
+  /// longest side in one step, above in two [0.01 to 0.05].
+  double carried_from = 0.5, carried_once = 0.02;
+  double slack = 0.2;  ///< part of a cell that the field may be off by, next to edges [0.1 to 0.5]
+  /// Sine, 64°, by which a vertex's surface may lean back from the plane that it is to leave a body by [0.7 to 0.95].
+  double leaning = 0.9;
+  double least_patch = 0.1;   ///< part of its area below which a patch's area vector is no direction [0.01 to 0.3]
+  double deepest_exit = 2.0;  ///< of its deepest nearest point, how far a patch's way out may lead [1.4 to 4]
+};
+
 struct CollisionTuning {
   HierarchyTuning hierarchy{};
   BroadTuning broad{};
   ConvexTuning convex{};
   NarrowTuning narrow{};
   FinderTuning finder{};
+  FieldTuning field{};
 };
 
 /// The process-wide value. Measurements and tests put other numbers in its place, while nothing of the module runs.

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "field/field_pairs.h"
 #include "finder/contact_id.h"
 #include "limber/collision/broad_phase.h"
 #include "limber/collision/contact_finder.h"
@@ -118,7 +119,10 @@ void ManifoldFinderOptions::validate() const {
 }
 
 struct ManifoldFinder::Impl {
-  explicit Impl(const ManifoldFinderOptions& o) : options(o) { options.validate(); }
+  explicit Impl(const ManifoldFinderOptions& o) : options(o) {
+    options.validate();
+    if (options.distance_fields) deforming = std::make_unique<internal::FieldPairs>();
+  }
 
   ManifoldFinderOptions options;
   internal::GeometryCache geometries;

@@ -36,8 +36,8 @@ class DeformingPairs {
   /// the last query, ascending
   virtual void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
                            std::span<const Index> changed, Jobs& jobs) = 0;
-  /// Whether it finds the contacts of two bodies, of which one deforms at least.
-  virtual bool takes(const ManifoldBody& a, const ManifoldBody& b) const = 0;
+  /// Whether it finds the contacts of a pair, of which one body deforms at least.
+  virtual bool takes(const PairQuery& query) const = 0;
   /// Appends.
   virtual void find(const PairQuery& query, std::vector<FeatureContact>& found) = 0;
 };

@@ -43,7 +43,11 @@ struct ManifoldFinderOptions {
   /// Share of a pair's size up to which overlapping faces keep two bodies apart, and by which the faces of neighbours
   /// may differ in height and still are one. In [0, 0.1].
   double flush = 5e-3;
-  /// Of pairs in which a surface deforms.
+  /// Whether pairs in which a surface deforms are looked up in distance fields, in bounded time and single precision,
+  /// where these resolve both bodies (docs/collision.md). Fields are made by add_body(), in up to some tenths of a
+  /// second for each model. Otherwise, and for all other such pairs, NarrowPhase finds the contacts.
+  bool distance_fields = false;
+  /// Of pairs in which a surface deforms and that NarrowPhase looks at.
   NarrowPhaseOptions narrow_phase{};
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };

@@ -1,0 +1,361 @@
+#include "field/field_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "limber/core/quaternion.h"
+
+namespace limber::internal {
+namespace {
+
+bool is_half_space(const FieldBody& body) {
+  return body.geometry != nullptr && std::holds_alternative<HalfSpace>(body.geometry->shape());
+}
+
+// A ball is a capsule of no length.
+bool capsule_of(const FieldBody& body, Capsule& capsule) {
+  if (body.geometry == nullptr) return false;
+  if (const auto* ball = std::get_if<Sphere>(&body.geometry->shape())) {
+    capsule = {.radius = ball->radius, .half_length = 0.0};
+    return true;
+  }
+  const auto* shape = std::get_if<Capsule>(&body.geometry->shape());
+  if (shape != nullptr) capsule = *shape;
+  return shape != nullptr;
+}
+
+double longest_side(const FieldBody& body) {
+  if (body.shell != nullptr) return body.shell->shell().longest_side();
+  return (body.geometry->bounds().high - body.geometry->bounds().low).maxCoeff();
+}
+
+void set_frame(FieldQuery& query, const Eigen::Matrix3f& R, const Vec3f& p) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) query.R[i][j] = R(i, j);
+    query.p[i] = p[i];
+  }
+}
+
+const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const ClusterView& clusters,
+                                            std::vector<std::uint32_t>& found) {
+  found.resize(kFieldLanes * clusters.groups);
+  found.resize(near_clusters(query, clusters, found.data()));
+  return found;
+}
+
+}  // namespace
+
+// -- What is found ----------------------------------------------------------------------------------------------------
+
+void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
+                      double reach) {
+  mine = &me, other = &field;
+  turn = to_matrix(X_FS.q).cast<float>(), shift = X_FS.p.cast<float>();
+  query.field = field.shell().distance();
+  query.lattice = field.lattice();
+  query.reach = static_cast<float>(reach);
+  query.flex = field.flex();
+  set_frame(query, turn, shift);
+}
+
+bool FieldView::apart() const {
+  const Vec3f centre = placed(0.5f * (mine->low() + mine->high())) - 0.5f * (other->low() + other->high());
+  const Vec3f half = turn.cwiseAbs() * (0.5f * (mine->high() - mine->low())) + 0.5f * (other->high() - other->low());
+  return (centre.cwiseAbs() - half).maxCoeff() > query.reach;
+}
+
+FoundSide at_vertex(const DeformedPointshell& body, Index v) {
+  const CollisionSurface& surface = body.shell().surface();
+  const Index t = surface.vertex_triangles(v).front();
+  FoundSide side{.key = feature_key(Feature::Kind::kVertex, v), .triangle = t, .point = body.vertex(v).cast<double>()};
+  for (std::size_t c = 0; c < 3; ++c) side.weight[c] = surface.triangle(t)[c] == v ? 1.0 : 0.0;
+  return side;
+}
+
+FoundSide on_foot(const SurfaceFoothold& foot) {
+  FoundSide side{.triangle = foot.triangle, .point = foot.point.cast<double>()};
+  const auto v = static_cast<double>(foot.weight[1]), w = static_cast<double>(foot.weight[2]);
+  side.weight = {1.0 - v - w, v, w};
+  return side;
+}
+
+void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples) {
+  const DeformedPointshell& body = *view.mine;
+  const CollisionSurface& surface = body.shell().surface();
+  if (sample_of_.size() < static_cast<std::size_t>(surface.vertices()))
+    sample_of_.resize(static_cast<std::size_t>(surface.vertices()), -1);
+  const auto sample_of = [&](Index v) -> Index& { return sample_of_[static_cast<std::size_t>(v)]; };
+  joined_.reset(samples.size());
+  patches_.assign(samples.size(), {});
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    if (samples[i].gap < 0.0f) sample_of(samples[i].vertex) = static_cast<Index>(i);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    if (samples[i].gap < 0.0f)
+      for (const Index w : surface.vertex_neighbours(samples[i].vertex))
+        if (sample_of(w) >= 0) joined_.join(static_cast<Index>(i), sample_of(w));
+  for (const SampleFoot& sample : samples) sample_of(sample.vertex) = -1;
+  const auto root = [&](std::size_t i) { return static_cast<std::size_t>(joined_.root(static_cast<Index>(i))); };
+  const auto deepest = static_cast<float>(collision_tuning().field.deepest_exit);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!(samples[i].gap < 0.0f)) continue;
+    const Vec3f area = view.turn * area_vector(body, samples[i].vertex);
+    Patch& patch = patches_[root(i)];
+    patch.way.direction -= area, patch.area += area.norm();
+    patch.way.most = std::max(patch.way.most, -deepest * samples[i].gap);
+    for (std::size_t j = 0; j < i && !patch.disagrees; ++j)
+      patch.disagrees = samples[j].gap < 0.0f && root(j) == root(i) && samples[j].normal.dot(samples[i].normal) <= 0.0f;
+  }
+  const auto least = static_cast<float>(collision_tuning().field.least_patch);
+  for (Patch& patch : patches_) {
+    const float length = patch.way.direction.norm();
+    if (patch.disagrees && length > least * patch.area)
+      patch.way.direction /= length;
+    else
+      patch.disagrees = false;
+  }
+}
+
+// -- Two bodies -------------------------------------------------------------------------------------------------------
+
+bool FieldContacts::serves(const FieldBody& a, const FieldBody& b) {
+  Capsule capsule;
+  const auto known = [&](const FieldBody& body) {
+    return body.shell != nullptr ? body.shell->shell().resolved() : is_half_space(body) || capsule_of(body, capsule);
+  };
+  if (!known(a) || !known(b) || (a.shell == nullptr && b.shell == nullptr)) return false;
+  constexpr double kCellsOfTheOther = 8.0;
+  const auto fine = [&](const FieldBody& field, const FieldBody& other) {
+    return field.shell == nullptr || field.shell->shell().distance().kind == DistanceView::Kind::kBox ||
+           is_half_space(other) || field.shell->shell().cell() * kCellsOfTheOther <= longest_side(other);
+  };
+  return fine(a, b) && fine(b, a);
+}
+
+std::span<const FoundContact> FieldContacts::find(const FieldBody& a, const FieldBody& b, const RigidTransform& X_AB,
+                                                  double reach) {
+  reach_ = reach;
+  found_.clear();
+  X_AB_ = X_AB;
+  if (a.shell != nullptr && b.shell != nullptr) {
+    find_between(a, b);
+  } else {
+    find_on_shape(a.shell != nullptr ? a : b, a.shell != nullptr ? b : a, a.shell == nullptr);
+  }
+  settle();
+  return found_;
+}
+
+void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
+  // What lies within the margin is told by the foot; the field is off by a part of its cells.
+  const double slack = collision_tuning().field.slack;
+  view_[0].place(*a.shell, *b.shell, X_AB_.inverse(), reach_ + slack * b.shell->shell().cell());
+  view_[1].place(*b.shell, *a.shell, X_AB_, reach_ + slack * a.shell->shell().cell());
+  if (view_[0].apart() || view_[1].apart()) return;
+  edges_.begin(view_[0], view_[1], reach_);
+  for (int of = 0; of < 2; ++of) find_samples(of, find_near(view_[of].query, view_[of].mine->view().samples, near_));
+  if (find_near(view_[0].query, view_[0].mine->view().edges, near_).empty() ||
+      find_near(view_[1].query, view_[1].mine->view().edges, other_near_).empty())
+    return;  // an edge that meets another one is met
+  edges_.find(0, near_);
+  edges_.find(1, other_near_);
+  edges_.finish(found_);
+}
+
+void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters) {
+  const FieldView& view = view_[of];
+  grow(hits_, kHitsOfCluster * clusters.size());
+  const std::size_t count = near_samples(view.query, view.mine->view(), clusters.data(), clusters.size(), hits_.data());
+  samples_.clear();
+  Index last = -1;
+  for (const FieldHit& hit : std::span(hits_).first(count)) {
+    SampleFoot sample{.vertex = view.mine->shell().sample_vertex(hit.feature)};
+    if (std::exchange(last, sample.vertex) == sample.vertex) continue;  // repeated to fill the last cluster
+    settle_foot(view, hit, sample);
+    if (sample.gap <= static_cast<float>(reach_)) samples_.push_back(sample);
+  }
+  leave_by_patches(view);
+  for (const SampleFoot& sample : samples_) add_sample(of, sample);
+}
+
+void FieldContacts::settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample) {
+  sample.at = Vec3f(hit.at[0], hit.at[1], hit.at[2]);
+  SurfaceFoothold start = foot_on(*view.other, view.other->shell().triangle_near(hit), sample.at);
+  Index last = start.triangle;
+  for (const Index t : view.other->shell().triangles_about(hit)) {
+    if (t == start.triangle || std::exchange(last, t) == t) continue;
+    const SurfaceFoothold foot = foot_on(*view.other, t, sample.at);
+    if (foot.squared_distance < start.squared_distance) start = foot;
+  }
+  sample.foot = walk_to_foot(*view.other, start.triangle, sample.at);
+  const Vec3f outward = normal_at(*view.other, sample.foot), out = sample.at - sample.foot.point;
+  // Next to the surface the field's sign is not to be relied on; farther off the foot may be on another part of it.
+  const float near = 0.5f * static_cast<float>(view.other->shell().cell());
+  const bool inside = std::abs(hit.distance) < near ? out.dot(outward) < 0.0f : hit.distance < 0.0f;
+  const float distance = std::sqrt(sample.foot.squared_distance);
+  sample.gap = inside ? -distance : distance;
+  // Directions between points as near as this are noise in single precision.
+  const float directionless = 1e-5f * static_cast<float>(view.other->shell().longest_side());
+  sample.normal = distance > directionless ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
+}
+
+// Vertices inside whose own surface does not lie on the side that their nearest point would push them to.
+void FieldContacts::leave_by_patches(const FieldView& view) {
+  const auto leaning = static_cast<float>(collision_tuning().field.leaning);
+  bool known = false;
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    SampleFoot& sample = samples_[i];
+    if (!(sample.gap < 0.0f) || lies_in_front(*view.mine, sample.vertex, view.turned_back(sample.normal), leaning))
+      continue;
+    if (!known) patches_.find(view, samples_);
+    known = true;
+    const PatchExits::Way* way = patches_.way(i);
+    if (way == nullptr) continue;
+    FieldQuery query = view.query;
+    set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
+    const DeformedPointshell& other = *view.other;
+    const Vec3f far = sample.at + way->most * way->direction;
+    FieldHit exit;
+    if (!first_exit(query, sample.at.data(), far.data(), static_cast<float>(other.shell().cell()), exit)) continue;
+    const Pierced through = walk_to_face(other, other.shell().triangle_near(exit), sample.at, far);
+    if (through.triangle < 0 || !(through.along > 0.0f && through.along <= 1.0f)) continue;
+    const Vec3f point = sample.at + through.along * (far - sample.at);
+    sample.foot = foot_on(other, through.triangle, point);
+    sample.normal = way->direction, sample.gap = -(point - sample.at).norm();
+  }
+}
+
+void FieldContacts::add_sample(int of, const SampleFoot& sample) {
+  const FieldView& view = view_[of];
+  FoundContact contact;
+  contact.of[of] = at_vertex(*view.mine, sample.vertex);
+  contact.of[1 - of] = on_foot(sample.foot);
+  const Vec3f n = of == 0 ? view.turned_back(sample.normal) : Vec3f(-sample.normal);
+  contact.normal = n.cast<double>();
+  found_.push_back(contact);
+  if (sample.gap < 0.0f) edges_.set_exit(of, sample.vertex, n);
+}
+
+// -- Half-spaces, balls and capsules ----------------------------------------------------------------------------------
+
+void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape, bool shape_is_a) {
+  const RigidTransform X_BS = shape_is_a ? X_AB_.inverse() : X_AB_, X_SB = X_BS.inverse();
+  FieldQuery query;
+  query.reach = static_cast<float>(reach_);
+  Capsule capsule;
+  const auto* half_space = std::get_if<HalfSpace>(&shape.geometry->shape());
+  if (half_space != nullptr) {
+    // In the frame of the samples, whose numbers are small however far away the plane's own frame is.
+    const Vec3 n = X_BS.q * half_space->normal;
+    query.field.kind = DistanceView::Kind::kPlane;
+    for (int axis = 0; axis < 3; ++axis) query.field.size[axis] = static_cast<float>(n[axis]);
+    query.field.radius = static_cast<float>(half_space->offset + n.dot(X_BS.p));
+    set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
+  } else {
+    capsule_of(shape, capsule);
+    query.field.kind = DistanceView::Kind::kSegment;
+    query.field.size[2] = static_cast<float>(capsule.half_length);
+    query.field.radius = static_cast<float>(capsule.radius);
+    set_frame(query, to_matrix(X_SB.q).cast<float>(), X_SB.p.cast<float>());
+  }
+  const ShellView shell = body.shell->view();
+  const std::vector<std::uint32_t>& clusters = find_near(query, shell.samples, near_);
+  grow(hits_, kHitsOfCluster * clusters.size());
+  const std::size_t count = near_samples(query, shell, clusters.data(), clusters.size(), hits_.data());
+  const Mat3 R_AB = to_matrix(X_AB_.q);
+  Index last = -1;
+  for (const FieldHit& hit : std::span(hits_).first(count)) {
+    const Index v = body.shell->shell().sample_vertex(hit.feature);
+    if (std::exchange(last, v) == v) continue;  // repeated to fill the last cluster
+    FoundContact contact;
+    FoundSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
+    mine = at_vertex(*body.shell, v);
+    const Vec3 p = X_SB * mine.point;
+    Vec3 n;
+    if (half_space != nullptr) {
+      n = half_space->normal;
+      other.point = p - (n.dot(p) - half_space->offset) * n;
+    } else {
+      const Vec3 centre(0.0, 0.0, std::clamp(p.z(), -capsule.half_length, capsule.half_length)), out = p - centre;
+      n = out.isZero(0.0) ? Vec3::UnitX() : out.normalized();
+      other.point = centre + capsule.radius * n;
+    }
+    contact.normal = shape_is_a ? Vec3(-n) : Vec3(R_AB * n);
+    found_.push_back(contact);
+  }
+  if (half_space == nullptr) find_shape_in_field(body, capsule, X_BS, shape_is_a);
+}
+
+// Nearest points of the surface to a capsule's axis: local minima, walked to from wherever the field has the axis or a
+// point of the capsule's own surface near.
+void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& shape, const RigidTransform& X_BS,
+                                        bool shape_is_a) {
+  const DeformedPointshell& shell = *body.shell;
+  FieldQuery query;
+  query.field = shell.shell().distance(), query.lattice = shell.lattice();
+  set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
+  const Mat3 R = to_matrix(X_BS.q), R_AB = to_matrix(X_AB_.q);
+  const double slack = collision_tuning().field.slack * shell.shell().cell() + static_cast<double>(shell.flex());
+  feet_.clear();
+  const int stations = shape.half_length > 0.0 ? 4 : 1;
+  for (int station = 0; station < stations; ++station) {
+    const double start = stations > 1 ? shape.half_length * (2.0 * station / (stations - 1) - 1.0) : 0.0;
+    for (int side = 0; side < 7; ++side) {
+      Vec3 probe = Vec3::Zero();
+      if (side > 0) probe[(side - 1) / 2] = side % 2 == 1 ? shape.radius : -shape.radius;
+      probe.z() += start;
+      const Vec3f at = (X_BS * probe).cast<float>();
+      const FieldHit hit = field_at(query, at.data());
+      if (static_cast<double>(hit.distance) > reach_ + slack + (side == 0 ? shape.radius : 0.0)) continue;
+      Index triangle = shell.shell().triangle_near(hit);
+      double along = start;
+      SurfaceFoothold foot;
+      // Whether the foot of a point of the axis lies farther up, m: the distance falls that way. It does not at the
+      // upper end, nor the other way at the lower one, so that a least distance lies between the start and one of them.
+      const auto farther_up = [&](double of) {
+        foot = walk_to_foot(shell, triangle, (X_BS * Vec3(0.0, 0.0, of)).cast<float>());
+        triangle = foot.triangle;
+        return (R.transpose() * (foot.point.cast<double>() - X_BS.p)).z() - of;
+      };
+      if (shape.half_length > 0.0) {
+        const bool up = farther_up(start) > 0.0;
+        double low = up ? start : -shape.half_length, high = up ? shape.half_length : start;
+        constexpr int kHalvings = 24;
+        for (int halving = 0; halving < kHalvings; ++halving) {
+          const double middle = 0.5 * (low + high);
+          (farther_up(middle) > 0.0 ? low : high) = middle;
+        }
+        along = up ? high : low;
+      }
+      farther_up(along);
+      const FeatureKey key = key_of(shell.shell().surface(), foot);
+      if (std::ranges::find(feet_, key) != feet_.end()) continue;
+      feet_.push_back(key);
+      const Vec3 centre = X_BS * Vec3(0.0, 0.0, along), out = centre - foot.point.cast<double>();
+      const Vec3 outward = normal_at(shell, foot).cast<double>();
+      const double distance = out.norm();
+      const bool inside = out.dot(outward) < 0.0;
+      const Vec3 n =
+          distance > 1e-5 * shape.radius ? Vec3(out / (inside ? -distance : distance)) : Vec3(outward.normalized());
+      if ((inside ? -distance : distance) - shape.radius > reach_) continue;
+      FoundContact contact;
+      FoundSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
+      mine = on_foot(foot), mine.key = key;
+      other.point = X_BS.inverse() * Vec3(centre - shape.radius * n);
+      contact.normal = shape_is_a ? Vec3(R_AB * n) : Vec3(-n);
+      found_.push_back(contact);
+    }
+  }
+}
+
+// Gaps are those of the points: in double, of numbers of single precision.
+void FieldContacts::settle() {
+  for (FoundContact& found : found_) {
+    found.normal.normalize();
+    found.gap = found.normal.dot(found.of[0].point - X_AB_ * found.of[1].point);
+  }
+  std::erase_if(found_, [this](const FoundContact& found) { return found.gap > reach_; });
+  std::ranges::sort(found_, {}, &FoundContact::id);
+}
+
+}  // namespace limber::internal

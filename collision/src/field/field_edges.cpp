@@ -1,0 +1,218 @@
+#include "field/field_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace limber::internal {
+namespace {
+
+int corner_of(const CollisionSurface& surface, Index t, Index e) {
+  return surface.edge_of(t, 0) == e ? 0 : surface.edge_of(t, 1) == e ? 1 : 2;
+}
+
+}  // namespace
+
+void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a, double margin) {
+  view_[0] = a_in_b, view_[1] = b_in_a;
+  margin_ = static_cast<float>(margin);
+  piercings_.clear(), contacts_.clear();
+  ++generation_;
+  for (int of = 0; of < 2; ++of) {
+    const auto vertices = static_cast<std::size_t>(view_[of].mine->shell().surface().vertices());
+    if (generation_ == 0) std::ranges::fill(stamp_[of], 0u);
+    if (stamp_[of].size() < vertices) stamp_[of].resize(vertices), exit_[of].resize(vertices);
+  }
+  if (generation_ == 0) generation_ = 1;
+}
+
+void FieldEdges::set_exit(int of, Index vertex, const Vec3f& direction) {
+  stamp_[of][static_cast<std::size_t>(vertex)] = generation_;
+  exit_[of][static_cast<std::size_t>(vertex)] = direction;
+}
+
+void FieldEdges::find(int of, std::span<const std::uint32_t> clusters) {
+  const FieldView& view = view_[of];
+  const Pointshell& mine = view.mine->shell();
+  grow(hits_, kHitsOfEdge * kFieldLanes * clusters.size());
+  const std::size_t count = near_edges(view.query, view.mine->view(), clusters.data(), clusters.size(),
+                                       static_cast<float>(view.other->shell().cell()), hits_.data());
+  Index last = -1;
+  for (const FieldHit& hit : std::span(hits_).first(count)) {
+    const Index e = mine.edge(hit.feature);
+    if (hit.feature > 0 && mine.edge(hit.feature - 1) == e && last != hit.feature) continue;  // repeated to fill eights
+    last = hit.feature;
+    const auto& ends = mine.surface().edge(e).vertices;
+    const Vec3f from = view.placed(view.mine->vertex(ends[0])), to = view.placed(view.mine->vertex(ends[1]));
+    const Index near = view.other->shell().triangle_near(hit);
+    const Pierced through = walk_to_face(*view.other, near, from, to);
+    if (through.triangle >= 0 && through.along > 0.0f && through.along < 1.0f) {
+      const Vec3f point = from + through.along * (to - from);
+      piercings_.push_back({of, e, through.triangle, of == 0 ? view.turned_back(point - view.shift) : point, 0});
+    } else {
+      add_separated(of, e, walk_to_foot(*view.other, near, from + hit.along * (to - from)).triangle);
+    }
+  }
+}
+
+Vec3f FieldEdges::vertex(int of, Index v) const {
+  return of == 0 ? view_[0].mine->vertex(v) : view_[1].placed(view_[1].mine->vertex(v));
+}
+
+// Where the common perpendicular of two edges meets both between their ends.
+bool FieldEdges::nearest_of_edges(Index e, Index f, EdgePair& pair) const {
+  const auto &ends_e = view_[0].mine->shell().surface().edge(e).vertices,
+             &ends_f = view_[1].mine->shell().surface().edge(f).vertices;
+  const Vec3f a0 = vertex(0, ends_e[0]), b0 = vertex(1, ends_f[0]);
+  const Vec3f u = vertex(0, ends_e[1]) - a0, w = vertex(1, ends_f[1]) - b0, r = b0 - a0;
+  const Vec3f n = u.cross(w);
+  const float n2 = n.squaredNorm();
+  // Directions of lines nearer to parallel are noise in single precision.
+  constexpr float kParallel = 1e-4f;
+  if (!(n2 > kParallel * kParallel * u.squaredNorm() * w.squaredNorm())) return false;
+  const float s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
+  if (!(s > 0.0f && s < 1.0f && t > 0.0f && t < 1.0f)) return false;
+  pair = {e, f, s, t, a0 + s * u, b0 + t * w, n / std::sqrt(n2), 0.0f};
+  pair.distance = pair.direction.dot(pair.on_e - pair.on_f);
+  if (pair.distance < 0.0f) pair.distance = -pair.distance, pair.direction = -pair.direction;
+  return true;
+}
+
+// See PairSurface::in_normal_cone().
+bool FieldEdges::in_normal_cone(int of, Index edge, const Vec3f& direction) const {
+  const DeformedPointshell& body = *view_[of].mine;
+  const CollisionSurface& surface = body.shell().surface();
+  const Vec3f d = of == 0 ? direction : view_[1].turned_back(direction);
+  const auto& ends = surface.edge(edge).vertices;
+  const Vec3f from = body.vertex(ends[0]), along = (body.vertex(ends[1]) - from).normalized();
+  Vec3f sum = Vec3f::Zero(), outward = Vec3f::Zero();
+  float worst = -1.0f;
+  for (const Index t : surface.edge_triangles(edge)) {
+    const Index tip = surface.triangle(t)[static_cast<std::size_t>((corner_of(surface, t, edge) + 2) % 3)];
+    Vec3f inward = body.vertex(tip) - from;
+    inward = (inward - along.dot(inward) * along).normalized();
+    sum += inward, outward += face_normal(body, t);
+    worst = std::max(worst, inward.dot(d));
+  }
+  constexpr float kRoundOffOfDirections = 1e-5f;
+  const auto rocking = static_cast<float>(collision_tuning().narrow.rocking);
+  return worst <= kRoundOffOfDirections + rocking * sum.norm() && outward.dot(d) >= -kRoundOffOfDirections;
+}
+
+// Edges that have not crossed, of a face next to the point at which the field is least.
+void FieldEdges::add_separated(int of, Index edge, Index face) {
+  for (int c = 0; c < 3; ++c) {
+    const Index other = view_[of].other->shell().surface().edge_of(face, c);
+    EdgePair pair;
+    if (!view_[of].other->shell().sticks_out(other)) continue;
+    if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair) || pair.distance > margin_) continue;
+    if (in_normal_cone(1, pair.f, pair.direction) && in_normal_cone(0, pair.e, -pair.direction))
+      add(pair, pair.direction);
+  }
+}
+
+// Where two triangles intersect, an edge of one goes through the other at each end: piercings with a triangle pair in
+// common belong to one loop. Sorts them by loop.
+void FieldEdges::find_loops() {
+  crossed_.clear();
+  for (std::size_t i = 0; i < piercings_.size(); ++i) {
+    const Piercing& p = piercings_[i];
+    for (const Index t : view_[p.of].mine->shell().surface().edge_triangles(p.edge)) {
+      const auto of_a = static_cast<std::uint64_t>(p.of == 0 ? t : p.face),
+                 of_b = static_cast<std::uint64_t>(p.of == 0 ? p.face : t);
+      crossed_.push_back({of_a << 32 | of_b, static_cast<Index>(i)});
+    }
+  }
+  std::ranges::sort(crossed_, [](const Crossed& x, const Crossed& y) {
+    return std::tie(x.triangles, x.piercing) < std::tie(y.triangles, y.piercing);
+  });
+  loops_.reset(piercings_.size());
+  for (std::size_t i = 1; i < crossed_.size(); ++i)
+    if (crossed_[i].triangles == crossed_[i - 1].triangles) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
+  for (std::size_t i = 0; i < piercings_.size(); ++i) piercings_[i].loop = loops_.root(static_cast<Index>(i));
+  std::ranges::sort(piercings_, [](const Piercing& x, const Piercing& y) {
+    return std::tie(x.loop, x.of, x.edge, x.face) < std::tie(y.loop, y.of, y.edge, y.face);
+  });
+}
+
+void FieldEdges::cross_loop(std::size_t first, std::size_t end) {
+  crossings_.clear();
+  for (std::size_t i = first; i < end; ++i) {
+    const Piercing& p = piercings_[i];
+    for (int c = 0; c < 3; ++c) {
+      const Index other = view_[p.of].other->shell().surface().edge_of(p.face, c);
+      EdgePair pair;
+      if (view_[p.of].other->shell().sticks_out(other) &&
+          nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair) &&
+          in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction))
+        crossings_.push_back(pair);
+    }
+  }
+  find_ways_out(first, end);
+  const auto same_way = static_cast<float>(collision_tuning().narrow.same_way);
+  for (const EdgePair& crossing : crossings_)
+    if (std::ranges::any_of(ways_out_, [&](const Vec3f& way) { return -crossing.direction.dot(way) > same_way; }))
+      add(crossing, -crossing.direction);
+}
+
+// Directions in which vertices leave that are inside next to the loop. Without any, that of the crossing along which
+// the loop, and with it what both bodies share, is least wide.
+void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
+  ways_out_.clear();
+  for (std::size_t i = first; i < end; ++i) {
+    const int of = piercings_[i].of;
+    const CollisionSurface& surface = view_[of].mine->shell().surface();
+    const auto inside = [&](Index v) { return stamp_[of][static_cast<std::size_t>(v)] == generation_; };
+    for (const Index v : surface.edge(piercings_[i].edge).vertices) {
+      if (!inside(v)) continue;
+      ways_out_.push_back(exit_[of][static_cast<std::size_t>(v)]);
+      // Their neighbours too: edges that do not stick out go through the loop as well and are not looked at.
+      for (const Index w : surface.vertex_neighbours(v))
+        if (inside(w)) ways_out_.push_back(exit_[of][static_cast<std::size_t>(w)]);
+    }
+  }
+  if (!ways_out_.empty() || crossings_.empty()) return;
+  const EdgePair* best = nullptr;
+  float least = std::numeric_limits<float>::infinity();
+  for (const EdgePair& crossing : crossings_) {
+    float low = std::numeric_limits<float>::infinity(), high = -low;
+    for (std::size_t i = first; i < end; ++i) {
+      const float height = crossing.direction.dot(piercings_[i].point);
+      low = std::min(low, height), high = std::max(high, height);
+    }
+    const float width = std::max(high - low, crossing.distance);
+    if (width < least) least = width, best = &crossing;
+  }
+  ways_out_.push_back(-best->direction);
+}
+
+FoundSide FieldEdges::on_edge(int of, Index edge, float along, const Vec3f& point) const {
+  const CollisionSurface& surface = view_[of].mine->shell().surface();
+  const Index t = surface.edge_triangles(edge).front();
+  const auto corner = static_cast<std::size_t>(corner_of(surface, t, edge));
+  const bool forward = surface.triangle(t)[corner] == surface.edge(edge).vertices[0];
+  const double at_next = static_cast<double>(forward ? along : 1.0f - along);
+  FoundSide side{.key = feature_key(Feature::Kind::kEdge, edge), .triangle = t};
+  side.weight[corner] = 1.0 - at_next, side.weight[(corner + 1) % 3] = at_next;
+  side.point = (of == 0 ? point : view_[1].turned_back(point - view_[1].shift)).cast<double>();
+  return side;
+}
+
+void FieldEdges::add(const EdgePair& pair, const Vec3f& normal) {
+  contacts_.push_back(
+      {{on_edge(0, pair.e, pair.s, pair.on_e), on_edge(1, pair.f, pair.t, pair.on_f)}, normal.cast<double>()});
+}
+
+void FieldEdges::finish(std::vector<FoundContact>& found) {
+  find_loops();
+  for (std::size_t first = 0, next = 0; first < piercings_.size(); first = next) {
+    while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
+    cross_loop(first, next);
+  }
+  std::ranges::sort(contacts_, {}, &FoundContact::id);
+  const auto repeated = std::ranges::unique(contacts_, {}, &FoundContact::id);
+  found.insert(found.end(), contacts_.begin(), repeated.begin());
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,65 @@
+// Edges of one surface on edges of another's where a distance field has them near.
+#pragma once
+
+#include <vector>
+
+#include "field/field_pair.h"
+#include "tuning.h"
+
+namespace limber::internal {
+
+/// See field_contacts.h. Everything in the frame of a.
+class FieldEdges {
+ public:
+  void begin(const FieldView& a_in_b, const FieldView& b_in_a, double margin);
+  /// An inside vertex leaves along a direction, out of b into a.
+  void set_exit(int of, Index vertex, const Vec3f& direction);
+  /// Edges of one side, in clusters that the other's field has near.
+  void find(int of, std::span<const std::uint32_t> clusters);
+  /// Appends the contacts of all edges found since begin(), each once.
+  void finish(std::vector<FoundContact>& found);
+
+ private:
+  struct Piercing {
+    int of;
+    Index edge, face;
+    Vec3f point;
+    Index loop;
+  };
+  /// The nearest points of an edge of a and one of b.
+  struct EdgePair {
+    Index e, f;
+    float s, t;
+    Vec3f on_e, on_f, direction;  ///< unit, from f to e
+    float distance;
+  };
+  struct Crossed {
+    std::uint64_t triangles;
+    Index piercing;
+  };
+
+  Vec3f vertex(int of, Index v) const;
+  bool nearest_of_edges(Index e, Index f, EdgePair& pair) const;
+  bool in_normal_cone(int of, Index edge, const Vec3f& direction) const;
+  void add_separated(int of, Index edge, Index face);
+  void find_loops();
+  void cross_loop(std::size_t first, std::size_t end);
+  void find_ways_out(std::size_t first, std::size_t end);
+  void add(const EdgePair& pair, const Vec3f& normal);
+  FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
+
+  FieldView view_[2];
+  float margin_ = 0.0f;
+  std::vector<FieldHit> hits_;
+  std::vector<Piercing> piercings_;
+  std::vector<Crossed> crossed_;
+  DisjointSets loops_;
+  std::vector<EdgePair> crossings_;  ///< of one loop
+  std::vector<Vec3f> ways_out_;      ///< of one loop
+  std::vector<std::uint32_t> stamp_[2];
+  std::vector<Vec3f> exit_[2];
+  std::uint32_t generation_ = 0;
+  std::vector<FoundContact> contacts_;
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,120 @@
+// The vector loops behind contacts by distance fields. Raw pointers only: the file that implements them is compiled for
+// several instruction sets, so neither Eigen nor a header that includes it may reach it.
+//
+// Points come in clusters of eight, x[8] y[8] z[8]. Every result is the same bits on every instruction set that has
+// fused multiply-add.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace limber::internal {
+
+inline constexpr std::size_t kFieldLanes = 8;
+inline constexpr std::size_t kClusterFloats = 3 * kFieldLanes;
+/// Rows of coordinates are computed so many at a time.
+inline constexpr std::size_t kRowTile = 16;
+
+/// Nodes of a regular grid: node (i, j, k) is number (i·count[1] + j)·count[2] + k.
+struct GridView {
+  float origin[3];         ///< of node 0, m
+  float inverse[3];        ///< 1/m: of the sides of a cell
+  float last[3];           ///< a little less than count − 1: what is beyond the grid is looked up on its border
+  std::int32_t stride[2];  ///< nodes from i to i + 1, and from j to j + 1
+};
+
+/// A signed distance, negative inside, in one frame.
+struct DistanceView {
+  enum class Kind : std::uint8_t {
+    kPlane,    ///< size · q − radius
+    kSegment,  ///< of a ball or capsule: about (0, 0, ±size[2]), of `radius`
+    kBox,      ///< half extents `size`
+    kGrid,     ///< trilinear between nodes
+  } kind = Kind::kGrid;
+  float size[3] = {0.0f, 0.0f, 0.0f};
+  float radius = 0.0f;
+  GridView grid{};
+  /// Per node its own distance, in the low 16 bits, and that of the next one along the third axis, in units of `unit`.
+  const std::int32_t* nodes = nullptr;
+  float unit = 0.0f;  ///< m
+};
+
+/// Displacements of a deformed body about its surface, trilinear between nodes.
+struct LatticeView {
+  GridView grid{};
+  const std::int32_t* place = nullptr;  ///< per node, where its xyz stand in `coordinates`; null: nothing is displaced
+  const float* coordinates = nullptr;
+  int steps = 0;  ///< of r ← q − u(r), which carries a point back into the rest shape
+};
+
+/// What distances are asked of: a field and how the points lie in its frame, q = R x + p.
+struct FieldQuery {
+  DistanceView field{};
+  LatticeView lattice{};
+  float R[3][3] = {};  ///< rows
+  float p[3] = {};
+  float reach = 0.0f;  ///< m: distances up to here count
+  float flex = 0.0f;   ///< m: no point of the field's body is displaced farther
+};
+
+/// Clusters of eight in one state: balls that hold them.
+struct ClusterView {
+  const float* centres = nullptr;  ///< by eights of clusters, x[8] y[8] z[8]
+  const float* radii = nullptr;    ///< m; negative: no cluster
+  std::size_t groups = 0;          ///< of eight clusters
+};
+
+/// A surface's samples and edges in one state.
+struct ShellView {
+  const float* coordinates = nullptr;  ///< of samples, by cluster
+  ClusterView samples{}, edges{};
+  /// Per cluster of edges, where x of their first eight ends stand in `coordinates`, then of their second.
+  const std::int32_t* edge_ends = nullptr;
+};
+
+/// A sample or a point of an edge near a field's surface.
+struct FieldHit {
+  std::int32_t feature;  ///< number of the sample or edge, by their order in the clusters
+  float along;           ///< of an edge, 0 to 1 from its first end
+  float distance;        ///< m, of the field
+  float at[3];           ///< in the field's frame, m
+  float rest[3];         ///< the same point carried back into the rest shape
+  float slope[3];        ///< of the distance; not of unit length
+};
+
+/// The largest number of hits that a query of so many clusters or edges has.
+inline constexpr std::size_t kHitsOfCluster = kFieldLanes;
+inline constexpr std::size_t kHitsOfEdge = 8;
+
+/// Coordinates of up to `kBodiesAtOnce` bodies of one geometry: out[b] = rest + U z[b].
+/// @param U tiles of kRowTile rows, [tile][mode][kRowTile] @param rest, out 64-byte aligned
+inline constexpr std::size_t kBodiesAtOnce = 4;
+void multiply_rows(const float* rest, const float* U, std::size_t tiles, std::size_t modes, const float* const* z,
+                   float* const* out, std::size_t bodies);
+
+/// The largest |v| of each axis over `count` points xyz xyz …
+void largest_magnitudes(const float* points, std::size_t count, float largest[3]);
+
+/// Box about balls about the clusters' centres. @param radii as many as lanes of `groups`; negative: none
+void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]);
+
+/// Clusters that may have something within reach. @param found room for 8 · groups @return how many
+std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found);
+
+/// Samples of clusters that are within reach. @param hits room for kHitsOfCluster each @return how many
+std::size_t near_samples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
+                         std::size_t count, FieldHit* hits);
+
+/// Points of edges at which the distance along them changes its sign, comes within reach or is least within it, those
+/// at the ends excepted. The field is looked at in steps of a cell at most.
+/// @param step m: of a cell @param hits room for 8 · kHitsOfEdge each
+std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
+                       std::size_t count, float step, FieldHit* hits);
+
+/// Where a straight way from an inside point first leaves. @param step see near_edges() @return false: nowhere on it
+bool first_exit(const FieldQuery& query, const float from[3], const float to[3], float step, FieldHit& exit);
+
+/// The distance at one point, for tests and for what is asked one by one.
+FieldHit field_at(const FieldQuery& query, const float x[3]);
+
+}  // namespace limber::internal

@@ -1,0 +1,94 @@
+// Two bodies as contacts by fields see them, and what is found between them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "field/surface_walk.h"
+#include "limber/core/disjoint_sets.h"
+
+namespace limber::internal {
+
+/// One body's surface as the other's field sees it.
+struct FieldView {
+  const DeformedPointshell* mine = nullptr;
+  const DeformedPointshell* other = nullptr;
+  FieldQuery query{};                                  ///< in the other's frame
+  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< from my frame to the other's
+  Vec3f shift = Vec3f::Zero();
+
+  /// @param X_FS where I am in the field's frame
+  void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS, double reach);
+  /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
+  bool apart() const;
+  Vec3f placed(const Vec3f& p) const { return turn * p + shift; }
+  Vec3f turned_back(const Vec3f& direction) const { return turn.transpose() * direction; }
+};
+
+/// Makes room; what a buffer holds beyond is left as it is.
+template <class T>
+void grow(std::vector<T>& buffer, std::size_t size) {
+  if (buffer.size() < size) buffer.resize(size);
+}
+
+/// The key of a surface that a vertex meets, whatever the feature there: a face, of no number.
+inline const FeatureKey kAnyFace = feature_key(Feature::Kind::kFace, 0x3fffffff);
+
+/// One body's side of a contact.
+struct FoundSide {
+  FeatureKey key = kAnyFace;
+  Index triangle = -1;
+  std::array<double, 3> weight{0.0, 0.0, 0.0};
+  Vec3 point = Vec3::Zero();  ///< body frame, m
+};
+
+struct FoundContact {
+  FoundSide of[2];             ///< of a and b
+  Vec3 normal = Vec3::Zero();  ///< unit, frame of a, out of b into a
+  double gap = 0.0;            ///< m: normal · (p_a − p_b)
+
+  std::uint64_t id() const { return std::uint64_t{of[0].key} << 32 | of[1].key; }
+};
+
+FoundSide at_vertex(const DeformedPointshell& body, Index v);
+FoundSide on_foot(const SurfaceFoothold& foot);
+
+/// A vertex and where it meets the other surface, in the field's frame.
+struct SampleFoot {
+  Index vertex = -1;
+  Vec3f at = Vec3f::Zero();
+  SurfaceFoothold foot{};
+  Vec3f normal = Vec3f::Zero();  ///< unit, out of the field's surface
+  float gap = 0.0f;              ///< m
+};
+
+/// Patches of inside vertices that edges join, whose nearest points do not agree on a way out: two of them at right
+/// angles or more.
+class PatchExits {
+ public:
+  void find(const FieldView& view, std::span<const SampleFoot> samples);
+  /// Unit, in the field's frame, for the vertex's surface to move along, and the most that it should have to, m; null
+  /// of a vertex whose patch agrees, or whose area vectors all but cancel.
+  struct Way {
+    Vec3f direction = Vec3f::Zero();
+    float most = 0.0f;
+  };
+  const Way* way(std::size_t sample) {
+    const Patch& patch = patches_[static_cast<std::size_t>(joined_.root(static_cast<Index>(sample)))];
+    return patch.disagrees ? &patch.way : nullptr;
+  }
+
+ private:
+  struct Patch {
+    Way way{};
+    float area = 0.0f;
+    bool disagrees = false;
+  };
+  DisjointSets joined_;  ///< samples
+  std::vector<Patch> patches_;
+  std::vector<Index> sample_of_;  ///< per vertex; −1: not inside. All −1 between calls
+};
+
+}  // namespace limber::internal

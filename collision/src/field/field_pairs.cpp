@@ -1,0 +1,96 @@
+#include "field/field_pairs.h"
+
+#include <algorithm>
+
+#include "limber/core/error.h"
+
+namespace limber::internal {
+namespace {
+
+FeatureSide feature_side(const FoundSide& side) { return {side.key, side.triangle, side.weight, side.point}; }
+
+}  // namespace
+
+void FieldPairs::add_body(Index index, const ManifoldBody& body) {
+  const auto at = static_cast<std::size_t>(index);
+  if (at >= entries_.size()) entries_.resize(at + 1);
+  entries_[at] = {.rigid = body.rigid};
+  if (!body.modal) {
+    rigid_.push_back(index);
+    return;
+  }
+  std::erase_if(shells_, [](const auto& entry) { return entry.second.expired(); });
+  auto& known = shells_[body.modal->surface.get()];
+  auto shell = known.lock();
+  if (!shell) known = shell = std::make_shared<const Pointshell>(body.modal->surface);
+  if (shell->resolved()) entries_[at].shell.emplace(std::move(shell)), entries_[at].fresh = true;
+  deforms_ = true;
+}
+
+void FieldPairs::remove_body(Index index) {
+  entries_[static_cast<std::size_t>(index)] = {};
+  std::erase(rigid_, index);
+}
+
+void FieldPairs::make_rigid_shells() {
+  if (!deforms_) return;
+  for (const Index index : rigid_) {
+    Entry& entry = entries_[static_cast<std::size_t>(index)];
+    const auto& surface = entry.rigid->geometry.surface();
+    if (!surface) continue;
+    auto& known = shells_[surface.get()];
+    auto shell = known.lock();
+    if (!shell) known = shell = std::make_shared<const Pointshell>(entry.rigid->geometry);
+    if (shell->resolved()) entry.shell.emplace(std::move(shell));
+  }
+  rigid_.clear();
+}
+
+void FieldPairs::start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
+                             std::span<const Index> changed, Jobs& jobs) {
+  make_rigid_shells();
+  to_deform_.clear();
+  const auto look_at = [&](std::size_t i, bool moved) {
+    Entry& entry = entries_[i];
+    if (!bodies[i].present || !bodies[i].modal || !entry.shell || !(moved || entry.fresh)) return;
+    entry.fresh = false;
+    entry.shell->set_amplitudes(states[i].amplitudes);
+    to_deform_.push_back(&*entry.shell);
+  };
+  for (const Index i : changed) look_at(static_cast<std::size_t>(i), true);
+  for (std::size_t i = 0; i < entries_.size(); ++i) look_at(i, false);
+  std::ranges::stable_sort(to_deform_, std::less<>(), [](const DeformedPointshell* body) { return &body->shell(); });
+  deform(to_deform_, jobs);
+  while (scratch_.size() < static_cast<std::size_t>(jobs.concurrency()))
+    scratch_.push_back(std::make_unique<FieldContacts>());
+  free_.clear();
+  for (const auto& scratch : scratch_) free_.push_back(scratch.get());
+}
+
+FieldBody FieldPairs::field_body(Index index) const {
+  const Entry& entry = entries_[static_cast<std::size_t>(index)];
+  return {entry.shell ? &*entry.shell : nullptr, entry.rigid ? &entry.rigid->geometry : nullptr};
+}
+
+bool FieldPairs::takes(const PairQuery& query) const {
+  return query.index_a != query.index_b && FieldContacts::serves(field_body(query.index_a), field_body(query.index_b));
+}
+
+void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found) {
+  FieldContacts* scratch = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) throw ComputationError("FieldPairs: Jobs runs more loop bodies at once than concurrency()");
+    scratch = free_.back(), free_.pop_back();
+  }
+  for (const FoundContact& c :
+       scratch->find(field_body(query.index_a), field_body(query.index_b), query.X_AB, query.reach)) {
+    FeatureContact contact{feature_side(c.of[0]), feature_side(c.of[1]), c.normal, c.gap};
+    contact.b.point = query.X_AB * contact.b.point;
+    found.push_back(contact);
+  }
+  const std::lock_guard lock(mutex_);
+  free_.push_back(scratch);
+}
+
+}  // namespace limber::internal

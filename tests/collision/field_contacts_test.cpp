@@ -1,0 +1,490 @@
+// Contacts by distance fields: what they are made of, and what they find beside NarrowPhase.
+#include "field/field_contacts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "coarse_bunny.h"
+#include "counted_new.h"
+#include "finder_scenes.h"
+#include "instruction_sets.h"
+#include "limber/collision/manifold_finder.h"
+#include "limber/mesh/winding_number.h"
+#include "random_states.h"
+#include "solid_bodies.h"
+#include "thread_jobs.h"
+
+namespace limber {
+namespace {
+
+using internal::DeformedPointshell;
+using internal::FieldBody;
+using internal::FieldContacts;
+using internal::FieldHit;
+using internal::FieldQuery;
+using internal::Pointshell;
+using internal::SignedDistanceGrid;
+using testing::Random;
+
+SurfaceMesh scaled(SurfaceMesh mesh, double by) {
+  for (Vec3& v : mesh.vertices) v *= by;
+  return mesh;
+}
+
+/// 300 mm long, faces cut in squares of 25 mm.
+SurfaceMesh bar() { return boundary_surface(testing::solid_box({0.15, 0.025, 0.025}, {12, 2, 2})).surface; }
+SurfaceMesh ball() { return shapes::sphere(Vec3::Zero(), 0.1, 3); }
+
+FieldQuery query_of(const internal::DistanceView& field) {
+  FieldQuery query;
+  query.field = field;
+  for (int axis = 0; axis < 3; ++axis) query.R[axis][axis] = 1.0f;
+  return query;
+}
+
+double distance_at(const FieldQuery& query, const Vec3& p) {
+  const Vec3f x = p.cast<float>();
+  return static_cast<double>(field_at(query, x.data()).distance);
+}
+
+/// A body as both ways of finding contacts have it.
+struct TwoWays {
+  explicit TwoWays(const std::shared_ptr<const ModalModel>& model)
+      : exact(model), shell(std::make_shared<const Pointshell>(std::make_shared<const CollisionSurface>(model))) {}
+  explicit TwoWays(const Shape& shape) : exact(shape), geometry(shape) {
+    if (geometry->surface()) shell = DeformedPointshell(std::make_shared<const Pointshell>(*geometry));
+  }
+
+  void place(const RigidTransform& X_WB, const std::vector<double>& z = {}) {
+    exact.place(X_WB, z);
+    if (geometry) return;
+    shell->set_amplitudes(z);
+    DeformedPointshell* const bodies[] = {&*shell};
+    deform(bodies, serial_jobs());
+  }
+  FieldBody field() const { return {shell ? &*shell : nullptr, geometry ? &*geometry : nullptr}; }
+
+  testing::Body exact;
+  std::optional<DeformedPointshell> shell;
+  std::optional<RigidGeometry> geometry{};
+};
+
+RigidTransform between(const TwoWays& a, const TwoWays& b) { return a.exact.pose.inverse() * b.exact.pose; }
+
+/// As NarrowPhase tells contacts.
+std::vector<ContactPoint> by_fields(const TwoWays& a, const TwoWays& b, double margin) {
+  FieldContacts finder;
+  std::vector<ContactPoint> contacts;
+  for (const internal::FoundContact& c : finder.find(a.field(), b.field(), between(a, b), margin)) {
+    ContactPoint point;
+    for (const auto& [side, of, index] : {std::tuple(&point.a, &c.of[0], 0), std::tuple(&point.b, &c.of[1], 1)})
+      side->body = index, side->triangle = of->triangle, side->weight = of->weight, side->point_B = of->point;
+    point.normal = a.exact.pose.q * c.normal, point.gap = c.gap, point.id = c.id();
+    point.position = 0.5 * (point_a(point, a.exact) + point_b(point, b.exact));
+    contacts.push_back(point);
+  }
+  return contacts;
+}
+
+double deepest(const std::vector<ContactPoint>& contacts) {
+  double depth = 0.0;
+  for (const ContactPoint& c : contacts) depth = std::max(depth, -c.gap);
+  return depth;
+}
+
+/// Brings b along a direction as near to a as makes an exact contact of that depth, and no nearer.
+void bring_together(TwoWays& a, TwoWays& b, const Vec3& direction, const std::vector<double>& z, double depth) {
+  double near = 0.0, far = 1.0;
+  const Quaternion turn = b.exact.pose.q;
+  for (int halving = 0; halving < 14; ++halving) {
+    const double middle = 0.5 * (near + far);
+    b.exact.place({turn, middle * direction}, z);
+    (deepest(contacts_of(a.exact, b.exact, 1e-3)) > depth ? near : far) = middle;
+  }
+  b.place({turn, near * direction}, z);
+}
+
+/// What of the exact contacts the fields have none like of: within 30 mm, of a normal within 45° and a third of the
+/// depth.
+bool has_like(const ContactPoint& c, const std::vector<ContactPoint>& all) {
+  return std::ranges::any_of(all, [&](const ContactPoint& o) {
+    return (o.position - c.position).norm() < 0.03 && o.normal.dot(c.normal) > 0.7 && -o.gap > 0.3 * -c.gap;
+  });
+}
+
+bool is_edge_on_edge(const ContactPoint& c) {
+  return testing::is_kind(testing::key_of(c, 0), Feature::Kind::kEdge) &&
+         testing::is_kind(testing::key_of(c, 1), Feature::Kind::kEdge);
+}
+
+// -- Distances --------------------------------------------------------------------------------------------------------
+
+TEST(SignedDistanceGrid, TellsDistanceAndSide) {
+  const CollisionSurface surface(testing::wavy_model(bar(), 0));
+  const SignedDistanceGrid grid(surface);
+  const FieldQuery query = query_of(grid.view());
+  const auto to_box = [](const Vec3& p) {
+    const Vec3 beyond = p.cwiseAbs() - Vec3(0.15, 0.025, 0.025);
+    return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
+  };
+  Random random(1);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 p = random.vector(1.0).cwiseProduct(Vec3(0.16, 0.035, 0.035));
+    const double exact = to_box(p);
+    // Trilinear interpolation is off where the distance has a ridge: by less than half a cell's way along the diagonal.
+    EXPECT_NEAR(distance_at(query, p), exact, 0.45 * grid.cell()) << p.transpose();
+    if (std::abs(exact) > 0.45 * grid.cell()) {
+      EXPECT_EQ(distance_at(query, p) < 0.0, exact < 0.0);
+    }
+  }
+}
+
+TEST(SignedDistanceGrid, IsExactAtNodesToItsUnit) {
+  const SurfaceMesh mesh = ball();
+  const CollisionSurface surface(testing::wavy_model(mesh, 0));
+  const SignedDistanceGrid grid(surface);
+  const internal::DistanceView view = grid.view();
+  const SurfaceLocator locator(mesh.vertices, mesh.triangles);
+  Random random(2);
+  for (int i = 0; i < 300; ++i) {
+    Vec3 p;
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = static_cast<double>(view.grid.origin[axis]) +
+                grid.cell() * random.index(static_cast<Index>(view.grid.last[axis]));
+    const double exact = locator.nearest(p).distance;
+    EXPECT_NEAR(std::abs(distance_at(query_of(view), p)), exact, static_cast<double>(view.unit) + 1e-6);
+    EXPECT_EQ(distance_at(query_of(view), p) < 0.0, winding_number(mesh, p) > 0.5 && exact > 0.0);
+  }
+}
+
+TEST(SignedDistanceGrid, BeyondItsBoxIsNoMoreThanTheDistance) {
+  const CollisionSurface surface(testing::wavy_model(ball(), 0));
+  const SignedDistanceGrid grid(surface);
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 p = random.vector(0.5);
+    EXPECT_LE(distance_at(query_of(grid.view()), p), p.norm() - 0.099 + 0.5 * grid.cell());
+  }
+}
+
+// -- One body ---------------------------------------------------------------------------------------------------------
+
+TEST(Pointshell, LeavesSheetsAndOpenSurfacesToTriangles) {
+  const auto resolved = [](const SurfaceMesh& mesh) {
+    return Pointshell(std::make_shared<const CollisionSurface>(testing::wavy_model(mesh, 0))).resolved();
+  };
+  EXPECT_TRUE(resolved(ball()));
+  EXPECT_TRUE(resolved(bar()));
+  // 200 mm across: two cells are 9 mm.
+  EXPECT_TRUE(resolved(boundary_surface(testing::solid_box({0.1, 0.1, 0.006}, {8, 8, 1})).surface));
+  EXPECT_FALSE(resolved(boundary_surface(testing::solid_box({0.1, 0.1, 0.003}, {8, 8, 1})).surface));
+  SurfaceMesh open = ball();
+  open.triangles.pop_back();
+  EXPECT_FALSE(resolved(open));
+}
+
+TEST(DeformedPointshell, HasVerticesWhereTheModesTakeThem) {
+  const Index modes = 11;
+  const auto model = testing::wavy_model(ball(), modes);
+  const auto shell = std::make_shared<const Pointshell>(std::make_shared<const CollisionSurface>(model));
+  Random random(4);
+  std::vector<DeformedPointshell> bodies;
+  std::vector<std::vector<double>> z;
+  for (int i = 0; i < 7; ++i) {
+    z.push_back(random.amplitudes(modes, 0.01));
+    bodies.emplace_back(shell).set_amplitudes(z.back());
+  }
+  std::vector<DeformedPointshell*> all;
+  for (DeformedPointshell& body : bodies) all.push_back(&body);
+  deform(all, serial_jobs());
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    for (Index v = 0; v < shell->surface().vertices(); ++v) {
+      Vec3 p = shell->surface().rest(v);
+      for (Index m = 0; m < modes; ++m)
+        p += z[i][static_cast<std::size_t>(m)] * model->collision().basis.shape(v, m).cast<double>();
+      const Vec3f q = bodies[i].vertex(v);
+      ASSERT_LE((q.cast<double>() - p).norm(), 1e-7);
+      ASSERT_TRUE((q.array() >= bodies[i].low().array() - 1e-6f).all() &&
+                  (q.array() <= bodies[i].high().array() + 1e-6f).all());
+      ASSERT_LE((q - shell->surface().rest(v).cast<float>()).norm(), bodies[i].flex() * 1.2f + 1e-6f);
+    }
+  // Alone, in parts by many threads, and on every instruction set with fused multiply-add: the same bits.
+  const std::vector<Vec3f> before = [&] {
+    std::vector<Vec3f> x;
+    for (Index v = 0; v < shell->surface().vertices(); ++v) x.push_back(bodies[5].vertex(v));
+    return x;
+  }();
+  const auto expect_same = [&] {
+    for (Index v = 0; v < shell->surface().vertices(); ++v)
+      ASSERT_EQ(bodies[5].vertex(v), before[static_cast<std::size_t>(v)]);
+  };
+  DeformedPointshell* const alone[] = {&bodies[5]};
+  deform(alone, serial_jobs());
+  expect_same();
+  testing::ThreadJobs threads(3);
+  deform(all, threads);
+  expect_same();
+  for_each_instruction_set([&](std::int64_t target) {
+    if (!has_fused_multiply_add(target)) return;
+    deform(all, serial_jobs());
+    expect_same();
+  });
+}
+
+// The lattice has any displacement that is linear in space exactly, and what it carries back is where it was at rest.
+TEST(DeformedPointshell, CarriesPointsBackIntoTheRestShape) {
+  ModalModelData data = testing::wavy_data(bar(), 2);
+  for (Index v = 0; v < data.render.vertices(); ++v) {
+    const Vec3f& r = data.render.rest[static_cast<std::size_t>(v)];
+    data.render.basis.set(v, 0, Vec3f(0.1f * r.x() + 0.02f * r.y(), 0.05f * r.x(), 0.0f));
+    data.render.basis.set(v, 1, Vec3f(0.0f, 0.3f * r.z(), 0.1f * r.x()));
+  }
+  const auto model = std::make_shared<const ModalModel>(std::move(data));
+  DeformedPointshell body(std::make_shared<const Pointshell>(std::make_shared<const CollisionSurface>(model)));
+  const std::vector<double> z{0.5, 0.4};
+  body.set_amplitudes(z);
+  DeformedPointshell* const bodies[] = {&body};
+  deform(bodies, serial_jobs());
+  FieldQuery query = query_of(body.shell().distance());
+  query.lattice = body.lattice();
+  ASSERT_EQ(query.lattice.steps, 2);
+  Random random(5);
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 r = random.vector(1.0).cwiseProduct(Vec3(0.15, 0.025, 0.025));
+    const Vec3 u =
+        z[0] * Vec3(0.1 * r.x() + 0.02 * r.y(), 0.05 * r.x(), 0.0) + z[1] * Vec3(0.0, 0.3 * r.z(), 0.1 * r.x());
+    const Vec3f q = (r + u).cast<float>();
+    const FieldHit hit = field_at(query, q.data());
+    // Each of two steps leaves |∇u| < 0.15 of what was off.
+    EXPECT_LE((Vec3(hit.rest[0], hit.rest[1], hit.rest[2]) - r).norm(),
+              0.15 * 0.15 * u.norm() + 1e-4 * u.norm() + 1e-6);
+  }
+}
+
+// -- Two bodies -------------------------------------------------------------------------------------------------------
+
+struct Missed {
+  int vertices = 0, edges = 0, missed_vertices = 0, missed_edges = 0, deep_pairs = 0, unseen_pairs = 0;
+};
+
+/// Random pairs, bent by up to 2 % of their size, 3 mm deep.
+void look_at_pairs(TwoWays& a, TwoWays& b, Index modes, int pairs, unsigned seed, Missed& missed) {
+  Random random(seed);
+  for (int i = 0; i < pairs; ++i) {
+    a.place({random.pose(0.0).q, Vec3::Zero()}, random.amplitudes(modes, 0.002));
+    const std::vector<double> z = random.amplitudes(modes, 0.002);
+    b.place({random.pose(0.0).q, Vec3::Zero()}, z);
+    bring_together(a, b, random.vector(1.0).normalized(), z, 3e-3);
+    const std::vector<ContactPoint> exact = contacts_of(a.exact, b.exact, 1e-3), found = by_fields(a, b, 1e-3);
+    for (std::size_t c = 0; c < found.size(); ++c) {
+      ASSERT_NEAR(found[c].normal.norm(), 1.0, 1e-12);
+      ASSERT_LE(found[c].gap, 1e-3);
+      ASSERT_NEAR(found[c].gap, found[c].normal.dot(point_a(found[c], a.exact) - point_b(found[c], b.exact)), 1e-12);
+      if (c > 0) {
+        ASSERT_LT(found[c - 1].id, found[c].id);
+      }
+    }
+    missed.deep_pairs += deepest(exact) > 3e-3 ? 1 : 0;
+    missed.unseen_pairs += deepest(exact) > 3e-3 && deepest(found) == 0.0 ? 1 : 0;
+    for (const ContactPoint& c : exact) {
+      if (!(-c.gap > 1e-3)) continue;
+      (is_edge_on_edge(c) ? missed.edges : missed.vertices) += 1;
+      if (!has_like(c, found)) (is_edge_on_edge(c) ? missed.missed_edges : missed.missed_vertices) += 1;
+    }
+  }
+}
+
+// The gate: of exact contacts deeper than 1 mm no more than 2 % of vertex–surface and 5 % of edge–edge ones have none
+// like them; no pair deeper than 3 mm is unseen.
+TEST(FieldContacts, HasWhatNarrowPhaseHas) {
+  constexpr Index kModes = 8;
+  std::vector<SurfaceMesh> meshes{bar(), ball()};
+  if (const auto bunny = testing::coarse_bunny(300)) meshes.push_back(scaled(*bunny, 0.2));
+  Missed missed;
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    for (std::size_t j = i; j < meshes.size(); ++j) {
+      TwoWays a(testing::wavy_model(meshes[i], kModes)), b(testing::wavy_model(meshes[j], kModes));
+      look_at_pairs(a, b, kModes, testing::trials(12), static_cast<unsigned>(10 * i + j), missed);
+    }
+  EXPECT_GT(missed.vertices, 100);
+  EXPECT_GT(missed.edges, 25);
+  EXPECT_LE(missed.missed_vertices, 0.02 * missed.vertices) << "of " << missed.vertices;
+  EXPECT_LE(missed.missed_edges, 0.05 * missed.edges) << "of " << missed.edges;
+  EXPECT_EQ(missed.unseen_pairs, 0) << "of " << missed.deep_pairs;
+}
+
+// Two bars laid across each other without a vertex in the other: their edges carry them.
+TEST(FieldContacts, BarsAcrossEachOtherRestOnTheirEdges) {
+  const auto bar_model =
+      testing::wavy_model(boundary_surface(testing::solid_box({0.15, 0.02, 0.02}, {1, 1, 1})).surface, 0);
+  TwoWays a(bar_model), b(bar_model);
+  a.place({});
+  for (const double depth : {-5e-4, 1e-3, 5e-3}) {
+    b.place({quaternion_from_rotation_vector({0.0, 0.0, 1.2}), {0.01, 0.005, 0.04 - depth}});
+    const std::vector<ContactPoint> found = by_fields(a, b, 1e-3);
+    int edges = 0;
+    for (const ContactPoint& c : found) {
+      edges += is_edge_on_edge(c) ? 1 : 0;
+      EXPECT_NEAR(c.normal.z(), -1.0, 1e-6);
+      EXPECT_NEAR(c.gap, -depth, 1e-6);
+    }
+    EXPECT_EQ(edges, 4) << depth;
+  }
+}
+
+// A bar pushed into another: nearest points of vertices next to its sides are there, and ways out to both of them and
+// to the top would hold it in place.
+TEST(FieldContacts, PatchesHaveOneWayOut) {
+  const auto model = testing::wavy_model(bar(), 0);
+  TwoWays a(model), b(model);
+  a.place({});
+  for (const double depth : {0.002, 0.006, 0.012, 0.02}) {
+    b.place({quaternion_from_rotation_vector({0.0, 0.0, 1.5}), {0.01, 0.02, 0.05 - depth}});
+    const std::vector<ContactPoint> found = by_fields(a, b, 1e-3);
+    EXPECT_GT(deepest(found), 0.99 * depth);
+    for (const ContactPoint& c : found)
+      for (const ContactPoint& d : found)
+        if (c.gap < 0.0 && d.gap < 0.0) {
+          EXPECT_GT(c.normal.dot(d.normal), 0.0) << depth;
+        }
+  }
+}
+
+TEST(FieldContacts, RigidShapesAreMetAsByNarrowPhase) {
+  constexpr Index kModes = 6;
+  TwoWays body(testing::wavy_model(ball(), kModes));
+  // Upwards these all meet the ball; a capsule with its end and its side.
+  const RigidTransform upright{}, lying{quaternion_from_rotation_vector({1.5, 0.2, 0.0}), Vec3::Zero()};
+  const std::vector<std::pair<Shape, RigidTransform>> kinds{{HalfSpace{{0.0, 0.0, 1.0}, 0.01}, upright},
+                                                            {Sphere{0.06}, upright},
+                                                            {Capsule{0.03, 0.08}, upright},
+                                                            {Capsule{0.03, 0.08}, lying},
+                                                            {Box{{0.3, 0.3, 0.002}}, upright},
+                                                            {Box{{0.04, 0.05, 0.06}}, lying}};
+  Random random(8);
+  for (const auto& [kind, pose] : kinds) {
+    TwoWays shape(kind);
+    shape.place(pose);
+    for (int i = 0; i < 15; ++i) {
+      const std::vector<double> z = random.amplitudes(kModes, 0.002);
+      body.place({random.pose(0.0).q, Vec3::Zero()}, z);
+      ASSERT_TRUE(FieldContacts::serves(shape.field(), body.field()));
+      bring_together(shape, body, (Vec3::UnitZ() + random.vector(0.2)).normalized(), z, 1.5e-3);
+      const std::vector<ContactPoint> exact = contacts_of(shape.exact, body.exact, 1e-3),
+                                      found = by_fields(shape, body, 1e-3);
+      EXPECT_NEAR(deepest(found), deepest(exact), 1e-4) << kind.index();
+      for (const ContactPoint& c : exact)
+        if (c.gap < -1e-3) {
+          EXPECT_TRUE(has_like(c, found)) << kind.index() << " " << c.gap;
+        }
+      for (const ContactPoint& c : found)
+        EXPECT_NEAR(c.gap, c.normal.dot(point_a(c, shape.exact) - point_b(c, body.exact)), 1e-12);
+    }
+  }
+}
+
+TEST(FieldContacts, OneBodyAndItsMirrorHaveTheSameContacts) {
+  const auto model = testing::wavy_model(ball(), 4);
+  TwoWays a(model), b(model);
+  Random random(9);
+  a.place({random.pose(0.0).q, Vec3::Zero()}, random.amplitudes(4, 0.002));
+  b.place({random.pose(0.0).q, {0.0, 0.0, 0.19}}, random.amplitudes(4, 0.002));
+  const std::vector<ContactPoint> one = by_fields(a, b, 1e-3), other = by_fields(b, a, 1e-3);
+  ASSERT_FALSE(one.empty());
+  ASSERT_EQ(one.size(), other.size());
+  for (const ContactPoint& c : one)
+    EXPECT_TRUE(std::ranges::any_of(other, [&](const ContactPoint& d) {
+      return (c.position - d.position).norm() < 1e-6 && (c.normal + d.normal).norm() < 1e-4;
+    }));
+}
+
+TEST(FieldContacts, NothingIsAllocatedOnceWarm) {
+  const auto model = testing::wavy_model(bar(), 8);
+  TwoWays a(model), b(model), floor{Shape{HalfSpace{}}};
+  FieldContacts finder;
+  std::size_t found = 0;
+  const auto pass = [&](Random random) {
+    for (int i = 0; i < 20; ++i) {
+      a.exact.pose = random.pose(0.03), b.exact.pose = random.pose(0.03), floor.exact.pose = random.pose(0.03);
+      found += finder.find(a.field(), b.field(), between(a, b), 1e-3).size();
+      found += finder.find(a.field(), floor.field(), between(a, floor), 1e-3).size();
+    }
+  };
+  const std::vector<double> z = Random(11).amplitudes(8, 0.002);
+  a.place({}, z), b.place({}, z);
+  pass(Random(12));
+  const long before = testing::allocations();
+  DeformedPointshell* const both[] = {&*a.shell, &*b.shell};
+  a.shell->set_amplitudes(z);
+  deform(both, serial_jobs());
+  pass(Random(12));
+  EXPECT_EQ(testing::allocations(), before);
+  EXPECT_GT(found, 100u);
+}
+
+// -- In ManifoldFinder -----------------------------------------------------------------------------------------------
+
+TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
+  const testing::ContactScene heap = testing::heap(40);
+  ManifoldFinder by_fields({.distance_fields = true}), by_triangles, by_threads({.distance_fields = true});
+  heap.add_all_to(by_fields), heap.add_all_to(by_triangles), heap.add_all_to(by_threads);
+  testing::ThreadJobs threads(3);
+  const auto found = contacts_of(by_fields, heap, 1e-2), exact = contacts_of(by_triangles, heap, 1e-2),
+             again = contacts_of(by_threads, heap, 1e-2, Vec3::Zero(), threads);
+  ASSERT_EQ(found.size(), again.size());
+  for (std::size_t c = 0; c < found.size(); ++c) {
+    EXPECT_EQ(found[c].id, again[c].id);
+    EXPECT_EQ(found[c].gap, again[c].gap);
+    EXPECT_EQ(found[c].normal, again[c].normal);
+  }
+  // Bodies of 1 m, three hundredths deep in each other: no pair that triangles have deep is missing.
+  std::map<std::pair<Index, Index>, std::pair<double, double>> depths;
+  for (const ContactPoint& c : exact) {
+    double& depth = depths[{c.a.body, c.b.body}].first;
+    depth = std::max(depth, -c.gap);
+  }
+  for (const ContactPoint& c : found) {
+    double& depth = depths[{c.a.body, c.b.body}].second;
+    depth = std::max(depth, -c.gap);
+  }
+  int deep = 0;
+  for (const auto& [pair, depth] : depths) {
+    deep += depth.first > 0.01 ? 1 : 0;
+    if (depth.first > 0.01) {
+      EXPECT_GT(depth.second, 0.3 * depth.first) << pair.first << " on " << pair.second;
+    }
+  }
+  EXPECT_GT(deep, 10);
+}
+
+TEST(FieldPairs, AWarmQueryAllocatesNothing) {
+  testing::ContactScene heap = testing::heap(24);
+  ManifoldFinder finder({.distance_fields = true});
+  heap.add_all_to(finder);
+  std::vector<ContactPoint> contacts;
+  const auto query = [&](double sign) {
+    for (RigidTransform& pose : heap.poses) pose.p.z() += sign * 0.02;  // farther than manifolds are kept
+    finder.find_contacts({.states = heap.states(), .margin = 1e-2}, contacts, serial_jobs());
+  };
+  for (int i = 0; i < 6; ++i) query(i % 2 == 0 ? 1.0 : -1.0);
+  const std::vector<BodyState> states = heap.states();
+  std::vector<BodyState> moved = states;
+  for (std::size_t i = 1; i < moved.size(); ++i) moved[i].pose.p.x() += 0.02 * static_cast<double>(i % 2);
+  finder.find_contacts({.states = moved, .margin = 1e-2}, contacts, serial_jobs());
+  finder.find_contacts({.states = states, .margin = 1e-2}, contacts, serial_jobs());
+  const long before = testing::allocations();
+  finder.find_contacts({.states = moved, .margin = 1e-2}, contacts, serial_jobs());
+  finder.find_contacts({.states = states, .margin = 1e-2}, contacts, serial_jobs());
+  EXPECT_EQ(testing::allocations(), before);
+  EXPECT_FALSE(contacts.empty());
+}
+
+}  // namespace
+}  // namespace limber
