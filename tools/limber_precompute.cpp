@@ -494,10 +494,9 @@ void precompute(Program& program, const Arguments& a) {
 
 int main(int argc, char** argv) {
   using namespace limber::tools;
-  Program program(
-      "limber-precompute",
-      "Bakes a mesh into an asset: its vibration modes by linear finite elements, those of them that a scene "
-      "can show, and the surfaces that move with them. Lengths in metres.");
+  Program program("limber-precompute",
+                  "Bakes a mesh into an asset: its vibration modes by finite elements, those of them that a scene "
+                  "can show, and the surfaces that move with them. Lengths in metres.");
   Arguments arguments;
   program.options().add_option("MESH", arguments.mesh,
                                "tetrahedra (Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk) or a surface "

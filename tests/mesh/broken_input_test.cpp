@@ -64,7 +64,7 @@ TEST(BrokenFile, OfTetgenNamesTheFileOfThePairThatIsWrong) {
   expect(with(node, "\n3 ", "\n4 "), ele, "pair.node", "seen 4, expected a node number from 3 to 3");
   expect(with(node, "13 3", "12 3"), ele, "pair.node", "the head counts fewer nodes");
   expect(with(node, "13 3", "1300000 3"), ele, "pair.node", "bytes follow");
-  expect(node, with(ele, "12 4 1", "12 10 1"), "pair.ele", "run tetgen without -o2");
+  expect(node, with(ele, "12 4 1", "12 10 1"), "pair.ele", "expected a node from 1 to 13");
   expect(node, with(ele, "\n1 1 ", "\n1 0 "), "pair.ele", "seen 0, expected a node from 1 to 13");
   expect(node, with(ele, " 21\n", " 21.5\n"), "pair.ele", "expected a whole number as region attribute");
   expect(node, cut(ele, 0.6), "pair.ele", "");

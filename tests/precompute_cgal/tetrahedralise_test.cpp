@@ -236,9 +236,9 @@ TEST(Tetrahedralise, ThinPartsGetWideCellsForQuadraticElements) {
 
 TEST(Tetrahedralise, WideCellsStayNearACurvedSurface) {
   const double radius = 0.05, thickness = 0.002, height = 0.02;
-  const SurfaceMesh ring = ring(radius, thickness, height, 128);
+  const SurfaceMesh band = ring(radius, thickness, height, 128);
   Warnings warnings;
-  const auto r = tetrahedralise(ring, {.quadratic = true}, warnings);
+  const auto r = tetrahedralise(band, {.quadratic = true}, warnings);
   for (const Vec3& x : r.mesh.nodes) {
     const double off = std::abs(std::hypot(x[0], x[1]) - radius) - thickness / 2.0;
     EXPECT_LT(off, 0.05 * thickness);

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <cstdio>
+#include <tuple>
 #include <utility>
 
 #include "limber/core/disjoint_sets.h"
@@ -102,7 +102,8 @@ void check_sharing(const TetMesh& mesh, const std::string& name) {
   struct Middle {
     std::pair<Index, Index> edge;
     Index node;
-    auto operator<=>(const Middle&) const = default;
+    bool operator==(const Middle&) const = default;
+    bool operator<(const Middle& other) const { return std::tie(edge, node) < std::tie(other.edge, other.node); }
   };
   std::vector<Middle> middles;
   std::vector<char> is_corner(mesh.nodes.size(), 0);
