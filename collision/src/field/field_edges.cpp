@@ -210,9 +210,11 @@ void FieldEdges::finish(std::vector<FoundContact>& found) {
     while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
     cross_loop(first, next);
   }
-  std::ranges::sort(contacts_, {}, &FoundContact::id);
-  const auto repeated = std::ranges::unique(contacts_, {}, &FoundContact::id);
-  found.insert(found.end(), contacts_.begin(), repeated.begin());
+  std::sort(contacts_.begin(), contacts_.end(),
+            [](const FoundContact& c, const FoundContact& d) { return c.id() < d.id(); });
+  const auto repeated = std::unique(contacts_.begin(), contacts_.end(),
+                                    [](const FoundContact& c, const FoundContact& d) { return c.id() == d.id(); });
+  found.insert(found.end(), contacts_.begin(), repeated);
 }
 
 }  // namespace limber::internal

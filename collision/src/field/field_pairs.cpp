@@ -59,7 +59,10 @@ void FieldPairs::start_query(std::span<const ManifoldBody> bodies, std::span<con
   };
   for (const Index i : changed) look_at(static_cast<std::size_t>(i), true);
   for (std::size_t i = 0; i < entries_.size(); ++i) look_at(i, false);
-  std::ranges::stable_sort(to_deform_, std::less<>(), [](const DeformedPointshell* body) { return &body->shell(); });
+  // By model, then by body: stable_sort() would allocate.
+  std::sort(to_deform_.begin(), to_deform_.end(), [](const DeformedPointshell* a, const DeformedPointshell* b) {
+    return std::pair(&a->shell(), a) < std::pair(&b->shell(), b);
+  });
   deform(to_deform_, jobs);
   while (scratch_.size() < static_cast<std::size_t>(jobs.concurrency()))
     scratch_.push_back(std::make_unique<FieldContacts>());

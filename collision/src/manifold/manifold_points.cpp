@@ -91,7 +91,7 @@ void keep_manifold_points(std::vector<FeatureContact>& found, std::span<const st
     const Vec3 normal = begin->normal;
     const auto end = std::partition(begin + 1, found.end(),
                                     [&](const FeatureContact& c) { return c.normal.dot(normal) > kLikeNormals; });
-    const std::size_t chosen = choose_manifold_points(std::span(begin, end), last);
+    const std::size_t chosen = choose_manifold_points({&*begin, static_cast<std::size_t>(end - begin)}, last);
     std::copy_n(begin, chosen, found.begin() + static_cast<std::ptrdiff_t>(kept));
     kept += chosen;
     begin = end;
