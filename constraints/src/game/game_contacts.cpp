@@ -182,7 +182,8 @@ void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodie
   }
   if (!(trace > 0.0f)) return;
   rolling.inverse = 1.0f / trace;  // at most that of the largest eigenvalue
-  const auto known = std::ranges::lower_bound(rolling_memory_, contact.id, {}, &Rolling::id);
+  const auto known = std::lower_bound(rolling_memory_.begin(), rolling_memory_.end(), contact.id,
+                                      [](const auto& memory, std::uint64_t id) { return memory.id < id; });
   if (known != rolling_memory_.end() && known->id == contact.id)
     for (int i = 0; i < 3; ++i) rolling.moment[i] = static_cast<float>(known->moment[i]);
   rolling_.push_back(rolling);
