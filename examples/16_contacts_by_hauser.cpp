@@ -3,8 +3,9 @@
 //          limber-precompute box.mesh --youngs-modulus 1e7 --poisson-ratio 0.4 --density 1100 --damping-ratio 0.03@100,1000
 //            --modes 8 -o box.glb
 //   run:   16_contacts_by_hauser box.glb
-//   see:   a box laid on a slope of 0.9 of the angle of friction, after two seconds: limber's own keeps it, the heuristic
-//          lets it creep, springs let it sink; and what the linear programs were asked
+//   see:   a box laid on a slope of 0.9 of the angle of friction, in its second second: limber's own keeps it where it is,
+//          springs let it sink by a tenth of a millimetre, friction after the normals lets it slide; and how many linear
+//          programs were solved
 //   next:  limber-benchmark methods, docs/papers.md
 #include <cmath>
 #include <cstdio>

@@ -3,8 +3,8 @@
 //          limber-precompute box.mesh --youngs-modulus 1e7 --poisson-ratio 0.4 --density 1100 --damping-ratio 0.03@100,1000
 //            --modes 8 --volume -o box.glb
 //   run:   17_overlaps_three_ways box.glb
-//   see:   two boxes, one pushed into the top of the other, deeper and deeper: the contact that is deepest. Beyond the
-//          middle the nearest point, which FCL's contacts take, is on another side; tetrahedra still point up
+//   see:   two boxes, one pushed into the top of the other beside its middle, deeper and deeper: the deepest contact. At
+//          9 cm the nearest point, which FCL's contacts take, is on a side; tetrahedra lead up and outwards at every depth
 //   next:  docs/papers.md
 #include <algorithm>
 #include <array>

@@ -1,7 +1,8 @@
 // 18_pose_by_penalties: how do the paper's weighted energies pose the lamp that constraints pose exactly?
 //   bake:  make_assembly lamp --out lamp.obj
 //   run:   18_pose_by_penalties lamp.obj lamp.joints.json
-//   see:   one drag of the shade by either form: iterations, and how far joints come apart, of the model's size
+//   see:   one drag of the shade, within its reach, by either form: both bring it there, penalties with fifty times as many
+//          iterations
 //   next:  docs/papers.md
 #include <cstdio>
 #include <exception>
