@@ -26,8 +26,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+/// Paths; empty: none.
+struct Files {
   std::string model, output, keep, urdf, mjcf, glb;
+};
+
+struct Arguments {
+  Files files;
   std::string components = "connectivity", contacts = "nearest", method = "default", unit = "m";
   std::vector<std::string> merge;
   double scale = 0.0, density = 1000.0, min_confidence = 0.0, overlap = 0.0;
@@ -49,15 +54,17 @@ double metres_per_unit(const Arguments& a) {
 }
 
 void declare_files(CLI::App& options, Arguments& a) {
-  options.add_option("MODEL", a.model, "surface of all parts: OBJ, STL, PLY, glTF, OFF, 3DS, ...")->required();
-  options.add_option("-o,--output", a.output, "joints file to write")->type_name("JOINTS.json");
+  options.add_option("MODEL", a.files.model, "surface of all parts: OBJ, STL, PLY, glTF, OFF, 3DS, ...")->required();
+  options.add_option("-o,--output", a.files.output, "joints file to write")->type_name("JOINTS.json");
   options
-      .add_option("--keep", a.keep, "joints file whose merges, names, types, axes and limits stay; may be the output")
+      .add_option("--keep", a.files.keep,
+                  "joints file whose merges, names, types, axes and limits stay; may be the output")
       ->type_name("JOINTS.json");
-  options.add_option("--urdf", a.urdf, "write a URDF, with its meshes (STL) in FILE_meshes/ beside it")
+  options.add_option("--urdf", a.files.urdf, "write a URDF, with its meshes (STL) in FILE_meshes/ beside it")
       ->type_name("FILE.urdf");
-  options.add_option("--mjcf", a.mjcf, "write an MJCF for MuJoCo, the same way")->type_name("FILE.xml");
-  options.add_option("--glb", a.glb, "write parts and axes as a scene for any glTF viewer")->type_name("FILE.glb");
+  options.add_option("--mjcf", a.files.mjcf, "write an MJCF for MuJoCo, the same way")->type_name("FILE.xml");
+  options.add_option("--glb", a.files.glb, "write parts and axes as a scene for any glTF viewer")
+      ->type_name("FILE.glb");
   options.add_flag("--explain", a.explain, "print why each joint is what it is, and what else it may be");
 }
 
@@ -190,8 +197,8 @@ struct Work {
 Assembly take_apart(const Arguments& a, const Work& work) {
   ComponentOptions options = component_options(a);
   Assembly assembly = find_components(work.surface, options);
-  if (a.keep.empty()) return assembly;
-  const ComponentOptions kept = kept_components(assembly, work.kept, "\"" + a.keep + "\"");
+  if (a.files.keep.empty()) return assembly;
+  const ComponentOptions kept = kept_components(assembly, work.kept, "\"" + a.files.keep + "\"");
   if (kept.merge.empty() && kept.rename.empty()) return assembly;
   options.merge.insert(options.merge.end(), kept.merge.begin(), kept.merge.end());
   options.rename = kept.rename;
@@ -364,34 +371,36 @@ void write_robot(Program& program, const Arguments& a, const Work& work, const s
 
 void write_files(Program& program, const Arguments& a, const Work& work) {
   program.progress().stage("writing");
-  if (!a.output.empty()) {
+  if (!a.files.output.empty()) {
     JointsFile file = joints_file(work.assembly, work.joints);
     for (std::size_t j = 0; j < file.joints.size(); ++j)
       file.joints[j].limits_known = !a.no_limits || work.limits_kept[j];
-    program.write_file(a.output, joints_text(file));
+    program.write_file(a.files.output, joints_text(file));
   }
-  if (!a.glb.empty()) program.write_file(a.glb, assembly_glb(work.assembly, work.joints, metres_per_unit(a)));
+  if (!a.files.glb.empty())
+    program.write_file(a.files.glb, assembly_glb(work.assembly, work.joints, metres_per_unit(a)));
   std::set<std::filesystem::path> folders;
-  if (!a.urdf.empty()) write_robot(program, a, work, a.urdf, urdf_file, folders);
-  if (!a.mjcf.empty()) write_robot(program, a, work, a.mjcf, mjcf_file, folders);
+  if (!a.files.urdf.empty()) write_robot(program, a, work, a.files.urdf, urdf_file, folders);
+  if (!a.files.mjcf.empty()) write_robot(program, a, work, a.files.mjcf, mjcf_file, folders);
 }
 
 void find_joints(Program& program, const Arguments& a) {
-  if (a.output.empty() && a.urdf.empty() && a.mjcf.empty() && a.glb.empty() && !a.explain)
+  if (a.files.output.empty() && a.files.urdf.empty() && a.files.mjcf.empty() && a.files.glb.empty() && !a.explain)
     throw InvalidArgument("nothing to do: one of --output, --explain, --urdf, --mjcf and --glb is needed; see --help");
   TbbJobs jobs;
   Stopwatch stopwatch;
   Work work;
-  program.add_input(a.model);
+  program.add_input(a.files.model);
   program.progress().stage("reading");
-  work.surface = stopwatch.time("read", [&] { return read_any_grouped_surface(a.model, program.warnings()); });
-  if (!a.keep.empty()) work.kept = read_joints(a.keep);
+  work.surface = stopwatch.time("read", [&] { return read_any_grouped_surface(a.files.model, program.warnings()); });
+  if (!a.files.keep.empty()) work.kept = read_joints(a.files.keep);
   program.progress().stage("components");
   work.assembly = stopwatch.time("components", [&] { return take_apart(a, work); });
   work.joints =
       stopwatch.time("detect", [&] { return detect_joints(work.assembly, detection_options(a, program), jobs); });
   work.limits_kept.assign(work.joints.size(), false);
-  if (!a.keep.empty()) work.limits_kept = keep_joints(work.assembly, work.kept, "\"" + a.keep + "\"", work.joints);
+  if (!a.files.keep.empty())
+    work.limits_kept = keep_joints(work.assembly, work.kept, "\"" + a.files.keep + "\"", work.joints);
   if (!a.no_limits)
     stopwatch.time("limits", [&] {
       find_limits(a, program, jobs, work);

@@ -26,10 +26,8 @@ struct PartsTuning {
   double all_holes = 0.05;
 };
 
-/// Contacts: which points of two surfaces face each other.
-struct ContactsTuning {
-  // Sampling.
-
+/// How contacts are sampled.
+struct SamplingTuning {
   /// Relative, 1e-9 … 1e-4: lengths and areas that differ by less are the same but for the round-off of a pose, so that
   /// which of them comes first does not depend on it. Round-off of coordinates 1e6 times the length stays below it.
   double same_length = 1e-6;
@@ -65,9 +63,10 @@ struct ContactsTuning {
   std::size_t coarse_fewest = 100;
   /// Times the reach of the cluster that the coarse look finds, 1 … 3: how far the fine one looks. Not measured.
   double fine_reach = 1.5;
+};
 
-  // The cluster of gaps.
-
+/// The cluster of gaps.
+struct GapClusterTuning {
   /// A divisor, 10 … 200: the cluster starts from the nearest 1/50 of the samples, so that a small hinge between large
   /// faces is not swamped. Case: the door. Not measured beside it.
   std::size_t cluster_start = 50;
@@ -82,9 +81,10 @@ struct ContactsTuning {
   /// Squared sine, 1e-3 … 1e-2. Smooth normals of the two sides that agree less are rough: of noise, not of facets.
   /// Smooth surfaces agree better however coarse their facets (docs/joints.md, "rough").
   double rough = 3e-3;
+};
 
-  // What is left out of it.
-
+/// Samples and contacts that the cluster leaves out.
+struct LeftOutTuning {
   /// Part of the pairs, 0.5 … 0.9: a lean that so many share is noise or curvature and stays.
   double askew_share = 0.75;
   /// 3 … 20, of the squared sine at that share: pairs that look past each other by more are left out.
@@ -102,9 +102,10 @@ struct ContactsTuning {
   /// Mean squared sine between facing normals, 0.02 … 0.08: above it surfaces curve away from each other and hold
   /// nothing. Noise of 0.1 % seldom leaves more than 0.02; beads that touch have 0.1 and more.
   double most_spread = 0.03;
+};
 
-  // Rough surfaces.
-
+/// Rough surfaces.
+struct RoughTuning {
   /// RMS thickness per width, 5e-3 … 0.05: a thinner rough contact takes its plane's normal. Not measured.
   double flat_thickness = 0.02;
   /// Part of the spread, 0.2 … 0.9: means of patches are taken if they bring it below. Noise of vertices halves; the
@@ -120,9 +121,10 @@ struct ContactsTuning {
   std::size_t fewest_in_patch = 6;
   /// Cosine, 0 … 0.9: normals that bend more are of another face. Not measured.
   double same_side = 0.5;
+};
 
-  // Parts inside each other, and hulls.
-
+/// Parts inside each other, and hulls.
+struct InsideTuning {
   /// Length of the mean normal, 0.3 … 0.9: above it an overlap is a shallow cap (78° about its pole) and by chance. A
   /// shaft held from all round has 0.
   double one_way = 0.6;
@@ -132,10 +134,17 @@ struct ContactsTuning {
   std::size_t hull_steps = 100;
 };
 
-/// Types: which motions slip.
-struct TypesTuning {
-  // Weights.
+/// Contacts: which points of two surfaces face each other.
+struct ContactsTuning {
+  SamplingTuning sampling{};
+  GapClusterTuning cluster{};
+  LeftOutTuning left_out{};
+  RoughTuning rough{};
+  InsideTuning inside{};
+};
 
+/// Weights of samples.
+struct WeightsTuning {
   /// Cosine, 0.7 … 0.99: normals that are alike share their weight, so that a wide plate does not drown the peg under
   /// it. Not measured.
   double similar = 0.9;
@@ -144,9 +153,10 @@ struct TypesTuning {
   double similar_floor = 0.05;
   /// Samples that stand for all when areas are compared, 200 … 3,000. A matter of time.
   std::size_t similar_compared = 600;
+};
 
-  // Fits.
-
+/// Fits of axes and pitches.
+struct FitsTuning {
   /// Rounds, 5 … 50, in which an axis' direction and place are improved in turn; it ends sooner at 1e-12.
   std::size_t axis_rounds = 12;
   /// Part of a motion, 1e-9 … 1e-4: one that turns by less is a translation and starts no search for an axis.
@@ -165,9 +175,10 @@ struct TypesTuning {
   double pitch_nearest = 0.1;
   /// Relative, 0.03 … 0.3: a pitch that changes by more was no start. Facets' own normals are up to 3 % off.
   double pitch_change = 0.1;
+};
 
-  // Judging.
-
+/// Judging which motion slips.
+struct JudgingTuning {
   /// Probability, 1e-6 … 1e-2: no motion slips more or less surely, so that one measurement does not decide alone.
   double tail = 1e-4;
   /// Times the contact's RMS radius, 2 … 10: a centre further off is a plane in disguise. Not measured.
@@ -186,9 +197,10 @@ struct TypesTuning {
   /// Singular value, 0.05 … 0.5: a motion that turns by more is a rotation, for SlippageMethod::kFixedRatio, of which
   /// [X09] does not say it. Not measured.
   double ratio_turns = 0.2;
+};
 
-  // Hypotheses beside the first.
-
+/// Hypotheses beside the first.
+struct OtherHypothesesTuning {
   /// Samples that stand for all when faces are compared, 100 … 2,000. A matter of time.
   std::size_t stop_compared = 400;
   /// Cosine, 0.8 … 0.99: 18°, one face.
@@ -214,9 +226,10 @@ struct TypesTuning {
   double round_share = 0.2;
   /// Confidence, 1e-6 … 0.05: hypotheses after the second are told from here on.
   double worth_telling = 1e-3;
+};
 
-  // Frames and chains.
-
+/// Frames and chains.
+struct FramesTuning {
   /// Cosine, 0.7 … 0.99: the contact's widest direction fixes a frame unless it lies along the axis. Either of two
   /// answers is right.
   double frame_aligned = 0.9;
@@ -228,8 +241,17 @@ struct TypesTuning {
   std::size_t dense_columns = 1200;
 };
 
-/// Ranges of motion: where a path is blocked.
-struct RangesTuning {
+/// Types: which motions slip.
+struct TypesTuning {
+  WeightsTuning weights{};
+  FitsTuning fits{};
+  JudgingTuning judging{};
+  OtherHypothesesTuning others{};
+  FramesTuning frames{};
+};
+
+/// Tolerances of a range, and which pairs it looks at.
+struct LimitsTuning {
   /// Part of the smaller body's diagonal, 1e-5 … 1e-3: δ to start with, where the caller gives none.
   double tolerance = 2e-4;
   /// Part of the smaller body's diagonal, 5e-3 … 0.05: δ at most, where the caller gives none. `limber-joints
@@ -248,9 +270,10 @@ struct RangesTuning {
   std::size_t cone_samples = 3;
   /// Samples, 50 … 1,000: a swing of the cone has no fewer; the least that FreeMotionOptions::samples allows.
   std::size_t cone_fewest = 100;
+};
 
-  // What stands against the motion.
-
+/// Surfaces that stand against the motion.
+struct AgainstTuning {
   /// Tangent, 1 … 5: the steepest slope at which any surface is a stop. Beyond, what the motion runs against all over
   /// is one. Case: the collar of a screw.
   double slope = 2.0;
@@ -262,9 +285,10 @@ struct RangesTuning {
   double slope_margin = 1.1;
   /// 1.05 … 2: steps in which δ grows to the overlap as read. δ is too generous by one step at most.
   double overlap_growth = 1.25;
+};
 
-  // Points, and the way downhill.
-
+/// Points of the orbit, and the way downhill.
+struct OrbitPointsTuning {
   /// Cosine, 0.8 … 0.99: edges that bend by more (20°) get points of their own.
   double sharp_edge = 0.94;
   /// A divisor, 1 … 10: half as many points on sharp edges as on faces; at most `corner_points` times as many as these
@@ -288,6 +312,13 @@ struct RangesTuning {
   std::size_t most_followed = 8;
   /// Steps, 20 … 200, of regula falsi to where a helix meets a plane; it ends sooner at 1e-14.
   std::size_t helix_steps = 60;
+};
+
+/// Ranges of motion: where a path is blocked.
+struct RangesTuning {
+  LimitsTuning limits{};
+  AgainstTuning against{};
+  OrbitPointsTuning points{};
 };
 
 struct Tuning {

@@ -109,8 +109,12 @@ struct GlbBuilder::Impl {
        nodes = json::array(), animations = json::array();
   json extensions = json::object(), extras = json::object();
   std::set<std::string> extensions_used;
-  std::vector<Numbers> numbers;           // per accessor
-  std::vector<std::size_t> mesh_targets;  // per mesh
+  std::vector<Numbers> numbers;  // per accessor
+  struct MeshNeeds {
+    std::size_t targets;
+    int joints;  // of a skin that it hangs on; -1: none
+  };
+  std::vector<MeshNeeds> mesh_needs;  // per mesh
   json skins = json::array();
   struct Influences {
     int joints, weights;  // accessors
@@ -118,7 +122,6 @@ struct GlbBuilder::Impl {
     int largest;  // joint
   };
   std::vector<Influences> influences;
-  std::vector<int> mesh_joints;  // per mesh, how many it takes
   std::vector<bool> has_parent;  // per node
 
   int add_view(const void* data, std::size_t size, int target) {
@@ -225,7 +228,7 @@ struct GlbBuilder::Impl {
     if (channel.path != GlbPath::kWeights) return 1;  // glTF counts vectors and quaternions as one element
     const json& node = nodes[static_cast<std::size_t>(channel.node)];
     if (!node.contains("mesh")) refuse(where + ": weights of a node without mesh");
-    return mesh_targets[node["mesh"].get<std::size_t>()];
+    return mesh_needs[node["mesh"].get<std::size_t>()].targets;
   }
 
   json document() const;
@@ -352,9 +355,9 @@ int GlbBuilder::add_mesh(const GlbMesh& mesh) {
     for (const auto& [name, unused] : out["extensions"].items()) impl_->extensions_used.insert(name);
   }
   impl_->meshes.push_back(std::move(out));
-  impl_->mesh_targets.push_back(mesh.targets.size());
-  impl_->mesh_joints.push_back(
-      mesh.influences >= 0 ? impl_->influences[static_cast<std::size_t>(mesh.influences)].largest : -1);
+  impl_->mesh_needs.push_back(
+      {mesh.targets.size(),
+       mesh.influences >= 0 ? impl_->influences[static_cast<std::size_t>(mesh.influences)].largest : -1});
   return static_cast<int>(impl_->meshes.size()) - 1;
 }
 
@@ -368,7 +371,7 @@ int GlbBuilder::add_node(const GlbNode& node) {
   }
   if (node.skin >= 0) {
     impl_->check_index(node.skin, impl_->skins, where + ".skin");
-    const int most = node.mesh >= 0 ? impl_->mesh_joints[static_cast<std::size_t>(node.mesh)] : -1;
+    const int most = node.mesh >= 0 ? impl_->mesh_needs[static_cast<std::size_t>(node.mesh)].joints : -1;
     if (most < 0 || most >= static_cast<int>(impl_->skins[static_cast<std::size_t>(node.skin)]["joints"].size()))
       refuse(where + ".skin: its mesh has no influences, or hangs on a joint that the skin has not");
     out["skin"] = node.skin;

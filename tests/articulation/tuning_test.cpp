@@ -16,14 +16,14 @@ namespace limber::internal {
 namespace {
 
 TEST(Tuning, IsReplacedForAsLongAsAScopeLasts) {
-  const double usual = tuning().types.stop_share;
+  const double usual = tuning().types.others.stop_share;
   {
     Tuning other = tuning();
-    other.types.stop_share = 0.5 * usual;
+    other.types.others.stop_share = 0.5 * usual;
     const testing::ScopedValue scoped(tuning_in_use, other);
-    EXPECT_EQ(tuning().types.stop_share, 0.5 * usual);
+    EXPECT_EQ(tuning().types.others.stop_share, 0.5 * usual);
   }
-  EXPECT_EQ(tuning().types.stop_share, usual);
+  EXPECT_EQ(tuning().types.others.stop_share, usual);
 }
 
 TEST(CreaseAngle, IsTheSameForContactsAndRanges) {

@@ -72,9 +72,11 @@ struct PageWorld::Impl {
   std::vector<int> drops;  // model of each body dropped so far, in this history
   internal::Hands hands;
   internal::PageHistory history;
-  std::vector<float> frame;
-  std::vector<double> numbers, joint_frames, amplitudes, stage_seconds = std::vector<double>(kStages, 0.0);
   std::vector<internal::JointPlace> joint_places;
+  struct {
+    std::vector<float> frame;
+    std::vector<double> numbers, joint_frames, amplitudes, stage_seconds = std::vector<double>(kStages, 0.0);
+  } told_to_page;  // what spans of the page point into
 };
 
 void PageWorld::Impl::start() {
@@ -140,22 +142,23 @@ void PageWorld::step() {
   Impl& m = *impl_;
   m.times = {};
   m.player->step();
-  for (std::size_t i = 0; i < kStages; ++i) m.stage_seconds[i] = m.times[static_cast<Stage>(i)].seconds;
+  for (std::size_t i = 0; i < kStages; ++i) m.told_to_page.stage_seconds[i] = m.times[static_cast<Stage>(i)].seconds;
 }
-std::span<const double> PageWorld::stage_seconds() const { return impl_->stage_seconds; }
+std::span<const double> PageWorld::stage_seconds() const { return impl_->told_to_page.stage_seconds; }
 std::int64_t PageWorld::steps_taken() const { return impl_->player->steps_taken(); }
 std::uint64_t PageWorld::state_hash() const { return impl_->world().state_hash(); }
 
 std::span<const float> PageWorld::frame() {
   Impl& m = *impl_;
-  m.frame.clear();
+  m.told_to_page.frame.clear();
   for (const internal::PageBody& body : m.bodies) {
     const BodyView view = m.world().body(body.id);
     const auto& [q, p] = view.pose;
-    for (const double x : {p.x(), p.y(), p.z(), q.w, q.x, q.y, q.z}) m.frame.push_back(static_cast<float>(x));
-    for (const double z : view.amplitudes) m.frame.push_back(static_cast<float>(z));
+    for (const double x : {p.x(), p.y(), p.z(), q.w, q.x, q.y, q.z})
+      m.told_to_page.frame.push_back(static_cast<float>(x));
+    for (const double z : view.amplitudes) m.told_to_page.frame.push_back(static_cast<float>(z));
   }
-  return m.frame;
+  return m.told_to_page.frame;
 }
 
 std::span<const double> PageWorld::numbers() {
@@ -174,32 +177,32 @@ std::span<const double> PageWorld::numbers() {
   const auto pressing = std::count_if(events.begin(), events.end(),
                                       [](const ContactEvent& e) { return e.phase != ContactPhase::kEnded; });
   const ConstraintReport report = m.world().constraint_report();
-  m.numbers = {m.world().time(),
-               sum.kinetic_rigid,
-               sum.kinetic_modal,
-               sum.elastic,
-               sum.potential,
-               asleep,
-               static_cast<double>(pressing),
-               static_cast<double>(report.rows),
-               static_cast<double>(report.iterations),
-               report.solved ? 1.0 : 0.0};
-  return m.numbers;
+  m.told_to_page.numbers = {m.world().time(),
+                            sum.kinetic_rigid,
+                            sum.kinetic_modal,
+                            sum.elastic,
+                            sum.potential,
+                            asleep,
+                            static_cast<double>(pressing),
+                            static_cast<double>(report.rows),
+                            static_cast<double>(report.iterations),
+                            report.solved ? 1.0 : 0.0};
+  return m.told_to_page.numbers;
 }
 
 std::span<const double> PageWorld::joint_frames() {
   Impl& m = *impl_;
-  m.joint_frames.clear();
+  m.told_to_page.joint_frames.clear();
   for (std::size_t i = 0; i < m.joint_places.size(); ++i) {
     const internal::JointPlace& place = m.joint_places[i];
     const RigidTransform X = place.on.generation == 0 ? RigidTransform{} : m.world().body(place.on).pose;
     const Vec3 origin = X * place.origin, axis = X.q * place.axis;
     const JointView view = m.world().joint(m.player->joints()[i]);
     for (const double x : {origin.x(), origin.y(), origin.z(), axis.x(), axis.y(), axis.z()})
-      m.joint_frames.push_back(x);
-    m.joint_frames.insert(m.joint_frames.end(), view.position.begin(), view.position.end());
+      m.told_to_page.joint_frames.push_back(x);
+    m.told_to_page.joint_frames.insert(m.told_to_page.joint_frames.end(), view.position.begin(), view.position.end());
   }
-  return m.joint_frames;
+  return m.told_to_page.joint_frames;
 }
 
 void PageWorld::reconstruct(int body, float* positions) const {
@@ -299,11 +302,11 @@ void PageWorld::Impl::forget_removed() {
 void PageWorld::show_mode(int body, Index mode, double amplitude) {
   Impl& m = *impl_;
   const BodyId id = m.id(body);
-  m.amplitudes.assign(static_cast<std::size_t>(m.world().model(id).modes()), 0.0);
-  const std::vector<double> rest = m.amplitudes;
-  if (mode >= 0 && static_cast<std::size_t>(mode) < m.amplitudes.size())
-    m.amplitudes[static_cast<std::size_t>(mode)] = amplitude;
-  m.world().set_amplitudes(id, m.amplitudes, rest);
+  m.told_to_page.amplitudes.assign(static_cast<std::size_t>(m.world().model(id).modes()), 0.0);
+  const std::vector<double> rest = m.told_to_page.amplitudes;
+  if (mode >= 0 && static_cast<std::size_t>(mode) < m.told_to_page.amplitudes.size())
+    m.told_to_page.amplitudes[static_cast<std::size_t>(mode)] = amplitude;
+  m.world().set_amplitudes(id, m.told_to_page.amplitudes, rest);
 }
 
 // History -------------------------------------------------------------------------------------------------------------

@@ -96,7 +96,7 @@ struct BothSides {
 };
 
 bool tell_enough(const BothSides& sides) {
-  return std::min(sides.a.size(), sides.b.size()) >= tuning().contacts.fewest_samples;
+  return std::min(sides.a.size(), sides.b.size()) >= tuning().contacts.sampling.fewest_samples;
 }
 
 double area_of(const BothSides& sides) {
@@ -125,7 +125,7 @@ struct GapLimit {
   bool holds(const NearSample& s) const { return s.distance <= at(own_chord_error(s)); }
   /// Noise is no chord: it tilts the normals of one side only.
   static double own_chord_error(const NearSample& s) {
-    return askew(s) < tuning().contacts.rough ? s.chord_error : 0.0;
+    return askew(s) < tuning().contacts.cluster.rough ? s.chord_error : 0.0;
   }
 };
 
@@ -138,14 +138,14 @@ GapLimit gap_limit(const BothSides& sides, double diagonal) {
     for (const NearSample& s : *side) samples.push_back(&s);
   if (samples.empty()) return {};
   auto grown =
-      samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, samples.size() / t.cluster_start));
+      samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, samples.size() / t.cluster.cluster_start));
   std::nth_element(samples.begin(), grown - 1, samples.end(),
                    [](const NearSample* x, const NearSample* y) { return x->distance < y->distance; });
   while (true) {
     std::vector<double> gaps, chords;
     for (auto s = samples.begin(); s != grown; ++s) gaps.push_back((*s)->distance), chords.push_back((*s)->chord_error);
-    const GapLimit limit = {t.cluster_gaps * median(gaps) + t.cluster_least * diagonal,
-                            t.cluster_chords * median(chords)};
+    const GapLimit limit = {t.cluster.cluster_gaps * median(gaps) + t.cluster.cluster_least * diagonal,
+                            t.cluster.cluster_chords * median(chords)};
     const auto before = grown;
     grown = std::partition(before, samples.end(), [&](const NearSample* s) { return limit.holds(*s); });
     if (grown == before) return limit;
@@ -170,9 +170,10 @@ void drop_askew(BothSides& sides) {
   for (const auto* side : {&sides.a, &sides.b})
     for (const NearSample& s : *side) all.push_back(askew(s));
   if (all.empty()) return;
-  const auto most = all.begin() + static_cast<std::ptrdiff_t>(t.askew_share * static_cast<double>(all.size() - 1));
+  const auto most =
+      all.begin() + static_cast<std::ptrdiff_t>(t.left_out.askew_share * static_cast<double>(all.size() - 1));
   std::nth_element(all.begin(), most, all.end());
-  const double limit = t.askew_always + t.askew_times * *most;
+  const double limit = t.left_out.askew_always + t.left_out.askew_times * *most;
   for (auto* side : {&sides.a, &sides.b}) std::erase_if(*side, [&](const NearSample& s) { return askew(s) > limit; });
 }
 
@@ -199,7 +200,7 @@ ContactRegion summarised(const Pair& pair, const BothSides& sides) {
 /// The normal of the plane that rough samples lie in, if they do: whatever their facets say, it blocks no motion along
 /// it.
 std::optional<Vec3> plane_of(const BothSides& sides) {
-  const double flat = tuning().contacts.flat_thickness;
+  const double flat = tuning().contacts.rough.flat_thickness;
   Vec3 centre = Vec3::Zero();
   Mat3 second = Mat3::Zero();
   for (const auto* side : {&sides.a, &sides.b})
@@ -223,7 +224,7 @@ void flatten(std::vector<NearSample>& samples, const Vec3& normal) {
 /// Takes the noise out of rough surfaces, where that makes the two sides agree better.
 void quieten(BothSides& sides) {
   const double before = normal_spread(sides);
-  if (before < tuning().contacts.rough) return;
+  if (before < tuning().contacts.cluster.rough) return;
   if (const auto normal = plane_of(sides)) {
     flatten(sides.a, *normal);
     flatten(sides.b, *normal);
@@ -232,7 +233,7 @@ void quieten(BothSides& sides) {
   BothSides quiet = sides;
   internal::average_patches(quiet.a);
   internal::average_patches(quiet.b);
-  if (normal_spread(quiet) < tuning().contacts.quieter * before) sides = std::move(quiet);
+  if (normal_spread(quiet) < tuning().contacts.rough.quieter * before) sides = std::move(quiet);
 }
 
 /// Σ A n nᵀ / Σ A, eigenvalues ascending: (0, 0, 1) for a flat contact, (0, ½, ½) for a cylinder.
@@ -279,10 +280,11 @@ std::optional<Cluster> wider_cluster(const BothSides& touch, const BothSides& re
   if (touch.a.empty() || touch.b.empty() || !tell_enough(rest)) return std::nullopt;
   Cluster wider = nearest_cluster(rest, diagonal);
   const BothSides& found = wider.samples;
-  if (!tell_enough(found) || area_of(found) < t.wider_area * area_of(touch)) return std::nullopt;
-  if (spread_of_directions(touch)[2] < t.stray_flat || spread_of_directions(found)[1] < t.wider_guides)
+  if (!tell_enough(found) || area_of(found) < t.left_out.wider_area * area_of(touch)) return std::nullopt;
+  if (spread_of_directions(touch)[2] < t.left_out.stray_flat ||
+      spread_of_directions(found)[1] < t.left_out.wider_guides)
     return std::nullopt;
-  if (normal_spread(found) > t.most_spread) return std::nullopt;
+  if (normal_spread(found) > t.left_out.most_spread) return std::nullopt;
   return wider;
 }
 
@@ -321,10 +323,10 @@ std::vector<ContactRegion> overlap(const Pair& pair, const Prepared& a, const Pr
   BothSides sides = {inside_samples(a.smooth, b.smooth, samples), inside_samples(b.smooth, a.smooth, samples)};
   (area_of({sides.a, {}}) >= area_of({{}, sides.b}) ? sides.b : sides.a).clear();
   const auto& kept = sides.a.empty() ? sides.b : sides.a;
-  if (kept.size() < tuning().contacts.fewest_samples) return {};
+  if (kept.size() < tuning().contacts.sampling.fewest_samples) return {};
   Vec3 mean = Vec3::Zero();
   for (const NearSample& s : kept) mean += s.contact.normal / static_cast<double>(kept.size());
-  if (mean.norm() > tuning().contacts.one_way) return {};
+  if (mean.norm() > tuning().contacts.inside.one_way) return {};
   ContactRegion out = summarised(pair, sides);
   out.overlapping = true;
   return {std::move(out)};
@@ -349,11 +351,11 @@ std::vector<ContactRegion> facing_contact(const Pair& pair, const Parts& parts, 
   const double diagonal = std::min(a.diagonal, b.diagonal), reach = options.search * diagonal;
   // A coarse look finds how wide the gap is; a fine one then spends its samples where the contact is.
   const ContactsTuning& t = tuning().contacts;
-  const int coarse =
-      static_cast<int>(std::max(t.coarse_fewest, static_cast<std::size_t>(options.samples) / t.coarse_divisor));
+  const int coarse = static_cast<int>(
+      std::max(t.sampling.coarse_fewest, static_cast<std::size_t>(options.samples) / t.sampling.coarse_divisor));
   BothSides sides = sample(a, b, reach, options.facing_cosine, coarse);
   if (sides.a.empty() && sides.b.empty()) return overlap(pair, a, b, coarse);
-  const double fine_reach = std::min(reach, t.fine_reach * contact_cluster(sides, diagonal).reach());
+  const double fine_reach = std::min(reach, t.sampling.fine_reach * contact_cluster(sides, diagonal).reach());
   sides = contact_cluster(sample(a, b, fine_reach, options.facing_cosine, options.samples), diagonal).samples;
   drop_askew(sides);
   drop_hidden(pair, parts, sides);

@@ -20,7 +20,7 @@ Vec3 centre(const SurfaceMesh& surface, Index t) {
 /// How far corners stand out from the planes of triangles at most; a convex surface has 0. With many, every so-manieth
 /// is looked at.
 double concavity_of(const SurfaceMesh& surface, std::span<const Index> piece) {
-  const std::size_t stride = 1 + piece.size() / tuning().contacts.hull_compared;
+  const std::size_t stride = 1 + piece.size() / tuning().contacts.inside.hull_compared;
   double most = 0.0;
   for (std::size_t i = 0; i < piece.size(); i += stride) {
     const Vec3& a = corner(surface, piece[i], 0);
@@ -59,7 +59,7 @@ std::size_t best_cut(const SurfaceMesh& surface, std::span<Index> piece) {
 /// on the way to p, until either bound of the distance tells.
 bool within_hull(const Vec3& p, const std::vector<Vec3>& corners, double distance) {
   Vec3 nearest = corners.front();
-  for (std::size_t step = 0; step < tuning().contacts.hull_steps; ++step) {
+  for (std::size_t step = 0; step < tuning().contacts.inside.hull_steps; ++step) {
     const Vec3 v = p - nearest;
     const double length = v.norm();
     if (length <= distance) return true;

@@ -37,7 +37,7 @@ std::array<Piece, 2> halves(const SmoothSurface& surface, const Piece& piece) {
     const double length =
         (surface.point(piece.triangle, piece.corner[k]) - surface.point(piece.triangle, piece.corner[(k + 1) % 3]))
             .squaredNorm();
-    if (length > (1.0 + tuning().contacts.same_length) * most) most = length, longest = k;
+    if (length > (1.0 + tuning().contacts.sampling.same_length) * most) most = length, longest = k;
   }
   const std::size_t next = (longest + 1) % 3;
   const Vec3 middle = 0.5 * (piece.corner[longest] + piece.corner[next]);
@@ -67,7 +67,7 @@ class NearPart {
       if (!box.intersects(own)) continue;
       push(Piece{0.0, static_cast<Index>(t), {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, kUnknown});
     }
-    for (std::size_t next_look = tuning().contacts.first_look; !heap_.empty() && heap_.size() < most;) {
+    for (std::size_t next_look = tuning().contacts.sampling.first_look; !heap_.empty() && heap_.size() < most;) {
       if (heap_.size() >= next_look) {
         if (mostly_matters()) break;
         next_look = 2 * heap_.size();
@@ -117,20 +117,20 @@ class NearPart {
       all += area;
       if (lies_within(p, surface_.point(p.triangle, p.centre()), reach_)) matters += area;
     }
-    return matters >= tuning().contacts.matters * all;
+    return matters >= tuning().contacts.sampling.matters * all;
   }
 
   /// Halves all that are as large as the largest, so that it does not matter which of them comes first.
   /// @return whether it did: not if there were many more than `most` then
   bool halve_largest(std::size_t most) {
-    const double least = (1.0 - tuning().contacts.same_length) * heap_.front().first;
+    const double least = (1.0 - tuning().contacts.sampling.same_length) * heap_.front().first;
     std::vector<std::size_t> largest;
     auto left = heap_.end();
     for (; left != heap_.begin() && heap_.front().first >= least; --left) {
       largest.push_back(heap_.front().second);
       std::pop_heap(heap_.begin(), left);
     }
-    if (heap_.size() + largest.size() > most + most / tuning().contacts.surplus_pieces) return false;
+    if (heap_.size() + largest.size() > most + most / tuning().contacts.sampling.surplus_pieces) return false;
     heap_.erase(left, heap_.end());
     for (const std::size_t number : largest) halve(Piece(pieces_[number]));
     return true;
@@ -168,8 +168,8 @@ Vec3 even_barycentric(const Piece& piece, std::size_t i) {
 /// @param shortest a shorter way has no direction
 bool leads_across(const Vec3& way, double shortest, const Vec3& normal, const Vec3& facing_facet) {
   const double distance = way.norm();
-  return distance <= shortest ||
-         std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >= tuning().contacts.across * distance;
+  return distance <= shortest || std::max(std::abs(way.dot(normal)), std::abs(way.dot(facing_facet))) >=
+                                     tuning().contacts.sampling.across * distance;
 }
 
 /// Calls use(triangle, barycentric, area) for the centres of 2^levels equal parts of a piece.
@@ -188,7 +188,8 @@ struct Row {
   /// How many points fall on the next area. On the end of one they count with the next, whatever the round-off.
   std::size_t next(double area) {
     const std::size_t before = points;
-    for (covered += area; (static_cast<double>(points) + 0.5 + tuning().contacts.same_length) * step < covered;)
+    for (covered += area;
+         (static_cast<double>(points) + 0.5 + tuning().contacts.sampling.same_length) * step < covered;)
       ++points;
     return points - before;
   }
@@ -219,7 +220,8 @@ void spread_evenly(const SmoothSurface& surface, const std::vector<Piece>& piece
       else
         sharing.push_back(end), small += area[end];
     }
-    const double points = std::max(std::round(small / step - t.same_length), whole < t.own_point * step ? 0.0 : 1.0);
+    const double points =
+        std::max(std::round(small / step - t.sampling.same_length), whole < t.sampling.own_point * step ? 0.0 : 1.0);
     Row of_triangle{small / points};
     for (const std::size_t p : sharing)
       if (points > 0.0) {
@@ -270,7 +272,7 @@ void average(NearSample& sample, const std::vector<Cell>& cells, const std::vect
   Cell mean{Vec3::Zero()};
   for (std::size_t j = 0; j < cells.size(); ++j) {
     const Cell& cell = cells[j];
-    if (squared[j] >= rim || cell.facet_normal.dot(sample.contact.normal) < tuning().contacts.same_side) continue;
+    if (squared[j] >= rim || cell.facet_normal.dot(sample.contact.normal) < tuning().contacts.rough.same_side) continue;
     const double weight = 1.0 - squared[j] / rim;
     mean.facet_normal += weight * cell.area * cell.facet_normal;
     mean.facing_normal += weight * cell.facing_normal;
@@ -290,8 +292,9 @@ void average(NearSample& sample, const std::vector<Cell>& cells, const std::vect
 void average_patches(std::vector<NearSample>& samples) {
   const ContactsTuning& t = tuning().contacts;
   if (samples.empty()) return;
-  const std::vector<Cell> cells = cells_of(samples, t.cells);
-  const std::size_t wanted = std::min(std::max(t.fewest_in_patch, cells.size() / t.patches), cells.size() - 1);
+  const std::vector<Cell> cells = cells_of(samples, t.rough.cells);
+  const std::size_t wanted =
+      std::min(std::max(t.rough.fewest_in_patch, cells.size() / t.rough.patches), cells.size() - 1);
   std::vector<Vec3> centres;
   centres.reserve(cells.size());
   for (const Cell& cell : cells) centres.push_back(cell.point / cell.area);
@@ -308,7 +311,7 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
                                      double facing_cosine, int wanted) {
   const ContactsTuning& t = tuning().contacts;
   const auto facing_place = [&](Index triangle, const Vec3& from, double limit) {
-    return other.tree().some_within(from, limit, surface.tree().normal(triangle), t.loose_facing);
+    return other.tree().some_within(from, limit, surface.tree().normal(triangle), t.sampling.loose_facing);
   };
   Eigen::AlignedBox3d box = other.tree().box();
   box.min().array() -= reach;
@@ -318,9 +321,10 @@ std::vector<NearSample> near_samples(const SmoothSurface& surface, const SmoothS
   std::vector<NearSample> out;
   spread_evenly(surface, pieces, wanted, [&](Index triangle, const Vec3& barycentric, double area) {
     const Vec3 point = surface.point(triangle, barycentric), normal = surface.normal(triangle, barycentric);
-    const auto facing = other.tree().nearest(point, reach, normal, t.facet_facing);
+    const auto facing = other.tree().nearest(point, reach, normal, t.sampling.facet_facing);
     if (!facing.found()) return;
-    if (!leads_across(point - facing.point, t.shortest_way * reach, normal, other.tree().normal(facing.triangle)))
+    if (!leads_across(point - facing.point, t.sampling.shortest_way * reach, normal,
+                      other.tree().normal(facing.triangle)))
       return;
     const Vec3 facing_normal = other.normal(facing.triangle, facing.barycentric);
     if (normal.dot(facing_normal) > facing_cosine) return;

@@ -71,7 +71,7 @@ FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBod
                                 std::span<const OrbitBody> fixed, const Tolerances& t,
                                 const FreeMotionOptions& options) {
   const internal::Encounters encounters(frame, moving, fixed, t.largest_overlap + t.nudge);
-  for (std::size_t pairs = tuning().ranges.nearest_pairs;; pairs *= tuning().ranges.pairs_growth) {
+  for (std::size_t pairs = tuning().ranges.limits.nearest_pairs;; pairs *= tuning().ranges.limits.pairs_growth) {
     const auto near = encounters.nearest(pairs);
     FreeMotion m = internal::search_motion(frame, internal::some_of(moving, near.moving),
                                            internal::some_of(fixed, near.fixed), t, options);
@@ -92,13 +92,13 @@ FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitB
                        const FreeMotionOptions& options, double sagitta) {
   const double size = std::min(diagonal(moving), diagonal(fixed));
   const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
-  const double least = given(options.tolerance, tuning().ranges.tolerance * size);
+  const double least = given(options.tolerance, tuning().ranges.limits.tolerance * size);
   Tolerances t{.least = least,
                .facets = sagitta,
                .across = least,
-               .largest_overlap = given(options.largest_overlap, tuning().ranges.largest_overlap * size)};
+               .largest_overlap = given(options.largest_overlap, tuning().ranges.limits.largest_overlap * size)};
   t.largest_overlap = std::max(t.largest_overlap, least + sagitta);
-  t.nudge = tuning().ranges.nudge * least;
+  t.nudge = tuning().ranges.limits.nudge * least;
 
   return motion_among_nearest(PathFrame(path), moving, fixed, t, options);
 }

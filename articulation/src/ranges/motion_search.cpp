@@ -16,9 +16,9 @@
 namespace limber::internal {
 namespace {
 
-/// Up to RangesTuning::slope any surface is a stop; beyond it, those that are one-sided are, such as a screw's collar,
+/// Up to AgainstTuning::slope any surface is a stop; beyond it, those that are one-sided are, such as a screw's collar,
 /// and all others slide.
-bool stands(double slope, bool one_sided) { return slope <= tuning().ranges.slope || one_sided; }
+bool stands(double slope, bool one_sided) { return slope <= tuning().ranges.against.slope || one_sided; }
 /// Slope of the surface where a piece begins or ends; ∞ where it slides.
 double slope_of_end(const OrbitPiece& p, bool low) {
   const double slope = low ? p.slope_low : p.slope_high;
@@ -167,7 +167,7 @@ Spans dilated(const std::vector<OrbitPiece>& pieces, double by) {
 /// it.
 /// @param delta δ as a length of t
 void keep_confirmed(std::vector<OrbitPiece>& pieces, const Spans& wide, double delta) {
-  const double margin = tuning().ranges.slope_margin, by = tuning().ranges.slope * delta;
+  const double margin = tuning().ranges.against.slope_margin, by = tuning().ranges.against.slope * delta;
   const auto explains = [&](double slope, double later) {
     return slope < kInfinity && later <= margin * slope * delta + (margin - 1.0) * delta;
   };
@@ -206,8 +206,9 @@ void Search::keep_wide(const SurfaceSample& at, bool moving, std::vector<OrbitPi
   const double v = frame_.speed(orbit), delta = tolerances_.across;
   if (pieces.empty()) return;
   // So near to the axis that δ is a good part of a turn, nothing can be told.
-  const double by = tuning().ranges.slope * delta / v;
-  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < tuning().ranges.near_axis)) return pieces.clear();
+  const double by = tuning().ranges.against.slope * delta / v;
+  if (frame_.kind() != MotionPath::Kind::kTranslation && !(by < tuning().ranges.against.near_axis))
+    return pieces.clear();
   Spans wide = dilated(pieces, by);
   thread_local std::vector<Index> near;
   gather(orbit, moving, delta, near);
@@ -270,7 +271,8 @@ void Search::settle_tolerance() {
         keep_wide(points[i], moving, pieces);
         if (!is_deep(pieces, points[i])) break;
         overlapping_ = tolerances_.across >= tolerances_.largest_overlap;
-        tolerances_.across = std::min(tuning().ranges.overlap_growth * tolerances_.across, tolerances_.largest_overlap);
+        tolerances_.across =
+            std::min(tuning().ranges.against.overlap_growth * tolerances_.across, tolerances_.largest_overlap);
       }
   }
 }
@@ -328,7 +330,7 @@ void Search::collect() {
 template <class PiecesOf>
 Witness Search::downhill(Witness best, bool low, const Span& gap, double finest, PiecesOf&& pieces_of) const {
   const RangesTuning& t = tuning().ranges;
-  const int directions = static_cast<int>(t.directions), most_steps = static_cast<int>(t.most_steps);
+  const int directions = static_cast<int>(t.points.directions), most_steps = static_cast<int>(t.points.most_steps);
   const SampledSurface& over = surface(best.moving);
   std::vector<OrbitPiece> pieces;
   double step = over.spacing();
@@ -338,7 +340,7 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
     const Vec3 e = (c[1] - c[0]).stableNormalized(), n = e.cross(c[2] - c[0]).stableNormalized(), f = n.cross(e);
     bool better = false;
     for (int k = 0; k < directions && !better; ++k, ++steps) {
-      const double angle = t.pattern_turn * level + 2.0 * kPi * k / directions;
+      const double angle = t.points.pattern_turn * level + 2.0 * kPi * k / directions;
       const SurfaceSample next =
           over.walk(best.point, best.point.p + step * (std::cos(angle) * e + std::sin(angle) * f));
       const auto improves = [&](const OrbitPiece& p) {
@@ -357,7 +359,7 @@ Witness Search::downhill(Witness best, bool low, const Span& gap, double finest,
 }
 
 Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) const {
-  const double finest = tuning().ranges.finest_blocked * tolerances_.across;
+  const double finest = tuning().ranges.points.finest_blocked * tolerances_.across;
   return downhill(seed, low, gap, finest,
                   [&](const SurfaceSample& next, auto&& improves, std::vector<OrbitPiece>& out) {
                     raw_pieces(frame_.orbit_of(next.p), seed.moving, out);
@@ -369,12 +371,12 @@ Witness Search::first_blocked(const Witness& seed, bool low, const Span& gap) co
 // A blocked point has the other body all around it, to a distance δ. Surfaces of the same overlap may meet it
 // before: the surface within δ of the point, where both surfaces stand against the motion rather than along it.
 Witness Search::first_touching(const Witness& blocked, bool low, const Span& gap) const {
-  const double finest = tuning().ranges.finest_touching * tolerances_.least, delta = tolerances_.across;
+  const double finest = tuning().ranges.points.finest_touching * tolerances_.least, delta = tolerances_.across;
   const Orbit centre = frame_.orbit_of(blocked.point.p);
   // How much earlier two surfaces explain; a blocked point may lie on one that slides.
   const double own = slope_at(blocked.point, blocked.moving), met = slope_of_end(blocked.piece, low);
   const auto explained = [](double slope) {
-    const double steepest = tuning().ranges.slope;
+    const double steepest = tuning().ranges.against.slope;
     return slope < kInfinity ? std::max(slope, steepest) : steepest;
   };
   const double earlier = (explained(own) + explained(met)) * delta / frame_.speed(centre);
@@ -416,7 +418,7 @@ void Search::refine_end(Span& span, bool low, const Span& gap, std::size_t most_
 void Search::refine() {
   const RangesTuning& t = tuning().ranges;
   const std::size_t count = blocked_.size();
-  const bool nearest_only = reachable_only_ || count > t.most_followed;
+  const bool nearest_only = reachable_only_ || count > t.points.most_followed;
   ends_.resize(count);
   // Spans on either side of 0; on a circle they may lie at the other end of the list.
   const auto above = static_cast<std::size_t>(
@@ -427,7 +429,7 @@ void Search::refine() {
     (whole.low >= 0.0 ? before : after) = whole.low >= 0.0 ? std::max(before, 0.0) : std::min(after, 0.0);
     Span low = whole, high = whole;
     const bool ends_above = i == above % count, ends_below = i == (above + count - 1) % count;
-    const auto seeds = [&](bool reachable) { return reachable ? t.seeds : t.seeds_behind; };
+    const auto seeds = [&](bool reachable) { return reachable ? t.points.seeds : t.points.seeds_behind; };
     if (ends_above || !nearest_only) refine_end(low, true, {before, whole.high}, seeds(ends_above), ends_[i].first);
     if (ends_below || !nearest_only) refine_end(high, false, {whole.low, after}, seeds(ends_below), ends_[i].second);
     blocked_[i] = {low.low, high.high};
@@ -472,7 +474,7 @@ FreeMotion search_motion(const PathFrame& frame, std::span<const OrbitBody> movi
   auto [moving_faces, fixed_faces] =
       faces_that_meet(frame, moving, fixed, t.largest_overlap + t.nudge, options.crease_angle);
   const double width = std::min(t.across + t.facets, t.largest_overlap);
-  const double slope = tuning().ranges.slope;
+  const double slope = tuning().ranges.against.slope;
   mark_narrow(frame, slope, width, options.crease_angle, moving_faces);
   mark_narrow(frame, slope, width, options.crease_angle, fixed_faces);
   const Side moving_side(frame, moving, std::move(moving_faces), options.samples);

@@ -201,25 +201,27 @@ double SideOnPath::angle(const OrbitFace& face, std::size_t corner) {
 
 /// The angles about the axis that a triangle covers: middle and half width.
 void SideOnPath::set_sector(OrbitFace& face) {
-  face.bearing = 0.0, face.sector = kPi;
+  face.sector.bearing = 0.0, face.sector.half = kPi;
   if (face.box.low[0] > 0.0) {
     const double start = angle(face, 0);
     const auto [low, high] = std::minmax({0.0, wrapped(angle(face, 1) - start), wrapped(angle(face, 2) - start)});
     constexpr double kMargin = 1e-9;  // rad: above round-off
-    if (high - low < kPi) face.bearing = start + 0.5 * (low + high), face.sector = 0.5 * (high - low) + kMargin;
+    if (high - low < kPi)
+      face.sector.bearing = start + 0.5 * (low + high), face.sector.half = 0.5 * (high - low) + kMargin;
   }
-  const double off = std::abs(wrapped(face.bearing - face.heading));
-  if (off > face.sector) face.cosine_high = std::cos(off - face.sector);
-  if (off + face.sector < kPi) face.cosine_low = std::cos(off + face.sector);
+  const double off = std::abs(wrapped(face.sector.bearing - face.heading));
+  if (off > face.sector.half) face.sector.cosine_high = std::cos(off - face.sector.half);
+  if (off + face.sector.half < kPi) face.sector.cosine_low = std::cos(off + face.sector.half);
 }
 
 /// A screw's face: the helices that can meet it as a box from 0 to a turn, or one that reaches beyond
 /// and a copy of the face one turn lower.
 void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& boxes) {
   const OrbitFace face = face_of(candidate);
-  const double turn = 2.0 * kPi * std::abs(frame_.pitch()), half = std::abs(frame_.pitch()) * face.sector;
+  const double turn = 2.0 * kPi * std::abs(frame_.pitch()), half = std::abs(frame_.pitch()) * face.sector.half;
   const auto [low_x, high_x] = std::minmax({face.corners[0].x(), face.corners[1].x(), face.corners[2].x()});
-  const double low = low_x - frame_.pitch() * face.bearing - half, high = high_x - frame_.pitch() * face.bearing + half;
+  const double low = low_x - frame_.pitch() * face.sector.bearing - half,
+               high = high_x - frame_.pitch() * face.sector.bearing + half;
   const double down = high - low < turn ? turn * std::floor(low / turn) : low;
   OrbitBox box = frame_.box_of(face.corners);
   box.low[1] = low - down;
@@ -236,7 +238,7 @@ void SideOnPath::add_helices(const Candidate& candidate, std::vector<OrbitBox>& 
 /// +1, −1: the motion leaves the outside of a triangle, or its inside, at all corners; 0: neither, or it lies along the
 /// motion to within a degree, which may be noise. @param normal unit. All in path coordinates
 int side_of_motion(const PathFrame& frame, const Vec3& normal, const std::array<Vec3, 3>& corners) {
-  const double least = tuning().ranges.one_sided;
+  const double least = tuning().ranges.against.one_sided;
   double low = kUnknown, high = kUnknown;
   for (const Vec3& corner : corners) {
     const double along = normal.dot(frame.direction(corner));
@@ -299,7 +301,7 @@ struct PatchExtent {
 };
 
 std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
-  const double flat = tuning().ranges.sharp_edge;
+  const double flat = tuning().ranges.points.sharp_edge;
   std::vector<SharpEdge> all;
   all.reserve(3 * surface.triangles.size());
   std::vector<Vec3> normals;

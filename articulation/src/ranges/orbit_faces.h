@@ -37,6 +37,11 @@ struct OrbitBody {
 };
 OrbitBody orbit_body(const MotionBody& body);
 
+struct OrbitSector {
+  double bearing = 0.0, half = 0.0;  ///< rotations, screws: all of a face lies within θ = bearing ± half, rad
+  double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − OrbitFace::heading over the sector
+};
+
 struct OrbitFace {
   std::array<Vec3, 3> corners;         ///< path coordinates, counter-clockwise seen from outside
   Vec3 normal;                         ///< outward, unit; 0 without an area
@@ -53,9 +58,8 @@ struct OrbitFace {
   /// It stands against the motion, but with all that continues it is narrower than what counts as an obstacle: a sliver
   /// between faces that slide, and no stop.
   bool narrow = false;
-  double bearing = 0.0, sector = 0.0;           ///< rotations, screws: all of it lies within θ = bearing ± sector
-  double cosine_low = -1.0, cosine_high = 1.0;  ///< of θ − heading over the sector
-  OrbitBox box{};                               ///< of the orbits that meet it
+  OrbitSector sector{};  ///< about the axis
+  OrbitBox box{};        ///< of the orbits that meet it
 };
 
 /// The faces around each vertex of a side.

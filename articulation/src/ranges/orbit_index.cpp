@@ -21,7 +21,8 @@ template <class F>
 double zero_between(const F& f, double a, double fa, double b, double fb) {
   constexpr double kClose = 1e-14;  // round-off
   for (std::size_t step = 0;
-       step < tuning().ranges.helix_steps && std::abs(b - a) > kClose * (1.0 + std::abs(b)) && fb != 0.0; ++step) {
+       step < tuning().ranges.points.helix_steps && std::abs(b - a) > kClose * (1.0 + std::abs(b)) && fb != 0.0;
+       ++step) {
     const double c = b - fb * (b - a) / (fb - fa), fc = f(c);
     if ((fc < 0.0) != (fb < 0.0))
       a = b, fa = fb;
@@ -50,12 +51,12 @@ OrbitIndex::OrbitIndex(const PathFrame& frame, std::span<const OrbitBody> bodies
 
 OrbitIndex::Face::Face(const OrbitFace& face, Kind kind)
     : plane{face.normal, face.offset},
-      low(face.across * face.cosine_low),
-      high(face.across * face.cosine_high),
+      low(face.across * face.sector.cosine_low),
+      high(face.across * face.sector.cosine_high),
       across(face.across),
       heading(face.heading),
-      bearing(face.bearing),
-      sector(face.sector),
+      bearing(face.sector.bearing),
+      sector(face.sector.half),
       body(face.body),
       one_sided(face.one_sided && !face.narrow),
       narrow(face.narrow) {

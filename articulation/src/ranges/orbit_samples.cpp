@@ -41,7 +41,7 @@ SampledSurface::SampledSurface(std::span<const OrbitBody> bodies, std::vector<Or
   if (faces_.empty()) return;
   around_ = FacesAround(faces_);
   add_face_points(count);
-  add_edge_points(sharp_edges(bodies), std::max(count / static_cast<int>(tuning().ranges.edge_points), 1));
+  add_edge_points(sharp_edges(bodies), std::max(count / static_cast<int>(tuning().ranges.points.edge_points), 1));
 }
 
 Vec3 SampledSurface::corner(Index face, Index vertex) const {
@@ -103,7 +103,7 @@ void SampledSurface::add_edge_points(const std::vector<Edge>& edges, int count) 
     const double length = (b - a).norm();
     points_.push_back({length > 0.0 ? Vec3(b + (along - sums[k]) / length * (b - a)) : a, edges[k].face});
   }
-  add_corner_points(edges, static_cast<int>(tuning().ranges.corner_points) * count);
+  add_corner_points(edges, static_cast<int>(tuning().ranges.points.corner_points) * count);
 }
 
 void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most) {
@@ -119,7 +119,7 @@ void SampledSurface::add_corner_points(const std::vector<Edge>& edges, int most)
 
 SurfaceSample SampledSurface::walk(const SurfaceSample& start, const Vec3& target) const {
   SurfaceSample here{nearest_point(faces_[static_cast<std::size_t>(start.face)], target), start.face};
-  for (std::size_t step = 0; step < tuning().ranges.walked_faces; ++step) {
+  for (std::size_t step = 0; step < tuning().ranges.points.walked_faces; ++step) {
     SurfaceSample best = here;
     for (const Index v : faces_[static_cast<std::size_t>(here.face)].vertices)
       for (const Index f : around_.of(v)) {

@@ -164,8 +164,8 @@ class Trial {
 
   FreeMotion along(const MotionPath& path, FreeMotionOptions options) const {
     // Tolerances belong to the two parts that are joined, not to all that hangs on them.
-    if (options.tolerance == 0.0) options.tolerance = tuning().ranges.tolerance * size_;
-    if (options.largest_overlap == 0.0) options.largest_overlap = tuning().ranges.largest_overlap * size_;
+    if (options.tolerance == 0.0) options.tolerance = tuning().ranges.limits.tolerance * size_;
+    if (options.largest_overlap == 0.0) options.largest_overlap = tuning().ranges.limits.largest_overlap * size_;
     // A tolerance that was found before has the facets in it.
     const double sagitta = options.tolerance == options.largest_overlap ? 0.0 : sagitta_;
     FreeMotion m = internal::free_motion(moving_, fixed_, path, options, sagitta);
@@ -182,7 +182,7 @@ class Trial {
     Vec3 low = Vec3::Constant(kInfinity), high = -low;
     for (const Vec3& p : joint.contact_points) low = low.cwiseMin(p), high = high.cwiseMax(p);
     if (joint.contact_points.empty()) return 0.0;
-    const Vec3 margin = Vec3::Constant(tuning().ranges.contact_margin * (high - low).norm() + joint.gap);
+    const Vec3 margin = Vec3::Constant(tuning().ranges.limits.contact_margin * (high - low).norm() + joint.gap);
     return facet_sagitta(part.surface, low - margin, high + margin, crease);
   }
 
@@ -194,7 +194,7 @@ class Trial {
 /// How many paths are tried for a joint, at most.
 std::size_t path_count(JointSpec joint, const RangeOptions& options) {
   const std::size_t swings = joint.type == JointType::kBall ? static_cast<std::size_t>(options.cone_directions) +
-                                                                  2 * tuning().ranges.cone_refinements
+                                                                  2 * tuning().ranges.limits.cone_refinements
                                                             : 0;
   return paths_of(joint).size() + swings;
 }
@@ -207,7 +207,8 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
   motion.tolerance = motion.largest_overlap = tolerance;
   motion.reachable_only = true;
   const internal::RangesTuning& t = tuning().ranges;
-  motion.samples = static_cast<int>(std::max(t.cone_fewest, static_cast<std::size_t>(motion.samples) / t.cone_samples));
+  motion.samples = static_cast<int>(
+      std::max(t.limits.cone_fewest, static_cast<std::size_t>(motion.samples) / t.limits.cone_samples));
   const auto swing = [&](double psi) {
     const Vec3 axis = std::cos(psi) * axis_of(joint, 1) + std::sin(psi) * axis_of(joint, 2);
     const double high = trial.along(rotation(joint, axis), motion).reachable.high;
@@ -220,7 +221,7 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
     if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
   if (least == kInfinity) return least;
   double d = 0.5 * step;
-  for (std::size_t i = 0; i < t.cone_refinements; ++i, d *= 0.5)
+  for (std::size_t i = 0; i < t.limits.cone_refinements; ++i, d *= 0.5)
     for (const double psi : {at - d, at + d})
       if (const double angle = swing(psi); angle < least) least = angle, at = psi;
   return std::min(least, std::numbers::pi);

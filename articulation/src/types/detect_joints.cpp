@@ -29,7 +29,9 @@ OrientedBox box_around(const std::vector<Vec3>& points, const Mat3& axes) {
 
 /// Surfaces that curve away from each other touch at a point or a line and hold nothing: their normals disagree over
 /// what is near. Spheres and planes that lie in each other differ by noise alone.
-bool conforms(const ContactRegion& region) { return region.normal_spread < internal::tuning().contacts.most_spread; }
+bool conforms(const ContactRegion& region) {
+  return region.normal_spread < internal::tuning().contacts.left_out.most_spread;
+}
 
 std::string contact_in_words(const std::vector<ContactRegion>& regions) {
   std::size_t samples = 0;
@@ -47,7 +49,7 @@ DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const Slippage
   out.confidence = slippage.hypotheses.front().confidence;
   out.reasons = {contact_in_words(regions), slippage.hypotheses.front().reason};
   for (std::size_t i = 1; i < slippage.hypotheses.size(); ++i)
-    if (i == 1 || slippage.hypotheses[i].confidence > internal::tuning().types.worth_telling)
+    if (i == 1 || slippage.hypotheses[i].confidence > internal::tuning().types.others.worth_telling)
       out.other_hypotheses.push_back(slippage.hypotheses[i]);
   out.contact_points = points_of(regions);
   out.influence = box_around(out.contact_points, out.joint.frame.axes);

@@ -49,7 +49,7 @@ Vec3 axis_of_symmetry(const Eigen::SelfAdjointEigenSolver<Mat3>& principal) {
 /// Columns a, b′, a × b′, where b′ is the part of b across a.
 Mat3 right_handed(const Vec3& a, const Vec3& b) {
   Vec3 across = b - a * a.dot(b);
-  across = across.norm() > tuning().types.frame_across ? Vec3(across.normalized()) : a.unitOrthogonal();
+  across = across.norm() > tuning().types.frames.frame_across ? Vec3(across.normalized()) : a.unitOrthogonal();
   Mat3 out;
   out << a, across, a.cross(across);
   return out;
@@ -64,7 +64,7 @@ JointFrame joint_frame(JointType type, const Vec3& axis, const Vec3& origin, std
   if (type == JointType::kBall) return {origin, right_handed(canonical_sense(axis_of_symmetry(principal)), second)};
   if (type == JointType::kFixed) return {mean(points), right_handed(widest, second)};
   const Vec3 main = canonical_sense(axis);
-  const Vec3 other = std::abs(main.dot(widest)) < tuning().types.frame_aligned ? widest : second;
+  const Vec3 other = std::abs(main.dot(widest)) < tuning().types.frames.frame_aligned ? widest : second;
   if (type == JointType::kPlanar) {
     const Mat3 m = right_handed(main, other);  // z, x, y
     Mat3 axes;

@@ -64,9 +64,9 @@ Index rank_of(Eigen::SparseMatrix<double> A) {
   const internal::TypesTuning& t = internal::tuning().types;
   for (Eigen::Index c = 0; c < A.cols(); ++c)
     if (const double norm = A.col(c).norm(); norm > 0.0) A.col(c) *= 1.0 / norm;
-  if (A.cols() <= static_cast<Eigen::Index>(t.dense_columns)) {
+  if (A.cols() <= static_cast<Eigen::Index>(t.frames.dense_columns)) {
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr{Eigen::MatrixXd(A)};
-    qr.setThreshold(t.independent);
+    qr.setThreshold(t.frames.independent);
     return static_cast<Index>(qr.rank());
   }
   constexpr double kKeepAway = 1e-12;  // above the round-off of AᵀA
@@ -74,7 +74,7 @@ Index rank_of(Eigen::SparseMatrix<double> A) {
   unit.setIdentity();
   normal += kKeepAway * unit;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
-  return static_cast<Index>((factor.vectorD().array() > t.independent * t.independent).count());
+  return static_cast<Index>((factor.vectorD().array() > t.frames.independent * t.frames.independent).count());
 }
 
 }  // namespace

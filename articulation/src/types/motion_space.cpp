@@ -15,7 +15,7 @@ namespace {
 /// peg under it. The floor keeps normals that are nothing but noise from counting for much.
 std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
   const TypesTuning& t = tuning().types;
-  const std::size_t stride = 1 + points.size() / t.similar_compared;
+  const std::size_t stride = 1 + points.size() / t.weights.similar_compared;
   const std::size_t count = (points.size() + stride - 1) / stride;
   // By coordinate, so that several are compared at once.
   std::array<std::vector<double>, 3> normals;
@@ -38,8 +38,8 @@ std::vector<double> balanced_weights(const std::vector<WeightedPoint>& points) {
     last = p.normal;
     const double x = p.normal.x(), y = p.normal.y(), z = p.normal.z();
     for (std::size_t j = 0; j < count; ++j)
-      alike[j] = x * normals[0][j] + y * normals[1][j] + z * normals[2][j] > t.similar ? areas[j] : 0.0;
-    similar = std::sqrt(t.similar_floor * compared + std::reduce(alike.begin(), alike.end()));
+      alike[j] = x * normals[0][j] + y * normals[1][j] + z * normals[2][j] > t.weights.similar ? areas[j] : 0.0;
+    similar = std::sqrt(t.weights.similar_floor * compared + std::reduce(alike.begin(), alike.end()));
     weights.push_back(p.weight / similar);
   }
   return weights;

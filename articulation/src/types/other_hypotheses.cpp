@@ -27,8 +27,8 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
   if (!(area > 0.0)) return std::nullopt;
   middle /= area;
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
-  std::vector<double> outline(t.round_sectors, 0.0);
-  const auto sectors = static_cast<double>(t.round_sectors);
+  std::vector<double> outline(t.others.round_sectors, 0.0);
+  const auto sectors = static_cast<double>(t.others.round_sectors);
   for (const auto& [p, weight] : points) {
     const Plane d = p - middle;
     moments += weight * d * d.transpose();
@@ -39,7 +39,7 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
   const Eigen::Vector2d along =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(moments, Eigen::EigenvaluesOnly).eigenvalues();
   const auto [least, most] = std::minmax_element(outline.begin(), outline.end());
-  if (along[1] - along[0] > t.round_moments * (along[1] + along[0]) || *least < t.round_radii * *most)
+  if (along[1] - along[0] > t.others.round_moments * (along[1] + along[0]) || *least < t.others.round_radii * *most)
     return std::nullopt;
   return plane.origin + plane.axes.leftCols<2>() * middle;
 }
@@ -74,7 +74,7 @@ void add_hypothesis_of_flange(const std::vector<ContactRegion>& regions, Slippag
   const Mat3& plane = first.joint.frame.axes;
   turns.joint.frame.origin = *middle;
   turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
-  turns.confidence = share_of_first(tuning().types.round_share, out);
+  turns.confidence = share_of_first(tuning().types.others.round_share, out);
   turns.reason =
       "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
   replace_hypothesis(std::move(turns), out);

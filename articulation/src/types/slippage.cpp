@@ -112,7 +112,7 @@ Family rotation_family(const Vec3& axis, const Vec3& origin) {
 Family refined_rotation(const MotionSpace& space, Vec3 axis) {
   Vec3 origin = best_centre(space, axis);
   constexpr double kSettled = 1e-12;  // rad: round-off
-  for (std::size_t round = 0; round < tuning().types.axis_rounds; ++round) {
+  for (std::size_t round = 0; round < tuning().types.fits.axis_rounds; ++round) {
     Motions about(6, 3);
     for (int k = 0; k < 3; ++k) about.col(k) = rotation_about(Vec3::Unit(k), origin);
     const Vec3 turned = about.topRows<3>() * space.spectrum(about).vectors.col(0);
@@ -129,7 +129,7 @@ Family fit_revolute(const MotionSpace& space) {
   std::vector<Vec3> starts;
   const auto lowest = space.spectrum().vectors;
   for (int k = 0; k < 3; ++k)
-    if (lowest.col(k).head<3>().norm() > tuning().types.least_turn * lowest.col(k).norm())
+    if (lowest.col(k).head<3>().norm() > tuning().types.fits.least_turn * lowest.col(k).norm())
       starts.push_back(lowest.col(k).head<3>().normalized());
   const Eigen::SelfAdjointEigenSolver<Mat3> normals(space.normal_covariance());
   for (int k = 0; k < 3; ++k) starts.push_back(normals.eigenvectors().col(k));
@@ -173,10 +173,10 @@ double pitch_of_facets(const MotionSpace& space, const Vec3& axis, const Vec3& o
 double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitch) {
   const TypesTuning& t = tuning().types;
   const std::vector<WeightedPoint>& points = space.points();
-  const std::size_t stride = 1 + points.size() / t.pitch_compared;
+  const std::size_t stride = 1 + points.size() / t.fits.pitch_compared;
   double found = pitch;
-  for (std::size_t round = 0; round < t.pitch_rounds; ++round) {
-    const double turn = 2.0 * std::numbers::pi * found, limit = std::pow(t.pitch_nearest * turn, 2);
+  for (std::size_t round = 0; round < t.fits.pitch_rounds; ++round) {
+    const double turn = 2.0 * std::numbers::pi * found, limit = std::pow(t.fits.pitch_nearest * turn, 2);
     double residual = 0.0, slope = 0.0;
     std::size_t count = 0;
     for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -185,7 +185,7 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
       double least = limit;
       for (const WeightedPoint& q : points)
         if (const double squared = (q.facet_point - moved).squaredNorm();
-            squared < least && q.facet_normal.dot(points[i].facet_normal) > t.pitch_alike)
+            squared < least && q.facet_normal.dot(points[i].facet_normal) > t.fits.pitch_alike)
           nearest = &q, least = squared;
       if (nearest == nullptr) continue;
       const double along = 2.0 * std::numbers::pi * nearest->facet_normal.dot(axis);
@@ -193,9 +193,9 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
       slope += points[i].weight * along * along;
       ++count;
     }
-    if (count < t.pitch_fewest || !(slope > 0.0)) return pitch;
+    if (count < t.fits.pitch_fewest || !(slope > 0.0)) return pitch;
     found -= residual / slope;
-    if (!(std::abs(found / pitch - 1.0) < t.pitch_change)) return pitch;
+    if (!(std::abs(found / pitch - 1.0) < t.fits.pitch_change)) return pitch;
   }
   return found;
 }
@@ -204,7 +204,7 @@ double pitch_over_a_turn(const MotionSpace& space, const Vec3& axis, double pitc
 std::optional<Family> fit_screw(const MotionSpace& space) {
   const Motion xi = space.spectrum().vectors.col(0);
   const Vec3 omega = xi.head<3>(), v = xi.tail<3>();
-  if (omega.norm() <= tuning().types.screw_least_turn * xi.norm()) return std::nullopt;
+  if (omega.norm() <= tuning().types.fits.screw_least_turn * xi.norm()) return std::nullopt;
   Family out = rotation_family(omega.normalized(), omega.cross(v) / omega.squaredNorm());
   out.type = JointType::kCylindrical;
   out.pitch = pitch_of_facets(space, out.axis, out.origin, omega.dot(v) / omega.squaredNorm());
@@ -218,7 +218,7 @@ std::optional<Family> fit_screw(const MotionSpace& space) {
 /// How likely a motion slips. The tails keep one measurement from deciding alone.
 double slip_probability(double mu, double threshold) {
   const double p = 1.0 / (1.0 + (mu / threshold) * (mu / threshold));
-  return std::clamp(p, tuning().types.tail, 1.0 - tuning().types.tail);
+  return std::clamp(p, tuning().types.judging.tail, 1.0 - tuning().types.judging.tail);
 }
 
 struct Judged {
@@ -247,11 +247,12 @@ Judged judge(const MotionSpace& space, const Family& family, double threshold) {
 /// @param plain μ of the best rotation or translation
 std::optional<Judged> judged_screw(const MotionSpace& space, double plain, double threshold) {
   const TypesTuning& t = tuning().types;
-  if (plain <= t.screw_least) return std::nullopt;
+  if (plain <= t.judging.screw_least) return std::nullopt;
   const auto screw = fit_screw(space);
-  if (!screw || screw->origin.norm() > t.far_axis || std::abs(screw->pitch) > t.far_axis) return std::nullopt;
+  if (!screw || screw->origin.norm() > t.judging.far_axis || std::abs(screw->pitch) > t.judging.far_axis)
+    return std::nullopt;
   const Judged out = judge(space, *screw, threshold);
-  return out.slippage < t.screw_clearly * plain ? std::optional(out) : std::nullopt;
+  return out.slippage < t.judging.screw_clearly * plain ? std::optional(out) : std::nullopt;
 }
 
 std::vector<Judged> judged_families(const MotionSpace& space, double threshold) {
@@ -262,10 +263,10 @@ std::vector<Judged> judged_families(const MotionSpace& space, double threshold) 
        {fit_ball(space), fit_planar(space), fit_cylindrical(space), revolute, fit_prismatic(space), Family{}})
     all.push_back(judge(space, family, threshold));
   const double rotation_mu = all[3].slippage, translation_mu = all[4].slippage;
-  if (all[0].family.origin.norm() > t.far_centre) all[0].log_evidence -= t.ruled_out;
-  if (revolute.origin.norm() > t.far_axis) all[3].log_evidence -= t.ruled_out;
+  if (all[0].family.origin.norm() > t.judging.far_centre) all[0].log_evidence -= t.judging.ruled_out;
+  if (revolute.origin.norm() > t.judging.far_axis) all[3].log_evidence -= t.judging.ruled_out;
   if (const auto screw = judged_screw(space, std::min(rotation_mu, translation_mu), threshold)) {
-    all[3].log_evidence -= t.screw_over_plain;
+    all[3].log_evidence -= t.judging.screw_over_plain;
     all.push_back(*screw);
   }
   return all;
@@ -320,7 +321,7 @@ JointType type_by_ratio(const MotionSpace& space, double ratio, std::array<doubl
   // Squares of the singular values of the turns.
   const Mat3 turns = vectors.topLeftCorner(3, slips) * vectors.topLeftCorner(3, slips).transpose();
   const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(turns, Eigen::EigenvaluesOnly).eigenvalues();
-  const auto rotations = (squares.array() > std::pow(tuning().types.ratio_turns, 2)).count();
+  const auto rotations = (squares.array() > std::pow(tuning().types.judging.ratio_turns, 2)).count();
   if (slips == 3) return rotations >= 2 ? JointType::kBall : JointType::kPlanar;
   if (slips == 2) return JointType::kCylindrical;
   return rotations > 0 ? JointType::kRevolute : JointType::kPrismatic;
@@ -335,7 +336,7 @@ Slippage hypotheses_of(const std::vector<ContactRegion>& regions, const Slippage
   if (options.method == SlippageMethod::kFixedRatio) {
     const JointType type = type_by_ratio(space, options.ratio, out.mu);
     for (Judged& j : judged)
-      j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -tuning().types.ruled_out;
+      j.log_evidence = j.family.type == type && j.family.pitch == 0.0 ? 0.0 : -tuning().types.judging.ruled_out;
   } else {
     const auto mu = space.spectrum().mu;
     std::copy(mu.begin(), mu.end(), out.mu.begin());
@@ -362,7 +363,7 @@ struct Facing {
 std::vector<Facing> faces_of(const std::vector<ContactRegion>& regions) {
   std::size_t count = 0;
   for (const ContactRegion& r : regions) count += r.on_a.size() + r.on_b.size();
-  const std::size_t stride = 1 + count / tuning().types.stop_compared;
+  const std::size_t stride = 1 + count / tuning().types.others.stop_compared;
   std::vector<Facing> out;
   std::size_t i = 0;
   for (const ContactRegion& r : regions)
@@ -383,10 +384,11 @@ std::optional<Vec3> one_sided_face(const std::vector<ContactRegion>& regions) {
     double like = 0.0, against = 0.0;
     for (const Facing& other : faces) {
       const double cosine = f.normal.dot(other.normal);
-      if (cosine > t.stop_alike) like += other.area;
-      if (cosine < -t.stop_alike) against += other.area;
+      if (cosine > t.others.stop_alike) like += other.area;
+      if (cosine < -t.others.stop_alike) against += other.area;
     }
-    if (against <= t.stop_against * like && like > t.stop_least * all && like > largest) largest = like, out = f.normal;
+    if (against <= t.others.stop_against * like && like > t.others.stop_least * all && like > largest)
+      largest = like, out = f.normal;
   }
   return out;
 }
@@ -395,14 +397,14 @@ std::vector<ContactRegion> without_face(std::vector<ContactRegion> regions, cons
   for (ContactRegion& r : regions)
     for (const auto& [side, sign] : {std::pair(&r.on_a, 1.0), {&r.on_b, -1.0}})
       std::erase_if(*side, [&, sign = sign](const ContactSample& s) {
-        return sign * s.normal.dot(normal) > tuning().types.stop_alike;
+        return sign * s.normal.dot(normal) > tuning().types.others.stop_alike;
       });
   return regions;
 }
 
 bool slides_along(const JointSpec& joint, const Vec3& direction) {
   return (joint.type == JointType::kPrismatic || (joint.type == JointType::kCylindrical && joint.pitch == 0.0)) &&
-         std::abs(joint.frame.axes.col(0).dot(direction)) > tuning().types.stop_along;
+         std::abs(joint.frame.axes.col(0).dot(direction)) > tuning().types.others.stop_along;
 }
 
 /// A drawer at its stop touches what a peg in a blind hole touches, a piston at its dead centre what a pin with a head
@@ -418,10 +420,10 @@ void add_hypothesis_with_stop(const std::vector<ContactRegion>& regions, const S
   const auto rest = without_face(regions, *stop);
   std::size_t left = 0;
   for (const ContactRegion& r : rest) left += r.on_a.size() + r.on_b.size();
-  if (left < t.stop_fewest) return;
+  if (left < t.others.stop_fewest) return;
   JointHypothesis free = hypotheses_of(rest, options).hypotheses.front();
   if (!slides_along(free.joint, *stop)) return;
-  free.confidence = internal::share_of_first(t.stop_share * free.confidence, out);
+  free.confidence = internal::share_of_first(t.others.stop_share * free.confidence, out);
   free.reason = "the face that holds it one way only may be a stop; without it " + free.reason;
   internal::replace_hypothesis(std::move(free), out);
 }

@@ -83,19 +83,22 @@ struct FclContactSource::Impl {
                             " holds no body, expected one that was added");
     return at(body);
   }
-  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
   const ExactMotion* motion(Index body) const {
-    return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
+    return static_cast<std::size_t>(body) < query.motions.size() ? query.motions[static_cast<std::size_t>(body)]
+                                                                 : nullptr;
   }
-  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
+  bool asked_for(Index body) const {
+    return query.some.empty() || std::binary_search(query.some.begin(), query.some.end(), body);
+  }
   template <class Visit>
   void for_each_asked(const Visit& visit) {
-    if (some.empty())
+    if (query.some.empty())
       for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i) {
         if (contains(i)) visit(i);
       }
     else
-      for (const Index i : some)
+      for (const Index i : query.some)
         if (contains(i)) visit(i);
   }
 
@@ -126,15 +129,16 @@ struct FclContactSource::Impl {
   TimeOfImpact time_of_impact;
   DeformedSurface root;
 
-  // Of the query under way.
-  std::span<const BodyState> states;
-  std::span<const ExactMotion* const> motions;
-  std::span<const Index> some;
-  double margin = 0.0;
-  Vec3 origin = Vec3::Zero();
-  std::vector<BodyPair> pairs;
-  std::vector<double> amplitudes, shape;
-  ContactRegions regions_of_all, regions_of_some;
+  struct Query {
+    std::span<const BodyState> states;
+    std::span<const ExactMotion* const> motions;
+    std::span<const Index> some;
+    double margin = 0.0;
+    Vec3 origin = Vec3::Zero();
+    std::vector<BodyPair> pairs;
+    std::vector<double> amplitudes, shape;
+    ContactRegions regions_of_all, regions_of_some;
+  } query;  ///< under way
 
   std::map<BodyPair, std::vector<std::uint64_t>> kept;  ///< ids of the last query's contacts, ascending
 };
@@ -146,9 +150,9 @@ void FclContactSource::Impl::check(Index body) const {
              std::to_string(at(body).fcl->modes()));
     return;
   }
-  if (static_cast<std::size_t>(body) >= states.size())
-    throw InvalidArgument("FclContactSource: " + std::to_string(states.size()) + " states, expected one for body " +
-                          std::to_string(body) + " too");
+  if (static_cast<std::size_t>(body) >= query.states.size())
+    throw InvalidArgument("FclContactSource: " + std::to_string(query.states.size()) +
+                          " states, expected one for body " + std::to_string(body) + " too");
   const BodyState& s = state(body);
   if (!s.pose.p.allFinite() || !(std::abs(s.pose.q.norm() - 1.0) <= 1e-6))
     refuse(body, "pose is not finite or its quaternion not of length 1", "a pose");
@@ -187,7 +191,7 @@ void FclContactSource::Impl::place_all() {
     if (s.asleep && known.placed_asleep) return;
     known.fcl->place(s.pose, s.amplitudes);
     // Half the margin on either side of a gap.
-    set_box(i, known.fcl->box().grown(reach_of_features(s) + 0.5 * margin));
+    set_box(i, known.fcl->box().grown(reach_of_features(s) + 0.5 * query.margin));
     known.placed_asleep = s.asleep;
   });
   manager.update(moved);
@@ -202,17 +206,17 @@ Aabb FclContactSource::Impl::swept_box(Index body) {
     box = swept(b.rigid()->bounds(), {}, m);
   } else {
     RigidTransform pose;
-    amplitudes.resize(static_cast<std::size_t>(b.modes()));
-    m.at(0.0, pose, amplitudes);
-    root.bind(b.modal()->surface, amplitudes);
-    shape = b.modal()->surface->model()->collision_extent().shape;
+    query.amplitudes.resize(static_cast<std::size_t>(b.modes()));
+    m.at(0.0, pose, query.amplitudes);
+    root.bind(b.modal()->surface, query.amplitudes);
+    query.shape = b.modal()->surface->model()->collision_extent().shape;
     if (b.modal()->surface->skin() != nullptr) {
-      m.changes(amplitudes);
-      root.skin_extent(amplitudes, shape);
+      m.changes(query.amplitudes);
+      root.skin_extent(query.amplitudes, query.shape);
     }
-    box = swept(root.bounds(0), shape, m);
+    box = swept(root.bounds(0), query.shape, m);
   }
-  return box.grown(0.5 * margin);
+  return box.grown(0.5 * query.margin);
 }
 
 bool FclContactSource::Impl::may_meet(Index a, Index b) const {
@@ -231,22 +235,22 @@ bool FclContactSource::Impl::planes_meet(Index plane, Index body) const {
   const bool in_flight = motion(body) != nullptr;
   // The box has been grown by what features are looked for; a plane is one for good.
   const double farther = in_flight ? 0.0 : state(body).way() - reach_of_features(state(body));
-  const double beyond = margin + farther + (in_flight ? 0.0 : state(plane).way());
+  const double beyond = query.margin + farther + (in_flight ? 0.0 : state(plane).way());
   return h.normal.dot(box.center()) - h.offset - h.normal.cwiseAbs().dot(half) <= beyond;
 }
 
 void FclContactSource::Impl::add_pair(Index a, Index b) {
-  if (may_meet(a, b)) pairs.push_back({std::min(a, b), std::max(a, b)});
+  if (may_meet(a, b)) query.pairs.push_back({std::min(a, b), std::max(a, b)});
 }
 
 void FclContactSource::Impl::find_pairs() {
-  pairs.clear();
+  query.pairs.clear();
   const auto visit = [](Object* s, Object* t, void* self) {
     const Index a = static_cast<const FclPlace*>(s)->body(), b = static_cast<const FclPlace*>(t)->body();
     if (a != b) static_cast<Impl*>(self)->add_pair(a, b);
     return false;
   };
-  if (some.empty())
+  if (query.some.empty())
     manager.collide(this, visit);
   else
     for_each_asked([&](Index i) {
@@ -257,15 +261,15 @@ void FclContactSource::Impl::find_pairs() {
       if (contains(i) && at(i).placed && (asked_for(i) || asked_for(plane)) && may_meet(plane, i) &&
           planes_meet(plane, i))
         add_pair(plane, i);
-  std::ranges::sort(pairs);
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  std::ranges::sort(query.pairs);
+  query.pairs.erase(std::unique(query.pairs.begin(), query.pairs.end()), query.pairs.end());
 }
 
 double FclContactSource::Impl::reach(const BodyPair& pair) const {
   const BodyState &s = state(pair.a), &t = state(pair.b);
   const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
   const bool plane = planes.contains(pair.a) || planes.contains(pair.b);
-  return margin + (plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t)));
+  return query.margin + (plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t)));
 }
 
 RegionSide FclContactSource::Impl::region_side(Index body) const {
@@ -284,7 +288,7 @@ ContactSpacing FclContactSource::Impl::spacing(const BodyPair& pair, bool by_reg
 void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts,
                                           ContactRegions& regions) {
   const std::size_t first = contacts.size();
-  touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), origin, contacts);
+  touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), query.origin, contacts);
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
   const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
@@ -361,16 +365,16 @@ void FclContactSource::find_contacts(const ContactQuery& query, std::vector<Cont
   check_length("margin", query.margin);
   if (!query.origin.allFinite())
     throw InvalidArgument("FclContactSource: origin is not finite, expected finite coordinates");
-  m.states = query.states, m.motions = {}, m.some = query.bodies;
-  m.margin = query.margin, m.origin = query.origin;
+  m.query.states = query.states, m.query.motions = {}, m.query.some = query.bodies;
+  m.query.margin = query.margin, m.query.origin = query.origin;
   StageClock clock(query.times);
   m.place_all();
   m.find_pairs();
-  clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
+  clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.query.pairs.size()));
   contacts.clear();
-  ContactRegions& regions = m.some.empty() ? m.regions_of_all : m.regions_of_some;
+  ContactRegions& regions = m.query.some.empty() ? m.query.regions_of_all : m.query.regions_of_some;
   regions.clear();
-  for (const BodyPair& pair : m.pairs) m.find_in_pair(pair, contacts, regions);
+  for (const BodyPair& pair : m.query.pairs) m.find_in_pair(pair, contacts, regions);
   regions.give_to(contacts);
   m.keep(contacts);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
@@ -380,12 +384,12 @@ void FclContactSource::find_impacts(const ImpactQuery& query, std::vector<Impact
   Impl& m = *impl_;
   check_length("step", query.step);
   check_length("margin", query.margin);
-  m.states = query.states, m.motions = query.motions, m.some = query.bodies;
-  m.margin = query.margin;
+  m.query.states = query.states, m.query.motions = query.motions, m.query.some = query.bodies;
+  m.query.margin = query.margin;
   m.place_all();
   m.find_pairs();
   impacts.clear();
-  for (const BodyPair& pair : m.pairs) {
+  for (const BodyPair& pair : m.query.pairs) {
     if (m.motion(pair.a) == nullptr && m.motion(pair.b) == nullptr) continue;
     if (std::ranges::binary_search(query.except, std::pair(pair.a, pair.b))) continue;
     using Status = ImpactTime::Status;

@@ -54,37 +54,37 @@ SolveStatus BoundedRows::solve(const IslandStep& step, const ContactRule& rule, 
                                std::span<double> F, ProgramReport& report) {
   b_.clear();
   for (const Index row : order_) b_.push_back(b[static_cast<std::size_t>(row)]);
-  b_bounded_.resize(order_.size() - first_bounded_);
-  A_bounded_.resize(b_bounded_.size() * b_bounded_.size());
-  elimination_.reduce(A_, b_, static_cast<int>(first_bounded_), A_bounded_, b_bounded_);
+  bounded_.b.resize(order_.size() - first_bounded_);
+  bounded_.A.resize(bounded_.b.size() * bounded_.b.size());
+  elimination_.reduce(A_, b_, static_cast<int>(first_bounded_), bounded_.A, bounded_.b);
   const SolveStatus status = solve_bounded(step, rule, F, report);
   F_equal_.resize(first_bounded_);
-  elimination_.recover(F_bounded_, F_equal_);
+  elimination_.recover(bounded_.F, F_equal_);
   for (std::size_t i = 0; i < order_.size(); ++i)
-    F[static_cast<std::size_t>(order_[i])] = i < first_bounded_ ? F_equal_[i] : F_bounded_[i - first_bounded_];
+    F[static_cast<std::size_t>(order_[i])] = i < first_bounded_ ? F_equal_[i] : bounded_.F[i - first_bounded_];
   return status;
 }
 
 SolveStatus BoundedRows::solve_bounded(const IslandStep& step, const ContactRule& rule, std::span<const double> F,
                                        ProgramReport& report) {
-  const std::size_t n = b_bounded_.size();
-  for (std::vector<double>* v : {&lower_, &upper_, &gap_before_, &F_bounded_}) v->resize(n);
+  const std::size_t n = bounded_.b.size();
+  for (std::vector<double>* v : {&bounded_.lower, &bounded_.upper, &bounded_.gap_before, &bounded_.F}) v->resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = static_cast<std::size_t>(order_[first_bounded_ + i]);
     const RowLaw& law = step.law(at);
-    F_bounded_[i] = F[at];
-    lower_[i] = law.lower, upper_[i] = law.upper;
-    gap_before_[i] = step.start_gap[at] - law.offset;
+    bounded_.F[i] = F[at];
+    bounded_.lower[i] = law.lower, bounded_.upper[i] = law.upper;
+    bounded_.gap_before[i] = step.start_gap[at] - law.offset;
   }
   return programs_.solve({.cones = contacts(),
-                          .A = A_bounded_,
-                          .b = b_bounded_,
+                          .A = bounded_.A,
+                          .b = bounded_.b,
                           .friction = friction_,
-                          .lower = lower_,
-                          .upper = upper_,
-                          .gap_before = gap_before_,
+                          .lower = bounded_.lower,
+                          .upper = bounded_.upper,
+                          .gap_before = bounded_.gap_before,
                           .step = step.length()},
-                         rule.program(), F_bounded_, report);
+                         rule.program(), bounded_.F, report);
 }
 
 void BoundedRows::keep_within(const IslandStep& step, const ContactRule& rule, std::span<double> F) const {

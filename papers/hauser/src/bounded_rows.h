@@ -31,12 +31,14 @@ class BoundedRows {
   SolveStatus solve_bounded(const IslandStep& step, const ContactRule& rule, std::span<const double> F,
                             ProgramReport& report);
 
-  std::vector<Index> order_, place_;           // of the rows, and of each its place
-  std::size_t first_bounded_ = 0;              // in that order
-  std::vector<double> friction_;               // of the contacts
-  std::vector<double> G_, A_, b_;              // J D^½ and the problem, in that order
-  std::vector<double> A_bounded_, b_bounded_;  // reduced to rows with bounds
-  std::vector<double> lower_, upper_, gap_before_, F_bounded_, F_equal_;
+  std::vector<Index> order_, place_;  // of the rows, and of each its place
+  std::size_t first_bounded_ = 0;     // in that order
+  std::vector<double> friction_;      // of the contacts
+  std::vector<double> G_, A_, b_;     // J D^½ and the problem, in that order
+  struct {
+    std::vector<double> A, b, lower, upper, gap_before, F;
+  } bounded_;  // the problem reduced to rows with bounds
+  std::vector<double> F_equal_;
   EqualityElimination elimination_;
   ContactProgramSolver programs_;
 };

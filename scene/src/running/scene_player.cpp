@@ -86,6 +86,14 @@ ContactOptions take_rule(const Scene& scene, World& world) {
 
 }  // namespace
 
+/// Strikes and forces of a scene, by the bodies that they act on.
+struct PlannedLoads {
+  std::vector<PlannedStrike> strikes{};  ///< by step
+  std::vector<PlannedForce> forces{};
+  std::uint64_t next_strike = 0;
+  std::vector<LoadReport> strike_reports{}, force_reports{};
+};
+
 struct ScenePlayer::Impl {
   Impl(const Scene& s, const SceneModels& m, std::int64_t n, Jobs& jobs)
       : scene(s),
@@ -130,11 +138,8 @@ struct ScenePlayer::Impl {
   std::vector<BodyId> bodies, statics;
   std::vector<JointId> joints;
   HeldPoints held;
-  std::vector<PlannedStrike> strikes;
-  std::vector<PlannedForce> forces;
-  std::uint64_t next_strike = 0;
+  PlannedLoads loads;
   std::vector<MovedBody> moved;
-  std::vector<LoadReport> strike_reports, force_reports;
 };
 
 void ScenePlayer::Impl::add_bodies() {
@@ -168,23 +173,23 @@ void ScenePlayer::Impl::add_joints() {
 void ScenePlayer::Impl::plan_loads() {
   for (const Strike& s : scene.strikes)
     for_bodies_named(s.body, [&](std::size_t body) {
-      strikes.push_back({.when = time_in_steps(s.time, scene.step), .strike = &s, .body = body});
+      loads.strikes.push_back({.when = time_in_steps(s.time, scene.step), .strike = &s, .body = body});
     });
   for (const HeldForce& f : scene.forces)
     for_bodies_named(f.body, [&](std::size_t body) {
-      forces.push_back({.first = step_at_or_after(f.start, scene.step),
-                        .end = step_at_or_after(f.start + f.duration, scene.step),
-                        .force = &f,
-                        .body = body,
-                        .at = {}});
+      loads.forces.push_back({.first = step_at_or_after(f.start, scene.step),
+                              .end = step_at_or_after(f.start + f.duration, scene.step),
+                              .force = &f,
+                              .body = body,
+                              .at = {}});
     });
-  std::erase_if(strikes, [&](const PlannedStrike& s) { return s.when.step >= steps; });
-  std::erase_if(forces, [&](const PlannedForce& f) { return f.first >= steps; });
-  strike_reports.resize(strikes.size());
-  force_reports.resize(forces.size());
-  for (std::size_t i = 0; i < strikes.size(); ++i) strikes[i].order = i;
-  for (std::size_t i = 0; i < forces.size(); ++i) forces[i].order = i;
-  std::stable_sort(strikes.begin(), strikes.end(),
+  std::erase_if(loads.strikes, [&](const PlannedStrike& s) { return s.when.step >= steps; });
+  std::erase_if(loads.forces, [&](const PlannedForce& f) { return f.first >= steps; });
+  loads.strike_reports.resize(loads.strikes.size());
+  loads.force_reports.resize(loads.forces.size());
+  for (std::size_t i = 0; i < loads.strikes.size(); ++i) loads.strikes[i].order = i;
+  for (std::size_t i = 0; i < loads.forces.size(); ++i) loads.forces[i].order = i;
+  std::stable_sort(loads.strikes.begin(), loads.strikes.end(),
                    [](const auto& a, const auto& b) { return a.when.step < b.when.step; });
 }
 
@@ -195,22 +200,23 @@ void ScenePlayer::Impl::move_frames() {
 }
 
 void ScenePlayer::Impl::strike() {
-  for (; next_strike < strikes.size() && strikes[next_strike].when.step == taken; ++next_strike) {
-    const PlannedStrike& p = strikes[next_strike];
+  for (; loads.next_strike < loads.strikes.size() && loads.strikes[loads.next_strike].when.step == taken;
+       ++loads.next_strike) {
+    const PlannedStrike& p = loads.strikes[loads.next_strike];
     const BodyId id = bodies[p.body];
     const SurfacePoint at = find_place(p.strike->at, world, id, p.strike->where);
     world.apply_impulse(id, at, p.strike->impulse, p.strike->axes, p.when.delay);
-    strike_reports[p.order] = {scene.bodies[p.body].name, taken, p.when.delay, world.position(id, at)};
+    loads.strike_reports[p.order] = {scene.bodies[p.body].name, taken, p.when.delay, world.position(id, at)};
   }
 }
 
 void ScenePlayer::Impl::push() {
-  for (PlannedForce& f : forces) {
+  for (PlannedForce& f : loads.forces) {
     if (taken < f.first || taken >= f.end) continue;
     const BodyId id = bodies[f.body];
     if (taken == f.first) {
       f.at = find_place(f.force->at, world, id, f.force->where);
-      force_reports[f.order] = {scene.bodies[f.body].name, taken, 0.0, world.position(id, f.at)};
+      loads.force_reports[f.order] = {scene.bodies[f.body].name, taken, 0.0, world.position(id, f.at)};
     }
     world.apply_force(id, f.at, f.force->force, f.force->axes);
   }
@@ -228,8 +234,8 @@ std::span<const BodyId> ScenePlayer::bodies() const { return impl_->bodies; }
 std::span<const BodyId> ScenePlayer::statics() const { return impl_->statics; }
 std::span<const JointId> ScenePlayer::joints() const { return impl_->joints; }
 std::int64_t ScenePlayer::steps_taken() const { return impl_->taken; }
-std::span<const LoadReport> ScenePlayer::strikes() const { return impl_->strike_reports; }
-std::span<const LoadReport> ScenePlayer::forces() const { return impl_->force_reports; }
+std::span<const LoadReport> ScenePlayer::strikes() const { return impl_->loads.strike_reports; }
+std::span<const LoadReport> ScenePlayer::forces() const { return impl_->loads.force_reports; }
 std::span<const HandleReport> ScenePlayer::handles() const { return impl_->held.reports(); }
 
 void ScenePlayer::begin_step() {
@@ -255,8 +261,8 @@ void ScenePlayer::save_state(std::vector<std::byte>& state) const {
   impl_->world.save_state(state);
   const auto world_bytes = static_cast<std::uint64_t>(state.size());
   StateWriter writer(state);
-  writer(impl_->taken, impl_->next_strike);
-  for (const PlannedForce& force : impl_->forces) writer(force.at);
+  writer(impl_->taken, impl_->loads.next_strike);
+  for (const PlannedForce& force : impl_->loads.forces) writer(force.at);
   impl_->held.save_state(writer);
   writer(world_bytes);
 }
@@ -269,8 +275,8 @@ void ScenePlayer::restore_state(std::span<const std::byte> state) {
     throw InvalidArgument("ScenePlayer::restore_state: the bytes are no state of save_state()");
   impl_->world.restore_state(state.first(static_cast<std::size_t>(world_bytes)));
   StateReader reader(state.subspan(static_cast<std::size_t>(world_bytes)));
-  reader(impl_->taken, impl_->next_strike);
-  for (PlannedForce& force : impl_->forces) reader(force.at);
+  reader(impl_->taken, impl_->loads.next_strike);
+  for (PlannedForce& force : impl_->loads.forces) reader(force.at);
   impl_->held.restore_state(reader);
 }
 
