@@ -24,32 +24,45 @@ void ContactHistory::reserve(std::size_t bodies) {
 }
 
 void ContactHistory::finish(std::span<const PreparedContact> contacts, std::span<const char> asleep, bool some_woke) {
-  events_.clear(), pressed_.clear();
-  for (const PreparedContact& contact : contacts)
-    if (!contact.impulse.isZero(0.0)) take(contact);
-  std::ranges::sort(pressed_, kById);
+  events_.clear(), pressed_.clear(), order_.clear();
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (!contacts[i].impulse.isZero(0.0)) order_.push_back({contacts[i].id, i});
+  std::ranges::sort(order_, kById);
   const std::size_t rested = resting_.size();
-  for (const ContactMemory& last : memory_) {
-    if (rests(asleep, last.a, last.b))
-      resting_.push_back(last);
-    else
-      end(last);
+  auto last = memory_.begin();
+  const auto leave = [&](const ContactMemory& memory, bool presses) {
+    if (rests(asleep, memory.a, memory.b))
+      resting_.push_back(memory);
+    else if (!presses)
+      end(memory);
+  };
+  for (const Pressing& pressing : order_) {
+    while (last != memory_.end() && last->id < pressing.id) leave(*last++, false);
+    const bool known = last != memory_.end() && last->id == pressing.id;
+    take(contacts[pressing.number], known || find_in(resting_, pressing.id) != nullptr);
+    if (known) leave(*last++, true);
   }
-  if (some_woke || resting_.size() > rested) {
-    std::erase_if(resting_, [&](const ContactMemory& last) {
-      const bool wakes = !rests(asleep, last.a, last.b);
-      if (wakes) end(last);
-      return wakes;
-    });
-    std::ranges::sort(resting_, kById);
-    find_energy(resting_, resting_energy_);
-  }
+  while (last != memory_.end()) leave(*last++, false);
+  if (some_woke || resting_.size() > rested) renew_resting(asleep);
   std::swap(memory_, pressed_);
+  list_ids();
   find_energy(memory_, energy_);
-  std::ranges::sort(events_, kById);
 }
 
-void ContactHistory::take(const PreparedContact& contact) {
+/// Those that wake press, or have ended.
+void ContactHistory::renew_resting(std::span<const char> asleep) {
+  const std::size_t told = events_.size();
+  std::erase_if(resting_, [&](const ContactMemory& last) {
+    const bool wakes = !rests(asleep, last.a, last.b);
+    if (wakes && find_in(pressed_, last.id) == nullptr) end(last);
+    return wakes;
+  });
+  std::ranges::sort(resting_, kById);
+  find_energy(resting_, resting_energy_);
+  if (events_.size() > told) std::ranges::sort(events_, kById);
+}
+
+void ContactHistory::take(const PreparedContact& contact, bool lasts) {
   pressed_.push_back({.id = contact.id,
                       .a = contact.a.body,
                       .b = contact.b.body,
@@ -62,19 +75,24 @@ void ContactHistory::take(const PreparedContact& contact) {
   events_.push_back({.id = contact.id,
                      .a = contact.a.body,
                      .b = contact.b.body,
-                     .phase = find(contact.id) != nullptr ? ContactPhase::kLasting : ContactPhase::kBegun,
+                     .phase = lasts ? ContactPhase::kLasting : ContactPhase::kBegun,
                      .position = contact.start_position,
                      .normal = contact.axes.col(0),
                      .impulse = contact.impulse});
 }
 
 void ContactHistory::end(const ContactMemory& last) {
-  if (find_in(pressed_, last.id) != nullptr) return;
   events_.push_back({last.id, last.a, last.b, ContactPhase::kEnded, last.position, last.normal, Vec3::Zero()});
+}
+
+void ContactHistory::list_ids() {
+  ids_.clear();
+  for (const ContactMemory& memory : memory_) ids_.push_back(memory.id);
 }
 
 void ContactHistory::find_energies(std::size_t bodies) {
   reserve(bodies);
+  list_ids();
   find_energy(memory_, energy_);
   find_energy(resting_, resting_energy_);
 }
@@ -82,8 +100,9 @@ void ContactHistory::find_energies(std::size_t bodies) {
 void ContactHistory::clear() { *this = {}; }
 
 const ContactMemory* ContactHistory::find(std::uint64_t id) const {
-  const ContactMemory* known = find_in(memory_, id);
-  return known != nullptr ? known : find_in(resting_, id);
+  const auto known = std::lower_bound(ids_.begin(), ids_.end(), id);
+  if (known != ids_.end() && *known == id) return &memory_[static_cast<std::size_t>(known - ids_.begin())];
+  return find_in(resting_, id);
 }
 
 double ContactHistory::energy(Index body) const {

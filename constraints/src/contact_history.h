@@ -53,13 +53,23 @@ class ContactHistory {
     return std::tie(s.memory_, s.resting_, s.events_);
   }
 
-  void take(const PreparedContact& contact);
+  /// A contact that presses, by its number.
+  struct Pressing {
+    std::uint64_t id = 0;
+    std::size_t number = 0;
+  };
+  void take(const PreparedContact& contact, bool lasts);
   void end(const ContactMemory& last);
+  void renew_resting(std::span<const char> asleep);
+  void list_ids();
 
   std::vector<ContactMemory> memory_, resting_;
   std::vector<ContactEvent> events_;
   std::vector<double> energy_, resting_energy_;  // by body: of memory_ and of resting_
-  std::vector<ContactMemory> pressed_;           // scratch of finish()
+  std::vector<std::uint64_t> ids_;               // of memory_
+  // Scratch of finish().
+  std::vector<ContactMemory> pressed_;
+  std::vector<Pressing> order_;
 };
 
 }  // namespace limber

@@ -26,24 +26,27 @@ void StepEvents::begin() {
   std::swap(events_, last_events_);
 }
 
+// Events come by id, and so do those that are known: each list is gone through once.
 void StepEvents::add(int substep, std::span<const ContactEvent> events) {
   const std::size_t known = merged_.size();
+  std::size_t at = 0;
+  auto last = last_events_.begin();
   for (const ContactEvent& event : events) {
-    const auto end = merged_.begin() + static_cast<std::ptrdiff_t>(known);
-    const auto found = std::lower_bound(merged_.begin(), end, event, kById);
-    if (found != end && found->event.id == event.id)
-      add_to(*found, event);
+    while (at < known && merged_[at].event.id < event.id) ++at;
+    while (last != last_events_.end() && last->id < event.id) ++last;
+    const bool pressed_before =
+        last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
+    if (at < known && merged_[at].event.id == event.id)
+      add_to(merged_[at], event);
     else
-      merged_.push_back(first_of(event, substep));
+      merged_.push_back(first_of(event, substep, pressed_before));
   }
-  std::sort(merged_.begin(), merged_.end(), kById);
+  if (known > 0) std::sort(merged_.begin(), merged_.end(), kById);
 }
 
-StepEvents::Merged StepEvents::first_of(const ContactEvent& event, int substep) const {
+StepEvents::Merged StepEvents::first_of(const ContactEvent& event, int substep, bool pressed_before) {
   Merged made{event, event.phase != ContactPhase::kEnded, event.phase == ContactPhase::kEnded};
   if (!made.pressed) return made;
-  const auto last = std::lower_bound(last_events_.begin(), last_events_.end(), event, kById);
-  const bool pressed_before = last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
   const bool lasting = pressed_before || (substep == 0 && event.phase == ContactPhase::kLasting);
   made.event.phase = lasting ? ContactPhase::kLasting : ContactPhase::kBegun;
   return made;
@@ -68,12 +71,13 @@ void StepEvents::end() {
       events_.back().phase = ContactPhase::kEnded;
       events_.back().impulse = Vec3::Zero();
     }
+  const bool released = !events_.empty();
   released_.clear();
   for (const Merged& merged : merged_) {
     events_.push_back(merged.event);
     if (merged.pressed && merged.let_go) released_.push_back(merged.event);
   }
-  std::sort(events_.begin(), events_.end(), kById);
+  if (released) std::sort(events_.begin(), events_.end(), kById);
 }
 
 }  // namespace limber::internal

@@ -33,7 +33,7 @@ class StepEvents {
     bool pressed;  // in some substep
     bool let_go;   // since it last pressed
   };
-  Merged first_of(const ContactEvent& event, int substep) const;
+  static Merged first_of(const ContactEvent& event, int substep, bool pressed_before);
   static void add_to(Merged& merged, const ContactEvent& event);
 
   std::vector<Merged> merged_;  // by id
