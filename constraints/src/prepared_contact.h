@@ -83,6 +83,7 @@ struct PreparedContact {
   Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
+  Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone
   double give = 0.0;               // what the contact yielded to it by itself, m/N
   double slip = 0.0;               // beyond what its spring gave, m
   bool foreseen = false;           // the step has been foreseen before, with:

@@ -60,10 +60,10 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
     by_number_[static_cast<std::size_t>(member)] = static_cast<std::int32_t>(bodies_.size());
     bodies_.push_back(body);
   }
-  const auto count = static_cast<std::size_t>(blocks);
+  const auto count = static_cast<std::size_t>(blocks) + 1;
   for (std::vector<Block8>* all : {&motion_, &free_, &answers_, &shapes_}) all->assign(count, {});
-  pushes_.assign(bodies_.size(), {});
-  shifts_.assign(bodies_.size(), {});
+  pushes_.assign(bodies_.size() + 1, {});
+  shifts_.assign(bodies_.size() + 1, {});
   for (const GameBody& body : bodies_)
     if (body.modes != nullptr) write_modes(body, shapes_);
 }
@@ -203,14 +203,19 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
     body.shift += h * body.v;
     if (pushed) body.shift += h / body.root_mass * read_vector(push.v);
     body.q = normalized(turned * body.q);
-    body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v,
-                                                     body.momentum_scale * body.turn);
+    if (plan_.seen) show(body);
   } else {
     turn_led(body, turned);
   }
   FrameShift& shift = shifts_[at];
   write_vector(body.shift, shift.shift);
   write_matrix(to_matrix(body.q) - body.R_start, shift.turned);
+}
+
+/// To its group.
+void GameBodies::show(GameBody& body) const {
+  body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v,
+                                                   body.momentum_scale * body.turn);
 }
 
 /// Where its parent has brought it, turned as constraints have it.
@@ -235,7 +240,10 @@ void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
 }
 
 void GameBodies::end_step() {
-  for (GameBody& body : bodies_) body.group->end_parts(body.slot);
+  for (GameBody& body : bodies_) {
+    if (body.led < 0) show(body);
+    body.group->end_parts(body.slot);
+  }
 }
 
 bool GameBodies::all_finite() const {

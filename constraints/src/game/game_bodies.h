@@ -24,6 +24,7 @@ struct SubstepPlan {
   double step = 0.0;  ///< s, the whole step
   int count = 1;      ///< substeps
   Vec3 gravity = Vec3::Zero();
+  bool seen = true;  // whether anybody looks at the bodies between substeps
   double length() const { return step / count; }
 };
 
@@ -69,6 +70,7 @@ class GameBodies {
   const GameBody& body(std::int32_t at) const { return bodies_[static_cast<std::size_t>(at)]; }
   const SubstepPlan& plan() const { return plan_; }
 
+  // Arrays by block or by body have one at their end that stands.
   std::vector<Block8>& motion() { return motion_; }  ///< y
   const std::vector<Block8>& motion() const { return motion_; }
   std::vector<Block8>& answers() { return answers_; }            ///< q, of what keeps its rows for the step
@@ -92,6 +94,7 @@ class GameBodies {
   void advance_modes(GameBody& body, int number, const FrameExcitation& excitation);
   void move_modes(GameBody& body);
   void move_frame(std::size_t at, bool pushed);
+  void show(GameBody& body) const;
   SubstepModes& modes_of(const ModalModel& model);
 
   SubstepPlan plan_;

@@ -32,20 +32,42 @@ double yield_of(const PreparedSide& side, const Vec3& n) {
   return n.dot(sum * n);
 }
 
+/// Whether a force pushes, is in its cone, and is finite.
+bool meets_law(const Vec3& f, double friction) {
+  constexpr double kRounded = 1e-5;  // of a force, in single precision
+  if (!f.allFinite() || f[0] < 0.0) return false;
+  return f[0] == 0.0 ? f[1] == 0.0 && f[2] == 0.0 : f.tail<2>().norm() <= friction * f[0] * (1.0 + kRounded);
+}
+
 }  // namespace
 
 void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
                               const Options& options) {
   contacts_ = contacts;
   rows_.clear();
+  numbers_.clear();
   blocks_.clear();
   rolling_.clear();
-  sums_.assign(contacts.size(), Vec3::Zero());
-  for (const PreparedContact& contact : contacts) add(states, bodies, contact, options);
+  const bool rolls = options.rolling_friction > 0.0;
+  bundles_.arrange(bodies, contacts, rolls);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PreparedContact& contact = contacts[i];
+    const std::size_t known = blocks_.size();
+    const ContactRow row = make(states, bodies, contact, options);
+    if (bundles_.holds(i)) {
+      bundles_.put(i, row, blocks_.data());
+      blocks_.resize(known);
+      continue;
+    }
+    rows_.push_back(row);
+    numbers_.push_back(i);
+    if (rolls && (is_round(contact.a) || is_round(contact.b))) add_rolling(states, bodies, contact, options);
+  }
+  sums_.assign(rows_.size(), Vec3::Zero());
 }
 
-void GameContacts::add(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                       const Options& options) {
+ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                              const Options& options) {
   ContactRow row;
   double thinnest = std::numeric_limits<double>::infinity(), yields = 0.0;
   for (int i = 0; i < 3; ++i) write_axis(contact.axes.col(i), row.axes[i]);
@@ -67,9 +89,7 @@ void GameContacts::add(const BodyStates& states, const GameBodies& bodies, const
   const Vec3 last = contact.axes.transpose() * contact.last_force;
   for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
   row.force[0] = std::max(0.0f, row.force[0]);
-  rows_.push_back(row);
-  if (options.rolling_friction > 0.0 && (is_round(contact.a) || is_round(contact.b)))
-    add_rolling(states, bodies, contact, options);
+  return row;
 }
 
 void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
@@ -190,56 +210,71 @@ void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodie
 }
 
 void GameContacts::apply_last_forces(GameBodies& bodies) {
+  apply_bundle_forces(bundles_.arrays(), bodies.answers().data());
   apply_forces(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), {blocks_.data(), bodies.answers().data()});
 }
 
 bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps) {
-  return measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(), bodies.shifts().data(),
-                          kPushShare, static_cast<float>(steps.push_speed * bodies.plan().length()));
+  const auto most = static_cast<float>(steps.push_speed * bodies.plan().length());
+  const bool bundles_overlap = measure_bundles(bundles_.arrays(), bodies.shifts().data(), kPushShare, most);
+  const bool rows_overlap = measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(),
+                                             bodies.shifts().data(), kPushShare, most);
+  return bundles_overlap || rows_overlap;
 }
 
 void GameContacts::sweep(GameBodies& bodies, bool backward) {
-  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward,
-                 {blocks_.data(), bodies.motion().data()});
+  const SweepArrays arrays{blocks_.data(), bodies.motion().data()};
+  if (!backward) sweep_bundles(bundles_.arrays(), backward, bodies.motion().data());
+  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward, arrays);
+  if (backward) sweep_bundles(bundles_.arrays(), backward, bodies.motion().data());
 }
 
 void GameContacts::push_apart(GameBodies& bodies, bool backward) {
+  if (!backward) push_bundles(bundles_.arrays(), backward, bodies.pushes().data());
   push_contacts(rows_.data(), rows_.size(), backward, blocks_.data(), bodies.pushes().data());
+  if (backward) push_bundles(bundles_.arrays(), backward, bodies.pushes().data());
 }
 
 void GameContacts::end_substep() {
+  add_up_bundles(bundles_.arrays());
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);
 }
 
-void GameContacts::end_step(double h) {
+void GameContacts::end_step(const SubstepPlan& plan) {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const float* last = rows_[i].force;
-    contacts_[i].impulse = h * (contacts_[i].axes * sums_[i]);
-    contacts_[i].last_force = contacts_[i].axes * Vec3(last[0], last[1], last[2]);
-    contacts_[i].give = contacts_[i].slip = 0.0;
+    tell(contacts_[numbers_[i]], Vec3(last[0], last[1], last[2]), sums_[i], plan);
   }
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (bundles_.holds(i)) tell(contacts_[i], bundles_.force(i), bundles_.sum(i), plan);
   rolling_memory_.clear();
   for (const RollingRow& rolling : rolling_) {
     const float* moment = rolling.moment;
     rolling_memory_.push_back(
-        {contacts_[static_cast<std::size_t>(rolling.contact)].id, Vec3(moment[0], moment[1], moment[2])});
+        {contacts_[numbers_[static_cast<std::size_t>(rolling.contact)]].id, Vec3(moment[0], moment[1], moment[2])});
   }
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
 }
 
-double GameContacts::residual(GameBodies& bodies) const {
+void GameContacts::tell(PreparedContact& contact, const Vec3& last, const Vec3& sum, const SubstepPlan& plan) const {
+  contact.last_force = contact.axes * last;
+  contact.mean_force = contact.axes * (sum / plan.count);
+  contact.impulse = plan.step * contact.mean_force;
+  contact.give = contact.slip = 0.0;
+}
+
+double GameContacts::residual(GameBodies& bodies) {
   return static_cast<double>(
-      residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), bodies.motion().data()}));
+      std::max(residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), bodies.motion().data()}),
+               residual_of_bundles(bundles_.arrays(), bodies.motion().data())));
 }
 
 bool GameContacts::meet_law() const {
-  constexpr float kRounded = 1e-5f;  // of a force, in single precision
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (bundles_.holds(i) && !meets_law(bundles_.force(i), bundles_.friction(i))) return false;
   return std::ranges::all_of(rows_, [](const ContactRow& row) {
-    const float* f = row.force;
-    if (!(std::isfinite(f[0]) && std::isfinite(f[1]) && std::isfinite(f[2]) && f[0] >= 0.0f)) return false;
-    return f[0] == 0.0f ? f[1] == 0.0f && f[2] == 0.0f
-                        : std::hypot(f[1], f[2]) <= row.friction * f[0] * (1.0f + kRounded);
+    return meets_law(Vec3(row.force[0], row.force[1], row.force[2]), static_cast<double>(row.friction));
   });
 }
 

@@ -7,6 +7,7 @@
 #include "../prepared_contact.h"
 #include "game_bodies.h"
 #include "limber/constraints/small_steps.h"
+#include "pair_bundles.h"
 
 namespace limber::internal {
 
@@ -42,19 +43,21 @@ class GameContacts {
   /// Adds up forces.
   void end_substep();
   /// Tells the contacts what acted on them.
-  void end_step(double h);
+  void end_step(const SubstepPlan& plan);
 
   /// m: how far from their law the last sweep left the rows.
-  double residual(GameBodies& bodies) const;
+  double residual(GameBodies& bodies);
   /// Whether no force pulls, is outside its cone, or is not finite.
   bool meet_law() const;
-  std::size_t size() const { return rows_.size(); }
+  std::size_t size() const { return contacts_.size(); }
 
   std::vector<Rolling>& rolling_memory() { return rolling_memory_; }
   const std::vector<Rolling>& rolling_memory() const { return rolling_memory_; }
 
  private:
-  void add(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, const Options& options);
+  ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
+                  const Options& options);
+  void tell(PreparedContact& contact, const Vec3& last, const Vec3& sum, const SubstepPlan& plan) const;
   void add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, std::size_t side,
                 ContactRow& row);
   void add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
@@ -65,8 +68,11 @@ class GameContacts {
                    const Options& options);
 
   std::span<PreparedContact> contacts_;
-  std::vector<ContactRow> rows_;  // one for each
-  std::vector<Block8> blocks_;    // of the rows
+  PairBundles bundles_;
+  // Contacts of bodies that bend, roll or are led: those that bundles do not hold.
+  std::vector<ContactRow> rows_;
+  std::vector<std::size_t> numbers_;  // in `contacts_`
+  std::vector<Block8> blocks_;        // of the rows
   std::vector<RollingRow> rolling_;
   std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;

@@ -46,7 +46,10 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
   const BodyStates states(problem.table);
   const SmallSteps steps = problem.contacts != nullptr ? problem.contacts->options().small_steps : SmallSteps{};
   m.bodies.begin_step(problem.table, problem.members,
-                      {.step = problem.step, .count = steps.substeps, .gravity = problem.gravity});
+                      {.step = problem.step,
+                       .count = steps.substeps,
+                       .gravity = problem.gravity,
+                       .seen = !problem.constraints.empty()});
   GameContacts::Options options{.steps = steps, .thickness = problem.thickness};
   std::span<PreparedContact> contacts;
   if (problem.contacts != nullptr) {
@@ -60,9 +63,9 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
   SmallStepReport report{.rows = static_cast<int>(3 * m.contacts.size() + m.constraints.size()),
                          .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual(m.bodies))};
   report.solved = m.contacts.meet_law() && m.constraints.all_finite() && m.bodies.all_finite();
-  m.contacts.end_step(m.bodies.plan().length());
-  if (problem.contacts != nullptr) problem.contacts->press_dents(states);
+  m.contacts.end_step(m.bodies.plan());
   m.bodies.end_step();
+  if (problem.contacts != nullptr) problem.contacts->press_dents(states);
   return report;
 }
 

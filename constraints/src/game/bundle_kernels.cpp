@@ -1,0 +1,357 @@
+#include "bundle_kernels.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "game/bundle_kernels.cpp"
+// Arrays of vectors, as in sweep_kernels.cpp.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+// foreach_target first
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace limber::internal::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lanes = hn::CappedTag<float, kBundleLanes>;
+using Vector = hn::Vec<Lanes>;
+constexpr std::size_t kLanesAtOnce = hn::MaxLanes(Lanes());
+
+HWY_INLINE HWY_ATTR Vector Get(const Block8& from, std::size_t lane) { return hn::Load(Lanes(), from.v + lane); }
+HWY_INLINE HWY_ATTR void Put(Vector x, Block8& to, std::size_t lane) { hn::Store(x, Lanes(), to.v + lane); }
+
+/// a · b + c, of three components.
+HWY_INLINE HWY_ATTR Vector AddDot(const Block8* a, const Vector* b, Vector c, std::size_t lane) {
+  for (std::size_t i = 0; i < 3; ++i) c = hn::MulAdd(Get(a[i], lane), b[i], c);
+  return c;
+}
+
+// Four numbers of each lane's own record, as four vectors over the lanes, and back.
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE HWY_ATTR void Gather4(const float* const* from, std::size_t at, Vector* to) {
+  for (std::size_t i = 0; i < 4; ++i) to[i] = hn::Set(Lanes(), from[0][at + i]);
+}
+HWY_INLINE HWY_ATTR void Scatter4(const Vector* from, float* const* to, std::size_t at) {
+  for (std::size_t i = 0; i < 4; ++i)
+    if (to[0] != nullptr) hn::Store(from[i], Lanes(), to[0] + at + i);
+}
+#else
+using Fours = hn::CappedTag<float, 4>;
+using Four = hn::Vec<Fours>;
+
+HWY_INLINE HWY_ATTR void Transpose(Four* x) {
+  const Fours d;
+  const Four a = hn::InterleaveLower(d, x[0], x[2]), b = hn::InterleaveLower(d, x[1], x[3]);
+  const Four e = hn::InterleaveUpper(d, x[0], x[2]), f = hn::InterleaveUpper(d, x[1], x[3]);
+  x[0] = hn::InterleaveLower(d, a, b), x[1] = hn::InterleaveUpper(d, a, b);
+  x[2] = hn::InterleaveLower(d, e, f), x[3] = hn::InterleaveUpper(d, e, f);
+}
+
+template <class D>
+HWY_INLINE HWY_ATTR hn::Vec<D> Joined(D d, const Four& lower, const Four& upper) {
+  if constexpr (hn::MaxLanes(D()) == 8)
+    return hn::Combine(d, upper, lower);
+  else
+    return lower;
+}
+
+template <class V>
+HWY_INLINE HWY_ATTR Four PartOf(const V& x, std::size_t four) {
+  if constexpr (sizeof(V) > sizeof(Four))
+    return four == 0 ? hn::LowerHalf(Fours(), x) : hn::UpperHalf(Fours(), x);
+  else
+    return x;
+}
+
+HWY_INLINE HWY_ATTR void Gather4(const float* const* from, std::size_t at, Vector* to) {
+  Four x[2][4];
+  for (std::size_t g = 0; g < kLanesAtOnce / 4; ++g) {
+    for (std::size_t l = 0; l < 4; ++l) x[g][l] = hn::LoadU(Fours(), from[4 * g + l] + at);
+    Transpose(x[g]);
+  }
+  for (std::size_t i = 0; i < 4; ++i) to[i] = Joined(Lanes(), x[0][i], x[kLanesAtOnce / 4 - 1][i]);
+}
+
+/// Null: nowhere.
+HWY_INLINE HWY_ATTR void Scatter4(const Vector* from, float* const* to, std::size_t at) {
+  for (std::size_t g = 0; g < kLanesAtOnce / 4; ++g) {
+    Four x[4];
+    for (std::size_t i = 0; i < 4; ++i) x[i] = PartOf(from[i], g);
+    Transpose(x);
+    for (std::size_t l = 0; l < 4; ++l)
+      if (to[4 * g + l] != nullptr) hn::StoreU(x[l], Fours(), to[4 * g + l] + at);
+  }
+}
+#endif
+
+/// Both bodies of the pairs in some lanes: what of their coordinates the contacts see and move. Origins are seen by
+/// their difference, in displacements: w = root_a y_a − root_b y_b.
+struct Sides {
+  Vector apart[3];    // w
+  Vector parted[3];   // Σ of forces, world: what w came by less
+  Vector turn[2][3];  // coordinates
+  Vector rate;        // root_a² + root_b²
+};
+
+HWY_INLINE HWY_ATTR void ReadSides(const PairBundle& bundle, const std::int32_t (*at)[kBundleLanes], const Block8* y,
+                                   std::size_t lane, Sides& sides) {
+  const Lanes d;
+  sides.rate = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) sides.apart[i] = sides.parted[i] = hn::Zero(d);
+  for (std::size_t s = 0; s < 2; ++s) {
+    const float* from[kLanesAtOnce];
+    for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = y[at[s][lane + l]].v;
+    Vector v[8];
+    Gather4(from, 0, v);
+    Gather4(from, 4, v + 4);
+    const Vector root = Get(bundle.root[s], lane);
+    sides.rate = hn::MulAdd(root, root, sides.rate);
+    for (std::size_t i = 0; i < 3; ++i) {
+      sides.apart[i] = s == 0 ? hn::Mul(root, v[i]) : hn::NegMulAdd(root, v[i], sides.apart[i]);
+      sides.turn[s][i] = v[3 + i];
+    }
+  }
+}
+
+HWY_INLINE HWY_ATTR void WriteSides(const PairBundle& bundle, const std::int32_t (*at)[kBundleLanes],
+                                    std::int32_t standing, Block8* y, std::size_t lane, const Sides& sides) {
+  const Lanes d;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const float* from[kLanesAtOnce];
+    float* to[kLanesAtOnce];
+    for (std::size_t l = 0; l < kLanesAtOnce; ++l) {
+      Block8& block = y[at[s][lane + l]];
+      from[l] = block.v;
+      to[l] = bundle.frame[s][lane + l] == standing ? nullptr : block.v;
+    }
+    Vector v[8];
+    Gather4(from, 0, v);
+    const Vector root = Get(bundle.root[s], lane);
+    for (std::size_t i = 0; i < 3; ++i) {
+      v[i] = s == 0 ? hn::MulAdd(root, sides.parted[i], v[i]) : hn::NegMulAdd(root, sides.parted[i], v[i]);
+      v[3 + i] = sides.turn[s][i];
+    }
+    v[6] = v[7] = hn::Zero(d);
+    Scatter4(v, to, 0);
+    Scatter4(v + 4, to, 4);
+  }
+}
+
+/// The row's number for the coordinates as they are.
+HWY_INLINE HWY_ATTR Vector ReadAxis(const BundleContact& c, std::size_t axis, const Sides& sides, std::size_t lane) {
+  Vector u = hn::Mul(Get(c.axes[axis][0], lane), sides.apart[0]);
+  for (std::size_t i = 1; i < 3; ++i) u = hn::MulAdd(Get(c.axes[axis][i], lane), sides.apart[i], u);
+  return AddDot(c.turn[1][axis], sides.turn[1], AddDot(c.turn[0][axis], sides.turn[0], u, lane), lane);
+}
+
+HWY_INLINE HWY_ATTR void MoveSides(const BundleContact& c, std::size_t axes, const Vector* by, Sides& sides,
+                                   std::size_t lane) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    Vector force = hn::Mul(by[0], Get(c.axes[0][i], lane));
+    for (std::size_t axis = 1; axis < axes; ++axis) force = hn::MulAdd(by[axis], Get(c.axes[axis][i], lane), force);
+    sides.apart[i] = hn::MulAdd(sides.rate, force, sides.apart[i]);
+    sides.parted[i] = hn::Add(sides.parted[i], force);
+    for (std::size_t s = 0; s < 2; ++s)
+      for (std::size_t axis = 0; axis < axes; ++axis)
+        sides.turn[s][i] = hn::MulAdd(by[axis], Get(c.turn[s][axis][i], lane), sides.turn[s][i]);
+  }
+}
+
+/// How much is left open along the normal: at most 0 where the law is met.
+HWY_INLINE HWY_ATTR Vector Approach(const BundleContact& c, const Sides& sides, std::size_t lane) {
+  const Vector open = hn::Sub(Get(c.target, lane), hn::Add(ReadAxis(c, 0, sides, lane), Get(c.now, lane)));
+  const Vector change = hn::Sub(Get(c.force[0], lane), Get(c.before, lane));
+  return hn::NegMulAdd(Get(c.compliance, lane), change, open);
+}
+
+HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, Sides& sides, std::size_t lane) {
+  const Lanes d;
+  const Vector zero = hn::Zero(d), before = Get(c.force[0], lane);
+  Vector change[3], wanted[2];
+  const Vector normal = hn::Max(zero, hn::MulAdd(Approach(c, sides, lane), Get(c.inverse_normal, lane), before));
+  change[0] = hn::Sub(normal, before);
+  for (std::size_t t = 0; t < 2; ++t) {
+    const Vector slip = hn::MulAdd(Get(c.coupling[t], lane), change[0], ReadAxis(c, 1 + t, sides, lane));
+    wanted[t] = hn::NegMulAdd(Get(c.inverse_tangent, lane), slip, Get(c.force[1 + t], lane));
+  }
+  const Vector square = hn::MulAdd(wanted[0], wanted[0], hn::Mul(wanted[1], wanted[1]));
+  const Vector most = hn::IfThenElseZero(hn::Gt(normal, zero), hn::Mul(Get(c.friction, lane), normal));
+  const Vector share =
+      hn::IfThenElse(hn::Gt(square, hn::Mul(most, most)), hn::Div(most, hn::Sqrt(square)), hn::Set(d, 1.0f));
+  Put(normal, c.force[0], lane);
+  for (std::size_t t = 0; t < 2; ++t) {
+    const Vector tangent = hn::Mul(share, wanted[t]);
+    change[1 + t] = hn::Sub(tangent, Get(c.force[1 + t], lane));
+    Put(tangent, c.force[1 + t], lane);
+  }
+  MoveSides(c, 3, change, sides, lane);
+}
+
+HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {
+  for (std::size_t i = 0; i < all.count; ++i) {
+    const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Sides sides;
+      ReadSides(bundle, bundle.motion, motion, lane, sides);
+      for (std::int32_t k = 0; k < bundle.count; ++k)
+        SolveOne(all.contacts[bundle.first + (backward ? bundle.count - 1 - k : k)], sides, lane);
+      WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
+    }
+  }
+}
+
+/// How points of two bodies have come apart since the step's start, by components.
+HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[12], std::size_t lane, Vector* apart) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    Vector of[2];
+    for (std::size_t s = 0; s < 2; ++s) {
+      of[s] = frames[s][i];
+      for (std::size_t j = 0; j < 3; ++j) of[s] = hn::MulAdd(frames[s][3 + 3 * i + j], Get(c.arm[s][j], lane), of[s]);
+    }
+    apart[i] = hn::Sub(of[0], of[1]);
+  }
+}
+
+HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], float share, float most,
+                                    std::size_t lane) {
+  const Lanes d;
+  const Vector zero = hn::Zero(d);
+  Vector apart[3];
+  Travel(c, frames, lane, apart);
+  const Vector now = AddDot(c.axes[0], apart, Get(c.rest, lane), lane), force = Get(c.force[0], lane);
+  const Vector yields = hn::Mul(Get(c.compliance, lane), force), gap = hn::Add(now, yields);
+  const Vector part = hn::Min(hn::Mul(hn::Set(d, share), hn::Neg(hn::Add(gap, Get(c.slop, lane)))), hn::Set(d, most));
+  Put(now, c.now, lane);
+  Put(hn::Sub(hn::Min(gap, zero), yields), c.target, lane);
+  Put(force, c.before, lane);
+  Put(zero, c.push, lane);
+  Put(part, c.part, lane);
+  return !hn::AllTrue(d, hn::Le(part, zero));
+}
+
+HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, float share, float most) {
+  bool any = false;
+  for (std::size_t b = 0; b < all.count; ++b) {
+    PairBundle& bundle = all.bundles[b];
+    bundle.overlaps = false;
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Vector of[2][12];
+      for (std::size_t s = 0; s < 2; ++s) {
+        const float* from[kLanesAtOnce];
+        for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = frames[bundle.frame[s][lane + l]].shift;
+        for (std::size_t i = 0; i < 12; i += 4) Gather4(from, i, of[s] + i);
+      }
+      for (std::int32_t k = 0; k < bundle.count; ++k)
+        if (MeasureOne(all.contacts[bundle.first + k], of, share, most, lane)) bundle.overlaps = true;
+    }
+    any = any || bundle.overlaps;
+  }
+  return any;
+}
+
+HWY_INLINE HWY_ATTR void PushOne(BundleContact& c, Sides& sides, std::size_t lane) {
+  const Lanes d;
+  const Vector zero = hn::Zero(d), part = Get(c.part, lane), before = Get(c.push, lane);
+  const Vector open = hn::Sub(part, ReadAxis(c, 0, sides, lane));
+  const Vector push = hn::Max(zero, hn::MulAdd(open, Get(c.inverse_push, lane), before));
+  const Vector change = hn::IfThenElseZero(hn::Gt(part, zero), hn::Sub(push, before));
+  Put(hn::Add(before, change), c.push, lane);
+  MoveSides(c, 1, &change, sides, lane);
+}
+
+HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, Block8* pushes) {
+  for (std::size_t i = 0; i < all.count; ++i) {
+    const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
+    for (std::size_t lane = 0; lane < kBundleLanes && bundle.overlaps; lane += kLanesAtOnce) {
+      Sides sides;
+      ReadSides(bundle, bundle.frame, pushes, lane, sides);
+      for (std::int32_t k = 0; k < bundle.count; ++k)
+        PushOne(all.contacts[bundle.first + (backward ? bundle.count - 1 - k : k)], sides, lane);
+      WriteSides(bundle, bundle.frame, all.standing, pushes, lane, sides);
+    }
+  }
+}
+
+HWY_ATTR float ResidualOfBundles(const BundleArrays& all, const Block8* motion) {
+  const Lanes d;
+  Vector largest = hn::Zero(d);
+  for (std::size_t b = 0; b < all.count; ++b) {
+    const PairBundle& bundle = all.bundles[b];
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Sides sides;
+      ReadSides(bundle, bundle.motion, motion, lane, sides);
+      for (std::int32_t k = 0; k < bundle.count; ++k) {
+        const BundleContact& c = all.contacts[bundle.first + k];
+        const Vector approach = Approach(c, sides, lane);
+        const auto presses = hn::Gt(Get(c.force[0], lane), hn::Zero(d));
+        const auto is_there = hn::Gt(Get(c.inverse_normal, lane), hn::Zero(d));
+        const Vector left = hn::IfThenElseZero(is_there, hn::IfThenElse(presses, hn::Abs(approach), approach));
+        largest = hn::Max(largest, left);
+      }
+    }
+  }
+  return hn::GetLane(hn::MaxOfLanes(d, largest));
+}
+
+HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
+  for (std::size_t b = 0; b < all.count; ++b) {
+    const PairBundle& bundle = all.bundles[b];
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Sides sides;
+      ReadSides(bundle, bundle.motion, motion, lane, sides);
+      for (std::int32_t k = 0; k < bundle.count; ++k) {
+        const BundleContact& c = all.contacts[bundle.first + k];
+        const Vector by[3] = {Get(c.force[0], lane), Get(c.force[1], lane), Get(c.force[2], lane)};
+        MoveSides(c, 3, by, sides, lane);
+      }
+      WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
+    }
+  }
+}
+
+HWY_ATTR void AddUpBundles(const BundleArrays& all) {
+  for (std::size_t b = 0; b < all.count; ++b)
+    for (std::int32_t k = 0; k < all.bundles[b].count; ++k) {
+      BundleContact& c = all.contacts[all.bundles[b].first + k];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce)
+          Put(hn::Add(Get(c.sum[axis], lane), Get(c.force[axis], lane)), c.sum[axis], lane);
+    }
+}
+
+}  // namespace limber::internal::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace limber::internal {
+
+HWY_EXPORT(MeasureBundles);
+HWY_EXPORT(SweepBundles);
+HWY_EXPORT(PushBundles);
+HWY_EXPORT(ResidualOfBundles);
+HWY_EXPORT(ApplyBundleForces);
+HWY_EXPORT(AddUpBundles);
+
+bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, float share, float most) {
+  return HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, share, most);
+}
+
+void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion) {
+  HWY_DYNAMIC_DISPATCH(SweepBundles)(bundles, backward, motion);
+}
+
+void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes) {
+  HWY_DYNAMIC_DISPATCH(PushBundles)(bundles, backward, pushes);
+}
+
+float residual_of_bundles(const BundleArrays& bundles, const Block8* motion) {
+  return HWY_DYNAMIC_DISPATCH(ResidualOfBundles)(bundles, motion);
+}
+
+void apply_bundle_forces(const BundleArrays& bundles, Block8* motion) {
+  HWY_DYNAMIC_DISPATCH(ApplyBundleForces)(bundles, motion);
+}
+
+void add_up_bundles(const BundleArrays& bundles) { HWY_DYNAMIC_DISPATCH(AddUpBundles)(bundles); }
+
+}  // namespace limber::internal
+#endif

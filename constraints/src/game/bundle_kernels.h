@@ -1,0 +1,53 @@
+// The vector loops of contacts between rigid bodies: eight pairs at a time, one in each lane. Plain data only, as in
+// sweep_kernels.h, whose coordinates these are.
+//
+// No two pairs of a bundle share a body that moves, so that each lane sees what one contact after the other would.
+// Every result is the same bits on every instruction set that has fused multiply-add, whatever its vectors' length.
+#pragma once
+
+#include "sweep_kernels.h"
+
+namespace limber::internal {
+
+inline constexpr std::size_t kBundleLanes = 8;
+
+/// Up to eight pairs. Contact k of all is contacts[first + k].
+struct PairBundle {
+  std::int32_t frame[2][kBundleLanes] = {};   // into FrameShifts and pushes; one past the last: stands
+  std::int32_t motion[2][kBundleLanes] = {};  // into the blocks of coordinates; one past the last: stands
+  Block8 root[2];                             // h/√m; 0: its origin does not move
+  std::int32_t first = 0, count = 0;
+  bool overlaps = false;  // whether any is to be pushed apart
+};
+
+/// One contact in each lane; fields as those of ContactRow. A lane without a contact has masses and rows of 0.
+struct BundleContact {
+  Block8 axes[3][3];     // normal, tangents; world: [axis][component]
+  Block8 turn[2][3][3];  // rows of the sides' turns: [side][axis][component]
+  Block8 arm[2][3];      // body axes
+  Block8 rest, friction, slop, compliance, inverse_normal, inverse_tangent, inverse_push, coupling[2];
+  Block8 now, target, force[3], before, push, part;
+  Block8 sum[3];  // of the substeps' forces, N
+};
+
+struct BundleArrays {
+  PairBundle* bundles = nullptr;
+  BundleContact* contacts = nullptr;
+  std::size_t count = 0;      // of bundles
+  std::int32_t standing = 0;  // number of frames: where what stands is found
+};
+
+/// As measure_contacts(). @param frames with one that stands at their end
+bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, float share, float most);
+/// As sweep_contacts(). @param motion with a block of zeros at its end
+void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
+/// As push_contacts(). @param pushes with a block of zeros at their end
+void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);
+/// As residual_of_contacts().
+float residual_of_bundles(const BundleArrays& bundles, const Block8* motion);
+/// As apply_forces().
+void apply_bundle_forces(const BundleArrays& bundles, Block8* motion);
+/// Adds up forces.
+void add_up_bundles(const BundleArrays& bundles);
+
+}  // namespace limber::internal

@@ -1,0 +1,127 @@
+#include "pair_bundles.h"
+
+#include <algorithm>
+
+namespace limber::internal {
+namespace {
+
+constexpr std::size_t kChunk = 4;  // contacts: those of a manifold
+
+bool is_rigid(const GameBodies& bodies, std::int32_t frame) {
+  return frame < 0 || (bodies.body(frame).modes == nullptr && bodies.body(frame).led < 0);
+}
+
+bool of_one_pair(const PreparedContact& x, const PreparedContact& y) {
+  return x.a.body == y.a.body && x.b.body == y.b.body;
+}
+
+}  // namespace
+
+void PairBundles::arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls) {
+  standing_ = static_cast<std::int32_t>(bodies.bodies().size());
+  chunks_.clear();
+  places_.assign(contacts.size(), {});
+  next_level_.assign(bodies.bodies().size(), 0);
+  for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
+    const PreparedContact& first = contacts[begin];
+    while (end < contacts.size() && of_one_pair(first, contacts[end])) ++end;
+    const bool round = rolls && (is_round(first.a) || is_round(first.b));
+    if (!round && is_rigid(bodies, bodies.of(first.a.body)) && is_rigid(bodies, bodies.of(first.b.body)))
+      add_chunks(bodies, contacts.subspan(begin, end - begin), begin);
+  }
+  order_by_level();
+  pack(bodies);
+}
+
+void PairBundles::add_chunks(const GameBodies& bodies, std::span<const PreparedContact> pair, std::size_t first) {
+  const std::int32_t frames[2] = {bodies.of(pair.front().a.body), bodies.of(pair.front().b.body)};
+  for (std::size_t i = 0; i < pair.size(); i += kChunk) {
+    Chunk chunk{.first = static_cast<std::int32_t>(first + i),
+                .count = static_cast<std::int32_t>(std::min(kChunk, pair.size() - i)),
+                .frame = {frames[0], frames[1]}};
+    for (const std::int32_t frame : frames)
+      if (frame >= 0) chunk.level = std::max(chunk.level, next_level_[static_cast<std::size_t>(frame)]);
+    for (const std::int32_t frame : frames)
+      if (frame >= 0) next_level_[static_cast<std::size_t>(frame)] = chunk.level + 1;
+    chunks_.push_back(chunk);
+  }
+}
+
+void PairBundles::order_by_level() {
+  begins_.clear();
+  for (const Chunk& chunk : chunks_) {
+    const auto level = static_cast<std::size_t>(chunk.level);
+    if (begins_.size() < level + 2) begins_.resize(level + 2, 0);
+    ++begins_[level + 1];
+  }
+  for (std::size_t i = 1; i < begins_.size(); ++i) begins_[i] += begins_[i - 1];
+  ordered_.resize(chunks_.size());
+  std::vector<std::int32_t>& next = next_level_;
+  next.assign(begins_.begin(), begins_.end());
+  for (const Chunk& chunk : chunks_)
+    ordered_[static_cast<std::size_t>(next[static_cast<std::size_t>(chunk.level)]++)] = chunk;
+}
+
+void PairBundles::pack(const GameBodies& bodies) {
+  bundles_.clear();
+  std::int32_t size = 0;
+  for (std::size_t level = 0; level + 1 < begins_.size(); ++level)
+    for (std::int32_t begin = begins_[level]; begin < begins_[level + 1]; begin += kBundleLanes) {
+      PairBundle& bundle = bundles_.emplace_back();
+      bundle.first = size;
+      const std::int32_t end = std::min(begins_[level + 1], begin + static_cast<std::int32_t>(kBundleLanes));
+      for (std::size_t lane = 0; lane < kBundleLanes; ++lane) {
+        const std::int32_t at = begin + static_cast<std::int32_t>(lane);
+        fill_lane(bodies, at < end ? ordered_[static_cast<std::size_t>(at)] : Chunk{.frame = {-1, -1}}, bundle, lane);
+      }
+      size += bundle.count;
+    }
+  packed_.assign(static_cast<std::size_t>(size), {});
+}
+
+void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane) {
+  for (std::size_t s = 0; s < 2; ++s) {
+    const std::int32_t frame = chunk.frame[s];
+    bundle.frame[s][lane] = frame >= 0 ? frame : standing_;
+    bundle.motion[s][lane] =
+        frame >= 0 ? bodies.body(frame).first : static_cast<std::int32_t>(bodies.motion().size() - 1);
+    if (frame >= 0) bundle.root[s].v[lane] = static_cast<float>(bodies.plan().length() / bodies.body(frame).root_mass);
+  }
+  for (std::int32_t k = 0; k < chunk.count; ++k)
+    places_[static_cast<std::size_t>(chunk.first + k)] = {bundle.first + k, static_cast<std::int32_t>(lane)};
+  bundle.count = std::max(bundle.count, chunk.count);
+}
+
+void PairBundles::put(std::size_t contact, const ContactRow& row, const Block8* rows) {
+  const auto lane = static_cast<std::size_t>(places_[contact].lane);
+  BundleContact& c = packed_[static_cast<std::size_t>(places_[contact].at)];
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < 3; ++i) c.axes[axis][i].v[lane] = row.axes[axis][i];
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::size_t i = 0; i < 3 && row.side[s].blocks > 0; ++i) {
+      c.arm[s][i].v[lane] = row.side[s].arm[i];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        c.turn[s][axis][i].v[lane] = rows[static_cast<std::size_t>(row.side[s].rows) + axis].v[3 + i];
+    }
+  c.rest.v[lane] = row.rest, c.friction.v[lane] = row.friction, c.slop.v[lane] = row.slop;
+  c.compliance.v[lane] = row.compliance;
+  c.inverse_normal.v[lane] = row.inverse_normal, c.inverse_tangent.v[lane] = row.inverse_tangent;
+  c.inverse_push.v[lane] = row.inverse_push;
+  for (std::size_t t = 0; t < 2; ++t) c.coupling[t].v[lane] = row.coupling[t];
+  for (std::size_t axis = 0; axis < 3; ++axis) c.force[axis].v[lane] = row.force[axis];
+}
+
+double PairBundles::friction(std::size_t contact) const {
+  const Place& place = places_[contact];
+  return static_cast<double>(packed_[static_cast<std::size_t>(place.at)].friction.v[place.lane]);
+}
+
+Vec3 PairBundles::read(std::size_t contact, Block8 (BundleContact::*field)[3]) const {
+  const Place& place = places_[contact];
+  const Block8* from = packed_[static_cast<std::size_t>(place.at)].*field;
+  Vec3 out;
+  for (int i = 0; i < 3; ++i) out[i] = static_cast<double>(from[i].v[place.lane]);
+  return out;
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,61 @@
+// Contacts between rigid bodies, packed for the vector loops: pairs in bundles of eight, in an order that gives what
+// Gauss–Seidel from one contact to the next gives.
+//
+//   level(pair) = 1 + the largest level of the pairs before it that share a body that moves
+//
+// Pairs of a level share no such body, so a bundle may hold any of them, and levels after each other keep the order.
+// A colouring with fewest colours fills bundles better, but its sweeps carry less: towers of boxes need half as many
+// substeps again.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "../prepared_contact.h"
+#include "bundle_kernels.h"
+#include "game_bodies.h"
+
+namespace limber::internal {
+
+class PairBundles {
+ public:
+  /// Finds places for all contacts of pairs that are rigid: those of a pair stand one after the other.
+  void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls);
+  /// Whether a contact has a place, by its number.
+  bool holds(std::size_t contact) const { return places_[contact].lane >= 0; }
+  /// Fills the place of a contact. @param rows three blocks of each side that moves, as the row says
+  void put(std::size_t contact, const ContactRow& row, const Block8* rows);
+
+  /// Force along a contact's axes at the last substep, and the sum of all, N.
+  Vec3 force(std::size_t contact) const { return read(contact, &BundleContact::force); }
+  Vec3 sum(std::size_t contact) const { return read(contact, &BundleContact::sum); }
+  double friction(std::size_t contact) const;
+
+  /// For the kernels.
+  BundleArrays arrays() { return {bundles_.data(), packed_.data(), bundles_.size(), standing_}; }
+
+ private:
+  /// Up to four contacts of a pair.
+  struct Chunk {
+    std::int32_t first = 0, count = 0, level = 0;
+    std::int32_t frame[2] = {};  // −1: stands
+  };
+  struct Place {
+    std::int32_t at = -1, lane = -1;  // in `packed_`; −1: none
+  };
+  void add_chunks(const GameBodies& bodies, std::span<const PreparedContact> pair, std::size_t first);
+  void order_by_level();
+  void pack(const GameBodies& bodies);
+  void fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane);
+  Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
+
+  std::int32_t standing_ = 0;
+  std::vector<PairBundle> bundles_;
+  std::vector<BundleContact> packed_;
+  std::vector<Place> places_;  // by contact
+  std::vector<Chunk> chunks_, ordered_;
+  std::vector<std::int32_t> next_level_;  // by frame
+  std::vector<std::int32_t> begins_;      // by level, in `ordered_`
+};
+
+}  // namespace limber::internal
