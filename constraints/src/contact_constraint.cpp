@@ -99,8 +99,9 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
     return static_cast<std::size_t>(body) < friction.size() ? friction[static_cast<std::size_t>(body)]
                                                             : options.friction;
   };
-  PreparedContact contact{
-      .id = point.id, .a = make_side(states, point.a, point.normal), .b = make_side(states, point.b, -point.normal)};
+  PreparedContact& contact = contacts.emplace_back();
+  contact.id = point.id;
+  contact.a = make_side(states, point.a, point.normal), contact.b = make_side(states, point.b, -point.normal);
   add_region(contact.a, point.a);
   add_region(contact.b, point.b);
   contact.axes = frame_along(point.normal);
@@ -114,7 +115,6 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
     contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
   if (const ContactMemory* known = find_in(foreseen, point.id))
     contact.foreseen = true, contact.foreseen_force = known->force, contact.foreseen_slip = known->slip;
-  contacts.push_back(contact);
 }
 
 /// So that spans of them stay where they are.
@@ -224,7 +224,7 @@ void ContactSet::press_dents(const BodyStates& states) {
       if (!yields(side)) continue;
       const Quaternion q_BW = states.pose(side.body, StepTime::kStart).q.conjugate();
       impl_->dents.press(side.body, side.region,
-                         side.turned_back(q_BW * (PreparedContact::sign(s) * contact.last_force)));
+                         side.turned_back(q_BW * (PreparedContact::sign(s) * contact.mean_force)));
     }
 }
 
@@ -235,7 +235,8 @@ void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
   s.touched.clear();
   for (PreparedContact& contact : s.contacts) {
     contact.foreseen = false;
-    s.touched.insert(s.touched.end(), {contact.a.body, contact.b.body});
+    for (const PreparedSide* side : {&contact.a, &contact.b})
+      if (yields(*side)) s.touched.push_back(side->body);
   }
   s.history.finish(s.contacts, asleep, some_woke);
   s.dents.finish(asleep, s.touched);
