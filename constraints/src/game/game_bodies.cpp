@@ -77,20 +77,35 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
   body.v = frame.velocity();
   if (c.motion == FrameMotion::kKinematic) return;
   if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
-  const Quaternion middle =
-      quaternion_from_rotation_vector(0.5 * plan_.step * frame.angular_velocity(c)) * frame.pose().q;
+  set_axes(body, quaternion_from_rotation_vector(0.5 * plan_.step * frame.angular_velocity(c)) * body.q);
+  if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * frame.angular_momentum(c);
+}
+
+void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
+  const FrameConstants& c = body.group->frame_constants();
   if (c.motion == FrameMotion::kLine) {
-    const Vec3 axis = middle * c.line_axis;
+    const Vec3 axis = attitude * c.line_axis;
     const double root = std::sqrt(line_inertia(c));
     body.turn_scale.row(0) = axis.transpose() / root;
     body.momentum_scale.col(0) = axis * root;
     return;
   }
-  const Mat3 axes = to_matrix(middle * c.principal.q_BP);
+  const Mat3 axes = to_matrix(attitude * c.principal.q_BP);
   const Vec3 roots = c.principal.moments.cwiseSqrt();
   body.turn_scale = roots.cwiseInverse().asDiagonal() * axes.transpose();
   body.momentum_scale = axes * roots.asDiagonal();
-  body.turn = body.turn_scale * frame.angular_momentum(c);
+}
+
+void GameBodies::turn_axes() {
+  for (GameBody& body : bodies_) {
+    if (body.keeps_axes || body.group->frame_constants().motion == FrameMotion::kKinematic) continue;
+    const FrameConstants& c = body.group->frame_constants();
+    const Vec3 momentum = body.momentum_scale * body.turn;
+    set_axes(body, body.q);
+    const Vec3 omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
+    set_axes(body, quaternion_from_rotation_vector(0.5 * plan_.length() * omega) * body.q);
+    if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * momentum;
+  }
 }
 
 void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
@@ -207,9 +222,39 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
   } else {
     turn_led(body, turned);
   }
-  FrameShift& shift = shifts_[at];
-  write_vector(body.shift, shift.shift);
-  write_matrix(to_matrix(body.q) - body.R_start, shift.turned);
+  tell_shift(at);
+}
+
+void GameBodies::tell_shift(std::size_t at) {
+  const GameBody& body = bodies_[at];
+  write_vector(body.shift, shifts_[at].shift);
+  write_matrix(to_matrix(body.q) - body.R_start, shifts_[at].turned);
+}
+
+void GameBodies::displace(std::int32_t at, const double* speed, const double* place) {
+  GameBody& body = bodies_[static_cast<std::size_t>(at)];
+  const double h = plan_.length();
+  const auto vector = [](const double* from) { return Vec3(from[0], from[1], from[2]); };
+  body.turn += vector(speed + 3);
+  body.q = normalized(
+      quaternion_from_rotation_vector(h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3)))) *
+      body.q);
+  if (body.led < 0) {
+    body.v += vector(speed) / body.root_mass;
+    body.shift += h / body.root_mass * (vector(speed) + vector(place));
+    show(body);
+  } else {
+    tell_led(body);
+  }
+  tell_shift(static_cast<std::size_t>(at));
+  if (body.modes == nullptr) return;
+  const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
+  const std::vector<float>&roots = body.modes->roots(), &by = body.modes->rates();
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    z[i] += static_cast<double>(roots[i]) * (speed[8 + i] + place[8 + i]);
+    rates[i] += static_cast<double>(by[i]) * speed[8 + i];
+  }
+  write_modes(body, shapes_);
 }
 
 /// To its group.
@@ -221,18 +266,25 @@ void GameBodies::show(GameBody& body) const {
 /// Where its parent has brought it, turned as constraints have it.
 void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
   const FrameConstants& c = body.group->frame_constants();
-  RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
-  if (c.motion == FrameMotion::kPoint) {
+  const RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
+  if (c.motion == FrameMotion::kPoint)
     body.q = normalized(turned * body.q);
-    end.set_turn(c, body.q, body.momentum_scale * body.turn);
-  } else if (c.motion == FrameMotion::kLine) {
-    const Quaternion carried = end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate();
-    body.q = normalized(carried * turned * body.q);
+  else if (c.motion == FrameMotion::kLine)
+    body.q =
+        normalized(end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate() * turned * body.q);
+  else
+    body.q = end.pose().q;
+  tell_led(body);
+}
+
+void GameBodies::tell_led(GameBody& body) {
+  const FrameConstants& c = body.group->frame_constants();
+  RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
+  if (c.motion == FrameMotion::kPoint) end.set_turn(c, body.q, body.momentum_scale * body.turn);
+  if (c.motion == FrameMotion::kLine) {
     const Vec3 omega =
         end.parent().angular_velocity + body.turn.x() / std::sqrt(line_inertia(c)) * (body.q * c.line_axis);
     end.set_turn(c, body.q, body.q * (c.inertia * (body.q.conjugate() * omega)));
-  } else {
-    body.q = end.pose().q;
   }
   body.group->frame_in_parts(body.slot) = end;
   body.shift = end.pose().p - body.start.p;

@@ -42,6 +42,7 @@ struct GameBody {
   const SubstepModes* modes = nullptr;  // null: none
   std::int32_t first = 0, blocks = 1;   // of its coordinates
   std::int32_t led = -1;                // its number among those that are
+  bool keeps_axes = false;              // its coordinates are those of the whole step
   double root_mass = 0.0;               // √m; 0: its origin is carried
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
   Mat3 momentum_scale = Mat3::Zero();   // L = momentum_scale coordinates
@@ -57,10 +58,17 @@ class GameBodies {
  public:
   /// The bodies of a step as it begins. @param members ascending, all that move
   void begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members, const SubstepPlan& plan);
+  /// Something has rows in its coordinates for the whole step.
+  void keep_axes(std::int32_t at) { bodies_[static_cast<std::size_t>(at)].keeps_axes = true; }
+  /// The inertia of the others becomes that of the coming substep's middle.
+  void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
   void begin_substep(int number);
   /// Moves them by what the sweeps found, and by pushes.
   void end_substep(bool pushed);
+  /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
+  /// without
+  void displace(std::int32_t at, const double* speed, const double* place);
   /// Their groups take over.
   void end_step();
 
@@ -76,6 +84,7 @@ class GameBodies {
   std::vector<Block8>& answers() { return answers_; }            ///< q, of what keeps its rows for the step
   const std::vector<Block8>& shapes() const { return shapes_; }  ///< modes at the substep's start
   std::vector<Block8>& pushes() { return pushes_; }  ///< by body: displacements of frames that leave no speed
+  const std::vector<Block8>& pushes() const { return pushes_; }
   const std::vector<FrameShift>& shifts() const { return shifts_; }
 
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
@@ -85,10 +94,13 @@ class GameBodies {
 
  private:
   void place_frame(GameBody& body, const RigidFrame& frame);
+  static void set_axes(GameBody& body, const Quaternion& attitude);
   void fall(GameBody& body) const;
   FrameExcitation lead(GameBody& body, int number, FrameShift& shift);
   void swing(GameBody& body);
   void turn_led(GameBody& body, const Quaternion& turned);
+  void tell_led(GameBody& body);
+  void tell_shift(std::size_t at);
   FrameLoad load_of(const GameBody& body) const;
   void write_modes(const GameBody& body, std::vector<Block8>& to) const;
   void advance_modes(GameBody& body, int number, const FrameExcitation& excitation);

@@ -2,42 +2,49 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace limber::internal {
 namespace {
 
-// Rows are in single precision: what is added to their products so that rows that say the same have an answer.
-constexpr double kRounded = 1e-6;
+// Rounds in which rows let go or take hold; what is out of its bounds then is cut off there.
+constexpr int kMostRounds = 4;
+// m/s and rad/s: what is out of place comes together this fast.
+constexpr double kRecoverySpeed = 1.0;
+// What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
+constexpr double kRounded = 1e-9;
 
-bool is_soft(const GameRow& row) { return row.compliance > 0.0; }
-bool is_unbounded(const RowLaw& law) { return law.lower == -kUnbounded && law.upper == kUnbounded; }
-/// Whether the gap itself counts, and not its rate alone.
-bool keeps_place(const RowLaw& law) { return !law.goes_on && !law.slides && law.radius == 0.0; }
+using Hold = GameRow::Hold;
 
-double dot(const Block8& a, const Block8& b) {
-  double sum = 0.0;
-  for (int i = 0; i < 8; ++i) sum += static_cast<double>(a.v[i]) * static_cast<double>(b.v[i]);
-  return sum;
+bool is_bounded(const GameRow& row) { return row.lower != -kUnbounded || row.upper != kUnbounded; }
+
+double dot(const double* a, const double* b, std::int32_t count) {
+  double sum[4] = {};
+  for (std::int32_t i = 0; i < count; i += 4)
+    for (int l = 0; l < 4; ++l) sum[l] += a[i + l] * b[i + l];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 }  // namespace
 
+// Rows ----------------------------------------------------------------------------------------------------------------
+
 void GameConstraints::make_rows(const BodyStates& states, const GameBodies& bodies,
                                 std::span<Constraint* const> constraints, int number) {
-  rows_.clear(), groups_.clear(), blocks_.clear();
-  wants_push_ = false;
+  std::swap(rows_, before_);
+  rows_.clear(), groups_.clear(), numbers_.clear(), led_.clear();
   const SubstepPlan& plan = bodies.plan();
   const double h = plan.length(), left = h * (plan.count - number);
+  length_ = h;
   for (Constraint* constraint : constraints) {
     constraint->begin_part({.length = h, .left = left, .whole = plan.step, .ahead = h});
     add_rows(states, bodies, constraint, h);
   }
-}
-
-void GameConstraints::begin_substep(GameBodies& bodies) {
-  for (const GameRow& row : rows_) {
-    apply(row, row.force, bodies.motion());
-    wants_push_ = wants_push_ || row.error != 0.0;
+  hold_as_before(number);
+  if (number == 0) find_graph(bodies);
+  for (Group& group : groups_) {
+    const std::int32_t frame = std::max(group.sides[0].frame, group.sides[1].frame);
+    group.component = frame < 0 ? 0 : roots_[static_cast<std::size_t>(frame)];
   }
 }
 
@@ -50,221 +57,405 @@ void GameConstraints::add_rows(const BodyStates& states, const GameBodies& bodie
   yields_.assign(count, 0.0);
   for (const ConstraintRows::Flexibility& f : made_.flexibility())
     if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value;
-  Group group{.constraint = constraint, .first = rows_.size(), .count = count};
-  for (std::size_t i = 0; i < count; ++i) {
-    add_row(bodies, made_.row(static_cast<Index>(i)), gaps_[i], yields_[i]);
-    const GameRow& row = rows_.back();
-    const bool locks = is_unbounded(row.law) && !is_soft(row) && row.mass > 0.0;
-    if (locks && group.together < kMostTogether)
-      group.equal[static_cast<std::size_t>(group.together++)] = group.first + i;
-  }
-  lock_together(group);
-  groups_.push_back(group);
+  groups_.push_back({.constraint = constraint, .first = rows_.size(), .count = count, .sides = {}});
+  add_sides(bodies, groups_.back());
+  for (std::size_t i = 0; i < count; ++i) add_row(bodies, groups_.back(), i);
 }
 
-void GameConstraints::add_row(const GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields) {
-  GameRow row{.sides = {}, .law = from.law};
-  for (std::size_t s = 0; s < 2; ++s) add_side(bodies, from.sides[s], row.sides[s]);
-  find_target(bodies, row, gap, yields);
+void GameConstraints::add_sides(const GameBodies& bodies, Group& group) {
+  for (std::size_t s = 0; s < 2 && group.count > 0; ++s) {
+    Side& side = group.sides[s];
+    side.frame = bodies.of(made_.row(0).sides[s].body);
+    if (side.frame < 0) continue;
+    const GameBody& body = bodies.body(side.frame);
+    side.body = body.first;
+    side.coordinates = 8 * body.blocks;
+    side.at = numbers_.size();
+    numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.coordinates));
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
+      write_side(bodies, from, &numbers_[side.at + i * static_cast<std::size_t>(side.coordinates)]);
+      if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
+    }
+  }
+}
+
+void GameConstraints::write_side(const GameBodies& bodies, const ConstraintRows::Side& from, double* to) const {
+  const GameBody& body = bodies.body(bodies.of(from.body));
+  const double h = bodies.plan().length();
+  const Vec3 turn = h * (body.turn_scale * from.angular);
+  for (int i = 0; i < 3; ++i) {
+    to[i] = body.root_mass > 0.0 ? h / body.root_mass * from.linear[i] : 0.0;
+    to[3 + i] = turn[i];
+  }
+  const std::span<const double> modal = made_.modal(from);
+  for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
+}
+
+void GameConstraints::add_row(const GameBodies& bodies, const Group& group, std::size_t i) {
+  const RowLaw& law = made_.row(static_cast<Index>(i)).law;
+  const double h = bodies.plan().length();
+  GameRow row{.lower = law.lower / h,
+              .upper = law.upper / h,
+              .compliance = h * law.compliance + yields_[i],
+              .gap = gaps_[i],
+              .rate = h * law.end_rate,
+              .force = law.last_force};
+  row.target = row.rate;
+  for (const Side& side : group.sides) {
+    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+    for (std::int32_t k = 8; k < side.coordinates; ++k)
+      row.target +=
+          numbers[k] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)].v[k % 8]);
+  }
+  const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
+             gives_way = is_bounded(row) && !from_below && !from_above;
+  row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
+  if (row.compliance > 0.0) {
+    row.target += law.offset - row.gap;
+  } else if (row.keeps_place) {
+    const double inside = from_below ? std::max(row.gap, 0.0) : from_above ? std::min(row.gap, 0.0) : 0.0;
+    row.target -= inside;
+    row.error = row.gap - inside;
+  } else if (!law.goes_on) {  // a hand of limited force, which pulls until its point is where it is wanted
+    row.target -= std::clamp(row.gap, -h * kRecoverySpeed, h * kRecoverySpeed);
+  }
   rows_.push_back(row);
 }
 
-void GameConstraints::add_side(const GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side) {
-  side.frame = bodies.of(from.body);
-  if (side.frame < 0) return;
-  const GameBody& body = bodies.body(side.frame);
-  side.rows = static_cast<std::int32_t>(blocks_.size());
-  side.body = body.first;
-  side.blocks = body.blocks;
-  blocks_.resize(blocks_.size() + static_cast<std::size_t>(body.blocks));
-  Block8* to = &blocks_[static_cast<std::size_t>(side.rows)];
-  bodies.write_frame_row(body, from.linear, from.angular, to[0]);
-  const std::span<const double> modal = made_.modal(from);
-  for (std::size_t m = 0; m < modal.size(); ++m)
-    to[1 + m / 8].v[m % 8] = static_cast<float>(modal[m]) * body.modes->roots()[m];
-}
-
-void GameConstraints::find_target(const GameBodies& bodies, GameRow& row, double gap, double yields) const {
-  const double h = bodies.plan().length();
-  const RowLaw& law = row.law;
-  double frames = 0.0, modes = 0.0, bent = 0.0;
-  for (std::size_t s = 0; s < 2; ++s) {
-    const GameRow::Side& side = row.sides[s];
-    for (std::int32_t k = 0; k < side.blocks; ++k) {
-      const Block8& part = blocks_[static_cast<std::size_t>(side.rows + k)];
-      (k == 0 ? frames : modes) += dot(part, part);
-      if (k > 0) bent += dot(part, bodies.shapes()[static_cast<std::size_t>(side.body + k)]);
-    }
-  }
-  row.compliance = h * law.compliance + yields;
-  row.mass = frames + modes + row.compliance > 0.0 ? 1.0 / (frames + modes + row.compliance) : 0.0;
-  row.push_mass = frames > 0.0 ? 1.0 / frames : 0.0;
-  row.wanted = bent + h * law.end_rate;
-  if (is_soft(row)) {
-    row.wanted += law.offset - gap;
-    return;
-  }
-  row.force = law.last_force;
-  if (!keeps_place(law)) return;
-  const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0;
-  if (from_below || from_above) {
-    const double inside = from_below ? std::max(gap, 0.0) : std::min(gap, 0.0);
-    row.wanted -= inside;
-    row.error = gap - inside;
-  } else {
-    row.error = gap;
-  }
-  const double own = frames + modes > 0.0 ? frames / (frames + modes) : 0.0;
-  row.wanted -= (1.0 - own) * row.error;
-  row.error *= own;
-}
-
-void GameConstraints::lock_together(Group& group) const {
-  const int n = group.together;
-  if (n == 0) return;
-  Together products(n, n);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j <= i; ++j)
-      products(i, j) = products(j, i) =
-          coupling(rows_[group.equal[static_cast<std::size_t>(i)]], rows_[group.equal[static_cast<std::size_t>(j)]]);
-  products.diagonal() *= 1.0 + kRounded;
-  group.inverse = products.ldlt().solve(Together::Identity(n, n));
-}
-
-double GameConstraints::coupling(const GameRow& row, const GameRow& other) const {
-  double sum = 0.0;
-  for (const GameRow::Side& side : row.sides)
-    for (const GameRow::Side& of_other : other.sides) {
-      if (side.frame < 0 || side.frame != of_other.frame) continue;
-      for (std::int32_t k = 0; k < side.blocks; ++k)
-        sum +=
-            dot(blocks_[static_cast<std::size_t>(side.rows + k)], blocks_[static_cast<std::size_t>(of_other.rows + k)]);
-    }
-  return sum;
-}
-
-double GameConstraints::read(const GameRow& row, const std::vector<Block8>& x) const {
-  double sum = 0.0;
-  for (const GameRow::Side& side : row.sides)
-    for (std::int32_t k = 0; k < side.blocks; ++k)
-      sum += dot(blocks_[static_cast<std::size_t>(side.rows + k)], x[static_cast<std::size_t>(side.body + k)]);
-  return sum;
-}
-
-void GameConstraints::apply(const GameRow& row, double force, std::vector<Block8>& x) const {
-  const auto by = static_cast<float>(force);
-  if (by == 0.0f) return;
-  for (const GameRow::Side& side : row.sides)
-    for (std::int32_t k = 0; k < side.blocks; ++k) {
-      const Block8& part = blocks_[static_cast<std::size_t>(side.rows + k)];
-      Block8& to = x[static_cast<std::size_t>(side.body + k)];
-      for (int l = 0; l < 8; ++l) to.v[l] += by * part.v[l];
-    }
-}
-
-/// What is left to be moved.
-double GameConstraints::open(const GameRow& row, const GameBodies& bodies) const {
-  return row.wanted - read(row, bodies.motion()) - row.compliance * row.force;
-}
-
-void GameConstraints::sweep(GameBodies& bodies, bool backward) {
-  for (std::size_t i = 0; i < groups_.size(); ++i) solve(groups_[backward ? groups_.size() - 1 - i : i], bodies);
-}
-
-void GameConstraints::solve(Group& group, GameBodies& bodies) {
-  solve_together(group, bodies);
-  const auto end = group.equal.begin() + group.together;
-  for (std::size_t at = group.first; at < group.first + group.count;) {
-    if (std::find(group.equal.begin(), end, at) != end)
-      ++at;
-    else
-      at += solve_bounded(at, bodies);
-  }
-}
-
-void GameConstraints::solve_together(Group& group, GameBodies& bodies) {
-  const int n = group.together;
-  if (n == 0) return;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostTogether, 1> left(n);
-  for (int i = 0; i < n; ++i) left[i] = open(rows_[group.equal[static_cast<std::size_t>(i)]], bodies);
-  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostTogether, 1> change = group.inverse * left;
-  for (int i = 0; i < n; ++i) {
-    GameRow& row = rows_[group.equal[static_cast<std::size_t>(i)]];
-    row.force += change[i];
-    apply(row, change[i], bodies.motion());
-  }
-}
-
-/// @return how many rows were solved for
-std::size_t GameConstraints::solve_bounded(std::size_t at, GameBodies& bodies) {
-  GameRow& row = rows_[at];
-  const double h = bodies.plan().length();
-  if (row.law.radius > 0.0) {
-    solve_vector(at, 3, row.law.radius / h, bodies);
-    return 3;
-  }
-  const double wanted = row.force + open(row, bodies) * row.mass;
-  const double change = std::clamp(wanted, row.law.lower / h, row.law.upper / h) - row.force;
-  row.force += change;
-  apply(row, change, bodies.motion());
-  if (!(row.law.friction > 0.0)) return 1;
-  solve_vector(at + 1, 2, row.law.friction * row.force, bodies);
-  return 3;
-}
-
-/// Rows whose forces are a vector no longer than `radius`, by one step for all.
-void GameConstraints::solve_vector(std::size_t first, std::size_t count, double radius, GameBodies& bodies) {
-  double trace = 0.0, square = 0.0;
-  std::array<double, 3> wanted{};
-  for (std::size_t i = 0; i < count; ++i) trace += rows_[first + i].mass > 0.0 ? 1.0 / rows_[first + i].mass : 0.0;
-  if (!(trace > 0.0)) return;
-  for (std::size_t i = 0; i < count; ++i) {
-    wanted[i] = rows_[first + i].force + open(rows_[first + i], bodies) / trace;
-    square += wanted[i] * wanted[i];
-  }
-  const double share = square > radius * radius ? radius / std::sqrt(square) : 1.0;
-  for (std::size_t i = 0; i < count; ++i) {
-    GameRow& row = rows_[first + i];
-    const double change = share * wanted[i] - row.force;
-    row.force += change;
-    apply(row, change, bodies.motion());
-  }
-}
-
-void GameConstraints::push_apart(GameBodies& bodies, bool backward) {
-  const double most = bodies.plan().length();
+/// Rows with bounds begin as they ended the last substep.
+void GameConstraints::hold_as_before(int number) {
+  const bool known = number > 0 && before_.size() == rows_.size();
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    GameRow& row = rows_[backward ? rows_.size() - 1 - i : i];
-    if (row.error == 0.0) continue;
-    double moved = 0.0;
-    for (const GameRow::Side& side : row.sides)
-      if (side.frame >= 0)
-        moved +=
-            dot(blocks_[static_cast<std::size_t>(side.rows)], bodies.pushes()[static_cast<std::size_t>(side.frame)]);
-    const double change = (std::clamp(-row.error, -most, most) - moved) * row.push_mass;
-    row.push += change;
-    for (const GameRow::Side& side : row.sides)
-      for (int l = 0; l < 8 && side.frame >= 0; ++l)
-        bodies.pushes()[static_cast<std::size_t>(side.frame)].v[l] +=
-            static_cast<float>(change) * blocks_[static_cast<std::size_t>(side.rows)].v[l];
+    GameRow& row = rows_[i];
+    if (known) {
+      row.hold = before_[i].hold;
+      row.force = before_[i].force;
+    } else if (is_bounded(row)) {
+      row.hold = row.force <= row.lower ? Hold::kLower : row.force >= row.upper ? Hold::kUpper : Hold::kMet;
+    }
+    row.force = row.hold == Hold::kLower ? row.lower : row.hold == Hold::kUpper ? row.upper : 0.0;
   }
 }
 
-void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies) {
-  for (const GameRow& row : rows_) apply(row, -row.force, bodies.answers());
+void GameConstraints::find_graph(const GameBodies& bodies) {
+  incident_.clear();
+  graph_.clear();
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    for (const Side& side : groups_[g].sides)
+      if (side.frame >= 0) incident_.push_back({side.frame, static_cast<std::int32_t>(g)});
+  std::ranges::sort(incident_);
+  frames_.clear();
+  for (const auto& [frame, group] : incident_)
+    if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
+  for (std::size_t i = 0; i < incident_.size(); ++i)
+    for (std::size_t j = i + 1; j < incident_.size() && incident_[j][0] == incident_[i][0]; ++j)
+      if (incident_[i][1] != incident_[j][1]) graph_.push_back({incident_[i][1], incident_[j][1]});
+  std::ranges::sort(graph_);
+  graph_.erase(std::unique(graph_.begin(), graph_.end()), graph_.end());
+  factor_.set_graph(groups_.size(), graph_);
+  find_components(bodies);
+}
+
+void GameConstraints::find_components(const GameBodies& bodies) {
+  roots_.resize(bodies.bodies().size());
+  std::iota(roots_.begin(), roots_.end(), 0);
+  const auto root = [&](std::int32_t frame) {
+    while (roots_[static_cast<std::size_t>(frame)] != frame) {
+      std::int32_t& up = roots_[static_cast<std::size_t>(frame)];
+      up = roots_[static_cast<std::size_t>(up)];
+      frame = up;
+    }
+    return frame;
+  };
   for (const Group& group : groups_) {
-    impulses_.clear();
-    for (std::size_t i = 0; i < group.count; ++i)
-      impulses_.push_back(bodies.plan().length() * rows_[group.first + i].force);
-    group.constraint->accept(states, impulses_);
+    const std::int32_t a = group.sides[0].frame, b = group.sides[1].frame;
+    if (a >= 0 && b >= 0) roots_[static_cast<std::size_t>(std::max(root(a), root(b)))] = std::min(root(a), root(b));
+  }
+  for (std::size_t frame = 0; frame < roots_.size(); ++frame) roots_[frame] = root(static_cast<std::int32_t>(frame));
+}
+
+/// What moves a led body in the substep whatever acts.
+void GameConstraints::add_what_leads(const GameBodies& bodies) {
+  for (const Led& led : led_) {
+    const FrameShift& shift = bodies.shifts()[static_cast<std::size_t>(led.frame)];
+    for (int i = 0; i < 3; ++i)
+      rows_[led.row].target -= led.linear[i] * static_cast<double>(shift.carried[i]) +
+                               led.angular[i] * static_cast<double>(shift.carried_turn[i]);
   }
 }
 
-double GameConstraints::residual(const GameBodies& bodies) const {
-  double largest = 0.0;
-  for (const GameRow& row : rows_)
-    if (is_unbounded(row.law)) largest = std::max(largest, std::abs(open(row, bodies)));
-  return largest;
+// The matrix ----------------------------------------------------------------------------------------------------------
+
+void GameConstraints::list_met() {
+  met_.clear(), sizes_.clear();
+  for (Group& group : groups_) {
+    group.first_met = met_.size();
+    for (std::size_t i = 0; i < group.count; ++i)
+      if (rows_[group.first + i].hold == Hold::kMet) met_.push_back(static_cast<std::int32_t>(i));
+    group.met = static_cast<std::int32_t>(met_.size() - group.first_met);
+    sizes_.push_back(group.met);
+  }
+}
+
+void GameConstraints::factor() {
+  list_met();
+  factor_.begin(sizes_);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    double* to = factor_.diagonal(g);
+    for (const Side& side : group.sides)
+      if (side.frame >= 0) add_products(group, group, side, side, to);
+    for (std::int32_t i = 0; i < group.met; ++i) {
+      double& own = to[i * group.met + i];
+      own +=
+          rows_[group.first + static_cast<std::size_t>(met_[group.first_met + static_cast<std::size_t>(i)])].compliance;
+      if (!(own > 0.0)) own = 1.0;  // nothing that it acts on moves
+    }
+  }
+  for (std::size_t c = 0; c < graph_.size(); ++c) {
+    const std::int32_t rows = factor_.rows_of(c), columns = graph_[c][0] == rows ? graph_[c][1] : graph_[c][0];
+    const Group &of_rows = groups_[static_cast<std::size_t>(rows)],
+                &of_columns = groups_[static_cast<std::size_t>(columns)];
+    double* to = factor_.block(c);
+    for (const Side& a : of_rows.sides)
+      for (const Side& b : of_columns.sides)
+        if (a.frame >= 0 && a.frame == b.frame) add_products(of_rows, of_columns, a, b, to);
+  }
+  factor_.factor();
+}
+
+void GameConstraints::add_products(const Group& of_rows, const Group& of_columns, const Side& a, const Side& b,
+                                   double* to) const {
+  const std::int32_t *rows = &met_[of_rows.first_met], *columns = &met_[of_columns.first_met];
+  for (std::int32_t i = 0; i < of_rows.met; ++i)
+    for (std::int32_t j = 0; j < of_columns.met; ++j)
+      to[i * of_columns.met + j] +=
+          dot(numbers_.data() + a.at + static_cast<std::size_t>(rows[i] * a.coordinates),
+              numbers_.data() + b.at + static_cast<std::size_t>(columns[j] * b.coordinates), a.coordinates);
+}
+
+double GameConstraints::read(const Group& group, std::size_t i, const std::vector<Block8>& x) const {
+  double sum = 0.0;
+  for (const Side& side : group.sides) {
+    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+    const Block8* at = x.data() + side.body;
+    for (std::int32_t k = 0; k < side.coordinates; k += 8)
+      for (int l = 0; l < 8; ++l) sum += numbers[k + l] * static_cast<double>(at[k / 8].v[l]);
+  }
+  return sum;
+}
+
+double GameConstraints::read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const {
+  double sum = 0.0;
+  for (const Side& side : group.sides) {
+    if (side.frame < 0) continue;
+    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+    for (int l = 0; l < 8; ++l)
+      sum += numbers[l] * static_cast<double>(pushes[static_cast<std::size_t>(side.frame)].v[l]);
+  }
+  return sum;
+}
+
+void GameConstraints::apply(const Group& group, std::span<const double> forces, std::vector<Block8>& x) const {
+  for (const Side& side : group.sides)
+    for (std::int32_t k = 0; k < side.coordinates; ++k) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < group.count; ++i)
+        sum += forces[i] *
+               numbers_[side.at + i * static_cast<std::size_t>(side.coordinates) + static_cast<std::size_t>(k)];
+      x[static_cast<std::size_t>(side.body + k / 8)].v[k % 8] += static_cast<float>(sum);
+    }
+}
+
+void GameConstraints::apply(const Group& group, std::span<const double> forces, std::span<double> x) const {
+  for (const Side& side : group.sides)
+    for (std::int32_t k = 0; k < side.coordinates; ++k)
+      for (std::size_t i = 0; i < group.count; ++i)
+        x[static_cast<std::size_t>(8 * side.body + k)] +=
+            forces[i] *
+            numbers_[side.at + i * static_cast<std::size_t>(side.coordinates) + static_cast<std::size_t>(k)];
+}
+
+// Velocities ----------------------------------------------------------------------------------------------------------
+
+void GameConstraints::solve(GameBodies& bodies) {
+  if (groups_.empty()) return;
+  add_what_leads(bodies);
+  taken_.assign(bodies.bodies().size(), 0.0);
+  for (const Group& group : groups_) {
+    forces_.assign(group.count, 0.0);
+    for (std::size_t i = 0; i < group.count; ++i) forces_[i] = rows_[group.first + i].force;
+    apply(group, forces_, bodies.motion());
+  }
+  for (int round = 0; round < kMostRounds; ++round) {
+    factor();
+    solve_once(bodies);
+    if (!let_go(bodies)) break;
+  }
+}
+
+/// Adds to the forces of the rows that hold what they are short of.
+void GameConstraints::solve_once(GameBodies& bodies) {
+  right_.assign(factor_.size(), 0.0);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    double* right = right_.data() + factor_.first(g);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
+      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+      const GameRow& row = rows_[group.first + i];
+      right[k] = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+    }
+  }
+  asked_ = right_;
+  factor_.solve(right_, 1);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    const std::size_t first = factor_.first(g);
+    double energy = 0.0;
+    forces_.assign(group.count, 0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
+      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+      forces_[i] = right_[first + k];
+      rows_[group.first + i].force += forces_[i];
+      energy += forces_[i] * asked_[first + k];
+    }
+    taken_[static_cast<std::size_t>(group.component)] += energy;
+    apply(group, forces_, bodies.motion());
+  }
+}
+
+/// Rows whose forces are beyond their bounds stay there, and those at a bound that would go beyond their gaps take
+/// hold. @return whether any did
+bool GameConstraints::let_go(GameBodies& bodies) {
+  bool changed = false;
+  for (const Group& group : groups_)
+    for (std::size_t i = 0; i < group.count; ++i) {
+      GameRow& row = rows_[group.first + i];
+      if (!is_bounded(row)) continue;
+      const Hold before = row.hold;
+      if (row.hold == Hold::kMet) {
+        if (row.force < row.lower - kRounded * std::abs(row.lower)) row.hold = Hold::kLower;
+        if (row.force > row.upper + kRounded * std::abs(row.upper)) row.hold = Hold::kUpper;
+        if (row.hold == Hold::kMet) continue;
+        forces_.assign(group.count, 0.0);
+        forces_[i] = (row.hold == Hold::kLower ? row.lower : row.upper) - row.force;
+        row.force += forces_[i];
+        apply(group, forces_, bodies.motion());
+      } else {
+        const double open = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+        if (row.hold == Hold::kLower ? open > kRounded * length_ : open < -kRounded * length_) row.hold = Hold::kMet;
+      }
+      changed = changed || row.hold != before;
+    }
+  return changed;
+}
+
+// Places --------------------------------------------------------------------------------------------------------------
+
+void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool pushed) {
+  if (groups_.empty()) return;
+  for (const Group& group : groups_) {
+    forces_.assign(group.count, 0.0);
+    for (std::size_t i = 0; i < group.count; ++i) forces_[i] = -rows_[group.first + i].force;
+    apply(group, forces_, bodies.answers());
+  }
+  measure(states, bodies, pushed);
+  asked_ = right_;
+  factor_.solve(right_, kColumns);
+  find_shares();
+  displace(bodies, true);
+}
+
+/// What the rows that hold are short of: in their rates, by the way they turned, and in places.
+void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
+  right_.assign(kColumns * factor_.size(), 0.0);
+  const double most = kRecoverySpeed * length_;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    gaps_.assign(group.count, 0.0);
+    group.constraint->gaps(states, StepTime::kStart, gaps_);
+    double* right = right_.data() + kColumns * factor_.first(g);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k, right += kColumns) {
+      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+      const GameRow& row = rows_[group.first + i];
+      right[kRate] = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+      if (!row.keeps_place) continue;
+      const double by_pushes = pushed ? read_pushes(group, i, bodies.pushes()) : 0.0,
+                   straight = row.error - right[kRate] + by_pushes;  // the gap as the rows foretell it
+      right[kCurve] = straight - (gaps_[i] - row.rate);
+      right[kPlace] = -std::clamp(row.error + by_pushes, -most, most);
+    }
+  }
+}
+
+/// By component, how much of what curves is closed by velocities: as much as takes no more energy than there is.
+void GameConstraints::find_shares() {
+  given_.assign(taken_.size(), 0.0);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const std::size_t first = factor_.first(g);
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(groups_[g].met); ++k)
+      given_[static_cast<std::size_t>(groups_[g].component)] +=
+          asked_[kColumns * k + kCurve] * right_[kColumns * k + kCurve];
+  }
+  for (std::size_t c = 0; c < given_.size(); ++c)
+    given_[c] = given_[c] > taken_[c] ? std::sqrt(std::max(0.0, taken_[c]) / given_[c]) : 1.0;
+}
+
+void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
+  speed_.assign(8 * bodies.motion().size(), 0.0);
+  place_.assign(8 * bodies.motion().size(), 0.0);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    const double share = gains_speed ? given_[static_cast<std::size_t>(group.component)] : 0.0;
+    const double* found = right_.data() + kColumns * factor_.first(g);
+    forces_.assign(group.count, 0.0), yields_.assign(group.count, 0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k, found += kColumns) {
+      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+      GameRow& row = rows_[group.first + i];
+      yields_[i] = found[kPlace] + (1.0 - share) * found[kCurve];
+      if (!gains_speed) continue;
+      const double force = std::clamp(row.force + found[kRate] + share * found[kCurve], row.lower, row.upper);
+      forces_[i] = force - row.force;
+      row.force = force;
+    }
+    if (gains_speed) apply(group, forces_, speed_);
+    apply(group, yields_, place_);
+  }
+  for (const std::int32_t frame : frames_) {
+    const GameBody& body = bodies.body(frame);
+    const auto from = static_cast<std::size_t>(8 * body.first);
+    bodies.displace(frame, speed_.data() + from, place_.data() + from);
+  }
+}
+
+void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
+  if (last && !groups_.empty()) {
+    right_.assign(kColumns * factor_.size(), 0.0);
+    residual_ = 0.0;
+    const double most = kRecoverySpeed * length_;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const Group& group = groups_[g];
+      gaps_.assign(group.count, 0.0);
+      group.constraint->gaps(states, StepTime::kStart, gaps_);
+      double* right = right_.data() + kColumns * factor_.first(g);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k, right += kColumns) {
+        const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+        const GameRow& row = rows_[group.first + i];
+        if (!row.keeps_place) continue;
+        const double open = gaps_[i] - row.rate;
+        right[kPlace] = -std::clamp(open, -most, most);
+        residual_ = std::max(residual_, std::abs(open));
+      }
+    }
+    factor_.solve(right_, kColumns);
+    displace(bodies, false);
+  }
+  for (const Group& group : groups_) {
+    forces_.clear();
+    for (std::size_t i = 0; i < group.count; ++i) forces_.push_back(length_ * rows_[group.first + i].force);
+    group.constraint->accept(states, forces_);
+  }
 }
 
 bool GameConstraints::all_finite() const {

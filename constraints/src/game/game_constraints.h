@@ -1,32 +1,36 @@
-// Handles, joints and other Constraints in a step by small steps: their rows are made anew in each substep, as they
-// turn with the bodies, and take part in its sweeps.
+// Handles, joints and other Constraints in a step by small steps, all of them solved at once in each substep:
 //
-// Rows without compliance ask for velocities, J Δy = h end_rate; what is left of their gaps is undone by displacements
-// of the frames that leave no speed, and where frames cannot move, by the modes. Rows with compliance ask for
-// gap − offset + C f = 0 at the substep's end. They begin a substep without a force: a row that looks at its gap and
-// begins with the last one would grow where the sweeps have not met it (docs/derivations/small-steps.md).
+//   (J Jᵀ + C) Δf = target − J y − C f        for the rows that hold, by JointFactor
+//
+// y: the bodies' coordinates (game_bodies.h), C: compliance of springs and dampers. Rows with bounds (limits, motors,
+// friction, hands) hold or stay at a bound, as the signs of their forces and of their gaps have it. First velocities
+// are made to agree with the rows, then contacts are swept, the bodies move, and what their gaps are off by there is
+// closed: by velocities, as far as they gain no more energy than the first solution took, and else by displacements
+// that leave no speed (docs/derivations/small-steps.md).
 #pragma once
 
 #include <span>
 #include <vector>
 
 #include "game_bodies.h"
+#include "joint_factor.h"
 #include "limber/constraints/constraint.h"
 
 namespace limber::internal {
 
-/// One row of a constraint in the coordinates of the bodies.
+/// One row of a constraint.
 struct GameRow {
-  struct Side {
-    std::int32_t rows = 0, body = 0, blocks = 0, frame = -1;  // as ContactSideRows, one row
-  };
-  std::array<Side, 2> sides;
-  RowLaw law;
-  double wanted = 0.0;      // what J y is to be, with what the modes had at the substep's start
-  double compliance = 0.0;  // gap per force
-  double mass = 0.0, push_mass = 0.0;
-  double error = 0.0;              // of its gap, that frames undo
-  double force = 0.0, push = 0.0;  // held over the substep; what displaces frames
+  enum class Hold : std::uint8_t { kMet, kLower, kUpper };
+
+  double lower = -kUnbounded, upper = kUnbounded;  // of its force
+  double target = 0.0;                             // what J y is to be, with what the modes had at the substep's start
+  double compliance = 0.0;                         // gap per force
+  double gap = 0.0;                                // at the substep's start
+  double rate = 0.0;                               // what the gap is to change by in the substep
+  double error = 0.0;                              // of its gap at the substep's start, which displacements undo
+  double force = 0.0;                              // held over the substep
+  bool keeps_place = true;                         // the gap itself counts, and not its rate alone
+  Hold hold = Hold::kMet;
 };
 
 class GameConstraints {
@@ -34,52 +38,77 @@ class GameConstraints {
   /// The rows of a substep, from where it begins. @param number of the substep, 0 …
   void make_rows(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                  int number);
-  /// Gives the bodies the forces that go on.
-  void begin_substep(GameBodies& bodies);
-  void sweep(GameBodies& bodies, bool backward);
-  /// @return whether any gap is to be undone
-  bool wants_push() const { return wants_push_; }
-  void push_apart(GameBodies& bodies, bool backward);
-  /// Once the bodies have moved: what goes on belongs to the rows to come.
-  void end_substep(const BodyStates& states, GameBodies& bodies);
+  /// Once the bodies have fallen: makes their motion meet the rows.
+  void solve(GameBodies& bodies);
+  /// Once the bodies have moved: closes what is open there. @param pushed whether GameBodies::pushes() moved them
+  void close(const BodyStates& states, GameBodies& bodies, bool pushed);
+  /// Closes what close() has left, at the end of a step, and tells the constraints what acted.
+  void end_substep(const BodyStates& states, GameBodies& bodies, bool last);
 
   std::size_t size() const { return rows_.size(); }
-  /// The largest change that a hard row's velocity law still asks for, m or rad of the last substep.
-  double residual(const GameBodies& bodies) const;
+  /// The largest gap of the rows that hold, m or rad, at the end of the last substep.
+  double residual() const { return residual_; }
   bool all_finite() const;
 
  private:
-  static constexpr int kMostTogether = 6;
-  using Together = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostTogether, kMostTogether>;
+  /// A body in the rows of one constraint: as many numbers a row as it has coordinates.
+  struct Side {
+    std::int32_t frame = -1, coordinates = 0, body = 0;  // −1: none. body: the first block of its coordinates
+    std::size_t at = 0;                                  // of the first row in numbers_
+  };
   /// The rows of one constraint.
   struct Group {
     Constraint* constraint = nullptr;
-    std::size_t first = 0, count = 0;
-    std::array<std::size_t, kMostTogether> equal{};  // those that lock, solved for together
-    int together = 0;
-    Together inverse{};
+    std::size_t first = 0, count = 0;  // of its rows
+    std::array<Side, 2> sides;
+    std::size_t first_met = 0;  // in met_: those of its rows that hold
+    std::int32_t met = 0, component = 0;
   };
+  /// A body that something leads, in a row.
+  struct Led {
+    std::size_t row = 0;
+    std::int32_t frame = -1;
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  };
+  enum Column : std::size_t { kRate, kCurve, kPlace, kColumns };
 
   void add_rows(const BodyStates& states, const GameBodies& bodies, Constraint* constraint, double h);
-  void add_row(const GameBodies& bodies, const ConstraintRows::Row& from, double gap, double yields);
-  void add_side(const GameBodies& bodies, const ConstraintRows::Side& from, GameRow::Side& side);
-  void find_target(const GameBodies& bodies, GameRow& row, double gap, double yields) const;
-  void lock_together(Group& group) const;
-  void solve(Group& group, GameBodies& bodies);
-  void solve_together(Group& group, GameBodies& bodies);
-  std::size_t solve_bounded(std::size_t at, GameBodies& bodies);
-  void solve_vector(std::size_t first, std::size_t count, double radius, GameBodies& bodies);
-  double read(const GameRow& row, const std::vector<Block8>& x) const;
-  void apply(const GameRow& row, double force, std::vector<Block8>& x) const;
-  double coupling(const GameRow& row, const GameRow& other) const;
-  double open(const GameRow& row, const GameBodies& bodies) const;
+  void add_sides(const GameBodies& bodies, Group& group);
+  void write_side(const GameBodies& bodies, const ConstraintRows::Side& from, double* to) const;
+  void add_row(const GameBodies& bodies, const Group& group, std::size_t i);
+  void hold_as_before(int number);
+  void find_graph(const GameBodies& bodies);
+  void find_components(const GameBodies& bodies);
+  void add_what_leads(const GameBodies& bodies);
+  void factor();
+  void list_met();
+  void add_products(const Group& of_rows, const Group& of_columns, const Side& a, const Side& b, double* to) const;
+  void solve_once(GameBodies& bodies);
+  bool let_go(GameBodies& bodies);
+  void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
+  void find_shares();
+  void displace(GameBodies& bodies, bool gains_speed);
+  double read(const Group& group, std::size_t i, const std::vector<Block8>& x) const;
+  double read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const;
+  void apply(const Group& group, std::span<const double> forces, std::vector<Block8>& x) const;
+  void apply(const Group& group, std::span<const double> forces, std::span<double> x) const;
 
-  std::vector<GameRow> rows_;
+  std::vector<GameRow> rows_, before_;  // of the last substep
   std::vector<Group> groups_;
-  std::vector<Block8> blocks_;
+  std::vector<double> numbers_;      // J
+  std::vector<std::int32_t> met_;    // rows that hold, by group
+  std::vector<std::int32_t> sizes_;  // their number
+  std::vector<Led> led_;
+  JointFactor factor_;
+  std::vector<JointFactor::Pair> graph_;
+  std::vector<std::array<std::int32_t, 2>> incident_;  // (frame, group)
+  std::vector<std::int32_t> frames_;                   // that rows act on
+  std::vector<std::int32_t> roots_;                    // of components, by frame
+  std::vector<double> taken_, given_;                  // energies by component
+  std::vector<double> right_, asked_, speed_, place_;
   ConstraintRows made_;
-  std::vector<double> gaps_, impulses_, yields_;  // scratch
-  bool wants_push_ = false;
+  std::vector<double> gaps_, forces_, yields_;  // scratch
+  double residual_ = 0.0, length_ = 0.0;
 };
 
 }  // namespace limber::internal

@@ -54,6 +54,8 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
     const PreparedContact& contact = contacts[i];
     const std::size_t known = blocks_.size();
     const ContactRow row = make(states, bodies, contact, options);
+    for (const ContactSideRows& side : row.side)
+      if (side.frame >= 0) bodies.keep_axes(side.frame);
     if (bundles_.holds(i)) {
       bundles_.put(i, row, blocks_.data());
       blocks_.resize(known);

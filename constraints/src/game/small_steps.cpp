@@ -1,5 +1,6 @@
 #include "limber/constraints/small_steps.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -33,7 +34,6 @@ struct SmallStepSolver::Impl {
   GameConstraints constraints;
 
   void take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number);
-  void push_apart(bool contacts_overlap);
 };
 
 SmallStepSolver::SmallStepSolver() : impl_(std::make_unique<Impl>()) {}
@@ -61,7 +61,7 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
   m.contacts.apply_last_forces(m.bodies);
   for (int number = 0; number < steps.substeps; ++number) m.take_substep(problem, steps, number);
   SmallStepReport report{.rows = static_cast<int>(3 * m.contacts.size() + m.constraints.size()),
-                         .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual(m.bodies))};
+                         .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual())};
   report.solved = m.contacts.meet_law() && m.constraints.all_finite() && m.bodies.all_finite();
   m.contacts.end_step(m.bodies.plan());
   m.bodies.end_step();
@@ -71,27 +71,20 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
 
 void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number) {
   const BodyStates states(problem.table);
+  bodies.turn_axes();
   constraints.make_rows(states, bodies, problem.constraints, number);
   bodies.begin_substep(number);
-  constraints.begin_substep(bodies);
   const bool overlap = contacts.begin_substep(bodies, steps);
-  for (const bool backward : {false, true}) {
-    constraints.sweep(bodies, backward);
-    contacts.sweep(bodies, backward);
+  constraints.solve(bodies);
+  for (const bool backward : {false, true}) contacts.sweep(bodies, backward);
+  if (overlap) {
+    std::ranges::fill(bodies.pushes(), internal::Block8{});
+    for (const bool backward : {false, true}) contacts.push_apart(bodies, backward);
   }
-  const bool pushed = overlap || constraints.wants_push();
-  if (pushed) push_apart(overlap);
-  bodies.end_substep(pushed);
+  bodies.end_substep(overlap);
+  constraints.close(states, bodies, overlap);
   contacts.end_substep();
-  constraints.end_substep(states, bodies);
-}
-
-void SmallStepSolver::Impl::push_apart(bool contacts_overlap) {
-  std::ranges::fill(bodies.pushes(), internal::Block8{});
-  for (const bool backward : {false, true}) {
-    constraints.push_apart(bodies, backward);
-    if (contacts_overlap) contacts.push_apart(bodies, backward);
-  }
+  constraints.end_substep(states, bodies, number + 1 == steps.substeps);
 }
 
 void SmallStepSolver::clear() { impl_->contacts.rolling_memory().clear(); }

@@ -4,14 +4,15 @@
 ///
 ///   1. all bodies move freely, modes in closed form,
 ///   2. gaps are measured again from the contacts' anchors,
-///   3. one sweep of Gauss–Seidel forward and one backward over all rows, each contact's normal and then both its
-///      tangents, begins with the forces of the substep before,
-///   4. what overlaps is parted by displacements of frames that leave no speed.
+///   3. joints and handles are solved all at once; then one sweep of Gauss–Seidel forward and one backward over all
+///      contacts, each one's normal and then both its tangents, begins with the forces of the substep before,
+///   4. what overlaps is parted by displacements of frames that leave no speed; what joints are open by is closed.
 ///
 ///   y = y_free + q,   q = Σ Jᵀf,   0 ≤ f_n ⊥ gap + J_n y − min(gap, 0) ≥ 0,   |f_t| ≤ μ f_n
 ///
-/// Work is substeps × rows, known before the step. The sweeps do not end where the law is met: what they leave acts
-/// like a spring whose stiffness grows with n². A force never pulls and stays in its cone whatever is left.
+/// Work is substeps × rows, known before the step; joints along a tree take time linear in their number. The sweeps do
+/// not end where the law is met: what they leave acts like a spring whose stiffness grows with n². A force never pulls
+/// and stays in its cone whatever is left.
 ///
 /// Both sweeps are needed: in one direction their spectrum is complex, and the forces that a substep begins with make
 /// such a sweep unstable. Modes answer as SubstepModes says, so that contact gives them no energy. Rows of contacts are

@@ -1,0 +1,228 @@
+// Joints at game quality (ContactSolver::kGame, 8 substeps, 60 steps a second): how long chains take, how far their
+// joints open, and what the energy does. Prints Markdown.
+// Usage: joint_chains [chains|ends|tops|grid]
+// Figures: docs/reports/joints.md.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cpu_time.h"
+#include "grounded_world.h"
+
+namespace limber::testing {
+namespace {
+
+/// Nothing ever touches: what is timed is joints.
+struct NoContacts final : ContactSource {
+  void add_body(Index, const BodyGeometry&, const CollisionFilter&) override {}
+  void remove_body(Index) override {}
+  void set_filter(Index, const CollisionFilter&) override {}
+  void exclude_pair(Index, Index, bool) override {}
+  void find_contacts(const ContactQuery&, std::vector<ContactPoint>& contacts, Jobs&) override { contacts.clear(); }
+  void find_impacts(const ImpactQuery&, std::vector<Impact>& impacts, Jobs&) override { impacts.clear(); }
+};
+
+constexpr ContactOptions kGame{.solver = ContactSolver::kGame};
+
+std::shared_ptr<const ModalModel> link(int modes) {
+  return sample_model({.modes = modes, .lowest_hz = 30.0, .decay = 6.0});
+}
+
+std::shared_ptr<const ModalModel> heavy(double times) {
+  ModalModelData d = sample_model_data({.modes = 0});
+  d.mass *= times;
+  d.inertia *= times;
+  return std::make_shared<const ModalModel>(std::move(d));
+}
+
+struct Chain {
+  std::vector<BodyId> bodies;
+  std::vector<JointId> joints;
+  double weight = 0.0;  // Σ m g, N
+};
+
+enum class Way { kLevel, kHung };
+
+/// Links on ball joints from a hook, level or straight down; the last so many times as heavy.
+Chain add_chain(World& world, int links, int modes, double times, Way way, double height) {
+  const auto model = link(modes), last = times > 1.0 ? heavy(times) : model;
+  const Vec3 along = way == Way::kLevel ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitZ());
+  const Quaternion q =
+      way == Way::kLevel ? Quaternion{} : quaternion_from_rotation_vector({0.0, 0.5 * std::numbers::pi, 0.0});
+  Chain chain;
+  BodyId before{};
+  for (int i = 0; i < links; ++i) {
+    const Vec3 start = Vec3(0.0, 0.0, height) + i * kSampleSize * along;
+    const auto& of = i + 1 < links ? model : last;
+    const BodyId next = world.add_body(of, {.pose = {q, start + 0.5 * kSampleSize * along}});
+    chain.joints.push_back(world.add_joint(before, next, {.type = JointType::kBall, .frame = {.origin = start}},
+                                           {.radius = 0.25}, {.radius = 0.25}));
+    chain.bodies.push_back(next);
+    chain.weight += of->data().mass * kGravity;
+    before = next;
+  }
+  return chain;
+}
+
+struct Seen {
+  std::vector<double> seconds;
+  double apart = 0.0, rise = -1e30, energy = 0.0;  // energy: the last less the first
+  double at(double part) const {
+    std::vector<double> sorted = seconds;
+    std::ranges::sort(sorted);
+    return sorted[static_cast<std::size_t>(part * static_cast<double>(sorted.size() - 1))];
+  }
+};
+
+Seen watch(World& world, const Chain& chain, int steps) {
+  Seen seen;
+  const double first = total_energy(world, chain.bodies);
+  double before = first;
+  for (int i = 0; i < steps; ++i) {
+    const double start = thread_seconds();
+    world.step();
+    seen.seconds.push_back(thread_seconds() - start);
+    for (const JointId joint : chain.joints) seen.apart = std::max(seen.apart, world.joint(joint).distance_error);
+    const double now = total_energy(world, chain.bodies);
+    seen.rise = std::max(seen.rise, now - before);
+    before = now;
+  }
+  seen.energy = before - first;
+  return seen;
+}
+
+void chains() {
+  std::printf(
+      "| links | modes | us a link and step: p50 | p99 | opening / size | largest rise in a step / Σ m g size | energy "
+      "after / Σ m g size |\n|---|---|---|---|---|---|---|\n");
+  for (const int modes : {0, 10, 20}) {
+    double least = 0.0, most = 0.0;
+    for (const int links : {4, 10, 32, 100, 316, 1000}) {
+      NoContacts none;
+      World world;
+      world.set_contact_source(&none, kGame);
+      const Chain chain = add_chain(world, links, modes, 1.0, Way::kLevel, 0.0);
+      const Seen seen = watch(world, chain, std::clamp(30'000 / links, 60, 600));
+      const double n = links, scale = chain.weight * kSampleSize;
+      (links == 4 ? least : most) = seen.at(0.5);
+      std::printf("| %d | %d | %.2f | %.2f | %.1e | %.1e | %.1e |\n", links, modes, 1e6 * seen.at(0.5) / n,
+                  1e6 * seen.at(0.99) / n, seen.apart / kSampleSize, seen.rise / scale, seen.energy / scale);
+      std::fflush(stdout);
+    }
+    std::printf("\nSlope of time over links with %d modes, 4 to 1,000: %.2f\n\n", modes,
+                std::log(most / least) / std::log(250.0));
+  }
+}
+
+/// Ten links, the last so many times as heavy: hung at rest, let go level in the air, and let go level so low that it
+/// comes to drag on the ground.
+void ends() {
+  std::printf(
+      "| chain of ten | its end times as heavy | modes | us a step: p50 | opening / size | sag / length | largest rise "
+      "/ "
+      "Σ m g size | energy after |\n|---|---|---|---|---|---|---|---|\n");
+  for (const double times : {1.0, 100.0, 1e4})
+    for (const int modes : {0, 10})
+      for (const auto& [name, way, height] : {std::tuple("hung", Way::kHung, 8.0),
+                                              {"in the air", Way::kLevel, 8.0},
+                                              {"on the ground", Way::kLevel, 3.0}}) {
+        GroundedWorld scene(kGame);
+        World& world = scene.world;
+        const Chain chain = add_chain(world, 10, modes, times, way, height);
+        const double at = world.body(chain.bodies.back()).pose.p.z();
+        const Seen seen = watch(world, chain, 300);
+        const double sag = at - world.body(chain.bodies.back()).pose.p.z(), scale = chain.weight * kSampleSize;
+        std::printf("| %s | %g | %d | %.0f | %.1e | ", name, times, modes, 1e6 * seen.at(0.5),
+                    seen.apart / kSampleSize);
+        if (way == Way::kHung)
+          std::printf("%.1e | ", sag / (10.0 * kSampleSize));
+        else
+          std::printf("| ");
+        std::printf("%.1e | %.1e |\n", seen.rise / scale, seen.energy / scale);
+        std::fflush(stdout);
+      }
+}
+
+/// A disc hangs by a ball joint a radius beside its middle, its axle level, and precesses by m g l/(I ω).
+void tops() {
+  constexpr double kRadius = 0.1, kArm = 0.1;
+  std::printf(
+      "| rad/s | precession after 2 s / law | height at its lowest / arm | energy after / before "
+      "|\n|---|---|---|---|\n");
+  for (const double spin : {30.0, 100.0, 300.0}) {
+    NoContacts none;
+    World world;
+    world.set_contact_source(&none, kGame);
+    ModalModelData d = sample_model_data({.modes = 0});
+    d.mass = 1.0;
+    const double axial = 0.5 * kRadius * kRadius, across = 0.25 * kRadius * kRadius;
+    d.inertia = Vec3(axial, across, across).asDiagonal();
+    const auto model = std::make_shared<const ModalModel>(std::move(d));
+    const double law = kGravity * kArm / (axial * spin);
+    const BodyId disc = world.add_body(
+        model,
+        {.pose = {{}, {kArm, 0.0, 0.0}}, .velocity = {0.0, law * kArm, 0.0}, .angular_velocity = {spin, 0.0, law}});
+    world.add_joint(BodyId{}, disc, {.type = JointType::kBall});
+    const double before = world.energy(disc).total();
+    double turned = 0.0, last = 0.0, low = 0.0;
+    for (int i = 0; i < 120; ++i) {
+      world.step();
+      const Vec3 p = world.body(disc).pose.p;
+      const double now = std::atan2(p.y(), p.x());
+      turned += std::remainder(now - last, 2.0 * std::numbers::pi);
+      last = now;
+      low = std::min(low, p.z());
+    }
+    std::printf("| %.0f | %.4f | %.3f | %.5f |\n", spin, turned / (2.0 * law), low / kArm,
+                world.energy(disc).total() / before);
+  }
+}
+
+/// Balls on a square grid, joined to their neighbours and hung by one edge's corners.
+void grid() {
+  std::printf("| balls | joints | ms a step: p50 | p99 | opening / size | moved, m |\n|---|---|---|---|---|---|\n");
+  for (const int n : {10, 30, 100}) {
+    NoContacts none;
+    World world;
+    world.set_contact_source(&none, kGame);
+    const auto model = sample_model({.modes = 0, .half_extent = {0.4, 0.4, 0.4}});
+    Chain chain;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const Vec3 p(1.0 * i, 0.0, -1.0 * j);
+        chain.bodies.push_back(world.add_body(model, {.pose = {{}, p}}));
+        const auto at = [&](int k, int l) { return chain.bodies[static_cast<std::size_t>(n * k + l)]; };
+        const auto join = [&](BodyId a, const Vec3& origin) {
+          chain.joints.push_back(
+              world.add_joint(a, chain.bodies.back(), {.type = JointType::kBall, .frame = {.origin = origin}}));
+        };
+        if (j == 0 && (i == 0 || i == n - 1 || i % 10 == 0)) join(BodyId{}, p);
+        if (i > 0) join(at(i - 1, j), p - Vec3(0.5, 0.0, 0.0));
+        if (j > 0) join(at(i, j - 1), p + Vec3(0.0, 0.0, 0.5));
+      }
+    const double before = world.body(chain.bodies.back()).pose.p.z();
+    const Seen seen = watch(world, chain, n < 100 ? 120 : 12);
+    std::printf("| %d | %zu | %.2f | %.2f | %.1e | %.1e |\n", n * n, chain.joints.size(), 1e3 * seen.at(0.5),
+                1e3 * seen.at(0.99), seen.apart, before - world.body(chain.bodies.back()).pose.p.z());
+    std::fflush(stdout);
+  }
+}
+
+int run(const std::string& part) {
+  const std::pair<const char*, void (*)()> parts[] = {
+      {"chains", chains}, {"ends", ends}, {"tops", tops}, {"grid", grid}};
+  bool any = false;
+  for (const auto& [name, print] : parts)
+    if (part.empty() || part == name) any = true, print(), std::printf("\n");
+  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, tops or grid\n", part.c_str());
+  return any ? 0 : 2;
+}
+
+}  // namespace
+}  // namespace limber::testing
+
+int main(int argc, char** argv) { return limber::testing::run(argc > 1 ? argv[1] : ""); }

@@ -1,0 +1,224 @@
+#include "joint_factor.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+// Far above what is lost to round-off in a pivot, far below what the lightest of bodies on the heaviest chain leaves.
+constexpr double kRegular = 1e-9;
+
+/// L of the lower part of a, n × n, in its place; its diagonal is inverted.
+void factor_dense(double* a, int n) {
+  for (int j = 0; j < n; ++j) {
+    double* row_j = a + j * n;
+    double pivot = row_j[j];
+    const double own = pivot;
+    for (int k = 0; k < j; ++k) pivot -= row_j[k] * row_j[k];
+    // What round-off leaves of a row that others say already.
+    const double inverse = 1.0 / std::sqrt(std::max(pivot, 1e-3 * kRegular * own));
+    row_j[j] = inverse;
+    for (int i = j + 1; i < n; ++i) {
+      double* row_i = a + i * n;
+      double sum = row_i[j];
+      for (int k = 0; k < j; ++k) sum -= row_i[k] * row_j[k];
+      row_i[j] = sum * inverse;
+    }
+  }
+}
+
+/// b ← b L⁻ᵀ, `rows` × n.
+void solve_rows(const double* l, int n, double* b, int rows) {
+  for (int i = 0; i < rows; ++i, b += n)
+    for (int j = 0; j < n; ++j) {
+      double sum = b[j];
+      for (int k = 0; k < j; ++k) sum -= l[j * n + k] * b[k];
+      b[j] = sum * l[j * n + j];
+    }
+}
+
+/// t −= b aᵀ, `rows` × `columns`, inner size n.
+void subtract_product(const double* b, int rows, const double* a, int columns, int n, double* t) {
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < n; ++k) sum += b[i * n + k] * a[j * n + k];
+      t[i * columns + j] -= sum;
+    }
+}
+
+}  // namespace
+
+void JointFactor::set_graph(std::size_t nodes, std::span<const Pair> couplings) {
+  if (nodes == nodes_ && std::ranges::equal(couplings, graph_)) return;
+  nodes_ = nodes;
+  graph_.assign(couplings.begin(), couplings.end());
+  order();
+}
+
+/// Least degree, the lower number first. What the graph of the others becomes is kept as it is.
+void JointFactor::order() {
+  std::vector<std::vector<std::int32_t>> neighbours(nodes_), columns(nodes_);
+  for (const auto& [a, b] : graph_) {
+    neighbours[static_cast<std::size_t>(a)].push_back(b);
+    neighbours[static_cast<std::size_t>(b)].push_back(a);
+  }
+  using Entry = std::array<std::int32_t, 2>;  // degree, node
+  std::vector<Entry> heap;
+  const auto later = [](const Entry& a, const Entry& b) { return a > b; };
+  const auto push = [&](std::int32_t node) {
+    heap.push_back({static_cast<std::int32_t>(neighbours[static_cast<std::size_t>(node)].size()), node});
+    std::push_heap(heap.begin(), heap.end(), later);
+  };
+  for (std::size_t i = 0; i < nodes_; ++i) {
+    std::ranges::sort(neighbours[i]);
+    push(static_cast<std::int32_t>(i));
+  }
+  position_.assign(nodes_, -1);
+  node_at_.clear();
+  std::vector<std::int32_t> merged;
+  while (node_at_.size() < nodes_) {
+    std::pop_heap(heap.begin(), heap.end(), later);
+    const auto [degree, node] = heap.back();
+    heap.pop_back();
+    const auto at = static_cast<std::size_t>(node);
+    if (position_[at] >= 0 || degree != static_cast<std::int32_t>(neighbours[at].size())) continue;
+    position_[at] = static_cast<std::int32_t>(node_at_.size());
+    columns[node_at_.size()] = neighbours[at];
+    node_at_.push_back(node);
+    for (const std::int32_t other : neighbours[at]) {
+      std::vector<std::int32_t>& theirs = neighbours[static_cast<std::size_t>(other)];
+      merged.clear();
+      std::ranges::set_union(theirs, neighbours[at], std::back_inserter(merged));
+      std::erase_if(merged, [&](std::int32_t n) { return n == other || n == node; });
+      theirs = merged;
+      push(other);
+    }
+  }
+  column_starts_.assign(1, 0);
+  rows_.clear();
+  for (std::vector<std::int32_t>& column : columns) {
+    for (std::int32_t& node : column) node = position_[static_cast<std::size_t>(node)];
+    std::ranges::sort(column);
+    rows_.insert(rows_.end(), column.begin(), column.end());
+    column_starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+  }
+  places_.clear();
+  for (const auto& [a, b] : graph_) {
+    const std::int32_t p = position_[static_cast<std::size_t>(a)], q = position_[static_cast<std::size_t>(b)];
+    places_.push_back(find(std::max(p, q), std::min(p, q)));
+  }
+  target_starts_.clear(), targets_.clear();
+  for (const std::vector<std::int32_t>& column : columns) {
+    target_starts_.push_back(static_cast<std::int32_t>(targets_.size()));
+    for (std::size_t a = 0; a < column.size(); ++a)
+      for (std::size_t b = a; b < column.size(); ++b) targets_.push_back(find(column[b], column[a]));
+  }
+}
+
+/// The number of a block of L.
+std::int32_t JointFactor::find(std::int32_t row, std::int32_t column) const {
+  if (row == column) return row;
+  const auto begin = rows_.begin() + column_starts_[static_cast<std::size_t>(column)],
+             end = rows_.begin() + column_starts_[static_cast<std::size_t>(column) + 1];
+  return static_cast<std::int32_t>(nodes_) +
+         static_cast<std::int32_t>(std::lower_bound(begin, end, row) - rows_.begin());
+}
+
+std::int32_t JointFactor::rows_of(std::size_t coupling) const {
+  const auto [a, b] = graph_[coupling];
+  return position_[static_cast<std::size_t>(a)] > position_[static_cast<std::size_t>(b)] ? a : b;
+}
+
+void JointFactor::begin(std::span<const std::int32_t> sizes) {
+  sizes_.resize(nodes_), firsts_.resize(nodes_), starts_.resize(nodes_ + rows_.size());
+  std::size_t numbers = 0;
+  size_ = 0;
+  for (std::size_t p = 0; p < nodes_; ++p) {
+    sizes_[p] = sizes[static_cast<std::size_t>(node_at_[p])];
+    const auto n = static_cast<std::size_t>(sizes_[p]);
+    firsts_[p] = size_;
+    size_ += n;
+    starts_[p] = numbers;
+    numbers += n * n;
+  }
+  for (std::size_t p = 0; p < nodes_; ++p)
+    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
+         ++e) {
+      starts_[nodes_ + e] = numbers;
+      numbers += static_cast<std::size_t>(sizes_[p] * sizes_[static_cast<std::size_t>(rows_[e])]);
+    }
+  values_.assign(numbers, 0.0);
+}
+
+void JointFactor::factor() {
+  for (std::size_t p = 0; p < nodes_; ++p) {
+    double* d = &values_[starts_[p]];
+    for (int i = 0; i < sizes_[p]; ++i) d[i * sizes_[p] + i] *= 1.0 + kRegular;
+  }
+  for (std::size_t p = 0; p < nodes_; ++p) eliminate(p);
+}
+
+void JointFactor::eliminate(std::size_t column) {
+  const int n = sizes_[column];
+  if (n == 0) return;
+  const double* l = &values_[starts_[column]];
+  factor_dense(&values_[starts_[column]], n);
+  const auto begin = static_cast<std::size_t>(column_starts_[column]),
+             end = static_cast<std::size_t>(column_starts_[column + 1]);
+  auto target = static_cast<std::size_t>(target_starts_[column]);
+  for (std::size_t e = begin; e < end; ++e)
+    solve_rows(l, n, &values_[starts_[nodes_ + e]], sizes_[static_cast<std::size_t>(rows_[e])]);
+  for (std::size_t a = begin; a < end; ++a)
+    for (std::size_t b = a; b < end; ++b)
+      subtract_product(&values_[starts_[nodes_ + b]], sizes_[static_cast<std::size_t>(rows_[b])],
+                       &values_[starts_[nodes_ + a]], sizes_[static_cast<std::size_t>(rows_[a])], n,
+                       &values_[starts_[static_cast<std::size_t>(targets_[target++])]]);
+}
+
+void JointFactor::solve(std::span<double> x, std::size_t columns) const {
+  const auto m = columns;
+  for (std::size_t p = 0; p < nodes_; ++p) {
+    const auto n = static_cast<std::size_t>(sizes_[p]);
+    double* own = x.data() + firsts_[p] * m;
+    const double* l = values_.data() + starts_[p];
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t c = 0; c < m; ++c) {
+        double sum = own[i * m + c];
+        for (std::size_t k = 0; k < i; ++k) sum -= l[i * n + k] * own[k * m + c];
+        own[i * m + c] = sum * l[i * n + i];
+      }
+    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
+         ++e) {
+      const auto row = static_cast<std::size_t>(rows_[e]);
+      const double* b = values_.data() + starts_[nodes_ + e];
+      double* other = x.data() + firsts_[row] * m;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
+        for (std::size_t k = 0; k < n; ++k)
+          for (std::size_t c = 0; c < m; ++c) other[i * m + c] -= b[i * n + k] * own[k * m + c];
+    }
+  }
+  for (std::size_t p = nodes_; p-- > 0;) {
+    const auto n = static_cast<std::size_t>(sizes_[p]);
+    double* own = x.data() + firsts_[p] * m;
+    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
+         ++e) {
+      const auto row = static_cast<std::size_t>(rows_[e]);
+      const double* b = values_.data() + starts_[nodes_ + e];
+      const double* other = x.data() + firsts_[row] * m;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
+        for (std::size_t k = 0; k < n; ++k)
+          for (std::size_t c = 0; c < m; ++c) own[k * m + c] -= b[i * n + k] * other[i * m + c];
+    }
+    const double* l = values_.data() + starts_[p];
+    for (std::size_t i = n; i-- > 0;)
+      for (std::size_t c = 0; c < m; ++c) {
+        double sum = own[i * m + c];
+        for (std::size_t k = i + 1; k < n; ++k) sum -= l[k * n + i] * own[k * m + c];
+        own[i * m + c] = sum * l[i * n + i];
+      }
+  }
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,158 @@
+// Joints solved directly in game contact: chains, heavy ends, loops, tops, hands that contradict.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "grounded_world.h"
+
+namespace limber::testing {
+namespace {
+
+const ContactOptions kGame{.solver = ContactSolver::kGame};
+
+/// Links on ball joints from a hook, level or straight down.
+struct Chain : GroundedWorld {
+  Chain(int links, const Vec3& along, double end_times, int modes = 0, const ContactOptions& options = kGame)
+      : GroundedWorld(options) {
+    const auto model = sample_model({.modes = modes, .lowest_hz = 40.0, .decay = 5.0});
+    ModalModelData end = sample_model_data({.modes = 0});
+    end.mass *= end_times, end.inertia *= end_times;
+    const auto last = end_times > 1.0 ? std::make_shared<const ModalModel>(std::move(end)) : model;
+    const double turn = std::acos(along.x());
+    const Quaternion q = quaternion_from_rotation_vector({0.0, turn, 0.0});
+    BodyId before{};
+    for (int i = 0; i < links; ++i) {
+      const Vec3 start = Vec3(0.0, 0.0, 10.0) + i * kSampleSize * along;
+      const auto& of = i + 1 < links ? model : last;
+      bodies.push_back(world.add_body(of, {.pose = {q, start + 0.5 * kSampleSize * along}}));
+      joints.push_back(world.add_joint(before, bodies.back(), {.type = JointType::kBall, .frame = {.origin = start}},
+                                       {.radius = 0.25}, {.radius = 0.25}));
+      scale += of->data().mass * kGravity * kSampleSize;
+      before = bodies.back();
+    }
+  }
+  double opening() const {
+    double worst = 0.0;
+    for (const JointId joint : joints) worst = std::max(worst, world.joint(joint).distance_error);
+    return worst / kSampleSize;
+  }
+  std::vector<BodyId> bodies;
+  std::vector<JointId> joints;
+  double scale = 0.0;  // Σ m g size
+};
+
+TEST(GameJoints, AChainLetGoLevelStaysClosedAndKeepsItsEnergy) {
+  for (const int modes : {0, 10}) {
+    Chain chain(6, Vec3::UnitX(), 1.0, modes);
+    const double before = total_energy(chain.world, chain.bodies);
+    for (int i = 0; i < 180; ++i) {
+      chain.step(1);
+      EXPECT_LT(chain.opening(), 1e-4) << modes;
+      EXPECT_LT(total_energy(chain.world, chain.bodies) - before, 0.01 * chain.scale) << modes;
+    }
+    // What half the chain's height gives, Σ m g L/2, is at hand.
+    EXPECT_GT(total_energy(chain.world, chain.bodies) - before, (modes > 0 ? -0.1 : -0.05) * 3.0 * chain.scale)
+        << modes;
+  }
+}
+
+TEST(GameJoints, AChainSwingsAsTheExactSolverHasIt) {
+  const auto place = [](const ContactOptions& options) {
+    Chain chain(3, Vec3::UnitX(), 1.0, 0, options);
+    chain.step(45);
+    return chain.world.body(chain.bodies.back()).pose.p;
+  };
+  // Velocities of small steps are half a substep late: of first order.
+  const Vec3 limit = place({.solver = ContactSolver::kGame, .small_steps = {256}});
+  const double coarse = (place({.solver = ContactSolver::kGame, .small_steps = {8}}) - limit).norm(),
+               fine = (place({.solver = ContactSolver::kGame, .small_steps = {16}}) - limit).norm();
+  EXPECT_LT(coarse, 0.02 * kSampleSize);
+  EXPECT_LT(fine, 0.6 * coarse);
+  EXPECT_LT((place({}) - limit).norm(), 0.02 * kSampleSize) << "kExact";
+}
+
+TEST(GameJoints, AHeavyEndHangsWithoutSag) {
+  Chain chain(10, -Vec3::UnitZ(), 100.0);
+  const double before = chain.world.body(chain.bodies.back()).pose.p.z();
+  chain.step(120);
+  EXPECT_NEAR(chain.world.body(chain.bodies.back()).pose.p.z(), before, 1e-9);
+  EXPECT_LT(chain.opening(), 1e-9);
+}
+
+TEST(GameJoints, AFastTopPrecessesAndDoesNotFall) {
+  for (const double spin : {100.0, 300.0}) {
+    constexpr double kRadius = 0.1, kArm = 0.1;
+    GroundedWorld scene(kGame);
+    ModalModelData d = sample_model_data({.modes = 0});
+    d.mass = 1.0;
+    const double axial = 0.5 * kRadius * kRadius;
+    d.inertia = Vec3(axial, 0.5 * axial, 0.5 * axial).asDiagonal();
+    const double law = kGravity * kArm / (axial * spin);
+    const Vec3 hook(0.0, 0.0, 5.0);
+    const BodyId disc = scene.world.add_body(std::make_shared<const ModalModel>(std::move(d)),
+                                             {.pose = {{}, hook + kArm * Vec3::UnitX()},
+                                              .velocity = {0.0, law * kArm, 0.0},
+                                              .angular_velocity = {spin, 0.0, law}});
+    scene.world.add_joint(BodyId{}, disc, {.type = JointType::kBall, .frame = {.origin = hook}});
+    double turned = 0.0, last = 0.0;
+    for (int i = 0; i < 120; ++i) {
+      scene.step(1);
+      const Vec3 p = scene.world.body(disc).pose.p - hook;
+      const double now = std::atan2(p.y(), p.x());
+      turned += std::remainder(now - last, 2.0 * std::numbers::pi);
+      last = now;
+      EXPECT_NEAR(p.z(), 0.0, 0.01 * kArm);
+    }
+    EXPECT_NEAR(turned, 2.0 * law, 0.01 * law) << spin;
+  }
+}
+
+/// Bars that hang side by side from the world and carry one beam: three bars and more say the same twice.
+TEST(GameJoints, FiveBarsInParallelSwingTheirBeamAsOnePendulum) {
+  GroundedWorld scene(kGame);
+  const auto bar = sample_model({.modes = 0, .half_extent = {0.05, 0.05, 0.5}});
+  const auto beam = sample_model({.modes = 0, .half_extent = {2.0, 0.1, 0.1}});
+  const double angle = 0.3;
+  const Vec3 down = 0.5 * Vec3(std::sin(angle), 0.0, -std::cos(angle));
+  const Quaternion tilt = quaternion_from_rotation_vector({0.0, -angle, 0.0});
+  const BodyId carried = scene.world.add_body(beam, {.pose = {{}, Vec3(0.0, 0.0, 5.0) + 2.0 * down}});
+  std::vector<JointId> joints;
+  for (int i = -2; i <= 2; ++i) {
+    const Vec3 top(0.8 * i, 0.0, 5.0);
+    const BodyId hanging = scene.world.add_body(bar, {.pose = {tilt, top + down}});
+    JointSpec hinge{.type = JointType::kRevolute, .frame = {.origin = top}};
+    hinge.frame.axes << Vec3::UnitY(), -Vec3::UnitX(), Vec3::UnitZ();
+    joints.push_back(scene.world.add_joint(BodyId{}, hanging, hinge));
+    hinge.frame.origin = top + 2.0 * down;
+    joints.push_back(scene.world.add_joint(hanging, carried, hinge));
+  }
+  double least = 10.0;
+  for (int i = 0; i < 240; ++i) {
+    scene.step(1);
+    for (const JointId joint : joints) {
+      EXPECT_LT(scene.world.joint(joint).distance_error, 1e-5);
+      EXPECT_LT(scene.world.joint(joint).angle_error, 1e-5);
+    }
+    EXPECT_LT(scene.world.body(carried).angular_velocity.norm(), 1e-3) << "it stays level";
+    least = std::min(least, scene.world.body(carried).pose.p.x());
+  }
+  EXPECT_NEAR(least, -2.0 * down.x(), 0.01) << "and comes as high on the other side";
+}
+
+TEST(GameJoints, HandsThatContradictMeetInTheMiddle) {
+  GroundedWorld scene(kGame);
+  const BodyId body = scene.world.add_body(sample_model({.modes = 0}), {.pose = {{}, {0.0, 0.0, 3.0}}});
+  const HandleId left = scene.world.add_handle(body, kMarked), right = scene.world.add_handle(body, kMarked);
+  const Vec3 start = scene.world.position(body, kMarked);
+  for (int i = 1; i <= 60; ++i) {
+    const Vec3 apart(0.005 * i, 0.0, 0.0), along(0.0, 0.01 * i, 0.0);
+    scene.world.set_handle_target(left, {.position = start + along - apart});
+    scene.world.set_handle_target(right, {.position = start + along + apart});
+    scene.step(1);
+    EXPECT_LT((scene.world.position(body, kMarked) - start - along).norm(), 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace limber::testing
