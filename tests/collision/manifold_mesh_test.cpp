@@ -47,6 +47,27 @@ TriangleMesh random_strip(double from, double to, int cells, unsigned seed, doub
   return mesh;
 }
 
+/// Rows of cells of other lengths each, in one mesh: vertices lie on edges of the next row.
+TriangleMesh unmatched_rows() {
+  TriangleMesh mesh;
+  for (int row = 0; row < 5; ++row) {
+    Random random(static_cast<unsigned>(row));
+    const int cells = 40 + 7 * row;
+    const double y = -1.0 + 0.4 * row, length = (kLength + 1.0) / cells;
+    double from = -1.0;
+    for (int i = 1; i <= cells; ++i) {
+      const double to = -1.0 + length * (i + (i < cells ? random.uniform(-0.4, 0.4) : 0.0));
+      const auto first = static_cast<Index>(mesh.vertices.size());
+      for (const Vec3& p : {Vec3(from, y, 0.0), Vec3(to, y, 0.0), Vec3(to, y + 0.4, 0.0), Vec3(from, y + 0.4, 0.0)})
+        mesh.vertices.push_back(p);
+      mesh.triangles.push_back({first, first + 1, first + 2});
+      mesh.triangles.push_back({first, first + 2, first + 3});
+      from = to;
+    }
+  }
+  return mesh;
+}
+
 struct Floor {
   const char* name;
   std::function<void(ContactScene&)> add;
@@ -64,6 +85,12 @@ std::vector<Floor> flat_floors() {
          for (int i = 0; i < 24; ++i)
            s.add(Box{{0.25, 1.0, 0.5}}, {{}, {0.5 * i, 0.0, -0.5 + 1e-4 * std::sin(3.0 * i)}});
        }},
+      {"tiles smaller than what slides",
+       [](ContactScene& s) {
+         for (int i = 0; i < 130; ++i)
+           for (int j = -3; j < 3; ++j) s.add(Box{{0.05, 0.05, 0.1}}, {{}, {-0.5 + 0.1 * i, 0.05 + 0.1 * j, -0.1}});
+       }},
+      {"triangles that only lie side by side", [](ContactScene& s) { s.add(unmatched_rows()); }},
       {"coarse mesh", [](ContactScene& s) { s.add(random_strip(-1.0, kLength, 11, 1)); }},
       {"fine mesh", [](ContactScene& s) { s.add(random_strip(-1.0, kLength, 97, 2)); }},
       {"two meshes side by side",
@@ -72,6 +99,13 @@ std::vector<Floor> flat_floors() {
        [](ContactScene& s) {
          s.add(random_strip(-1.0, 3.0, 7, 3));
          s.add(Box{{5.0, 1.0, 0.5}}, {{}, {8.0, 0.0, -0.5}});
+       }},
+      {"mesh beside a height field",
+       [](ContactScene& s) {
+         s.add(random_strip(-1.0, 3.0, 13, 6));
+         HeightField field{.columns = 31, .rows = 7, .spacing_x = 0.3, .spacing_y = 0.35, .heights = {}};
+         field.heights.assign(static_cast<std::size_t>(field.columns * field.rows), 0.0f);
+         s.add(field, {{}, {3.0, -1.05, 0.0}});
        }},
       {"height field",
        [](ContactScene& s) {
@@ -85,7 +119,7 @@ std::vector<Floor> flat_floors() {
 TEST(ManifoldSeams, AFrictionlessCubeKeepsItsSpeedOverTenMetresOfAnyFlatFloor) {
   for (const Floor& floor : flat_floors())
     for (const double speed : {0.5, 2.0, 7.0})
-      for (const double turn : {0.0, 0.3}) {
+      for (const double turn : {0.0, 0.3, std::numbers::pi / 6.0}) {
         ContactScene scene;
         floor.add(scene);
         SlidingBody cube(scene, Box{Vec3::Constant(0.1)},
@@ -144,7 +178,29 @@ TEST(ManifoldSeams, ACubeThatRestedBesideASeamIsNotHeldByIt) {
       for (int step = 0; step < 5; ++step) cube.step(finder);
       cube.v = {speed, 0.0, 0.0};
       for (int step = 0; step < 120; ++step) cube.step(finder);
-      EXPECT_NEAR(cube.v.x(), speed, 1e-3 * speed) << floor.name << " at " << speed << " m/s";
+      // 1e-4 m/s is what a floor off level by 5e-6 gives it meanwhile.
+      EXPECT_NEAR(cube.v.x(), speed, 1e-3 * std::max(speed, 0.1)) << floor.name << " at " << speed << " m/s";
+    }
+}
+
+/// All is turned such that its weight presses it to both.
+TEST(ManifoldSeams, ACubeGoesOnAlongAWallAndTheFloorAtOnce) {
+  const RigidTransform upright{quaternion_from_rotation_vector({0.5 * std::numbers::pi, 0.0, 0.0}), {0.0, 0.3, 0.5}};
+  const RigidTransform turned{quaternion_from_rotation_vector({-0.25 * std::numbers::pi, 0.0, 0.0}), Vec3::Zero()};
+  for (const Floor& floor : flat_floors())
+    for (const bool wall_of_boxes : {true, false}) {
+      ContactScene scene;
+      floor.add(scene);
+      for (int i = 0; wall_of_boxes && i < 30; ++i) scene.add(Box{{0.2, 0.25, 0.5}}, {{}, {0.4 * i, 0.55, 0.4}});
+      if (!wall_of_boxes) scene.add(random_strip(-1.0, kLength, 31, 7), upright);
+      for (RigidTransform& pose : scene.poses) pose = turned * pose;
+      SlidingBody cube(scene, Box{Vec3::Constant(0.1)}, turned * RigidTransform{{}, {0.0, 0.2, 0.1}}, 0.0);
+      cube.v = {3.0, 0.0, 0.0};
+      ManifoldFinder finder;
+      scene.add_all_to(finder);
+      while (cube.pose().p.x() < 9.0 && cube.v.x() > 0.1) cube.step(finder);
+      EXPECT_NEAR(cube.v.x(), 3.0, 3e-3) << floor.name << (wall_of_boxes ? ", boxes" : ", mesh");
+      EXPECT_LE((turned.inverse() * cube.pose().p - Vec3(cube.pose().p.x(), 0.2, 0.1)).norm(), 2e-3) << floor.name;
     }
 }
 

@@ -303,6 +303,7 @@ PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   const Quaternion to_a = a.pose.q.conjugate();
   q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
   q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
+  if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
   q.reach = margin + a.reach + b.reach + q.passing.way.norm();
   return q;
 }
@@ -311,10 +312,11 @@ RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q) const
   return q.a.radius <= q.b.radius ? q.X_AB.inverse() : q.X_AB;
 }
 
-/// How far points of the smaller body may come while a manifold is kept.
+/// How far points of one body may come against the other while a manifold is kept: by what it moves, turns and bends.
 double ManifoldFinder::Impl::slack(const PairQuery& q) const {
-  return options.recycle_distance * std::min(q.a.thickness, q.b.thickness) +
-         options.recycle_turn * std::min(q.a.radius, q.b.radius);
+  const double farthest = options.recycle_distance * std::min(q.a.thickness, q.b.thickness);
+  const double bends = q.a.modal || q.b.modal ? farthest : 0.0;
+  return farthest + bends + options.recycle_turn * std::min(q.a.radius, q.b.radius);
 }
 
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
@@ -465,8 +467,8 @@ void ManifoldFinder::Impl::write_contacts(std::vector<ContactPoint>& contacts, J
 
 // -- Seams between bodies ---------------------------------------------------------------------------------------------
 
-/// Where a body rests on one thing and comes to another one that reaches to the same plane and no farther, the plane is
-/// what both touch along. Manifolds made in this query are made again so, one after the other.
+/// Where a body rests or comes down on one thing and comes to another one that reaches to the same plane and no
+/// farther, the plane is what both touch along. Manifolds made in this query are made again so, one after the other.
 void ManifoldFinder::Impl::level_seams() {
   bool listed = false;
   const ManifoldWorkers::Lease worker(workers);
@@ -496,8 +498,8 @@ void ManifoldFinder::Impl::list_pairs_of_bodies() {
   first_pair_of[0] = 0;
 }
 
-/// Planes, in the frame of a convex body of a pair, that it rests on beside the other one, to which that one reaches,
-/// and along which not all of the pair's contacts are.
+/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
+/// that one reaches, and along which not all of the pair's contacts are.
 void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes,
                                        ManifoldWorker& worker) {
   planes.clear();
@@ -514,7 +516,8 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<in
       const Vec3 out = out_of_other(point, pairs[beside], body);
       if ((out - last).norm() <= kSameNormal) continue;  // contacts of a face
       const Measured m = measure(point, pairs[beside], worker);
-      if (m.gap > tolerance) continue;
+      const ManifoldBody& ground = at(pairs[beside].a == body ? pairs[beside].b : pairs[beside].a);
+      if (m.gap + std::min(0.0, out.dot(me.displacement - ground.displacement)) > tolerance) continue;
       last = out;
       if (touches_along(p, body, out)) continue;
       const double offset =

@@ -21,11 +21,11 @@ bool reaches_to(PairSurface& mesh, Index t, const SupportPlane& plane) {
 }
 
 /// Whether a contact along a direction goes: all that meets at the feature reaches to a plane that the body rests on.
-bool is_beneath(const MeshContacts::Query& q, FeatureKey feature, const Vec3& out) {
-  return std::ranges::any_of(q.planes, [&](const SupportPlane& plane) {
+bool is_beneath(PairSurface& mesh, std::span<const SupportPlane> planes, FeatureKey feature, const Vec3& out) {
+  return std::ranges::any_of(planes, [&](const SupportPlane& plane) {
     if ((out - plane.normal).norm() <= kFlushNormal) return false;
     bool all = true;
-    q.mesh.for_faces_at(feature, [&](Index t) { all = all && reaches_to(q.mesh, t, plane); });
+    mesh.for_faces_at(feature, [&](Index t) { all = all && reaches_to(mesh, t, plane); });
     return all;
   });
 }
@@ -55,10 +55,26 @@ bool MeshContacts::Cone::allows(const Vec3& out) {
 
 void MeshContacts::find(const Query& q, std::vector<FeatureContact>& found) {
   found_ = &found;
+  const std::size_t first = found.size();
   if (q.core.faces.empty())
     find_rounded(q);
   else if (!leave_as_a_whole(q))
     find_polytope(q);
+  rest_on_own_faces(q, first);
+}
+
+/// Where the body rests on a face, edges and vertices that reach to its plane and no farther are nothing beside it: of
+/// triangles that only lie side by side.
+void MeshContacts::rest_on_own_faces(const Query& q, std::size_t first) {
+  own_planes_.clear();
+  const auto begin = found_->begin() + static_cast<std::ptrdiff_t>(first);
+  for (auto c = begin; c != found_->end(); ++c)
+    if (kind_of(c->b.key) == Feature::Kind::kFace && c->gap <= q.passing.touching)
+      own_planes_.push_back({c->normal, c->normal.dot(c->b.point), q.passing.touching});
+  const auto goes = [&](const FeatureContact& c) {
+    return kind_of(c.b.key) != Feature::Kind::kFace && is_beneath(q.mesh, own_planes_, c.b.key, c.normal);
+  };
+  if (!own_planes_.empty()) found_->erase(std::remove_if(begin, found_->end(), goes), found_->end());
 }
 
 // -- Balls and capsules -----------------------------------------------------------------------------------------------
@@ -69,7 +85,7 @@ void MeshContacts::find_rounded(const Query& q) {
   core_contacts_.find(q.mesh, {{q.core.points.front(), q.core.points.back()}, q.core.points.size() == 2, q.core.radius},
                       q.reach, *found_);
   const auto goes = [&](const FeatureContact& c) {
-    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q, c.a.key, -c.normal);
+    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q.mesh, q.planes, c.a.key, -c.normal);
   };
   found_->erase(std::remove_if(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), goes),
                 found_->end());
@@ -124,7 +140,6 @@ void MeshContacts::on_triangle(const Query& q, Index t) {
     triangle_.points.resize(3), triangle_.edge_directions.resize(3);
     triangle_.loops = triangle_.loop_edges = {0, 1, 2};
     triangle_.faces.resize(1);
-    triangle_.extent = std::numeric_limits<double>::infinity();
   }
   triangle_.faces[0] = {face.normal, offset, 0, 3};
   for (std::size_t c = 0; c < 3; ++c) {

@@ -44,6 +44,7 @@ class MeshContacts {
     FeatureKey nearest = 0;
   };
 
+  void rest_on_own_faces(const Query& query, std::size_t first);
   void find_rounded(const Query& query);
   void find_polytope(const Query& query);
   bool leave_as_a_whole(const Query& query);
@@ -56,6 +57,7 @@ class MeshContacts {
   ConvexCore triangle_;
   Cone cone_;
   std::vector<Index> triangles_;
+  std::vector<SupportPlane> own_planes_;
   std::vector<FeatureContact>* found_ = nullptr;
 };
 

@@ -54,7 +54,7 @@ void PairFinder::between_convex(const PairQuery& q, const ConvexCore& a, const C
   else
     convex_.find_along(a, b, q.X_AB,
                        q.planes_a.empty() ? Vec3(q.X_AB.q * -q.planes_b.front().normal) : q.planes_a.front().normal,
-                       q.reach, found_);
+                       q.reach, q.passing.ground, found_);
 }
 
 /// A convex body and a half-space or a mesh, in the frame of the former, which is a of each contact.

@@ -49,11 +49,13 @@ void ConvexContacts::load(const ConvexCore& a, const ConvexCore& b, const RigidT
                           std::vector<FeatureContact>& contacts) {
   load(side_[0], a, nullptr), load(side_[1], b, &X_AB);
   contacts_ = &contacts, first_ = contacts.size();
+  ground_ = -1;
 }
 
 void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
                           std::vector<FeatureContact>& contacts, const Passing& passing) {
   load(a, b, X_AB, contacts);
+  ground_ = passing.ground;
   const std::size_t face_tests = a.faces.size() * b.points.size() + b.faces.size() * a.points.size();
   const bool told = !a.faces.empty() && !b.faces.empty() && face_tests <= collision_tuning().convex.most_face_tests &&
                     faces_tell(margin);
@@ -76,15 +78,16 @@ void ConvexContacts::let_pass(const Passing& passing, double margin) {
 }
 
 void ConvexContacts::find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
-                                const Vec3& normal, double margin, std::vector<FeatureContact>& contacts) {
+                                const Vec3& normal, double margin, int ground, std::vector<FeatureContact>& contacts) {
   load(a, b, X_AB, contacts);
+  ground_ = ground;
   if (a.points.size() > 1 && b.points.size() > 1) clip_faces(normal, margin);
 }
 
 void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& triangle, const TriangleQuery& query,
                                       DirectionFilter& leaves, std::vector<FeatureContact>& contacts) {
   load(side_[0], a, nullptr), load(side_[1], triangle, nullptr);
-  contacts_ = &contacts, first_ = contacts.size();
+  contacts_ = &contacts, first_ = contacts.size(), ground_ = 1;
   const ConvexFace& face = triangle.faces.front();
   const double gap = lowest(side_[0], face.normal) - face.offset - a.radius, touching = query.passing.touching;
   const Range whole = along(side_[0], face.normal);
@@ -308,17 +311,22 @@ const ConvexFace* ConvexContacts::facing(const Side& side, const Vec3& out) {
   });
 }
 
-// The face that the normal fits better is the reference, of faces that fit alike that of the larger body: what lies on
-// it is not pushed along by its own tilt. The other's face, or its segment, is clipped to what lies over
+// Of faces that fit alike: that of what stands still, or of the larger body. What lies on it is not pushed along by its
+// own tilt.
+int ConvexContacts::reference_of_like_faces() const {
+  if (ground_ >= 0) return ground_;
+  return side_[0].core->extent > side_[1].core->extent ? 0 : 1;
+}
+
+// The face that the normal fits better is the reference; the other's face, or its segment, is clipped to what lies over
 // it (Ericson 2005, 5.5).
 void ConvexContacts::clip_faces(const Vec3& normal, double margin) {
   const ConvexFace *on_a = facing(side_[0], -normal), *on_b = facing(side_[1], normal);
   const double fit_a = on_a == nullptr ? -1.0 : -side_[0].normal(*on_a).dot(normal);
   const double fit_b = on_b == nullptr ? -1.0 : side_[1].normal(*on_b).dot(normal);
   const ConvexTuning& tuning = collision_tuning().convex;
-  const double preference =
-      side_[0].core->extent > side_[1].core->extent ? -tuning.reference_preference : tuning.reference_preference;
-  const int reference = fit_a > fit_b + preference ? 0 : 1;
+  const double alike = tuning.reference_preference;
+  const int reference = fit_a > fit_b + (reference_of_like_faces() == 0 ? -alike : alike) ? 0 : 1;
   if (std::max(fit_a, fit_b) < tuning.face_alignment) return;
   const Side &side = side_[reference], &other = side_[1 - reference];
   const ConvexFace* best = reference == 0 ? on_a : on_b;

@@ -18,6 +18,7 @@ namespace limber::internal {
 struct Passing {
   Vec3 way = Vec3::Zero();  // of a against b, straight on and evenly, in the frame of a
   double touching = 0.0;    // m: faces that overlap by no more keep them apart nevertheless
+  int ground = -1;          // 0 or 1: a or b stands still; −1: neither, or both
 
   // Whether it brings a nearer to b along a direction, by more than what is at rest may stir.
   bool closes(const Vec3& normal) const { return normal.dot(way) < -1e-3 * touching; }
@@ -38,8 +39,9 @@ class ConvexContacts {
   void find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
             std::vector<FeatureContact>& contacts, const Passing& passing = {});
   // Of the faces that look along a direction which is known to keep the two apart. @param normal unit, out of b into a
+  // @param ground as in Passing
   void find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, const Vec3& normal,
-                  double margin, std::vector<FeatureContact>& contacts);
+                  double margin, int ground, std::vector<FeatureContact>& contacts);
   struct TriangleQuery {
     double margin = 0.0;
     Passing passing{};
@@ -124,6 +126,7 @@ class ConvexContacts {
   Deepest deepest_along(const Direction& d) const;
 
   void touch_along(const Vec3& normal, double margin);
+  int reference_of_like_faces() const;
   static const ConvexFace* facing(const Side& side, const Vec3& out);
   void clip_faces(const Vec3& normal, double margin);
   void load_incident(const Side& side, const Vec3& out);
@@ -135,6 +138,7 @@ class ConvexContacts {
   mutable std::vector<Vec3> moved_;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::size_t first_ = 0;  // of the contacts of this pair
+  int ground_ = -1;
 };
 
 }  // namespace limber::internal
