@@ -109,6 +109,10 @@ struct NarrowTuning {
 
 /// Whole queries: thinning, and the first time of impact.
 struct FinderTuning {
+  /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
+  /// meets nothing.
+  double touch = 1e-3;
+  int touches_on_the_way = 4;     ///< of a pair that comes far, at most [1 to 16]: bounds its time
   double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1: a promise of the header
   std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
   /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets

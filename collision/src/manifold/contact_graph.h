@@ -21,11 +21,13 @@ struct KeptPoint {
   FeatureSide a, b;            ///< each in its body's frame at rest; deforming sides are found by triangle and weight
   Vec3 normal = Vec3::Zero();  ///< unit, out of b into a, in the frame of the body it turns with
   bool turns_with_b = false;   ///< otherwise with a
+  double round_a = 0.0, round_b = 0.0;  ///< radii about the points, m
+  double ahead = 0.0;                   ///< share of the expected way after which it was found; 0: where they are
 
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.id, s.a.key, s.a.triangle, s.a.weight, s.a.point, s.b.key, s.b.triangle, s.b.weight, s.b.point,
-                    s.normal, s.turns_with_b);
+                    s.normal, s.turns_with_b, s.round_a, s.round_b, s.ahead);
   }
 };
 

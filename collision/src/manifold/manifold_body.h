@@ -12,6 +12,7 @@
 #include "finder/geometry_cache.h"
 #include "finder/world_bounds.h"
 #include "limber/collision/narrow_phase.h"
+#include "manifold/inner_ball.h"
 #include "manifold/mesh_facets.h"
 
 namespace limber::internal {
@@ -58,6 +59,7 @@ struct ManifoldBody {
   bool present = false;
   std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
   std::shared_ptr<const ManifoldShape> rigid{};
+  std::optional<InnerBall> inner{};  ///< none: the shape holds no ball that is known
   bool finds_itself = false;
   double thickness = 0.0, radius = 0.0;  ///< thickness_of() its box at rest; farthest point from the origin, m
 

@@ -16,6 +16,7 @@
 #include "manifold/contact_graph.h"
 #include "manifold/manifold_points.h"
 #include "manifold/pair_finder.h"
+#include "manifold/swept_path.h"
 #include "tuning.h"
 
 namespace limber {
@@ -31,7 +32,8 @@ using internal::PairQuery;
 
 namespace {
 
-constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+constexpr double kSameNormal = 1e-3;                   // length of the difference of two normals that are one
+constexpr internal::FeatureKey kInside = 0xffffffffu;  // a body's inner ball: of a kind that no feature has
 
 [[noreturn]] void refuse_state(Index body, const std::string& seen, const std::string& expected) {
   throw InvalidArgument("ManifoldFinder: state of body " + std::to_string(body) + ": " + seen + ", expected " +
@@ -52,6 +54,9 @@ void check_body_state(Index index, const ManifoldBody& body, const BodyState& st
   for (std::size_t i = 0; i < state.amplitudes.size(); ++i)
     if (!std::isfinite(state.amplitudes[i]))
       refuse_state(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
+  if (std::isfinite(state.doubt) &&
+      !std::ranges::all_of(state.end_amplitudes, [](double z) { return std::isfinite(z); }))
+    refuse_state(index, "end_amplitudes are not finite", "finite numbers");
 }
 
 /// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
@@ -67,8 +72,11 @@ void bind_body_state(DeformedSurface& surface, Index index, const ManifoldBody& 
 struct ManifoldWorker {
   explicit ManifoldWorker(const NarrowPhaseOptions& options) : pairs(options) {}
   PairFinder pairs;
+  internal::SweptPath path{};
   DeformedSurface root{};  // for boxes of whole bodies
   std::vector<std::uint64_t> last{};
+  std::vector<KeptPoint> made{};  // a manifold under way
+  std::vector<double> gaps{};     // of these, where they were found
 };
 
 class ManifoldWorkers {
@@ -173,6 +181,12 @@ struct ManifoldFinder::Impl {
   void find_manifolds(Jobs& jobs);
   bool keeps(const LivePair& pair, const PairQuery& query) const;
   void make(LivePair& pair, const PairQuery& query, ManifoldWorker& worker);
+  void follow(ManifoldWorker& worker) const;
+  static void touch(std::span<const FeatureContact> found, const PairQuery& query, ManifoldWorker& worker);
+  void keep(std::span<const FeatureContact> found, const PairQuery& query, ManifoldWorker& worker) const;
+  static void keep(const FeatureContact& contact, double round_a, double round_b, const PairQuery& query,
+                   ManifoldWorker& worker);
+  static void keep_inner_balls(const FeatureContact& deepest, const PairQuery& query, ManifoldWorker& worker);
   struct Measured {
     Vec3 normal, p_a, p_b;  ///< world; points from the origin of a
     double gap;
@@ -342,31 +356,99 @@ bool is_face(const FeatureSide& side) { return internal::kind_of(side.key) == Fe
 
 }  // namespace
 
-/// Contacts with a face turn with the body that has it.
 void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWorker& worker) {
   worker.last.clear();
   for (const KeptPoint& point : pair.points)
     worker.last.push_back(static_cast<std::uint64_t>(point.a.key) << 32 | point.b.key);
+  const bool follows = internal::SweptPath::is_needed(q);
   PairQuery farther = q;
-  farther.reach += slack(q);
-  const RigidTransform X_BA = q.X_AB.inverse();
-  const BodyPair bodies_of{q.index_a, q.index_b};
+  if (follows)
+    farther.reach = internal::SweptPath::near_at_start(q);
+  else
+    farther.reach += slack(q);
+  worker.made.clear(), worker.gaps.clear();
   const std::span<const FeatureContact> found = worker.pairs.find(farther, worker.last);
-  graph.make_room(pair, found.size());
-  for (const FeatureContact& c : found) {
-    KeptPoint point{.id = internal::contact_id(bodies_of, internal::feature_pair(c)), .a = c.a, .b = c.b};
-    point.a.point += q.a.rounding() * c.normal;
-    point.b.point = X_BA * (c.b.point - q.b.rounding() * c.normal);
-    point.turns_with_b = is_face(c.b) && !is_face(c.a);
-    point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
-    pair.points.push_back(point);
+  keep(found, q, worker);
+  if (follows) {
+    worker.path.begin(q);
+    if (std::ranges::any_of(worker.gaps, [&](double gap) { return gap <= internal::SweptPath::margin(q); }))
+      touch(found, q, worker);
+    follow(worker);
   }
+  graph.make_room(pair, worker.made.size());
+  pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
-  pair.known = true;
+  pair.known = !follows;
   pair.X_LS = smaller_in_larger(q);
   pair.reach = q.reach;
   pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
   pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
+}
+
+/// Adds the contacts of all places where two bodies come to touch on their way.
+void ManifoldFinder::Impl::follow(ManifoldWorker& worker) const {
+  const int most = internal::collision_tuning().finder.touches_on_the_way;
+  for (int n = 0; n < most && worker.path.advance(); ++n) {
+    const PairQuery there = worker.path.query();
+    const std::span<const FeatureContact> found = worker.pairs.find(there, worker.last);
+    keep(found, there, worker);
+    if (found.empty()) return;
+    touch(found, there, worker);
+  }
+}
+
+void ManifoldFinder::Impl::touch(std::span<const FeatureContact> found, const PairQuery& q, ManifoldWorker& worker) {
+  keep_inner_balls(*std::ranges::min_element(found, {}, &FeatureContact::gap), q, worker);
+  worker.path.turn_aside(found);
+}
+
+void ManifoldFinder::Impl::keep(std::span<const FeatureContact> found, const PairQuery& q,
+                                ManifoldWorker& worker) const {
+  for (const FeatureContact& c : found) keep(c, q.a.rounding(), q.b.rounding(), q, worker);
+}
+
+/// Contacts with a face turn with the body that has it. Of what is touched twice the first touch counts, and any before
+/// what is only near.
+void ManifoldFinder::Impl::keep(const FeatureContact& c, double round_a, double round_b, const PairQuery& q,
+                                ManifoldWorker& worker) {
+  const RigidTransform X_BA = q.X_AB.inverse();
+  const std::uint64_t id = internal::contact_id({q.index_a, q.index_b}, internal::feature_pair(c));
+  const bool inside = c.a.key == kInside || c.b.key == kInside;
+  KeptPoint point{.id = inside ? id >> 24 : id, .a = c.a, .b = c.b};
+  point.a.point += round_a * c.normal;
+  point.b.point = X_BA * (c.b.point - round_b * c.normal);
+  point.turns_with_b = is_face(c.b) && !is_face(c.a);
+  point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
+  point.round_a = round_a, point.round_b = round_b, point.ahead = q.ahead;
+  if (q.ahead > 0.0) point.normal = (point.turns_with_b ? q.b : q.a).pose.q.conjugate() * (q.state_a.pose.q * c.normal);
+  const auto known = std::ranges::find(worker.made, point.id, &KeptPoint::id);
+  if (q.ahead == 0.0 || known == worker.made.end()) {
+    worker.made.push_back(point), worker.gaps.push_back(c.gap);
+  } else if (double& gap = worker.gaps[static_cast<std::size_t>(known - worker.made.begin())];
+             known->ahead == 0.0 && gap > internal::SweptPath::margin(q)) {
+    *known = point, gap = c.gap;
+  }
+}
+
+/// What turns far touches with one point after the other: a ball inside of it stays on its side whichever that is. Its
+/// id is the least of the pair, so that who goes through contacts forward and back ends with it.
+void ManifoldFinder::Impl::keep_inner_balls(const FeatureContact& deepest, const PairQuery& q, ManifoldWorker& worker) {
+  FeatureContact c = deepest;
+  double round_a = q.a.rounding(), round_b = q.b.rounding();
+  const auto turns = [](const ManifoldBody& body, const BodyState& state) {
+    return body.inner && !state.rotation.isZero(0.0);
+  };
+  const bool by_a = turns(q.a, q.state_a), by_b = turns(q.b, q.state_b);
+  if (by_a) {
+    round_a = q.a.inner->radius;
+    c.a = {.key = kInside, .triangle = -1, .weight = {}, .point = q.a.inner->middle - round_a * c.normal};
+  }
+  if (by_b) {
+    round_b = q.b.inner->radius;
+    c.b = {.key = kInside, .triangle = -1, .weight = {}, .point = q.X_AB * q.b.inner->middle + round_b * c.normal};
+  }
+  c.gap = c.normal.dot(c.a.point - c.b.point);
+  if (by_a || by_b) keep(c, round_a, round_b, q, worker);
 }
 
 void ManifoldFinder::Impl::find_manifolds(Jobs& jobs) {
@@ -391,7 +473,7 @@ namespace {
 /// Where a kept point of a body is now, in the body's frame.
 Vec3 place_of(const FeatureSide& side, Index index, const ManifoldBody& body, const BodyState& state,
               PairFinder& finder) {
-  if (!body.modal) return side.point;
+  if (!body.modal || side.triangle < 0) return side.point;
   DeformedSurface& surface = finder.surface(index, body, state);
   const Triangle& t = body.modal->surface->triangle(side.triangle);
   Vec3 p = Vec3::Zero();
@@ -400,9 +482,9 @@ Vec3 place_of(const FeatureSide& side, Index index, const ManifoldBody& body, co
   return p;
 }
 
-ContactSide side_of(const FeatureSide& kept, Index index, const ManifoldBody& body, const Vec3& point_B) {
-  ContactSide side{.body = index, .point_B = point_B, .radius = body.rounding()};
-  if (body.modal) side.triangle = kept.triangle, side.weight = kept.weight;
+ContactSide side_of(const FeatureSide& kept, Index index, const ManifoldBody& body, double round, const Vec3& point_B) {
+  ContactSide side{.body = index, .point_B = point_B, .radius = round};
+  if (body.modal && kept.triangle >= 0) side.triangle = kept.triangle, side.weight = kept.weight;
   return side;
 }
 
@@ -414,10 +496,11 @@ ManifoldFinder::Impl::Measured ManifoldFinder::Impl::measure(const KeptPoint& po
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
   Measured m;
   m.normal = (point.turns_with_b ? b.turn : a.turn) * point.normal;
-  m.p_a = a.turn * place_of(point.a, pair.a, a, state(pair.a), worker.pairs) - a.rounding() * m.normal;
+  m.p_a = a.turn * place_of(point.a, pair.a, a, state(pair.a), worker.pairs) - point.round_a * m.normal;
   m.p_b = b.turn * place_of(point.b, pair.b, b, state(pair.b), worker.pairs) + (b.pose.p - a.pose.p) +
-          b.rounding() * m.normal;
+          point.round_b * m.normal;
   m.gap = m.normal.dot(m.p_a - m.p_b);
+  if (point.ahead > 0.0) return m;
   if (point.turns_with_b && !b.modal) m.p_b = m.p_a - m.gap * m.normal;
   if (!point.turns_with_b && !a.modal) m.p_a = m.p_b + m.gap * m.normal;
   return m;
@@ -432,9 +515,9 @@ std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pa
   std::size_t count = 0;
   for (const KeptPoint& point : live.points) {
     const Measured m = measure(point, pair, worker);
-    if (m.gap > near_enough + std::max(0.0, -m.normal.dot(way))) continue;
-    to[count++] = {side_of(point.a, pair.a, a, a.turn.transpose() * m.p_a),
-                   side_of(point.b, pair.b, b, b.turn.transpose() * (m.p_b - between)),
+    if (point.ahead == 0.0 && m.gap > near_enough + std::max(0.0, -m.normal.dot(way))) continue;
+    to[count++] = {side_of(point.a, pair.a, a, point.round_a, a.turn.transpose() * m.p_a),
+                   side_of(point.b, pair.b, b, point.round_b, b.turn.transpose() * (m.p_b - between)),
                    m.normal,
                    base + 0.5 * (m.p_a + m.p_b),
                    m.gap,
@@ -573,6 +656,10 @@ void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const Co
   }
   const Aabb box = fresh.modal ? fresh.modal->surface->rest_bounds() : fresh.rigid->geometry.bounds();
   fresh.thickness = fresh.half_space() ? kInfinity : internal::thickness_of(box, fresh.rigid && !fresh.core());
+  if (fresh.modal)
+    fresh.inner = internal::inner_ball(*geometry.model);
+  else if (fresh.core())
+    fresh.inner = internal::inner_ball(*fresh.core());
   fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
   m.broad_phase.add(body, filter);
   if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);

@@ -30,6 +30,17 @@ bool is_beneath(PairSurface& mesh, std::span<const SupportPlane> planes, Feature
   });
 }
 
+Vec3 middle_of(const ConvexCore& core) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : core.points) middle += p;
+  return middle / static_cast<double>(core.points.size());
+}
+
+/// Whether a point is inside of what a surface bounds.
+bool holds(PairSurface& mesh, const Vec3& p) {
+  return mesh.may_hold(p) && mesh.nearest(p, std::numeric_limits<double>::infinity()).inside;
+}
+
 }  // namespace
 
 /// The vertices that reach farthest along the direction are a vertex or an edge; nothing beside it may reach farther.
@@ -79,13 +90,18 @@ void MeshContacts::rest_on_own_faces(const Query& q, std::size_t first) {
 
 // -- Balls and capsules -----------------------------------------------------------------------------------------------
 
-/// The local minima of the distance.
+/// The local minima of the distance. What goes through a thin wall leaves it on the side of its middle.
 void MeshContacts::find_rounded(const Query& q) {
   const std::size_t first = found_->size();
   core_contacts_.find(q.mesh, {{q.core.points.front(), q.core.points.back()}, q.core.points.size() == 2, q.core.radius},
                       q.reach, *found_);
+  const Vec3 middle = middle_of(q.core);
+  const auto is_behind = [&](const FeatureContact& c) { return c.normal.dot(middle - c.a.point) > 0.0; };
+  const bool crosses = std::any_of(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), is_behind) &&
+                       !holds(q.mesh, middle);
   const auto goes = [&](const FeatureContact& c) {
-    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q.mesh, q.planes, c.a.key, -c.normal);
+    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q.mesh, q.planes, c.a.key, -c.normal) ||
+           (crosses && is_behind(c));
   };
   found_->erase(std::remove_if(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), goes),
                 found_->end());
@@ -100,9 +116,7 @@ void MeshContacts::find_rounded(const Query& q) {
 
 /// A body whose middle is inside of what the mesh bounds goes out along one direction, to the nearest point of it.
 bool MeshContacts::leave_as_a_whole(const Query& q) {
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& p : q.core.points) middle += p;
-  middle /= static_cast<double>(q.core.points.size());
+  const Vec3 middle = middle_of(q.core);
   if (!q.mesh.may_hold(middle)) return false;
   const PairSurface::Nearest nearest = q.mesh.nearest(middle, std::numeric_limits<double>::infinity());
   if (!nearest.inside) return false;

@@ -27,7 +27,7 @@ std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<c
   } else if (core_b != nullptr && q.a.rigid) {
     against_ground(q, q.b, q.a, q.X_AB.inverse(), q.X_AB.q.conjugate() * -q.passing.way);
     for (FeatureContact& c : found_) c = exchanged(c, q.X_AB);
-  } else if (deforming_ != nullptr && (q.a.modal || q.b.modal) && deforming_->takes(q)) {
+  } else if (deforming_ != nullptr && q.ahead == 0.0 && (q.a.modal || q.b.modal) && deforming_->takes(q)) {
     deforming_->find(q, found_);
   } else {
     by_narrow_phase(q);
@@ -87,11 +87,24 @@ void PairFinder::on_half_space(const ConvexCore& core, const RigidTransform& X_B
   }
 }
 
-CollisionBody PairFinder::collision_body(Index index, const ManifoldBody& body, const BodyState& state) {
-  CollisionBody result{.index = index, .X_WB = state.pose};
+DeformedSurface& PairFinder::surface_of(const PairQuery& q, Side side) {
+  const bool is_a = side == Side::kA;
+  const ManifoldBody& body = is_a ? q.a : q.b;
+  const BodyState& state = is_a ? q.state_a : q.state_b;
+  if (q.ahead == 0.0) return surface(is_a ? q.index_a : q.index_b, body, state);
+  DeformedSurface& ahead = ahead_[is_a ? 0 : 1];
+  ahead.bind(body.modal->surface, state.amplitudes, BoundsChoice::kAutomatic);
+  return ahead;
+}
+
+CollisionBody PairFinder::collision_body(const PairQuery& q, Side side) {
+  const bool is_a = side == Side::kA;
+  const ManifoldBody& body = is_a ? q.a : q.b;
+  const BodyState& state = is_a ? q.state_a : q.state_b;
+  CollisionBody result{.index = is_a ? q.index_a : q.index_b, .X_WB = state.pose};
   result.displacement = state.displacement, result.rotation = state.rotation;
   if (body.modal) {
-    result.surface = &surface(index, body, state);
+    result.surface = &surface_of(q, side);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;
   } else {
     result.geometry = &body.rigid->geometry;
@@ -101,11 +114,11 @@ CollisionBody PairFinder::collision_body(Index index, const ManifoldBody& body, 
 
 void PairFinder::by_narrow_phase(const PairQuery& q) {
   contacts_.clear();
-  const CollisionBody a = collision_body(q.index_a, q.a, q.state_a);
+  const CollisionBody a = collision_body(q, Side::kA);
   if (q.index_a == q.index_b)
     narrow_.find_self_contacts(a, q.reach, q.state_a.pose.p, contacts_);
   else
-    narrow_.find_contacts(a, collision_body(q.index_b, q.b, q.state_b), q.reach, q.state_a.pose.p, contacts_);
+    narrow_.find_contacts(a, collision_body(q, Side::kB), q.reach, q.state_a.pose.p, contacts_);
   const Quaternion to_a = q.state_a.pose.q.conjugate();
   for (const ContactPoint& c : contacts_)
     found_.push_back({{static_cast<FeatureKey>(c.id >> 32), c.a.triangle, c.a.weight, c.a.point_B},

@@ -1,6 +1,7 @@
 // What finds the contacts of one pair, by the kinds of its two bodies.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct PairQuery {
   /// Planes that a, or b, rests on beside the other: what of the other reaches no farther is touched along these alone.
   /// In the frame of a, or of b.
   std::span<const SupportPlane> planes_a{}, planes_b{};
+  /// Share of the expected way after which they are so; 0: now.
+  double ahead = 0.0;
 };
 
 /// Finds the contacts of pairs in which a surface deforms: what may take the place of NarrowPhase there. Calls of
@@ -65,7 +68,9 @@ class PairFinder {
   void on_half_space(const ConvexCore& core, const RigidTransform& X_BH, const HalfSpace& shape, double reach);
   void keep_each_once();
   void by_narrow_phase(const PairQuery& query);
-  CollisionBody collision_body(Index index, const ManifoldBody& body, const BodyState& state);
+  enum class Side { kA, kB };
+  CollisionBody collision_body(const PairQuery& query, Side side);
+  DeformedSurface& surface_of(const PairQuery& query, Side side);
 
   ConvexContacts convex_;
   MeshContacts mesh_contacts_;
@@ -73,6 +78,7 @@ class PairFinder {
   PairSurface mesh_;
   NarrowPhase narrow_;
   SurfacePool pool_;
+  std::array<DeformedSurface, 2> ahead_;  // of a pair that is on its way
   DeformingPairs* deforming_ = nullptr;
   std::vector<ContactPoint> contacts_;
   std::vector<FeatureContact> found_;

@@ -16,7 +16,11 @@
 /// *Real-Time Collision Detection*, 2005, 5.5).
 ///
 /// Contacts are *speculative*: those are found whose gap the motion that BodyState::displacement and reach tell may
-/// close, and a solver gives way to them by their gap. BodyState::look_ahead, doubt and the expected ends are not read.
+/// close, and a solver gives way to them by their gap. BodyState::look_ahead and end_pose are not read. Two bodies that
+/// come or turn farther against each other than the thinner is thick are followed along the expected motion to where
+/// they first touch (TimeOfImpact), and on along what they touch, up to four times: contacts are those of these places,
+/// with gaps as they are now. What turns has one more there, of a ball inside of it, whose row holds however far it
+/// turns.
 ///
 /// No seam shows. Where a face keeps two convex shapes apart all along the expected motion, contacts with other faces
 /// that close on the way are none; where a body rests on one thing and comes to another that reaches to the same plane
@@ -56,9 +60,9 @@ struct ManifoldFinderOptions {
 ///
 /// What find_contacts() refuses, before anything is changed (InvalidArgument naming body and member): a pose that is
 /// not finite or whose quaternion is not of length 1 within 1e-6, a displacement, reach or margin that is not finite or
-/// a negative one of the latter two, another number of amplitudes than the body has modes, amplitudes that are not
-/// finite, and `states` that do not reach to every body. States of bodies that sleep are looked at when they fall
-/// asleep and when something comes near.
+/// a negative one of the latter two, end amplitudes that are not finite where the doubt is, another number of
+/// amplitudes than the body has modes, amplitudes that are not finite, and `states` that do not reach to every body.
+/// States of bodies that sleep are looked at when they fall asleep and when something comes near.
 ///
 /// Ids: equal for the same features of the same two body indices, whatever happened between; made by mixing 64 bits.
 class ManifoldFinder final : public ContactSource {

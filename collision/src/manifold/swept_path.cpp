@@ -1,0 +1,135 @@
+#include "manifold/swept_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tuning.h"
+
+namespace limber::internal {
+namespace {
+
+/// How far a body's points may come beside the straight way that its state tells. @return m; 0 where nothing is
+/// expected
+double doubt_of(const BodyState& state) { return std::isfinite(state.doubt) ? state.doubt : 0.0; }
+
+double thinner(const PairQuery& q) { return std::min(q.a.thickness, q.b.thickness); }
+
+}  // namespace
+
+// -- One body ---------------------------------------------------------------------------------------------------------
+
+void SweptPath::Side::begin(const BodyState& from) {
+  state = from;
+  amplitudes.assign(from.amplitudes.begin(), from.amplitudes.end());
+  state.amplitudes = amplitudes;
+  still.assign(amplitudes.size(), 0.0);
+  rates = still;
+  if (std::isfinite(from.doubt) && from.end_amplitudes.size() == amplitudes.size())
+    for (std::size_t i = 0; i < rates.size(); ++i) rates[i] = from.end_amplitudes[i] - from.amplitudes[i];
+  moves = !(state.displacement.isZero(0.0) && state.rotation.isZero(0.0) &&
+            std::ranges::all_of(rates, [](double rate) { return rate == 0.0; }));
+}
+
+void SweptPath::Side::go(double share) {
+  if (!moves) return;
+  state.pose.p += share * state.displacement;
+  state.pose.q = normalized(quaternion_from_rotation_vector(share * state.rotation) * state.pose.q);
+  for (std::size_t i = 0; i < rates.size(); ++i) amplitudes[i] += share * rates[i];
+}
+
+MovingBody SweptPath::Side::moving(const ManifoldBody& body, double left) {
+  MovingBody moving{.pose = state.pose, .amplitudes = amplitudes};
+  if (body.modal)
+    moving.surface = body.modal->surface;
+  else
+    moving.geometry = &body.rigid->geometry;
+  if (!moves) return moving;
+  motion.set_frame({.pose = state.pose, .velocity = state.displacement, .angular_velocity = state.rotation}, left);
+  motion.set_modes(still, still, amplitudes, rates);
+  moving.motion = &motion;
+  return moving;
+}
+
+// -- Two ------------------------------------------------------------------------------------------------------------
+
+bool SweptPath::is_needed(const PairQuery& q) {
+  if (q.index_a == q.index_b || q.a.half_space() != nullptr || q.b.half_space() != nullptr) return false;
+  const double turning = q.state_a.reach - doubt_of(q.state_a) + q.state_b.reach - doubt_of(q.state_b);
+  return q.passing.way.norm() + turning > thinner(q);
+}
+
+double SweptPath::near_at_start(const PairQuery& q) {
+  return q.reach - q.passing.way.norm() - q.state_a.reach - q.state_b.reach + doubt_of(q.state_a) +
+         doubt_of(q.state_b) + margin(q);
+}
+
+double SweptPath::margin(const PairQuery& q) { return collision_tuning().finder.touch * thinner(q); }
+
+void SweptPath::begin(const PairQuery& q) {
+  pair_ = &q;
+  margin_ = margin(q);
+  time_ = 0.0;
+  sides_[0].begin(q.state_a);
+  sides_[1].begin(q.state_b);
+}
+
+bool SweptPath::advance() {
+  const double left = 1.0 - time_;
+  if (!(left > 0.0)) return false;
+  const ImpactTime touch =
+      impacts_.find(sides_[0].moving(pair_->a, left), sides_[1].moving(pair_->b, left), left, margin_, 0.125 * margin_);
+  if (touch.status == ImpactTime::Status::kNone || touch.status == ImpactTime::Status::kTouching) return false;
+  for (Side& side : sides_) side.go(touch.time);
+  time_ += touch.time;
+  return true;
+}
+
+Vec3 SweptPath::way() const { return sides_[0].state.displacement - sides_[1].state.displacement; }
+
+PairQuery SweptPath::query() const {
+  const BodyState &a = sides_[0].state, &b = sides_[1].state;
+  PairQuery q{.index_a = pair_->index_a,
+              .index_b = pair_->index_b,
+              .a = pair_->a,
+              .b = pair_->b,
+              .state_a = a,
+              .state_b = b,
+              .ahead = time_};
+  const Quaternion to_a = a.pose.q.conjugate();
+  q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
+  const double far = thinner(q), length = (1.0 - time_) * way().norm();
+  q.passing = pair_->passing;
+  q.passing.way = to_a * ((1.0 - time_) * std::min(1.0, far / std::max(length, far)) * way());
+  q.reach = std::min(pair_->reach, far);
+  q.planes_a = pair_->planes_a, q.planes_b = pair_->planes_b;
+  return q;
+}
+
+void SweptPath::turn_aside(std::span<const FeatureContact> contacts) {
+  if (contacts.empty()) return;
+  const Quaternion from_a = sides_[0].state.pose.q;
+  const auto deepest = std::ranges::min_element(contacts, {}, &FeatureContact::gap);
+  Side& mover = sides_[0].moves ? sides_[0] : sides_[1];
+  const double sign = sides_[0].moves ? 1.0 : -1.0;
+  if (deepest->gap < margin_) mover.state.pose.p += sign * 1.25 * (margin_ - deepest->gap) * (from_a * deepest->normal);
+  Vec3 on = way();
+  bool turns_in = false;
+  for (int round = 0; round < 2; ++round)
+    for (const FeatureContact& c : contacts) {
+      if (c.gap > std::max(deepest->gap, 0.0) + margin_) continue;
+      const Vec3 normal = from_a * c.normal;
+      on -= std::min(0.0, normal.dot(on)) * normal;
+      const Vec3 arm_a = from_a * c.a.point, arm_b = from_a * (c.b.point - pair_b_in_a());
+      turns_in =
+          turns_in || normal.dot(sides_[0].state.rotation.cross(arm_a) - sides_[1].state.rotation.cross(arm_b)) < 0.0;
+    }
+  mover.state.displacement += sign * (on - way());
+  if (turns_in)
+    for (Side& side : sides_) side.state.rotation.setZero();
+}
+
+Vec3 SweptPath::pair_b_in_a() const {
+  return sides_[0].state.pose.q.conjugate() * (sides_[1].state.pose.p - sides_[0].state.pose.p);
+}
+
+}  // namespace limber::internal
