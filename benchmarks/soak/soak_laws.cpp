@@ -14,7 +14,7 @@ constexpr double kRise = 1e-2;           // of Σ m g size
 
 bool is_finite(const SoakStep& step) {
   const auto contact_is = [](const ContactEvent& c) { return c.impulse.allFinite() && c.normal.allFinite(); };
-  const auto hand_is = [](const SeenHand& h) { return h.force.allFinite() && h.way.allFinite(); };
+  const auto hand_is = [](const SeenHand& h) { return h.force.allFinite() && std::isfinite(h.work); };
   const auto dent_is = [](const SeenDent& d) { return std::isfinite(d.largest); };
   return step.finite && std::isfinite(step.energy) && std::ranges::all_of(step.contacts, contact_is) &&
          std::ranges::all_of(step.hands, hand_is) && std::ranges::all_of(step.dents, dent_is);
@@ -71,7 +71,7 @@ const char* name(SoakLaw law) {
 
 double work_of(std::span<const SeenHand> hands) {
   double sum = 0.0;
-  for (const SeenHand& hand : hands) sum += hand.force.dot(hand.way);
+  for (const SeenHand& hand : hands) sum += hand.work;
   return sum;
 }
 

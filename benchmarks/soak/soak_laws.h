@@ -30,7 +30,7 @@ struct SeenDent {
 
 struct SeenHand {
   Vec3 force = Vec3::Zero();  ///< mean over the step, N
-  Vec3 way = Vec3::Zero();    ///< of the held point in the step, m
+  double work = 0.0;          ///< on the body in the step, J
   double max_force = 0.0;     ///< along each axis, N
 };
 
@@ -55,7 +55,7 @@ struct SoakShares {
 };
 SoakShares shares_of_laws(const SoakStep& step);
 
-/// Σ F · way: what the hands did on the bodies, J. A force that changes within the step counts by its mean.
+/// What the hands did on the bodies, J.
 double work_of(std::span<const SeenHand> hands);
 
 }  // namespace limber::testing

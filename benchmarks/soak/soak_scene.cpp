@@ -40,7 +40,7 @@ std::vector<SurfacePoint> vertices_of(const ModalSurface& surface) {
 }  // namespace
 
 SoakScene::SoakScene(const SoakBodies& bodies, unsigned seed, const ContactOptions& options)
-    : finder_(finder_options(options)), random_(seed), hands_(kHands), held_before_(kHands) {
+    : finder_(finder_options(options)), random_(seed), hands_(kHands) {
   world_.set_contact_source(&finder_, options);
   make_pit();
   add_loose(bodies);
@@ -132,10 +132,7 @@ void SoakScene::guide(Hand& hand) {
 }
 
 const SoakStep& SoakScene::step() {
-  for (std::size_t i = 0; i < hands_.size(); ++i) {
-    guide(hands_[i]);
-    if (hands_[i].handle) held_before_[i] = world_.position(hands_[i].body, hands_[i].at);
-  }
+  for (Hand& hand : hands_) guide(hand);
   seen_.energy_before = seen_.energy;
   const double begin = thread_seconds();
   world_.step();
@@ -150,11 +147,11 @@ const SoakStep& SoakScene::step() {
 
 void SoakScene::see_hands() {
   seen_hands_.clear();
-  for (std::size_t i = 0; i < hands_.size(); ++i)
-    if (const Hand& hand = hands_[i]; hand.handle)
-      seen_hands_.push_back({.force = world_.handle(*hand.handle).force,
-                             .way = world_.position(hand.body, hand.at) - held_before_[i],
-                             .max_force = hand.max_force});
+  for (const Hand& hand : hands_)
+    if (hand.handle) {
+      const HandleView view = world_.handle(*hand.handle);
+      seen_hands_.push_back({.force = view.force, .work = view.work, .max_force = hand.max_force});
+    }
   seen_.hands = seen_hands_;
 }
 

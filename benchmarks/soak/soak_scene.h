@@ -60,7 +60,6 @@ class SoakScene {
   std::vector<BodyId> bodies_;
   std::vector<JointId> joints_;
   std::vector<Hand> hands_;
-  std::vector<Vec3> held_before_;
   std::vector<SeenDent> dents_;
   std::vector<Dented> dented_;  // of `dents_`
   std::vector<SeenHand> seen_hands_;

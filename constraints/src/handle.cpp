@@ -54,6 +54,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
   const FrameInstant at = point_.at(states, when);
   const Vec3& p = at.position;
   const Vec3& target = when == StepTime::kStart ? now_ : then_;
+  if (when == StepTime::kStart) from_ = p;
   const double arm = (p - at.origin).norm();
   for (std::size_t i = 0; i < options_.directions.size(); ++i) {
     const Vec3& n = options_.directions[i];
@@ -94,12 +95,13 @@ void Handle::add_force_derivative(const BodyStates& states, std::span<const doub
 }
 
 void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
-  if (left_ == whole_) force_ = Vec3::Zero();  // the step's first part
+  if (left_ == whole_) force_ = Vec3::Zero(), work_ = 0.0;  // the step's first part
   Vec3 off = Vec3::Zero();
   const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     last_force_[i] = impulses[i] / step_;
     force_ += impulses[i] / whole_ * options_.directions[i];
+    work_ += last_force_[i] * options_.directions[i].dot(p - from_);
     off += options_.directions[i].dot(p - then_) * options_.directions[i];
   }
   error_ = off.norm();

@@ -16,8 +16,7 @@ struct GoodStep {
   std::array<ContactEvent, 1> contacts{
       ContactEvent{.a = 0, .b = 1, .normal = Vec3::UnitZ(), .impulse = Vec3(0.3, 0.0, 1.0)}};
   std::array<SeenDent, 1> dents{SeenDent{.body = 0, .largest = 5e-4, .compliance = 1e-5}};
-  std::array<SeenHand, 1> hands{
-      SeenHand{.force = Vec3(0.0, 0.0, 50.0), .way = Vec3(0.0, 0.0, 0.02), .max_force = 60.0}};
+  std::array<SeenHand, 1> hands{SeenHand{.force = Vec3(0.0, 0.0, 50.0), .work = 1.0, .max_force = 60.0}};
   SoakStep step{
       .length = 0.01, .friction = 0.5, .weight = 100.0, .energy_scale = 30.0, .energy_before = 7.0, .energy = 8.2};
 

@@ -131,7 +131,8 @@ struct JointAttachment {
 struct HandleView {
   HandleTarget target{};      ///< for the coming step
   Vec3 force = Vec3::Zero();  ///< mean force on the body, world, N
-  double error = 0.0;         ///< distance from the target along the held directions, m
+  double work = 0.0;   ///< done on the body in the last step, J: each substep's force along the point's way in it
+  double error = 0.0;  ///< distance from the target along the held directions, m
 };
 
 /// One direction in which a point of a body is to do something: PointWish of manipulation.h by BodyId.
