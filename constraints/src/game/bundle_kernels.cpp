@@ -136,7 +136,56 @@ HWY_INLINE HWY_ATTR void WriteSides(const PairBundle& bundle, const std::int32_t
   }
 }
 
-/// The row's number for the coordinates as they are.
+/// The modes of both bodies, in the lanes that have any.
+struct Modes {
+  Vector y[2][kMostBundledModes];
+};
+
+HWY_INLINE HWY_ATTR void ReadModes(const BundleArrays& all, const PairBundle& bundle, const Block8* y, std::size_t lane,
+                                   Modes& modes) {
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::int32_t k = 0; 8 * k < bundle.modes[s]; ++k) {
+      const float* from[kLanesAtOnce];
+      for (std::size_t l = 0; l < kLanesAtOnce; ++l)
+        from[l] = y[bundle.blocks[s][lane + l] > k ? bundle.motion[s][lane + l] + 1 + k : all.zeros].v;
+      Gather4(from, 0, modes.y[s] + 8 * k);
+      Gather4(from, 4, modes.y[s] + 8 * k + 4);
+    }
+}
+
+HWY_INLINE HWY_ATTR void WriteModes(const PairBundle& bundle, Block8* y, std::size_t lane, const Modes& modes) {
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::int32_t k = 0; 8 * k < bundle.modes[s]; ++k) {
+      float* to[kLanesAtOnce];
+      for (std::size_t l = 0; l < kLanesAtOnce; ++l)
+        to[l] = bundle.blocks[s][lane + l] > k ? y[bundle.motion[s][lane + l] + 1 + k].v : nullptr;
+      Scatter4(modes.y[s] + 8 * k, to, 0);
+      Scatter4(modes.y[s] + 8 * k + 4, to, 4);
+    }
+}
+
+/// The modes' rows of contact k of a bundle.
+HWY_INLINE HWY_ATTR Block8* RowsOf(const BundleArrays& all, const PairBundle& bundle, std::int32_t k) {
+  return all.rows + bundle.rows + 3 * k * (bundle.modes[0] + bundle.modes[1]);
+}
+
+/// Adds what the modes give to the three rows' numbers.
+HWY_INLINE HWY_ATTR void AddModes(const PairBundle& bundle, const Block8* rows, const Modes& modes, std::size_t lane,
+                                  Vector* u) {
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3)
+      for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = hn::MulAdd(Get(rows[axis], lane), modes.y[s][i], u[axis]);
+}
+
+HWY_INLINE HWY_ATTR void MoveModes(const PairBundle& bundle, const Block8* rows, const Vector* by, std::size_t lane,
+                                   Modes& modes) {
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        modes.y[s][i] = hn::MulAdd(by[axis], Get(rows[axis], lane), modes.y[s][i]);
+}
+
+/// The row's number for the frames as they are.
 HWY_INLINE HWY_ATTR Vector ReadAxis(const BundleContact& c, std::size_t axis, const Sides& sides, std::size_t lane) {
   Vector u = hn::Mul(Get(c.axes[axis][0], lane), sides.apart[0]);
   for (std::size_t i = 1; i < 3; ++i) u = hn::MulAdd(Get(c.axes[axis][i], lane), sides.apart[i], u);
@@ -156,22 +205,31 @@ HWY_INLINE HWY_ATTR void MoveSides(const BundleContact& c, std::size_t axes, con
   }
 }
 
+/// The three rows' numbers for the coordinates as they are.
+HWY_INLINE HWY_ATTR void ReadRows(const PairBundle& bundle, const BundleContact& c, const Block8* rows,
+                                  const Sides& sides, const Modes& modes, std::size_t lane, Vector* u) {
+  for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = ReadAxis(c, axis, sides, lane);
+  AddModes(bundle, rows, modes, lane, u);
+}
+
 /// How much is left open along the normal: at most 0 where the law is met.
-HWY_INLINE HWY_ATTR Vector Approach(const BundleContact& c, const Sides& sides, std::size_t lane) {
-  const Vector open = hn::Sub(Get(c.target, lane), hn::Add(ReadAxis(c, 0, sides, lane), Get(c.now, lane)));
+HWY_INLINE HWY_ATTR Vector Approach(const BundleContact& c, Vector u, std::size_t lane) {
+  const Vector open = hn::Sub(Get(c.target, lane), hn::Add(u, Get(c.gap, lane)));
   const Vector change = hn::Sub(Get(c.force[0], lane), Get(c.before, lane));
   return hn::NegMulAdd(Get(c.compliance, lane), change, open);
 }
 
-HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, Sides& sides, std::size_t lane) {
+/// @param u the rows' numbers. @param change out: of the forces
+HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, const Vector* u, std::size_t lane, Vector* change) {
   const Lanes d;
   const Vector zero = hn::Zero(d), before = Get(c.force[0], lane);
-  Vector change[3], wanted[2];
-  const Vector normal = hn::Max(zero, hn::MulAdd(Approach(c, sides, lane), Get(c.inverse_normal, lane), before));
+  Vector wanted[2];
+  const Vector normal = hn::Max(zero, hn::MulAdd(Approach(c, u[0], lane), Get(c.inverse_normal, lane), before));
   change[0] = hn::Sub(normal, before);
   for (std::size_t t = 0; t < 2; ++t) {
-    const Vector slip = hn::MulAdd(Get(c.coupling[t], lane), change[0], ReadAxis(c, 1 + t, sides, lane));
-    wanted[t] = hn::NegMulAdd(Get(c.inverse_tangent, lane), slip, Get(c.force[1 + t], lane));
+    const Vector slip = hn::Add(u[1 + t], Get(c.slip[t], lane));
+    wanted[t] = hn::NegMulAdd(Get(c.inverse_tangent, lane), hn::MulAdd(Get(c.coupling[t], lane), change[0], slip),
+                              Get(c.force[1 + t], lane));
   }
   const Vector square = hn::MulAdd(wanted[0], wanted[0], hn::Mul(wanted[1], wanted[1]));
   const Vector most = hn::IfThenElseZero(hn::Gt(normal, zero), hn::Mul(Get(c.friction, lane), normal));
@@ -183,7 +241,78 @@ HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, Sides& sides, std::size_t la
     change[1 + t] = hn::Sub(tangent, Get(c.force[1 + t], lane));
     Put(tangent, c.force[1 + t], lane);
   }
-  MoveSides(c, 3, change, sides, lane);
+}
+
+/// The turns' parts of a side's three rows: ± scale (lever × axis).
+HWY_INLINE HWY_ATTR void MakeTurns(const PairBundle& bundle, BundleContact& c, std::size_t s, std::size_t lane) {
+  Vector r[3];
+  for (std::size_t i = 0; i < 3; ++i) r[i] = s == 0 ? Get(c.lever[s][i], lane) : hn::Neg(Get(c.lever[s][i], lane));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Vector n[3] = {Get(c.axes[axis][0], lane), Get(c.axes[axis][1], lane), Get(c.axes[axis][2], lane)};
+    Vector moment[3];
+    for (std::size_t i = 0; i < 3; ++i)
+      moment[i] = hn::NegMulAdd(r[(i + 2) % 3], n[(i + 1) % 3], hn::Mul(r[(i + 1) % 3], n[(i + 2) % 3]));
+    for (std::size_t i = 0; i < 3; ++i)
+      Put(AddDot(bundle.scale[s][i], moment, hn::Zero(Lanes()), lane), c.turn[s][axis][i], lane);
+  }
+}
+
+/// Products of two of the rows, by frames.
+HWY_INLINE HWY_ATTR Vector FrameProduct(const BundleContact& c, std::size_t x, std::size_t y, Vector rate,
+                                        std::size_t lane) {
+  Vector along = hn::Zero(Lanes()), sum = along;
+  for (std::size_t i = 0; i < 3; ++i) {
+    along = hn::MulAdd(Get(c.axes[x][i], lane), Get(c.axes[y][i], lane), along);
+    for (std::size_t s = 0; s < 2; ++s) sum = hn::MulAdd(Get(c.turn[s][x][i], lane), Get(c.turn[s][y][i], lane), sum);
+  }
+  return hn::MulAdd(rate, along, sum);
+}
+
+/// 1/x; 0 where it is not positive.
+HWY_INLINE HWY_ATTR Vector Inverse(Vector x) {
+  return hn::IfThenElseZero(hn::Gt(x, hn::Zero(Lanes())), hn::Div(hn::Set(Lanes(), 1.0f), x));
+}
+
+/// The largest eigenvalue of a symmetric 2 × 2 block.
+HWY_INLINE HWY_ATTR Vector LargestOf(Vector a, Vector b, Vector off) {
+  const Vector half = hn::Set(Lanes(), 0.5f), apart = hn::Mul(half, hn::Sub(a, b));
+  return hn::MulAdd(half, hn::Add(a, b), hn::Sqrt(hn::MulAdd(apart, apart, hn::Mul(off, off))));
+}
+
+HWY_INLINE HWY_ATTR void MakeMasses(const PairBundle& bundle, BundleContact& c, const Block8* rows, const Modes& shapes,
+                                    Vector rate, std::size_t lane) {
+  constexpr std::size_t kPairs[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+  Vector of[6];
+  for (std::size_t i = 0; i < 6; ++i) of[i] = FrameProduct(c, kPairs[i][0], kPairs[i][1], rate, lane);
+  Put(Inverse(of[0]), c.inverse_push, lane);
+  for (std::int32_t m = 0; m < bundle.modes[0] + bundle.modes[1]; ++m)
+    for (std::size_t i = 0; i < 6; ++i)
+      of[i] = hn::MulAdd(Get(rows[3 * m + kPairs[i][0]], lane), Get(rows[3 * m + kPairs[i][1]], lane), of[i]);
+  Put(Inverse(hn::Add(of[0], Get(c.compliance, lane))), c.inverse_normal, lane);
+  Put(of[1], c.coupling[0], lane);
+  Put(of[2], c.coupling[1], lane);
+  // One step for both tangents: what slides is braked against its slip.
+  Put(Inverse(LargestOf(of[3], of[5], of[4])), c.inverse_tangent, lane);
+  Vector bent[3] = {hn::Zero(Lanes()), hn::Zero(Lanes()), hn::Zero(Lanes())};
+  AddModes(bundle, rows, shapes, lane, bent);
+  Put(hn::Sub(Get(c.rest, lane), bent[0]), c.rest, lane);
+}
+
+HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
+  for (std::size_t b = 0; b < all.count; ++b) {
+    const PairBundle& bundle = all.bundles[b];
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Modes modes;
+      ReadModes(all, bundle, shapes, lane, modes);
+      const Vector root_a = Get(bundle.root[0], lane), root_b = Get(bundle.root[1], lane);
+      const Vector rate = hn::MulAdd(root_a, root_a, hn::Mul(root_b, root_b));
+      for (std::int32_t k = 0; k < bundle.count; ++k) {
+        BundleContact& c = all.contacts[bundle.first + k];
+        for (std::size_t s = 0; s < 2; ++s) MakeTurns(bundle, c, s, lane);
+        MakeMasses(bundle, c, RowsOf(all, bundle, k), modes, rate, lane);
+      }
+    }
+  }
 }
 
 HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {
@@ -191,10 +320,21 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
     const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Sides sides;
+      Modes modes;
       ReadSides(bundle, bundle.motion, motion, lane, sides);
-      for (std::int32_t k = 0; k < bundle.count; ++k)
-        SolveOne(all.contacts[bundle.first + (backward ? bundle.count - 1 - k : k)], sides, lane);
+      ReadModes(all, bundle, motion, lane, modes);
+      for (std::int32_t j = 0; j < bundle.count; ++j) {
+        const std::int32_t k = backward ? bundle.count - 1 - j : j;
+        BundleContact& c = all.contacts[bundle.first + k];
+        const Block8* rows = RowsOf(all, bundle, k);
+        Vector u[3], change[3];
+        ReadRows(bundle, c, rows, sides, modes, lane, u);
+        SolveOne(c, u, lane, change);
+        MoveSides(c, 3, change, sides, lane);
+        MoveModes(bundle, rows, change, lane, modes);
+      }
       WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
+      WriteModes(bundle, motion, lane, modes);
     }
   }
 }
@@ -211,16 +351,20 @@ HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[1
   }
 }
 
-HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], float share, float most,
-                                    std::size_t lane) {
+/// @param bent what the modes give to the rows' numbers
+HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], const Vector* bent, float share,
+                                    float most, std::size_t lane) {
   const Lanes d;
   const Vector zero = hn::Zero(d);
   Vector apart[3];
   Travel(c, frames, lane, apart);
-  const Vector now = AddDot(c.axes[0], apart, Get(c.rest, lane), lane), force = Get(c.force[0], lane);
+  const Vector straight = AddDot(c.axes[0], apart, Get(c.rest, lane), lane), force = Get(c.force[0], lane);
+  const Vector now = hn::Add(straight, bent[0]);
   const Vector yields = hn::Mul(Get(c.compliance, lane), force), gap = hn::Add(now, yields);
   const Vector part = hn::Min(hn::Mul(hn::Set(d, share), hn::Neg(hn::Add(gap, Get(c.slop, lane)))), hn::Set(d, most));
   Put(now, c.now, lane);
+  Put(straight, c.gap, lane);
+  for (std::size_t t = 0; t < 2; ++t) Put(hn::Neg(bent[1 + t]), c.slip[t], lane);
   Put(hn::Sub(hn::Min(gap, zero), yields), c.target, lane);
   Put(force, c.before, lane);
   Put(zero, c.push, lane);
@@ -228,7 +372,9 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   return !hn::AllTrue(d, hn::Le(part, zero));
 }
 
-HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, float share, float most) {
+HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, const Block8* shapes, float share,
+                             float most) {
+  const Lanes d;
   bool any = false;
   for (std::size_t b = 0; b < all.count; ++b) {
     PairBundle& bundle = all.bundles[b];
@@ -240,8 +386,13 @@ HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
         for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = frames[bundle.frame[s][lane + l]].shift;
         for (std::size_t i = 0; i < 12; i += 4) Gather4(from, i, of[s] + i);
       }
-      for (std::int32_t k = 0; k < bundle.count; ++k)
-        if (MeasureOne(all.contacts[bundle.first + k], of, share, most, lane)) bundle.overlaps = true;
+      Modes modes;
+      ReadModes(all, bundle, shapes, lane, modes);
+      for (std::int32_t k = 0; k < bundle.count; ++k) {
+        Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+        AddModes(bundle, RowsOf(all, bundle, k), modes, lane, bent);
+        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane)) bundle.overlaps = true;
+      }
     }
     any = any || bundle.overlaps;
   }
@@ -278,10 +429,14 @@ HWY_ATTR float ResidualOfBundles(const BundleArrays& all, const Block8* motion) 
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Sides sides;
+      Modes modes;
       ReadSides(bundle, bundle.motion, motion, lane, sides);
+      ReadModes(all, bundle, motion, lane, modes);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
-        const Vector approach = Approach(c, sides, lane);
+        Vector u[3];
+        ReadRows(bundle, c, RowsOf(all, bundle, k), sides, modes, lane, u);
+        const Vector approach = Approach(c, u[0], lane);
         const auto presses = hn::Gt(Get(c.force[0], lane), hn::Zero(d));
         const auto is_there = hn::Gt(Get(c.inverse_normal, lane), hn::Zero(d));
         const Vector left = hn::IfThenElseZero(is_there, hn::IfThenElse(presses, hn::Abs(approach), approach));
@@ -297,13 +452,17 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Sides sides;
+      Modes modes;
       ReadSides(bundle, bundle.motion, motion, lane, sides);
+      ReadModes(all, bundle, motion, lane, modes);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
         const Vector by[3] = {Get(c.force[0], lane), Get(c.force[1], lane), Get(c.force[2], lane)};
         MoveSides(c, 3, by, sides, lane);
+        MoveModes(bundle, RowsOf(all, bundle, k), by, lane, modes);
       }
       WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
+      WriteModes(bundle, motion, lane, modes);
     }
   }
 }
@@ -324,6 +483,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace limber::internal {
 
+HWY_EXPORT(MakeBundleRows);
 HWY_EXPORT(MeasureBundles);
 HWY_EXPORT(SweepBundles);
 HWY_EXPORT(PushBundles);
@@ -331,8 +491,13 @@ HWY_EXPORT(ResidualOfBundles);
 HWY_EXPORT(ApplyBundleForces);
 HWY_EXPORT(AddUpBundles);
 
-bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, float share, float most) {
-  return HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, share, most);
+void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes) {
+  HWY_DYNAMIC_DISPATCH(MakeBundleRows)(bundles, shapes);
+}
+
+bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
+                     float most) {
+  return HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, shapes, share, most);
 }
 
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion) {

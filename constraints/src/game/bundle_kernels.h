@@ -1,5 +1,5 @@
-// The vector loops of contacts between rigid bodies: eight pairs at a time, one in each lane. Plain data only, as in
-// sweep_kernels.h, whose coordinates these are.
+// The vector loops of contacts between free or standing bodies: eight pairs at a time, one in each lane. Plain data
+// only, as in sweep_kernels.h, whose coordinates these are.
 //
 // No two pairs of a bundle share a body that moves, so that each lane sees what one contact after the other would.
 // Every result is the same bits on every instruction set that has fused multiply-add, whatever its vectors' length.
@@ -10,12 +10,17 @@
 namespace limber::internal {
 
 inline constexpr std::size_t kBundleLanes = 8;
+inline constexpr std::int32_t kMostBundledModes = 32;  // of a body
 
 /// Up to eight pairs. Contact k of all is contacts[first + k].
 struct PairBundle {
   std::int32_t frame[2][kBundleLanes] = {};   // into FrameShifts and pushes; one past the last: stands
   std::int32_t motion[2][kBundleLanes] = {};  // into the blocks of coordinates; one past the last: stands
   Block8 root[2];                             // h/√m; 0: its origin does not move
+  Block8 scale[2][3][3];                      // coordinates of the turn per moment held over the substep, row by row
+  std::int32_t blocks[2][kBundleLanes] = {};  // of each lane's modes
+  std::int32_t modes[2] = {};                 // the most in any lane, in whole blocks
+  std::int32_t rows = 0;                      // of its first contact's modes
   std::int32_t first = 0, count = 0;
   bool overlaps = false;  // whether any is to be pushed apart
 };
@@ -25,20 +30,28 @@ struct BundleContact {
   Block8 axes[3][3];     // normal, tangents; world: [axis][component]
   Block8 turn[2][3][3];  // rows of the sides' turns: [side][axis][component]
   Block8 arm[2][3];      // body axes
+  Block8 lever[2][3];    // world
   Block8 rest, friction, slop, compliance, inverse_normal, inverse_tangent, inverse_push, coupling[2];
-  Block8 now, target, force[3], before, push, part;
+  Block8 now, gap, slip[2], target, force[3], before, push, part;
   Block8 sum[3];  // of the substeps' forces, N
 };
 
 struct BundleArrays {
   PairBundle* bundles = nullptr;
   BundleContact* contacts = nullptr;
+  Block8* rows = nullptr;     // of modes: by contact, side, mode and axis
   std::size_t count = 0;      // of bundles
+  std::int32_t zeros = 0;     // the block of coordinates that stands
   std::int32_t standing = 0;  // number of frames: where what stands is found
 };
 
-/// As measure_contacts(). @param frames with one that stands at their end
-bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, float share, float most);
+/// Rows of frames and effective masses, from axes, levers and the rows of modes; takes from the gaps in `rest` what the
+/// modes give them. @param shapes with a block of zeros at their end
+void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
+/// As measure_contacts(). @param frames with one that stands at their end. @param shapes with a block of zeros at
+/// theirs
+bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
+                     float most);
 /// As sweep_contacts(). @param motion with a block of zeros at its end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
 /// As push_contacts(). @param pushes with a block of zeros at their end

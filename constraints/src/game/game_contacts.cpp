@@ -53,7 +53,7 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PreparedContact& contact = contacts[i];
     const std::size_t known = blocks_.size();
-    const ContactRow row = make(states, bodies, contact, options);
+    ContactRow row = make(states, bodies, contact, options, !bundles_.holds(i));
     for (const ContactSideRows& side : row.side)
       if (side.frame >= 0) bodies.keep_axes(side.frame);
     if (bundles_.holds(i)) {
@@ -61,20 +61,23 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
       blocks_.resize(known);
       continue;
     }
+    find_masses(bodies, row);
     rows_.push_back(row);
     numbers_.push_back(i);
     if (rolls && (is_round(contact.a) || is_round(contact.b))) add_rolling(states, bodies, contact, options);
   }
+  make_bundle_rows(bundles_.arrays(), bodies.shapes().data());
   sums_.assign(rows_.size(), Vec3::Zero());
 }
 
+/// All but its masses; `rest` is the gap.
 ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                              const Options& options) {
+                              const Options& options, bool with_frames) {
   ContactRow row;
   double thinnest = std::numeric_limits<double>::infinity(), yields = 0.0;
   for (int i = 0; i < 3; ++i) write_axis(contact.axes.col(i), row.axes[i]);
   for (std::size_t s = 0; s < 2; ++s) {
-    add_side(states, bodies, contact, s, row);
+    add_side(states, bodies, contact, s, with_frames, row);
     const PreparedSide& side = contact.side(s);
     const auto number = static_cast<std::size_t>(side.body);
     if (!states.is_static(side.body) && number < options.thickness.size())
@@ -87,7 +90,7 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
   row.friction = static_cast<float>(contact.friction);
   row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
   row.compliance = static_cast<float>(yields);
-  find_masses(bodies, row, contact.axes.col(0).dot(contact.apart(states, StepTime::kStart)));
+  row.rest = static_cast<float>(contact.axes.col(0).dot(contact.offset));
   const Vec3 last = contact.axes.transpose() * contact.last_force;
   for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
   row.force[0] = std::max(0.0f, row.force[0]);
@@ -95,7 +98,7 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
 }
 
 void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                            std::size_t s, ContactRow& row) {
+                            std::size_t s, bool with_frames, ContactRow& row) {
   const PreparedSide& side = contact.side(s);
   ContactSideRows& at = row.side[s];
   at.frame = bodies.of(side.body);
@@ -107,9 +110,10 @@ void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, 
   const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart)),
              arm = body.R_start * carried_B + side.rim;
   write_axis(carried_B, at.arm);
+  write_axis(arm, at.lever);
   blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * body.blocks));
   const Mat3 axes = PreparedContact::sign(s) * contact.axes;
-  for (Index i = 0; i < 3; ++i)
+  for (Index i = 0; i < 3 && with_frames; ++i)
     bodies.write_frame_row(body, axes.col(i), arm.cross(axes.col(i)), blocks_[static_cast<std::size_t>(at.rows + i)]);
   if (body.modes != nullptr && side.model != nullptr)
     add_modes(states, body, side, axes, static_cast<std::size_t>(at.rows));
@@ -160,8 +164,8 @@ void GameContacts::join_sides(ContactRow& row) {
   b.blocks = 0;
 }
 
-/// Effective masses, and what the gap is without the modes.
-void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row, double gap) {
+/// Effective masses; takes from the gap in `rest` what the modes give it.
+void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row) {
   float nn = 0.0f, nt[2] = {}, tt[3] = {}, frames = 0.0f, bent = 0.0f;
   for (const ContactSideRows& side : row.side)
     for (std::int32_t k = 0; k < side.blocks; ++k) {
@@ -175,7 +179,7 @@ void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row, double
       else
         bent += dot(rows[0], bodies.shapes()[static_cast<std::size_t>(side.body + k)]);
     }
-  row.rest = static_cast<float>(gap) - bent;
+  row.rest -= bent;
   nn += row.compliance;
   // One step for both tangents, the block's largest eigenvalue: what slides is braked against its slip.
   const float largest = 0.5f * (tt[0] + tt[2]) + std::sqrt(0.25f * (tt[0] - tt[2]) * (tt[0] - tt[2]) + tt[1] * tt[1]);
@@ -218,7 +222,8 @@ void GameContacts::apply_last_forces(GameBodies& bodies) {
 
 bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps) {
   const auto most = static_cast<float>(steps.push_speed * bodies.plan().length());
-  const bool bundles_overlap = measure_bundles(bundles_.arrays(), bodies.shifts().data(), kPushShare, most);
+  const bool bundles_overlap =
+      measure_bundles(bundles_.arrays(), bodies.shifts().data(), bodies.shapes().data(), kPushShare, most);
   const bool rows_overlap = measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(),
                                              bodies.shifts().data(), kPushShare, most);
   return bundles_overlap || rows_overlap;

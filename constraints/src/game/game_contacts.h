@@ -56,20 +56,20 @@ class GameContacts {
 
  private:
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                  const Options& options);
+                  const Options& options, bool with_frames);
   void tell(PreparedContact& contact, const Vec3& last, const Vec3& sum, const SubstepPlan& plan) const;
   void add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, std::size_t side,
-                ContactRow& row);
+                bool with_frames, ContactRow& row);
   void add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
                  std::size_t rows);
   void join_sides(ContactRow& row);
-  void find_masses(const GameBodies& bodies, ContactRow& row, double gap);
+  void find_masses(const GameBodies& bodies, ContactRow& row);
   void add_rolling(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
                    const Options& options);
 
   std::span<PreparedContact> contacts_;
   PairBundles bundles_;
-  // Contacts of bodies that bend, roll or are led: those that bundles do not hold.
+  // Contacts of bodies that roll, are led, touch themselves or have many modes: those that bundles do not hold.
   std::vector<ContactRow> rows_;
   std::vector<std::size_t> numbers_;  // in `contacts_`
   std::vector<Block8> blocks_;        // of the rows

@@ -7,8 +7,13 @@ namespace {
 
 constexpr std::size_t kChunk = 4;  // contacts: those of a manifold
 
-bool is_rigid(const GameBodies& bodies, std::int32_t frame) {
-  return frame < 0 || (bodies.body(frame).modes == nullptr && bodies.body(frame).led < 0);
+std::int32_t blocks_of(const GameBodies& bodies, std::int32_t frame) {
+  return frame < 0 ? 0 : bodies.body(frame).blocks - 1;
+}
+
+/// Whether it is free or stands.
+bool is_taken(const GameBodies& bodies, std::int32_t frame) {
+  return frame < 0 || (bodies.body(frame).led < 0 && 8 * blocks_of(bodies, frame) <= kMostBundledModes);
 }
 
 bool of_one_pair(const PreparedContact& x, const PreparedContact& y) {
@@ -19,14 +24,15 @@ bool of_one_pair(const PreparedContact& x, const PreparedContact& y) {
 
 void PairBundles::arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls) {
   standing_ = static_cast<std::int32_t>(bodies.bodies().size());
+  zeros_ = static_cast<std::int32_t>(bodies.motion().size()) - 1;
   chunks_.clear();
   places_.assign(contacts.size(), {});
   next_level_.assign(bodies.bodies().size(), 0);
   for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
     const PreparedContact& first = contacts[begin];
     while (end < contacts.size() && of_one_pair(first, contacts[end])) ++end;
-    const bool round = rolls && (is_round(first.a) || is_round(first.b));
-    if (!round && is_rigid(bodies, bodies.of(first.a.body)) && is_rigid(bodies, bodies.of(first.b.body)))
+    const bool round = rolls && (is_round(first.a) || is_round(first.b)), self = first.a.body == first.b.body;
+    if (!round && !self && is_taken(bodies, bodies.of(first.a.body)) && is_taken(bodies, bodies.of(first.b.body)))
       add_chunks(bodies, contacts.subspan(begin, end - begin), begin);
   }
   order_by_level();
@@ -38,7 +44,8 @@ void PairBundles::add_chunks(const GameBodies& bodies, std::span<const PreparedC
   for (std::size_t i = 0; i < pair.size(); i += kChunk) {
     Chunk chunk{.first = static_cast<std::int32_t>(first + i),
                 .count = static_cast<std::int32_t>(std::min(kChunk, pair.size() - i)),
-                .frame = {frames[0], frames[1]}};
+                .frame = {frames[0], frames[1]},
+                .blocks = {blocks_of(bodies, frames[0]), blocks_of(bodies, frames[1])}};
     for (const std::int32_t frame : frames)
       if (frame >= 0) chunk.level = std::max(chunk.level, next_level_[static_cast<std::size_t>(frame)]);
     for (const std::int32_t frame : frames)
@@ -60,35 +67,50 @@ void PairBundles::order_by_level() {
   next.assign(begins_.begin(), begins_.end());
   for (const Chunk& chunk : chunks_)
     ordered_[static_cast<std::size_t>(next[static_cast<std::size_t>(chunk.level)]++)] = chunk;
+  // Bodies with as many modes share bundles.
+  for (std::size_t level = 0; level + 1 < begins_.size(); ++level)
+    std::sort(ordered_.begin() + begins_[level], ordered_.begin() + begins_[level + 1],
+              [](const Chunk& x, const Chunk& y) {
+                return x.width() != y.width() ? x.width() < y.width() : x.first < y.first;
+              });
 }
 
 void PairBundles::pack(const GameBodies& bodies) {
   bundles_.clear();
-  std::int32_t size = 0;
+  std::int32_t size = 0, rows = 0;
   for (std::size_t level = 0; level + 1 < begins_.size(); ++level)
     for (std::int32_t begin = begins_[level]; begin < begins_[level + 1]; begin += kBundleLanes) {
       PairBundle& bundle = bundles_.emplace_back();
-      bundle.first = size;
+      bundle.first = size, bundle.rows = rows;
       const std::int32_t end = std::min(begins_[level + 1], begin + static_cast<std::int32_t>(kBundleLanes));
       for (std::size_t lane = 0; lane < kBundleLanes; ++lane) {
         const std::int32_t at = begin + static_cast<std::int32_t>(lane);
         fill_lane(bodies, at < end ? ordered_[static_cast<std::size_t>(at)] : Chunk{.frame = {-1, -1}}, bundle, lane);
       }
       size += bundle.count;
+      rows += 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]);
     }
   packed_.assign(static_cast<std::size_t>(size), {});
+  rows_.assign(static_cast<std::size_t>(rows), {});
 }
 
 void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane) {
   for (std::size_t s = 0; s < 2; ++s) {
     const std::int32_t frame = chunk.frame[s];
     bundle.frame[s][lane] = frame >= 0 ? frame : standing_;
-    bundle.motion[s][lane] =
-        frame >= 0 ? bodies.body(frame).first : static_cast<std::int32_t>(bodies.motion().size() - 1);
-    if (frame >= 0) bundle.root[s].v[lane] = static_cast<float>(bodies.plan().length() / bodies.body(frame).root_mass);
+    bundle.motion[s][lane] = frame >= 0 ? bodies.body(frame).first : zeros_;
+    bundle.blocks[s][lane] = chunk.blocks[s];
+    bundle.modes[s] = std::max(bundle.modes[s], 8 * chunk.blocks[s]);
+    if (frame < 0) continue;
+    const double h = bodies.plan().length();
+    bundle.root[s].v[lane] = static_cast<float>(h / bodies.body(frame).root_mass);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        bundle.scale[s][i][j].v[lane] = static_cast<float>(h * bodies.body(frame).turn_scale(i, j));
   }
   for (std::int32_t k = 0; k < chunk.count; ++k)
-    places_[static_cast<std::size_t>(chunk.first + k)] = {bundle.first + k, static_cast<std::int32_t>(lane)};
+    places_[static_cast<std::size_t>(chunk.first + k)] = {bundle.first + k, static_cast<std::int32_t>(lane),
+                                                          static_cast<std::int32_t>(bundles_.size() - 1)};
   bundle.count = std::max(bundle.count, chunk.count);
 }
 
@@ -98,17 +120,22 @@ void PairBundles::put(std::size_t contact, const ContactRow& row, const Block8* 
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (std::size_t i = 0; i < 3; ++i) c.axes[axis][i].v[lane] = row.axes[axis][i];
   for (std::size_t s = 0; s < 2; ++s)
-    for (std::size_t i = 0; i < 3 && row.side[s].blocks > 0; ++i) {
-      c.arm[s][i].v[lane] = row.side[s].arm[i];
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        c.turn[s][axis][i].v[lane] = rows[static_cast<std::size_t>(row.side[s].rows) + axis].v[3 + i];
-    }
+    for (std::size_t i = 0; i < 3 && row.side[s].blocks > 0; ++i)
+      c.arm[s][i].v[lane] = row.side[s].arm[i], c.lever[s][i].v[lane] = row.side[s].lever[i];
+  for (std::size_t s = 0; s < 2; ++s) put_modes(places_[contact], s, rows + row.side[s].rows);
   c.rest.v[lane] = row.rest, c.friction.v[lane] = row.friction, c.slop.v[lane] = row.slop;
   c.compliance.v[lane] = row.compliance;
-  c.inverse_normal.v[lane] = row.inverse_normal, c.inverse_tangent.v[lane] = row.inverse_tangent;
-  c.inverse_push.v[lane] = row.inverse_push;
-  for (std::size_t t = 0; t < 2; ++t) c.coupling[t].v[lane] = row.coupling[t];
   for (std::size_t axis = 0; axis < 3; ++axis) c.force[axis].v[lane] = row.force[axis];
+}
+
+/// @param rows three blocks of the frame, then three of each eight modes
+void PairBundles::put_modes(const Place& place, std::size_t side, const Block8* rows) {
+  const PairBundle& bundle = bundles_[static_cast<std::size_t>(place.bundle)];
+  Block8* to = rows_.data() + bundle.rows + 3 * (place.at - bundle.first) * (bundle.modes[0] + bundle.modes[1]) +
+               (side == 0 ? 0 : 3 * bundle.modes[0]);
+  for (std::int32_t k = 0; k < bundle.blocks[side][place.lane]; ++k)
+    for (std::int32_t axis = 0; axis < 3; ++axis)
+      for (std::int32_t i = 0; i < 8; ++i) to[3 * (8 * k + i) + axis].v[place.lane] = rows[3 * (1 + k) + axis].v[i];
 }
 
 double PairBundles::friction(std::size_t contact) const {

@@ -1,5 +1,5 @@
-// Contacts between rigid bodies, packed for the vector loops: pairs in bundles of eight, in an order that gives what
-// Gauss–Seidel from one contact to the next gives.
+// Contacts between bodies that are free or stand, packed for the vector loops: pairs in bundles of eight, in an order
+// that gives what Gauss–Seidel from one contact to the next gives.
 //
 //   level(pair) = 1 + the largest level of the pairs before it that share a body that moves
 //
@@ -19,11 +19,12 @@ namespace limber::internal {
 
 class PairBundles {
  public:
-  /// Finds places for all contacts of pairs that are rigid: those of a pair stand one after the other.
+  /// Finds places for the contacts of all pairs that the loops take: those of a pair stand one after the other.
   void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls);
   /// Whether a contact has a place, by its number.
   bool holds(std::size_t contact) const { return places_[contact].lane >= 0; }
-  /// Fills the place of a contact. @param rows three blocks of each side that moves, as the row says
+  /// Fills the place of a contact, but for its masses; `rest` is the gap. @param rows blocks of each side that moves,
+  /// as the row says; those of frames are not read
   void put(std::size_t contact, const ContactRow& row, const Block8* rows);
 
   /// Force along a contact's axes at the last substep, and the sum of all, N.
@@ -32,26 +33,31 @@ class PairBundles {
   double friction(std::size_t contact) const;
 
   /// For the kernels.
-  BundleArrays arrays() { return {bundles_.data(), packed_.data(), bundles_.size(), standing_}; }
+  BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
 
  private:
   /// Up to four contacts of a pair.
   struct Chunk {
     std::int32_t first = 0, count = 0, level = 0;
-    std::int32_t frame[2] = {};  // −1: stands
+    std::int32_t frame[2] = {};   // −1: stands
+    std::int32_t blocks[2] = {};  // of modes
+    std::int32_t width() const { return blocks[0] + blocks[1]; }
   };
   struct Place {
     std::int32_t at = -1, lane = -1;  // in `packed_`; −1: none
+    std::int32_t bundle = -1;
   };
   void add_chunks(const GameBodies& bodies, std::span<const PreparedContact> pair, std::size_t first);
   void order_by_level();
   void pack(const GameBodies& bodies);
   void fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane);
+  void put_modes(const Place& place, std::size_t side, const Block8* rows);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
 
-  std::int32_t standing_ = 0;
+  std::int32_t standing_ = 0, zeros_ = 0;
   std::vector<PairBundle> bundles_;
   std::vector<BundleContact> packed_;
+  std::vector<Block8> rows_;   // of modes
   std::vector<Place> places_;  // by contact
   std::vector<Chunk> chunks_, ordered_;
   std::vector<std::int32_t> next_level_;  // by frame

@@ -32,6 +32,7 @@ struct ContactSideRows {
   std::int32_t blocks = 0;  // 0: the side does not move
   std::int32_t frame = 0;   // its number
   float arm[3] = {};        // of the point that the body carries along, body axes
+  float lever[3] = {};      // from the origin to where the body touches, world
 };
 
 /// One contact as the sweeps see it. Lengths in m, forces in N, held over the substep.
