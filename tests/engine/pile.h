@@ -19,8 +19,8 @@ struct Pile : GroundedWorld {
   /// @param bend every tenth body is a box of this many modes; none where it is negative
   /// @param rolls whether there are balls and capsules, which take long to come to rest
   explicit Pile(int count, int bend, bool rolls = true, const ContactOptions& options = {},
-                const WorldOptions& world_options = {})
-      : GroundedWorld(options, world_options) {
+                const WorldOptions& world_options = {}, Jobs& jobs = serial_jobs())
+      : GroundedWorld(options, world_options, jobs) {
     for (int side = 0; side < 4; ++side) {
       const Quaternion tilt = quaternion_from_rotation_vector({0.0, kSlope, 0.0});
       const Quaternion turn = quaternion_from_rotation_vector({0.0, 0.0, 0.5 * std::numbers::pi * side});

@@ -33,7 +33,7 @@ namespace limber {
 class ContactSet;
 
 struct SmallSteps {
-  int substeps = 8;         ///< n ≥ 1: 4 for debris, 16 to 32 for towers and heavy loads
+  int substeps = 12;        ///< n ≥ 1: 4 for debris, 16 to 32 for towers and heavy loads
   double slop = 2e-3;       ///< ≥ 0: overlap that is left alone, as a share of the smaller body's thickness: less
                             ///< keeps high piles swaying
   double push_speed = 1.0;  ///< m/s, ≥ 0: what overlaps is parted at most this fast
