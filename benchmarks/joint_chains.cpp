@@ -28,8 +28,10 @@ struct NoContacts final : ContactSource {
 
 constexpr ContactOptions kGame{.solver = ContactSolver::kGame};
 
-std::shared_ptr<const ModalModel> link(int modes) {
-  return sample_model({.modes = modes, .lowest_hz = 30.0, .decay = 6.0});
+/// One that bends by as much under what is so many times heavier as it would under its own like.
+std::shared_ptr<const ModalModel> link(int modes, double times) {
+  const double stiffer = std::sqrt(times);
+  return sample_model({.modes = modes, .lowest_hz = 30.0 * stiffer, .decay = 6.0 * stiffer});
 }
 
 std::shared_ptr<const ModalModel> heavy(double times) {
@@ -49,7 +51,7 @@ enum class Way { kLevel, kHung };
 
 /// Links on ball joints from a hook, level or straight down; the last so many times as heavy.
 Chain add_chain(World& world, int links, int modes, double times, Way way, double height) {
-  const auto model = link(modes), last = times > 1.0 ? heavy(times) : model;
+  const auto model = link(modes, times), last = times > 1.0 ? heavy(times) : model;
   const Vec3 along = way == Way::kLevel ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitZ());
   const Quaternion q =
       way == Way::kLevel ? Quaternion{} : quaternion_from_rotation_vector({0.0, 0.5 * std::numbers::pi, 0.0});

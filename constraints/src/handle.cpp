@@ -64,6 +64,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
                .tolerance = distance_tolerance(internal::kConstraintsTuning.rows.hand_tolerance, arm, p),
                .digits = digits_of(arm + p.norm() + target.norm()),
                .last_force = last_force_[i]};
+    law.gap = gap;
     law.agent_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {

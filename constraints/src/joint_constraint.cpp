@@ -111,6 +111,8 @@ void JointConstraint::plan_actuation() {
       rows_.push_back(row_of(i, Law::kDrive, 1.0, act.drive_target));
     if (act.friction > 0.0) rows_.push_back(row_of(i, Law::kFriction));
   }
+  counts_turns_ = std::ranges::any_of(
+      rows_, [](const RowPlan& row) { return row.measure == Measure::kAngle || row.measure == Measure::kScrew; });
 }
 
 JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double sign, double zero) const {
@@ -332,6 +334,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
     const bool distance = is_distance(plan);
     const double gap = this->gap(at.place, plan);
     RowLaw law = law_of(plan, gap);
+    law.gap = gap;
     law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
     law.digits = digits_of(distance ? length + at.place.o_b.norm() : 1.0 + std::abs(gap));
     if (i < force_.plan.size()) law.last_force = force_.plan[i];
@@ -425,6 +428,7 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
     else if (plan.measure == Measure::kTranslation)
       force_.locked += force * axes_at_start_.col(plan.axis);
   }
+  if (!ends_step_ && !counts_turns_) return;
   const Placement at = place(states, StepTime::kStart);  // the state has been taken: the step's end
   for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
 }

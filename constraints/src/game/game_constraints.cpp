@@ -9,6 +9,8 @@ namespace {
 
 // Rounds in which rows let go or take hold; what is out of its bounds then is cut off there.
 constexpr int kMostRounds = 4;
+// Steps of conjugate gradients where the factor has left something out.
+constexpr int kMostGradients = 8;
 // m/s and rad/s: what is out of place comes together this fast.
 constexpr double kRecoverySpeed = 1.0;
 // What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
@@ -36,11 +38,14 @@ void GameConstraints::make_rows(const BodyStates& states, const GameBodies& bodi
   const SubstepPlan& plan = bodies.plan();
   const double h = plan.length(), left = h * (plan.count - number);
   length_ = h;
+  scales_.assign(bodies.bodies().size(), {});
+  goes_on_ = number > 0;
   for (Constraint* constraint : constraints) {
     constraint->begin_part({.length = h, .left = left, .whole = plan.step, .ahead = h});
     add_rows(states, bodies, constraint, h);
   }
   hold_as_before(number);
+  scale_turns();
   if (number == 0) find_graph(bodies);
   for (Group& group : groups_) {
     const std::int32_t frame = std::max(group.sides[0].frame, group.sides[1].frame);
@@ -52,8 +57,6 @@ void GameConstraints::add_rows(const BodyStates& states, const GameBodies& bodie
   made_.clear();
   constraint->add_rows(states, StepTime::kStart, h, made_);
   const auto count = static_cast<std::size_t>(made_.size());
-  gaps_.assign(count, 0.0);
-  constraint->gaps(states, StepTime::kStart, gaps_);
   yields_.assign(count, 0.0);
   for (const ConstraintRows::Flexibility& f : made_.flexibility())
     if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value;
@@ -77,7 +80,54 @@ void GameConstraints::add_sides(const GameBodies& bodies, Group& group) {
       write_side(bodies, from, &numbers_[side.at + i * static_cast<std::size_t>(side.coordinates)]);
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
+    stiffen(bodies, group, s);
   }
+}
+
+double GameConstraints::last_force(const Group& group, std::size_t i) const {
+  const std::size_t at = group.first + i;
+  return goes_on_ && at < before_.size() ? before_[at].force : made_.row(static_cast<Index>(i)).law.last_force;
+}
+
+/// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
+/// body's inertia, about the axes of its coordinates.
+void GameConstraints::stiffen(const GameBodies& bodies, const Group& group, std::size_t s) {
+  Vec3 force = Vec3::Zero(), arms = Vec3::Zero();
+  double directions = 0.0;
+  for (std::size_t i = 0; i < group.count; ++i) {
+    const ConstraintRows::Side& row = made_.row(static_cast<Index>(i)).sides[s];
+    force += last_force(group, i) * row.linear;
+    arms += row.linear.cross(row.angular);  // those across each direction: r again in all but one
+    directions += row.linear.squaredNorm();
+  }
+  const double size = force.norm(), outward = directions > 1.5 ? force.dot(arms) / (directions - 1.0) : 0.0;
+  if (!(outward > 0.0)) return;
+  const std::int32_t frame = group.sides[s].frame;
+  const Mat3& turn = bodies.body(frame).turn_scale;
+  const Vec3 along = turn * (force / size);
+  for (int axis = 0; axis < 3; ++axis)
+    scales_[static_cast<std::size_t>(frame)][static_cast<std::size_t>(3 + axis)] +=
+        outward * std::max(0.0, turn.row(axis).squaredNorm() - along[axis] * along[axis]);
+}
+
+/// The turn of a stretched link comes as by the trapezoidal rule: I + ¼h²k in place of I. Without that a link that
+/// turns to and fro faster than 2 radians a substep would be thrown about.
+void GameConstraints::scale_turns() {
+  unscales_ = scales_;
+  for (std::size_t frame = 0; frame < scales_.size(); ++frame)
+    for (std::size_t k = 0; k < 8; ++k) {
+      const double stiffness = scales_[frame][k];
+      unscales_[frame][k] = std::sqrt(1.0 + 0.25 * length_ * length_ * stiffness);
+      scales_[frame][k] = 1.0 / unscales_[frame][k];
+    }
+  for (const Group& group : groups_)
+    for (const Side& side : group.sides) {
+      if (side.frame < 0) continue;
+      for (std::size_t i = 0; i < group.count; ++i) {
+        double* numbers = &numbers_[side.at + i * static_cast<std::size_t>(side.coordinates)];
+        for (std::size_t k = 3; k < 6; ++k) numbers[k] *= scales_[static_cast<std::size_t>(side.frame)][k];
+      }
+    }
 }
 
 void GameConstraints::write_side(const GameBodies& bodies, const ConstraintRows::Side& from, double* to) const {
@@ -98,7 +148,7 @@ void GameConstraints::add_row(const GameBodies& bodies, const Group& group, std:
   GameRow row{.lower = law.lower / h,
               .upper = law.upper / h,
               .compliance = h * law.compliance + yields_[i],
-              .gap = gaps_[i],
+              .gap = law.gap,
               .rate = h * law.end_rate,
               .force = law.last_force};
   row.target = row.rate;
@@ -236,45 +286,61 @@ void GameConstraints::add_products(const Group& of_rows, const Group& of_columns
 }
 
 double GameConstraints::read(const Group& group, std::size_t i, const std::vector<Block8>& x) const {
-  double sum = 0.0;
+  double sum[4] = {};
   for (const Side& side : group.sides) {
+    if (side.frame < 0) continue;
     const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
     const Block8* at = x.data() + side.body;
-    for (std::int32_t k = 0; k < side.coordinates; k += 8)
-      for (int l = 0; l < 8; ++l) sum += numbers[k + l] * static_cast<double>(at[k / 8].v[l]);
+    const double* unscale = unscales_[static_cast<std::size_t>(side.frame)].data();
+    for (int l = 0; l < 8; ++l) sum[l % 4] += numbers[l] * unscale[l] * static_cast<double>(at->v[l]);
+    for (std::int32_t k = 8; k < side.coordinates; k += 8)
+      for (int l = 0; l < 8; ++l) sum[l % 4] += numbers[k + l] * static_cast<double>(at[k / 8].v[l]);
   }
-  return sum;
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 double GameConstraints::read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const {
   double sum = 0.0;
   for (const Side& side : group.sides) {
     if (side.frame < 0) continue;
+    const auto frame = static_cast<std::size_t>(side.frame);
     const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
-    for (int l = 0; l < 8; ++l)
-      sum += numbers[l] * static_cast<double>(pushes[static_cast<std::size_t>(side.frame)].v[l]);
+    for (std::size_t l = 0; l < 8; ++l)
+      sum += numbers[l] * unscales_[frame][l] * static_cast<double>(pushes[frame].v[l]);
   }
+  return sum;
+}
+
+/// What forces move eight coordinates by, from `first` on.
+std::array<double, 8> GameConstraints::answer(const Group& group, const Side& side, std::int32_t first,
+                                              std::span<const double> forces) const {
+  std::array<double, 8> sum{};
+  const double* numbers = numbers_.data() + side.at + first;
+  for (std::size_t i = 0; i < group.count; ++i, numbers += side.coordinates) {
+    if (forces[i] == 0.0) continue;
+    for (std::size_t l = 0; l < 8; ++l) sum[l] += forces[i] * numbers[l];
+  }
+  const std::array<double, 8>& scale = scales_[static_cast<std::size_t>(side.frame)];
+  for (std::size_t l = 0; first == 0 && l < 8; ++l) sum[l] *= scale[l];
   return sum;
 }
 
 void GameConstraints::apply(const Group& group, std::span<const double> forces, std::vector<Block8>& x) const {
   for (const Side& side : group.sides)
-    for (std::int32_t k = 0; k < side.coordinates; ++k) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < group.count; ++i)
-        sum += forces[i] *
-               numbers_[side.at + i * static_cast<std::size_t>(side.coordinates) + static_cast<std::size_t>(k)];
-      x[static_cast<std::size_t>(side.body + k / 8)].v[k % 8] += static_cast<float>(sum);
+    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
+      const std::array<double, 8> by = answer(group, side, k, forces);
+      float* to = x[static_cast<std::size_t>(side.body + k / 8)].v;
+      for (std::size_t l = 0; l < 8; ++l) to[l] += static_cast<float>(by[l]);
     }
 }
 
 void GameConstraints::apply(const Group& group, std::span<const double> forces, std::span<double> x) const {
   for (const Side& side : group.sides)
-    for (std::int32_t k = 0; k < side.coordinates; ++k)
-      for (std::size_t i = 0; i < group.count; ++i)
-        x[static_cast<std::size_t>(8 * side.body + k)] +=
-            forces[i] *
-            numbers_[side.at + i * static_cast<std::size_t>(side.coordinates) + static_cast<std::size_t>(k)];
+    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
+      const std::array<double, 8> by = answer(group, side, k, forces);
+      double* to = x.data() + 8 * side.body + k;
+      for (std::size_t l = 0; l < 8; ++l) to[l] += by[l];
+    }
 }
 
 // Velocities ----------------------------------------------------------------------------------------------------------
@@ -308,7 +374,10 @@ void GameConstraints::solve_once(GameBodies& bodies) {
     }
   }
   asked_ = right_;
-  factor_.solve(right_, 1);
+  if (factor_.is_complete())
+    factor_.solve<1>(right_);
+  else
+    solve_by_gradients(bodies);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
     const std::size_t first = factor_.first(g);
@@ -322,6 +391,60 @@ void GameConstraints::solve_once(GameBodies& bodies) {
     }
     taken_[static_cast<std::size_t>(group.component)] += energy;
     apply(group, forces_, bodies.motion());
+  }
+}
+
+/// Conjugate gradients, conditioned by the factor, which has left something out.
+void GameConstraints::solve_by_gradients(const GameBodies& bodies) {
+  const auto dot_of = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  residuals_ = right_;
+  std::ranges::fill(right_, 0.0);
+  directions_ = residuals_;
+  factor_.solve<1>(directions_);
+  double square = dot_of(residuals_, directions_);
+  products_.resize(right_.size());
+  for (int i = 0; i < kMostGradients && square > 0.0; ++i) {
+    multiply(bodies, directions_, products_);
+    const double along = dot_of(directions_, products_);
+    if (!(along > 0.0)) break;
+    for (std::size_t k = 0; k < right_.size(); ++k) {
+      right_[k] += square / along * directions_[k];
+      residuals_[k] -= square / along * products_[k];
+    }
+    conditioned_ = residuals_;
+    factor_.solve<1>(conditioned_);
+    const double next = dot_of(residuals_, conditioned_);
+    for (std::size_t k = 0; k < right_.size(); ++k) directions_[k] = conditioned_[k] + next / square * directions_[k];
+    square = next;
+  }
+}
+
+/// (J Jᵀ + C) x of the rows that hold.
+void GameConstraints::multiply(const GameBodies& bodies, std::span<const double> x, std::span<double> product) {
+  place_.assign(8 * bodies.motion().size(), 0.0);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    forces_.assign(group.count, 0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k)
+      forces_[static_cast<std::size_t>(met_[group.first_met + k])] = x[factor_.first(g) + k];
+    apply(group, forces_, place_);
+  }
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
+      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
+      double sum = rows_[group.first + i].compliance * x[factor_.first(g) + k];
+      for (const Side& side : group.sides) {
+        if (side.frame < 0) continue;
+        const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+        const double *at = place_.data() + 8 * side.body,
+                     *unscale = unscales_[static_cast<std::size_t>(side.frame)].data();
+        for (std::int32_t l = 0; l < side.coordinates; ++l) sum += numbers[l] * at[l] * (l < 8 ? unscale[l] : 1.0);
+      }
+      product[factor_.first(g) + k] = sum;
+    }
   }
 }
 
@@ -362,7 +485,7 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   }
   measure(states, bodies, pushed);
   asked_ = right_;
-  factor_.solve(right_, kColumns);
+  factor_.solve<kColumns>(right_);
   find_shares();
   displace(bodies, true);
 }
@@ -448,7 +571,7 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
         residual_ = std::max(residual_, std::abs(open));
       }
     }
-    factor_.solve(right_, kColumns);
+    factor_.solve<kColumns>(right_);
     displace(bodies, false);
   }
   for (const Group& group : groups_) {

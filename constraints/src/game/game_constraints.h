@@ -74,6 +74,9 @@ class GameConstraints {
 
   void add_rows(const BodyStates& states, const GameBodies& bodies, Constraint* constraint, double h);
   void add_sides(const GameBodies& bodies, Group& group);
+  void stiffen(const GameBodies& bodies, const Group& group, std::size_t s);
+  void scale_turns();
+  double last_force(const Group& group, std::size_t i) const;
   void write_side(const GameBodies& bodies, const ConstraintRows::Side& from, double* to) const;
   void add_row(const GameBodies& bodies, const Group& group, std::size_t i);
   void hold_as_before(int number);
@@ -84,20 +87,25 @@ class GameConstraints {
   void list_met();
   void add_products(const Group& of_rows, const Group& of_columns, const Side& a, const Side& b, double* to) const;
   void solve_once(GameBodies& bodies);
+  void solve_by_gradients(const GameBodies& bodies);
+  void multiply(const GameBodies& bodies, std::span<const double> x, std::span<double> product);
   bool let_go(GameBodies& bodies);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies, bool gains_speed);
   double read(const Group& group, std::size_t i, const std::vector<Block8>& x) const;
   double read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const;
+  std::array<double, 8> answer(const Group& group, const Side& side, std::int32_t first,
+                               std::span<const double> forces) const;
   void apply(const Group& group, std::span<const double> forces, std::vector<Block8>& x) const;
   void apply(const Group& group, std::span<const double> forces, std::span<double> x) const;
 
   std::vector<GameRow> rows_, before_;  // of the last substep
   std::vector<Group> groups_;
-  std::vector<double> numbers_;      // J
-  std::vector<std::int32_t> met_;    // rows that hold, by group
-  std::vector<std::int32_t> sizes_;  // their number
+  std::vector<std::array<double, 8>> scales_, unscales_;  // by frame: of its coordinates, for what pulls at it
+  std::vector<double> numbers_;                           // J
+  std::vector<std::int32_t> met_;                         // rows that hold, by group
+  std::vector<std::int32_t> sizes_;                       // their number
   std::vector<Led> led_;
   JointFactor factor_;
   std::vector<JointFactor::Pair> graph_;
@@ -106,9 +114,11 @@ class GameConstraints {
   std::vector<std::int32_t> roots_;                    // of components, by frame
   std::vector<double> taken_, given_;                  // energies by component
   std::vector<double> right_, asked_, speed_, place_;
+  std::vector<double> residuals_, directions_, products_, conditioned_;  // of conjugate gradients
   ConstraintRows made_;
   std::vector<double> gaps_, forces_, yields_;  // scratch
   double residual_ = 0.0, length_ = 0.0;
+  bool goes_on_ = false;  // rows are those of the substep before
 };
 
 }  // namespace limber::internal

@@ -8,6 +8,9 @@ namespace {
 
 // Far above what is lost to round-off in a pivot, far below what the lightest of bodies on the heaviest chain leaves.
 constexpr double kRegular = 1e-9;
+// Neighbours of a node up to which its elimination may join them. Trees need none beside those that share a body;
+// machines of a few loops are below it.
+constexpr std::size_t kMostJoined = 8;
 
 /// L of the lower part of a, n × n, in its place; its diagonal is inverted.
 void factor_dense(double* a, int n) {
@@ -87,10 +90,14 @@ void JointFactor::order() {
     position_[at] = static_cast<std::int32_t>(node_at_.size());
     columns[node_at_.size()] = neighbours[at];
     node_at_.push_back(node);
+    const bool joins = neighbours[at].size() <= kMostJoined;
     for (const std::int32_t other : neighbours[at]) {
       std::vector<std::int32_t>& theirs = neighbours[static_cast<std::size_t>(other)];
       merged.clear();
-      std::ranges::set_union(theirs, neighbours[at], std::back_inserter(merged));
+      if (joins)
+        std::ranges::set_union(theirs, neighbours[at], std::back_inserter(merged));
+      else
+        merged = theirs;
       std::erase_if(merged, [&](std::int32_t n) { return n == other || n == node; });
       theirs = merged;
       push(other);
@@ -115,15 +122,17 @@ void JointFactor::order() {
     for (std::size_t a = 0; a < column.size(); ++a)
       for (std::size_t b = a; b < column.size(); ++b) targets_.push_back(find(column[b], column[a]));
   }
+  complete_ = std::ranges::find(targets_, -1) == targets_.end();
 }
 
-/// The number of a block of L.
+/// The number of a block of L; −1: there is none.
 std::int32_t JointFactor::find(std::int32_t row, std::int32_t column) const {
   if (row == column) return row;
   const auto begin = rows_.begin() + column_starts_[static_cast<std::size_t>(column)],
              end = rows_.begin() + column_starts_[static_cast<std::size_t>(column) + 1];
-  return static_cast<std::int32_t>(nodes_) +
-         static_cast<std::int32_t>(std::lower_bound(begin, end, row) - rows_.begin());
+  const auto found = std::lower_bound(begin, end, row);
+  if (found == end || *found != row) return -1;
+  return static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(found - rows_.begin());
 }
 
 std::int32_t JointFactor::rows_of(std::size_t coupling) const {
@@ -171,54 +180,81 @@ void JointFactor::eliminate(std::size_t column) {
   for (std::size_t e = begin; e < end; ++e)
     solve_rows(l, n, &values_[starts_[nodes_ + e]], sizes_[static_cast<std::size_t>(rows_[e])]);
   for (std::size_t a = begin; a < end; ++a)
-    for (std::size_t b = a; b < end; ++b)
-      subtract_product(&values_[starts_[nodes_ + b]], sizes_[static_cast<std::size_t>(rows_[b])],
-                       &values_[starts_[nodes_ + a]], sizes_[static_cast<std::size_t>(rows_[a])], n,
-                       &values_[starts_[static_cast<std::size_t>(targets_[target++])]]);
+    for (std::size_t b = a; b < end; ++b) {
+      const std::int32_t to = targets_[target++];
+      if (to < 0)
+        leave_out(column, a, b);
+      else
+        subtract_product(&values_[starts_[nodes_ + b]], sizes_[static_cast<std::size_t>(rows_[b])],
+                         &values_[starts_[nodes_ + a]], sizes_[static_cast<std::size_t>(rows_[a])], n,
+                         &values_[starts_[static_cast<std::size_t>(to)]]);
+    }
 }
 
-void JointFactor::solve(std::span<double> x, std::size_t columns) const {
-  const auto m = columns;
+/// The product of two blocks of a column: its size goes to both diagonals.
+void JointFactor::leave_out(std::size_t column, std::size_t a, std::size_t b) {
+  const int n = sizes_[column];
+  const auto row_a = static_cast<std::size_t>(rows_[a]), row_b = static_cast<std::size_t>(rows_[b]);
+  double square = 0.0;
+  for (int i = 0; i < sizes_[row_b]; ++i)
+    for (int j = 0; j < sizes_[row_a]; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < n; ++k)
+        sum += values_[starts_[nodes_ + b] + static_cast<std::size_t>(i * n + k)] *
+               values_[starts_[nodes_ + a] + static_cast<std::size_t>(j * n + k)];
+      square += sum * sum;
+    }
+  const double size = std::sqrt(square);
+  for (const std::size_t row : {row_a, row_b})
+    for (int i = 0; i < sizes_[row]; ++i) values_[starts_[row] + static_cast<std::size_t>(i * sizes_[row] + i)] += size;
+}
+
+template <std::size_t columns>
+void JointFactor::solve(std::span<double> x) const {
+  using Sides = std::array<double, columns>;  // one row of right-hand sides
+  const auto rows_at = [&](std::size_t position) {
+    return reinterpret_cast<Sides*>(x.data() + firsts_[position] * columns);
+  };
+  const auto subtract = [](double by, const Sides& from, Sides& to) {
+    for (std::size_t c = 0; c < columns; ++c) to[c] -= by * from[c];
+  };
   for (std::size_t p = 0; p < nodes_; ++p) {
     const auto n = static_cast<std::size_t>(sizes_[p]);
-    double* own = x.data() + firsts_[p] * m;
+    Sides* own = rows_at(p);
     const double* l = values_.data() + starts_[p];
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t c = 0; c < m; ++c) {
-        double sum = own[i * m + c];
-        for (std::size_t k = 0; k < i; ++k) sum -= l[i * n + k] * own[k * m + c];
-        own[i * m + c] = sum * l[i * n + i];
-      }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < i; ++k) subtract(l[i * n + k], own[k], own[i]);
+      for (double& number : own[i]) number *= l[i * n + i];
+    }
     for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
          ++e) {
       const auto row = static_cast<std::size_t>(rows_[e]);
       const double* b = values_.data() + starts_[nodes_ + e];
-      double* other = x.data() + firsts_[row] * m;
+      Sides* other = rows_at(row);
       for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
-        for (std::size_t k = 0; k < n; ++k)
-          for (std::size_t c = 0; c < m; ++c) other[i * m + c] -= b[i * n + k] * own[k * m + c];
+        for (std::size_t k = 0; k < n; ++k) subtract(b[i * n + k], own[k], other[i]);
     }
   }
   for (std::size_t p = nodes_; p-- > 0;) {
     const auto n = static_cast<std::size_t>(sizes_[p]);
-    double* own = x.data() + firsts_[p] * m;
+    Sides* own = rows_at(p);
     for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
          ++e) {
       const auto row = static_cast<std::size_t>(rows_[e]);
       const double* b = values_.data() + starts_[nodes_ + e];
-      const double* other = x.data() + firsts_[row] * m;
+      const Sides* other = rows_at(row);
       for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
-        for (std::size_t k = 0; k < n; ++k)
-          for (std::size_t c = 0; c < m; ++c) own[k * m + c] -= b[i * n + k] * other[i * m + c];
+        for (std::size_t k = 0; k < n; ++k) subtract(b[i * n + k], other[i], own[k]);
     }
     const double* l = values_.data() + starts_[p];
-    for (std::size_t i = n; i-- > 0;)
-      for (std::size_t c = 0; c < m; ++c) {
-        double sum = own[i * m + c];
-        for (std::size_t k = i + 1; k < n; ++k) sum -= l[k * n + i] * own[k * m + c];
-        own[i * m + c] = sum * l[i * n + i];
-      }
+    for (std::size_t i = n; i-- > 0;) {
+      for (std::size_t k = i + 1; k < n; ++k) subtract(l[k * n + i], own[k], own[i]);
+      for (double& number : own[i]) number *= l[i * n + i];
+    }
   }
 }
+
+template void JointFactor::solve<1>(std::span<double>) const;
+template void JointFactor::solve<3>(std::span<double>) const;
 
 }  // namespace limber::internal

@@ -36,6 +36,7 @@ struct RowSide {
 
 /// How a row is to be met.
 struct RowLaw {
+  double gap = 0.0;            ///< when the row was made, for solvers that do not ask again
   double offset = 0.0;         ///< wanted gap at the step's end, in the gap's unit
   double compliance = 0.0;     ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
   double lower = -kUnbounded;  ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)

@@ -51,6 +51,7 @@ class JointConstraint final : public Constraint {
 
   std::array<Index, 2> bodies() const override { return {a_.body(), b_.body()}; }
   bool may_be_divided() const override { return true; }
+  void begin_part(const PartOfStep& part) override { ends_step_ = part.length == part.left; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
                             ForceDerivative& sum) const override;
@@ -148,6 +149,7 @@ class JointConstraint final : public Constraint {
   std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
   Forces force_;
   double step_ = 0.0;
+  bool ends_step_ = true, counts_turns_ = false;  // the part at hand does; a row measures an angle
   Mat3 axes_at_start_ = Mat3::Identity();
   std::vector<double> modal_a_, modal_b_;
   mutable std::vector<Vec3> shapes_;  // scratch of add_force_derivative()
