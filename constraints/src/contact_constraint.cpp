@@ -287,7 +287,9 @@ void ContactSet::forget(Index body) { impl_->dents.forget(body); }
 std::span<const DentLoad> ContactSet::dent_loads(Index body) const { return impl_->dents.loads(body); }
 
 double ContactSet::dent_energy(const BodyStates& states, Index body) const {
-  return impl_->dents.energy(states, body) + impl_->history.energy(body);
+  // Contacts of small steps have springs of their own; dents are what their mean force shows.
+  const bool by_springs = impl_->options.solver == ContactSolver::kGame;
+  return (by_springs ? 0.0 : impl_->dents.energy(states, body)) + impl_->history.energy(body);
 }
 
 }  // namespace limber

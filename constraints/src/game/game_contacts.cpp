@@ -251,10 +251,11 @@ void GameContacts::end_substep() {
 void GameContacts::end_step(const SubstepPlan& plan) {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const float* last = rows_[i].force;
-    tell(contacts_[numbers_[i]], Vec3(last[0], last[1], last[2]), sums_[i], plan);
+    tell(contacts_[numbers_[i]], {Vec3(last[0], last[1], last[2]), sums_[i], static_cast<double>(rows_[i].compliance)},
+         plan);
   }
   for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (bundles_.holds(i)) tell(contacts_[i], bundles_.force(i), bundles_.sum(i), plan);
+    if (bundles_.holds(i)) tell(contacts_[i], {bundles_.force(i), bundles_.sum(i), bundles_.compliance(i)}, plan);
   rolling_memory_.clear();
   for (const RollingRow& rolling : rolling_) {
     const float* moment = rolling.moment;
@@ -264,11 +265,14 @@ void GameContacts::end_step(const SubstepPlan& plan) {
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
 }
 
-void GameContacts::tell(PreparedContact& contact, const Vec3& last, const Vec3& sum, const SubstepPlan& plan) const {
-  contact.last_force = contact.axes * last;
-  contact.mean_force = contact.axes * (sum / plan.count);
+/// Its spring stores what the row's law does, by the normal force of the last substep: ½ give F².
+void GameContacts::tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const {
+  contact.last_force = contact.axes * told.last;
+  contact.mean_force = contact.axes * (told.sum / plan.count);
   contact.impulse = plan.step * contact.mean_force;
-  contact.give = contact.slip = 0.0;
+  const double square = told.last.squaredNorm();
+  contact.give = square > 0.0 ? told.compliance * told.last[0] * told.last[0] / square : 0.0;
+  contact.slip = 0.0;
 }
 
 double GameContacts::residual(GameBodies& bodies) {

@@ -57,7 +57,12 @@ class GameContacts {
  private:
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
                   const Options& options, bool with_frames);
-  void tell(PreparedContact& contact, const Vec3& last, const Vec3& sum, const SubstepPlan& plan) const;
+  /// Of a contact after the step: the last substep's force along its axes, the sum of all, and its compliance.
+  struct Told {
+    Vec3 last, sum;
+    double compliance = 0.0;
+  };
+  void tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const;
   void add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, std::size_t side,
                 bool with_frames, ContactRow& row);
   void add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,

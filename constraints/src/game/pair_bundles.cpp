@@ -143,6 +143,11 @@ double PairBundles::friction(std::size_t contact) const {
   return static_cast<double>(packed_[static_cast<std::size_t>(place.at)].friction.v[place.lane]);
 }
 
+double PairBundles::compliance(std::size_t contact) const {
+  const Place& place = places_[contact];
+  return static_cast<double>(packed_[static_cast<std::size_t>(place.at)].compliance.v[place.lane]);
+}
+
 Vec3 PairBundles::read(std::size_t contact, Block8 (BundleContact::*field)[3]) const {
   const Place& place = places_[contact];
   const Block8* from = packed_[static_cast<std::size_t>(place.at)].*field;

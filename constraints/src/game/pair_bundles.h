@@ -31,6 +31,7 @@ class PairBundles {
   Vec3 force(std::size_t contact) const { return read(contact, &BundleContact::force); }
   Vec3 sum(std::size_t contact) const { return read(contact, &BundleContact::sum); }
   double friction(std::size_t contact) const;
+  double compliance(std::size_t contact) const;
 
   /// For the kernels.
   BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
