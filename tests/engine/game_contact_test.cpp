@@ -99,6 +99,22 @@ TEST(GameContact, ContactsPushWhateverTheirFriction) {
   }
 }
 
+/// Once it has come to lie it stays where it is, even for infinite friction.
+TEST(GameContact, WhatFallsWithHugeFrictionLiesAndStays) {
+  for (const double friction : {1.0, 1e2, 1e4, 1e6, std::numeric_limits<double>::infinity()}) {
+    Bricks scene(game(8, friction));
+    const BodyId box = scene.add(
+        {.pose = {quaternion_from_rotation_vector({0.2, 0.3, 0.0}), {0.0, 0.0, 0.5}}, .velocity = {0.5, 0.2, 0.0}});
+    scene.step(240);
+    const RigidTransform before = scene.world.body(box).pose;
+    scene.step(120);
+    const RigidTransform after = scene.world.body(box).pose;
+    EXPECT_LT((after.p - before.p).norm(), 1e-4 * kSize) << friction;
+    EXPECT_NEAR(after.p.z(), kHalf.z(), 5e-3 * kSize) << friction;
+    EXPECT_TRUE(scene.world.constraint_report().solved) << friction;
+  }
+}
+
 TEST(GameContact, WhatSlidesWithoutFrictionKeepsItsSpeed) {
   Bricks scene(game(8, 0.0));
   const BodyId box = scene.add({.pose = {{}, {0.0, 0.0, kHalf.z()}}, .velocity = {2.0, 0.0, 0.0}});
