@@ -68,7 +68,8 @@ void strike(const Bar& bar, const Case& at, double phase, Rebound& worst) {
   const double step = at.step * kContactTime;
   ContactFinder finder({.clusters = {.max_points = at.thinned ? ContactClusterOptions{}.max_points : 0}});
   World world({.step = step, .gravity = Vec3::Zero()});
-  world.set_contact_source(&finder, {.friction = 0.0,
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact,
+                                     .friction = 0.0,
                                      .recovery_speed = at.recovers ? ContactOptions{}.recovery_speed : 0.0,
                                      .residual_compliance = at.residual,
                                      .impact = at.impact});

@@ -38,7 +38,7 @@ Outcome drop(const std::shared_ptr<const ModalModel>& model, double step, std::m
   const double size = model->collision_extent().radius;
   ContactFinder finder;
   World world({.step = step});
-  world.set_contact_source(&finder, {.friction = 0.5});
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .friction = 0.5});
   world.add_static(std::make_shared<const Shape>(HalfSpace{}));
   const BodyId low = world.add_body(model, {.pose = {turn(), {0.0, 0.0, 1.5 * size}}});
   world.add_body(model,
@@ -69,7 +69,7 @@ void heap(const std::shared_ptr<const ModalModel>& model, int bodies) {
   const double size = model->collision_extent().radius;
   ContactFinder finder;
   World world({.step = 1.0 / 60.0});
-  world.set_contact_source(&finder, {.friction = 0.5});
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .friction = 0.5});
   world.add_static(std::make_shared<const Shape>(HalfSpace{}));
   for (int i = 0; i < bodies; ++i)
     world.add_body(model,

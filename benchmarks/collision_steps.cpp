@@ -214,7 +214,7 @@ struct Scene {
   Recorder recorder;
   World world{{.step = kStep}};
   Scene() {
-    world.set_contact_source(&recorder, {.friction = 0.5});
+    world.set_contact_source(&recorder, {.solver = ContactSolver::kExact, .friction = 0.5});
     world.add_static(std::make_shared<const Shape>(HalfSpace{}));
   }
   void run(const std::string& name, const std::vector<Phase>& phases) {
@@ -225,7 +225,7 @@ struct Scene {
 void hundred_boxes() {
   Pile pile(100, -1, false);
   Recorder recorder;
-  pile.world.set_contact_source(&recorder, {});
+  pile.world.set_contact_source(&recorder, {.solver = ContactSolver::kExact});
   run("100 boxes", recorder, {{"falling", 120}, {"", 180}, {"at rest", 60}}, [&] { pile.world.step(); });
 }
 

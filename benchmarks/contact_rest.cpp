@@ -100,7 +100,7 @@ double drawing_seconds(const World& world, const std::vector<BodyId>& bodies) {
 }
 
 void run(const Scene& scene, double seconds) {
-  GroundedWorld grounded({.residual_compliance = scene.residual}, {.step = kStep});
+  GroundedWorld grounded(exactly({.residual_compliance = scene.residual}), {.step = kStep});
   World& world = grounded.world;
   const Extent extent(*scene.model);
   const double size = (extent.high - extent.low).maxCoeff();

@@ -42,7 +42,8 @@ void run(const std::string& name, const BoxStack& stack, const Way& way, double 
   const auto model = baked(stack, way.residual);
   ContactFinder finder({.clusters = {.max_points = way.all ? 0 : 4}, .region_spacing = way.spacing});
   World world;
-  world.set_contact_source(&finder, {.friction = friction, .residual_compliance = way.residual});
+  world.set_contact_source(
+      &finder, {.solver = ContactSolver::kExact, .friction = friction, .residual_compliance = way.residual});
   world.add_static(std::make_shared<Shape>(HalfSpace{}));
   const Vec3 centre = model->data().origin_in_input - Vec3(0.5 * stack.size.x(), 0.5 * stack.size.y(), 0.0);
   std::vector<BodyId> bodies;

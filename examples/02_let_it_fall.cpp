@@ -12,17 +12,17 @@
 #include <memory>
 #include <vector>
 
-#include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
 #include "limber/model/asset.h"
 
 int main(int argc, char** argv) try {
   const auto block = limber::read_asset(argc > 1 ? argv[1] : "block.glb").bodies.at(0);
 
-  // Who finds contacts is the caller's choice. kHeld: what bends in an impact gives its energy back.
-  limber::ContactFinder finder;
+  // Who finds contacts is the caller's choice.
+  limber::ManifoldFinder finder;
   limber::World world({.step = 1.0 / 240.0});
-  world.set_contact_source(&finder, {.friction = 0.6, .impact = limber::ImpactModel::kHeld});
+  world.set_contact_source(&finder, {.friction = 0.6});
   world.add_static(std::make_shared<limber::Shape>(limber::HalfSpace{}));  // z ≤ 0
   const limber::Quaternion tilt = limber::quaternion_from_rotation_vector({0.5, 0.6, 0.0});
   const limber::BodyId id = world.add_body(block, {.pose = {tilt, {0.0, 0.0, 0.8}}});

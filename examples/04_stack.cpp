@@ -13,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
 #include "limber/model/asset.h"
 
@@ -42,7 +42,7 @@ void settle(limber::World& world, const std::vector<limber::BodyId>& stack) {
 
 int main(int argc, char** argv) try {
   const auto box = limber::read_asset(argc > 1 ? argv[1] : "box.glb").bodies.at(0);
-  limber::ContactFinder finder;
+  limber::ManifoldFinder finder;
   limber::World world({.step = 1.0 / 60.0, .sleep = {.enabled = true}});
   world.set_contact_source(&finder, {.friction = 0.5});
   world.add_static(std::make_shared<limber::Shape>(limber::HalfSpace{}));  // z ≤ 0

@@ -74,6 +74,8 @@ int main(int argc, char** argv) try {
   const auto ranges = limber::ranges_of_motion(assembly, found);
 
   limber::World world({.step = 1.0 / 240.0});
+  // To round-off: the default, game contact, leaves a little (docs/contact.md).
+  world.set_contact_source(nullptr, {.solver = limber::ContactSolver::kExact});
   std::vector<limber::BodyId> bodies;
   for (const limber::Component& part : assembly.components) {
     const auto body = body_of(part);

@@ -196,6 +196,8 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["step"] = scene.step;
   report["steps"] = result.steps;
   report["substeps"] = scene.substeps;
+  report["solver"] = to_string(scene.solver);
+  report["small_steps"] = scene.small_steps.substeps;
   report["gravity"] = vector(scene.gravity);
   report["models"] = Json::array();
   for (const ModelManifest& m : models.manifest) report["models"].push_back(manifest(m));
@@ -285,7 +287,7 @@ void warn_of_limits(Program& program, const RunResult& r) {
   program.warnings().push_back(
       fmt::format("of {} steps {} ended at a limit of the solver and {} failed: contacts, joints or handles are off by "
                   "up to {:.3g} "
-                  "tolerances; try \"substeps\" or a smaller \"step\"",
+                  "tolerances; try \"small_steps\", \"substeps\" or a smaller \"step\"",
                   r.steps, sum.limit_steps, sum.failed_steps, sum.largest_residual));
 }
 

@@ -111,7 +111,7 @@ struct Rest {
 Rest at_rest(const Solid& solid, const std::shared_ptr<const ModalModel>& model, const Punch& punch, bool all) {
   ContactFinder finder({.clusters = {.max_points = all ? 0 : 4}});
   World world;
-  world.set_contact_source(&finder, {.friction = 0.0});
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .friction = 0.0});
   world.add_static(std::make_shared<Shape>(HalfSpace{}));
   const Vec3 origin = model->data().origin_in_input, middle = 0.5 * solid.size;
   const BodyId id = world.add_body(model, {.pose = {{}, origin}});
@@ -172,7 +172,7 @@ double stack_sunk(const BoxStack& stack, double friction, int steps) {
   const auto model = solid.baked();
   ContactFinder finder;
   World world;
-  world.set_contact_source(&finder, {.friction = friction});
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .friction = friction});
   world.add_static(std::make_shared<Shape>(HalfSpace{}));
   const Vec3 centre = model->data().origin_in_input - Vec3(0.5 * solid.size.x(), 0.5 * solid.size.y(), 0.0);
   BodyId top{};

@@ -46,7 +46,10 @@ struct Tower : GroundedWorld {
   static inline const RubberBox kBox{
       .size = {0.4, 0.3, kHeight}, .cells = {3, 2, 2}, .modes = 12, .mass = MassKind::kConsistent};
 
-  Tower() : GroundedWorld({.recovery_speed = 0.0}), model(bake_box(kBox)), meter(mesh_of(kBox), kBoxRubber, model) {
+  Tower()
+      : GroundedWorld(exactly({.recovery_speed = 0.0})),
+        model(bake_box(kBox)),
+        meter(mesh_of(kBox), kBoxRubber, model) {
     for (int i = 0; i < kBoxes; ++i)
       boxes.push_back(world.add_body(model, {.pose = {quaternion_from_rotation_vector({0.0, 0.0, 0.05 * i}),
                                                       {0.012 * (i % 2), 0.01 * (i % 3),
@@ -109,7 +112,7 @@ TEST(Rest, ARubberBlockDroppedOnACornerFallsAsleep) {
   for (const bool residual : {false, true})
     for (const ImpactModel impact : {ImpactModel::kAbsorbed, ImpactModel::kHeld}) {
       SCOPED_TRACE(::testing::Message() << "residual " << residual << ", held " << (impact == ImpactModel::kHeld));
-      GroundedWorld scene({.friction = 0.6, .impact = impact}, {.sleep = {.enabled = true}});
+      GroundedWorld scene(exactly({.friction = 0.6, .impact = impact}), {.sleep = {.enabled = true}});
       const BodyId block =
           scene.world.add_body(bake_box({.residual = residual}),
                                {.pose = {quaternion_from_rotation_vector({0.5, 0.6, 0.0}), {0.0, 0.0, 0.8}}});

@@ -62,7 +62,8 @@ double sag_of_world(int modes, bool residual) {
   const auto model = bake({.name = "bar", .mesh = mesh}, o, warnings).asset.bodies[0];
   ContactFinder finder;
   World world;
-  world.set_contact_source(&finder, {.friction = 0.0, .residual_compliance = residual});
+  world.set_contact_source(&finder,
+                           {.solver = ContactSolver::kExact, .friction = 0.0, .residual_compliance = residual});
   constexpr double kRadius = 0.01;
   const Vec3 origin = model->data().origin_in_input;
   const Quaternion across = quaternion_from_rotation_vector({0.5 * EIGEN_PI, 0.0, 0.0});  // from z to y

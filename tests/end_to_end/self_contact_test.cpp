@@ -55,7 +55,7 @@ std::shared_ptr<const ModalModel> baked(bool held, bool residual = false) {
 struct Strip {
   Strip(const std::shared_ptr<const ModalModel>& model, bool touches_itself, const WorldOptions& options = {})
       : world(options) {
-    world.set_contact_source(&finder, ContactOptions{.residual_compliance = true});
+    world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .residual_compliance = true});
     body = world.add_body(model, {.filter = {.self = touches_itself}});
   }
   void step(int count) {

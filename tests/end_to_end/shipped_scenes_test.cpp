@@ -89,7 +89,8 @@ void expect_momenta_of_free_flight(const limber::Scene& scene, const RunResult& 
 }
 
 /// Where bodies fall and touch: they touch, stay above the ground and within reach, hang together, and lose energy.
-void expect_a_fall(const RunResult& r) {
+/// @param apart of joints, in sizes. @param rise of a step's energy, of that at first
+void expect_a_fall(const RunResult& r, double apart, double rise) {
   constexpr double kSize = 0.1;           // m, of a body
   constexpr double kDeep = 0.02 * kSize;  // in the ground, while they strike it
   constexpr double kReach = 0.5 * kGravity * kSeconds * kSeconds;
@@ -98,10 +99,10 @@ void expect_a_fall(const RunResult& r) {
     EXPECT_GT(lowest(body), -kDeep) << body.name;
     EXPECT_LT((body.poses.back().p - body.poses.front().p).norm(), kReach) << body.name;
   }
-  for (const JointReport& joint : r.joints) EXPECT_LT(joint.largest_distance_error, 1e-6 * kSize) << joint.b;
+  for (const JointReport& joint : r.joints) EXPECT_LT(joint.largest_distance_error, apart * kSize) << joint.b;
   double before = energy_at(r, 0);
   for (std::size_t key = 1; key < r.trajectory.times.size(); ++key) {
-    EXPECT_LE(energy_at(r, key), before + 1e-6 * energy_at(r, 0)) << "key " << key;
+    EXPECT_LE(energy_at(r, key), before + rise * energy_at(r, 0)) << "key " << key;
     before = energy_at(r, key);
   }
 }
@@ -111,17 +112,23 @@ TEST(ShippedScenes, PlayAsPhysicsSays) {
   for (const auto& entry : std::filesystem::directory_iterator(LIMBER_SOURCE_DIR "/assets/scenes")) {
     if (entry.path().extension() != ".json") continue;
     SCOPED_TRACE(entry.path());
-    const limber::Scene scene = read_scene(entry.path());
-    const RunResult r = played(scene);
     ++scenes;
-    EXPECT_EQ(static_cast<double>(r.steps) * scene.step, kSeconds);
-    ASSERT_EQ(r.trajectory.bodies.size(), scene.bodies.size());
-    for (const BodyTrack& body : r.trajectory.bodies) ASSERT_NO_FATAL_FAILURE(expect_finite(body));
-    const bool flies = scene.gravity == Vec3::Zero() && !scene.contact && scene.joints.empty() && scene.handles.empty();
-    EXPECT_EQ(r.constraints.failed_steps, 0);  // bodies that fall on each other may end at the limit of contact solves
-    if (flies) expect_momenta_of_free_flight(scene, r);
-    if (scene.contact) expect_a_fall(r);
-    EXPECT_TRUE(flies || scene.contact) << "expected a scene that this test can judge";
+    for (const ContactSolver solver : {ContactSolver::kGame, ContactSolver::kExact}) {
+      SCOPED_TRACE(solver == ContactSolver::kExact ? "exact" : "game");
+      limber::Scene scene = read_scene(entry.path());
+      scene.solver = solver;
+      const RunResult r = played(scene);
+      EXPECT_EQ(static_cast<double>(r.steps) * scene.step, kSeconds);
+      ASSERT_EQ(r.trajectory.bodies.size(), scene.bodies.size());
+      for (const BodyTrack& body : r.trajectory.bodies) ASSERT_NO_FATAL_FAILURE(expect_finite(body));
+      const bool flies =
+          scene.gravity == Vec3::Zero() && !scene.contact && scene.joints.empty() && scene.handles.empty();
+      EXPECT_EQ(r.constraints.failed_steps, 0);  // exact: bodies that fall on each other may end at a limit of work
+      if (flies) expect_momenta_of_free_flight(scene, r);
+      // Small steps leave joints apart and may add energy, each to a share of its own.
+      if (scene.contact) solver == ContactSolver::kExact ? expect_a_fall(r, 1e-6, 1e-6) : expect_a_fall(r, 1e-3, 1e-2);
+      EXPECT_TRUE(flies || scene.contact) << "expected a scene that this test can judge";
+    }
   }
   EXPECT_GE(scenes, 2);
 }

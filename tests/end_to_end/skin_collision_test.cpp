@@ -115,7 +115,8 @@ Release release_on_a_plane(const Fall& fall) {
   const auto model = bar({.residual = fall.residual});
   ContactFinder finder;
   World world({.step = kPeriod / steps_a_period, .gravity = Vec3::Zero()});
-  world.set_contact_source(&finder, {.friction = fall.friction, .recovery_speed = 0.0});
+  world.set_contact_source(&finder,
+                           {.solver = ContactSolver::kExact, .friction = fall.friction, .recovery_speed = 0.0});
   const Vec3 origin = model->data().origin_in_input;
   world.add_static(std::make_shared<Shape>(HalfSpace{}), {.p = Vec3(0.0, 0.0, -0.05) - Vec3(0.0, 0.0, origin.z())});
   const BodyId id = world.add_body(model);
@@ -164,6 +165,7 @@ TEST(WorldWithSkins, BarsOnAJointKeepTheirEnergyAndStayTogether) {
   const auto model = bar({.held = false});
   for (const JointType type : {JointType::kBall, JointType::kRevolute}) {
     World world(kWeightless);
+    world.set_contact_source(nullptr, {.solver = ContactSolver::kExact});
     const Vec3 in_body = model->data().origin_in_input;
     const BodyId a = world.add_body(model, {.angular_velocity = {0.0, 0.01, 0.02}}),
                  b = world.add_body(model, {.pose = {{}, {1.1 * kLength, 0.0, 0.0}}, .velocity = {0.0, 0.05, 0.0}});

@@ -53,6 +53,7 @@ double total_energy(const World& world, const Chain& chain) {
 /// All modes of a stiff body answer a hand statically. Let go, they are at rest once more, and stay so.
 TEST(Constraints, AStiffBodyThatIsLetGoKeepsItsEnergy) {
   World world;
+  world.set_contact_source(nullptr, testing::exactly());
   const BodyId body = world.add_body(sample_model({.modes = 8, .lowest_hz = 100.0}));
   const HandleId hand = world.add_handle(body, kMarked);
   Vec3 target = world.position(body, kMarked);
@@ -72,6 +73,7 @@ TEST(Constraints, AStiffBodyThatIsLetGoKeepsItsEnergy) {
 
 TEST(Constraints, DraggedPointIsWhereTheHandIs) {
   World world;
+  world.set_contact_source(nullptr, testing::exactly());
   const BodyId body = world.add_body(sample_model({.modes = 8, .lowest_hz = 12.0, .decay = 0.5}));
   const HandleId hand = world.add_handle(body, kMarked);
   Vec3 target = world.position(body, kMarked);
@@ -93,6 +95,7 @@ TEST(Constraints, DraggedPointIsWhereTheHandIs) {
 
 TEST(Constraints, ChainOfFlexibleLinksHangsTogetherAndGainsNothing) {
   World world;
+  world.set_contact_source(nullptr, testing::exactly());
   const Chain chain = add_chain(world, sample_model({.modes = 8, .lowest_hz = 25.0, .decay = 0.5}), 4, {0, 0, 2});
   double before = total_energy(world, chain);
   const double scale = 4.0 * world.model(chain.links[0]).data().mass * 9.80665 * kSampleSize;
@@ -130,6 +133,7 @@ TEST(Constraints, ChainsThatWhipHangTogether) {
   int cuts = 0;
   for (const auto& [links, step] : {std::pair(3, 0.1), std::pair(8, 1.0 / 60.0)}) {
     World world({.step = step});
+    world.set_contact_source(nullptr, testing::exactly());
     std::vector<JointId> joints;
     BodyId last{};
     for (int i = 0; i < links; ++i) {
@@ -178,7 +182,7 @@ TEST(Constraints, AHandThatPushesABlockIntoTheGroundThrowsNothing) {
   for (const int modes : {0, 8}) {
     ContactFinder finder;
     World world;
-    world.set_contact_source(&finder, {.friction = 0.5});
+    world.set_contact_source(&finder, testing::exactly({.friction = 0.5}));
     world.add_static(std::make_shared<Shape>(HalfSpace{}));
     const auto model = sample_model({.modes = modes, .lowest_hz = 30.0, .decay = 6.0});
     const BodyId block = world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}});
@@ -209,7 +213,7 @@ TEST(Constraints, AHandThatPushesABlockIntoTheGroundThrowsNothing) {
 TEST(Constraints, AChainWhoseEndDragsOnTheGroundHangsTogetherAndGainsNothing) {
   constexpr double kRise = 1e-9;  // of Σ m g size
   for (const double times : {1.0, 100.0}) {
-    testing::GroundedWorld scene({.friction = 0.5, .recovery_speed = 0.0});
+    testing::GroundedWorld scene(testing::exactly({.friction = 0.5, .recovery_speed = 0.0}));
     World& world = scene.world;
     const auto model = sample_model({.modes = 0});
     ModalModelData heavy = testing::sample_model_data({.modes = 0});
@@ -243,6 +247,7 @@ TEST(Constraints, StopsThatAreHitAtTwentyRadiansASecondHold) {
   constexpr double kStop = 0.5;
   for (const int modes : {0, 8}) {
     World world;
+    world.set_contact_source(nullptr, testing::exactly());
     JointSpec hinge = hinge_at({0.0, 0.0, 1.0});
     hinge.limits.rotation = {-kStop, kStop};
     const Vec3 omega(0.0, 20.0, 0.0), arm = 0.5 * kSampleSize * Vec3::UnitX();
@@ -302,6 +307,7 @@ TEST(Constraints, RefuseWhatIsNotThere) {
 
 TEST(Constraints, MotorTurnsTheWorld) {
   World world({.gravity = Vec3::Zero()});
+  world.set_contact_source(nullptr, testing::exactly());
   const BodyId body = world.add_body(sample_model({.modes = 0}), {.pose = {.p = {0.3, 0, 0}}});
   const JointId joint = world.add_joint(BodyId{}, body, hinge_at(Vec3::Zero()));
   world.set_joint_actuation(joint, 0, {.motor_velocity = 3.0, .motor_max_force = 1e4});

@@ -18,7 +18,7 @@ constexpr int kStepsOfLump = kSanitized ? 20 : 60;
 void expect_momenta_kept_in_a_lump(int modes) {
   ContactFinder finder;
   World world({.gravity = Vec3::Zero()});
-  world.set_contact_source(&finder, {.recovery_speed = 0.0});
+  world.set_contact_source(&finder, exactly({.recovery_speed = 0.0}));
   const Vec3 half(0.15, 0.12, 0.09);
   const auto model = sample_model({.modes = modes, .lowest_hz = 60.0, .decay = 12.0, .half_extent = half});
   const auto brick = modes > 0 ? nullptr : std::make_shared<const Shape>(Box{.half_extents = half});
@@ -64,7 +64,7 @@ TEST(WorldContact, BodiesThatBendAndMeetInALumpKeepTheirMomenta) { expect_moment
 TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   constexpr double kRise = 1e-6;
   // What overlaps stays so: pushing it apart is work that the island is given.
-  GroundedWorld scene({.recovery_speed = 0.0});
+  GroundedWorld scene(exactly({.recovery_speed = 0.0}));
   World& world = scene.world;
   const auto model = sample_model({.modes = 8, .lowest_hz = 20.0});
   std::vector<BodyId> boxes;
@@ -79,7 +79,7 @@ TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll
   constexpr double kRise = 1e-6;
   const auto model = sample_model({.modes = 6, .dropped = 14, .lowest_hz = 20.0});
   for (const ImpactModel impact : all_or_first<ImpactModel>({ImpactModel::kAbsorbed, ImpactModel::kHeldFromTouch})) {
-    GroundedWorld scene({.recovery_speed = 0.0, .residual_compliance = true, .impact = impact});
+    GroundedWorld scene(exactly({.recovery_speed = 0.0, .residual_compliance = true, .impact = impact}));
     World& world = scene.world;
     std::vector<BodyId> boxes;
     for (int i = 0; i < 3; ++i)
@@ -95,7 +95,7 @@ TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll
 /// steps are whole.
 TEST(WorldContact, ImpactsInCutStepsGainNoEnergyAndEndAtRest) {
   constexpr double kRise = 1e-6;
-  GroundedWorld scene({.recovery_speed = 0.0, .impact = ImpactModel::kHeldFromTouch});
+  GroundedWorld scene(exactly({.recovery_speed = 0.0, .impact = ImpactModel::kHeldFromTouch}));
   World& world = scene.world;
   const BodyId box = world.add_body(damped_box(8, 30.0), {.pose = {{}, {0.0, 0.0, 0.6}}});
   const double scale = world.energy(box).total();

@@ -51,7 +51,7 @@ TEST(WorldContact, ABoxOnABoxStands) {
 /// A rigid box on one that is ten thousand times lighter.
 TEST(WorldContact, ABoxStandsOnAMuchLighterOne) {
   constexpr double kHeight = 0.2;  // m, of the one below
-  GroundedWorld scene({.recovery_speed = 0.0});
+  GroundedWorld scene(exactly({.recovery_speed = 0.0}));
   World& world = scene.world;
   const auto light = sample_model({.modes = 0});
   ModalModelData d = sample_model_data({.modes = 0});
@@ -75,7 +75,7 @@ TEST(WorldContact, AStackOfTenRigidBoxesStands) {
   constexpr int kBoxes = 10;
   constexpr double kHeight = 0.2, kApart = 1e-5;                      // of a box; between boxes, m
   constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
-  GroundedWorld scene;
+  GroundedWorld scene(exactly());
   World& world = scene.world;
   const auto model = damped_box(0, 60.0);
   std::vector<BodyId> boxes;
@@ -98,7 +98,7 @@ TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
   constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   const auto model = damped_box(0, 60.0);
   for (const int count : {3, 5}) {
-    GroundedWorld scene;
+    GroundedWorld scene(exactly());
     World& world = scene.world;
     std::vector<BodyId> boxes;
     for (int i = 0; i < count; ++i) {
@@ -119,7 +119,7 @@ TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
 // An island of more than a hundred contacts is solved in blocks.
 TEST(WorldContact, APileOfBoxesComesToRest) {
   constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
-  Pile pile(kPileBoxes, -1, false);
+  Pile pile(kPileBoxes, -1, false, exactly());
   for (int i = 0; i < 90; ++i) pile.step_once();
   std::vector<Vec3> before;
   for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
@@ -137,7 +137,7 @@ TEST(WorldContact, StacksOfFlexibleBoxesThatAreDroppedStandAndEveryStepSettles) 
   constexpr double kPenetration = 1e-3 * kSampleSize, kShift = 1e-4;  // m
   for (const int dropped : {0, 14}) {
     const auto model = sample_model({.modes = 6, .dropped = dropped, .lowest_hz = 60.0, .decay = 12.0});
-    GroundedWorld scene;
+    GroundedWorld scene(exactly());
     World& world = scene.world;
     std::vector<BodyId> boxes;
     for (int i = 0; i < 3; ++i) {
@@ -166,7 +166,7 @@ TEST(WorldContact, FlexibleBarsDroppedAcrossEachOtherLieStill) {
   const auto bar = sample_model({.modes = 6, .lowest_hz = 60.0, .decay = 12.0, .half_extent = {0.3, 0.06, 0.05}});
   const double low = depth_below_origin(*bar);
   for (const double roll : {0.1, 0.3, 0.5}) {
-    GroundedWorld scene;
+    GroundedWorld scene(exactly());
     const Quaternion across = quaternion_from_rotation_vector({0.0, 0.0, 1.2}),
                      tilted = quaternion_from_rotation_vector({roll, 0.1, 0.0});
     scene.world.add_body(bar, {.pose = {{}, {0.0, 0.0, low}}});
@@ -188,7 +188,7 @@ TEST(WorldContact, FlexibleBarsDroppedAcrossEachOtherLieStill) {
 /// see that they do, or forces jump between them and the bar sinks. Without recovery nothing would push it out again.
 TEST(WorldContact, ABarThatTopplesLiesStill) {
   constexpr double kPenetration = 1e-3;  // m, of a bar of 1 m
-  GroundedWorld scene({.recovery_speed = 0.0});
+  GroundedWorld scene(exactly({.recovery_speed = 0.0}));
   ModalModelData bar = bar_data(20, false);
   for (double& decay : bar.decays) decay = 0.03 * std::sqrt(bar.eigenvalues[0]);
   for (double& lambda : bar.eigenvalues) lambda *= 1e4;
@@ -209,7 +209,7 @@ TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
   constexpr double kGap = 1e-9;                // m, to which contacts are solved
   const double decay = 0.05 * 2.0 * std::numbers::pi * kHz;
   const auto rest_height = [](const SampleOptions& sample) {
-    GroundedWorld scene({.friction = 0.0});
+    GroundedWorld scene(exactly({.friction = 0.0}));
     ModalModelData data = sample_model_data(sample);
     const auto model = std::make_shared<const ModalModel>(std::move(data));
     const BodyId box = scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}});
@@ -226,7 +226,7 @@ TEST(WorldContact, ABoxWithResidualComplianceRestsAsOneWithAllItsModes) {
 
 TEST(WorldContact, BoxesExactlyOnEachOtherStand) {
   constexpr double kShift = 1e-4;  // m
-  GroundedWorld scene;
+  GroundedWorld scene(exactly());
   World& world = scene.world;
   const auto model = damped_box(0, 60.0);
   std::vector<BodyId> boxes;

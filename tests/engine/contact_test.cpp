@@ -22,7 +22,7 @@ namespace {
 constexpr int kHashSteps = kSanitized ? 20 : 60;
 
 void expect_no_allocation_in_a_warm_pile(int bend) {
-  Pile pile(kPileBoxes, bend, false);
+  Pile pile(kPileBoxes, bend, false, exactly());
   for (int i = 0; i < 90; ++i) pile.step_once();
   // Pushed from the side, so that contacts slide and the forces of the last step do not fit. Memory grows to the
   // largest islands seen: the push that counts is one that has been before.
@@ -50,7 +50,7 @@ TEST(WorldContact, AWarmStepOfAPileWithBodiesThatBendAllocatesNothing) { expect_
 TEST(WorldContact, AWarmStepThatIsCutAllocatesNothing) {
   const std::vector<double> still(20, 0.0);
   const RigidTransform above{quaternion_from_rotation_vector({0.5, 0.4, 0.1}), {0.0, 0.0, 0.6}};
-  GroundedWorld scene({.friction = 0.0, .impact = ImpactModel::kHeldFromTouch});
+  GroundedWorld scene(exactly({.friction = 0.0, .impact = ImpactModel::kHeldFromTouch}));
   World& world = scene.world;
   const BodyId box = world.add_body(sample_model({.modes = 20, .dropped = 30, .lowest_hz = 60.0}), {.pose = above});
   scene.step(120);
@@ -128,7 +128,7 @@ TEST(WorldContact, ABoxSlidesOverAFloorOfBoxesAndOfTrianglesAsOverAPlane) {
       for (const bool tiles : {true, false}) {
         ContactFinder finder;
         World world;
-        world.set_contact_source(&finder, {.friction = 0.0});
+        world.set_contact_source(&finder, exactly({.friction = 0.0}));
         for (int i = 0; tiles && i < 10; ++i)
           world.add_static(std::make_shared<Shape>(Box{{0.5, 0.5, 0.1}}), {{}, {static_cast<double>(i), 0.0, -0.1}});
         if (!tiles) world.add_static(std::make_shared<Shape>(field), {{}, {-0.5, -0.5, 0.0}});
@@ -241,7 +241,7 @@ TEST(WorldContact, StateHashIsTheSameForAnyThreadCount) {
 }
 
 TEST(Contact, AChainWhoseDraggingEndWeighsTenThousandLinksHoldsTogetherOnTheGround) {
-  GroundedWorld s({.friction = 0.5, .recovery_speed = 0.0});
+  GroundedWorld s(exactly({.friction = 0.5, .recovery_speed = 0.0}));
   std::vector<BodyId> bodies;
   std::vector<JointId> joints;
   BodyId before{};

@@ -27,7 +27,7 @@ std::shared_ptr<const ModalModel> stiff(const SampleOptions& sample) {
 /// A body on the ground, without friction, so that nothing is wedged.
 struct Lying {
   explicit Lying(const std::shared_ptr<const ModalModel>& model)
-      : scene({.friction = 0.0}),
+      : scene(exactly({.friction = 0.0})),
         body(scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}})) {}
   std::vector<float> drawn(double interpolation = 1.0) const {
     std::vector<float> positions(3 * static_cast<std::size_t>(scene.world.model(body).render().vertices()));

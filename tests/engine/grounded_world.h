@@ -8,6 +8,7 @@
 
 #include "constants.h"
 #include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
 #include "sample_models.h"
 
@@ -18,24 +19,30 @@ inline std::shared_ptr<const ModalModel> damped_box(int modes, double hz) {
   return sample_model({.modes = modes, .lowest_hz = hz, .decay = 0.03 * 2.0 * std::numbers::pi * hz});
 }
 
+/// The same by the exact solver.
+inline ContactOptions exactly(ContactOptions options = {}) {
+  options.solver = ContactSolver::kExact;
+  return options;
+}
+
+/// Who finds contacts for a solver, as scenes choose.
+inline std::unique_ptr<ContactSource> make_finder(ContactSolver solver = kDefaultContactSolver) {
+  if (solver == ContactSolver::kGame) return std::make_unique<ManifoldFinder>();
+  return std::make_unique<ContactFinder>();
+}
+
 /// A world with the ground, and its finder.
 struct GroundedWorld {
   explicit GroundedWorld(const ContactOptions& options = {}, const WorldOptions& world_options = {},
                          Jobs& jobs = serial_jobs())
-      : finder(finder_options(options)), world(world_options, jobs) {
-    world.set_contact_source(&finder, options);
+      : finder(make_finder(options.solver)), world(world_options, jobs) {
+    world.set_contact_source(finder.get(), options);
     ground = world.add_static(std::make_shared<Shape>(HalfSpace{}));
   }
   void step(int count) {
     for (int i = 0; i < count; ++i) world.step();
   }
-  /// Small steps take all contacts that there are.
-  static ContactFinderOptions finder_options(const ContactOptions& options) {
-    ContactFinderOptions finder;
-    if (options.solver == ContactSolver::kGame) finder.clusters.max_points = 0;
-    return finder;
-  }
-  ContactFinder finder;
+  std::unique_ptr<ContactSource> finder;
   World world;
   BodyId ground;
 };

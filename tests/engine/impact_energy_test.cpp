@@ -13,7 +13,8 @@ double energy_kept(double steps_per_second, int dropped_modes, ImpactModel impac
   const auto model = sample_model({.modes = 20, .dropped = dropped_modes, .lowest_hz = 60.0});
   double sum = 0.0;
   for (int way = 0; way < kWays; ++way) {
-    GroundedWorld scene({.friction = 0.0, .recovery_speed = 0.0, .impact = impact}, {.step = 1.0 / steps_per_second});
+    GroundedWorld scene(exactly({.friction = 0.0, .recovery_speed = 0.0, .impact = impact}),
+                        {.step = 1.0 / steps_per_second});
     const Vec3 turn = 1.5 * Vec3(std::sin(1.0 * way), std::sin(2.0 * way), std::sin(3.0 * way));
     const BodyId box = scene.world.add_body(model, {.pose = {quaternion_from_rotation_vector(turn), {0.0, 0.0, 0.8}}});
     const double before = scene.world.energy(box).total();

@@ -36,7 +36,8 @@ struct Offered {
     body = world.add_body(model, {.pose = {{}, {0.0, 0.0, 1.0}}, .velocity = {0.1, 0.2, 0.3}});
     other = world.add_body(model, {.pose = {{}, {2.0, 0.0, 1.0}}});
     held = world.add_body(sample_model({.motion = FrameMotion::kKinematic}), {.pose = {{}, {-3.0, 0.0, 1.0}}});
-    world.set_contact_source(&finder);
+    // By game contact friction may be infinite.
+    world.set_contact_source(&finder, {.solver = ContactSolver::kExact});
     handle = world.add_handle(body, kMarked);
     joint = world.add_joint(body, other, {.type = JointType::kRevolute, .frame = {.origin = {1.0, 0.0, 1.0}}});
     drawn.resize(3 * static_cast<std::size_t>(model->render().vertices()));
@@ -185,7 +186,10 @@ void offer_joints(Offers& all) {
 
 void offer_contact(Offers& all) {
   offer_fields<ContactOptions>(all, "set_contact_source",
-                               [](Offered& o, const ContactOptions& c) { o.world.set_contact_source(&o.finder, c); },
+                               [](Offered& o, ContactOptions c) {
+                                 c.solver = ContactSolver::kExact;
+                                 o.world.set_contact_source(&o.finder, c);
+                               },
                                {{"friction", [](auto& c, double bad) { c.friction = bad; }},
                                 {"rolling_friction", [](auto& c, double bad) { c.rolling_friction = bad; }},
                                 {"recovery_speed", [](auto& c, double bad) { c.recovery_speed = bad; }},

@@ -23,7 +23,7 @@ TEST(ContactReach, WhatABlowThrowsIsStoppedInTheSameStep) {
   const auto ball = std::make_shared<const Shape>(Sphere{kRadius});
   ContactFinder finder;
   World world({.step = 1.0 / 60.0, .gravity = Vec3::Zero()});
-  world.set_contact_source(&finder, {.friction = 0.0});
+  world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .friction = 0.0});
   world.add_static(std::make_shared<const Shape>(Box{{0.05, 0.5, 0.5}}), {.p = {kRadius + kRoom + 0.05, 0.0, 0.0}});
   const BodyId struck = world.add_body(rigid(0.1), {.shape = ball});
   world.add_body(rigid(1.0),

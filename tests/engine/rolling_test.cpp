@@ -22,7 +22,7 @@ constexpr double kRolling = 1.0 / (1.0 + 0.4);  // of what a block that slides w
 struct RollingBall : GroundedWorld {
   explicit RollingBall(double slope, double speed = 0.0, double spin = 0.0, double resistance = kResistance,
                        double heading = 0.0)
-      : GroundedWorld({.friction = 0.8, .rolling_friction = resistance},
+      : GroundedWorld(exactly({.friction = 0.8, .rolling_friction = resistance}),
                       {.gravity = kGravity * Vec3(std::sin(slope), 0.0, -std::cos(slope))}) {
     ModalModelData data = sample_model_data({.modes = 0});
     data.inertia = 0.4 * data.mass * kRadius * kRadius * Mat3::Identity();
@@ -143,7 +143,7 @@ TEST(Rolling, TakesEnergyAwayAndAllocatesNothing) {
 TEST(Rolling, APileOfMixedBodiesComesToRest) {
   constexpr int kSteps = kSanitized ? 120 : 180;
   constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
-  Pile pile(kPileBoxes, -1, true, {.rolling_friction = 0.1});
+  Pile pile(kPileBoxes, -1, true, exactly({.rolling_friction = 0.1}));
   for (int i = 0; i < kSteps; ++i) pile.step_once();
   std::vector<Vec3> before;
   for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
@@ -155,7 +155,7 @@ TEST(Rolling, APileOfMixedBodiesComesToRest) {
 
 TEST(Rolling, AFallingPileOfMixedBodiesTakesABoundedNumberOfNewtonSteps) {
   constexpr int kAllowed = 100;
-  Pile pile(24, -1, true, {.rolling_friction = 0.1});
+  Pile pile(24, -1, true, exactly({.rolling_friction = 0.1}));
   int most = 0;
   for (int i = 0; i < 90; ++i) {
     pile.step_once();

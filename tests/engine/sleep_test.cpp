@@ -11,7 +11,8 @@ constexpr double kHeight = 0.2;  // of a box, m
 
 /// Boxes laid on each other, at rest and asleep.
 struct SleepingStack : GroundedWorld {
-  explicit SleepingStack(int count = 3, int modes = 0) : GroundedWorld({}, kSleepy) {
+  explicit SleepingStack(int count = 3, int modes = 0, const ContactOptions& options = {})
+      : GroundedWorld(options, kSleepy) {
     const auto model = damped_box(modes, 60.0);
     for (int i = 0; i < count; ++i) boxes.push_back(world.add_body(model, {.pose = {{}, place(*model, i)}}));
     step(120);
@@ -28,7 +29,7 @@ struct SleepingStack : GroundedWorld {
 TEST(Sleep, AStackFallsAsleepAndKeepsItsPlaceAndEnergyToTheBit) {
   for (const int modes : {0, 6}) {
     const int count = 3;
-    SleepingStack scene(count, modes);
+    SleepingStack scene(count, modes, exactly());
     ASSERT_EQ(scene.asleep(), count);
     std::vector<RigidTransform> poses;
     std::vector<double> energies;
@@ -68,7 +69,7 @@ TEST(Sleep, TheWholeStackWakesWhenItIsHitAndGoesOnWhereItWas) {
 }
 
 TEST(Sleep, WakingChangesNothingAboutWhatStands) {
-  SleepingStack scene;
+  SleepingStack scene(3, 0, exactly());
   const Vec3 before = scene.world.body(scene.boxes[2]).pose.p;
   scene.world.wake(scene.boxes[1]);
   EXPECT_EQ(scene.asleep(), 0);

@@ -58,8 +58,8 @@ struct Sleepers {
   World world{{.sleep = {.enabled = true, .time = 0.1, .speed = 0.01}}};
   std::vector<BodyId> boxes;
 
-  Sleepers() {
-    world.set_contact_source(&source);
+  explicit Sleepers(const ContactOptions& options = {}) {
+    world.set_contact_source(&source, options);
     world.add_static(std::make_shared<Shape>(HalfSpace{}));
     const auto model = damped_box(4, 60.0);
     for (int i = 0; i <= kSleepers; ++i)
@@ -86,7 +86,7 @@ TEST(Sleepers, AreNotShownToTheSourceOfContactsAgain) {
 }
 
 TEST(Sleepers, CountForNothingInTheStagesOfAStep) {
-  Sleepers scene;
+  Sleepers scene(exactly());
   StageTimes times;
   scene.world.set_stage_times(&times);
   scene.shake();

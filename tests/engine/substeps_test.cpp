@@ -96,6 +96,7 @@ TEST(Substeps, EveryContactIsToldToBeginBeforeItLastsOrEnds) {
 
 TEST(Substeps, HandlesFollowAStraightLineAndMeetTheirTargetAtTheStepsEnd) {
   World world({.substeps = kParts});
+  world.set_contact_source(nullptr, exactly());
   const BodyId box = world.add_body(damped_box(4, 30.0));
   const HandleId hand = world.add_handle(box, kMarked);
   const Vec3 start = world.position(box, kMarked);

@@ -39,7 +39,7 @@ TEST(VaryingStep, FreeFlightComesToWhereOneLongStepDoes) {
 }
 
 TEST(VaryingStep, WhatLiesStillStaysWhereItIs) {
-  GroundedWorld at({.recovery_speed = 0.0});
+  GroundedWorld at(exactly({.recovery_speed = 0.0}));
   const BodyId box = at.world.add_body(damped_box(6, 30.0), {.pose = {.p = {0.0, 0.0, 0.5}}});
   at.step(240);
   const Vec3 start = at.world.body(box).pose.p;

@@ -49,7 +49,7 @@ TEST(AnyContactRule, AWarmStepOfAWorldAllocatesNothing) {
 
 /// Of a world whose bodies fall, touch, and hang on each other.
 std::uint64_t played(const IslandSolverFactory* islands) {
-  GroundedWorld scene;
+  GroundedWorld scene(exactly());
   World& world = scene.world;
   if (islands != nullptr) world.set_island_solver(*islands);
   const auto model = damped_box(4, 30.0);

@@ -28,6 +28,11 @@ std::string rigid(const std::string& inside, const std::string& steps = "100") {
   return R"({"step": 0.02, "steps": )" + steps + R"(, "assets": {"block": "block.glb"}, )" + inside + "}";
 }
 
+/// The same by the exact solver.
+std::string exact(const std::string& inside, const std::string& steps = "100") {
+  return rigid(R"("solver": "exact", )" + inside, steps);
+}
+
 RunResult play(const std::string& text, const std::filesystem::path& folder = "") {
   const Scene scene = parse_scene(text, "\"test.json\"", folder);
   return run_scene(scene, make_models(scene, {{"block", block_asset(0)}}), {.key_rate = 1e6, .keep_contacts = true});
@@ -47,7 +52,7 @@ std::string block_at(const std::string& name, const std::string& position, const
 std::string bodies(const std::string& list) { return R"("bodies": [)" + list + "]"; }
 
 TEST(ContactRun, ABlockThatFallsComesToRestOnTheGroundAndTheGroundCarriesItsWeight) {
-  const RunResult r = play(rigid(kGround + "," + bodies(block_at("b", "[0, 0, 0.7]"))));
+  const RunResult r = play(exact(kGround + "," + bodies(block_at("b", "[0, 0, 0.7]"))));
   EXPECT_NEAR(end_of(r, "b").z(), 0.5, 1e-7);
   EXPECT_EQ(r.constraints.limit_steps + r.constraints.failed_steps, 0);
   EXPECT_GT(r.constraints.begun, 0);
@@ -66,7 +71,7 @@ TEST(ContactRun, ABlockThatFallsComesToRestOnTheGroundAndTheGroundCarriesItsWeig
 TEST(ContactRun, AStackOfBlocksRestsAlikeWhoeverFindsTheContactsAndABuildWithoutFclSaysSo) {
   const auto stack = [](const std::string& finder) {
     const std::string contact = R"("contact": {"finder": ")" + finder + R"("},)";
-    return rigid(contact + kGround + "," + bodies(block_at("b", "[0, 0, 0.6]") + "," + block_at("c", "[0.3, 0, 1.8]")),
+    return exact(contact + kGround + "," + bodies(block_at("b", "[0, 0, 0.6]") + "," + block_at("c", "[0.3, 0, 1.8]")),
                  "150");
   };
   const RunResult limber = play(stack("limber"));
@@ -92,7 +97,7 @@ TEST(ContactRun, WithoutContactBodiesPassThroughEachOther) {
 
 TEST(ContactRun, BodiesMeetEachOtherAlsoWhereNothingStands) {
   const RunResult r =
-      play(rigid(R"("gravity": [0, 0, 0], "contact": {},)" +
+      play(exact(R"("gravity": [0, 0, 0], "contact": {},)" +
                  bodies(block_at("b", "[0, 0, 0]", R"(, "velocity": [1, 0, 0])") + "," + block_at("c", "[3, 0, 0]"))));
   // Rigid bodies that absorb the impact go on together at half the speed, from the touch at 1 s on.
   EXPECT_NEAR(end_of(r, "b").x(), 1.5, 0.03);
@@ -122,7 +127,7 @@ TEST(ContactRun, FrictionOfEachBodyDecidesWhetherItHoldsOnASlope) {
 
 TEST(ContactRun, WhatDoesNotMeetALayerFallsThroughIt) {
   const RunResult r = play(
-      rigid(R"("statics": [{"name": "ground", "layers": [3], "shape": {"half_space": {}}}],)" +
+      exact(R"("statics": [{"name": "ground", "layers": [3], "shape": {"half_space": {}}}],)" +
             bodies(block_at("stays", "[0, 0, 0.7]") + "," + block_at("falls", "[5, 0, 0.7]", R"(, "meets": [0])"))));
   EXPECT_NEAR(end_of(r, "stays").z(), 0.5, 1e-7);
   EXPECT_LT(end_of(r, "falls").z(), -10.0);
@@ -167,7 +172,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ContactRun, ABodyThatWearsAShapeLiesOnThat) {
   const RunResult r =
-      play(rigid(kGround + "," +
+      play(exact(kGround + "," +
                  bodies(block_at("b", "[0, 0, 2]", R"(, "shape": {"box": {"half_extents": [1, 1, 0.75]}})") + "," +
                         block_at("round", "[9, 0, 2]", R"(, "shape": {"sphere": {"radius": 0.9}})"))));
   EXPECT_NEAR(end_of(r, "b").z(), 0.75, 1e-6);
@@ -187,7 +192,7 @@ TEST(ContactRun, TheMethodOfTheFileIsTheOneThatActs) {
 TEST(ContactRun, AHandleLeadsItsPointAlongTheKeysAndLetsGo) {
   const std::string led = R"("handles": [{"body": "b", "start": 0.2, "duration": 1, "at": {"nearest": [1, 0.5, 0.5]},
       "motion": {"keys": [{"time": 0.5, "position": [1, 0.5, 1]}]}}], "gravity": [0, 0, 0],)";
-  const RunResult r = play(rigid(led + bodies(block_at("b", "[0, 0, 0]"))));
+  const RunResult r = play(exact(led + bodies(block_at("b", "[0, 0, 0]"))));
   ASSERT_EQ(r.handles.size(), 1u);
   EXPECT_EQ(r.handles[0].step, 10);
   EXPECT_LT((r.handles[0].point - Vec3(1.0, 0.5, 0.5)).norm(), 1e-6);
@@ -212,7 +217,7 @@ TEST(ContactRun, AHandleOfOneDirectionLeavesTheOthers) {
 TEST(ContactRun, AHingeKeepsItsPointAndItsMotorTurnsIt) {
   const std::string hinge = R"("gravity": [0, 0, 0], "joints": [{"b": "b", "type": "revolute", "origin": [-1, 0, 0],
       "axis": [0, 0, 2], "coordinates": [{"motor": {"velocity": 0.5, "max_force": 1000}}]}],)";
-  const RunResult r = play(rigid(hinge + bodies(block_at("b", "[0, 0, 0]"))));
+  const RunResult r = play(exact(hinge + bodies(block_at("b", "[0, 0, 0]"))));
   ASSERT_EQ(r.joints.size(), 1u);
   EXPECT_EQ(r.joints[0].view.coordinates, 1);
   EXPECT_NEAR(r.joints[0].view.position[0], 0.5 * 2.0, 0.02);  // the first step takes up speed

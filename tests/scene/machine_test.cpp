@@ -9,6 +9,7 @@
 
 #include "block_model.h"
 #include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/scene/run.h"
@@ -48,15 +49,15 @@ Asset chain() {
   return asset;
 }
 
-World world_with(ContactFinder& finder) {
+World world_with(ContactSource& finder, ContactSolver solver = kDefaultContactSolver) {
   World world({.step = 0.01});
-  world.set_contact_source(&finder);
+  world.set_contact_source(&finder, {.solver = solver});
   return world;
 }
 
 TEST(Machine, StandsWhereItIsPutAndMovesByItsJoints) {
   ContactFinder finder;
-  World world = world_with(finder);
+  World world = world_with(finder, ContactSolver::kExact);
   const Asset asset = chain();
   const Machine machine = add_machine(world, asset, {.pose = kPose});
   ASSERT_EQ(machine.bodies.size(), 3u);
@@ -76,7 +77,7 @@ TEST(Machine, StandsWhereItIsPutAndMovesByItsJoints) {
 }
 
 TEST(Machine, PairsOfTheAssetHaveNoContacts) {
-  ContactFinder finder;
+  ManifoldFinder finder;
   World world = world_with(finder);
   const Machine machine = add_machine(world, chain());
   const auto touch = [&] {
@@ -96,6 +97,7 @@ TEST(Machine, PairsOfTheAssetHaveNoContacts) {
 
 TEST(Machine, UntiedItFallsAsOneThing) {
   World world({.step = 0.01});
+  world.set_contact_source(nullptr, {.solver = ContactSolver::kExact});
   const Machine machine = add_machine(world, chain(), {.pose = kPose, .velocity = {1, 0, 0}, .tied = false});
   EXPECT_EQ(machine.joints[0], JointId{});
   const Vec3 start = world.body(machine.bodies[1]).pose.p;
@@ -135,7 +137,7 @@ TEST_F(MachineScene, IsTheMachineOfTheWorld) {
   const Scene scene = parse(R"({"name": "m", "asset": "chain", "position": [3, 1, 2],
     "orientation": {"axis": [1, 0, 0], "degrees": 30}})");
   const RunResult run = run_scene(scene, load_models(scene));
-  ContactFinder finder;
+  ManifoldFinder finder;
   World world = world_with(finder);
   add_machine(world, chain(), {.pose = {quaternion_from_rotation_vector({std::numbers::pi / 6.0, 0, 0}), {3, 1, 2}}});
   for (int step = 0; step < 40; ++step) world.step();

@@ -86,6 +86,10 @@ TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
   EXPECT_EQ(s.contact_rule.method, SceneContactRule::Method::kGapProgram);
   EXPECT_EQ(s.contact_rule.friction, SceneContactRule::Friction::kHeuristicNoSlip);
   EXPECT_FALSE(s.contact_rule.is_own());
+  EXPECT_EQ(s.solver, ContactSolver::kExact);
+  EXPECT_THROW(parse(scene_with(R"({"name": "bell", "asset": "bell"})",
+                                R"("solver": "game", "contact": {"method": "gap_program"})")),
+               InputError);
 #else
   try {
     parse(told);
@@ -95,6 +99,16 @@ TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
     EXPECT_THAT(e.what(), ::testing::HasSubstr("LIMBER_BUILD_PAPERS=ON"));
   }
 #endif
+}
+
+TEST(SceneFile, TheSolverIsGameUnlessTheFileChoosesTheExactOne) {
+  const std::string bell = R"({"name": "bell", "asset": "bell"})";
+  const Scene usual = parse(scene_with(bell));
+  EXPECT_EQ(usual.solver, ContactSolver::kGame);
+  EXPECT_EQ(usual.small_steps.substeps, SmallSteps{}.substeps);
+  const Scene chosen = parse(scene_with(bell, R"("solver": "exact", "small_steps": 16)"));
+  EXPECT_EQ(chosen.solver, ContactSolver::kExact);
+  EXPECT_EQ(chosen.small_steps.substeps, 16);
 }
 
 TEST(SceneFile, ContactIsReadWhereItBelongs) {
@@ -325,6 +339,8 @@ TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
       {contact(R"("method": "lcp")"), "contact.method", "\"gap_program\", \"complementary\""},
       {contact(R"("friction_model": "coulomb")"), "contact.friction_model", "\"cone\""},
       {contact(R"("guard": 1)"), "contact.guard", "text"},
+      {scene_with(kBell, R"("solver": "soft")"), "solver", "\"exact\""},
+      {scene_with(kBell, R"("small_steps": 0)"), "small_steps", "an integer from 1"},
       {contact(R"("impact": "elastic")"), "contact.impact", "\"held_from_touch\""},
       {contact(R"("friction": -0.1)"), "contact.friction", ">= 0"},
       {contact(R"("penalty_frequency": 0)"), "contact.penalty_frequency", "> 0"},

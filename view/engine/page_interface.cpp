@@ -37,7 +37,7 @@ int guarded(F&& work) {
   }
 }
 
-/// From 11 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, method.
+/// From 11 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, solver.
 PageSettings settings_of(const double* n) {
   PageSettings s;
   s.gravity = {n[0], n[1], n[2]};
@@ -48,7 +48,7 @@ PageSettings settings_of(const double* n) {
   s.modes = static_cast<limber::Index>(n[7]);
   s.damping = n[8];
   s.friction = n[9];
-  s.method = static_cast<limber::SceneContactRule::Method>(static_cast<int>(n[10]));
+  s.solver = static_cast<limber::ContactSolver>(static_cast<int>(n[10]));
   return s;
 }
 

@@ -78,7 +78,7 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
                      {"poke_speed", settings.poke_speed},   {"step", settings.step},
                      {"substeps", settings.substeps},       {"modes", settings.modes},
                      {"damping", settings.damping},         {"friction", settings.friction},
-                     {"method", to_string(settings.method)}};
+                     {"solver", to_string(settings.solver)}};
   out["contact"] = scene.contact.has_value();
   out["models"] = Json::array();
   for (const PageModel& model : shown)

@@ -45,7 +45,8 @@ struct PageWorld::Impl {
     settings.gravity = told.gravity;
     settings.step = told.step;
     settings.substeps = told.substeps;
-    if (told.contact) settings.friction = told.contact->friction, settings.method = told.contact_rule.method;
+    settings.solver = told.solver;
+    if (told.contact) settings.friction = told.contact->friction;
   }
 
   void start();
@@ -85,7 +86,8 @@ void PageWorld::Impl::start() {
   scene.step = settings.step;
   scene.substeps = settings.substeps;
   scene.gravity = settings.gravity;
-  if (scene.contact) scene.contact->friction = settings.friction, scene.contact_rule.method = settings.method;
+  if (scene.contact) scene.contact->friction = settings.friction;
+  if (scene.contact_rule.is_own()) scene.solver = settings.solver;
   models = baked;
   std::map<const ModalModel*, int> kind_of;
   kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();

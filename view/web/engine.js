@@ -63,9 +63,9 @@ export class Engine {
   }
 
   writeSettings(s) {
-    const methods = ['penalty', 'velocity_program', 'gap_program', 'complementary'];
+    const solvers = ['game', 'exact'];
     this.module.HEAPF64.set([...s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
-      methods.indexOf(s.method)], this.settingsAt / 8);
+      solvers.indexOf(s.solver)], this.settingsAt / 8);
   }
   setLive(s) { this.writeSettings(s); this.check(this.module._page_set_live(this.settingsAt)); }
   restart(s) { this.writeSettings(s); this.check(this.module._page_restart(this.settingsAt)); this.describe(); }

@@ -3,7 +3,7 @@ import { button, choice, element, section, slider } from './dom.js';
 import { Chart } from './charts.js';
 
 const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin']];
-const METHODS = [['complementary', 'complementary'], ['gap_program', 'gap program'], ['velocity_program', 'velocity program'], ['penalty', 'penalty']];
+const SOLVERS = [['game', 'game'], ['exact', 'exact']];
 
 export class Panel {
   constructor(host, app) {
@@ -75,7 +75,7 @@ export class Panel {
       this.anew('modes', 'Modes', { min: 0, max: this.mostModes, step: 1, show: (x) => `${x}` }),
       this.anew('damping', 'Damping', { min: 0, max: 5, step: 0.05, show: (x) => `× ${x.toFixed(2)}` }),
       this.anew('friction', 'Friction', { min: 0, max: 1.5, step: 0.05, show: (x) => x.toFixed(2) }),
-      choice('Contact', METHODS, app.settings.method, (method) => { app.settings.method = method; }),
+      choice('Contact', SOLVERS, app.settings.solver, (solver) => { app.settings.solver = solver; }),
       element('div', { className: 'row' }, button('Start again', () => app.restart()))];
   }
 

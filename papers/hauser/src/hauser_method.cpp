@@ -41,6 +41,7 @@ ContactOptions HauserMethod::contacts(ContactOptions options) const {
   constexpr double kCompliance = 3e-3;
   const bool by_gaps = rule_.method == ContactMethod::kGapProgram ||
                        (rule_.method == ContactMethod::kComplementary && !rule_.has_cone());
+  options.solver = ContactSolver::kExact;
   if (by_gaps) options.compliance = kCompliance;
   if (rule_.method != ContactMethod::kComplementary || !rule_.has_cone()) options.rolling_friction = 0.0;
   return options;

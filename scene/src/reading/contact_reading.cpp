@@ -29,6 +29,11 @@ std::string_view to_string(SceneFinder finder) {
   return kWords[static_cast<std::size_t>(finder)];
 }
 
+std::string_view to_string(ContactSolver solver) {
+  constexpr std::array kWords{"game", "exact"};
+  return kWords[static_cast<std::size_t>(solver)];
+}
+
 std::string_view to_string(ImpactModel model) {
   constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
   return kWords[static_cast<std::size_t>(model)];
@@ -40,6 +45,8 @@ namespace limber::internal {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr std::int64_t kMaxSmallSteps = 1'000'000;
 
 std::optional<double> read_friction(const JsonObject& o) {
   if (!o.has("friction")) return {};
@@ -110,6 +117,17 @@ ContactOptions read_contact_options(const JsonObject& o) {
 
 }  // namespace
 
+/// [H03]'s rules stand in place of the exact solver.
+void read_solver(const JsonObject& o, Scene& scene) {
+  scene.solver = choice_of(o, "solver", {ContactSolver::kGame, ContactSolver::kExact}, scene.solver);
+  scene.small_steps.substeps =
+      static_cast<int>(o.integer("small_steps", 1, kMaxSmallSteps, scene.small_steps.substeps));
+  if (scene.contact_rule.is_own()) return;
+  if (o.has("solver") && scene.solver == ContactSolver::kGame)
+    refuse(o.where("solver"), "\"game\", and \"contact\" has a rule of [H03]", "\"exact\"");
+  scene.solver = ContactSolver::kExact;
+}
+
 void read_contact(const JsonObject& o, Scene& scene) {
   if (o.has("contact")) {
     const JsonObject contact(o.at("contact"), o.where("contact"));
@@ -119,6 +137,7 @@ void read_contact(const JsonObject& o, Scene& scene) {
   } else if (o.has("statics")) {
     scene.contact.emplace();
   }
+  read_solver(o, scene);
 }
 
 SceneStatic read_static(const Json& value, const std::string& where, const std::filesystem::path& folder) {

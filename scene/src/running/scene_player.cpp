@@ -5,6 +5,7 @@
 #include <string>
 
 #include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #if LIMBER_HAS_FCL
 #include "limber/collision_fcl/fcl_contact_source.h"
 #endif
@@ -56,7 +57,8 @@ BodyPlacement start_of(const SceneBody& body) {
   return placement;
 }
 
-std::unique_ptr<ContactSource> make_finder(SceneFinder which) {
+std::unique_ptr<ContactSource> make_finder(SceneFinder which, ContactSolver solver) {
+  if (which == SceneFinder::kLimber && solver == ContactSolver::kGame) return std::make_unique<ManifoldFinder>();
   if (which == SceneFinder::kLimber) return std::make_unique<ContactFinder>();
 #if LIMBER_HAS_FCL
   return std::make_unique<FclContactSource>();
@@ -65,10 +67,17 @@ std::unique_ptr<ContactSource> make_finder(SceneFinder which) {
 #endif
 }
 
+ContactOptions options_of(const Scene& scene) {
+  ContactOptions options = scene.contact.value_or(ContactOptions{});
+  options.solver = scene.solver;
+  options.small_steps = scene.small_steps;
+  return options;
+}
+
 /// [H03]'s way for the islands of a scene that asks for it. @return the options of its contacts
 ContactOptions take_rule(const Scene& scene, World& world) {
   const SceneContactRule& told = scene.contact_rule;
-  if (told.is_own()) return *scene.contact;
+  if (told.is_own()) return options_of(scene);
 #if LIMBER_HAS_HAUSER
   // The same constants in the same order.
   const HauserMethod method({.method = static_cast<ContactMethod>(told.method),
@@ -77,7 +86,7 @@ ContactOptions take_rule(const Scene& scene, World& world) {
                              .penalty_frequency = told.penalty_frequency,
                              .penalty_damping = told.penalty_damping});
   world.set_island_solver(method.islands());
-  return method.contacts(*scene.contact);
+  return method.contacts(options_of(scene));
 #else
   (void)world;
   throw InvalidArgument("ScenePlayer: contact_rule is one of [H03]'s, and this build has no limber::hauser");
@@ -99,7 +108,7 @@ struct ScenePlayer::Impl {
       : scene(s),
         models(m),
         steps(n),
-        finder(make_finder(s.finder)),
+        finder(make_finder(s.finder, s.solver)),
         world({.step = s.step, .substeps = s.substeps, .gravity = s.gravity, .sleep = s.sleep}, jobs) {
     add_bodies();
     for (std::size_t i = 0; i < scene.statics.size(); ++i) {
@@ -143,7 +152,7 @@ struct ScenePlayer::Impl {
 };
 
 void ScenePlayer::Impl::add_bodies() {
-  if (scene.contact) world.set_contact_source(finder.get(), take_rule(scene, world));
+  world.set_contact_source(scene.contact ? finder.get() : nullptr, take_rule(scene, world));
   if (models.of_body.size() != scene.bodies.size())
     throw InvalidArgument("ScenePlayer: there are " + std::to_string(models.of_body.size()) +
                           " models, expected one per body, " + std::to_string(scene.bodies.size()));

@@ -66,7 +66,7 @@ enum class ContactSolver {
   kGame,   ///< by small steps (small_steps.h): bounded work
   kExact,  ///< as one convex problem an island (island_solver.h): to the law, in the time that it takes
 };
-constexpr ContactSolver kDefaultContactSolver = ContactSolver::kExact;
+constexpr ContactSolver kDefaultContactSolver = ContactSolver::kGame;
 
 struct ContactOptions {
   ContactSolver solver = kDefaultContactSolver;

@@ -13,11 +13,13 @@
 /// order in the step (limber/dynamics/rigid_frame.h). Deterministic: same calls, same bits, for any Jobs. Once warm, a
 /// step allocates nothing. A World is used by one thread at a time; it spreads the work over its Jobs itself.
 ///
-/// Handles, joints and contacts tie bodies together into islands, each one problem per step, solved at the step's end:
-/// held points and joints are where they should be to round-off, and the island's energy does not rise but by the work
-/// of what drives it (limber/constraints/island_solver.h). An island that a limit of work ends, as piles of contacts
-/// often do, may miss that: ConstraintReport counts such islands and tells how far they are from their rows' law.
-/// Bodies without constraints cost what they cost without. Contact: docs/contact.md.
+/// Handles, joints and contacts are answered by small steps, in bounded work (ContactSolver::kGame,
+/// limber/constraints/small_steps.h), or, by choice, as islands, each one problem per step, solved at the step's end
+/// (kExact, limber/constraints/island_solver.h): held points and joints are then where they should be to round-off, and
+/// the island's energy does not rise but by the work of what drives it. An island that a limit of work ends, as piles
+/// of contacts often do, may miss that: ConstraintReport counts such islands and tells how far they are from their
+/// rows' law. set_contact_source() chooses. Bodies without constraints cost what they cost without. Contact:
+/// docs/contact.md.
 ///
 /// All functions throw InvalidArgument, and then change nothing, for an id that names no body, for numbers that are not
 /// finite, and for arrays of the wrong length.
@@ -296,8 +298,8 @@ class World {
 
   ConstraintReport constraint_report() const;
 
-  /// Makes what takes the steps of islands from now on; empty: limber's own (make_island_solver()). Solvers keep
-  /// nothing from step to step, so they are no part of the state that is saved.
+  /// Makes what takes the steps of islands from now on, by ContactSolver::kExact alone; empty: limber's own
+  /// (make_island_solver()). Solvers keep nothing from step to step, so they are no part of the state that is saved.
   void set_island_solver(IslandSolverFactory make);
 
   /// What steps and reconstruct() spend on their stages from here on is added to `times`, which outlives the world or
@@ -306,10 +308,11 @@ class World {
   void set_stage_times(StageTimes* times);
 
   // Contacts ---------------------------------------------------------------------------------------------------------
-  /// Who finds the contacts, such as ContactFinder of collision/: without one, bodies pass through each other. It is
-  /// not told of bodies that meet nothing: those in no layer or with an empty mask, and those without a shape whose
-  /// model is not touchable. Its bodies are those of the world, numbered by BodyId::index; it must outlive the world
-  /// and holds none at first. Null: none.
+  /// Who finds the contacts, such as ManifoldFinder of collision/, or ContactFinder for kExact: without one, bodies
+  /// pass through each other. It is not told of bodies that meet nothing: those in no layer or with an empty mask, and
+  /// those without a shape whose model is not touchable. Its bodies are those of the world, numbered by BodyId::index;
+  /// it must outlive the world and holds none at first. Null: none.
+  /// @param options choose, too, who answers contacts, handles and joints (ContactOptions::solver)
   void set_contact_source(ContactSource* source, const ContactOptions& options = {});
   /// Asked of every contact found, before it acts: false leaves it out of the step. From the thread that calls step();
   /// empty: all act.

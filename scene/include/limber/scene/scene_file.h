@@ -149,13 +149,13 @@ struct SceneJoint {
 
 /// Who finds the contacts of a scene.
 enum class SceneFinder {
-  kLimber,  ///< ContactFinder
+  kLimber,  ///< ManifoldFinder for ContactSolver::kGame, ContactFinder for kExact
   kFcl,     ///< FclContactSource, in builds with limber::collision_fcl
 };
 std::string_view to_string(SceneFinder finder);
 
-/// How the forces of contacts are found: limber's own way, or one of [H03]'s in builds with limber::hauser, whose
-/// contact_rule.h says what the words mean.
+/// How the forces of contacts are found: limber's own way, or one of [H03]'s with ContactSolver::kExact in builds with
+/// limber::hauser, whose contact_rule.h says what the words mean.
 struct SceneContactRule {
   enum class Method { kPenalty, kVelocityProgram, kGapProgram, kComplementary };
   enum class Friction { kCone, kHeuristic, kHeuristicNoSlip };
@@ -172,6 +172,7 @@ std::string_view to_string(SceneContactRule::Method method);
 std::string_view to_string(SceneContactRule::Friction friction);
 std::string_view to_string(SceneContactRule::Guard guard);
 std::string_view to_string(ImpactModel model);
+std::string_view to_string(ContactSolver solver);
 
 struct Scene {
   std::string name{};                                     ///< the file's name without folder and extension
@@ -182,11 +183,14 @@ struct Scene {
   Vec3 gravity = {0.0, 0.0, -9.80665};                    ///< m/s²
   std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
-  std::optional<ContactOptions> contact{};                ///< absent: bodies pass through each other
-  SceneFinder finder = SceneFinder::kLimber;              ///< of contacts
-  SceneContactRule contact_rule{};                        ///< of contacts
-  std::vector<SceneStatic> statics{};                     ///< none without contact
-  std::vector<SceneBody> bodies{};                        ///< those of machines last
+  ContactSolver solver = kDefaultContactSolver;           ///< of contacts, handles and joints
+  SmallSteps small_steps{};                               ///< of ContactSolver::kGame
+  /// Absent: bodies pass through each other. Its solver and small steps are those above.
+  std::optional<ContactOptions> contact{};
+  SceneFinder finder = SceneFinder::kLimber;  ///< of contacts
+  SceneContactRule contact_rule{};            ///< of contacts
+  std::vector<SceneStatic> statics{};         ///< none without contact
+  std::vector<SceneBody> bodies{};            ///< those of machines last
   std::vector<Strike> strikes{};
   std::vector<HeldForce> forces{};
   std::vector<SceneHandle> handles{};

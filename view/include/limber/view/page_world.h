@@ -20,15 +20,15 @@ namespace limber {
 
 /// Settings for a person. The first three act at once, the others when the scene starts anew.
 struct PageSettings {
-  Vec3 gravity = {0.0, 0.0, -9.80665};  ///< m/s²
-  double drag_frequency = 3.0;          ///< Hz, of a body's mass on the spring by which it is dragged; > 0
-  double poke_speed = 1.0;              ///< m/s, that a poke gives a body's mass; ≥ 0
-  double step = 1.0 / 60.0;             ///< s; > 0
-  int substeps = 1;                     ///< ≥ 1
-  Index modes = 256;                    ///< of each model at most; ≥ 0
-  double damping = 1.0;                 ///< factor on the decay of every mode; ≥ 0
-  double friction = 0.5;                ///< ≥ 0, where the scene has contact
-  SceneContactRule::Method method = SceneContactRule::Method::kComplementary;
+  Vec3 gravity = {0.0, 0.0, -9.80665};           ///< m/s²
+  double drag_frequency = 3.0;                   ///< Hz, of a body's mass on the spring by which it is dragged; > 0
+  double poke_speed = 1.0;                       ///< m/s, that a poke gives a body's mass; ≥ 0
+  double step = 1.0 / 60.0;                      ///< s; > 0
+  int substeps = 1;                              ///< ≥ 1
+  Index modes = 256;                             ///< of each model at most; ≥ 0
+  double damping = 1.0;                          ///< factor on the decay of every mode; ≥ 0
+  double friction = 0.5;                         ///< ≥ 0, where the scene has contact
+  ContactSolver solver = kDefaultContactSolver;  ///< not where the scene has one of [H03]'s rules
 };
 
 /// A model once for all its bodies, made for a vertex shader.

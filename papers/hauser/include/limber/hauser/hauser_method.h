@@ -28,8 +28,9 @@ class HauserMethod {
 
   /// Makes island solvers by the rule. They may outlive this object. Called by one thread at a time.
   IslandSolverFactory islands() const;
-  /// The options that contacts need beside these solvers: the compliance that makes the forces of redundant contacts
-  /// unique under kGapProgram, and under kComplementary without the cone; no rolling resistance but beside the cone.
+  /// The options that contacts need beside these solvers: ContactSolver::kExact, whose place they take; the compliance
+  /// that makes the forces of redundant contacts unique under kGapProgram, and under kComplementary without the cone;
+  /// no rolling resistance but beside the cone.
   ContactOptions contacts(ContactOptions options = {}) const;
   /// Of the linear programs of all steps that islands() solvers have taken so far. Not while a step is under way.
   ProgramReport programs() const;
