@@ -189,16 +189,19 @@ ErrorScene driven(ErrorScene scene, double times) {
 }
 
 std::string text(const ErrorSetting& s) {
-  return fmt::format("{} modes, step {:.6g} s, {}, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}", s.modes,
+  return fmt::format("{} modes, step {:.6g} s, {}, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}{}", s.modes,
                      s.step, s.method, s.impact, s.contacts == 0 ? "all" : std::to_string(s.contacts),
-                     s.residual ? "on" : "off", s.basis, s.mesh, s.drive);
+                     s.residual ? "on" : "off", s.basis, s.mesh, s.drive,
+                     s.substeps > 0 ? fmt::format(", game {}", s.substeps) : "");
 }
 
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,
                        const std::function<std::string(const std::string&)>& asset_file) {
   Json out{{"step", setting.step},
            {"steps", std::llround(scene.duration / setting.step)},
-           {"gravity", vector(scene.gravity)}};
+           {"gravity", vector(scene.gravity)},
+           {"solver", setting.substeps > 0 ? "game" : "exact"}};
+  if (setting.substeps > 0) out["small_steps"] = setting.substeps;
   for (const ErrorBody& body : scene.bodies) {
     out["assets"][body.name] = asset_file(body.name);
     out["bodies"].push_back(body_json(body));

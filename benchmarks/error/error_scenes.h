@@ -63,6 +63,7 @@ struct ErrorScene {
   std::size_t tip_body = 0;
   Vec3 tip = Vec3::Zero();  ///< the node whose error is told by itself
 
+  bool has_constraints() const { return has_contact() || !leads.empty() || !ties.empty(); }
   bool has_contact() const { return ground || bodies.front().wall.has_value(); }
 };
 
@@ -86,6 +87,7 @@ struct ErrorSetting {
   std::string method = "complementary";  ///< as in scene files
   std::string impact = "absorbed";       ///< the same
   int contacts = 4;                      ///< kept of a patch; 0: all. Others than 4 are not told by scene files
+  int substeps = 0;                      ///< of ContactSolver::kGame, which takes contacts as it finds them; 0: kExact
   bool residual = true;                  ///< static answers of the modes left out, where loads act and bodies touch
   std::string basis = "float";           ///< or "half": shapes rounded to IEEE half precision
   int mesh = 1;                          ///< times as many cells along each axis

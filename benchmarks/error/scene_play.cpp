@@ -110,8 +110,8 @@ class Playing {
         models_(make_models(scene_, baked.assets)),
         player_(scene_, models_, scene_.steps),
         own_finder_({.clusters = {.max_points = setting.contacts}}) {
-    if (scene.has_contact() && setting.contacts != ContactClusterOptions{}.max_points)
-      player_.world().set_contact_source(&own_finder_, *scene_.contact);
+    if (scene.has_contact() && setting.substeps == 0 && setting.contacts != ContactClusterOptions{}.max_points)
+      choose_contacts();
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       vertices_.push_back(compared_vertices(scene.bodies[i], *models_.of_body[i]));
     played_.motions.resize(scene.bodies.size());
@@ -136,6 +136,13 @@ class Playing {
   }
 
  private:
+  /// Before anything moves.
+  void choose_contacts() {
+    ContactOptions options = *scene_.contact;
+    options.solver = ContactSolver::kExact;
+    player_.world().set_contact_source(&own_finder_, options);
+  }
+
   void note_step(double time) {
     const World& world = player_.world();
     played_.unsettled += world.constraint_report().solved ? 0 : 1;

@@ -81,7 +81,7 @@ const char* name(StabilityFault fault) {
 }
 
 unsigned faults(const StabilityCase& at, const StabilityResult& r) {
-  constexpr double kRise = 1e-6, kOff = 1e-6, kMomentum = 1e-9, kUnsettled = 0.01;
+  constexpr double kExactRise = 1e-6, kGameRise = 1e-2, kOff = 1e-6, kMomentum = 1e-9, kUnsettled = 0.01;
   const double rounding = kEpsilon * at.far_away / at.size, digits = 16.0 * rounding;  // of a place, in parts of a bar
   const bool recovers = has_contact(at.scene) && at.recovery_speed > 0.0;
   unsigned bits = 0;
@@ -89,7 +89,8 @@ unsigned faults(const StabilityCase& at, const StabilityResult& r) {
     if (at_fault) bits |= 1u << static_cast<unsigned>(fault);
   };
   judge(StabilityFault::kNotFinite, !r.finite);
-  const double rise = kRise + (16.0 + r.steps) * r.energy_digits;  // each step rounds it
+  const double rise =
+      (at.substeps > 0 ? kGameRise : kExactRise) + (16.0 + r.steps) * r.energy_digits;  // each step rounds it
   judge(StabilityFault::kEnergy, !recovers && (r.total_rise > rise || r.node_total_rise > rise + 2.0 * r.spin_bound));
   judge(StabilityFault::kPassed, r.passed);
   judge(StabilityFault::kOverlap, r.rest_overlap > kMostOverlap);
@@ -118,7 +119,8 @@ std::vector<std::pair<const char*, double>> coordinates(const StabilityCase& c) 
           {"spin", c.spin},
           {"pull", c.pull},
           {"far_away", c.far_away},
-          {"recovery_speed", c.recovery_speed}};
+          {"recovery_speed", c.recovery_speed},
+          {"substeps", c.substeps}};
 }
 
 StabilityCase simplified(StabilityCase at, const std::function<bool(const StabilityCase&)>& is_alike) {

@@ -8,6 +8,7 @@
 #include "constants.h"
 #include "energy_meter.h"
 #include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
 #include "stability_bars.h"
 
@@ -44,12 +45,29 @@ SurfacePoint corner(const ModalModel& model, const Vec3& near) {
   return best;
 }
 
+ContactOptions contact_options(const StabilityCase& at) {
+  ContactOptions options{.friction = at.friction, .recovery_speed = at.recovery_speed};
+  options.solver = at.substeps > 0 ? ContactSolver::kGame : ContactSolver::kExact;
+  if (at.substeps > 0) options.small_steps.substeps = at.substeps;
+  if (at.recovery_speed == 0.0) options.small_steps.push_speed = 0.0;
+  return options;
+}
+
+std::unique_ptr<ContactSource> finder_for(const StabilityCase& at) {
+  if (at.substeps > 0) return std::make_unique<ManifoldFinder>();
+  return std::make_unique<ContactFinder>();
+}
+
 /// A world, its bodies and what is measured of them.
 class Scene {
  public:
   explicit Scene(const StabilityCase& at)
-      : at_(at), world_({.step = at.step, .gravity = at.gravity * kDown}), length_(kSize.x() * at.size) {
+      : at_(at),
+        finder_(finder_for(at)),
+        world_({.step = at.step, .gravity = at.gravity * kDown}),
+        length_(kSize.x() * at.size) {
     const Bar light = make_bar(at, 1.0), heavy = at.mass_ratio == 1.0 ? light : make_bar(at, at.mass_ratio);
+    world_.set_contact_source(nullptr, contact_options(at));  // which solver answers handles and joints
     switch (at.scene) {
       case StabilityScene::kFlight:
         let_fly(light);
@@ -146,7 +164,7 @@ class Scene {
   }
 
   void stand_on_ground() {
-    world_.set_contact_source(&finder_, {.friction = at_.friction, .recovery_speed = at_.recovery_speed});
+    world_.set_contact_source(finder_.get(), contact_options(at_));
     world_.add_static(std::make_shared<Shape>(HalfSpace{}));
     has_ground_ = true;
   }
@@ -267,7 +285,7 @@ class Scene {
   }
 
   StabilityCase at_;
-  ContactFinder finder_;
+  std::unique_ptr<ContactSource> finder_;
   World world_;
   double length_;
   std::vector<BodyId> bodies_;

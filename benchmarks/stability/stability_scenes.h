@@ -43,6 +43,7 @@ struct StabilityCase {
   double pull = 0.0;            ///< by how many sizes the hand pulls within ten steps before it lets go; kHandle
   double far_away = 0.0;        ///< distance of the scene from the origin, m
   double recovery_speed = 0.0;  ///< m/s; 0: nothing does work on bodies that overlap
+  int substeps = 0;  ///< of ContactSolver::kGame; 0: kExact. With recovery it parts bodies by its own push_speed
 };
 inline constexpr int kAllModes = 1000;
 
@@ -83,7 +84,7 @@ bool has_bullet();  ///< whether this build has it; else run_by_bullet() throws 
 /// knows of; where something recovers from overlap, by the work of that, which is not judged.
 enum class StabilityFault {
   kNotFinite,
-  kEnergy,     ///< more than was put in, by World::energy or by the nodes: by 1e-6 of its scale
+  kEnergy,     ///< more than was put in, by World::energy or by the nodes: by 1e-6 of its scale; kGame: by 1e-2
   kPassed,     ///< wholly below the ground
   kOverlap,    ///< deeper in the ground at the end than kMostOverlap of the length
   kOffTarget,  ///< held points and joints: more than 1e-6 of the length, or rad, beside what the place's digits allow

@@ -35,7 +35,8 @@ constexpr double kNudge = 0.01;        // by how much what drives a scene is cha
 struct ErrorArguments {
   std::vector<std::string> scenes, methods{"complementary"}, impacts{"absorbed", "held_from_touch"}, residuals{"on"},
       bases{"float"};
-  std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1};
+  std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1},
+      substeps{0, 2, 4, 8, 16, 32};
   std::vector<double> drives{1.0};
   std::string against = "linear", target, settings, csv, plot;
   bool split = false, capture = false;
@@ -99,6 +100,7 @@ std::string method_of(const ErrorSetting& at) {
   if (at.contacts != usual.contacts)
     out += at.contacts == 0 ? ", all contacts" : fmt::format(", {} contacts", at.contacts);
   if (!at.residual) out += ", no residual";
+  if (at.substeps > 0) out += fmt::format(", game {}", at.substeps);
   if (at.basis != usual.basis) out += ", " + at.basis;
   if (at.mesh != usual.mesh) out += fmt::format(", mesh {}", at.mesh);
   if (at.drive != usual.drive) out += fmt::format(", drive {:g}", at.drive);
@@ -141,26 +143,35 @@ std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
     for (const std::string& basis : a.bases)
       for (const std::string& residual : a.residuals)
         for (const int contacts : a.contacts)
-          for (const std::string& impact : a.impacts)
-            for (const std::string& method : a.methods)
-              for (const double drive : a.drives)
-                for (const int rate : a.rates)
-                  for (const int modes : a.modes)
-                    out.push_back({.modes = modes,
-                                   .step = 1.0 / rate,
-                                   .method = method,
-                                   .impact = impact,
-                                   .contacts = contacts,
-                                   .residual = residual == "on",
-                                   .basis = basis,
-                                   .mesh = mesh,
-                                   .drive = drive});
+          for (const int substeps : a.substeps)
+            for (const std::string& impact : a.impacts)
+              for (const std::string& method : a.methods)
+                for (const double drive : a.drives)
+                  for (const int rate : a.rates)
+                    for (const int modes : a.modes)
+                      out.push_back({.modes = modes,
+                                     .step = 1.0 / rate,
+                                     .method = method,
+                                     .impact = impact,
+                                     .contacts = contacts,
+                                     .substeps = substeps,
+                                     .residual = residual == "on",
+                                     .basis = basis,
+                                     .mesh = mesh,
+                                     .drive = drive});
   return out;
 }
 
-/// Without contact other rules are the same run again.
-bool has_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
+bool is_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
   return at.method == a.methods.front() && at.impact == a.impacts.front() && at.contacts == a.contacts.front();
+}
+
+/// Whether no other setting makes the same run: rules of contact are the exact solver's, substeps those of what is
+/// held, joined or touched.
+bool is_run_of_its_own(const ErrorScene& scene, const ErrorSetting& at, const ErrorArguments& a) {
+  const bool is_first_rule = is_first_contact_rule(at, a);
+  if (!scene.has_constraints()) return is_first_rule && at.substeps == a.substeps.front();
+  return is_first_rule || (at.substeps == 0 && scene.has_contact());
 }
 
 /// Marks the rows of a scene that no other beats in both error and time.
@@ -175,7 +186,8 @@ void mark_front(std::vector<ErrorRow>& rows) {
 // Table ------------------------------------------------------------------------------------------------------------
 
 using Column = std::pair<const char*, double (*)(const ErrorRow&)>;
-constexpr std::array<Column, 22> kColumns{{
+constexpr std::array<Column, 23> kColumns{{
+    {"substeps", [](const ErrorRow& r) { return static_cast<double>(r.at.substeps); }},
     {"error", [](const ErrorRow& r) { return r.error.motion.mean; }},
     {"error_worst", [](const ErrorRow& r) { return r.error.motion.worst; }},
     {"error_vertex", [](const ErrorRow& r) { return r.error.motion.worst_vertex; }},
@@ -353,7 +365,9 @@ double share_of(const std::string& text) {
 }
 
 /// Settings that a scene file can hold.
-bool is_told_by_a_scene(const ErrorSetting& at) { return at.modes > 0 && at.contacts == 4 && at.basis == "float"; }
+bool is_told_by_a_scene(const ErrorSetting& at) {
+  return at.substeps == 0 && at.modes > 0 && at.contacts == 4 && at.basis == "float";
+}
 
 void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, const std::vector<ErrorRow>& rows) {
   const double target = share_of(a.target);
@@ -416,7 +430,7 @@ void benchmark_error(Program& program, const ErrorArguments& a) {
   program.print(kHead);
   for (const ErrorScene* scene : scenes) {
     for (const ErrorSetting& at : settings_of(a))
-      if (scene->has_contact() || has_first_contact_rule(at, a)) rows.push_back(run_setting(runs, *scene, at, a));
+      if (is_run_of_its_own(*scene, at, a)) rows.push_back(run_setting(runs, *scene, at, a));
     if (a.against == "linear") rows.push_back(run_all_nodes(runs, *scene));
   }
   mark_front(rows);
@@ -425,7 +439,11 @@ void benchmark_error(Program& program, const ErrorArguments& a) {
   report["benchmark"] = "error";
   report["against"] = a.against;
   for (const ErrorRow& row : rows) report["rows"].push_back(json_of(row));
-  if (a.split) print_parts(program, runs, scenes, settings_of(a).back());
+  if (a.split) {
+    ErrorSetting last = settings_of(a).back();
+    last.substeps = 0;
+    print_parts(program, runs, scenes, last);
+  }
   if (a.capture) print_capture(program, runs, scenes, a);
   if (!a.csv.empty()) program.write_file(a.csv, csv_of(rows));
   if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows));
@@ -444,6 +462,8 @@ void declare_axes(CLI::App& app, ErrorArguments& a) {
   list("--impact", a.impacts, "whether impacts rebound", "NAME,...")
       ->check(CLI::IsMember({"absorbed", "held", "held_from_touch"}));
   list("--contacts", a.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
+  list("--substeps", a.substeps, "of contact, handles and joints by small steps; 0: the exact solver", "N,...")
+      ->check(CLI::Range(0, 1'000));
   list("--residual", a.residuals, "static answers of the modes left out", "on|off,...")
       ->check(CLI::IsMember({"on", "off"}));
   list("--basis", a.bases, "shapes as they are, or rounded to half precision", "float|half,...")
@@ -462,7 +482,8 @@ void declare(CLI::App& app, ErrorArguments& a) {
       ->check(CLI::IsMember({"linear", "nonlinear", "neo-hookean", "linear-fine", "fine"}))
       ->capture_default_str();
   app.add_flag("--split", a.split,
-               "tell what the last setting's error is made of: step, contact rule, modes, frame, linearisation, mesh");
+               "tell what the last setting's error by the exact solver is made of: step, contact rule, modes, frame, "
+               "linearisation, mesh");
   app.add_flag("--capture", a.capture, "tell how much of the static compliance the modes show, from the assets alone");
   app.add_option("--target-error", a.target, "name the cheapest setting within it, such as 1%")->type_name("SHARE");
   app.add_option("-o,--output", a.settings, "write that setting as a scene for limber-simulate, with its assets beside")

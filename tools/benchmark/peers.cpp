@@ -14,6 +14,7 @@
 #include "cpu_time.h"
 #include "growing_table.h"
 #include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/core/error.h"
 #include "limber/engine/world.h"
 #include "limber/mesh/surface_mesh.h"
@@ -28,9 +29,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct PeersArguments {
-  int bodies = 100, seconds = 6, modes = 20, copies = 4;
+  int substeps = SmallSteps{}.substeps, bodies = 100, seconds = 6, modes = 20, copies = 4;
   std::vector<int> vertices{0, 1000};
-  std::vector<std::string> scenes{"boxes", "mixed"};
+  std::vector<std::string> scenes{"boxes", "mixed"}, solvers{"game"};
   std::string csv;
   bool skip_piles = false, skip_reduced = false;
 };
@@ -70,10 +71,19 @@ LibraryPile library_pile(scenes::SceneLibrary& library, const std::string& name,
   return out;
 }
 
+std::unique_ptr<ContactSource> finder_for(ContactSolver solver) {
+  if (solver == ContactSolver::kGame) return std::make_unique<ManifoldFinder>();
+  return std::make_unique<ContactFinder>();
+}
+
 class LimberPile final : public PileEngine {
  public:
-  explicit LimberPile(const LibraryPile& made) : world_({.step = made.scene.step, .gravity = made.scene.gravity}) {
-    world_.set_contact_source(&finder_, *made.scene.contact);
+  LimberPile(const LibraryPile& made, ContactSolver solver, int substeps)
+      : finder_(finder_for(solver)), world_({.step = made.scene.step, .gravity = made.scene.gravity}) {
+    ContactOptions options = *made.scene.contact;
+    options.solver = solver;
+    options.small_steps.substeps = substeps;
+    world_.set_contact_source(finder_.get(), options);
     for (std::size_t i = 0; i < made.scene.bodies.size(); ++i) {
       BodyPlacement placement = made.scene.bodies[i].placement;
       placement.shape = made.models.shape_of_body[i];
@@ -100,7 +110,7 @@ class LimberPile final : public PileEngine {
   }
 
  private:
-  ContactFinder finder_;
+  std::unique_ptr<ContactSource> finder_;
   World world_;
   std::vector<BodyId> bodies_;
   PileStep seen_;
@@ -229,7 +239,10 @@ PileTable run_piles(Program& program, const PeersArguments& a, GrowingTable& csv
     const auto play = [&](const std::string& name, std::unique_ptr<PileEngine> engine) {
       run_pile(program, *engine, made.pile, {.scene = scene, .engine = name}, a.seconds, table, csv);
     };
-    play("limber", std::make_unique<LimberPile>(made));
+    for (const std::string& solver : a.solvers)
+      play(solver == "game" ? "limber" : "exact",
+           std::make_unique<LimberPile>(made, solver == "game" ? ContactSolver::kGame : ContactSolver::kExact,
+                                        a.substeps));
 #if LIMBER_HAS_BOX3D
     play("Box3D", box3d_pile(made.pile));
 #endif
@@ -325,7 +338,7 @@ ReducedCost run_limber(const Bar& bar, const ReducedRun& run, bool all_contacts)
   ContactFinder finder(options);
   World world({.step = run.step, .gravity = run.on_ground ? Vec3(0.0, 0.0, -9.80665) : Vec3(Vec3::Zero())});
   if (run.on_ground) {
-    world.set_contact_source(&finder);
+    world.set_contact_source(&finder, {.solver = ContactSolver::kExact});
     world.add_static(std::make_shared<Shape>(HalfSpace{}));
   }
   double low = 0.0;
@@ -476,6 +489,12 @@ void declare_peers(CLI::App& app, PeersArguments& a) {
       ->check(CLI::IsMember({"boxes", "mixed"}))
       ->capture_default_str();
   add("--bodies", a.bodies, 10'000, "of the piles");
+  app.add_option("--solver", a.solvers, "limber's, of the piles: game, told as limber; exact")
+      ->type_name("NAME,...")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"game", "exact"}))
+      ->capture_default_str();
+  add("--substeps", a.substeps, 1000, "of game");
   add("--seconds", a.seconds, 1000, "that the piles are played");
   add("--modes", a.modes, 200, "of the reduced body");
   add("--copies", a.copies, 10'000, "of the reduced body, beside one alone");

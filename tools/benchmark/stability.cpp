@@ -36,7 +36,8 @@ using Json = nlohmann::ordered_json;
 struct StabilityArguments {
   std::string grid = "extremes", csv, plot, limits, peer;
   std::vector<std::string> scenes, known;
-  int random = 360, steps = 120, every = 1, first = 0;
+  std::vector<std::string> solvers{"exact", "game"};
+  int random = 360, steps = 120, every = 1, first = 0, substeps = SmallSteps{}.substeps;
   bool simplify = false, recovers = false;
 };
 
@@ -214,13 +215,13 @@ struct SceneTally {
 };
 
 std::string line(std::string_view scene, const SceneTally& t) {
-  std::string out = fmt::format("{:<8} {:>6} {:>6} {:>8}", scene, t.cases, t.good, t.refused);
+  std::string out = fmt::format("{:<11} {:>6} {:>6} {:>8}", scene, t.cases, t.good, t.refused);
   for (const int count : t.by_fault) out += fmt::format(" {:>10}", count);
   return out + fmt::format(" {:>9.1e} {:>8.1f}\n", t.worst_rise, t.seconds);
 }
 
 std::string head() {
-  std::string out = fmt::format("{:<8} {:>6} {:>6} {:>8}", "scene", "cases", "good", "refused");
+  std::string out = fmt::format("{:<11} {:>6} {:>6} {:>8}", "scene", "cases", "good", "refused");
   for (int i = 0; i < testing::kStabilityFaults; ++i) out += fmt::format(" {:>10}", name(StabilityFault(i)));
   return out + fmt::format(" {:>9} {:>8}\n", "rise", "seconds");
 }
@@ -303,12 +304,23 @@ std::vector<Figure> figures_of(const std::map<std::string, SceneTally>& tallies)
   return figures;
 }
 
-/// The cases of a grid that are asked for.
+/// A scene by one of the solvers, as tables name it.
+std::string tallied(const StabilityCase& at) {
+  return std::string(testing::name(at.scene)) + (at.substeps > 0 ? ".game" : "");
+}
+
+/// The cases of a grid that are asked for, scene by scene; a solver at a time where constraints act.
 std::vector<StabilityCase> cases_of(const std::vector<StabilityCase>& grid, const StabilityArguments& a) {
   std::vector<StabilityCase> cases;
-  for (std::size_t i = static_cast<std::size_t>(a.first); i < grid.size(); i += static_cast<std::size_t>(a.every))
-    if (a.scenes.empty() || std::ranges::find(a.scenes, testing::name(grid[i].scene)) != a.scenes.end())
+  for (const std::string& solver : a.solvers)
+    for (std::size_t i = static_cast<std::size_t>(a.first); i < grid.size(); i += static_cast<std::size_t>(a.every)) {
+      const bool is_asked =
+          a.scenes.empty() || std::ranges::find(a.scenes, testing::name(grid[i].scene)) != a.scenes.end();
+      const bool is_known = grid[i].scene == testing::StabilityScene::kFlight && solver != a.solvers.front();
+      if (!is_asked || is_known) continue;
       cases.push_back(grid[i]);
+      if (solver == "game" && grid[i].scene != testing::StabilityScene::kFlight) cases.back().substeps = a.substeps;
+    }
   return cases;
 }
 
@@ -320,6 +332,13 @@ void tell_if_bad(Program& program, const CaseRow& row, const StabilityArguments&
   program.progress().stage("simplifying " + testing::text(row.at));
   const CaseRow simple = simplest(row, a.steps);
   program.print("    as in " + verdict(simple) + ": " + testing::text(simple.at) + "\n");
+}
+
+/// Rows of one solver: shares of faults of two are not to be mixed in one field.
+std::vector<CaseRow> of_first_solver(std::vector<CaseRow> rows) {
+  const bool by_game = rows.front().at.substeps > 0;
+  std::erase_if(rows, [&](const CaseRow& row) { return (row.at.substeps > 0) != by_game; });
+  return rows;
 }
 
 void benchmark_stability(Program& program, const StabilityArguments& a) {
@@ -335,15 +354,15 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   std::map<std::string, SceneTally> tallies;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     program.progress().stage(fmt::format("case {} of {}: {}", i + 1, cases.size(), testing::text(cases[i])));
-    rows.push_back(try_case(cases[i], a.steps, !a.peer.empty(), known));
+    rows.push_back(try_case(cases[i], a.steps, !a.peer.empty() && cases[i].substeps == 0, known));
     csv.add(csv_of(rows.back()));
     tell_if_bad(program, rows.back(), a);
-    SceneTally& tally = tallies[testing::name(cases[i].scene)];
+    SceneTally& tally = tallies[tallied(cases[i])];
     tally.add(rows.back());
     tallies["all"].add(rows.back());
-    if (i + 1 == cases.size() || cases[i + 1].scene != cases[i].scene)
-      program.print(fmt::format("{}: {} of {} cases good, {} of {} done\n", testing::name(cases[i].scene), tally.good,
-                                tally.cases, i + 1, cases.size()));
+    if (i + 1 == cases.size() || tallied(cases[i + 1]) != tallied(cases[i]))
+      program.print(fmt::format("{}: {} of {} cases good, {} of {} done\n", tallied(cases[i]), tally.good, tally.cases,
+                                i + 1, cases.size()));
   }
   program.print("\n" + head());
   for (const auto& [scene, tally] : tallies)
@@ -363,7 +382,7 @@ void benchmark_stability(Program& program, const StabilityArguments& a) {
   report["steps"] = all.steps;
   report["unsettled_steps"] = all.unsettled;
   report["worst_rise"] = all.worst_rise;
-  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(rows));
+  if (!a.plot.empty()) write_plot(program, a.plot, svg_of(of_first_solver(rows)));
   if (!a.limits.empty()) hold_to_limits(program, figures_of(tallies), a.limits);
   csv.finish(program);
 }
@@ -380,6 +399,15 @@ void declare(CLI::App& app, StabilityArguments& a) {
       ->type_name("NAME,...")
       ->delimiter(',')
       ->check(CLI::IsMember({"flight", "ground", "pile", "handle", "chain"}));
+  app.add_option("--solver", a.solvers, "who answers contacts, handles and joints: exact, game")
+      ->type_name("NAME,...")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"exact", "game"}))
+      ->capture_default_str();
+  app.add_option("--substeps", a.substeps, "of game")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   app.add_option("--random", a.random, "random cases of each scene, for --grid extremes")
       ->type_name("N")
       ->check(CLI::Range(0, 1'000'000))
