@@ -1,13 +1,16 @@
 // Joints at game quality (ContactSolver::kGame, 8 substeps, 60 steps a second): how long chains take, how far their
 // joints open, and what the energy does. Prints Markdown.
-// Usage: joint_chains [chains|ends|tops|grid]
+// Usage: joint_chains [chains|ends|tops|figures|grid]
 // Figures: docs/reports/joints.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <numbers>
+#include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "cpu_time.h"
@@ -26,7 +29,7 @@ struct NoContacts final : ContactSource {
   void find_impacts(const ImpactQuery&, std::vector<Impact>& impacts, Jobs&) override { impacts.clear(); }
 };
 
-constexpr ContactOptions kGame{.solver = ContactSolver::kGame};
+constexpr ContactOptions kGame{.solver = ContactSolver::kGame, .small_steps = {8}};
 
 /// One that bends by as much under what is so many times heavier as it would under its own like.
 std::shared_ptr<const ModalModel> link(int modes, double times) {
@@ -184,6 +187,96 @@ void tops() {
   }
 }
 
+/// Ten boxes as a figure: hinges at knees and elbows, balls with cones at hips, shoulders and neck. It falls turned at
+/// random.
+struct Figure : Chain {
+  Figure(World& world, const RigidTransform& place) {
+    const BodyId trunk = add(world, place, {0.0, 0.0, 0.0}, {0.15, 0.1, 0.3});
+    ball(world, place, trunk, add(world, place, {0.0, 0.0, 0.45}, {0.08, 0.08, 0.1}), {0.0, 0.0, 0.32}, Vec3::UnitZ());
+    for (const double side : {-1.0, 1.0}) {
+      const BodyId thigh = add(world, place, {0.1 * side, 0.0, -0.55}, {0.07, 0.07, 0.2}),
+                   shin = add(world, place, {0.1 * side, 0.0, -1.0}, {0.05, 0.05, 0.2}),
+                   upper = add(world, place, {0.35 * side, 0.0, 0.2}, {0.15, 0.05, 0.05}),
+                   lower = add(world, place, {0.7 * side, 0.0, 0.2}, {0.15, 0.04, 0.04});
+      ball(world, place, trunk, thigh, {0.1 * side, 0.0, -0.33}, -Vec3::UnitZ());
+      hinge(world, place, thigh, shin, {0.1 * side, 0.0, -0.77}, Vec3::UnitX());
+      ball(world, place, trunk, upper, {0.18 * side, 0.0, 0.2}, side * Vec3::UnitX());
+      hinge(world, place, upper, lower, {0.52 * side, 0.0, 0.2}, Vec3::UnitZ());
+    }
+  }
+  BodyId add(World& world, const RigidTransform& place, const Vec3& at, const Vec3& half_extent) {
+    bodies.push_back(
+        world.add_body(sample_model({.modes = 0, .half_extent = half_extent}), {.pose = {place.q, place * at}}));
+    return bodies.back();
+  }
+  static JointSpec spec(const RigidTransform& place, JointType type, const Vec3& at, const Vec3& axis) {
+    JointSpec joint{.type = type, .frame = {.origin = place * at}};
+    const Vec3 x = axis.normalized(), y = x.unitOrthogonal();
+    joint.frame.axes.col(0) = place.q * x, joint.frame.axes.col(1) = place.q * y,
+    joint.frame.axes.col(2) = place.q * x.cross(y);
+    return joint;
+  }
+  void ball(World& world, const RigidTransform& place, BodyId a, BodyId b, const Vec3& at, const Vec3& axis) {
+    JointSpec joint = spec(place, JointType::kBall, at, axis);
+    joint.limits.cone = kCone;
+    cones.push_back(world.add_joint(a, b, joint));
+    tips.push_back({a, b, world.body(a).pose.q.conjugate() * joint.frame.axes.col(0)});
+    joints.push_back(cones.back());
+  }
+  void hinge(World& world, const RigidTransform& place, BodyId a, BodyId b, const Vec3& at, const Vec3& axis) {
+    JointSpec joint = spec(place, JointType::kRevolute, at, axis);
+    joint.limits.rotation = {-0.1, kBend};
+    hinges.push_back(world.add_joint(a, b, joint));
+    joints.push_back(hinges.back());
+  }
+  /// By how much a limit is passed, rad.
+  double passed(const World& world) const {
+    double most = 0.0;
+    for (const JointId joint : hinges) {
+      const double angle = world.joint(joint).position[0];
+      most = std::max({most, angle - kBend, -0.1 - angle});
+    }
+    for (const auto& [a, b, axis] : tips) {
+      const Vec3 of_a = world.body(a).pose.q * axis, of_b = world.body(b).pose.q * axis;
+      most = std::max(most, std::atan2(of_a.cross(of_b).norm(), of_a.dot(of_b)) - kCone);
+    }
+    return most;
+  }
+  static constexpr double kCone = 0.8, kBend = 2.0;  // rad
+  std::vector<JointId> cones, hinges;
+  std::vector<std::tuple<BodyId, BodyId, Vec3>> tips;
+};
+
+void figures() {
+  std::printf(
+      "| figures | ms a step and figure: p50 | p99 | limits passed, degrees: p99 of steps | most | opening, m | steps "
+      "not solved |\n|---|---|---|---|---|---|---|\n");
+  std::mt19937 numbers(1);
+  std::normal_distribution<double> normal;
+  Seen seen;
+  std::vector<double> passed;
+  int failed = 0;
+  constexpr int kFalls = 30;
+  for (int fall = 0; fall < kFalls; ++fall) {
+    GroundedWorld scene(kGame);
+    const Quaternion q = normalized({normal(numbers), normal(numbers), normal(numbers), normal(numbers)});
+    const Figure figure(scene.world, {q, {0.0, 0.0, 2.0}});
+    for (int i = 0; i < 180; ++i) {
+      const double start = thread_seconds();
+      scene.world.step();
+      seen.seconds.push_back(thread_seconds() - start);
+      passed.push_back(figure.passed(scene.world) * 180.0 / std::numbers::pi);
+      for (const JointId joint : figure.joints)
+        seen.apart = std::max(seen.apart, scene.world.joint(joint).distance_error);
+      failed += scene.world.constraint_report().solved ? 0 : 1;
+    }
+  }
+  std::ranges::sort(passed);
+  std::printf("| %d | %.3f | %.3f | %.2f | %.2f | %.1e | %d of %d |\n", kFalls, 1e3 * seen.at(0.5), 1e3 * seen.at(0.99),
+              passed[static_cast<std::size_t>(0.99 * static_cast<double>(passed.size()))], passed.back(), seen.apart,
+              failed, 180 * kFalls);
+}
+
 /// Balls on a square grid, joined to their neighbours and hung by one edge's corners.
 void grid() {
   std::printf("| balls | joints | ms a step: p50 | p99 | opening / size | moved, m |\n|---|---|---|---|---|---|\n");
@@ -216,11 +309,11 @@ void grid() {
 
 int run(const std::string& part) {
   const std::pair<const char*, void (*)()> parts[] = {
-      {"chains", chains}, {"ends", ends}, {"tops", tops}, {"grid", grid}};
+      {"chains", chains}, {"ends", ends}, {"tops", tops}, {"figures", figures}, {"grid", grid}};
   bool any = false;
   for (const auto& [name, print] : parts)
     if (part.empty() || part == name) any = true, print(), std::printf("\n");
-  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, tops or grid\n", part.c_str());
+  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, tops, figures or grid\n", part.c_str());
   return any ? 0 : 2;
 }
 

@@ -199,8 +199,8 @@ TEST(GameState, AWarmStepAllocatesNothing) {
   const HandleId hand = pile.world.add_handle(pile.bodies[9], kMarked);
   pile.world.add_joint(pile.bodies[0], pile.bodies[1],
                        hinge_at(pile.world.body(pile.bodies[0]).pose.p, JointType::kBall));
-  pile.world.set_handle_target(hand, {.position = {0.0, 0.0, 1.0}, .velocity = {0.01, 0.0, 0.0}});
-  pile.step(400);
+  pile.world.set_handle_target(hand, {.position = {0.0, 0.0, 1.0}});
+  pile.step(600);  // all that touch each other have met by then
   const long before = allocations();
   for (int i = 0; i < 60; ++i) pile.world.step();
   EXPECT_EQ(allocations() - before, 0);
