@@ -398,7 +398,9 @@ void ManifoldFinder::Impl::follow(ManifoldWorker& worker) const {
 }
 
 void ManifoldFinder::Impl::touch(std::span<const FeatureContact> found, const PairQuery& q, ManifoldWorker& worker) {
-  keep_inner_balls(*std::ranges::min_element(found, {}, &FeatureContact::gap), q, worker);
+  keep_inner_balls(
+      *std::min_element(found.begin(), found.end(), [](const auto& c, const auto& d) { return c.gap < d.gap; }), q,
+      worker);
   worker.path.turn_aside(found);
 }
 

@@ -108,7 +108,8 @@ PairQuery SweptPath::query() const {
 void SweptPath::turn_aside(std::span<const FeatureContact> contacts) {
   if (contacts.empty()) return;
   const Quaternion from_a = sides_[0].state.pose.q;
-  const auto deepest = std::ranges::min_element(contacts, {}, &FeatureContact::gap);
+  const auto deepest =
+      std::min_element(contacts.begin(), contacts.end(), [](const auto& c, const auto& d) { return c.gap < d.gap; });
   Side& mover = sides_[0].moves ? sides_[0] : sides_[1];
   const double sign = sides_[0].moves ? 1.0 : -1.0;
   if (deepest->gap < margin_) mover.state.pose.p += sign * 1.25 * (margin_ - deepest->gap) * (from_a * deepest->normal);

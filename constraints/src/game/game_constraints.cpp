@@ -361,7 +361,14 @@ void GameConstraints::solve(GameBodies& bodies) {
   }
 }
 
-/// Adds to the forces of the rows that hold what they are short of.
+/// A force within its row's bounds. Rows that contradict each other ask for any force, and what single precision loses
+/// of such a force would throw the bodies about: so forces are cut off before they act.
+double GameConstraints::cut_off(GameRow& row, double force) {
+  row.cut = force < row.lower - kRounded * std::abs(row.lower) || force > row.upper + kRounded * std::abs(row.upper);
+  return row.cut ? std::clamp(force, row.lower, row.upper) : force;
+}
+
+/// Adds to the forces of the rows that hold what they are short of, within their bounds.
 void GameConstraints::solve_once(GameBodies& bodies) {
   right_.assign(factor_.size(), 0.0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -385,9 +392,11 @@ void GameConstraints::solve_once(GameBodies& bodies) {
     forces_.assign(group.count, 0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
       const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
-      forces_[i] = right_[first + k];
-      rows_[group.first + i].force += forces_[i];
-      energy += forces_[i] * asked_[first + k];
+      GameRow& row = rows_[group.first + i];
+      const double force = cut_off(row, row.force + right_[first + k]);
+      forces_[i] = force - row.force;
+      row.force = force;
+      if (!row.cut) energy += forces_[i] * asked_[first + k];
     }
     taken_[static_cast<std::size_t>(group.component)] += energy;
     apply(group, forces_, bodies.motion());
@@ -448,9 +457,9 @@ void GameConstraints::multiply(const GameBodies& bodies, std::span<const double>
   }
 }
 
-/// Rows whose forces are beyond their bounds stay there, and those at a bound that would go beyond their gaps take
-/// hold. @return whether any did
-bool GameConstraints::let_go(GameBodies& bodies) {
+/// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps take hold.
+/// @return whether any did
+bool GameConstraints::let_go(const GameBodies& bodies) {
   bool changed = false;
   for (const Group& group : groups_)
     for (std::size_t i = 0; i < group.count; ++i) {
@@ -458,13 +467,8 @@ bool GameConstraints::let_go(GameBodies& bodies) {
       if (!is_bounded(row)) continue;
       const Hold before = row.hold;
       if (row.hold == Hold::kMet) {
-        if (row.force < row.lower - kRounded * std::abs(row.lower)) row.hold = Hold::kLower;
-        if (row.force > row.upper + kRounded * std::abs(row.upper)) row.hold = Hold::kUpper;
-        if (row.hold == Hold::kMet) continue;
-        forces_.assign(group.count, 0.0);
-        forces_[i] = (row.hold == Hold::kLower ? row.lower : row.upper) - row.force;
-        row.force += forces_[i];
-        apply(group, forces_, bodies.motion());
+        if (!row.cut) continue;
+        row.hold = row.force == row.lower ? Hold::kLower : Hold::kUpper;
       } else {
         const double open = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
         if (row.hold == Hold::kLower ? open > kRounded * length_ : open < -kRounded * length_) row.hold = Hold::kMet;
