@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -28,15 +29,17 @@ struct Arguments {
 /// One mode as people and tables want it.
 struct ModeLine {
   Index mode = 0;
-  double eigenvalue = 0.0;     // rad²/s²
-  double frequency_hz = 0.0;   // undamped
-  double damped_hz = 0.0;      // 0: it creeps back without swinging
-  double damping_ratio = 0.0;  // infinite for a damped mechanism
-  double decay = 0.0;          // 1/s
-  double largest_shape = 0.0;  // kg^−½, over the render surface
+  double eigenvalue = 0.0;       // rad²/s²
+  double frequency_hz = 0.0;     // undamped
+  double damped_hz = 0.0;        // 0: it creeps back without swinging
+  double damping_ratio = 0.0;    // infinite for a damped mechanism
+  double decay = 0.0;            // 1/s
+  double largest_shape = 0.0;    // kg^−½, over the render surface
+  double frequency_error = 0.0;  // relative, estimated; NaN: not told
 };
 
-std::vector<ModeLine> mode_lines(const ModalModel& model) {
+/// @param told frequency errors, or empty
+std::vector<ModeLine> mode_lines(const ModalModel& model, const std::vector<double>& told) {
   std::vector<ModeLine> lines;
   for (Index i = 0; i < model.modes(); ++i) {
     const double lambda = model.data().eigenvalues[static_cast<std::size_t>(i)];
@@ -50,7 +53,9 @@ std::vector<ModeLine> mode_lines(const ModalModel& model) {
                      .damped_hz = std::sqrt(std::max(lambda - decay * decay, 0.0)) / (2.0 * std::numbers::pi),
                      .damping_ratio = decay > 0.0 ? decay / std::sqrt(lambda) : 0.0,
                      .decay = decay,
-                     .largest_shape = largest});
+                     .largest_shape = largest,
+                     .frequency_error =
+                         told.empty() ? std::numeric_limits<double>::quiet_NaN() : told[static_cast<std::size_t>(i)]});
   }
   return lines;
 }
@@ -98,20 +103,21 @@ Json captured_report(const ModalModelData& d) {
 
 Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
 
-Json body_report(const ModalModel& model) {
+Json body_report(const ModalModel& model, const std::vector<double>& told) {
   const ModalModelData& d = model.data();
   const Box box = box_of(d.render);
   Json inertia = Json::array();
   for (int r = 0; r < 3; ++r) inertia.push_back(vector(d.inertia.row(r).transpose()));
   Json modes = Json::array();
-  for (const ModeLine& m : mode_lines(model))
+  for (const ModeLine& m : mode_lines(model, told))
     modes.push_back({{"mode", m.mode},
                      {"frequency_hz", m.frequency_hz},
                      {"damped_frequency_hz", m.damped_hz},
                      {"damping_ratio", m.damping_ratio},
                      {"decay", m.decay},
                      {"eigenvalue", m.eigenvalue},
-                     {"largest_shape", m.largest_shape}});
+                     {"largest_shape", m.largest_shape},
+                     {"frequency_error", m.frequency_error}});
   return {
       {"name", d.name},
       {"motion", to_string(d.motion)},
@@ -133,9 +139,9 @@ Json body_report(const ModalModel& model) {
 }
 
 /// Notes that a user of the asset should know.
-void warn(const ModalModel& model, Warnings& warnings) {
+void warn(const ModalModel& model, const std::vector<double>& told, Warnings& warnings) {
   const std::string body = "Body \"" + model.name() + "\"";
-  const auto lines = mode_lines(model);
+  const auto lines = mode_lines(model, told);
   const auto mechanisms =
       std::count_if(lines.begin(), lines.end(), [](const ModeLine& m) { return m.eigenvalue == 0.0; });
   if (mechanisms > 0)
@@ -183,7 +189,21 @@ std::string surfaces_text(const ModalModel& model) {
   return text + fmt::format("  memory          {:.2f} MB\n", 1e-6 * static_cast<double>(shape_bytes(d)));
 }
 
-std::string body_text(const ModalModel& model, std::size_t number) {
+/// Of the lowest elastic modes of which an error is told; nothing where none is.
+std::string errors_text(const std::vector<ModeLine>& lines) {
+  constexpr int kTold = 10;
+  double largest = 0.0;
+  int modes = 0;
+  for (const ModeLine& m : lines)
+    if (modes < kTold && m.eigenvalue > 0.0 && !std::isnan(m.frequency_error))
+      ++modes, largest = std::max(largest, std::abs(m.frequency_error));
+  if (modes == 0) return "";
+  return fmt::format(
+      "  frequencies     of the {} lowest elastic modes: within {:.2g} % of the continuum's, estimated\n", modes,
+      100.0 * largest);
+}
+
+std::string body_text(const ModalModel& model, const std::vector<double>& told, std::size_t number) {
   const ModalModelData& d = model.data();
   const Box box = box_of(d.render);
   const Vec3 size = box.high - box.low, center = d.center_of_mass + d.origin_in_input;
@@ -194,11 +214,14 @@ std::string body_text(const ModalModel& model, std::size_t number) {
   text += fmt::format("  centre of mass  ({:.6g}, {:.6g}, {:.6g}) m in the input mesh\n", center.x(), center.y(),
                       center.z());
   text += surfaces_text(model);
-  text += fmt::format("  {:>5} {:>14} {:>14} {:>14} {:>14}\n", "mode", "frequency Hz", "damped Hz", "damping ratio",
-                      "decay 1/s");
-  for (const ModeLine& m : mode_lines(model))
-    text += fmt::format("  {:>5} {:>14.6g} {:>14.6g} {:>14.6g} {:>14.6g}\n", m.mode, m.frequency_hz, m.damped_hz,
-                        m.damping_ratio, m.decay);
+  const std::vector<ModeLine> lines = mode_lines(model, told);
+  text += errors_text(lines);
+  text += fmt::format("  {:>5} {:>14} {:>14} {:>14} {:>14} {:>14}\n", "mode", "frequency Hz", "damped Hz",
+                      "damping ratio", "decay 1/s", "error of Hz %");
+  for (const ModeLine& m : lines)
+    text += fmt::format("  {:>5} {:>14.6g} {:>14.6g} {:>14.6g} {:>14.6g} {:>14}\n", m.mode, m.frequency_hz, m.damped_hz,
+                        m.damping_ratio, m.decay,
+                        std::isnan(m.frequency_error) ? "-" : fmt::format("{:+.2g}", 100.0 * m.frequency_error));
   return text;
 }
 
@@ -276,11 +299,13 @@ std::string csv_field(const std::string& text) {
 }
 
 std::string frequencies_csv(const Asset& asset) {
-  std::string csv = "body,mode,frequency_hz,damped_frequency_hz,damping_ratio,decay_per_s,eigenvalue_rad2_per_s2\n";
-  for (const auto& body : asset.bodies)
-    for (const ModeLine& m : mode_lines(*body))
-      csv += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.17g}\n", csv_field(body->name()), m.mode, m.frequency_hz,
-                         m.damped_hz, m.damping_ratio, m.decay, m.eigenvalue);
+  std::string csv =
+      "body,mode,frequency_hz,damped_frequency_hz,damping_ratio,decay_per_s,eigenvalue_rad2_per_s2,frequency_error\n";
+  for (std::size_t i = 0; i < asset.bodies.size(); ++i)
+    for (const ModeLine& m : mode_lines(*asset.bodies[i], asset.frequency_errors[i]))
+      csv += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{}\n", csv_field(asset.bodies[i]->name()), m.mode,
+                         m.frequency_hz, m.damped_hz, m.damping_ratio, m.decay, m.eigenvalue,
+                         std::isnan(m.frequency_error) ? "" : fmt::format("{:.3g}", m.frequency_error));
   return csv;
 }
 
@@ -301,9 +326,10 @@ void inspect(Program& program, const Arguments& a) {
                           {"options", asset.provenance.options}};
   report["bodies"] = Json::array();
   for (std::size_t i = 0; i < asset.bodies.size(); ++i) {
-    program.print(body_text(*asset.bodies[i], i));
-    report["bodies"].push_back(body_report(*asset.bodies[i]));
-    warn(*asset.bodies[i], program.warnings());
+    const std::vector<double>& told = asset.frequency_errors[i];
+    program.print(body_text(*asset.bodies[i], told, i));
+    report["bodies"].push_back(body_report(*asset.bodies[i], told));
+    warn(*asset.bodies[i], told, program.warnings());
   }
   program.print(joints_text(asset));
   report_machine(asset, report);

@@ -4,7 +4,9 @@
 #include <sys/resource.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -36,6 +38,7 @@ struct Arguments {
   int collision_triangles = 0;
   std::string mass;
   std::string elements;
+  std::string frequency_error;
   std::vector<double> rayleigh;
   std::string damping_ratio;
   std::string render_surface, collision_surface, skin;
@@ -121,12 +124,17 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
                  "tets from a surface: largest circumradius; default: 1/40 of the diagonal, less where parts are thin")
       ->type_name("M")
       ->check(positive_number());
+  app.add_option("--frequency-error", a.frequency_error,
+                 "tets from a surface: cells so small that the ten lowest elastic frequencies are within this of the "
+                 "continuum's, by the estimate that the asset keeps, as far as --max-nodes allows")
+      ->type_name("PERCENT%");
   app.add_option("--alpha", a.tets.alpha, "wrap of a soup: smallest hole it enters; default: 1/50 of the diagonal")
       ->type_name("M")
       ->check(positive_number());
   app.add_option(
          "--max-nodes", a.tets.max_nodes,
-         "tets from a surface: nodes that cells smaller than --cell-size may cost, where parts or gaps are thin")
+         "tets from a surface: nodes that cells smaller than --cell-size may cost, where parts or gaps are thin, or by "
+         "--frequency-error")
       ->type_name("N")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
@@ -229,6 +237,17 @@ SkinOptions skin_of(const std::string& text) {
   return skin;
 }
 
+/// "1%" or "0.5 %" as a ratio; 0 for an empty text.
+double frequency_error_of(const std::string& text) {
+  if (text.empty()) return 0.0;
+  double percent = 0.0;
+  char sign = 0, rest = 0;
+  if (std::sscanf(text.c_str(), "%lf %c %c", &percent, &sign, &rest) != 2 || sign != '%' || !(percent > 0.0) ||
+      !std::isfinite(percent))
+    throw InvalidArgument("--frequency-error " + text + ": expected per cent above 0, such as 1%");
+  return 0.01 * percent;
+}
+
 LoadKind load_of(const std::string& text) {
   return text == "static" ? LoadKind::kStatic : text == "resonant" ? LoadKind::kResonant : LoadKind::kSudden;
 }
@@ -254,6 +273,7 @@ BakeOptions options_of(const Arguments& a) {
   o.volume_block = a.volume_block;
   o.validate();
   a.tets.validate();
+  (void)frequency_error_of(a.frequency_error);
   return o;
 }
 
@@ -309,19 +329,93 @@ nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahed
           {"volume_after", t.volume_after}};
 }
 
-/// Fills a surface with tets; it stays what is drawn.
-void fill_with_tets(Program& program, const Arguments& a, BakeInput& input, Stopwatch& stopwatch) {
+/// Fills a surface with tets, told of failures by the file's name.
+Tetrahedralisation tets_of(Program& program, const Arguments& a, const SurfaceMesh& surface, double cell_size,
+                           Warnings& warnings) {
   TetrahedralisationOptions options = a.tets;
+  options.cell_size = cell_size;
   options.quadratic = a.elements != "linear";
   options.progress = [&](const std::string& stage) { program.progress().stage(stage); };
-  Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
-    try {
-      return tetrahedralise(*input.render, options, program.warnings());
-    } catch (const ComputationError& e) {
-      throw ComputationError("\"" + a.mesh + "\": " + e.what());
-    } catch (const InputError& e) {
-      throw InputError("\"" + a.mesh + "\": " + e.what());
+  try {
+    return tetrahedralise(surface, options, warnings);
+  } catch (const ComputationError& e) {
+    throw ComputationError("\"" + a.mesh + "\": " + e.what());
+  } catch (const InputError& e) {
+    throw InputError("\"" + a.mesh + "\": " + e.what());
+  }
+}
+
+/// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
+void choose_elements(const Arguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options) {
+  if (a.elements.empty() && made_here) options.elements = Elements::kQuadratic;
+  const bool quadratic =
+      options.elements == Elements::kQuadratic || (options.elements == Elements::kAsGiven && has_mid_edge_nodes);
+  if (a.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
+}
+
+/// Tets, and what a bake of the lowest modes alone tells of them.
+struct TriedCells {
+  Tetrahedralisation tets;
+  Warnings warnings;
+  double size = 0.0;   ///< of the tets as they are, m
+  double error = 0.0;  ///< estimated, of the lowest frequencies
+  Index nodes = 0;
+};
+
+/// Cells that were asked to be no larger than `cell_size`.
+TriedCells try_cells(Program& program, const Arguments& a, const BakeInput& input, BakeOptions options,
+                     double cell_size) {
+  TriedCells tried;
+  tried.tets = tets_of(program, a, *input.render, cell_size, tried.warnings);
+  choose_elements(a, true, false, options);
+  options.analysis.modes = options.limits.max_modes = kModesTold;
+  options.residual = {};
+  options.skin = {};
+  options.volume_block = false;
+  Warnings unread;  // those of the whole bake follow
+  TbbJobs jobs;
+  const BakeResult result = bake({.name = input.name, .mesh = tried.tets.mesh}, options, unread, jobs);
+  for (const BodyReport& body : result.bodies) {
+    tried.error = std::max(tried.error, largest_frequency_error(body));
+    tried.nodes += body.nodes;
+  }
+  // The circumradius of the regular tet of mean volume; the mesher's tets have 0.75 of the radius that it was given.
+  const double mean = tried.tets.volume_after / static_cast<double>(tried.tets.mesh.tets.size());
+  tried.size = std::cbrt(mean * 1.948) / 0.75;
+  return tried;
+}
+
+/// Smaller and smaller cells until the error is what was asked for, or nodes run out.
+Tetrahedralisation cells_by_error(Program& program, const Arguments& a, const BakeInput& input,
+                                  const BakeOptions& options) {
+  const double wanted = frequency_error_of(a.frequency_error);
+  constexpr double kAim = 0.8, kLeast = 0.35, kMost = 0.9;  // of the size before, or of the error wanted
+  double order = a.elements == "linear" ? 2.0 : 3.0;
+  TriedCells tried = try_cells(program, a, input, options, a.tets.cell_size);
+  while (tried.error > wanted) {
+    const double needed = std::clamp(std::pow(kAim * wanted / tried.error, 1.0 / order), kLeast, kMost);
+    const double affordable = std::cbrt(tried.nodes / static_cast<double>(a.tets.max_nodes));
+    if (affordable > kMost) {
+      program.warnings().push_back(fmt::format(
+          "--frequency-error: {} nodes leave an error of {:.2g} %, and smaller cells would take more than --max-nodes",
+          tried.nodes, 100.0 * tried.error));
+      break;
     }
+    TriedCells finer = try_cells(program, a, input, options, tried.size * std::max(needed, affordable));
+    if (finer.size < tried.size && finer.error < tried.error)
+      order = std::clamp(std::log(finer.error / tried.error) / std::log(finer.size / tried.size), 1.0, 4.0);
+    tried = std::move(finer);
+  }
+  program.warnings().insert(program.warnings().end(), tried.warnings.begin(), tried.warnings.end());
+  return std::move(tried.tets);
+}
+
+/// Fills a surface with tets; it stays what is drawn.
+void fill_with_tets(Program& program, const Arguments& a, const BakeOptions& bake, BakeInput& input,
+                    Stopwatch& stopwatch) {
+  Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
+    return a.frequency_error.empty() ? tets_of(program, a, *input.render, a.tets.cell_size, program.warnings())
+                                     : cells_by_error(program, a, input, bake);
   });
   stopwatch.add("wrap", t.seconds_wrap);
   stopwatch.add("thickness", t.seconds_thickness);
@@ -333,19 +427,20 @@ void fill_with_tets(Program& program, const Arguments& a, BakeInput& input, Stop
   input.mesh = std::move(t.mesh);
 }
 
-BakeInput read_input(Program& program, const Arguments& a, Stopwatch& stopwatch) {
+BakeInput read_input(Program& program, const Arguments& a, const BakeOptions& bake, Stopwatch& stopwatch) {
   BakeInput input;
   input.name = fs::path(a.mesh).stem().string();
   auto read = stopwatch.time("read", [&] { return read_any_mesh(a.mesh, program.warnings()); });
   if (auto* mesh = std::get_if<TetMesh>(&read)) {
     input.mesh = std::move(*mesh);
     scale(input.mesh.nodes, a.scale);
-    if (a.tets.cell_size > 0.0 || a.tets.alpha > 0.0)
-      program.warnings().push_back("--cell-size and --alpha have no effect: the input is made of tetrahedra already");
+    if (a.tets.cell_size > 0.0 || a.tets.alpha > 0.0 || !a.frequency_error.empty())
+      program.warnings().push_back(
+          "--cell-size, --frequency-error and --alpha have no effect: the input is made of tetrahedra already");
   } else {
     input.render = std::get<SurfaceMesh>(std::move(read));
     scale(input.render->vertices, a.scale);
-    fill_with_tets(program, a, input, stopwatch);
+    fill_with_tets(program, a, bake, input, stopwatch);
   }
   if (!a.render_surface.empty()) input.render = read_surface(program, a.render_surface, a.scale);
   if (!a.collision_surface.empty()) input.collision = read_surface(program, a.collision_surface, a.scale);
@@ -413,6 +508,8 @@ void check_assembly(const Arguments& a) {
         "--scene, --rigid, --ground and --no-ground are for assemblies: give --joints or --auto-joints");
   if (is_one && !(a.fixes.empty() && a.render_surface.empty() && a.collision_surface.empty()))
     throw InvalidArgument("--fix, --render-surface and --collision-surface are for single bodies, not for assemblies");
+  if (is_one && !a.frequency_error.empty())
+    throw InvalidArgument("--frequency-error is for single surfaces, not for assemblies");
   if (a.assembly.free && !a.assembly.ground.empty())
     throw InvalidArgument("--ground and --no-ground exclude each other");
 }
@@ -444,14 +541,6 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
                                             fs::absolute(a.output).lexically_relative(folder).string()));
 }
 
-/// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
-void choose_elements(const Arguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options) {
-  if (a.elements.empty() && made_here) options.elements = Elements::kQuadratic;
-  const bool quadratic =
-      options.elements == Elements::kQuadratic || (options.elements == Elements::kAsGiven && has_mid_edge_nodes);
-  if (a.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
-}
-
 void precompute(Program& program, const Arguments& a) {
   if (a.list_materials) return print_materials(program);
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
@@ -467,7 +556,7 @@ void precompute(Program& program, const Arguments& a) {
   for (const std::string& input : {a.mesh, a.materials_file, a.render_surface, a.collision_surface})
     if (!input.empty()) program.add_input(input);
   program.progress().stage("reading");
-  BakeInput input = read_input(program, a, stopwatch);
+  BakeInput input = read_input(program, a, options, stopwatch);
   input.provenance = provenance_of(program, a, program.options());
   choose_elements(a, program.report().contains("surface"), input.mesh.has_mid_edge_nodes(), options);
 

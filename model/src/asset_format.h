@@ -3,7 +3,9 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,7 +35,8 @@ class ContentHash {
     add(std::uint64_t{bodies});
   }
 
-  void add_body(const ModalModelData& body) {
+  /// @param frequency_errors per mode, or empty
+  void add_body(const ModalModelData& body, const std::vector<double>& frequency_errors) {
     add(body.name);
     add(to_string(body.motion));
     if (body.motion == FrameMotion::kLine) add(body.line_axis);
@@ -64,6 +67,10 @@ class ContentHash {
       add(std::string_view("captured"));
       add(std::uint64_t{body.captured.size()});
       for (const CapturedLoad& load : body.captured) add(load.at), add(load.share);
+    }
+    if (!frequency_errors.empty()) {
+      add(std::string_view("frequency_errors"));
+      for (const double x : frequency_errors) add(std::isnan(x) ? std::numeric_limits<double>::quiet_NaN() : x);
     }
     if (body.skin) {
       add(std::string_view("skin"));

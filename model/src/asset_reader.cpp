@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -162,6 +163,8 @@ class BodyReader {
   BodyReader(const json& value, const std::string& where, BinaryPieces& pieces)
       : mesh_(value, where), block_(extension_of(mesh_)), pieces_(pieces) {}
 
+  const std::vector<double>& frequency_errors() const { return frequency_errors_; }
+
   ModalModelData read() {
     data_.name = mesh_.text("name");
     read_rigid_body();
@@ -170,6 +173,7 @@ class BodyReader {
     if (block_.has("collision")) read_collision_surface();
     if (block_.has("volume_block")) read_volume();
     if (block_.has("residual_compliance")) read_residual();
+    if (block_.has("frequency_errors")) read_frequency_errors();
     if (block_.has("captured")) read_captured();
     if (block_.has("skin")) read_skin();
     block_.finish();
@@ -292,6 +296,19 @@ class BodyReader {
     data_.residual_compliance = std::move(residual);
   }
 
+  /// A number per mode, or null.
+  void read_frequency_errors() {
+    block_.for_each("frequency_errors", [&](const json& value, const std::string& where) {
+      if (!value.is_null() && !value.is_number()) throw InputError(where + ": expected a number or null");
+      const double error = value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
+      if (error <= -1.0) throw InputError(where + ": is " + JsonObject::shown(value) + ", expected more than -1");
+      frequency_errors_.push_back(error);
+    });
+    if (frequency_errors_.size() != modes_)
+      throw InputError(block_.where("frequency_errors") + ": has " + std::to_string(frequency_errors_.size()) +
+                       " entries, expected " + std::to_string(modes_) + ", one per mode");
+  }
+
   void read_captured() {
     const JsonObject block(block_.at("captured"), block_.where("captured"));
     const std::size_t loads = count_of(block, "loads");
@@ -355,6 +372,7 @@ class BodyReader {
   JsonObject mesh_, block_;
   BinaryPieces& pieces_;
   ModalModelData data_;
+  std::vector<double> frequency_errors_;
   std::size_t modes_ = 0;
 };
 
@@ -408,12 +426,14 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   for (const char* unread : {"asset", "scene", "scenes", "nodes", "materials", "extensionsUsed"})
     (void)root.has(unread);
 
-  Asset asset{.bodies = {}, .provenance = block.provenance, .joints = {}, .apart = {}};
+  Asset asset{.bodies = {}, .provenance = block.provenance, .joints = {}, .apart = {}, .frequency_errors = {}};
   std::vector<ModalModelData> bodies;
   std::set<std::string> names;
   BinaryPieces pieces(root, binary);
   root.for_each("meshes", [&](const json& value, const std::string& where) {
-    bodies.push_back(BodyReader(value, where, pieces).read());
+    BodyReader reader(value, where, pieces);
+    bodies.push_back(reader.read());
+    asset.frequency_errors.push_back(reader.frequency_errors());
     if (!names.insert(bodies.back().name).second) throw InputError(where + ".name: is that of another body too");
   });
   root.finish();
@@ -421,7 +441,7 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   if (bodies.empty()) throw InputError(name + ": holds no body");
 
   ContentHash hash(block.provenance, bodies.size());
-  for (const ModalModelData& body : bodies) hash.add_body(body);
+  for (std::size_t i = 0; i < bodies.size(); ++i) hash.add_body(bodies[i], asset.frequency_errors[i]);
   if (block.machine != nullptr)
     internal::read_machine(*block.machine, block.machine_place, static_cast<Index>(bodies.size()), asset);
   hash.add_machine(asset.joints, asset.apart);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -165,20 +166,38 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material) {
   return mesh;
 }
 
-void add_body(GlbBuilder& glb, const ModalModel& model, int material, ContentHash& hash) {
+void add_body(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& frequency_errors, int material,
+              ContentHash& hash) {
   const ModalModelData& body = model.data();
   GlbMesh mesh = surface_mesh(glb, model, material);
   json block = body_block(body);
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
   if (body.residual_compliance) block["residual_compliance"] = residual_block(glb, *body.residual_compliance);
+  if (!frequency_errors.empty()) block["frequency_errors"] = frequency_errors;  // NaN becomes null
   if (!body.captured.empty()) block["captured"] = captured_block(body.captured);
   if (body.skin) block["skin"] = skin_block(glb, *body.skin);
   mesh.extras = extras_for_people(model);
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
   // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.
   glb.add_node({.name = body.name, .mesh = glb.add_mesh(mesh), .translation = body.origin_in_input});
-  hash.add_body(body);
+  hash.add_body(body, frequency_errors);
+}
+
+void check_frequency_errors(const Asset& asset) {
+  if (asset.frequency_errors.empty()) return;
+  if (asset.frequency_errors.size() != asset.bodies.size())
+    throw InvalidArgument("asset_bytes: frequency_errors are told of " + std::to_string(asset.frequency_errors.size()) +
+                          " bodies, expected " + std::to_string(asset.bodies.size()) + " or none");
+  for (std::size_t i = 0; i < asset.bodies.size(); ++i) {
+    const auto& errors = asset.frequency_errors[i];
+    const auto modes = static_cast<std::size_t>(asset.bodies[i]->modes());
+    const auto wrong = [](double e) { return std::isinf(e) || e <= -1.0; };
+    if ((!errors.empty() && errors.size() != modes) || std::any_of(errors.begin(), errors.end(), wrong))
+      throw InvalidArgument("asset_bytes: frequency_errors of body \"" + asset.bodies[i]->name() + "\" are " +
+                            std::to_string(errors.size()) + " numbers, expected " + std::to_string(modes) +
+                            " above -1 and finite or NaN, or none");
+  }
 }
 
 void check(const Asset& asset) {
@@ -193,6 +212,7 @@ void check(const Asset& asset) {
                             " modes, expected at most " + std::to_string(kMaxMorphTargets) +
                             ", as viewers take no more morph targets; keep fewer (--modes)");
   }
+  check_frequency_errors(asset);
   const auto bodies = static_cast<Index>(asset.bodies.size());
   const auto require_two = [&](Index a, Index b, Index least, const char* what) {
     if (a < least || a >= bodies || b < 0 || b >= bodies || a == b)
@@ -233,7 +253,9 @@ std::string asset_bytes(const Asset& asset) {
   // Double-sided, because a render surface may be open.
   const int material = glb.add_material(
       {.name = "limber", .base_color = {0.62f, 0.70f, 0.78f, 1.0f}, .roughness = 0.55f, .double_sided = true});
-  for (const auto& body : asset.bodies) add_body(glb, *body, material, hash);
+  for (std::size_t i = 0; i < asset.bodies.size(); ++i)
+    add_body(glb, *asset.bodies[i], asset.frequency_errors.empty() ? std::vector<double>() : asset.frequency_errors[i],
+             material, hash);
   json block = {{"version", asset_format::kFormatVersion},
                 {"provenance",
                  {{"tool", provenance.tool},

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <functional>
@@ -181,6 +182,26 @@ TEST(Asset, SharesOfTheStaticComplianceAreKept) {
   expect_same_body(read.bodies[0]->data(), written.bodies[0]->data());
   EXPECT_NE(asset_bytes({.bodies = {captured(0.5)}, .provenance = {}}), bytes);
   EXPECT_THROW(captured(1.5), InvalidArgument);
+}
+
+TEST(Asset, ErrorsOfFrequenciesAreKeptAndMayBeUnknown) {
+  const auto with_errors = [](std::vector<double> errors) {
+    Asset asset{.bodies = {example::model(example::box("bar", 3))}, .provenance = {}};
+    asset.frequency_errors = {std::move(errors)};
+    return asset;
+  };
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  const std::string bytes = asset_bytes(with_errors({1.0 / 3.0, -0.01, unknown}));
+  const Asset read = asset_from_bytes(bytes, "test");
+  EXPECT_EQ(read.frequency_errors[0][0], 1.0 / 3.0);
+  EXPECT_EQ(read.frequency_errors[0][1], -0.01);
+  EXPECT_TRUE(std::isnan(read.frequency_errors[0][2]));
+  expect_same_bytes(asset_bytes(read), bytes);
+  EXPECT_NE(asset_bytes(with_errors({1.0 / 3.0, 0.02, unknown})), bytes);
+  const std::string untold = asset_bytes(with_errors({}));
+  EXPECT_TRUE(asset_from_bytes(untold, "test").frequency_errors[0].empty());
+  EXPECT_THROW(asset_bytes(with_errors({0.1, 0.1, -1.0})), InvalidArgument);
+  EXPECT_THROW(asset_bytes(with_errors({0.1})), InvalidArgument);
 }
 
 TEST(Asset, RigidBodyHasNoMorphTargets) {

@@ -25,6 +25,11 @@ function contentHash(document, binary) {
     optional(body.collision, 'vertices', 'triangles');
     optional(body.volume_block, 'nodes', 'tets');
     if (body.residual_compliance) text(body.residual_compliance.form), u64(body.residual_compliance.vertices);
+    if (body.captured) {
+      text('captured'), u64(body.captured.loads);
+      for (let i = 0; i < body.captured.loads; ++i) f64(body.captured.places.slice(3 * i, 3 * i + 3)), f64(body.captured.shares[i]);
+    }
+    if (body.frequency_errors) text('frequency_errors'), f64(body.frequency_errors.map((e) => e ?? NaN));
     if (body.skin) text('skin'), [body.skin.version, body.skin.handles].forEach(u64);
   }
   return `sha256:${hash.update(binary).digest('hex')}`;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -93,10 +94,11 @@ Json discarded(Index index, const DroppedMode& d) {
 
 void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
   const auto modes = merged_modes(bodies);
-  Json hz = Json::array(), kept = Json::array(), dropped = Json::array(), owner = Json::array();
+  Json hz = Json::array(), errors = Json::array(), kept = Json::array(), dropped = Json::array(), owner = Json::array();
   for (std::size_t i = 0; i < modes.size(); ++i) {
     const ModeSelection& s = bodies[modes[i].body].selection;
     hz.push_back(modes[i].hz);
+    errors.push_back(bodies[modes[i].body].frequency_errors[static_cast<std::size_t>(modes[i].mode)]);
     owner.push_back(modes[i].body);
     if (std::binary_search(s.kept.begin(), s.kept.end(), modes[i].mode)) {
       kept.push_back(i);
@@ -106,6 +108,7 @@ void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
       if (d.mode == modes[i].mode) dropped.push_back(discarded(static_cast<Index>(i), d));
   }
   report["frequencies_hz"] = std::move(hz);
+  report["frequency_errors"] = std::move(errors);
   if (bodies.size() > 1) report["body_of_frequency"] = std::move(owner);
   report["kept"] = std::move(kept);
   report["discarded"] = std::move(dropped);
@@ -126,6 +129,7 @@ Json json(const BodyReport& b) {
           {"zero_modes", b.zero_modes},
           {"mechanisms", b.mechanisms},
           {"frequencies_hz", b.frequencies_hz},
+          {"frequency_errors", b.frequency_errors},
           {"kept", b.selection.kept},
           {"discarded", std::move(dropped)},
           {"certified", b.certified},
@@ -167,7 +171,22 @@ std::string skin_summary(const SkinReport& r) {
   return text + "\n";
 }
 
+/// "  lowest ten modes: within 0.4 % of the continuum's, as their stresses tell"
+std::string error_summary(const BodyReport& b) {
+  const std::size_t told = std::min<std::size_t>(b.frequency_errors.size(), kModesTold);
+  return fmt::format("  lowest {}: frequencies within {:.2g} % of the continuum's, as their stresses tell\n",
+                     told == 1 ? std::string("elastic mode") : fmt::format("{} elastic modes", told),
+                     100.0 * largest_frequency_error(b));
+}
+
 }  // namespace
+
+double largest_frequency_error(const BodyReport& b) {
+  double largest = 0.0;
+  for (std::size_t m = 0; m < std::min<std::size_t>(b.frequency_errors.size(), kModesTold); ++m)
+    largest = std::max(largest, std::abs(b.frequency_errors[m]));
+  return largest;
+}
 
 void add_bake(Json& report, const std::vector<BodyReport>& bodies) {
   const Total total = total_of(bodies);
@@ -195,6 +214,7 @@ void add_bake_seconds(Json& seconds, const std::vector<BodyReport>& bodies) {
   seconds["factor"] = sum(bodies, [](const BodyReport& b) { return b.seconds.factor; });
   seconds["iterate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.iterate; });
   seconds["certify"] = sum(bodies, [](const BodyReport& b) { return b.seconds.certify; });
+  seconds["estimate"] = sum(bodies, [](const BodyReport& b) { return b.seconds_estimate; });
   seconds["residual"] = sum(bodies, [](const BodyReport& b) { return b.residual.seconds; });
   seconds["skin"] = sum(bodies, [](const BodyReport& b) { return b.skin.seconds; });
   seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds_embed; });
@@ -213,6 +233,7 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
       text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
                           b.frequencies_hz.front(), b.frequencies_hz.back(),
                           b.certified ? ", none missed (certified)" : ", not certified", b.selection.kept.size(), why);
+    if (!b.frequency_errors.empty()) text += error_summary(b);
     if (b.residual.modes > 0)
       text += fmt::format(
           "  {} residual modes at chosen places, of whose static compliance the others show {:.0f} % and more\n",

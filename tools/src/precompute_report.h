@@ -20,6 +20,12 @@ void add_bake(nlohmann::ordered_json& report, const std::vector<BodyReport>& bod
 /// Seconds per stage of the bake, summed over bodies.
 void add_bake_seconds(nlohmann::ordered_json& seconds, const std::vector<BodyReport>& bodies);
 
+/// Of how many of the lowest elastic modes the summary tells the error, and --frequency-error bounds it.
+inline constexpr int kModesTold = 10;
+
+/// The largest estimated error of these frequencies, relative, without its sign.
+double largest_frequency_error(const BodyReport& body);
+
 /// A few lines for people: what was baked and what was left out.
 std::string bake_summary(const std::vector<BodyReport>& bodies);
 

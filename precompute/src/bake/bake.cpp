@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "bake/residual.h"
 #include "bake/simplify_surface.h"
+#include "fem/frequency_error.h"
 #include "fem/locking.h"
 #include "fem/mass_properties.h"
 #include "limber/core/error.h"
@@ -361,6 +363,32 @@ void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, con
   r.seconds = a.seconds;
 }
 
+/// Of all elastic modes of the analysis.
+void estimate_errors(const BodyInput& in, std::span<const Material> materials, const ModalAnalysis& a,
+                     const ModalAnalysisOptions& options, BodyReport& report, Jobs& jobs) {
+  const auto start = Clock::now();
+  const auto mechanisms = static_cast<std::size_t>(a.mechanisms);
+  report.frequency_errors = internal::frequency_errors(
+      in.part.mesh, materials, in.fixed, options.mass, std::span(a.eigenvalues).subspan(mechanisms),
+      std::span(a.shapes).subspan(3 * mechanisms * static_cast<std::size_t>(a.nodes)), jobs);
+  report.seconds_estimate = seconds_since(start);
+}
+
+/// What the asset tells of each mode kept: mechanisms are exact, and modes that join for static loads are no modes of
+/// the continuum.
+std::vector<double> errors_of(std::span<const Index> kept, const ModalAnalysis& a, const BodyReport& report) {
+  std::vector<double> errors;
+  for (const Index m : kept) {
+    const auto elastic = static_cast<std::size_t>(m - a.mechanisms);
+    if (m < a.mechanisms)
+      errors.push_back(0.0);
+    else
+      errors.push_back(elastic < report.frequency_errors.size() ? report.frequency_errors[elastic]
+                                                                : std::numeric_limits<double>::quiet_NaN());
+  }
+  return errors;
+}
+
 /// Of the lowest elastic mode, where its linear tets lock.
 void warn_of_locking(const BodyInput& in, std::span<const Material> materials, const ModalAnalysis& a,
                      Warnings& warnings) {
@@ -423,6 +451,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
   fill_report(report, in, a, mass);
   warn_of_locking(in, materials, a, warnings);
+  estimate_errors(in, materials, a, wanted, report, jobs);
 
   const auto start = Clock::now();
   const BodySurfaces surfaces = place_surfaces(in, options, report);
@@ -444,6 +473,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
     data.eigenvalues.push_back(a.eigenvalues[m]);
     data.decays.push_back(decay_of(options.damping, a.eigenvalues[m]));
   }
+  report.kept_errors = errors_of(kept, a, report);
   add_inertial_integrals(data, a, mesh, kept);
   data.render = modal_surface(surfaces.render, a, mesh, kept, data.origin_in_input);
   if (surfaces.collision) data.collision = modal_surface(*surfaces.collision, a, mesh, kept, data.origin_in_input);
@@ -611,6 +641,7 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
     result.asset.bodies.push_back(bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));
+    result.asset.frequency_errors.push_back(result.bodies.back().kept_errors);
   }
   return result;
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "fem/element_rules.h"
 #include "limber/core/error.h"
 #include "limber/mesh/ten_node_tet.h"
 
@@ -43,19 +44,12 @@ Element make_element(const std::array<Vec3, 4>& x, const Material& material) {
   return e;
 }
 
-/// The four-point rule, of degree 2: one coordinate far, three near.
-constexpr double kFar = 0.58541019662496845446, kNear = 0.13819660112501051518;  // (5 + 3√5)/20, (5 − √5)/20
-
 using SlopesAtPoints = std::array<std::array<std::array<double, 4>, 10>, 4>;
 
 const SlopesAtPoints& slopes_at_points() {
   static const SlopesAtPoints kSlopes = [] {
     SlopesAtPoints slopes{};
-    for (std::size_t q = 0; q < 4; ++q) {
-      Barycentric L{kNear, kNear, kNear, kNear};
-      L[q] = kFar;
-      slopes[q] = quadratic_shape_slopes(L);
-    }
+    for (std::size_t q = 0; q < 4; ++q) slopes[q] = quadratic_shape_slopes(internal::rule_points(10)[q]);
     return slopes;
   }();
   return kSlopes;
@@ -229,23 +223,6 @@ SparseMatrix stiffness_pattern(const NodeGraph& graph) {
   return K;
 }
 
-/// Whole numbers whose ratio to `whole` is M_ab/m.
-int mass_share(std::size_t a, std::size_t b, std::size_t n) {
-  if (n == 4) return a == b ? 2 : 1;
-  if (a > b) std::swap(a, b);
-  if (b < 4) return a == b ? 6 : 1;
-  const auto ends = [](std::size_t edge, std::size_t corner) {
-    return static_cast<std::size_t>(kTetEdges[edge - 4][0]) == corner ||
-           static_cast<std::size_t>(kTetEdges[edge - 4][1]) == corner;
-  };
-  if (a < 4) return ends(b, a) ? -4 : -6;
-  if (a == b) return 32;
-  const bool meet =
-      ends(b, static_cast<std::size_t>(kTetEdges[a - 4][0])) || ends(b, static_cast<std::size_t>(kTetEdges[a - 4][1]));
-  return meet ? 16 : 8;
-}
-double whole_mass(std::size_t n) { return n == 4 ? 20.0 : 420.0; }
-
 /// A part of each tet's mass, kg: the unit its mass block is written in.
 std::vector<double> mass_units(const TetMesh& mesh, std::span<const Material> materials, double share) {
   std::vector<double> unit(mesh.tets.size());
@@ -275,7 +252,10 @@ SparseMatrix consistent_mass(const TetMesh& mesh, std::span<const Material> mate
   M.size = static_cast<Index>(mesh.nodes.size());
   M.value.assign(graph.neighbour.size(), 0.0);
   const std::size_t per_tet = mesh.has_mid_edge_nodes() ? 10 : 4;
-  const auto unit = mass_units(mesh, materials, 1.0 / whole_mass(per_tet));
+  const auto mass = mass_units(mesh, materials, 1.0);
+  std::array<std::array<double, 10>, 10> share{};
+  for (std::size_t a = 0; a < per_tet; ++a)
+    for (std::size_t b = 0; b < per_tet; ++b) share[a][b] = internal::mass_share(a, b, per_tet);
   jobs.parallel_for(mesh.nodes.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (Index node = static_cast<Index>(begin); node < static_cast<Index>(end); ++node) {
       double* column = M.value.data() + graph.neighbour_start[node];
@@ -283,7 +263,7 @@ SparseMatrix consistent_mass(const TetMesh& mesh, std::span<const Material> mate
         const TetNodes t(mesh, static_cast<std::size_t>(e));
         const auto own = static_cast<std::size_t>(std::find(t.begin(), t.end(), node) - t.begin());
         for (std::size_t a = 0; a < per_tet; ++a)
-          column[place_of(t[a], graph.neighbours_of(node))] += mass_share(a, own, per_tet) * unit[e];
+          column[place_of(t[a], graph.neighbours_of(node))] += share[a][own] * mass[e];
       }
     }
   });

@@ -34,6 +34,10 @@ struct Asset {
   Provenance provenance{};
   std::vector<AssetJoint> joints{};           ///< closed chains too
   std::vector<std::array<Index, 2>> apart{};  ///< bodies without contacts with each other, though no joint says so
+  /// Per body the estimated relative error of each mode's frequency, f_h/f − 1, against the continuum in the same
+  /// polyhedron (docs/modal-analysis.md): above −1, or NaN where none is known, as of modes that join a basis for
+  /// static loads. Empty, as a whole or for a body: not told.
+  std::vector<std::vector<double>> frequency_errors{};
 };
 
 /// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this

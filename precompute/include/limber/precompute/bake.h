@@ -160,8 +160,12 @@ struct BodyReport {
   int zero_modes = 0;           ///< rigid motions and mechanisms
   int mechanisms = 0;
   std::vector<double> frequencies_hz;  ///< elastic, before selection, ascending
-  ModeSelection selection;             ///< indices into frequencies_hz
-  bool all_modes = false;              ///< frequencies_hz holds every mode the mesh has
+  /// f_h/f − 1 of each of frequencies_hz against the continuum in the tets' own polyhedron, estimated by recovered
+  /// stresses (docs/modal-analysis.md).
+  std::vector<double> frequency_errors;
+  std::vector<double> kept_errors;  ///< the asset's: of the modes kept, mechanisms and those of static loads too
+  ModeSelection selection;          ///< indices into frequencies_hz
+  bool all_modes = false;           ///< frequencies_hz holds every mode the mesh has
   double residual_max = 0.0, residual_bound = 0.0, backward_error_max = 0.0, orthogonality_max = 0.0;
   bool certified = false;
   int solves = 0;
@@ -171,7 +175,7 @@ struct BodyReport {
   ResidualReport residual;
   SkinReport skin;
   ModalAnalysis::Seconds seconds;
-  double seconds_embed = 0.0;
+  double seconds_embed = 0.0, seconds_estimate = 0.0;
 };
 
 struct BakeResult {
