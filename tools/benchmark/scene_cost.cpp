@@ -6,6 +6,8 @@
 
 #include "counted_new.h"
 #include "cpu_time.h"
+#include "limber/collision/contact_finder.h"
+#include "limber/collision/manifold_finder.h"
 #include "limber/scene/scene_player.h"
 #include "touched_pages.h"
 
@@ -39,13 +41,23 @@ struct DrawnBodies {
   }
 };
 
+Scene with(const ContactChoice& choice, Scene scene) {
+  if (!scene.contact) return scene;
+  if (choice.solver) scene.contact->solver = *choice.solver;
+  if (choice.substeps > 0) scene.contact->small_steps.substeps = choice.substeps;
+  return scene;
+}
+
 class Measurement {
  public:
   Measurement(const TimedScene& timed, const CostOptions& options)
       : timed_(timed),
         options_(options),
-        player_(timed.scene, timed.models, timed.scene.steps, options.jobs ? *options.jobs : serial_jobs()),
+        finder_(options.contact.make_finder()),
+        scene_(with(options.contact, timed.scene)),
+        player_(scene_, timed.models, scene_.steps, options.jobs ? *options.jobs : serial_jobs()),
         drawn_(player_) {
+    if (finder_ && scene_.contact) player_.world().set_contact_source(finder_.get(), *scene_.contact);
     cost_.scene = timed.name;
     cost_.bodies = player_.bodies().size();
     cost_.vertices = static_cast<Index>(drawn_.positions.size() / 3);
@@ -115,12 +127,28 @@ class Measurement {
 
   const TimedScene& timed_;
   const CostOptions& options_;
+  const std::unique_ptr<ContactSource> finder_;  // null: the scene's
+  const Scene scene_;
   ScenePlayer player_;
   DrawnBodies drawn_;
   SceneCost cost_;
 };
 
 }  // namespace
+
+std::unique_ptr<ContactSource> ContactChoice::make_finder() const {
+  switch (finder) {
+    case Finder::kOfTheScene:
+      break;
+    case Finder::kContactFinder:
+      return std::make_unique<ContactFinder>();
+    case Finder::kManifolds:
+      return std::make_unique<ManifoldFinder>();
+    case Finder::kFields:
+      return std::make_unique<ManifoldFinder>(ManifoldFinderOptions{.distance_fields = true});
+  }
+  return nullptr;
+}
 
 SceneCost measure(const TimedScene& timed, const CostOptions& options) { return Measurement(timed, options).run(); }
 

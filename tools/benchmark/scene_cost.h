@@ -3,12 +3,15 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "limber/constraints/contact_constraint.h"
 #include "limber/core/jobs.h"
 #include "limber/core/stage_times.h"
+#include "limber/dynamics/contact_source.h"
 #include "limber/scene/scene_file.h"
 #include "limber/scene/scene_model.h"
 
@@ -22,10 +25,22 @@ struct TimedScene {
   int settling = 0;  ///< steps at the start that are not timed
 };
 
+/// Who answers contacts in place of what the scene says.
+struct ContactChoice {
+  enum class Finder { kOfTheScene, kContactFinder, kManifolds, kFields };
+  std::optional<ContactSolver> solver{};
+  Finder finder = Finder::kOfTheScene;
+  int substeps = 0;  ///< of ContactSolver::kGame; 0: the scene's
+
+  /// Null: the scene's own. kFields: ManifoldFinder with distance fields.
+  std::unique_ptr<ContactSource> make_finder() const;
+};
+
 struct CostOptions {
   int steps = 0;         ///< timed at most; 0: all of the scene
   Jobs* jobs = nullptr;  ///< null: serial
   bool draw = true;      ///< all bodies after every step: positions, then positions and normals
+  ContactChoice contact{};
 };
 
 struct SceneCost {

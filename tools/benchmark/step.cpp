@@ -26,6 +26,7 @@ using Json = nlohmann::ordered_json;
 struct StepArguments {
   std::vector<std::string> scenes;
   SceneScale scale;
+  ContactChoice contact;
   int steps = 0, threads = 1;
   bool sweep = false;
   std::string csv, plot, limits;
@@ -196,7 +197,7 @@ void measure_scenes(Program& program, const StepArguments& a) {
   for (const std::string& name : a.scenes.empty() ? usual_scenes() : a.scenes) {
     if (name.ends_with(".json")) program.add_input(name);
     program.progress().stage(name);
-    costs.push_back(measure(source.scene(name, a.scale), {.steps = a.steps, .jobs = jobs.get()}));
+    costs.push_back(measure(source.scene(name, a.scale), {.steps = a.steps, .jobs = jobs.get(), .contact = a.contact}));
     program.print(text_of(costs.back()));
     report["scenes"].push_back(counts_of(costs.back()));
     times.push_back(times_of(costs.back()));
@@ -275,6 +276,22 @@ void declare_step(CLI::App& app, StepArguments& a) {
   add_size("--steps", a.steps, 1'000'000, "timed at most; default: all of the scene; with --sweep 120");
   add_size("--threads", a.threads, 1024, "that share the work; times are then by the wall clock")
       ->capture_default_str();
+  using Finder = ContactChoice::Finder;
+  app.add_option("--solver", a.contact.solver,
+                 "who answers contacts, handles and joints: game, exact; default: the scene's")
+      ->transform(CLI::Transformer(
+          std::map<std::string, ContactSolver>{{"game", ContactSolver::kGame}, {"exact", ContactSolver::kExact}}))
+      ->option_text("NAME");
+  app.add_option(
+         "--finder", a.contact.finder,
+         "who finds contacts: exact (ContactFinder), manifolds (ManifoldFinder), fields (with distance fields); "
+         "default: the scene's")
+      ->transform(CLI::Transformer(std::map<std::string, Finder>{
+          {"exact", Finder::kContactFinder}, {"manifolds", Finder::kManifolds}, {"fields", Finder::kFields}}))
+      ->option_text("NAME");
+  app.add_option("--substeps", a.contact.substeps, "of the game solver; default: the scene's")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000));
   app.add_flag("--sweep", a.sweep, "how the cost grows with bodies, modes, vertices and contacts");
   app.add_option("--check", a.limits,
                  "measure small scenes alone and fail where counts, or ratios of times in this run, are beyond these "
