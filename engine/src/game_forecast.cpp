@@ -20,9 +20,11 @@ void expect_to_stay(BodyState& state) {
 
 }  // namespace
 
-bool GameForecast::write_states(double length, const Vec3& gravity) {
+bool GameForecast::write_states(double length, int substeps, const Vec3& gravity) {
   length_ = length;
   gravity_ = gravity;
+  // Velocities change at each substep's start: Σ k g h² over n of them, h = T/n.
+  fall_ = 0.5 * (1.0 + 1.0 / substeps) * length * length * gravity;
   if (told_.changes != sleep_->changes()) told_ = {sleep_->changes(), 2};
   if (told_.left > 0) {
     --told_.left;
@@ -67,14 +69,14 @@ void GameForecast::write_awake(Index body) {
   BodyState& state = states_[static_cast<std::size_t>(body)];
   state = {.pose = group.frame(e.slot).pose(), .look_ahead = e.extent.thickness};
   if (!e.shape) state.amplitudes = group.amplitudes(e.slot);
-  state.doubt = gravity_.norm() * length_ * length_ + kSpeculativeMargin * e.extent.thickness;
+  state.doubt = kSpeculativeMargin * e.extent.thickness;
   const bool steady = group.frame_constants().motion == FrameMotion::kFree && (e.shape || !group.skinned(e.slot));
   if (steady)
     expect_steady(body, state);
   else
     expect_exact(body, state);
   state.end_amplitudes = end_amplitudes_[static_cast<std::size_t>(body)];
-  state.reach += state.doubt;
+  state.reach += state.doubt + fall_.norm();
 }
 
 /// A free body goes on with its velocities, its modes no farther than they would swing by these: what lies on something

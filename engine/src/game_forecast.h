@@ -20,12 +20,15 @@ class GameForecast {
 
   /// What the source has been told is forgotten.
   void tell_all_anew() { told_ = {}; }
-  /// @param length of the step, s. @return whether those of bodies that sleep were written, too
-  bool write_states(double length, const Vec3& gravity);
+  /// @param length of the step, s, taken in so many substeps. @return whether those of bodies that sleep were written,
+  /// too
+  bool write_states(double length, int substeps, const Vec3& gravity);
 
   /// By body.
   std::span<const BodyState> states() const { return states_; }
   std::span<const double> thickness() const { return thickness_; }
+  /// See ContactQuery::fall.
+  const Vec3& fall() const { return fall_; }
 
  private:
   struct Told {
@@ -40,7 +43,7 @@ class GameForecast {
   BodyTable* bodies_;
   SleepStage* sleep_;
   double length_ = 0.0;
-  Vec3 gravity_ = Vec3::Zero();
+  Vec3 gravity_ = Vec3::Zero(), fall_ = Vec3::Zero();
   Told told_;
   // By body.
   std::vector<BodyState> states_;

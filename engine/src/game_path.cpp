@@ -37,11 +37,13 @@ void GamePath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, S
 /// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.
 void GamePath::find_contacts(const Substep& substep, Jobs& jobs, StageClock& clock) {
   do {
-    const bool told_all = forecast_.write_states(substep.length, substep.gravity);
+    const int substeps = rows_.set.options().small_steps.substeps;
+    const bool told_all = forecast_.write_states(substep.length, substeps, substep.gravity);
     if (told_all) rows_.note_friction(*bodies_);
     clock.lap(Stage::kLookAhead, std::ssize(sleep_->awake()));
     StageTimes theirs;
     registry_->source()->find_contacts({.states = forecast_.states(),
+                                        .fall = forecast_.fall(),
                                         .awake = told_all ? std::span<const Index>() : sleep_->awake(),
                                         .times = clock.runs() ? &theirs : nullptr},
                                        found_, jobs);

@@ -320,6 +320,65 @@ TEST(FieldContacts, HasWhatNarrowPhaseHas) {
   EXPECT_EQ(missed.unseen_pairs, 0) << "of " << missed.deep_pairs;
 }
 
+// Two balls 20 mm apart. What their motion brings together until the step's end is told before it, and nothing else.
+TEST(FieldContacts, TellsWhatTheExpectedMotionOfItsPointsCloses) {
+  constexpr Index kModes = 4;
+  constexpr double kReach = 1e-3, kApart = 0.02;
+  const auto model = testing::wavy_model(ball(), kModes);
+  TwoWays a(model), b(model);
+  Random random(21);
+  const RigidTransform start{random.pose(0.0).q, {0.0, 0.0, 0.2 + kApart}};
+  const auto at_end = [&](const std::vector<double>& z, const RigidTransform& end) {
+    b.place(end, z);
+    return by_fields(a, b, kReach);
+  };
+  FieldContacts finder;
+  const std::vector<double> still(kModes, 0.0);
+  const auto motion_to = [&](const RigidTransform& end) {
+    return internal::FieldMotion{between(a, b), a.exact.pose.inverse() * end};
+  };
+  const auto expected = [&](const std::vector<double>& z, const RigidTransform& end) {
+    b.place(start, still);
+    b.shell->set_amplitudes(still, z);
+    DeformedPointshell* const bodies[] = {&*b.shell};
+    deform(bodies, serial_jobs());
+    return finder.find(a.field(), b.field(), motion_to(end), kReach);
+  };
+  a.place({}, still);
+  const RigidTransform near{start.q, start.p - Vec3(0.0, 0.0, kApart + 0.005)};
+  const RigidTransform beside{start.q, start.p + Vec3(0.1, 0.0, 0.0)};
+  const RigidTransform spun{quaternion_from_rotation_vector({0.0, 0.0, 1.0}) * start.q, start.p};
+  EXPECT_TRUE(expected(still, start).empty());
+  EXPECT_TRUE(expected(still, beside).empty());
+  EXPECT_TRUE(expected(still, spun).empty());
+  // One of the two may fall on the other, but not beside it.
+  const RigidTransform here = between(a, b);
+  const auto count_in_fall = [&](const Vec3& fall) {
+    return finder.find(a.field(), b.field(), internal::FieldMotion{here, here, fall}, kReach).size();
+  };
+  EXPECT_EQ(count_in_fall({1.1 * kApart, 0.0, 0.0}), 0u);
+  EXPECT_GT(count_in_fall({0.0, 0.0, -1.1 * kApart}), 0u);
+  // By its frame alone, by its modes alone, and by both.
+  std::vector<double> bent = random.amplitudes(kModes, 0.01);
+  while (deepest(at_end(bent, start)) < 3e-3)
+    for (double& z : bent) z *= 1.2;
+  for (const auto& [z, end] : {std::pair(still, near), std::pair(bent, start), std::pair(bent, near)}) {
+    const std::vector<ContactPoint> then = at_end(z, end);
+    std::map<std::uint64_t, double> before;
+    int deep = 0;
+    for (const internal::FoundContact& c : expected(z, end)) {
+      before[c.id()] = c.gap;
+      EXPECT_LE(c.gap, kReach + FieldContacts::closing(a.field(), b.field(), motion_to(end), c));
+    }
+    for (const ContactPoint& c : then) {
+      if (is_edge_on_edge(c) || c.gap > -1e-3) continue;
+      ++deep;
+      EXPECT_TRUE(before.contains(c.id)) << c.gap;
+    }
+    EXPECT_GT(deep, 0);
+  }
+}
+
 // Two bars laid across each other without a vertex in the other: their edges carry them.
 TEST(FieldContacts, BarsAcrossEachOtherRestOnTheirEdges) {
   const auto bar_model =

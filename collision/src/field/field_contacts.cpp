@@ -37,6 +37,16 @@ void set_frame(FieldQuery& query, const Eigen::Matrix3f& R, const Vec3f& p) {
   }
 }
 
+void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransform& end) {
+  const Mat3 turn = to_matrix(end.q) - to_matrix(X_FS.q);
+  const Vec3 shift = end.p - X_FS.p;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) query.turn[i][j] = static_cast<float>(turn(i, j));
+    query.shift[i] = static_cast<float>(shift[i]);
+  }
+  query.turning = static_cast<float>(turn.norm());
+}
+
 const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const ClusterView& clusters,
                                             std::vector<std::uint32_t>& found) {
   found.resize(kFieldLanes * clusters.groups);
@@ -49,7 +59,7 @@ const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const Clust
 // -- What is found ----------------------------------------------------------------------------------------------------
 
 void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
-                      double reach) {
+                      const RigidTransform& end, double reach) {
   mine = &me, other = &field;
   turn = to_matrix(X_FS.q).cast<float>(), shift = X_FS.p.cast<float>();
   query.field = field.shell().distance();
@@ -57,12 +67,18 @@ void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& fi
   query.reach = static_cast<float>(reach);
   query.flex = field.flex();
   set_frame(query, turn, shift);
+  set_motion(query, X_FS, end);
+  query.swing = me.largest_swing();
 }
 
 bool FieldView::apart() const {
   const Vec3f centre = placed(0.5f * (mine->low() + mine->high())) - 0.5f * (other->low() + other->high());
   const Vec3f half = turn.cwiseAbs() * (0.5f * (mine->high() - mine->low())) + 0.5f * (other->high() - other->low());
-  return (centre.cwiseAbs() - half).maxCoeff() > query.reach;
+  const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&query.turn[0][0]);
+  const Vec3f middle = 0.5f * (mine->low() + mine->high());
+  const Vec3f moved = (turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2])).cwiseAbs();
+  const float spread = query.turning * 0.5f * (mine->high() - mine->low()).norm() + query.swing;
+  return (centre.cwiseAbs() - half - moved).maxCoeff() > query.reach + spread;
 }
 
 FoundSide at_vertex(const DeformedPointshell& body, Index v) {
@@ -132,11 +148,12 @@ bool FieldContacts::serves(const FieldBody& a, const FieldBody& b) {
   return fine(a, b) && fine(b, a);
 }
 
-std::span<const FoundContact> FieldContacts::find(const FieldBody& a, const FieldBody& b, const RigidTransform& X_AB,
+std::span<const FoundContact> FieldContacts::find(const FieldBody& a, const FieldBody& b, const FieldMotion& motion,
                                                   double reach) {
   reach_ = reach;
   found_.clear();
-  X_AB_ = X_AB;
+  bodies_[0] = &a, bodies_[1] = &b;
+  motion_ = motion;
   if (a.shell != nullptr && b.shell != nullptr) {
     find_between(a, b);
   } else {
@@ -149,10 +166,11 @@ std::span<const FoundContact> FieldContacts::find(const FieldBody& a, const Fiel
 void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   // What lies within the margin is told by the foot; the field is off by a part of its cells.
   const double slack = collision_tuning().field.slack;
-  view_[0].place(*a.shell, *b.shell, X_AB_.inverse(), reach_ + slack * b.shell->shell().cell());
-  view_[1].place(*b.shell, *a.shell, X_AB_, reach_ + slack * a.shell->shell().cell());
+  view_[0].place(*a.shell, *b.shell, motion_.X_AB.inverse(), motion_.end.inverse(),
+                 comes_near(1) + slack * b.shell->shell().cell());
+  view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, comes_near(0) + slack * a.shell->shell().cell());
   if (view_[0].apart() || view_[1].apart()) return;
-  edges_.begin(view_[0], view_[1], reach_);
+  edges_.begin(view_[0], view_[1]);
   for (int of = 0; of < 2; ++of) find_samples(of, find_near(view_[of].query, view_[of].mine->view().samples, near_));
   if (find_near(view_[0].query, view_[0].mine->view().edges, near_).empty() ||
       find_near(view_[1].query, view_[1].mine->view().edges, other_near_).empty())
@@ -172,7 +190,7 @@ void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters
     SampleFoot sample{.vertex = view.mine->shell().sample_vertex(hit.feature)};
     if (std::exchange(last, sample.vertex) == sample.vertex) continue;  // repeated to fill the last cluster
     settle_foot(view, hit, sample);
-    if (sample.gap <= static_cast<float>(reach_)) samples_.push_back(sample);
+    samples_.push_back(sample);
   }
   leave_by_patches(view);
   for (const SampleFoot& sample : samples_) add_sample(of, sample);
@@ -239,9 +257,10 @@ void FieldContacts::add_sample(int of, const SampleFoot& sample) {
 // -- Half-spaces, balls and capsules ----------------------------------------------------------------------------------
 
 void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape, bool shape_is_a) {
-  const RigidTransform X_BS = shape_is_a ? X_AB_.inverse() : X_AB_, X_SB = X_BS.inverse();
+  const RigidTransform X_BS = shape_is_a ? motion_.X_AB.inverse() : motion_.X_AB, X_SB = X_BS.inverse();
   FieldQuery query;
-  query.reach = static_cast<float>(reach_);
+  query.reach = static_cast<float>(reach_ + motion_.fall.norm());
+  query.swing = body.shell->largest_swing();
   Capsule capsule;
   const auto* half_space = std::get_if<HalfSpace>(&shape.geometry->shape());
   if (half_space != nullptr) {
@@ -251,18 +270,22 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     for (int axis = 0; axis < 3; ++axis) query.field.size[axis] = static_cast<float>(n[axis]);
     query.field.radius = static_cast<float>(half_space->offset + n.dot(X_BS.p));
     set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
+    // In that frame the plane moves the other way.
+    const RigidTransform moved = X_BS * (shape_is_a ? motion_.end : motion_.end.inverse());
+    set_motion(query, {}, moved);
   } else {
     capsule_of(shape, capsule);
     query.field.kind = DistanceView::Kind::kSegment;
     query.field.size[2] = static_cast<float>(capsule.half_length);
     query.field.radius = static_cast<float>(capsule.radius);
     set_frame(query, to_matrix(X_SB.q).cast<float>(), X_SB.p.cast<float>());
+    set_motion(query, X_SB, shape_is_a ? motion_.end : motion_.end.inverse());
   }
   const ShellView shell = body.shell->view();
   const std::vector<std::uint32_t>& clusters = find_near(query, shell.samples, near_);
   grow(hits_, kHitsOfCluster * clusters.size());
   const std::size_t count = near_samples(query, shell, clusters.data(), clusters.size(), hits_.data());
-  const Mat3 R_AB = to_matrix(X_AB_.q);
+  const Mat3 R_AB = to_matrix(motion_.X_AB.q);
   Index last = -1;
   for (const FieldHit& hit : std::span(hits_).first(count)) {
     const Index v = body.shell->shell().sample_vertex(hit.feature);
@@ -294,8 +317,15 @@ void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& sh
   FieldQuery query;
   query.field = shell.shell().distance(), query.lattice = shell.lattice();
   set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
-  const Mat3 R = to_matrix(X_BS.q), R_AB = to_matrix(X_AB_.q);
-  const double slack = collision_tuning().field.slack * shell.shell().cell() + static_cast<double>(shell.flex());
+  const Mat3 R = to_matrix(X_BS.q), R_AB = to_matrix(motion_.X_AB.q);
+  // How far points of the capsule come against those of the body.
+  const RigidTransform moved =
+      (shape_is_a ? motion_.end : motion_.end.inverse()) * X_BS;  // of the shape, from its frame now
+  const double comes = motion_.fall.norm() + moved.p.norm() +
+                       2.0 * moved.q.vector().norm() * (shape.half_length + shape.radius) +
+                       static_cast<double>(shell.largest_swing());
+  const double slack =
+      comes + collision_tuning().field.slack * shell.shell().cell() + static_cast<double>(shell.flex());
   feet_.clear();
   const int stations = shape.half_length > 0.0 ? 4 : 1;
   for (int station = 0; station < stations; ++station) {
@@ -337,7 +367,6 @@ void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& sh
       const bool inside = out.dot(outward) < 0.0;
       const Vec3 n =
           distance > 1e-5 * shape.radius ? Vec3(out / (inside ? -distance : distance)) : Vec3(outward.normalized());
-      if ((inside ? -distance : distance) - shape.radius > reach_) continue;
       FoundContact contact;
       FoundSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
       mine = on_foot(foot), mine.key = key;
@@ -348,13 +377,35 @@ void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& sh
   }
 }
 
+// m: gaps of the samples' own motion aside, up to which the other's points may come by its modes.
+double FieldContacts::comes_near(int of) const {
+  return reach_ + motion_.fall.norm() + static_cast<double>(bodies_[of]->shell->largest_swing());
+}
+
+double FieldContacts::closing(const FieldBody& a, const FieldBody& b, const FieldMotion& motion,
+                              const FoundContact& contact) {
+  const auto swing = [](const FieldBody& body, const FoundSide& side) {
+    Vec3 sum = Vec3::Zero();
+    if (body.shell == nullptr || side.triangle < 0) return sum;
+    const Triangle& t = body.shell->shell().surface().triangle(side.triangle);
+    for (std::size_t c = 0; c < 3; ++c)
+      if (side.weight[c] != 0.0) sum += side.weight[c] * body.shell->swing(t[c]).cast<double>();
+    return sum;
+  };
+  const Vec3& p_b = contact.of[1].point;
+  const Vec3 of_b = motion.end * Vec3(p_b + swing(b, contact.of[1])) - motion.X_AB * p_b;
+  return contact.normal.dot(of_b - swing(a, contact.of[0])) + std::abs(contact.normal.dot(motion.fall));
+}
+
 // Gaps are those of the points: in double, of numbers of single precision.
 void FieldContacts::settle() {
   for (FoundContact& found : found_) {
     found.normal.normalize();
-    found.gap = found.normal.dot(found.of[0].point - X_AB_ * found.of[1].point);
+    found.gap = found.normal.dot(found.of[0].point - motion_.X_AB * found.of[1].point);
   }
-  std::erase_if(found_, [this](const FoundContact& found) { return found.gap > reach_; });
+  std::erase_if(found_, [this](const FoundContact& found) {
+    return found.gap > reach_ && found.gap > reach_ + closing(*bodies_[0], *bodies_[1], motion_, found);
+  });
   std::ranges::sort(found_, {}, &FoundContact::id);
 }
 

@@ -31,6 +31,12 @@ struct FieldBody {
   const RigidGeometry* geometry = nullptr;
 };
 
+/// Where b is in the frame of a.
+struct FieldMotion {
+  RigidTransform X_AB{}, end{};  ///< now, and as expected at the step's end
+  Vec3 fall = Vec3::Zero();      ///< frame of a, m: one of the two may do that beside it (ContactQuery::fall)
+};
+
 /// Holds the scratch of one thread, and allocates nothing once warm. The same contacts in the same order whatever was
 /// asked before.
 class FieldContacts {
@@ -39,10 +45,15 @@ class FieldContacts {
   /// longer than an eighth of the other body's longest side. Other pairs are NarrowPhase's.
   static bool serves(const FieldBody& a, const FieldBody& b);
 
-  /// All contacts of gap ≤ reach, ascending by id: the two features, as NarrowPhase names them, but for vertices a face
-  /// of no number in place of the feature met, so that what slides keeps its id. Until the next call.
+  /// All contacts of gap ≤ reach + closing(), ascending by id: the two features, as NarrowPhase names them, but for
+  /// vertices a face of no number in place of the feature met, so that what slides keeps its id. Until the next call.
   /// @pre serves(a, b), reach ≥ 0, m
-  std::span<const FoundContact> find(const FieldBody& a, const FieldBody& b, const RigidTransform& X_AB, double reach);
+  std::span<const FoundContact> find(const FieldBody& a, const FieldBody& b, const FieldMotion& motion, double reach);
+  std::span<const FoundContact> find(const FieldBody& a, const FieldBody& b, const RigidTransform& X_AB, double reach) {
+    return find(a, b, FieldMotion{X_AB, X_AB}, reach);
+  }
+  /// What the expected motion of the two points of a contact, and a fall, close of its gap, m; negative: it opens.
+  static double closing(const FieldBody& a, const FieldBody& b, const FieldMotion& motion, const FoundContact& contact);
 
  private:
   void find_on_shape(const FieldBody& body, const FieldBody& shape, bool shape_is_a);
@@ -52,11 +63,13 @@ class FieldContacts {
   static void settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample);
   void leave_by_patches(const FieldView& view);
   void add_sample(int of, const SampleFoot& sample);
+  double comes_near(int of) const;
   void settle();
 
   double reach_ = 0.0;
   FieldView view_[2];  ///< of a in b's field, and of b in a's
-  RigidTransform X_AB_{};
+  const FieldBody* bodies_[2] = {};
+  FieldMotion motion_{};
   std::vector<std::uint32_t> near_, other_near_;  ///< clusters
   std::vector<FieldHit> hits_;
   std::vector<SampleFoot> samples_;  ///< of one side

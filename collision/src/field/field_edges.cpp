@@ -14,9 +14,8 @@ int corner_of(const CollisionSurface& surface, Index t, Index e) {
 
 }  // namespace
 
-void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a, double margin) {
+void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a) {
   view_[0] = a_in_b, view_[1] = b_in_a;
-  margin_ = static_cast<float>(margin);
   piercings_.clear(), contacts_.clear();
   ++generation_;
   for (int of = 0; of < 2; ++of) {
@@ -106,7 +105,7 @@ void FieldEdges::add_separated(int of, Index edge, Index face) {
     const Index other = view_[of].other->shell().surface().edge_of(face, c);
     EdgePair pair;
     if (!view_[of].other->shell().sticks_out(other)) continue;
-    if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair) || pair.distance > margin_) continue;
+    if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) continue;
     if (in_normal_cone(1, pair.f, pair.direction) && in_normal_cone(0, pair.e, -pair.direction))
       add(pair, pair.direction);
   }

@@ -11,7 +11,7 @@ namespace limber::internal {
 /// See field_contacts.h. Everything in the frame of a.
 class FieldEdges {
  public:
-  void begin(const FieldView& a_in_b, const FieldView& b_in_a, double margin);
+  void begin(const FieldView& a_in_b, const FieldView& b_in_a);
   /// An inside vertex leaves along a direction, out of b into a.
   void set_exit(int of, Index vertex, const Vec3f& direction);
   /// Edges of one side, in clusters that the other's field has near.
@@ -49,7 +49,6 @@ class FieldEdges {
   FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 
   FieldView view_[2];
-  float margin_ = 0.0f;
   std::vector<FieldHit> hits_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;

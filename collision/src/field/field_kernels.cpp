@@ -48,12 +48,21 @@ HWY_INLINE HWY_ATTR Points GatherEnds(const float* coordinates, const std::int32
           hn::GatherIndex(d, coordinates + 2 * kFieldLanes, at)};
 }
 
-HWY_INLINE HWY_ATTR Points Placed(const FieldQuery& q, const Points& v) {
-  const auto row = [&](int i) HWY_ATTR {
-    return hn::MulAdd(All(q.R[i][0]), v.x,
-                      hn::MulAdd(All(q.R[i][1]), v.y, hn::MulAdd(All(q.R[i][2]), v.z, All(q.p[i]))));
+// R v + to
+HWY_INLINE HWY_ATTR Points Rotated(const float (&R)[3][3], const Points& v, const Points& to) {
+  const auto row = [&](int i, F sum) HWY_ATTR {
+    return hn::MulAdd(All(R[i][0]), v.x, hn::MulAdd(All(R[i][1]), v.y, hn::MulAdd(All(R[i][2]), v.z, sum)));
   };
-  return {row(0), row(1), row(2)};
+  return {row(0, to.x), row(1, to.y), row(2, to.z)};
+}
+
+HWY_INLINE HWY_ATTR Points Placed(const FieldQuery& q, const Points& v) {
+  return Rotated(q.R, v, {All(q.p[0]), All(q.p[1]), All(q.p[2])});
+}
+
+// The expected motion of points of the samples' body, but for their swing.
+HWY_INLINE HWY_ATTR Points Carried(const FieldQuery& q, const Points& v) {
+  return Rotated(q.turn, v, {All(q.shift[0]), All(q.shift[1]), All(q.shift[2])});
 }
 
 struct Cell {
@@ -226,14 +235,16 @@ struct Lanes {
 
 HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found) {
   const Floats d;
-  const F reach = All(query.reach + query.flex);
+  const F reach = All(query.reach + query.flex + query.swing);
   std::size_t count = 0;
   for (std::size_t g = 0; g < clusters.groups; ++g)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
-      const Points q = Placed(query, LoadCluster(clusters.centres + g * kClusterFloats, lane));
+      const Points centre = LoadCluster(clusters.centres + g * kClusterFloats, lane), q = Placed(query, centre),
+                   moved = Carried(query, centre);
       const F radius = hn::LoadU(d, clusters.radii + g * kFieldLanes + lane);
       const F beyond = hn::Sub(DistanceOf(query.field, q).value, radius);
-      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, reach)));
+      const F comes = hn::MulAdd(All(query.turning), radius, hn::Add(hn::Sqrt(Dot(moved, moved)), reach));
+      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, comes)));
       for (; near != 0; near &= near - 1) {
         const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
         found[count++] = static_cast<std::uint32_t>(g * kFieldLanes + lane + at);
@@ -245,17 +256,23 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
 HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
                                  std::size_t count, FieldHit* hits) {
   const bool carried = query.lattice.place != nullptr && query.lattice.steps > 0;
+  const Floats d;
   std::size_t found = 0;
   Lanes lanes;
   for (std::size_t c = 0; c < count; ++c) {
     const std::size_t cluster = clusters[c];
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
-      const Points q = Placed(query, LoadCluster(shell.coordinates + cluster * kClusterFloats, lane));
+      const Points x = LoadCluster(shell.coordinates + cluster * kClusterFloats, lane), q = Placed(query, x);
+      Points moved = Carried(query, x);
+      if (shell.swings != nullptr)
+        moved = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), moved);
+      const F reach = hn::Add(hn::Sqrt(Dot(moved, moved)), All(query.reach));
       // What is far off as seen from the rest shape is not worth the way back into it.
-      if (carried && Bits(hn::Le(DistanceOf(query.field, q).value, All(query.reach + query.flex))) == 0) continue;
+      if (carried && hn::AllFalse(d, hn::Le(DistanceOf(query.field, q).value, hn::Add(reach, All(query.flex)))))
+        continue;
       const Points r = CarriedBack(query.lattice, q);
       const Distance distance = DistanceOf(query.field, r);
-      unsigned within = Bits(hn::Le(distance.value, All(query.reach)));
+      unsigned within = Bits(hn::Le(distance.value, reach));
       if (within == 0) continue;
       lanes.Store(q, r, distance);
       for (; within != 0; within &= within - 1) {
@@ -272,6 +289,7 @@ struct Way {
   float from[3], to[3];
   float rest[3][3];  // of its start, middle and end
   float length;
+  float reach;  // m: distances up to here count
 };
 
 // Distances along a way at points that are evenly spaced, eight at a time.
@@ -296,9 +314,9 @@ class Profile {
       const float here = distance_[i], next = distance_[i + 1];
       if ((here < 0.0f) != (next < 0.0f)) {
         add(i, here / (here - next));
-      } else if ((here <= query.reach) != (next <= query.reach)) {
-        add(i, (query.reach - here) / (next - here));
-      } else if (i > 0 && here >= 0.0f && here <= query.reach && here < distance_[i - 1] && here <= next) {
+      } else if ((here <= way.reach) != (next <= way.reach)) {
+        add(i, (way.reach - here) / (next - here));
+      } else if (i > 0 && here >= 0.0f && here <= way.reach && here < distance_[i - 1] && here <= next) {
         add(i, 0.0f);
       }
     }
@@ -335,8 +353,8 @@ class EdgeBlock {
   // @return those that may come within reach, a bit each
   HWY_ATTR unsigned Look(const FieldQuery& query, const ShellView& shell, const std::int32_t* ends) {
     const Floats d;
-    const Points a = Placed(query, GatherEnds(shell.coordinates, ends)),
-                 b = Placed(query, GatherEnds(shell.coordinates, ends + kFieldLanes));
+    const Points x = GatherEnds(shell.coordinates, ends), y = GatherEnds(shell.coordinates, ends + kFieldLanes);
+    const Points a = Placed(query, x), b = Placed(query, y);
     const Points across = Difference(b, a);
     const F length = hn::Sqrt(Dot(across, across)), half = hn::Mul(All(0.5f), length);
     const Points middle{hn::MulAdd(All(0.5f), across.x, a.x), hn::MulAdd(All(0.5f), across.y, a.y),
@@ -345,7 +363,9 @@ class EdgeBlock {
     // from neither side.
     const auto long_enough = hn::Gt(length, hn::Zero(d));
     const F coarse = hn::Abs(DistanceOf(query.field, middle).value);
-    const auto near = hn::And(long_enough, hn::Le(coarse, hn::Add(half, All(query.reach + query.flex))));
+    const F reach =
+        hn::Add(All(query.reach), hn::Max(Motion(query, shell, x, ends), Motion(query, shell, y, ends + kFieldLanes)));
+    const auto near = hn::And(long_enough, hn::Le(coarse, hn::Add(half, hn::Add(reach, All(query.flex)))));
     if (hn::AllFalse(d, near)) return 0;
     // The same of its two halves, in the rest shape.
     const Points start = CarriedBack(query.lattice, a), centre = CarriedBack(query.lattice, middle),
@@ -353,14 +373,14 @@ class EdgeBlock {
     const F at_start = hn::Abs(DistanceOf(query.field, start).value),
             at_end = hn::Abs(DistanceOf(query.field, end).value),
             at_centre = hn::Abs(DistanceOf(query.field, centre).value);
-    const F most = hn::Add(half, All(2.0f * query.reach));
+    const F most = hn::MulAdd(All(2.0f), reach, half);
     const auto within =
         hn::And(near, hn::Or(hn::Le(hn::Add(at_start, at_centre), most), hn::Le(hn::Add(at_centre, at_end), most)));
     const unsigned bits = Bits(within);
     if (bits == 0) return 0;
     Store(a, from_), Store(b, to_);
     Store(start, rest_[0]), Store(centre, rest_[1]), Store(end, rest_[2]);
-    hn::Store(length, d, length_);
+    hn::Store(length, d, length_), hn::Store(reach, d, reach_);
     return bits;
   }
   Way At(unsigned lane) const {
@@ -369,16 +389,23 @@ class EdgeBlock {
       way.from[a] = from_[a][lane], way.to[a] = to_[a][lane];
       for (int i = 0; i < 3; ++i) way.rest[i][a] = rest_[i][a][lane];
     }
-    way.length = length_[lane];
+    way.length = length_[lane], way.reach = reach_[lane];
     return way;
   }
 
  private:
+  // How far ends are expected to move.
+  static HWY_INLINE HWY_ATTR F Motion(const FieldQuery& query, const ShellView& shell, const Points& x,
+                                      const std::int32_t* ends) {
+    Points moved = Carried(query, x);
+    if (shell.swings != nullptr) moved = Rotated(query.R, GatherEnds(shell.swings, ends), moved);
+    return hn::Sqrt(Dot(moved, moved));
+  }
   static HWY_INLINE HWY_ATTR void Store(const Points& p, float (&to)[3][kLanes]) {
     const Floats d;
     hn::Store(p.x, d, to[0]), hn::Store(p.y, d, to[1]), hn::Store(p.z, d, to[2]);
   }
-  HWY_ALIGN float from_[3][kLanes], to_[3][kLanes], rest_[3][3][kLanes], length_[kLanes];
+  HWY_ALIGN float from_[3][kLanes], to_[3][kLanes], rest_[3][3][kLanes], length_[kLanes], reach_[kLanes];
 };
 
 HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
@@ -412,7 +439,7 @@ HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float*
   float squared = 0.0f;
   for (int a = 0; a < 3; ++a)
     way.from[a] = from[a], way.to[a] = to[a], squared += (to[a] - from[a]) * (to[a] - from[a]);
-  way.length = std::sqrt(squared);
+  way.length = std::sqrt(squared), way.reach = query.reach;
   Profile profile;
   FieldHit hits[kHitsOfEdge];
   if (profile.Find(query, way, 0, step, hits) == 0) return false;
@@ -461,6 +488,17 @@ HWY_ATTR void MultiplyRows(const float* rest, const float* U, std::size_t tiles,
   }
 }
 
+HWY_ATTR float LargestLength(const float* clusters, std::size_t count) {
+  const Floats d;
+  F most = hn::Zero(d);
+  for (std::size_t c = 0; c < count; ++c)
+    for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
+      const Points v = LoadCluster(clusters + c * kClusterFloats, lane);
+      most = hn::Max(most, Dot(v, v));
+    }
+  return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, most)));
+}
+
 HWY_ATTR void LargestMagnitudes(const float* points, std::size_t count, float* largest) {
   const Floats d;
   // Three vectors of xyz xyz …: every lane of them belongs to one axis, as their number of lanes is a power of two.
@@ -503,6 +541,7 @@ HWY_AFTER_NAMESPACE();
 namespace limber::internal {
 
 HWY_EXPORT(MultiplyRows);
+HWY_EXPORT(LargestLength);
 HWY_EXPORT(LargestMagnitudes);
 HWY_EXPORT(BoxOfClusters);
 HWY_EXPORT(NearClusters);
@@ -514,6 +553,10 @@ HWY_EXPORT(FieldAt);
 void multiply_rows(const float* rest, const float* U, std::size_t tiles, std::size_t modes, const float* const* z,
                    float* const* out, std::size_t bodies) {
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(rest, U, tiles, modes, z, out, bodies);
+}
+
+float largest_length(const float* clusters, std::size_t count) {
+  return HWY_DYNAMIC_DISPATCH(LargestLength)(clusters, count);
 }
 
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]) {

@@ -53,8 +53,13 @@ struct FieldQuery {
   LatticeView lattice{};
   float R[3][3] = {};  ///< rows
   float p[3] = {};
-  float reach = 0.0f;  ///< m: distances up to here count
+  float reach = 0.0f;  ///< m: distances up to here count, and farther ones as the points' own motion closes them
   float flex = 0.0f;   ///< m: no point of the field's body is displaced farther
+  /// How a point is expected to move in the field's frame until the step's end: turn x + shift + R u, u its swing.
+  float turn[3][3] = {};
+  float shift[3] = {};
+  float turning = 0.0f;  ///< |turn|
+  float swing = 0.0f;    ///< m: no |u| is larger
 };
 
 /// Clusters of eight in one state: balls that hold them.
@@ -67,6 +72,7 @@ struct ClusterView {
 /// A surface's samples and edges in one state.
 struct ShellView {
   const float* coordinates = nullptr;  ///< of samples, by cluster
+  const float* swings = nullptr;       ///< how modes are expected to move these, m; null: they do not
   ClusterView samples{}, edges{};
   /// Per cluster of edges, where x of their first eight ends stand in `coordinates`, then of their second.
   const std::int32_t* edge_ends = nullptr;
@@ -92,16 +98,20 @@ inline constexpr std::size_t kBodiesAtOnce = 4;
 void multiply_rows(const float* rest, const float* U, std::size_t tiles, std::size_t modes, const float* const* z,
                    float* const* out, std::size_t bodies);
 
+/// The largest |v| of the points of `count` clusters.
+float largest_length(const float* clusters, std::size_t count);
+
 /// The largest |v| of each axis over `count` points xyz xyz …
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]);
 
 /// Box about balls about the clusters' centres. @param radii as many as lanes of `groups`; negative: none
 void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]);
 
-/// Clusters that may have something within reach. @param found room for 8 · groups @return how many
+/// Clusters that may have something within reach, or come there. @param found room for 8 · groups @return how many
 std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found);
 
-/// Samples of clusters that are within reach. @param hits room for kHitsOfCluster each @return how many
+/// Samples of clusters that are within reach, or may come there. @param hits room for kHitsOfCluster each @return how
+/// many
 std::size_t near_samples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
                          std::size_t count, FieldHit* hits);
 

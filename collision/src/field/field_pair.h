@@ -19,8 +19,9 @@ struct FieldView {
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< from my frame to the other's
   Vec3f shift = Vec3f::Zero();
 
-  /// @param X_FS where I am in the field's frame
-  void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS, double reach);
+  /// @param X_FS, end where I am in the field's frame, and am expected to be at the step's end
+  void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
+             const RigidTransform& end, double reach);
   /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
   bool apart() const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }

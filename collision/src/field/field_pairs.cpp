@@ -1,6 +1,7 @@
 #include "field/field_pairs.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "limber/core/error.h"
 
@@ -54,7 +55,8 @@ void FieldPairs::start_query(std::span<const ManifoldBody> bodies, std::span<con
     Entry& entry = entries_[i];
     if (!bodies[i].present || !bodies[i].modal || !entry.shell || !(moved || entry.fresh)) return;
     entry.fresh = false;
-    entry.shell->set_amplitudes(states[i].amplitudes);
+    const bool expected = std::isfinite(states[i].doubt);
+    entry.shell->set_amplitudes(states[i].amplitudes, expected ? states[i].end_amplitudes : std::span<const double>());
     to_deform_.push_back(&*entry.shell);
   };
   for (const Index i : changed) look_at(static_cast<std::size_t>(i), true);
@@ -75,8 +77,22 @@ FieldBody FieldPairs::field_body(Index index) const {
   return {entry.shell ? &*entry.shell : nullptr, entry.rigid ? &entry.rigid->geometry : nullptr};
 }
 
-bool FieldPairs::takes(const PairQuery& query) const {
-  return query.index_a != query.index_b && FieldContacts::serves(field_body(query.index_a), field_body(query.index_b));
+bool FieldPairs::takes(Index a, Index b) const { return a != b && FieldContacts::serves(field_body(a), field_body(b)); }
+
+Vec3 FieldPairs::place(Index body, const FeatureSide& side) const {
+  const DeformedPointshell& shell = *entries_[static_cast<std::size_t>(body)].shell;
+  const Triangle& t = shell.shell().surface().triangle(side.triangle);
+  Vec3 p = Vec3::Zero();
+  for (std::size_t c = 0; c < 3; ++c)
+    if (side.weight[c] != 0.0) p += side.weight[c] * shell.vertex(t[c]).cast<double>();
+  return p;
+}
+
+double FieldPairs::closing(const PairQuery& query, const FeatureContact& contact) const {
+  const auto found_side = [](const FeatureSide& s) { return FoundSide{s.key, s.triangle, s.weight, s.point}; };
+  return FieldContacts::closing(field_body(query.index_a), field_body(query.index_b),
+                                {query.X_AB, query.X_AB_end, query.fall},
+                                {{found_side(contact.a), found_side(contact.b)}, contact.normal, contact.gap});
 }
 
 void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found) {
@@ -86,8 +102,8 @@ void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found
     if (free_.empty()) throw ComputationError("FieldPairs: Jobs runs more loop bodies at once than concurrency()");
     scratch = free_.back(), free_.pop_back();
   }
-  for (const FoundContact& c :
-       scratch->find(field_body(query.index_a), field_body(query.index_b), query.X_AB, query.reach)) {
+  for (const FoundContact& c : scratch->find(field_body(query.index_a), field_body(query.index_b),
+                                             {query.X_AB, query.X_AB_end, query.fall}, query.near)) {
     FeatureContact contact{feature_side(c.of[0]), feature_side(c.of[1]), c.normal, c.gap};
     contact.b.point = query.X_AB * contact.b.point;
     found.push_back(contact);

@@ -20,8 +20,11 @@ class FieldPairs final : public DeformingPairs {
   void remove_body(Index index) override;
   void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
                    std::span<const Index> changed, Jobs& jobs) override;
-  bool takes(const PairQuery& query) const override;
+  bool takes(Index a, Index b) const override;
   void find(const PairQuery& query, std::vector<FeatureContact>& found) override;
+  bool has(Index body) const override { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
+  Vec3 place(Index body, const FeatureSide& side) const override;
+  double closing(const PairQuery& query, const FeatureContact& contact) const override;
 
  private:
   struct Entry {

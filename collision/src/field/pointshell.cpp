@@ -159,6 +159,8 @@ void Pointshell::lay_out() {
   lattice_rows_ = rounded_up(row, kRowTile);
   rows_ = rounded_up(lattice_rows_ + 3 * nodes, kRowTile), radii = rounded_up(radii, kRowTile);
   rest_ = AlignedArray<float>(rows_), U_ = AlignedArray<float>(rows_ * k);
+  none_ = AlignedArray<float>(rounded_up(sample_clusters_.count * kClusterFloats, kRowTile));
+  std::fill_n(none_.data(), none_.size(), 0.0f);
   radius_ = AlignedArray<float>(radii), spread_ = AlignedArray<float>(radii * k);
   std::fill_n(radius_.data(), radii, -std::numeric_limits<float>::infinity());
   largest_shape_.assign(k, 0.0f);
@@ -239,8 +241,9 @@ DeformedPointshell::DeformedPointshell(std::shared_ptr<const Pointshell> shell) 
   const Pointshell& s = *shell_;
   coordinates_ = s.rest_.data();
   if (s.modes() > 0) {
-    own_ = AlignedArray<float>(s.rows_), radii_ = AlignedArray<float>(s.radius_.size());
-    amplitudes_ = AlignedArray<float>(2 * static_cast<std::size_t>(s.modes()));
+    own_ = AlignedArray<float>(s.rows_), swings_ = AlignedArray<float>(s.none_.size());
+    radii_ = AlignedArray<float>(s.radius_.size());
+    amplitudes_ = AlignedArray<float>(3 * static_cast<std::size_t>(s.modes()));
     coordinates_ = own_.data();
     std::copy_n(s.rest_.data(), s.rows_, own_.data());
     std::copy_n(s.radius_.data(), s.radius_.size(), radii_.data());
@@ -248,10 +251,13 @@ DeformedPointshell::DeformedPointshell(std::shared_ptr<const Pointshell> shell) 
   find_extent();
 }
 
-void DeformedPointshell::set_amplitudes(std::span<const double> z) {
+void DeformedPointshell::set_amplitudes(std::span<const double> z, std::span<const double> end) {
+  swings_about_ = false, largest_swing_ = 0.0f;
   for (std::size_t m = 0; m < z.size(); ++m) {
     amplitudes_[m] = static_cast<float>(z[m]);
     amplitudes_[z.size() + m] = std::abs(amplitudes_[m]);
+    amplitudes_[2 * z.size() + m] = end.empty() ? 0.0f : static_cast<float>(end[m] - z[m]);
+    swings_about_ = swings_about_ || amplitudes_[2 * z.size() + m] != 0.0f;
   }
 }
 
@@ -261,7 +267,8 @@ ShellView DeformedPointshell::view() const {
   const auto clusters = [&](const Pointshell::Clusters& of) {
     return ClusterView{coordinates_ + of.centres, radii + of.radii, of.groups};
   };
-  return {coordinates_, clusters(s.sample_clusters_), clusters(s.edge_clusters_), s.edge_ends_.data()};
+  return {coordinates_, swings_about_ ? swings_.data() : nullptr, clusters(s.sample_clusters_),
+          clusters(s.edge_clusters_), s.edge_ends_.data()};
 }
 
 LatticeView DeformedPointshell::lattice() const {
@@ -307,6 +314,15 @@ void DeformedPointshell::deform_together(std::span<DeformedPointshell* const> bo
   const std::size_t first = s.lattice_rows_;
   multiply_rows(s.rest_.data(), s.U_.data(), first / kRowTile, k, z, x, bodies.size());
   multiply_rows(s.radius_.data(), s.spread_.data(), s.radius_.size() / kRowTile, k, magnitudes, radii, bodies.size());
+  std::size_t swinging = 0;
+  const float* changes[kBodiesAtOnce] = {};
+  float* swings[kBodiesAtOnce] = {};
+  for (DeformedPointshell* body : bodies)
+    if (body->swings_about_)
+      changes[swinging] = body->amplitudes_.data() + 2 * k, swings[swinging++] = body->swings_.data();
+  multiply_rows(s.none_.data(), s.U_.data(), s.none_.size() / kRowTile, k, changes, swings, swinging);
+  for (DeformedPointshell* body : bodies)
+    if (body->swings_about_) body->largest_swing_ = largest_length(body->swings_.data(), s.sample_clusters_.count);
   // Displacements of the space about a body are for those that are bent by enough.
   std::size_t bent = 0;
   for (DeformedPointshell* body : bodies) {

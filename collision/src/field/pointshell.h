@@ -85,6 +85,7 @@ class Pointshell {
 
   Clusters sample_clusters_{}, edge_clusters_{};
   std::size_t lattice_rows_ = 0, rows_ = 0;
+  AlignedArray<float> none_;             ///< zeros, as many as samples have rows, up to a whole tile
   std::vector<Index> sample_vertex_;     ///< by cluster; the last ones may be repeated
   std::vector<std::int32_t> slot_;       ///< of vertices: where x stands in the coordinates; −1: of no triangle
   std::vector<bool> sticks_out_;         ///< of edges of the surface
@@ -102,13 +103,21 @@ class DeformedPointshell {
   explicit DeformedPointshell(std::shared_ptr<const Pointshell> shell);
 
   const Pointshell& shell() const { return *shell_; }
-  /// The amplitudes of the next deform(). @pre as many as the shell has modes
-  void set_amplitudes(std::span<const double> z);
+  /// The amplitudes of the next deform(), and those expected at the step's end; none: the same.
+  /// @pre as many as the shell has modes
+  void set_amplitudes(std::span<const double> z, std::span<const double> end = {});
 
   Vec3f vertex(Index v) const {
     const float* x = coordinates_ + shell_->slot_[static_cast<std::size_t>(v)];
     return {x[0], x[kFieldLanes], x[2 * kFieldLanes]};
   }
+  /// How a vertex is expected to move as the modes take it, body frame.
+  Vec3f swing(Index v) const {
+    if (!swings_about_) return Vec3f::Zero();
+    const float* u = swings_.data() + shell_->slot_[static_cast<std::size_t>(v)];
+    return {u[0], u[kFieldLanes], u[2 * kFieldLanes]};
+  }
+  float largest_swing() const { return largest_swing_; }  ///< of any vertex, m
   /// Encloses the surface, body frame.
   const Vec3f& low() const { return low_; }
   const Vec3f& high() const { return high_; }
@@ -125,10 +134,12 @@ class DeformedPointshell {
   void find_flex();
 
   std::shared_ptr<const Pointshell> shell_;
-  AlignedArray<float> own_, radii_, amplitudes_;  ///< none of a rigid one; amplitudes, then their magnitudes
+  AlignedArray<float> own_, swings_, radii_;  ///< none of a rigid one
+  AlignedArray<float> amplitudes_;            ///< then their magnitudes, then how they are expected to change
   const float* coordinates_ = nullptr;
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();
-  float flex_ = 0.0f;
+  float flex_ = 0.0f, largest_swing_ = 0.0f;
+  bool swings_about_ = false;  ///< some amplitude is expected to change
   bool carries_back_ = false;  ///< the lattice's displacements are known, and long beside a cell
 };
 

@@ -54,7 +54,7 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   CollisionBody result{.index = index, .X_WB = s.pose};
   result.displacement = s.displacement, result.rotation = s.rotation;
   result.reach = s.reach + 0.5 * margin;
-  result.doubt = s.doubt + 0.5 * margin;
+  result.doubt = s.doubt + 0.5 * margin + fall;
   result.end_X_WB = s.end_pose;
   if (body.modal) {
     result.surface = &worker.pool.get(index, Instant::kNow, body.modal->surface, s.amplitudes, options.bounds);
@@ -275,7 +275,7 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   m.motions = {};
   m.some = query.bodies;
   m.awake = query.awake;
-  m.margin = query.margin;
+  m.margin = query.margin, m.fall = query.fall.norm();
   m.origin = query.origin;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
@@ -295,7 +295,7 @@ void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& 
   m.some = query.bodies;
   m.awake = {};
   m.step = query.step;
-  m.margin = query.margin;
+  m.margin = query.margin, m.fall = 0.0;
   m.least_margin = query.least_margin;
   m.find_near_pairs(jobs);
   m.drop_pairs(query.except);

@@ -34,7 +34,7 @@ struct ContactFinder::Impl {
   std::span<const Index> some;                  ///< the bodies that are asked for; none: all
   std::span<const Index> awake;                 ///< ContactQuery::awake
   double farthest_beyond = 0.0;                 ///< by how much a reach exceeds that of features
-  double step = 0.0, margin = 0.0, least_margin = 0.0;
+  double step = 0.0, margin = 0.0, least_margin = 0.0, fall = 0.0;
   Vec3 origin = Vec3::Zero();
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place

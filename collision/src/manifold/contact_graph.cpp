@@ -41,7 +41,7 @@ LivePair& ContactGraph::append(const BodyPair& pair) {
 
 void ContactGraph::reserve(Index modes) {
   modes_ = std::max(modes_, static_cast<std::size_t>(modes));
-  for (LivePair& pair : slots_) pair.amplitudes.reserve(2 * modes_);
+  for (LivePair& pair : slots_) pair.amplitudes.reserve(4 * modes_);
 }
 
 std::uint32_t ContactGraph::take() {

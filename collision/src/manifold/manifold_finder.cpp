@@ -51,12 +51,19 @@ void check_body_state(Index index, const ManifoldBody& body, const BodyState& st
     refuse_state(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
   if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
     refuse_state(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
-  for (std::size_t i = 0; i < state.amplitudes.size(); ++i)
-    if (!std::isfinite(state.amplitudes[i]))
-      refuse_state(index, "amplitudes[" + std::to_string(i) + "] is not finite", "finite numbers");
-  if (std::isfinite(state.doubt) &&
-      !std::ranges::all_of(state.end_amplitudes, [](double z) { return std::isfinite(z); }))
-    refuse_state(index, "end_amplitudes are not finite", "finite numbers");
+  const auto check_finite = [index](std::span<const double> numbers, const char* name) {
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      if (!std::isfinite(numbers[i]))
+        refuse_state(index, std::string(name) + "[" + std::to_string(i) + "] is not finite", "finite numbers");
+  };
+  check_finite(state.amplitudes, "amplitudes");
+  if (!std::isfinite(state.doubt)) return;
+  if (!(state.doubt >= 0.0)) refuse_state(index, "doubt is " + std::to_string(state.doubt), "at least 0");
+  if (!state.end_pose.p.allFinite() || !(std::abs(state.end_pose.q.norm() - 1.0) <= unit))
+    refuse_state(index, "end_pose is not a pose", "finite coordinates and a quaternion of length 1");
+  if (state.end_amplitudes.size() != state.amplitudes.size())
+    refuse_state(index, std::to_string(state.end_amplitudes.size()) + " end_amplitudes", std::to_string(body.modes()));
+  check_finite(state.end_amplitudes, "end_amplitudes");
 }
 
 /// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
@@ -147,7 +154,7 @@ struct ManifoldFinder::Impl {
   std::span<const BodyState> states;
   std::span<const Index> some, awake;
   double margin = 0.0;
-  Vec3 origin = Vec3::Zero();
+  Vec3 origin = Vec3::Zero(), fall = Vec3::Zero();
   std::vector<Index> to_place, near;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
@@ -180,6 +187,8 @@ struct ManifoldFinder::Impl {
   PairQuery query_of(const BodyPair& pair) const;
   void find_manifolds(Jobs& jobs);
   bool keeps(const LivePair& pair, const PairQuery& query) const;
+  bool keeps_motion(const LivePair& pair, const PairQuery& query) const;
+  void expect(PairQuery& query) const;
   void make(LivePair& pair, const PairQuery& query, ManifoldWorker& worker);
   void follow(ManifoldWorker& worker) const;
   static void touch(std::span<const FeatureContact> found, const PairQuery& query, ManifoldWorker& worker);
@@ -191,6 +200,7 @@ struct ManifoldFinder::Impl {
     Vec3 normal, p_a, p_b;  ///< world; points from the origin of a
     double gap;
   };
+  FeatureContact feature_contact(const Measured& measured, const KeptPoint& point, const BodyPair& pair) const;
   Measured measure(const KeptPoint& point, const BodyPair& pair, ManifoldWorker& worker) const;
   void level_seams();
   Vec3 out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const;
@@ -198,7 +208,8 @@ struct ManifoldFinder::Impl {
   void list_pairs_of_bodies();
   void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes, ManifoldWorker& worker);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
-  RigidTransform smaller_in_larger(const PairQuery& query) const;
+  RigidTransform smaller_in_larger(const PairQuery& query, const RigidTransform& X_AB) const;
+  double farthest(const PairQuery& query) const;
   double slack(const PairQuery& query) const;
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);
   std::size_t write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker, ContactPoint* to) const;
@@ -319,24 +330,49 @@ PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
   if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
   q.reach = margin + a.reach + b.reach + q.passing.way.norm();
+  if (deforming && (a.modal || b.modal) && deforming->takes(pair.a, pair.b)) expect(q);
   return q;
 }
 
-RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q) const {
-  return q.a.radius <= q.b.radius ? q.X_AB.inverse() : q.X_AB;
+/// Bodies that nobody expects anything of go straight on, and come as far as they may.
+void ManifoldFinder::Impl::expect(PairQuery& q) const {
+  const auto end_of = [](const BodyState& s) {
+    return std::isfinite(s.doubt) ? s.end_pose : RigidTransform{s.pose.q, s.pose.p + s.displacement};
+  };
+  const auto beside = [](const BodyState& s) { return std::isfinite(s.doubt) ? s.doubt : s.reach; };
+  q.by_fields = true;
+  q.X_AB_end = end_of(q.state_a).inverse() * end_of(q.state_b);
+  q.near = margin + beside(q.state_a) + beside(q.state_b);
+  q.fall = q.state_a.pose.q.conjugate() * fall;
 }
 
-/// How far points of one body may come against the other while a manifold is kept: by what it moves, turns and bends.
-double ManifoldFinder::Impl::slack(const PairQuery& q) const {
-  const double farthest = options.recycle_distance * std::min(q.a.thickness, q.b.thickness);
-  const double bends = q.a.modal || q.b.modal ? farthest : 0.0;
-  return farthest + bends + options.recycle_turn * std::min(q.a.radius, q.b.radius);
+RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q, const RigidTransform& X_AB) const {
+  return q.a.radius <= q.b.radius ? X_AB.inverse() : X_AB;
 }
+
+double ManifoldFinder::Impl::farthest(const PairQuery& q) const {
+  return options.recycle_distance * std::min(q.a.thickness, q.b.thickness);
+}
+
+/// How far points of one body may come against the other while a manifold is kept: by what it moves, turns and bends;
+/// by fields also what more their motion closes.
+double ManifoldFinder::Impl::slack(const PairQuery& q) const {
+  const double parts = q.by_fields ? 3.0 : q.a.modal || q.b.modal ? 2.0 : 1.0;
+  return parts * farthest(q) + options.recycle_turn * std::min(q.a.radius, q.b.radius);
+}
+
+namespace {
+
+double expected_change(const BodyState& state, std::size_t mode) {
+  return std::isfinite(state.doubt) ? state.end_amplitudes[mode] - state.amplitudes[mode] : 0.0;
+}
+
+}  // namespace
 
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
-  const double farthest = options.recycle_distance * std::min(q.a.thickness, q.b.thickness);
-  if (!pair.known || q.reach > pair.reach + farthest) return false;
-  const RigidTransform X_LS = smaller_in_larger(q);
+  const double farthest = this->farthest(q);
+  if (!pair.known || (q.by_fields ? q.near > pair.reach : q.reach > pair.reach + farthest)) return false;
+  const RigidTransform X_LS = smaller_in_larger(q, q.X_AB);
   if (!((X_LS.p - pair.X_LS.p).norm() <= farthest)) return false;
   if (!(2.0 * (X_LS.q * pair.X_LS.q.conjugate()).vector().norm() <= options.recycle_turn)) return false;
   double bent = 0.0;
@@ -347,7 +383,22 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
       if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
       bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
     }
-  return bent <= farthest;
+  return bent <= farthest && (!q.by_fields || keeps_motion(pair, q));
+}
+
+/// Whether the expected motion closes at most so much more as manifolds are made for.
+bool ManifoldFinder::Impl::keeps_motion(const LivePair& pair, const PairQuery& q) const {
+  const RigidTransform X_LS = smaller_in_larger(q, q.X_AB), end = smaller_in_larger(q, q.X_AB_end);
+  const Vec3 way = end.p - X_LS.p, way_before = pair.X_LS_end.p - pair.X_LS.p;
+  const Quaternion turn = end.q * X_LS.q.conjugate(), turn_before = pair.X_LS_end.q * pair.X_LS.q.conjugate();
+  double more = (way - way_before).norm() +
+                2.0 * (turn * turn_before.conjugate()).vector().norm() * std::min(q.a.radius, q.b.radius);
+  const double* change = pair.amplitudes.data() + pair.amplitudes.size() / 2;
+  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
+    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
+      more +=
+          std::abs(expected_change(*state, i) - *change++) * body->modal->surface->largest_shape(static_cast<Index>(i));
+  return more <= farthest(q);
 }
 
 namespace {
@@ -360,12 +411,12 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   worker.last.clear();
   for (const KeptPoint& point : pair.points)
     worker.last.push_back(static_cast<std::uint64_t>(point.a.key) << 32 | point.b.key);
-  const bool follows = internal::SweptPath::is_needed(q);
+  const bool follows = !q.by_fields && internal::SweptPath::is_needed(q);
   PairQuery farther = q;
   if (follows)
     farther.reach = internal::SweptPath::near_at_start(q);
   else
-    farther.reach += slack(q);
+    farther.reach += slack(q), farther.near += slack(q);
   worker.made.clear(), worker.gaps.clear();
   const std::span<const FeatureContact> found = worker.pairs.find(farther, worker.last);
   keep(found, q, worker);
@@ -379,10 +430,14 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
   pair.known = !follows;
-  pair.X_LS = smaller_in_larger(q);
-  pair.reach = q.reach;
+  pair.X_LS = smaller_in_larger(q, q.X_AB);
+  pair.X_LS_end = smaller_in_larger(q, q.X_AB_end);
+  pair.reach = q.by_fields ? q.near : q.reach;
   pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
   pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
+  if (!q.by_fields) return;
+  for (const BodyState* state : {&q.state_a, &q.state_b})
+    for (std::size_t i = 0; i < state->amplitudes.size(); ++i) pair.amplitudes.push_back(expected_change(*state, i));
 }
 
 /// Adds the contacts of all places where two bodies come to touch on their way.
@@ -476,6 +531,7 @@ namespace {
 Vec3 place_of(const FeatureSide& side, Index index, const ManifoldBody& body, const BodyState& state,
               PairFinder& finder) {
   if (!body.modal || side.triangle < 0) return side.point;
+  if (finder.deforming() != nullptr && finder.deforming()->has(index)) return finder.deforming()->place(index, side);
   DeformedSurface& surface = finder.surface(index, body, state);
   const Triangle& t = body.modal->surface->triangle(side.triangle);
   Vec3 p = Vec3::Zero();
@@ -508,16 +564,30 @@ ManifoldFinder::Impl::Measured ManifoldFinder::Impl::measure(const KeptPoint& po
   return m;
 }
 
+/// In the frame of a, but for the point of b, which is in its own.
+FeatureContact ManifoldFinder::Impl::feature_contact(const Measured& m, const KeptPoint& point,
+                                                     const BodyPair& pair) const {
+  const ManifoldBody &a = at(pair.a), &b = at(pair.b);
+  FeatureContact c{point.a, point.b, a.turn.transpose() * m.normal, m.gap};
+  c.a.point = a.turn.transpose() * m.p_a;
+  c.b.point = b.turn.transpose() * (m.p_b - (b.pose.p - a.pose.p));
+  return c;
+}
+
 /// The contacts that the expected motion may close, with gaps as they are now.
 std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker,
                                         ContactPoint* to) const {
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
-  const double near_enough = margin + a.reach + b.reach;
+  const PairQuery q = query_of(pair);
+  const double near_enough = q.by_fields ? q.near : margin + a.reach + b.reach;
   const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - origin;
   std::size_t count = 0;
   for (const KeptPoint& point : live.points) {
     const Measured m = measure(point, pair, worker);
-    if (point.ahead == 0.0 && m.gap > near_enough + std::max(0.0, -m.normal.dot(way))) continue;
+    if (point.ahead == 0.0 && m.gap > near_enough &&
+        m.gap >
+            near_enough + (q.by_fields ? deforming->closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way)))
+      continue;
     to[count++] = {side_of(point.a, pair.a, a, point.round_a, a.turn.transpose() * m.p_a),
                    side_of(point.b, pair.b, b, point.round_b, b.turn.transpose() * (m.p_b - between)),
                    m.normal,
@@ -715,10 +785,10 @@ void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<Contac
   if (!(query.margin >= 0.0 && std::isfinite(query.margin)))
     throw InvalidArgument("ManifoldFinder: margin is " + std::to_string(query.margin) +
                           ", expected a finite number of at least 0");
-  if (!query.origin.allFinite())
-    throw InvalidArgument("ManifoldFinder: origin is not finite, expected finite coordinates");
+  if (!query.origin.allFinite() || !query.fall.allFinite())
+    throw InvalidArgument("ManifoldFinder: origin or fall is not finite, expected finite coordinates");
   m.states = query.states, m.some = query.bodies, m.awake = query.awake;
-  m.margin = query.margin, m.origin = query.origin;
+  m.margin = query.margin, m.origin = query.origin, m.fall = query.fall;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
   m.merge_self_pairs();

@@ -27,7 +27,7 @@ std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<c
   } else if (core_b != nullptr && q.a.rigid) {
     against_ground(q, q.b, q.a, q.X_AB.inverse(), q.X_AB.q.conjugate() * -q.passing.way);
     for (FeatureContact& c : found_) c = exchanged(c, q.X_AB);
-  } else if (deforming_ != nullptr && q.ahead == 0.0 && (q.a.modal || q.b.modal) && deforming_->takes(q)) {
+  } else if (q.by_fields) {
     deforming_->find(q, found_);
   } else {
     by_narrow_phase(q);

@@ -26,6 +26,12 @@ struct PairQuery {
   std::span<const SupportPlane> planes_a{}, planes_b{};
   /// Share of the expected way after which they are so; 0: now.
   double ahead = 0.0;
+  /// Of pairs that DeformingPairs finds: where b is expected in the frame of a at the step's end, and the gaps up to
+  /// which contacts are wanted beside what the expected motion of their points, and a fall, close, m.
+  bool by_fields = false;
+  RigidTransform X_AB_end{};
+  double near = 0.0;
+  Vec3 fall = Vec3::Zero();  ///< ContactQuery::fall, frame of a
 };
 
 /// Finds the contacts of pairs in which a surface deforms: what may take the place of NarrowPhase there. Calls of
@@ -39,10 +45,15 @@ class DeformingPairs {
   /// the last query, ascending
   virtual void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
                            std::span<const Index> changed, Jobs& jobs) = 0;
-  /// Whether it finds the contacts of a pair, of which one body deforms at least.
-  virtual bool takes(const PairQuery& query) const = 0;
-  /// Appends.
+  /// Whether it finds the contacts of two bodies, of which one deforms at least.
+  virtual bool takes(Index a, Index b) const = 0;
+  /// Appends. @pre query.by_fields
   virtual void find(const PairQuery& query, std::vector<FeatureContact>& found) = 0;
+  /// Whether it has a body's coordinates, and where a point of it is then, body frame.
+  virtual bool has(Index body) const = 0;
+  virtual Vec3 place(Index body, const FeatureSide& side) const = 0;
+  /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a
+  virtual double closing(const PairQuery& query, const FeatureContact& contact) const = 0;
 };
 
 /// Finds the contacts of all pairs; the scratch of one thread.
@@ -51,6 +62,7 @@ class PairFinder {
   explicit PairFinder(const NarrowPhaseOptions& options) : narrow_(options) {}
 
   void start_query(DeformingPairs* deforming) { pool_.start_query(), deforming_ = deforming; }
+  const DeformingPairs* deforming() const { return deforming_; }
   /// Until the next call. Of rigid pairs at most kManifoldPoints to a patch.
   /// @param last feature_pair() of those of the last manifold
   std::span<const FeatureContact> find(const PairQuery& query, std::span<const std::uint64_t> last);

@@ -16,18 +16,19 @@
 /// *Real-Time Collision Detection*, 2005, 5.5).
 ///
 /// Contacts are *speculative*: those are found whose gap the motion that BodyState::displacement and reach tell may
-/// close, and a solver gives way to them by their gap. BodyState::look_ahead and end_pose are not read. Two bodies that
+/// close, and a solver gives way to them by their gap. BodyState::look_ahead is not read. Two bodies that
 /// come or turn farther against each other than the thinner is thick are followed along the expected motion to where
 /// they first touch (TimeOfImpact), and on along what they touch, up to four times: contacts are those of these places,
 /// with gaps as they are now. What turns has one more there, of a ball inside of it, whose row holds however far it
-/// turns.
+/// turns. Pairs of distance fields are not followed: there doubt and the expected ends are read, and the motion of a
+/// contact's own two points counts, turn and bending included.
 ///
 /// No seam shows. Where a face keeps two convex shapes apart all along the expected motion, contacts with other faces
 /// that close on the way are none; where a body rests on one thing and comes to another that reaches to the same plane
 /// and no farther, that plane's normal is the contacts'; of meshes and height fields only edges and vertices where the
 /// surface is convex or ends are touched otherwise than along a face's normal. Where bodies overlap, convex shapes
 /// leave each other along the direction of least depth, and what has its middle in a mesh goes out to the nearest
-/// point. Pairs in which a surface deforms have all contacts of NarrowPhase.
+/// point. Pairs in which a surface deforms have all their contacts, by distance fields or NarrowPhase.
 #pragma once
 
 #include <cstdint>
@@ -60,9 +61,9 @@ struct ManifoldFinderOptions {
 ///
 /// What find_contacts() refuses, before anything is changed (InvalidArgument naming body and member): a pose that is
 /// not finite or whose quaternion is not of length 1 within 1e-6, a displacement, reach or margin that is not finite or
-/// a negative one of the latter two, end amplitudes that are not finite where the doubt is, another number of
-/// amplitudes than the body has modes, amplitudes that are not finite, and `states` that do not reach to every body.
-/// States of bodies that sleep are looked at when they fall asleep and when something comes near.
+/// a negative one of the latter two, another number of amplitudes than the body has modes, amplitudes that are not
+/// finite, the same of the expected end where doubt is finite, and `states` that do not reach to every body. States of
+/// bodies that sleep are looked at when they fall asleep and when something comes near.
 ///
 /// Ids: equal for the same features of the same two body indices, whatever happened between; made by mixing 64 bits.
 class ManifoldFinder final : public ContactSource {

@@ -70,6 +70,9 @@ struct ContactQuery {
   std::span<const BodyState> states{};  ///< by body index; entries of indices that hold no body are not read
   double margin = 0.0;                  ///< m, ≥ 0: gaps up to here are contacts
   Vec3 origin = Vec3::Zero();           ///< world; positions come out relative to it
+  /// Gravity moves any body by so much or not at all until the next query, beside its `doubt`, as something holds it or
+  /// not; `reach` has it. Of two bodies the difference counts. World, m.
+  Vec3 fall = Vec3::Zero();
   /// Ascending; none: all. Otherwise only pairs of these bodies are looked at, among each other and with those that do
   /// not move; all else is as it was in the last query.
   std::span<const Index> bodies{};
