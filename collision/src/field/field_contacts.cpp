@@ -102,6 +102,8 @@ void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples
   if (sample_of_.size() < static_cast<std::size_t>(surface.vertices()))
     sample_of_.resize(static_cast<std::size_t>(surface.vertices()), -1);
   const auto sample_of = [&](Index v) -> Index& { return sample_of_[static_cast<std::size_t>(v)]; };
+  // No more samples than vertices: the room of the largest surface once.
+  if (patches_.capacity() < sample_of_.size()) patches_.reserve(sample_of_.size()), joined_.reset(sample_of_.size());
   joined_.reset(samples.size());
   patches_.assign(samples.size(), {});
   for (std::size_t i = 0; i < samples.size(); ++i)

@@ -23,6 +23,13 @@ class FieldPairs final : public DeformingPairs {
   bool takes(Index a, Index b) const override;
   void find(const PairQuery& query, std::vector<FeatureContact>& found) override;
   bool has(Index body) const override { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
+  Aabb bounds(Index body) const override {
+    const DeformedPointshell& shell = *entries_[static_cast<std::size_t>(body)].shell;
+    return {shell.low().cast<double>(), shell.high().cast<double>()};
+  }
+  double largest_swing(Index body) const override {
+    return static_cast<double>(entries_[static_cast<std::size_t>(body)].shell->largest_swing());
+  }
   Vec3 place(Index body, const FeatureSide& side) const override;
   double closing(const PairQuery& query, const FeatureContact& contact) const override;
 

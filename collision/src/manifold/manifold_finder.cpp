@@ -181,6 +181,7 @@ struct ManifoldFinder::Impl {
   void set_finds_itself(Index body, bool finds);
   void check_and_list();
   void make_boxes(Jobs& jobs);
+  Aabb swept_box(Index body) const;
   void place();
   void find_near_pairs(Jobs& jobs);
   void merge_self_pairs();
@@ -243,6 +244,15 @@ void ManifoldFinder::Impl::check_and_list() {
     if (contains(index)) list(index);
 }
 
+/// About all that a deforming body is expected to pass through until the next query, straight on.
+Aabb ManifoldFinder::Impl::swept_box(Index body) const {
+  const BodyState& s = state(body);
+  const Aabb bounds = deforming->bounds(body);
+  Aabb box = internal::world_box(bounds, s.pose);
+  box.include(internal::world_box(bounds.grown(deforming->largest_swing(body)), s.end_pose));
+  return box.grown(s.doubt + fall.norm());
+}
+
 /// About all that a body may pass through until the next query.
 void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
   boxes.resize(to_place.size());
@@ -255,6 +265,10 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                         if (body.half_space() != nullptr) continue;
                         if (body.modal) bind_body_state((*worker).root, to_place[i], body, s);
                         Aabb& box = boxes[i];
+                        if (body.modal && deforming && deforming->has(to_place[i]) && std::isfinite(s.doubt)) {
+                          box = swept_box(to_place[i]);
+                          continue;
+                        }
                         box = body.modal ? internal::world_box((*worker).root.bounds(0), s.pose)
                                          : internal::world_box(body.rigid->geometry, s.pose);
                         box.include(Aabb{box.low + s.displacement, box.high + s.displacement});
@@ -285,6 +299,7 @@ void ManifoldFinder::Impl::place() {
 void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   check_and_list();
   workers.start_query(options.narrow_phase, deforming.get(), jobs.concurrency());
+  if (deforming) deforming->start_query(bodies, states, to_place, jobs);
   make_boxes(jobs);
   place();
   if (some.empty()) {
@@ -302,7 +317,6 @@ void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   for (const auto& [a, b] : pairs)
     for (const Index index : {a, b})
       if (state(index).asleep) check_body_state(index, at(index), state(index));
-  if (deforming) deforming->start_query(bodies, states, to_place, jobs);
 }
 
 /// Bodies that find themselves and are awake, among the pairs in their order.

@@ -41,16 +41,19 @@ class DeformingPairs {
   virtual ~DeformingPairs() = default;
   virtual void add_body(Index index, const ManifoldBody& body) = 0;
   virtual void remove_body(Index index) = 0;
-  /// Once a query, before any pair: all states are checked. @param changed bodies whose state may be another than in
-  /// the last query, ascending
+  /// Once a query, before anything else: all states are checked. @param changed bodies whose state may be another than
+  /// in the last query, ascending
   virtual void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
                            std::span<const Index> changed, Jobs& jobs) = 0;
   /// Whether it finds the contacts of two bodies, of which one deforms at least.
   virtual bool takes(Index a, Index b) const = 0;
   /// Appends. @pre query.by_fields
   virtual void find(const PairQuery& query, std::vector<FeatureContact>& found) = 0;
-  /// Whether it has a body's coordinates, and where a point of it is then, body frame.
+  /// Whether it has a body's coordinates, and then: what holds its surface, how far modes are expected to move any
+  /// point of it, m, and where a point of it is; body frame.
   virtual bool has(Index body) const = 0;
+  virtual Aabb bounds(Index body) const = 0;
+  virtual double largest_swing(Index body) const = 0;
   virtual Vec3 place(Index body, const FeatureSide& side) const = 0;
   /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a
   virtual double closing(const PairQuery& query, const FeatureContact& contact) const = 0;
