@@ -492,7 +492,8 @@ void ManifoldFinder::Impl::keep(const FeatureContact& c, double round_a, double 
   point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
   point.round_a = round_a, point.round_b = round_b, point.ahead = q.ahead;
   if (q.ahead > 0.0) point.normal = (point.turns_with_b ? q.b : q.a).pose.q.conjugate() * (q.state_a.pose.q * c.normal);
-  const auto known = std::ranges::find(worker.made, point.id, &KeptPoint::id);
+  const auto known =
+      std::find_if(worker.made.begin(), worker.made.end(), [&](const KeptPoint& made) { return made.id == point.id; });
   if (q.ahead == 0.0 || known == worker.made.end()) {
     worker.made.push_back(point), worker.gaps.push_back(c.gap);
   } else if (double& gap = worker.gaps[static_cast<std::size_t>(known - worker.made.begin())];

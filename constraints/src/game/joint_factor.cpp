@@ -83,7 +83,7 @@ void JointFactor::order() {
   std::vector<std::int32_t> merged;
   while (node_at_.size() < nodes_) {
     std::pop_heap(heap.begin(), heap.end(), later);
-    const auto [degree, node] = heap.back();
+    const std::int32_t degree = heap.back()[0], node = heap.back()[1];
     heap.pop_back();
     const auto at = static_cast<std::size_t>(node);
     if (position_[at] >= 0 || degree != static_cast<std::int32_t>(neighbours[at].size())) continue;
@@ -95,7 +95,8 @@ void JointFactor::order() {
       std::vector<std::int32_t>& theirs = neighbours[static_cast<std::size_t>(other)];
       merged.clear();
       if (joins)
-        std::ranges::set_union(theirs, neighbours[at], std::back_inserter(merged));
+        std::set_union(theirs.begin(), theirs.end(), neighbours[at].begin(), neighbours[at].end(),
+                       std::back_inserter(merged));
       else
         merged = theirs;
       std::erase_if(merged, [&](std::int32_t n) { return n == other || n == node; });

@@ -78,9 +78,9 @@ struct RowLaw {
 
   /// Makes it a spring k with a damper c, F = −k x' − c (x' − x)/Δt, x the gap now and x' at the step's end: stable for
   /// every k and c.
-  void make_spring(double k, double c, double step, double gap) {
+  void make_spring(double k, double c, double step, double x) {
     compliance = 1.0 / (step * k + c);
-    offset = c / (step * k + c) * gap;
+    offset = c / (step * k + c) * x;
     stiffness = k;
     goes_on = true;
   }
