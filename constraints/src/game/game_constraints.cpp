@@ -7,7 +7,7 @@
 namespace limber::internal {
 namespace {
 
-// Rounds in which rows let go or take hold; what is out of its bounds then is cut off there.
+// Rounds in which rows may take hold as well as let go; after that they let go alone, so that rounds end.
 constexpr int kMostRounds = 4;
 // Steps of conjugate gradients where the factor has left something out.
 constexpr int kMostGradients = 8;
@@ -161,6 +161,7 @@ void GameConstraints::add_row(const GameBodies& bodies, const Group& group, std:
   const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = is_bounded(row) && !from_below && !from_above;
   row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
+  row.gives_way = !law.goes_on && gives_way && row.compliance == 0.0;
   if (row.compliance > 0.0) {
     row.target += law.offset - row.gap;
   } else if (row.keeps_place) {
@@ -237,19 +238,21 @@ void GameConstraints::add_what_leads(const GameBodies& bodies) {
 
 // The matrix ----------------------------------------------------------------------------------------------------------
 
-void GameConstraints::list_met() {
+/// @param closing places: what a hand of limited force asks for may contradict them
+void GameConstraints::list_met(bool closing) {
   met_.clear(), sizes_.clear();
   for (Group& group : groups_) {
     group.first_met = met_.size();
     for (std::size_t i = 0; i < group.count; ++i)
-      if (rows_[group.first + i].hold == Hold::kMet) met_.push_back(static_cast<std::int32_t>(i));
+      if (const GameRow& row = rows_[group.first + i]; row.hold == Hold::kMet && !(closing && row.gives_way))
+        met_.push_back(static_cast<std::int32_t>(i));
     group.met = static_cast<std::int32_t>(met_.size() - group.first_met);
     sizes_.push_back(group.met);
   }
 }
 
-void GameConstraints::factor() {
-  list_met();
+void GameConstraints::factor(bool closing) {
+  list_met(closing);
   factor_.begin(sizes_);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
@@ -354,11 +357,11 @@ void GameConstraints::solve(GameBodies& bodies) {
     for (std::size_t i = 0; i < group.count; ++i) forces_[i] = rows_[group.first + i].force;
     apply(group, forces_, bodies.motion());
   }
-  for (int round = 0; round < kMostRounds; ++round) {
-    factor();
+  int round = 0;
+  do {
+    factor(false);
     solve_once(bodies);
-    if (!let_go(bodies)) break;
-  }
+  } while (let_go(bodies, ++round < kMostRounds));
 }
 
 /// A force within its row's bounds. Rows that contradict each other ask for any force, and what single precision loses
@@ -457,9 +460,9 @@ void GameConstraints::multiply(const GameBodies& bodies, std::span<const double>
   }
 }
 
-/// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps take hold.
-/// @return whether any did
-bool GameConstraints::let_go(const GameBodies& bodies) {
+/// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps may take
+/// hold. @return whether any did: the others are to be solved for again, as their forces stand against those
+bool GameConstraints::let_go(const GameBodies& bodies, bool takes_hold) {
   bool changed = false;
   for (const Group& group : groups_)
     for (std::size_t i = 0; i < group.count; ++i) {
@@ -469,7 +472,7 @@ bool GameConstraints::let_go(const GameBodies& bodies) {
       if (row.hold == Hold::kMet) {
         if (!row.cut) continue;
         row.hold = row.force == row.lower ? Hold::kLower : Hold::kUpper;
-      } else {
+      } else if (takes_hold) {
         const double open = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
         if (row.hold == Hold::kLower ? open > kRounded * length_ : open < -kRounded * length_) row.hold = Hold::kMet;
       }
@@ -487,6 +490,8 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
     for (std::size_t i = 0; i < group.count; ++i) forces_[i] = -rows_[group.first + i].force;
     apply(group, forces_, bodies.answers());
   }
+  if (std::ranges::any_of(rows_, [](const GameRow& row) { return row.gives_way && row.hold == Hold::kMet; }))
+    factor(true);
   measure(states, bodies, pushed);
   asked_ = right_;
   factor_.solve<kColumns>(right_);
@@ -525,8 +530,10 @@ void GameConstraints::find_shares() {
       given_[static_cast<std::size_t>(groups_[g].component)] +=
           asked_[kColumns * k + kCurve] * right_[kColumns * k + kCurve];
   }
-  for (std::size_t c = 0; c < given_.size(); ++c)
-    given_[c] = given_[c] > taken_[c] ? std::sqrt(std::max(0.0, taken_[c]) / given_[c]) : 1.0;
+  for (std::size_t c = 0; c < given_.size(); ++c) {
+    const double most = std::max(0.0, taken_[c]);  // of what rows that held took: less than nothing where others let go
+    given_[c] = given_[c] > most ? std::sqrt(most / given_[c]) : 1.0;
+  }
 }
 
 void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {

@@ -30,6 +30,7 @@ struct GameRow {
   double error = 0.0;                              // of its gap at the substep's start, which displacements undo
   double force = 0.0;                              // held over the substep
   bool keeps_place = true;                         // the gap itself counts, and not its rate alone
+  bool gives_way = false;                          // of a hand of limited force, which closing does not wait for
   bool cut = false;                                // whether the last solution asked for a force beyond a bound
   Hold hold = Hold::kMet;
 };
@@ -84,14 +85,14 @@ class GameConstraints {
   void find_graph(const GameBodies& bodies);
   void find_components(const GameBodies& bodies);
   void add_what_leads(const GameBodies& bodies);
-  void factor();
-  void list_met();
+  void factor(bool closing);
+  void list_met(bool closing);
   void add_products(const Group& of_rows, const Group& of_columns, const Side& a, const Side& b, double* to) const;
   void solve_once(GameBodies& bodies);
   static double cut_off(GameRow& row, double force);
   void solve_by_gradients(const GameBodies& bodies);
   void multiply(const GameBodies& bodies, std::span<const double> x, std::span<double> product);
-  bool let_go(const GameBodies& bodies);
+  bool let_go(const GameBodies& bodies, bool takes_hold);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies, bool gains_speed);

@@ -12,15 +12,14 @@ constexpr double kRegular = 1e-9;
 // machines of a few loops are below it.
 constexpr std::size_t kMostJoined = 8;
 
-/// L of the lower part of a, n × n, in its place; its diagonal is inverted.
-void factor_dense(double* a, int n) {
+/// L of the lower part of a, n × n, in its place; its diagonal is inverted. @param own each row's own response, of
+/// which others that say the same leave no more than round-off, of either sign
+void factor_dense(double* a, int n, const double* own) {
   for (int j = 0; j < n; ++j) {
     double* row_j = a + j * n;
     double pivot = row_j[j];
-    const double own = pivot;
     for (int k = 0; k < j; ++k) pivot -= row_j[k] * row_j[k];
-    // What round-off leaves of a row that others say already.
-    const double inverse = 1.0 / std::sqrt(std::max(pivot, 1e-3 * kRegular * own));
+    const double inverse = 1.0 / std::sqrt(std::max(pivot, 1e-3 * kRegular * own[j]));
     row_j[j] = inverse;
     for (int i = j + 1; i < n; ++i) {
       double* row_i = a + i * n;
@@ -163,9 +162,11 @@ void JointFactor::begin(std::span<const std::int32_t> sizes) {
 }
 
 void JointFactor::factor() {
+  own_.resize(size_);
   for (std::size_t p = 0; p < nodes_; ++p) {
-    double* d = &values_[starts_[p]];
-    for (int i = 0; i < sizes_[p]; ++i) d[i * sizes_[p] + i] *= 1.0 + kRegular;
+    double* d = values_.data() + starts_[p];
+    for (int i = 0; i < sizes_[p]; ++i)
+      own_[firsts_[p] + static_cast<std::size_t>(i)] = d[i * sizes_[p] + i] *= 1.0 + kRegular;
   }
   for (std::size_t p = 0; p < nodes_; ++p) eliminate(p);
 }
@@ -174,7 +175,7 @@ void JointFactor::eliminate(std::size_t column) {
   const int n = sizes_[column];
   if (n == 0) return;
   const double* l = &values_[starts_[column]];
-  factor_dense(&values_[starts_[column]], n);
+  factor_dense(&values_[starts_[column]], n, &own_[firsts_[column]]);
   const auto begin = static_cast<std::size_t>(column_starts_[column]),
              end = static_cast<std::size_t>(column_starts_[column + 1]);
   auto target = static_cast<std::size_t>(target_starts_[column]);

@@ -60,6 +60,7 @@ class JointFactor {
   std::vector<std::int32_t> sizes_;                    // by position
   std::vector<std::size_t> firsts_;                    // by position
   std::vector<double> values_;
+  std::vector<double> own_;  // by row: its diagonal before elimination
 };
 
 }  // namespace limber::internal
