@@ -29,7 +29,7 @@ struct SleepingStack : GroundedWorld {
 TEST(Sleep, AStackFallsAsleepAndKeepsItsPlaceAndEnergyToTheBit) {
   for (const int modes : {0, 6}) {
     const int count = 3;
-    SleepingStack scene(count, modes, exactly());
+    SleepingStack scene(count, modes);
     ASSERT_EQ(scene.asleep(), count);
     std::vector<RigidTransform> poses;
     std::vector<double> energies;
