@@ -103,6 +103,7 @@ CollisionBody PairFinder::collision_body(const PairQuery& q, Side side) {
   const BodyState& state = is_a ? q.state_a : q.state_b;
   CollisionBody result{.index = is_a ? q.index_a : q.index_b, .X_WB = state.pose};
   result.displacement = state.displacement, result.rotation = state.rotation;
+  result.left_alone = q.passing.touching;
   if (body.modal) {
     result.surface = &surface_of(q, side);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;

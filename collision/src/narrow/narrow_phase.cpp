@@ -336,8 +336,9 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     const auto [rule_a, rule_b] = rules(a, b, X_AB);
     expect_ends(a, b);
     const Vec3 way_A = to_a * (b.displacement - a.displacement);
-    surface_contacts.find(surface[0], surface[1], X_AB, {margin, a.reach + b.reach, way_A, a.doubt + b.doubt}, rule_a,
-                          rule_b, memory, found);
+    surface_contacts.find(surface[0], surface[1], X_AB,
+                          {margin, a.reach + b.reach, way_A, a.doubt + b.doubt, std::max(a.left_alone, b.left_alone)},
+                          rule_a, rule_b, memory, found);
   }
 }
 

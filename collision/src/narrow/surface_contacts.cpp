@@ -61,6 +61,7 @@ void SurfaceContacts::find(PairSurface& a, PairSurface& b, const RigidTransform&
                            OverlapRule* rule_a, OverlapRule* rule_b, PairMemory* memory,
                            std::vector<FeatureContact>& contacts) {
   begin(a, b, reach.margin, false, contacts);
+  passed_ = reach.passed;
   test_pairs(X_AB, reach, memory);
   spread_inside(0, rule_b);
   spread_inside(1, rule_a);
@@ -410,7 +411,7 @@ Vec3 SurfaceContacts::unhindered(int of, Index v, const PairSurface::Minimum& mi
   Vec3 best = minimum.direction;
   double end = minimum.distance + best.dot(motion);
   if (!(end < 0.0)) return best;
-  const double passed = tuning_->passed / tuning_->touching * nearness(of, v, minimum.at.triangle);
+  const double passed = std::max(passed_, tuning_->passed / tuning_->touching * nearness(of, v, minimum.at.triangle));
   const auto try_normal = [&](const FeatureSide& at, const Vec3& n) {
     const double gap = n.dot(p - at.point);
     if (!(gap >= -passed) || !(gap + n.dot(motion) > end)) return;
@@ -442,7 +443,7 @@ Vec3 SurfaceContacts::unhindered(const EdgePair& pair) {
   Vec3 best = pair.direction;
   double end = best.dot(apart + motion);
   if (self_ || !(end < 0.0)) return best;
-  const double passed = tuning_->passed * shorter_edge(pair);
+  const double passed = std::max(passed_, tuning_->passed * shorter_edge(pair));
   const double room_s = std::min(pair.s, 1.0 - pair.s), room_t = std::min(pair.t, 1.0 - pair.t);
   if (room_s * side_[0]->edge_vector(pair.e).norm() <= passed ||
       room_t * side_[1]->edge_vector(pair.f).norm() <= passed)

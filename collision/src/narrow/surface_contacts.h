@@ -39,6 +39,7 @@ struct ContactReach {
   Vec3 way_A = Vec3::Zero();                               // of b as seen from a
   double doubt = std::numeric_limits<double>::infinity();  // how near faces are to come to each other; finite: their
                                                            // ends are known
+  double passed = 0.0;  // by how much a plane may have been passed and still keeps the bodies apart, at least
 
   // How far points are expected to move against each other; 0: not known.
   double expected() const { return std::isfinite(doubt) ? std::max(0.0, beside - doubt) + way_A.norm() : 0.0; }
@@ -132,7 +133,7 @@ class SurfaceContacts {
 
   PairSurface* side_[2] = {nullptr, nullptr};
   const NarrowTuning* tuning_ = nullptr;
-  double margin_ = 0.0, tolerance_ = 0.0, directionless_ = 0.0;
+  double margin_ = 0.0, passed_ = 0.0, tolerance_ = 0.0, directionless_ = 0.0;
   bool self_ = false, overlap_ = false;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;

@@ -116,6 +116,9 @@ struct CollisionBody {
   /// Features that this keeps apart are no contacts. Infinite: not known.
   double doubt = std::numeric_limits<double>::infinity();
   RigidTransform end_X_WB{};
+  /// By how much it may stand in another body and still be kept apart by the plane that it stands in, m, ≥ 0: what a
+  /// solver leaves of overlaps. What slides over flush boxes is then not stopped by their sides.
+  double left_alone = 0.0;
   DeformedSurface* end_surface = nullptr;  ///< null where geometry has the triangles
 };
 
