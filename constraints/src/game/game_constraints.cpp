@@ -302,6 +302,17 @@ double GameConstraints::read(const Group& group, std::size_t i, const std::vecto
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
+double GameConstraints::read(const Group& group, std::size_t i, const std::vector<double>& x) const {
+  double sum = 0.0;
+  for (const Side& side : group.sides) {
+    if (side.frame < 0) continue;
+    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+    const double *at = x.data() + 8 * side.body, *unscale = unscales_[static_cast<std::size_t>(side.frame)].data();
+    for (std::int32_t l = 0; l < side.coordinates; ++l) sum += numbers[l] * at[l] * (l < 8 ? unscale[l] : 1.0);
+  }
+  return sum;
+}
+
 double GameConstraints::read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const {
   double sum = 0.0;
   for (const Side& side : group.sides) {
@@ -351,28 +362,39 @@ void GameConstraints::apply(const Group& group, std::span<const double> forces, 
 void GameConstraints::solve(GameBodies& bodies) {
   if (groups_.empty()) return;
   add_what_leads(bodies);
-  taken_.assign(bodies.bodies().size(), 0.0);
-  for (const Group& group : groups_) {
-    forces_.assign(group.count, 0.0);
-    for (std::size_t i = 0; i < group.count; ++i) forces_[i] = rows_[group.first + i].force;
-    apply(group, forces_, bodies.motion());
-  }
+  begun_.clear();
+  for (const GameRow& row : rows_) begun_.push_back(row.force);
+  for (const Group& group : groups_) apply(group, std::span(begun_).subspan(group.first, group.count), bodies.motion());
   int round = 0;
   do {
     factor(false);
     solve_once(bodies);
   } while (let_go(bodies, ++round < kMostRounds));
+  for (const Group& group : groups_) apply(group, changes(group, [](const GameRow&) { return true; }), bodies.motion());
+  find_taken(bodies);
 }
 
-/// A force within its row's bounds. Rows that contradict each other ask for any force, and what single precision loses
-/// of such a force would throw the bodies about: so forces are cut off before they act.
+/// A force within its row's bounds.
 double GameConstraints::cut_off(GameRow& row, double force) {
   row.cut = force < row.lower - kRounded * std::abs(row.lower) || force > row.upper + kRounded * std::abs(row.upper);
   return row.cut ? std::clamp(force, row.lower, row.upper) : force;
 }
 
-/// Adds to the forces of the rows that hold what they are short of, within their bounds.
-void GameConstraints::solve_once(GameBodies& bodies) {
+/// By how much forces of a group's rows differ from those that the motion has already.
+template <class Counts>
+std::span<const double> GameConstraints::changes(const Group& group, const Counts& counts) {
+  forces_.assign(group.count, 0.0);
+  for (std::size_t i = group.first; i < group.first + group.count; ++i)
+    if (counts(rows_[i])) forces_[i - group.first] = rows_[i].force - begun_[i];
+  return forces_;
+}
+
+/// The forces with which the rows that hold are met, within their bounds. Only what is found last acts on the motion,
+/// whose single precision would lose what rounds find whose rows contradict.
+void GameConstraints::solve_once(const GameBodies& bodies) {
+  answers_.assign(8 * bodies.motion().size(), 0.0);
+  for (const Group& group : groups_)
+    apply(group, changes(group, [](const GameRow& row) { return row.hold != Hold::kMet; }), answers_);
   right_.assign(factor_.size(), 0.0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
@@ -380,29 +402,35 @@ void GameConstraints::solve_once(GameBodies& bodies) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
       const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
       const GameRow& row = rows_[group.first + i];
-      right[k] = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+      right[k] = row.target - read(group, i, bodies.motion()) - read(group, i, answers_) -
+                 row.compliance * begun_[group.first + i];
     }
   }
-  asked_ = right_;
   if (factor_.is_complete())
     factor_.solve<1>(right_);
   else
     solve_by_gradients(bodies);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
-    const std::size_t first = factor_.first(g);
-    double energy = 0.0;
-    forces_.assign(group.count, 0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
-      const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
-      GameRow& row = rows_[group.first + i];
-      const double force = cut_off(row, row.force + right_[first + k]);
-      forces_[i] = force - row.force;
-      row.force = force;
-      if (!row.cut) energy += forces_[i] * asked_[first + k];
+      const std::size_t i = group.first + static_cast<std::size_t>(met_[group.first_met + k]);
+      rows_[i].force = cut_off(rows_[i], begun_[i] + right_[factor_.first(g) + k]);
     }
-    taken_[static_cast<std::size_t>(group.component)] += energy;
-    apply(group, forces_, bodies.motion());
+    apply(group, changes(group, [](const GameRow& row) { return row.hold == Hold::kMet; }), answers_);
+  }
+}
+
+/// Twice the energy of what the rows took from the motion, by component.
+void GameConstraints::find_taken(const GameBodies& bodies) {
+  taken_.assign(bodies.bodies().size(), 0.0);
+  for (const std::int32_t frame : frames_) {
+    const GameBody& body = bodies.body(frame);
+    const double* at = answers_.data() + 8 * body.first;
+    double& sum = taken_[static_cast<std::size_t>(roots_[static_cast<std::size_t>(frame)])];
+    for (std::size_t l = 0; l < static_cast<std::size_t>(8 * body.blocks); ++l) {
+      const double by = l < 8 ? at[l] * unscales_[static_cast<std::size_t>(frame)][l] : at[l];
+      sum += by * by;
+    }
   }
 }
 
@@ -447,15 +475,8 @@ void GameConstraints::multiply(const GameBodies& bodies, std::span<const double>
     const Group& group = groups_[g];
     for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k) {
       const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
-      double sum = rows_[group.first + i].compliance * x[factor_.first(g) + k];
-      for (const Side& side : group.sides) {
-        if (side.frame < 0) continue;
-        const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
-        const double *at = place_.data() + 8 * side.body,
-                     *unscale = unscales_[static_cast<std::size_t>(side.frame)].data();
-        for (std::int32_t l = 0; l < side.coordinates; ++l) sum += numbers[l] * at[l] * (l < 8 ? unscale[l] : 1.0);
-      }
-      product[factor_.first(g) + k] = sum;
+      product[factor_.first(g) + k] =
+          rows_[group.first + i].compliance * x[factor_.first(g) + k] + read(group, i, place_);
     }
   }
 }
@@ -473,7 +494,8 @@ bool GameConstraints::let_go(const GameBodies& bodies, bool takes_hold) {
         if (!row.cut) continue;
         row.hold = row.force == row.lower ? Hold::kLower : Hold::kUpper;
       } else if (takes_hold) {
-        const double open = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+        const double open =
+            row.target - read(group, i, bodies.motion()) - read(group, i, answers_) - row.compliance * row.force;
         if (row.hold == Hold::kLower ? open > kRounded * length_ : open < -kRounded * length_) row.hold = Hold::kMet;
       }
       changed = changed || row.hold != before;

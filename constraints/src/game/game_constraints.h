@@ -88,7 +88,10 @@ class GameConstraints {
   void factor(bool closing);
   void list_met(bool closing);
   void add_products(const Group& of_rows, const Group& of_columns, const Side& a, const Side& b, double* to) const;
-  void solve_once(GameBodies& bodies);
+  template <class Counts>
+  std::span<const double> changes(const Group& group, const Counts& counts);
+  void solve_once(const GameBodies& bodies);
+  void find_taken(const GameBodies& bodies);
   static double cut_off(GameRow& row, double force);
   void solve_by_gradients(const GameBodies& bodies);
   void multiply(const GameBodies& bodies, std::span<const double> x, std::span<double> product);
@@ -97,6 +100,7 @@ class GameConstraints {
   void find_shares();
   void displace(GameBodies& bodies, bool gains_speed);
   double read(const Group& group, std::size_t i, const std::vector<Block8>& x) const;
+  double read(const Group& group, std::size_t i, const std::vector<double>& x) const;
   double read_pushes(const Group& group, std::size_t i, std::span<const Block8> pushes) const;
   std::array<double, 8> answer(const Group& group, const Side& side, std::int32_t first,
                                std::span<const double> forces) const;
@@ -115,6 +119,8 @@ class GameConstraints {
   std::vector<std::array<std::int32_t, 2>> incident_;  // (frame, group)
   std::vector<std::int32_t> frames_;                   // that rows act on
   std::vector<std::int32_t> roots_;                    // of components, by frame
+  std::vector<double> begun_;                          // by row: the force that the motion has when solving begins
+  std::vector<double> answers_;                        // by coordinate: what the other forces move
   std::vector<double> taken_, given_;                  // energies by component
   std::vector<double> right_, asked_, speed_, place_;
   std::vector<double> residuals_, directions_, products_, conditioned_;  // of conjugate gradients
