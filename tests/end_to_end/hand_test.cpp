@@ -67,7 +67,7 @@ TEST(Hands, ContactsOfABoxThatIsLedPushAndDentItByTheirForces) {
   const auto model = rubber_box(true);
   const auto triangles = static_cast<Index>(model->collision().triangles.size());
   for (const HandleOptions& options : {kSpringHand, kLimitedHand}) {
-    GroundedWorld scene({.friction = kFriction});
+    GroundedWorld scene(exactly({.friction = kFriction}));
     World& world = scene.world;
     const BodyId box = world.add_body(model, {.pose = {{}, {0.0, 0.0, 0.5 * kSide}}});
     for (int i = 0; i < 10; ++i) world.step();

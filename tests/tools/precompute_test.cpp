@@ -398,7 +398,8 @@ TEST_F(Precompute, SurfaceFarFromTheMeshAndOptionsWithoutEffectAreToldOf) {
   arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
   const Json r = report(arguments);
   ASSERT_EQ(r["warnings"].size(), 2u);
-  EXPECT_THAT(r["warnings"][0].get<std::string>(), HasSubstr("--cell-size and --alpha have no effect"));
+  EXPECT_THAT(r["warnings"][0].get<std::string>(),
+              HasSubstr("--cell-size, --frequency-error and --alpha have no effect"));
   EXPECT_THAT(r["warnings"][1].get<std::string>(), HasSubstr("8 of 8 vertices lie outside the tetrahedra"));
 }
 
