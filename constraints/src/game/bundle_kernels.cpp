@@ -164,6 +164,24 @@ HWY_INLINE HWY_ATTR void WriteModes(const PairBundle& bundle, Block8* y, std::si
     }
 }
 
+/// All coordinates of both bodies.
+struct Coordinates {
+  Sides sides;
+  Modes modes;
+};
+
+HWY_INLINE HWY_ATTR void ReadCoordinates(const BundleArrays& all, const PairBundle& bundle, const Block8* motion,
+                                         std::size_t lane, Coordinates& y) {
+  ReadSides(bundle, bundle.motion, motion, lane, y.sides);
+  ReadModes(all, bundle, motion, lane, y.modes);
+}
+
+HWY_INLINE HWY_ATTR void WriteCoordinates(const BundleArrays& all, const PairBundle& bundle, Block8* motion,
+                                          std::size_t lane, const Coordinates& y) {
+  WriteSides(bundle, bundle.motion, all.standing, motion, lane, y.sides);
+  WriteModes(bundle, motion, lane, y.modes);
+}
+
 /// The modes' rows of contact k of a bundle.
 HWY_INLINE HWY_ATTR Block8* RowsOf(const BundleArrays& all, const PairBundle& bundle, std::int32_t k) {
   return all.rows + bundle.rows + 3 * k * (bundle.modes[0] + bundle.modes[1]);
@@ -207,9 +225,16 @@ HWY_INLINE HWY_ATTR void MoveSides(const BundleContact& c, std::size_t axes, con
 
 /// The three rows' numbers for the coordinates as they are.
 HWY_INLINE HWY_ATTR void ReadRows(const PairBundle& bundle, const BundleContact& c, const Block8* rows,
-                                  const Sides& sides, const Modes& modes, std::size_t lane, Vector* u) {
-  for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = ReadAxis(c, axis, sides, lane);
-  AddModes(bundle, rows, modes, lane, u);
+                                  const Coordinates& y, std::size_t lane, Vector* u) {
+  for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = ReadAxis(c, axis, y.sides, lane);
+  AddModes(bundle, rows, y.modes, lane, u);
+}
+
+/// What changes of the three forces move.
+HWY_INLINE HWY_ATTR void MoveCoordinates(const PairBundle& bundle, const BundleContact& c, const Block8* rows,
+                                         const Vector* by, std::size_t lane, Coordinates& y) {
+  MoveSides(c, 3, by, y.sides, lane);
+  MoveModes(bundle, rows, by, lane, y.modes);
 }
 
 /// How much is left open along the normal: at most 0 where the law is met.
@@ -319,22 +344,18 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
   for (std::size_t i = 0; i < all.count; ++i) {
     const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Sides sides;
-      Modes modes;
-      ReadSides(bundle, bundle.motion, motion, lane, sides);
-      ReadModes(all, bundle, motion, lane, modes);
+      Coordinates y;
+      ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t j = 0; j < bundle.count; ++j) {
         const std::int32_t k = backward ? bundle.count - 1 - j : j;
         BundleContact& c = all.contacts[bundle.first + k];
         const Block8* rows = RowsOf(all, bundle, k);
         Vector u[3], change[3];
-        ReadRows(bundle, c, rows, sides, modes, lane, u);
+        ReadRows(bundle, c, rows, y, lane, u);
         SolveOne(c, u, lane, change);
-        MoveSides(c, 3, change, sides, lane);
-        MoveModes(bundle, rows, change, lane, modes);
+        MoveCoordinates(bundle, c, rows, change, lane, y);
       }
-      WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
-      WriteModes(bundle, motion, lane, modes);
+      WriteCoordinates(all, bundle, motion, lane, y);
     }
   }
 }
@@ -428,14 +449,12 @@ HWY_ATTR float ResidualOfBundles(const BundleArrays& all, const Block8* motion) 
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Sides sides;
-      Modes modes;
-      ReadSides(bundle, bundle.motion, motion, lane, sides);
-      ReadModes(all, bundle, motion, lane, modes);
+      Coordinates y;
+      ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
         Vector u[3];
-        ReadRows(bundle, c, RowsOf(all, bundle, k), sides, modes, lane, u);
+        ReadRows(bundle, c, RowsOf(all, bundle, k), y, lane, u);
         const Vector approach = Approach(c, u[0], lane);
         const auto presses = hn::Gt(Get(c.force[0], lane), hn::Zero(d));
         const auto is_there = hn::Gt(Get(c.inverse_normal, lane), hn::Zero(d));
@@ -451,18 +470,14 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Sides sides;
-      Modes modes;
-      ReadSides(bundle, bundle.motion, motion, lane, sides);
-      ReadModes(all, bundle, motion, lane, modes);
+      Coordinates y;
+      ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
         const Vector by[3] = {Get(c.force[0], lane), Get(c.force[1], lane), Get(c.force[2], lane)};
-        MoveSides(c, 3, by, sides, lane);
-        MoveModes(bundle, RowsOf(all, bundle, k), by, lane, modes);
+        MoveCoordinates(bundle, c, RowsOf(all, bundle, k), by, lane, y);
       }
-      WriteSides(bundle, bundle.motion, all.standing, motion, lane, sides);
-      WriteModes(bundle, motion, lane, modes);
+      WriteCoordinates(all, bundle, motion, lane, y);
     }
   }
 }

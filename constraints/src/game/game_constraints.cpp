@@ -521,10 +521,11 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   displace(bodies, true);
 }
 
-/// What the rows that hold are short of: in their rates, by the way they turned, and in places.
-void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
+/// Right-hand sides of zeros, and of each row that holds: its group, its number there, and its gap as it is now.
+/// @param visit (group, i, gap, right) with right of kColumns numbers
+template <class Visit>
+void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit) {
   right_.assign(kColumns * factor_.size(), 0.0);
-  const double most = kRecoverySpeed * length_;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
     gaps_.assign(group.count, 0.0);
@@ -532,15 +533,23 @@ void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies
     double* right = right_.data() + kColumns * factor_.first(g);
     for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k, right += kColumns) {
       const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
-      const GameRow& row = rows_[group.first + i];
-      right[kRate] = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
-      if (!row.keeps_place) continue;
-      const double by_pushes = pushed ? read_pushes(group, i, bodies.pushes()) : 0.0,
-                   straight = row.error - right[kRate] + by_pushes;  // the gap as the rows foretell it
-      right[kCurve] = straight - (gaps_[i] - row.rate);
-      right[kPlace] = -std::clamp(row.error + by_pushes, -most, most);
+      visit(group, i, gaps_[i], right);
     }
   }
+}
+
+/// What the rows that hold are short of: in their rates, by the way they turned, and in places.
+void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
+  const double most = kRecoverySpeed * length_;
+  for_met_gaps(states, [&](const Group& group, std::size_t i, double gap, double* right) {
+    const GameRow& row = rows_[group.first + i];
+    right[kRate] = row.target - read(group, i, bodies.motion()) - row.compliance * row.force;
+    if (!row.keeps_place) return;
+    const double by_pushes = pushed ? read_pushes(group, i, bodies.pushes()) : 0.0,
+                 straight = row.error - right[kRate] + by_pushes;  // the gap as the rows foretell it
+    right[kCurve] = straight - (gap - row.rate);
+    right[kPlace] = -std::clamp(row.error + by_pushes, -most, most);
+  });
 }
 
 /// By component, how much of what curves is closed by velocities: as much as takes no more energy than there is.
@@ -552,10 +561,8 @@ void GameConstraints::find_shares() {
       given_[static_cast<std::size_t>(groups_[g].component)] +=
           asked_[kColumns * k + kCurve] * right_[kColumns * k + kCurve];
   }
-  for (std::size_t c = 0; c < given_.size(); ++c) {
-    const double most = std::max(0.0, taken_[c]);  // of what rows that held took: less than nothing where others let go
-    given_[c] = given_[c] > most ? std::sqrt(most / given_[c]) : 1.0;
-  }
+  for (std::size_t c = 0; c < given_.size(); ++c)
+    given_[c] = given_[c] > taken_[c] ? std::sqrt(taken_[c] / given_[c]) : 1.0;
 }
 
 void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
@@ -587,23 +594,15 @@ void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
 
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
   if (last && !groups_.empty()) {
-    right_.assign(kColumns * factor_.size(), 0.0);
     residual_ = 0.0;
     const double most = kRecoverySpeed * length_;
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const Group& group = groups_[g];
-      gaps_.assign(group.count, 0.0);
-      group.constraint->gaps(states, StepTime::kStart, gaps_);
-      double* right = right_.data() + kColumns * factor_.first(g);
-      for (std::size_t k = 0; k < static_cast<std::size_t>(group.met); ++k, right += kColumns) {
-        const auto i = static_cast<std::size_t>(met_[group.first_met + k]);
-        const GameRow& row = rows_[group.first + i];
-        if (!row.keeps_place) continue;
-        const double open = gaps_[i] - row.rate;
-        right[kPlace] = -std::clamp(open, -most, most);
-        residual_ = std::max(residual_, std::abs(open));
-      }
-    }
+    for_met_gaps(states, [&](const Group& group, std::size_t i, double gap, double* right) {
+      const GameRow& row = rows_[group.first + i];
+      if (!row.keeps_place) return;
+      const double open = gap - row.rate;
+      right[kPlace] = -std::clamp(open, -most, most);
+      residual_ = std::max(residual_, std::abs(open));
+    });
     factor_.solve<kColumns>(right_);
     displace(bodies, false);
   }

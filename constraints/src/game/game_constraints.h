@@ -96,6 +96,8 @@ class GameConstraints {
   void solve_by_gradients(const GameBodies& bodies);
   void multiply(const GameBodies& bodies, std::span<const double> x, std::span<double> product);
   bool let_go(const GameBodies& bodies, bool takes_hold);
+  template <class Visit>
+  void for_met_gaps(const BodyStates& states, const Visit& visit);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies, bool gains_speed);
