@@ -29,6 +29,12 @@ struct ConvexCore {
   std::span<const Index> loop(const ConvexFace& f) const {
     return std::span(loops).subspan(static_cast<std::size_t>(f.first), static_cast<std::size_t>(f.count));
   }
+  // The mean of its points.
+  Vec3 middle() const {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& p : points) sum += p;
+    return sum / static_cast<double>(points.size());
+  }
 };
 
 ConvexCore convex_core(const Sphere& shape);

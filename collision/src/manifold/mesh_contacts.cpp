@@ -30,12 +30,6 @@ bool is_beneath(PairSurface& mesh, std::span<const SupportPlane> planes, Feature
   });
 }
 
-Vec3 middle_of(const ConvexCore& core) {
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& p : core.points) middle += p;
-  return middle / static_cast<double>(core.points.size());
-}
-
 /// Whether a point is inside of what a surface bounds.
 bool holds(PairSurface& mesh, const Vec3& p) {
   return mesh.may_hold(p) && mesh.nearest(p, std::numeric_limits<double>::infinity()).inside;
@@ -95,7 +89,7 @@ void MeshContacts::find_rounded(const Query& q) {
   const std::size_t first = found_->size();
   core_contacts_.find(q.mesh, {{q.core.points.front(), q.core.points.back()}, q.core.points.size() == 2, q.core.radius},
                       q.reach, *found_);
-  const Vec3 middle = middle_of(q.core);
+  const Vec3 middle = q.core.middle();
   const auto is_behind = [&](const FeatureContact& c) { return c.normal.dot(middle - c.a.point) > 0.0; };
   const bool crosses = std::any_of(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), is_behind) &&
                        !holds(q.mesh, middle);
@@ -116,7 +110,7 @@ void MeshContacts::find_rounded(const Query& q) {
 
 /// A body whose middle is inside of what the mesh bounds goes out along one direction, to the nearest point of it.
 bool MeshContacts::leave_as_a_whole(const Query& q) {
-  const Vec3 middle = middle_of(q.core);
+  const Vec3 middle = q.core.middle();
   if (!q.mesh.may_hold(middle)) return false;
   const PairSurface::Nearest nearest = q.mesh.nearest(middle, std::numeric_limits<double>::infinity());
   if (!nearest.inside) return false;

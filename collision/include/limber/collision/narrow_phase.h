@@ -116,10 +116,10 @@ struct CollisionBody {
   /// Features that this keeps apart are no contacts. Infinite: not known.
   double doubt = std::numeric_limits<double>::infinity();
   RigidTransform end_X_WB{};
-  /// By how much it may stand in another body and still be kept apart by the plane that it stands in, m, ≥ 0: what a
-  /// solver leaves of overlaps. What slides over flush boxes is then not stopped by their sides.
-  double left_alone = 0.0;
   DeformedSurface* end_surface = nullptr;  ///< null where geometry has the triangles
+  /// By how much it may stand in another body and still be kept apart by the plane that it stands in, m, ≥ 0: what a
+  /// solver leaves of overlaps. Bodies that slide over flush boxes are then not stopped by their sides.
+  double left_alone = 0.0;
 };
 
 /// Depth and normal of a vertex that is inside another modal body.
