@@ -36,7 +36,10 @@ class BenchmarkProgram : public ::testing::Test {
   nlohmann::json json(const std::string& name) const { return nlohmann::json::parse(bytes(name)); }
   bool exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
 
-  const std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "limber_benchmark_test";
+  /// One folder a test: tests run side by side.
+  const std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) /
+      (std::string("limber_benchmark_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 TEST_F(BenchmarkProgram, SoakTellsOfEachSeedWhichLawsItsStepsKept) {
