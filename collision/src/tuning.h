@@ -64,6 +64,16 @@ struct ConvexTuning {
   double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]; by judgement
 };
 
+/// Lists of tests that pairs of surfaces keep from query to query. These decide time alone.
+struct PairListTuning {
+  /// Part of the margin by which two surfaces may move against each other while one list of tests lasts [0.2 to 1]:
+  /// more lasts longer and holds more.
+  double slack = 0.5;
+  /// Part of that, moved since the last query and expected until the next, up to which a list is made [0.05 to 0.5]: it
+  /// is to serve some queries.
+  double when = 0.1;
+};
+
 /// Surfaces made of triangles. "Edges at hand" are the shortest ones around a vertex and of the face it meets.
 struct NarrowTuning {
   /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
@@ -93,13 +103,7 @@ struct NarrowTuning {
   double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. Steady.
   /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. Steady.
   double parallel_touching = 1e-4;
-  double grazing = 1e-9;  ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
-  /// Part of the margin by which two surfaces may move against each other while one list of tests lasts [0.2 to 1]:
-  /// more lasts longer and holds more. Time alone.
-  double list_slack = 0.5;
-  /// Part of that, moved since the last query and expected until the next, up to which a list is made [0.05 to 0.5]: it
-  /// is to serve some queries. Time alone.
-  double list_when = 0.1;
+  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
   int rest_depth_steps = 16;  ///< tetrahedra walked to carry a point back to the rest shape [≥ 8]. Steady.
   double least_stretch =
       1e-6;  ///< det F up to which a tetrahedron is flat and carries nothing [1e-12 to 1e-3]. Steady.
@@ -163,6 +167,7 @@ struct CollisionTuning {
   HierarchyTuning hierarchy{};
   BroadTuning broad{};
   ConvexTuning convex{};
+  PairListTuning lists{};
   NarrowTuning narrow{};
   FinderTuning finder{};
   FieldTuning field{};

@@ -32,12 +32,18 @@ constexpr double kFinestRate = 960.0;  // 1/s, of limber, where its step is to c
 constexpr int kManyModes = 4;          // times as many, where truncation is to cost little
 constexpr double kNudge = 0.01;        // by how much what drives a scene is changed to see what the scene makes of it
 
-struct ErrorArguments {
-  std::vector<std::string> scenes, methods{"complementary"}, impacts{"absorbed", "held_from_touch"}, residuals{"on"},
+/// All that is varied: each setting takes one of each.
+struct ErrorAxes {
+  std::vector<std::string> methods{"complementary"}, impacts{"absorbed", "held_from_touch"}, residuals{"on"},
       bases{"float"};
   std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1},
       substeps{0, 2, 4, 8, 16, 32};
   std::vector<double> drives{1.0};
+};
+
+struct ErrorArguments {
+  std::vector<std::string> scenes;
+  ErrorAxes axes{};
   std::string against = "linear", target, settings, csv, plot;
   bool split = false, capture = false;
 };
@@ -113,7 +119,7 @@ ErrorRow run_setting(ErrorRuns& runs, const ErrorScene& scene, const ErrorSettin
   const PlayedScene played = runs.play(scene, at);
   const testing::BakedScene& baked = runs.bakery().baked(scene, at);
   ErrorRow row{.scene = scene.name, .method = method_of(at), .at = at};
-  const int finest = *std::max_element(a.meshes.begin(), a.meshes.end());
+  const int finest = *std::max_element(a.axes.meshes.begin(), a.axes.meshes.end());
   row.error = scene_error(scene, played, runs.against(scene, a.against, at, finest));
   row.step = testing::quantiles(played.step_seconds);
   row.frame = frame_of(scene, std::accumulate(played.step_seconds.begin(), played.step_seconds.end(), 0.0));
@@ -139,16 +145,16 @@ ErrorRow run_all_nodes(ErrorRuns& runs, const ErrorScene& scene) {
 
 std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
   std::vector<ErrorSetting> out;
-  for (const int mesh : a.meshes)
-    for (const std::string& basis : a.bases)
-      for (const std::string& residual : a.residuals)
-        for (const int contacts : a.contacts)
-          for (const int substeps : a.substeps)
-            for (const std::string& impact : a.impacts)
-              for (const std::string& method : a.methods)
-                for (const double drive : a.drives)
-                  for (const int rate : a.rates)
-                    for (const int modes : a.modes)
+  for (const int mesh : a.axes.meshes)
+    for (const std::string& basis : a.axes.bases)
+      for (const std::string& residual : a.axes.residuals)
+        for (const int contacts : a.axes.contacts)
+          for (const int substeps : a.axes.substeps)
+            for (const std::string& impact : a.axes.impacts)
+              for (const std::string& method : a.axes.methods)
+                for (const double drive : a.axes.drives)
+                  for (const int rate : a.axes.rates)
+                    for (const int modes : a.axes.modes)
                       out.push_back({.modes = modes,
                                      .step = 1.0 / rate,
                                      .method = method,
@@ -163,14 +169,15 @@ std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
 }
 
 bool is_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
-  return at.method == a.methods.front() && at.impact == a.impacts.front() && at.contacts == a.contacts.front();
+  return at.method == a.axes.methods.front() && at.impact == a.axes.impacts.front() &&
+         at.contacts == a.axes.contacts.front();
 }
 
 /// Whether no other setting makes the same run: rules of contact are the exact solver's, substeps those of what is
 /// held, joined or touched.
 bool is_run_of_its_own(const ErrorScene& scene, const ErrorSetting& at, const ErrorArguments& a) {
   const bool is_first_rule = is_first_contact_rule(at, a);
-  if (!scene.has_constraints()) return is_first_rule && at.substeps == a.substeps.front();
+  if (!scene.has_constraints()) return is_first_rule && at.substeps == a.axes.substeps.front();
   return is_first_rule || (at.substeps == 0 && scene.has_contact());
 }
 
@@ -402,7 +409,7 @@ void print_capture(Program& program, ErrorRuns& runs, const std::vector<const Er
       "touch\n"
       "scene    body     modes    least  |   least   median\n");
   for (const ErrorScene* scene : scenes)
-    for (const int modes : a.modes)
+    for (const int modes : a.axes.modes)
       for (const auto& [body, asset] : runs.bakery().baked(*scene, {.modes = modes}).assets) {
         const ModalModel& model = *asset.bodies[0];
         std::string line = fmt::format("{:<8} {:<8} {:>5}", scene->name, body, modes);
@@ -455,21 +462,21 @@ void declare_axes(CLI::App& app, ErrorArguments& a) {
     return app.add_option(name, values, what)->type_name(type)->delimiter(',')->capture_default_str();
   };
   list("--scene", a.scenes, "poke, drag, drop, collide, spin, lamp, squeeze, strip; default: all", "NAME,...");
-  list("--modes", a.modes, "modes kept", "K,...")->check(CLI::Range(1, 100'000));
-  list("--steps-per-second", a.rates, "a multiple of 30", "N,...")->check(CLI::Range(30, 1'000'000));
-  list("--method", a.methods, "how contact forces are found", "NAME,...")
+  list("--modes", a.axes.modes, "modes kept", "K,...")->check(CLI::Range(1, 100'000));
+  list("--steps-per-second", a.axes.rates, "a multiple of 30", "N,...")->check(CLI::Range(30, 1'000'000));
+  list("--method", a.axes.methods, "how contact forces are found", "NAME,...")
       ->check(CLI::IsMember({"complementary", "gap_program", "velocity_program", "penalty"}));
-  list("--impact", a.impacts, "whether impacts rebound", "NAME,...")
+  list("--impact", a.axes.impacts, "whether impacts rebound", "NAME,...")
       ->check(CLI::IsMember({"absorbed", "held", "held_from_touch"}));
-  list("--contacts", a.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
-  list("--substeps", a.substeps, "of contact, handles and joints by small steps; 0: the exact solver", "N,...")
+  list("--contacts", a.axes.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
+  list("--substeps", a.axes.substeps, "of contact, handles and joints by small steps; 0: the exact solver", "N,...")
       ->check(CLI::Range(0, 1'000));
-  list("--residual", a.residuals, "static answers of the modes left out", "on|off,...")
+  list("--residual", a.axes.residuals, "static answers of the modes left out", "on|off,...")
       ->check(CLI::IsMember({"on", "off"}));
-  list("--basis", a.bases, "shapes as they are, or rounded to half precision", "float|half,...")
+  list("--basis", a.axes.bases, "shapes as they are, or rounded to half precision", "float|half,...")
       ->check(CLI::IsMember({"float", "half"}));
-  list("--mesh", a.meshes, "times as many cells along each axis", "N,...")->check(CLI::Range(1, 8));
-  list("--drive", a.drives, "forces, ways, velocities and gravity, times those of the scene", "FACTOR,...")
+  list("--mesh", a.axes.meshes, "times as many cells along each axis", "N,...")->check(CLI::Range(1, 8));
+  list("--drive", a.axes.drives, "forces, ways, velocities and gravity, times those of the scene", "FACTOR,...")
       ->check(CLI::Range(1e-6, 1e6));
 }
 

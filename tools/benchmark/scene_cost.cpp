@@ -59,30 +59,32 @@ class Measurement {
         drawn_(player_) {
     if (finder_ && scene_.contact) player_.world().set_contact_source(finder_.get(), *scene_.contact);
     cost_.scene = timed.name;
-    cost_.bodies = player_.bodies().size();
-    cost_.vertices = static_cast<Index>(drawn_.positions.size() / 3);
-    for (const BodyId id : player_.bodies()) cost_.modes = std::max(cost_.modes, player_.world().model(id).modes());
-    cost_.step = timed.scene.step;
+    cost_.size.bodies = player_.bodies().size();
+    cost_.size.vertices = static_cast<Index>(drawn_.positions.size() / 3);
+    for (const BodyId id : player_.bodies())
+      cost_.size.modes = std::max(cost_.size.modes, player_.world().model(id).modes());
+    cost_.size.step = timed.scene.step;
     const auto left = static_cast<int>(timed.scene.steps) - timed.settling;
-    cost_.steps = options.steps > 0 ? std::min(options.steps, left) : left;
+    cost_.size.steps = options.steps > 0 ? std::min(options.steps, left) : left;
   }
 
   SceneCost run() {
     for (auto* seconds : {&cost_.step_seconds, &cost_.position_seconds, &cost_.draw_seconds})
-      seconds->reserve(static_cast<std::size_t>(cost_.steps));
+      seconds->reserve(static_cast<std::size_t>(cost_.size.steps));
     for (int n = 0; n < timed_.settling; ++n) player_.step();
     long before = 0;
-    for (int n = 0; n < cost_.steps; ++n) {
-      if (n == cost_.steps / 2) before = testing::allocations();
+    for (int n = 0; n < cost_.size.steps; ++n) {
+      if (n == cost_.size.steps / 2) before = testing::allocations();
       take_step();
       if (options_.draw) draw();
     }
-    cost_.allocations = static_cast<double>(testing::allocations() - before) / (cost_.steps - cost_.steps / 2);
-    const double steps = cost_.steps;
-    cost_.contacts = static_cast<double>(cost_.stages[Stage::kNarrowPhase].units) / steps;
-    cost_.rows = static_cast<double>(cost_.stages[Stage::kSolve].units) / steps;
-    cost_.iterations /= steps, cost_.newton_steps /= steps;
-    for (const BodyId id : player_.bodies()) cost_.asleep += player_.world().is_asleep(id) ? 1 : 0;
+    cost_.allocations =
+        static_cast<double>(testing::allocations() - before) / (cost_.size.steps - cost_.size.steps / 2);
+    const double steps = cost_.size.steps;
+    cost_.work.contacts = static_cast<double>(cost_.stages[Stage::kNarrowPhase].units) / steps;
+    cost_.work.rows = static_cast<double>(cost_.stages[Stage::kSolve].units) / steps;
+    cost_.work.iterations /= steps, cost_.work.newton_steps /= steps;
+    for (const BodyId id : player_.bodies()) cost_.work.asleep += player_.world().is_asleep(id) ? 1 : 0;
     count_bytes();
     return std::move(cost_);
   }
@@ -105,9 +107,9 @@ class Measurement {
     world.set_stage_times(nullptr);
     player_.end_step();
     const ConstraintReport report = world.constraint_report();
-    cost_.iterations += report.iterations;
-    cost_.newton_steps += report.newton_steps;
-    cost_.unsettled += report.statuses.worst() == IslandStatus::kFailed ? 1 : 0;
+    cost_.work.iterations += report.iterations;
+    cost_.work.newton_steps += report.newton_steps;
+    cost_.work.unsettled += report.statuses.worst() == IslandStatus::kFailed ? 1 : 0;
   }
 
   void draw() {

@@ -43,20 +43,27 @@ struct CostOptions {
   ContactChoice contact{};
 };
 
-struct SceneCost {
-  std::string scene;
+/// What a scene that is measured holds.
+struct SceneSize {
   std::size_t bodies = 0;
   Index modes = 0;     ///< the most of a body
   Index vertices = 0;  ///< drawn, of all bodies
   double step = 0.0;   ///< s
   int steps = 0;       ///< timed
+};
 
-  // Means of a step, and sums. They do not differ between equal runs.
+/// Means of a step, and sums. They do not differ between equal runs.
+struct SceneWork {
   double contacts = 0.0, rows = 0.0, iterations = 0.0, newton_steps = 0.0;
   int unsettled = 0;
   long asleep = 0;  ///< at the end
+};
 
-  // They do. Seconds of this thread where the work is serial, of the wall clock where it is not.
+/// Times are seconds of this thread where the work is serial, of the wall clock where it is not.
+struct SceneCost {
+  std::string scene;
+  SceneSize size{};
+  SceneWork work{};
   std::vector<double> step_seconds, position_seconds, draw_seconds;  ///< of every step; the last: normals too
   StageTimes stages;                                  ///< of all timed steps, and of drawing with normals
   double allocations = 0.0;                           ///< calls of new a step, in the last half

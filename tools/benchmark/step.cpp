@@ -66,10 +66,12 @@ double share(const SceneCost& c, Stage stage) {
 /// their quantiles are by.
 double stage_seconds(const SceneCost& c, Stage stage) {
   const auto sum = [](const std::vector<double>& s) { return std::accumulate(s.begin(), s.end(), 0.0); };
-  return share(c, stage) * (sum(c.step_seconds) + sum(c.draw_seconds)) / c.steps;
+  return share(c, stage) * (sum(c.step_seconds) + sum(c.draw_seconds)) / c.size.steps;
 }
 
-double units_per_step(const SceneCost& c, Stage stage) { return static_cast<double>(c.stages[stage].units) / c.steps; }
+double units_per_step(const SceneCost& c, Stage stage) {
+  return static_cast<double>(c.stages[stage].units) / c.size.steps;
+}
 
 double ns_per_unit(const SceneCost& c, Stage stage) {
   const double units = units_per_step(c, stage);
@@ -81,12 +83,12 @@ std::string kib_text(const std::optional<std::size_t>& bytes) {
 }
 
 std::string text_of(const SceneCost& c) {
-  std::string text = fmt::format("\n{}: {} bodies, {} modes, {} vertices; {} steps of {:.4g} ms", c.scene, c.bodies,
-                                 c.modes, c.vertices, c.steps, 1e3 * c.step);
+  std::string text = fmt::format("\n{}: {} bodies, {} modes, {} vertices; {} steps of {:.4g} ms", c.scene,
+                                 c.size.bodies, c.size.modes, c.size.vertices, c.size.steps, 1e3 * c.size.step);
   text += fmt::format(
       "\n  a step  {:.1f} contacts, {:.1f} rows, {:.1f} rounds, {:.1f} Newton steps, {:.2f} allocations; {} "
       "unsettled\n",
-      c.contacts, c.rows, c.iterations, c.newton_steps, c.allocations, c.unsettled);
+      c.work.contacts, c.work.rows, c.work.iterations, c.work.newton_steps, c.allocations, c.work.unsettled);
   const auto times = [](const char* what, const std::vector<double>& s, const std::string& touched) {
     return fmt::format("  {:<8}p50 {:.4f}, p99 {:.4f}, worst {:.4f} ms; touches {}\n", what, 1e3 * quantile(s, 0.5),
                        1e3 * quantile(s, 0.99), 1e3 * quantile(s, 1.0), touched);
@@ -107,17 +109,17 @@ std::string text_of(const SceneCost& c) {
 
 Json counts_of(const SceneCost& c) {
   return {{"scene", c.scene},
-          {"bodies", c.bodies},
-          {"modes", c.modes},
-          {"vertices", c.vertices},
-          {"step", c.step},
-          {"steps", c.steps},
-          {"contacts_per_step", c.contacts},
-          {"rows_per_step", c.rows},
-          {"rounds_per_step", c.iterations},
-          {"newton_steps_per_step", c.newton_steps},
-          {"unsettled_steps", c.unsettled},
-          {"asleep", c.asleep}};
+          {"bodies", c.size.bodies},
+          {"modes", c.size.modes},
+          {"vertices", c.size.vertices},
+          {"step", c.size.step},
+          {"steps", c.size.steps},
+          {"contacts_per_step", c.work.contacts},
+          {"rows_per_step", c.work.rows},
+          {"rounds_per_step", c.work.iterations},
+          {"newton_steps_per_step", c.work.newton_steps},
+          {"unsettled_steps", c.work.unsettled},
+          {"asleep", c.work.asleep}};
 }
 
 Json quantiles_of(const std::vector<double>& seconds) {
@@ -157,9 +159,9 @@ std::string csv_row(const SceneCost& c) {
   const auto bytes = [](const std::optional<std::size_t>& b) { return b ? std::to_string(*b) : ""; };
   std::string row = fmt::format(
       "{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{},{:.4g},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}", c.scene,
-      c.bodies, c.modes, c.vertices, c.steps, c.contacts, c.rows, c.iterations, c.newton_steps, c.unsettled,
-      c.allocations, bytes(c.step_bytes), bytes(c.draw_bytes), 1e6 * quantile(c.step_seconds, 0.5),
-      1e6 * quantile(c.step_seconds, 0.99), 1e6 * quantile(c.step_seconds, 1.0),
+      c.size.bodies, c.size.modes, c.size.vertices, c.size.steps, c.work.contacts, c.work.rows, c.work.iterations,
+      c.work.newton_steps, c.work.unsettled, c.allocations, bytes(c.step_bytes), bytes(c.draw_bytes),
+      1e6 * quantile(c.step_seconds, 0.5), 1e6 * quantile(c.step_seconds, 0.99), 1e6 * quantile(c.step_seconds, 1.0),
       1e6 * quantile(c.position_seconds, 0.5), 1e6 * quantile(c.draw_seconds, 0.5));
   for (std::size_t i = 0; i < kStages; ++i)
     row += fmt::format(",{:.4g},{:.4g}", 1e6 * stage_seconds(c, stage_at(i)), ns_per_unit(c, stage_at(i)));
@@ -172,10 +174,10 @@ std::string frames_svg(const std::vector<SceneCost>& costs) {
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const SceneCost& c = costs[i];
     for (std::size_t n = 0; n < c.step_seconds.size(); ++n)
-      data += fmt::format("{},{:.6g},{:.6g}\n", i, c.step * static_cast<double>(n + 1),
+      data += fmt::format("{},{:.6g},{:.6g}\n", i, c.size.step * static_cast<double>(n + 1),
                           1e3 * (c.step_seconds[n] + (n < c.draw_seconds.size() ? c.draw_seconds[n] : 0.0)));
-    lines +=
-        fmt::format(", 'data.csv' using ($1=={} ? $2 : NaN):3 with lines title '{}, {} bodies'", i, c.scene, c.bodies);
+    lines += fmt::format(", 'data.csv' using ($1=={} ? $2 : NaN):3 with lines title '{}, {} bodies'", i, c.scene,
+                         c.size.bodies);
   }
   return svg_by_gnuplot({900, 420}, data,
                         "set datafile separator ','\nset xlabel 'time in the scene, s'\nset ylabel 'one frame: step, "
@@ -246,9 +248,10 @@ void check_small(Program& program, const StepArguments& a) {
     const auto add = [&, scene = name](const char* what, double value) {
       figures.push_back({scene + "." + what, value});
     };
-    if (c.rows > 0.0) add("rows", c.rows), add("rounds", c.iterations), add("newton_steps", c.newton_steps);
-    if (c.contacts > 0.0) add("contacts", c.contacts);
-    add("unsettled", c.unsettled);
+    if (c.work.rows > 0.0)
+      add("rows", c.work.rows), add("rounds", c.work.iterations), add("newton_steps", c.work.newton_steps);
+    if (c.work.contacts > 0.0) add("contacts", c.work.contacts);
+    add("unsettled", c.work.unsettled);
     add("allocations", c.allocations);
     if (name == "flight") normals = quantile(c.draw_seconds, 0.5) / quantile(c.position_seconds, 0.5);
   }

@@ -47,10 +47,10 @@ std::vector<SweepLine> run_sweep(const Sweep& sweep, SceneSource& source, int st
     (sweep.axis == "modes" ? scale.modes : draws ? scale.vertices : scale.bodies) = size;
     const SceneCost cost =
         measure(source.scene(sweep.scene, scale), {.steps = steps > 0 ? steps : kSteps, .draw = draws});
-    const double x = sweep.axis == "modes"      ? static_cast<double>(cost.modes)
-                     : draws                    ? static_cast<double>(cost.vertices)
-                     : sweep.axis == "contacts" ? cost.contacts
-                                                : static_cast<double>(cost.bodies);
+    const double x = sweep.axis == "modes"      ? static_cast<double>(cost.size.modes)
+                     : draws                    ? static_cast<double>(cost.size.vertices)
+                     : sweep.axis == "contacts" ? cost.work.contacts
+                                                : static_cast<double>(cost.size.bodies);
     line.x.push_back(x), normals.x.push_back(x);
     line.seconds.push_back(quantile(draws ? cost.position_seconds : cost.step_seconds, 0.5));
     normals.seconds.push_back(quantile(cost.draw_seconds, 0.5));

@@ -15,6 +15,14 @@ struct DeformedSurface::Scratch {
     std::uint32_t stamp = 0;
   };
 
+  /// Of a surface with a skin.
+  struct Skinned {
+    std::optional<SkinPose> pose{};
+    double flexed = 0.0;   ///< no |Ũ z| is larger, m
+    double carried = 0.0;  ///< size of what handles add to a vertex, for round-off, m
+    std::vector<double> rates{};
+  };
+
   /// Of this state. Boxes that a refit made carry stamp | kRefitted until someone asks for them.
   std::uint32_t stamp = 0;
   static constexpr std::uint32_t kRefitted = 0x80000000u;
@@ -27,11 +35,7 @@ struct DeformedSurface::Scratch {
   AlignedArray<float> amplitudes, magnitudes;
   float norm = 0.0f;
   double farthest = 0.0;
-  // With a skin.
-  std::optional<SkinPose> pose{};
-  double flexed = 0.0;   ///< no |Ũ z| is larger, m
-  double carried = 0.0;  ///< size of what handles add to a vertex, for round-off, m
-  std::vector<double> rates{};
+  Skinned skinned{};
   long boxes_before_refit = 0;   ///< kAutomatic: so many, then refit
   std::vector<float> positions;  ///< of a refit: xyz, and one float more
 };

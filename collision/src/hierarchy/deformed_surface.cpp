@@ -113,27 +113,27 @@ void DeformedSurface::set_skin(std::span<const double> z, bool same_surface) {
   const ModalSkin* skin = surface_->skin();
   if (skin == nullptr) return;
   Scratch& s = *scratch_;
-  if (!s.pose)
-    s.pose.emplace(*skin);
-  else if (!same_surface || &s.pose->skin() != skin)
-    s.pose->bind(*skin);
-  s.rates.resize(3 * z.size());
-  s.pose->set(z);
-  s.flexed = s.farthest;
-  s.farthest = s.carried = 0.0;
+  if (!s.skinned.pose)
+    s.skinned.pose.emplace(*skin);
+  else if (!same_surface || &s.skinned.pose->skin() != skin)
+    s.skinned.pose->bind(*skin);
+  s.skinned.rates.resize(3 * z.size());
+  s.skinned.pose->set(z);
+  s.skinned.flexed = s.farthest;
+  s.farthest = s.skinned.carried = 0.0;
   const double radius = surface_->rest_radius_;
-  for (const SkinPose::Handle& handle : s.pose->handles()) {
-    s.farthest = std::max(s.farthest, handle.turn.norm() * radius + handle.shift.norm() + s.flexed);
-    s.carried =
-        std::max(s.carried, handle.shift.norm() + 2.0 * handle.drift.norm() + 2.0 * handle.angle.norm() * radius);
+  for (const SkinPose::Handle& handle : s.skinned.pose->handles()) {
+    s.farthest = std::max(s.farthest, handle.turn.norm() * radius + handle.shift.norm() + s.skinned.flexed);
+    s.skinned.carried = std::max(s.skinned.carried,
+                                 handle.shift.norm() + 2.0 * handle.drift.norm() + 2.0 * handle.angle.norm() * radius);
   }
 }
 
-const SkinPose* DeformedSurface::skin() const { return surface_->skin() ? &*scratch_->pose : nullptr; }
+const SkinPose* DeformedSurface::skin() const { return surface_->skin() ? &*scratch_->skinned.pose : nullptr; }
 
 double DeformedSurface::skin_extent(std::span<const double> change, std::span<double> shape) {
-  scratch_->pose->differentiate();
-  return surface_->extent_->find(*scratch_->pose, amplitudes(), change, shape, scratch_->rates);
+  scratch_->skinned.pose->differentiate();
+  return surface_->extent_->find(*scratch_->skinned.pose, amplitudes(), change, shape, scratch_->skinned.rates);
 }
 
 /// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
@@ -176,12 +176,12 @@ void DeformedSurface::carry_box(Index node) {
   const Vec3 center = 0.5 * (low + high), half = 0.5 * (high - low);
   Aabb all;
   for (const std::uint8_t h : surface_->node_handles(static_cast<std::size_t>(node))) {
-    const SkinPose::Handle& handle = s.pose->handles()[h];
+    const SkinPose::Handle& handle = s.skinned.pose->handles()[h];
     const Mat3 R = Mat3::Identity() + handle.turn;
     const Vec3 c = R * center + handle.shift, reach = R.cwiseAbs() * half;
     all.include(Aabb{c - reach, c + reach});
   }
-  const double size = surface_->rest_radius_ + s.flexed + s.carried;
+  const double size = surface_->rest_radius_ + s.skinned.flexed + s.skinned.carried;
   const Vec3 rounding = Vec3::Constant(8.0 * kUnitRoundOff * size);
   store(all.low - rounding, all.high + rounding, s.stamp, box);
 }
@@ -213,7 +213,7 @@ const Vec3& DeformedSurface::vertex(Index v) {
   double u[3];
   make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->stride_, u);
   if (surface_->skin())
-    vertex.p = s.pose->position(surface_->influences(v), vertex.p, {u[0], u[1], u[2]});
+    vertex.p = s.skinned.pose->position(surface_->influences(v), vertex.p, {u[0], u[1], u[2]});
   else
     vertex.p += Vec3(u[0], u[1], u[2]);
   return vertex.p;
@@ -234,7 +234,8 @@ void DeformedSurface::refit() {
   else
     reconstruct(surface_->model()->collision(), std::span(&target, 1));
   // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
-  const double terms = surface_->modes() + 24.0, flexed = surface_->skin() ? s.flexed + s.carried : s.farthest;
+  const double terms = surface_->modes() + 24.0,
+               flexed = surface_->skin() ? s.skinned.flexed + s.skinned.carried : s.farthest;
   const double pad = kUnitRoundOff * (terms * flexed + 24.0 * surface_->rest_radius_ +
                                       (surface_->skin() ? 64.0 * (flexed + surface_->rest_radius_) : 0.0)) +
                      internal::kBoxUnderflow;

@@ -14,7 +14,7 @@ void PairMemory::keep(std::span<const ListedTests> list) {
 }
 
 PairMemory::Advice PairMemory::advise(const State& now) {
-  const NarrowTuning& tuning = collision_tuning().narrow;
+  const PairListTuning& tuning = collision_tuning().lists;
   const double moved = known_ ? farthest_move(now) : std::numeric_limits<double>::infinity();
   if (listed_ && moved + std::max(0.0, now.margin - margin_) <= slack_) return Advice::kLook;
   known_ = true;
@@ -22,8 +22,8 @@ PairMemory::Advice PairMemory::advise(const State& now) {
   z_a_.assign(now.z_a.begin(), now.z_a.end());
   z_b_.assign(now.z_b.begin(), now.z_b.end());
   margin_ = now.margin;
-  slack_ = tuning.list_slack * now.margin;
-  listed_ = std::max(moved, now.expected) <= tuning.list_when * slack_;
+  slack_ = tuning.slack * now.margin;
+  listed_ = std::max(moved, now.expected) <= tuning.when * slack_;
   return listed_ ? Advice::kList : Advice::kSearch;
 }
 

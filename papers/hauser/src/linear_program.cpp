@@ -54,6 +54,30 @@ std::size_t steepest(const double* d, const std::vector<double>& weight, double 
   return best;
 }
 
+/// R A C with R and C the powers of two that bring rows, then columns, to about 1; b and c scaled alike.
+struct ScaledProgram {
+  MatrixBuffer memory;
+  MatrixView A{};
+  std::vector<double> R, C, b, c;
+
+  void take(const LinearProgram& program);
+};
+
+void ScaledProgram::take(const LinearProgram& program) {
+  const std::size_t r = static_cast<std::size_t>(program.rows), n = static_cast<std::size_t>(program.columns);
+  A = memory.need(r, n);
+  for (std::size_t i = 0; i < r; ++i) {
+    std::copy_n(program.A.data() + i * n, n, A.row(i));
+    std::fill(A.row(i) + n, A.row(i) + A.stride, 0.0);
+  }
+  R.resize(r), C.assign(n, 0.0);
+  equilibrate(A, R, C);
+  c.resize(n);
+  for (std::size_t j = 0; j < n; ++j) c[j] = C[j] * (program.c.empty() ? 1.0 : program.c[j]);
+  b.resize(r);
+  for (std::size_t i = 0; i < r; ++i) b[i] = R[i] * program.b[i];
+}
+
 }  // namespace
 
 // The dual, one row per column j of A:  Σ_i A_ij y_i + s_j = c_j, y, s ≥ 0. Variables are numbered y_i: i, s_j: r + j.
@@ -62,10 +86,10 @@ std::size_t steepest(const double* d, const std::vector<double>& weight, double 
 // own behind those of A, which no program needs that can do without.
 struct LinearProgramSolver::Impl {
   std::size_t r = 0, n = 0;
-  MatrixBuffer scaled_memory, tableau_memory;
-  MatrixView A{}, T{};             // A: R A C, with R and C the powers of two that bring rows, then columns, to about 1
-  std::vector<double> R, C, b, c;  // b and c scaled
-  std::vector<double> weight;      // of the nonbasic variables: about the square of what a unit of each moves (Devex)
+  ScaledProgram scaled;
+  MatrixBuffer tableau_memory;
+  MatrixView T{};
+  std::vector<double> weight;  // of the nonbasic variables: about the square of what a unit of each moves (Devex)
   std::vector<double> column, values;  // the entering column, and the values beside it
   std::vector<int> basic, nonbasic;    // the variable of each row and column
   std::size_t slacks = 0;              // r once the program proves infeasible: columns of A's rows behind the others
@@ -80,7 +104,6 @@ struct LinearProgramSolver::Impl {
   double* costs() const { return T.row(columns()); }
   bool bland() const { return idle > 20 + static_cast<int>(r + columns()); }
 
-  void take(const LinearProgram& program);
   void start_cold();
   bool restore_basis();
   bool clean_values();
@@ -95,32 +118,17 @@ struct LinearProgramSolver::Impl {
   double violation(Numbers f);
 };
 
-void LinearProgramSolver::Impl::take(const LinearProgram& program) {
-  r = static_cast<std::size_t>(program.rows), n = static_cast<std::size_t>(program.columns);
-  A = scaled_memory.need(r, n);
-  for (std::size_t i = 0; i < r; ++i) {
-    std::copy_n(program.A.data() + i * n, n, A.row(i));
-    std::fill(A.row(i) + n, A.row(i) + A.stride, 0.0);
-  }
-  R.resize(r), C.assign(n, 0.0);
-  equilibrate(A, R, C);
-  c.resize(n);
-  for (std::size_t j = 0; j < n; ++j) c[j] = C[j] * (program.c.empty() ? 1.0 : program.c[j]);
-  b.resize(r);
-  for (std::size_t i = 0; i < r; ++i) b[i] = R[i] * program.b[i];
-}
-
 void LinearProgramSolver::Impl::start_cold() {
   T = tableau_memory.need(columns() + 1, r + 1);
-  transpose(T, A, r, n);
+  transpose(T, scaled.A, r, n);
   for (std::size_t i = 0; i < slacks; ++i) {
     std::fill_n(T.row(n + i), T.stride, 0.0);
     T.row(n + i)[i] = 1.0, value(n + i) = kSlackPrice;
   }
-  const double price = inverse_power_of_two(n == 0 ? 0.0 : *std::max_element(c.begin(), c.end()));
-  for (std::size_t j = 0; j < n; ++j) value(j) = c[j] * price;
+  const double price = inverse_power_of_two(n == 0 ? 0.0 : *std::max_element(scaled.c.begin(), scaled.c.end()));
+  for (std::size_t j = 0; j < n; ++j) value(j) = scaled.c[j] * price;
   std::fill_n(costs(), T.stride, 0.0);
-  for (std::size_t i = 0; i < r; ++i) costs()[i] = -b[i];
+  for (std::size_t i = 0; i < r; ++i) costs()[i] = -scaled.b[i];
   nonbasic.resize(r), basic.resize(columns());
   weight.assign(r, 1.0);
   column.resize(columns()), values.resize(columns());
@@ -250,7 +258,7 @@ void LinearProgramSolver::Impl::extract(std::span<double> f) const {
   std::fill(f.begin(), f.end(), 0.0);
   for (std::size_t q = 0; q < r; ++q)
     if (const auto j = static_cast<std::size_t>(nonbasic[q]) - r; !is_y(nonbasic[q]) && j < n)
-      f[j] = C[j] * std::max(0.0, -costs()[q]);
+      f[j] = scaled.C[j] * std::max(0.0, -costs()[q]);
 }
 
 // How far the rows are violated, relative to their terms; and in the result in their own unit.
@@ -258,14 +266,14 @@ double LinearProgramSolver::Impl::violation(Numbers f) {
   double worst = 0.0;
   result.slack = 0.0;
   for (std::size_t i = 0; i < r; ++i) {
-    double w = b[i], size = std::abs(b[i]);
+    double w = scaled.b[i], size = std::abs(scaled.b[i]);
     for (std::size_t j = 0; j < n; ++j) {
-      const double term = A.row(i)[j] * f[j] / C[j];
+      const double term = scaled.A.row(i)[j] * f[j] / scaled.C[j];
       w += term, size += std::abs(term);
     }
     if (w >= 0.0) continue;
     worst = std::max(worst, -w / size);
-    result.slack = std::max(result.slack, -w / R[i]);
+    result.slack = std::max(result.slack, -w / scaled.R[i]);
   }
   return worst;
 }
@@ -286,7 +294,7 @@ LinearProgramResult LinearProgramSolver::Impl::run(std::span<double> f) {
     if (!restore_basis()) start_cold();
   }
   if (violated > kRowTolerance && result.status == SolveStatus::kSolved) result.status = SolveStatus::kRelaxed;
-  for (std::size_t j = 0; j < n; ++j) result.objective += c[j] / C[j] * f[j];
+  for (std::size_t j = 0; j < n; ++j) result.objective += scaled.c[j] / scaled.C[j] * f[j];
   return result;
 }
 
@@ -322,7 +330,8 @@ LinearProgramResult LinearProgramSolver::solve(const LinearProgram& program, std
     std::fill(f.begin(), f.end(), 0.0);
     return {.status = SolveStatus::kInvalidInput};
   }
-  impl_->take(program);
+  impl_->r = static_cast<std::size_t>(program.rows), impl_->n = static_cast<std::size_t>(program.columns);
+  impl_->scaled.take(program);
   impl_->slacks = 0;
   impl_->start_cold();
   return impl_->run(f);
