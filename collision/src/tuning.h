@@ -117,6 +117,9 @@ struct FinderTuning {
   /// meets nothing.
   double touch = 1e-3;
   int touches_on_the_way = 4;     ///< of a pair that comes far, at most [1 to 16]: bounds its time
+  /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
+  /// followed to its end counts as touching there. Steady.
+  int looks_on_the_way = 64;
   double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1: a promise of the header
   std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
   /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets

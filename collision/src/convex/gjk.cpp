@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "limber/collision/closest_features.h"
 #include "tuning.h"
@@ -74,19 +75,37 @@ Vec3 shrink_to_nearest(Simplex& s) {
   return reduce_to(s, kFaces[best], best_foot);
 }
 
-// The different vertices of one side of a simplex of up to three, the last repeated to make a triangle.
-TrianglePoints corners(const Simplex& s, std::span<const Vec3> points, std::size_t Vertex::*side) {
-  TrianglePoints t;
-  std::array<std::size_t, 3> used{};
+ClosestPoints exchanged(ClosestPoints c) {
+  std::swap(c.a, c.b);
+  return c;
+}
+
+// The different vertices of one side of a simplex of up to three.
+struct Corners {
+  TrianglePoints points{};
   std::size_t count = 0;
-  for (std::size_t i = 0; i < s.size; ++i) {
-    const std::size_t v = s.vertices[i].*side;
-    if (std::find(used.begin(), used.begin() + static_cast<std::ptrdiff_t>(count), v) ==
-        used.begin() + static_cast<std::ptrdiff_t>(count))
-      used[count++] = v;
+
+  Corners(const Simplex& s, std::span<const Vec3> of, std::size_t Vertex::*side) {
+    std::array<std::size_t, 3> used{};
+    for (std::size_t i = 0; i < s.size; ++i) {
+      const auto end = used.begin() + static_cast<std::ptrdiff_t>(count);
+      const std::size_t v = s.vertices[i].*side;
+      if (std::find(used.begin(), end, v) == end) points[count] = of[v], used[count++] = v;
+    }
   }
-  for (std::size_t i = 0; i < 3; ++i) t[i] = points[used[std::min(i, count - 1)]];
-  return t;
+  SegmentPoints segment() const { return {points[0], points[1]}; }
+};
+
+// Of two features, by as many corners as each has; the first has no fewer. Distance 0: they intersect.
+ClosestPoints closest_of(const Corners& a, const Corners& b) {
+  if (b.count == 3) return closest_points(a.points, b.points);
+  if (a.count == 3 && b.count == 2) return exchanged(closest_points(b.segment(), a.points));
+  if (b.count == 2) return closest_points(a.segment(), b.segment());
+  const Vec3& p = b.points[0];
+  ClosestPoints pair{{a.points[0], {}, {}}, {p, {}, {}}};
+  if (a.count > 1) pair.a = a.count == 3 ? closest_on_triangle(p, a.points) : closest_on_segment(p, a.segment());
+  pair.distance = (pair.a.point - p).norm();
+  return pair;
 }
 
 ConvexDistance intersecting(const Vec3& common, double radii) { return {common, common, Vec3::Zero(), -radii, true}; }
@@ -111,9 +130,9 @@ ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b) {
     if (larger.size < 4 && nearer.squaredNorm() >= squared) break;
     simplex = larger, nearest = nearer;
   }
-  const ClosestOrCrossing pair =
-      closest_points(corners(simplex, a.points, &Vertex::a), corners(simplex, b.points, &Vertex::b));
-  if (pair.intersecting) return intersecting(pair.a.point, radii);
+  const Corners of_a(simplex, a.points, &Vertex::a), of_b(simplex, b.points, &Vertex::b);
+  const ClosestPoints pair = of_a.count < of_b.count ? exchanged(closest_of(of_b, of_a)) : closest_of(of_a, of_b);
+  if (pair.distance == 0.0) return intersecting(pair.a.point, radii);
   const Vec3 n = (pair.a.point - pair.b.point) / pair.distance;
   return {pair.a.point - a.radius * n, pair.b.point + b.radius * n, n, pair.distance - radii, false};
 }

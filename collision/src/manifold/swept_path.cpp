@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limber/collision/closest_features.h"
 #include "tuning.h"
 
 namespace limber::internal {
@@ -35,6 +36,14 @@ void SweptPath::Side::go(double share) {
   state.pose.p += share * state.displacement;
   state.pose.q = normalized(quaternion_from_rotation_vector(share * state.rotation) * state.pose.q);
   for (std::size_t i = 0; i < rates.size(); ++i) amplitudes[i] += share * rates[i];
+}
+
+std::span<const Vec3> SweptPath::Side::points_after(double share, const ConvexCore& core) {
+  const Mat3 R = to_matrix(quaternion_from_rotation_vector(share * state.rotation) * state.pose.q);
+  const Vec3 p = state.pose.p + share * state.displacement;
+  points.clear();
+  for (const Vec3& point : core.points) points.push_back(p + R * point);
+  return points;
 }
 
 MovingBody SweptPath::Side::moving(const ManifoldBody& body, double left) {
@@ -76,12 +85,36 @@ void SweptPath::begin(const PairQuery& q) {
 bool SweptPath::advance() {
   const double left = 1.0 - time_;
   if (!(left > 0.0)) return false;
+  const double least = 0.125 * margin_;
   const ImpactTime touch =
-      impacts_.find(sides_[0].moving(pair_->a, left), sides_[1].moving(pair_->b, left), left, margin_, 0.125 * margin_);
+      pair_->a.core() != nullptr && pair_->b.core() != nullptr
+          ? touch_of_cores(left, least)
+          : impacts_.find(sides_[0].moving(pair_->a, left), sides_[1].moving(pair_->b, left), left, margin_, least);
   if (touch.status == ImpactTime::Status::kNone || touch.status == ImpactTime::Status::kTouching) return false;
   for (Side& side : sides_) side.go(touch.time);
   time_ += touch.time;
   return true;
+}
+
+/// Conservative advancement: the gap between the nearest points of two convex shapes closes along the line of these, no
+/// faster than the bodies come and their farthest points turn. The answer is as that of TimeOfImpact.
+ImpactTime SweptPath::touch_of_cores(double left, double least) {
+  using Status = ImpactTime::Status;
+  const ConvexCore &a = *pair_->a.core(), &b = *pair_->b.core();
+  const int most = collision_tuning().finder.looks_on_the_way;
+  double margin = margin_, t = 0.0;
+  for (int n = 1; n <= most; ++n) {
+    const ConvexDistance d = distance({sides_[0].points_after(t, a), a.radius}, {sides_[1].points_after(t, b), b.radius});
+    while (t == 0.0 && d.distance <= margin && 0.5 * margin >= least) margin *= 0.5;
+    if (d.distance <= margin) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
+    double closing = -d.normal.dot(way());
+    closing += d.normal.cross(sides_[0].state.rotation).norm() * pair_->a.radius;
+    closing += d.normal.cross(sides_[1].state.rotation).norm() * pair_->b.radius;
+    const double open = d.distance - collision_tuning().finder.kept_gap * margin;
+    if (!(closing * (left - t) > open)) return {Status::kNone, left, n};
+    t += open / closing;
+  }
+  return {Status::kResting, t, most};
 }
 
 Vec3 SweptPath::way() const { return sides_[0].state.displacement - sides_[1].state.displacement; }

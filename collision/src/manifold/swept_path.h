@@ -1,7 +1,7 @@
 // The way of two bodies past each other until the next query: to where they first touch, and on along what they touch.
 //
 // A contact is a plane between features, good as far as a body is thick. What comes farther is followed to its touch by
-// conservative advancement (TimeOfImpact), straight on and evenly as BodyState tells; the features that meet are those
+// conservative advancement (of cores, else TimeOfImpact), straight on and evenly as BodyState tells; the features that meet are those
 // there. What of the way would go into them is left out, and the rest is followed as well.
 #pragma once
 
@@ -41,12 +41,15 @@ class SweptPath {
     std::vector<double> amplitudes, rates, still;
     bool moves = false;
     ExactMotion motion;
+    std::vector<Vec3> points;  // of its core, world
 
     void begin(const BodyState& from);
     void go(double share);
+    std::span<const Vec3> points_after(double share, const ConvexCore& core);
     MovingBody moving(const ManifoldBody& body, double left);
   };
 
+  ImpactTime touch_of_cores(double left, double least);
   Vec3 way() const;
   Vec3 pair_b_in_a() const;
 
