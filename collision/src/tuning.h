@@ -116,7 +116,7 @@ struct FinderTuning {
   /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
   /// meets nothing.
   double touch = 1e-3;
-  int touches_on_the_way = 4;     ///< of a pair that comes far, at most [1 to 16]: bounds its time
+  int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]: bounds its time
   /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
   /// followed to its end counts as touching there. Steady.
   int looks_on_the_way = 64;

@@ -67,7 +67,8 @@ Vec3 shrink_to_nearest(Simplex& s) {
   SurfaceFoot best_foot{};
   double best_distance = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) {
-    inside = inside && on_inner_side(s, kFaces[i], i);
+    if (on_inner_side(s, kFaces[i], i)) continue;  // what is nearest on it is on another face too
+    inside = false;
     const SurfaceFoot foot = nearest_to_origin(s, kFaces[i]);
     if (const double d = foot.point.norm(); d < best_distance) best = i, best_foot = foot, best_distance = d;
   }

@@ -161,6 +161,7 @@ struct ManifoldFinder::Impl {
   std::vector<std::uint8_t> recycled;                ///< by pair
   std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
   std::vector<internal::SupportPlane> planes_a, planes_b;
+  std::vector<Vec3> own_normals;  ///< of the pair whose planes are sought, into the body that they are sought for
   std::vector<std::size_t> first_of, counts;  ///< by pair: of its contacts, and how many
   Counts told;
 
@@ -185,6 +186,9 @@ struct ManifoldFinder::Impl {
   void place();
   void find_near_pairs(Jobs& jobs);
   void merge_self_pairs();
+  bool by_fields(const BodyPair& pair) const {
+    return deforming && (at(pair.a).modal || at(pair.b).modal) && deforming->takes(pair.a, pair.b);
+  }
   PairQuery query_of(const BodyPair& pair) const;
   void find_manifolds(Jobs& jobs);
   bool keeps(const LivePair& pair, const PairQuery& query) const;
@@ -205,7 +209,7 @@ struct ManifoldFinder::Impl {
   Measured measure(const KeptPoint& point, const BodyPair& pair, ManifoldWorker& worker) const;
   void level_seams();
   Vec3 out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const;
-  bool touches_along(std::size_t pair, Index body, const Vec3& out) const;
+  bool touches_along(const Vec3& out) const;
   void list_pairs_of_bodies();
   void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes, ManifoldWorker& worker);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
@@ -344,7 +348,7 @@ PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
   if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
   q.reach = margin + a.reach + b.reach + q.passing.way.norm();
-  if (deforming && (a.modal || b.modal) && deforming->takes(pair.a, pair.b)) expect(q);
+  if (by_fields(pair)) expect(q);
   return q;
 }
 
@@ -592,17 +596,20 @@ FeatureContact ManifoldFinder::Impl::feature_contact(const Measured& m, const Ke
 /// The contacts that the expected motion may close, with gaps as they are now.
 std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker,
                                         ContactPoint* to) const {
+  if (live.points.empty()) return 0;
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
-  const PairQuery q = query_of(pair);
-  const double near_enough = q.by_fields ? q.near : margin + a.reach + b.reach;
+  const bool by_fields = this->by_fields(pair);
+  const PairQuery q =
+      by_fields ? query_of(pair) : PairQuery{.a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
+  const double near_enough = by_fields ? q.near : margin + a.reach + b.reach;
   const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - origin;
   std::size_t count = 0;
   for (const KeptPoint& point : live.points) {
     const Measured m = measure(point, pair, worker);
-    if (point.ahead == 0.0 && m.gap > near_enough &&
-        m.gap >
-            near_enough + (q.by_fields ? deforming->closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way)))
-      continue;
+    const auto closing = [&] {
+      return by_fields ? deforming->closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way);
+    };
+    if (point.ahead == 0.0 && m.gap > near_enough && m.gap > near_enough + closing()) continue;
     to[count++] = {side_of(point.a, pair.a, a, point.round_a, a.turn.transpose() * m.p_a),
                    side_of(point.b, pair.b, b, point.round_b, b.turn.transpose() * (m.p_b - between)),
                    m.normal,
@@ -678,18 +685,23 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<in
   if (me.core() == nullptr || at(other).half_space() != nullptr) return;
   const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
   const auto i = static_cast<std::size_t>(body);
+  own_normals.clear();
+  for (const KeptPoint& point : graph.at(p).points) own_normals.push_back(out_of_other(point, pairs[p], body));
   for (std::size_t k = first_pair_of[i]; k < first_pair_of[i + 1]; ++k) {
     const std::size_t beside = pairs_of[k];
     if (beside == p) continue;
-    Vec3 last = Vec3::Zero();
+    const KeptPoint* last_point = nullptr;
+    Vec3 out = Vec3::Zero(), last = Vec3::Zero();
     for (const KeptPoint& point : graph.at(beside).points) {
-      const Vec3 out = out_of_other(point, pairs[beside], body);
-      if ((out - last).norm() <= kSameNormal) continue;  // contacts of a face
+      if (last_point == nullptr || last_point->turns_with_b != point.turns_with_b || last_point->normal != point.normal)
+        out = out_of_other(point, pairs[beside], body);
+      last_point = &point;
+      if ((out - last).squaredNorm() <= kSameNormal * kSameNormal) continue;  // contacts of a face
       const Measured m = measure(point, pairs[beside], worker);
       const ManifoldBody& ground = at(pairs[beside].a == body ? pairs[beside].b : pairs[beside].a);
       if (m.gap + std::min(0.0, out.dot(me.displacement - ground.displacement)) > tolerance) continue;
       last = out;
-      if (touches_along(p, body, out)) continue;
+      if (touches_along(out)) continue;
       const double offset =
           pairs[beside].a == body ? out.dot(m.p_b) : out.dot(m.p_a + at(pairs[beside].a).pose.p - me.pose.p);
       if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
@@ -704,10 +716,9 @@ Vec3 ManifoldFinder::Impl::out_of_other(const KeptPoint& point, const BodyPair& 
   return pair.a == body ? normal : Vec3(-normal);
 }
 
-bool ManifoldFinder::Impl::touches_along(std::size_t p, Index body, const Vec3& out) const {
-  return std::ranges::all_of(graph.at(p).points, [&](const KeptPoint& point) {
-    return (out_of_other(point, pairs[p], body) - out).norm() <= kSameNormal;
-  });
+bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {
+  return std::ranges::all_of(own_normals,
+                             [&](const Vec3& own) { return (own - out).squaredNorm() <= kSameNormal * kSameNormal; });
 }
 
 /// Whether a convex body reaches to normal · x = offset, x from its origin, and no farther; of meshes each triangle is

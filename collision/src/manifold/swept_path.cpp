@@ -104,7 +104,8 @@ ImpactTime SweptPath::touch_of_cores(double left, double least) {
   const int most = collision_tuning().finder.looks_on_the_way;
   double margin = margin_, t = 0.0;
   for (int n = 1; n <= most; ++n) {
-    const ConvexDistance d = distance({sides_[0].points_after(t, a), a.radius}, {sides_[1].points_after(t, b), b.radius});
+    const ConvexDistance d =
+        distance({sides_[0].points_after(t, a), a.radius}, {sides_[1].points_after(t, b), b.radius});
     while (t == 0.0 && d.distance <= margin && 0.5 * margin >= least) margin *= 0.5;
     if (d.distance <= margin) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
     double closing = -d.normal.dot(way());

@@ -1,8 +1,8 @@
 // The way of two bodies past each other until the next query: to where they first touch, and on along what they touch.
 //
 // A contact is a plane between features, good as far as a body is thick. What comes farther is followed to its touch by
-// conservative advancement (of cores, else TimeOfImpact), straight on and evenly as BodyState tells; the features that meet are those
-// there. What of the way would go into them is left out, and the rest is followed as well.
+// conservative advancement (of cores, else TimeOfImpact), straight on and evenly as BodyState tells; the features that
+// meet are those there. What of the way would go into them is left out, and the rest is followed as well.
 #pragma once
 
 #include <array>
