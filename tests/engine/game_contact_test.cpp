@@ -260,26 +260,32 @@ TEST(GameContact, AFallIsTheSameBitsForAnyThreadsAndEveryInstructionSet) {
   });
 }
 
-// Bundles hold the contacts of rigid pairs that nothing resists in rolling; the others are swept one by one. A pile of
-// balls that next to nothing resists goes the second way.
+// Bundles hold the contacts of bodies of up to 32 modes; the others are swept one by one. Balls that do not bend by
+// theirs go either way.
 TEST(GameContact, BundlesOfPairsSweepAsOneContactAfterTheOtherDoes) {
-  const auto fall = [](double rolling_friction) {
+  const auto fall = [](Index modes, double rolling_friction) {
     GroundedWorld scene({.solver = ContactSolver::kGame, .rolling_friction = rolling_friction});
     const auto ball = std::make_shared<Shape>(Sphere{.radius = 0.5 * kSize});
-    const auto model = sample_model({.modes = 0, .half_extent = Vec3::Constant(0.4 * kSize)});
+    const auto model = sample_model({.modes = modes, .half_extent = Vec3::Constant(0.4 * kSize)});
     std::vector<BodyId> balls;
     for (int i = 0; i < 12; ++i)
       balls.push_back(scene.world.add_body(
           model, {.pose = {{}, kSize * Vec3(0.9 * (i % 3) + 0.1 * std::sin(i), 0.1 * (i % 2), 0.5 + 0.95 * (i / 3))},
                   .velocity = {0.0, 0.0, -0.5},
+                  .angular_velocity = {0.0, 5.0, 3.0},
                   .shape = ball}));
     scene.step(3);
-    std::vector<Vec3> velocities;
-    for (const BodyId id : balls) velocities.push_back(scene.world.body(id).velocity);
-    return velocities;
+    std::vector<Vec3> motions;
+    for (const BodyId id : balls)
+      for (const Vec3& motion : {scene.world.body(id).velocity, scene.world.body(id).angular_velocity})
+        motions.push_back(motion);
+    return motions;
   };
-  const std::vector<Vec3> bundled = fall(0.0), one_by_one = fall(1e-9);
-  for (std::size_t i = 0; i < bundled.size(); ++i) EXPECT_LT((bundled[i] - one_by_one[i]).norm(), 1e-4) << i;
+  for (const double rolling_friction : {0.0, 0.05}) {
+    const std::vector<Vec3> bundled = fall(0, rolling_friction), one_by_one = fall(40, rolling_friction);
+    for (std::size_t i = 0; i < bundled.size(); ++i)
+      EXPECT_LT((bundled[i] - one_by_one[i]).norm(), 1e-4) << i << " with " << rolling_friction;
+  }
 }
 
 TEST(GameContact, NoSeamStopsWhatSlidesOverFlushBoxes) {

@@ -1,5 +1,7 @@
 #include "bundle_kernels.h"
 
+#include <limits>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "game/bundle_kernels.cpp"
 // Arrays of vectors, as in sweep_kernels.cpp.
@@ -244,6 +246,13 @@ HWY_INLINE HWY_ATTR Vector Approach(const BundleContact& c, Vector u, std::size_
   return hn::NegMulAdd(Get(c.compliance, lane), change, open);
 }
 
+/// The share of a vector that is no longer than `most`. Squares of small numbers vanish: then the share errs to less.
+HWY_INLINE HWY_ATTR Vector ShareWithin(Vector square, Vector most) {
+  const Lanes d;
+  const Vector length = hn::Sqrt(hn::Max(square, hn::Set(d, std::numeric_limits<float>::min())));
+  return hn::IfThenElse(hn::Lt(square, hn::Mul(most, most)), hn::Set(d, 1.0f), hn::Div(most, length));
+}
+
 /// @param u the rows' numbers. @param change out: of the forces
 HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, const Vector* u, std::size_t lane, Vector* change) {
   const Lanes d;
@@ -258,14 +267,44 @@ HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, const Vector* u, std::size_t
   }
   const Vector square = hn::MulAdd(wanted[0], wanted[0], hn::Mul(wanted[1], wanted[1]));
   const Vector most = hn::IfThenElseZero(hn::Gt(normal, zero), hn::Mul(Get(c.friction, lane), normal));
-  const Vector share =
-      hn::IfThenElse(hn::Gt(square, hn::Mul(most, most)), hn::Div(most, hn::Sqrt(square)), hn::Set(d, 1.0f));
+  const Vector share = ShareWithin(square, most);
   Put(normal, c.force[0], lane);
   for (std::size_t t = 0; t < 2; ++t) {
     const Vector tangent = hn::Mul(share, wanted[t]);
     change[1 + t] = hn::Sub(tangent, Get(c.force[1 + t], lane));
     Put(tangent, c.force[1 + t], lane);
   }
+}
+
+/// Moves what turns by moments about the world's axes.
+HWY_INLINE HWY_ATTR void TurnSides(const PairBundle& bundle, const Vector* by, Sides& sides, std::size_t lane) {
+  const Vector against[3] = {hn::Neg(by[0]), hn::Neg(by[1]), hn::Neg(by[2])};
+  for (std::size_t s = 0; s < 2; ++s)
+    for (std::size_t i = 0; i < 3; ++i)
+      sides.turn[s][i] = AddDot(bundle.scale[s][i], s == 0 ? by : against, sides.turn[s][i], lane);
+}
+
+/// Resistance to rolling and spinning, after the forces: of no radius, no moment.
+HWY_INLINE HWY_ATTR void RollOne(const PairBundle& bundle, BundleContact& c, Sides& sides, std::size_t lane) {
+  const Lanes d;
+  Vector wanted[3], change[3], square = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Vector turn = hn::Zero(d);
+    for (std::size_t k = 0; k < 3; ++k) {
+      turn = hn::MulAdd(Get(bundle.scale[0][k][i], lane), sides.turn[0][k], turn);
+      turn = hn::NegMulAdd(Get(bundle.scale[1][k][i], lane), sides.turn[1][k], turn);
+    }
+    wanted[i] = hn::NegMulAdd(Get(bundle.inverse_turn, lane), turn, Get(c.moment[i], lane));
+    square = hn::MulAdd(wanted[i], wanted[i], square);
+  }
+  const Vector most = hn::Mul(Get(c.radius, lane), Get(c.force[0], lane));
+  const Vector share = ShareWithin(square, most);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vector moment = hn::Mul(share, wanted[i]);
+    change[i] = hn::Sub(moment, Get(c.moment[i], lane));
+    Put(moment, c.moment[i], lane);
+  }
+  TurnSides(bundle, change, sides, lane);
 }
 
 /// The turns' parts of a side's three rows: ± scale (lever × axis).
@@ -354,6 +393,7 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
         ReadRows(bundle, c, rows, y, lane, u);
         SolveOne(c, u, lane, change);
         MoveCoordinates(bundle, c, rows, change, lane, y);
+        if (bundle.rolls) RollOne(bundle, c, y.sides, lane);
       }
       WriteCoordinates(all, bundle, motion, lane, y);
     }
@@ -476,6 +516,8 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
         const BundleContact& c = all.contacts[bundle.first + k];
         const Vector by[3] = {Get(c.force[0], lane), Get(c.force[1], lane), Get(c.force[2], lane)};
         MoveCoordinates(bundle, c, RowsOf(all, bundle, k), by, lane, y);
+        const Vector moment[3] = {Get(c.moment[0], lane), Get(c.moment[1], lane), Get(c.moment[2], lane)};
+        if (bundle.rolls) TurnSides(bundle, moment, y.sides, lane);
       }
       WriteCoordinates(all, bundle, motion, lane, y);
     }

@@ -22,6 +22,8 @@ struct PairBundle {
   std::int32_t modes[2] = {};                 // the most in any lane, in whole blocks
   std::int32_t rows = 0;                      // of its first contact's modes
   std::int32_t first = 0, count = 0;
+  Block8 inverse_turn;    // as RollingRow::inverse
+  bool rolls = false;     // whether any resists rolling
   bool overlaps = false;  // whether any is to be pushed apart
 };
 
@@ -33,7 +35,8 @@ struct BundleContact {
   Block8 lever[2][3];    // world
   Block8 rest, friction, slop, compliance, inverse_normal, inverse_tangent, inverse_push, coupling[2];
   Block8 now, gap, slip[2], target, force[3], before, push, part;
-  Block8 sum[3];  // of the substeps' forces, N
+  Block8 sum[3];             // of the substeps' forces, N
+  Block8 radius, moment[3];  // as those of RollingRow
 };
 
 struct BundleArrays {

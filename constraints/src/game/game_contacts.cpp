@@ -49,22 +49,25 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
   blocks_.clear();
   rolling_.clear();
   const bool rolls = options.rolling_friction > 0.0;
-  bundles_.arrange(bodies, contacts, rolls);
+  bundles_.arrange(bodies, contacts);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PreparedContact& contact = contacts[i];
     const std::size_t known = blocks_.size();
     ContactRow row = make(states, bodies, contact, options, !bundles_.holds(i));
     for (const ContactSideRows& side : row.side)
       if (side.frame >= 0) bodies.keep_axes(side.frame);
+    const bool resists = rolls && (is_round(contact.a) || is_round(contact.b));
+    const double radius = resists ? options.rolling_friction * shorter_arm(states, contact) : 0.0;
     if (bundles_.holds(i)) {
       bundles_.put(i, row, blocks_.data());
       blocks_.resize(known);
+      if (resists) bundles_.resist_rolling(i, radius, last_moment(contact));
       continue;
     }
     find_masses(bodies, row);
     rows_.push_back(row);
     numbers_.push_back(i);
-    if (rolls && (is_round(contact.a) || is_round(contact.b))) add_rolling(states, bodies, contact, options);
+    if (resists) add_rolling(bodies, contact, radius);
   }
   make_bundle_rows(bundles_.arrays(), bodies.shapes().data());
   sums_.assign(rows_.size(), Vec3::Zero());
@@ -190,10 +193,15 @@ void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row) {
   for (int t = 0; t < 2; ++t) row.coupling[t] = nt[t];
 }
 
-void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                               const Options& options) {
-  RollingRow rolling{.contact = static_cast<std::int32_t>(rows_.size() - 1),
-                     .radius = static_cast<float>(options.rolling_friction * shorter_arm(states, contact))};
+/// At the end of the last step, N·m; zero where it was not there.
+Vec3 GameContacts::last_moment(const PreparedContact& contact) const {
+  const auto known = std::lower_bound(rolling_memory_.begin(), rolling_memory_.end(), contact.id,
+                                      [](const Rolling& memory, std::uint64_t id) { return memory.id < id; });
+  return known != rolling_memory_.end() && known->id == contact.id ? known->moment : Vec3(Vec3::Zero());
+}
+
+void GameContacts::add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius) {
+  RollingRow rolling{.contact = static_cast<std::int32_t>(rows_.size() - 1), .radius = static_cast<float>(radius)};
   float trace = 0.0f;
   for (std::size_t s = 0; s < 2; ++s) {
     const std::int32_t frame = bodies.of(contact.side(s).body);
@@ -208,10 +216,7 @@ void GameContacts::add_rolling(const BodyStates& states, const GameBodies& bodie
   }
   if (!(trace > 0.0f)) return;
   rolling.inverse = 1.0f / trace;  // at most that of the largest eigenvalue
-  const auto known = std::lower_bound(rolling_memory_.begin(), rolling_memory_.end(), contact.id,
-                                      [](const auto& memory, std::uint64_t id) { return memory.id < id; });
-  if (known != rolling_memory_.end() && known->id == contact.id)
-    for (int i = 0; i < 3; ++i) rolling.moment[i] = static_cast<float>(known->moment[i]);
+  write_axis(last_moment(contact), rolling.moment);
   rolling_.push_back(rolling);
 }
 
@@ -262,6 +267,9 @@ void GameContacts::end_step(const SubstepPlan& plan) {
     rolling_memory_.push_back(
         {contacts_[numbers_[static_cast<std::size_t>(rolling.contact)]].id, Vec3(moment[0], moment[1], moment[2])});
   }
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (bundles_.holds(i) && bundles_.resists_rolling(i))
+      rolling_memory_.push_back({contacts_[i].id, bundles_.moment(i)});
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
 }
 

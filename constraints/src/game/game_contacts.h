@@ -69,12 +69,12 @@ class GameContacts {
                  std::size_t rows);
   void join_sides(ContactRow& row);
   void find_masses(const GameBodies& bodies, ContactRow& row);
-  void add_rolling(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                   const Options& options);
+  Vec3 last_moment(const PreparedContact& contact) const;
+  void add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius);
 
   std::span<PreparedContact> contacts_;
   PairBundles bundles_;
-  // Contacts of bodies that roll, are led, touch themselves or have many modes: those that bundles do not hold.
+  // Contacts of bodies that are led, touch themselves or have many modes: those that bundles do not hold.
   std::vector<ContactRow> rows_;
   std::vector<std::size_t> numbers_;  // in `contacts_`
   std::vector<Block8> blocks_;        // of the rows

@@ -22,7 +22,7 @@ bool of_one_pair(const PreparedContact& x, const PreparedContact& y) {
 
 }  // namespace
 
-void PairBundles::arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls) {
+void PairBundles::arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts) {
   standing_ = static_cast<std::int32_t>(bodies.bodies().size());
   zeros_ = static_cast<std::int32_t>(bodies.motion().size()) - 1;
   chunks_.clear();
@@ -31,8 +31,8 @@ void PairBundles::arrange(const GameBodies& bodies, std::span<const PreparedCont
   for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
     const PreparedContact& first = contacts[begin];
     while (end < contacts.size() && of_one_pair(first, contacts[end])) ++end;
-    const bool round = rolls && (is_round(first.a) || is_round(first.b)), self = first.a.body == first.b.body;
-    if (!round && !self && is_taken(bodies, bodies.of(first.a.body)) && is_taken(bodies, bodies.of(first.b.body)))
+    const bool self = first.a.body == first.b.body;
+    if (!self && is_taken(bodies, bodies.of(first.a.body)) && is_taken(bodies, bodies.of(first.b.body)))
       add_chunks(bodies, contacts.subspan(begin, end - begin), begin);
   }
   order_by_level();
@@ -138,14 +138,24 @@ void PairBundles::put_modes(const Place& place, std::size_t side, const Block8* 
       for (std::int32_t i = 0; i < 8; ++i) to[3 * (8 * k + i) + axis].v[place.lane] = rows[3 * (1 + k) + axis].v[i];
 }
 
-double PairBundles::friction(std::size_t contact) const {
-  const Place& place = places_[contact];
-  return static_cast<double>(packed_[static_cast<std::size_t>(place.at)].friction.v[place.lane]);
+void PairBundles::resist_rolling(std::size_t contact, double radius, const Vec3& moment) {
+  const auto lane = static_cast<std::size_t>(places_[contact].lane);
+  PairBundle& bundle = bundles_[static_cast<std::size_t>(places_[contact].bundle)];
+  float trace = 0.0f;
+  for (const auto& scale : bundle.scale)
+    for (const auto& row : scale)
+      for (const Block8& number : row) trace += number.v[lane] * number.v[lane];
+  if (!(trace > 0.0f)) return;
+  bundle.rolls = true;
+  bundle.inverse_turn.v[lane] = 1.0f / trace;  // at most that of the largest eigenvalue
+  BundleContact& c = packed_[static_cast<std::size_t>(places_[contact].at)];
+  c.radius.v[lane] = static_cast<float>(radius);
+  for (int i = 0; i < 3; ++i) c.moment[i].v[lane] = static_cast<float>(moment[i]);
 }
 
-double PairBundles::compliance(std::size_t contact) const {
+double PairBundles::read(std::size_t contact, Block8 BundleContact::*field) const {
   const Place& place = places_[contact];
-  return static_cast<double>(packed_[static_cast<std::size_t>(place.at)].compliance.v[place.lane]);
+  return static_cast<double>((packed_[static_cast<std::size_t>(place.at)].*field).v[place.lane]);
 }
 
 Vec3 PairBundles::read(std::size_t contact, Block8 (BundleContact::*field)[3]) const {

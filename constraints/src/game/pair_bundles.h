@@ -20,18 +20,23 @@ namespace limber::internal {
 class PairBundles {
  public:
   /// Finds places for the contacts of all pairs that the loops take: those of a pair stand one after the other.
-  void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts, bool rolls);
+  void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts);
   /// Whether a contact has a place, by its number.
   bool holds(std::size_t contact) const { return places_[contact].lane >= 0; }
   /// Fills the place of a contact, but for its masses; `rest` is the gap. @param rows blocks of each side that moves,
   /// as the row says; those of frames are not read
   void put(std::size_t contact, const ContactRow& row, const Block8* rows);
+  /// Gives a contact in its place resistance to rolling. @param radius m, > 0. @param moment N·m, to begin with
+  void resist_rolling(std::size_t contact, double radius, const Vec3& moment);
 
   /// Force along a contact's axes at the last substep, and the sum of all, N.
   Vec3 force(std::size_t contact) const { return read(contact, &BundleContact::force); }
   Vec3 sum(std::size_t contact) const { return read(contact, &BundleContact::sum); }
-  double friction(std::size_t contact) const;
-  double compliance(std::size_t contact) const;
+  /// What resists rolling at the last substep, N·m.
+  Vec3 moment(std::size_t contact) const { return read(contact, &BundleContact::moment); }
+  bool resists_rolling(std::size_t contact) const { return read(contact, &BundleContact::radius) > 0.0; }
+  double friction(std::size_t contact) const { return read(contact, &BundleContact::friction); }
+  double compliance(std::size_t contact) const { return read(contact, &BundleContact::compliance); }
 
   /// For the kernels.
   BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
@@ -54,6 +59,7 @@ class PairBundles {
   void fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane);
   void put_modes(const Place& place, std::size_t side, const Block8* rows);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
+  double read(std::size_t contact, Block8 BundleContact::*field) const;
 
   std::int32_t standing_ = 0, zeros_ = 0;
   std::vector<PairBundle> bundles_;

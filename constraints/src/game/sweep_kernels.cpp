@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "game/sweep_kernels.cpp"
@@ -119,6 +120,11 @@ HWY_INLINE HWY_ATTR float Largest(float friction, float normal_force) {
   return normal_force > 0.0f ? friction * normal_force : 0.0f;
 }
 
+/// The share of a vector that is no longer than `most`. Squares of small numbers vanish: then the share errs to less.
+HWY_INLINE HWY_ATTR float ShareWithin(float square, float most) {
+  return square < most * most ? 1.0f : most / std::sqrt(std::max(square, std::numeric_limits<float>::min()));
+}
+
 HWY_INLINE HWY_ATTR void SolveContact(ContactRow& c, const SweepArrays& arrays) {
   float u[4], change[3];
   ReadContact(c, arrays, u);
@@ -130,7 +136,7 @@ HWY_INLINE HWY_ATTR void SolveContact(ContactRow& c, const SweepArrays& arrays) 
     square += wanted[t] * wanted[t];
   }
   const float most = Largest(c.friction, normal);
-  const float share = square > most * most ? most / std::sqrt(square) : 1.0f;
+  const float share = ShareWithin(square, most);
   for (int t = 0; t < 2; ++t) {
     const float tangent = share * wanted[t];
     change[1 + t] = tangent - c.force[1 + t];
@@ -152,7 +158,7 @@ HWY_INLINE HWY_ATTR void SolveRolling(RollingRow& r, const ContactRow& c, const 
     square += wanted[i] * wanted[i];
   }
   const float most = r.radius * c.force[0];
-  const float share = square > most * most ? most / std::sqrt(square) : 1.0f;
+  const float share = ShareWithin(square, most);
   for (int i = 0; i < 3; ++i) {
     const float moment = share * wanted[i];
     change[i] = moment - r.moment[i];
