@@ -144,7 +144,8 @@ JointConstraint::Instant JointConstraint::instant(const BodyStates& states, Step
 }
 
 JointConstraint::Placement JointConstraint::place(const BodyStates& states, StepTime when) const {
-  return {a_.position(states, when), b_.position(states, when), a_.axes(states, when), b_.axes(states, when)};
+  const JointFrame a = a_.place(states, when), b = b_.place(states, when);
+  return {a.origin, b.origin, a.axes, b.axes};
 }
 
 double JointConstraint::raw_angle(const Placement& at, int i) const {

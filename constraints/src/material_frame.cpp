@@ -158,6 +158,21 @@ Mat3 MaterialFrame::axes(const BodyStates& states, StepTime when) const {
   return to_matrix(q_WB) * rest_.axes;
 }
 
+JointFrame MaterialFrame::place(const BodyStates& states, StepTime when) const {
+  if (body_ < 0) return rest_;
+  const RigidTransform& pose = states.pose(body_, when);
+  const Mat3 R = to_matrix(pose.q);
+  JointFrame at{.axes = R * rest_.axes};
+  if (displacement_.empty() && anchors_.empty()) {
+    at.origin = pose.p + R * rest_.origin;
+    return at;
+  }
+  const std::span<const double> z = states.amplitudes(body_, when);
+  at.origin = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
+  if (!rotation_.empty()) at.axes = R * (to_matrix(quaternion_from_rotation_vector(turn(z))) * rest_.axes);
+  return at;
+}
+
 Vec3 MaterialFrame::velocity(const BodyStates& states, StepTime when) const {
   if (body_ < 0) return Vec3::Zero();
   const RigidTransform& X = states.pose(body_, when);
@@ -186,6 +201,7 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   const RigidTransform& pose = states.pose(body_, when);
   const Mat3 R = to_matrix(pose.q);
   const std::span<const double> z = states.amplitudes(body_, when);
+  at.bends = !displacement_.empty() || !anchors_.empty();
   at.origin = pose.p;
   at.R_BW = R.transpose();
   at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
@@ -207,6 +223,7 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
                   .axes = 0.5 * (start.axes + end.axes),
                   .origin = 0.5 * (start.origin + end.origin)};
   if (body_ < 0) return at;
+  at.bends = start.bends;
   at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
   at.axes_B = 0.5 * (start.axes_B + end.axes_B);
   if (rotation_.empty()) return at;
@@ -226,6 +243,7 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
 void FrameInstant::add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
   to.linear += n;
   to.angular += (p - origin).cross(n);
+  if (!bends) return;
   to.shift_B += R_BW * n;
   to.turn_B += R_BW * (p - position).cross(n);
 }
@@ -233,6 +251,7 @@ void FrameInstant::add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) con
 /// J_l Θ Δz is ε to third order; what is missing is made up for along Δz.
 void FrameInstant::add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
   to.angular += axes.col(axis).cross(u);
+  if (!bends) return;
   const Vec3 a_B = axes_B.col(axis).cross(R_BW * u), about = turning.transpose() * a_B;
   to.turn_B += about;
   to.along_bend += inverse_square * (cayley.dot(a_B) - turned.dot(about));
@@ -240,6 +259,7 @@ void FrameInstant::add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
 
 void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
   to.angular += a;
+  if (!bends) return;
   to.turn_B += turning.transpose() * (R_BW * a);
 }
 

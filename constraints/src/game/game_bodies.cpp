@@ -98,11 +98,17 @@ void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
 
 void GameBodies::turn_axes() {
   for (GameBody& body : bodies_) {
-    if (body.keeps_axes || body.group->frame_constants().motion == FrameMotion::kKinematic) continue;
     const FrameConstants& c = body.group->frame_constants();
+    if (body.keeps_axes || c.motion == FrameMotion::kKinematic) continue;
     const Vec3 momentum = body.momentum_scale * body.turn;
-    set_axes(body, body.q);
-    const Vec3 omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
+    Vec3 omega;
+    if (c.motion == FrameMotion::kLine) {
+      set_axes(body, body.q);
+      omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
+    } else {
+      const Mat3 axes = to_matrix(body.q * c.principal.q_BP);
+      omega = axes * (axes.transpose() * momentum).cwiseQuotient(c.principal.moments);
+    }
     set_axes(body, quaternion_from_rotation_vector(0.5 * plan_.length() * omega) * body.q);
     if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * momentum;
   }
@@ -122,6 +128,7 @@ FrameLoad GameBodies::load_of(const GameBody& body) const {
 void GameBodies::begin_substep(int number) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     GameBody& body = bodies_[i];
+    tell_shift(i);
     FrameExcitation excitation;
     if (body.led < 0)
       fall(body);
@@ -222,7 +229,6 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
   } else {
     turn_led(body, turned);
   }
-  tell_shift(at);
 }
 
 void GameBodies::tell_shift(std::size_t at) {
@@ -246,7 +252,6 @@ void GameBodies::displace(std::int32_t at, const double* speed, const double* pl
   } else {
     tell_led(body);
   }
-  tell_shift(static_cast<std::size_t>(at));
   if (body.modes == nullptr) return;
   const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
   const std::vector<float>&roots = body.modes->roots(), &by = body.modes->rates();

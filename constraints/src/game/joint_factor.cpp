@@ -12,9 +12,17 @@ constexpr double kRegular = 1e-9;
 // machines of a few loops are below it.
 constexpr std::size_t kMostJoined = 8;
 
+/// Three, the rows of a ball joint, or as many as are given: kernels below come for both.
+template <int fixed>
+constexpr int size_of(int given) {
+  return fixed > 0 ? fixed : given;
+}
+
 /// L of the lower part of a, n × n, in its place; its diagonal is inverted. @param own each row's own response, of
 /// which others that say the same leave no more than round-off, of either sign
-void factor_dense(double* a, int n, const double* own) {
+template <int fixed>
+void factor_dense(double* a, int given, const double* own) {
+  const int n = size_of<fixed>(given);
   for (int j = 0; j < n; ++j) {
     double* row_j = a + j * n;
     double pivot = row_j[j];
@@ -31,8 +39,10 @@ void factor_dense(double* a, int n, const double* own) {
 }
 
 /// b ← b L⁻ᵀ, `rows` × n.
-void solve_rows(const double* l, int n, double* b, int rows) {
-  for (int i = 0; i < rows; ++i, b += n)
+template <int fixed>
+void solve_rows(const double* l, int given, double* b, int rows) {
+  const int n = size_of<fixed>(given);
+  for (int i = 0; i < size_of<fixed>(rows); ++i, b += n)
     for (int j = 0; j < n; ++j) {
       double sum = b[j];
       for (int k = 0; k < j; ++k) sum -= l[j * n + k] * b[k];
@@ -41,13 +51,62 @@ void solve_rows(const double* l, int n, double* b, int rows) {
 }
 
 /// t −= b aᵀ, `rows` × `columns`, inner size n.
-void subtract_product(const double* b, int rows, const double* a, int columns, int n, double* t) {
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < columns; ++j) {
+template <int fixed>
+void subtract_product(const double* b, int rows, const double* a, int columns, int given, double* t) {
+  const int n = size_of<fixed>(given), count = size_of<fixed>(columns);
+  for (int i = 0; i < size_of<fixed>(rows); ++i)
+    for (int j = 0; j < count; ++j) {
       double sum = 0.0;
       for (int k = 0; k < n; ++k) sum += b[i * n + k] * a[j * n + k];
-      t[i * columns + j] -= sum;
+      t[i * count + j] -= sum;
     }
+}
+
+template <std::size_t columns>
+using Sides = std::array<double, columns>;  // one row of right-hand sides
+
+template <std::size_t columns>
+void subtract(double by, const Sides<columns>& from, Sides<columns>& to) {
+  for (std::size_t c = 0; c < columns; ++c) to[c] -= by * from[c];
+}
+
+/// x ← L⁻¹ x, n rows.
+template <int fixed, std::size_t columns>
+void solve_lower(const double* l, int given, Sides<columns>* x) {
+  const int n = size_of<fixed>(given);
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < i; ++k) subtract(l[i * n + k], x[k], x[i]);
+    for (double& number : x[i]) number *= l[i * n + i];
+  }
+}
+
+/// x ← L⁻ᵀ x
+template <int fixed, std::size_t columns>
+void solve_upper(const double* l, int given, Sides<columns>* x) {
+  const int n = size_of<fixed>(given);
+  for (int i = n; i-- > 0;) {
+    for (int k = i + 1; k < n; ++k) subtract(l[k * n + i], x[k], x[i]);
+    for (double& number : x[i]) number *= l[i * n + i];
+  }
+}
+
+/// y −= b x, b `rows` × n
+template <int fixed, std::size_t columns>
+void subtract_times(const double* b, int rows, int given, const Sides<columns>* x, Sides<columns>* y) {
+  const int n = size_of<fixed>(given);
+  for (int i = 0; i < size_of<fixed>(rows); ++i) {
+    Sides<columns> sum = y[i];
+    for (int k = 0; k < n; ++k) subtract(b[i * n + k], x[k], sum);
+    y[i] = sum;
+  }
+}
+
+/// x −= bᵀ y
+template <int fixed, std::size_t columns>
+void subtract_transposed(const double* b, int rows, int given, const Sides<columns>* y, Sides<columns>* x) {
+  const int n = size_of<fixed>(given);
+  for (int i = 0; i < size_of<fixed>(rows); ++i)
+    for (int k = 0; k < n; ++k) subtract(b[i * n + k], y[i], x[k]);
 }
 
 }  // namespace
@@ -174,22 +233,28 @@ void JointFactor::factor() {
 void JointFactor::eliminate(std::size_t column) {
   const int n = sizes_[column];
   if (n == 0) return;
-  const double* l = &values_[starts_[column]];
-  factor_dense(&values_[starts_[column]], n, &own_[firsts_[column]]);
+  double* l = &values_[starts_[column]];
+  const bool ball = n == 3;
+  (ball ? factor_dense<3> : factor_dense<0>)(l, n, &own_[firsts_[column]]);
   const auto begin = static_cast<std::size_t>(column_starts_[column]),
              end = static_cast<std::size_t>(column_starts_[column + 1]);
   auto target = static_cast<std::size_t>(target_starts_[column]);
-  for (std::size_t e = begin; e < end; ++e)
-    solve_rows(l, n, &values_[starts_[nodes_ + e]], sizes_[static_cast<std::size_t>(rows_[e])]);
+  for (std::size_t e = begin; e < end; ++e) {
+    const int rows = sizes_[static_cast<std::size_t>(rows_[e])];
+    (ball && rows == 3 ? solve_rows<3> : solve_rows<0>)(l, n, &values_[starts_[nodes_ + e]], rows);
+  }
   for (std::size_t a = begin; a < end; ++a)
     for (std::size_t b = a; b < end; ++b) {
       const std::int32_t to = targets_[target++];
-      if (to < 0)
+      if (to < 0) {
         leave_out(column, a, b);
-      else
-        subtract_product(&values_[starts_[nodes_ + b]], sizes_[static_cast<std::size_t>(rows_[b])],
-                         &values_[starts_[nodes_ + a]], sizes_[static_cast<std::size_t>(rows_[a])], n,
-                         &values_[starts_[static_cast<std::size_t>(to)]]);
+        continue;
+      }
+      const int rows = sizes_[static_cast<std::size_t>(rows_[b])], columns = sizes_[static_cast<std::size_t>(rows_[a])];
+      (ball && rows == 3 && columns == 3 ? subtract_product<3>
+                                         : subtract_product<0>)(&values_[starts_[nodes_ + b]], rows,
+                                                                &values_[starts_[nodes_ + a]], columns, n,
+                                                                &values_[starts_[static_cast<std::size_t>(to)]]);
     }
 }
 
@@ -213,46 +278,34 @@ void JointFactor::leave_out(std::size_t column, std::size_t a, std::size_t b) {
 
 template <std::size_t columns>
 void JointFactor::solve(std::span<double> x) const {
-  using Sides = std::array<double, columns>;  // one row of right-hand sides
-  const auto rows_at = [&](std::size_t position) {
-    return reinterpret_cast<Sides*>(x.data() + firsts_[position] * columns);
-  };
-  const auto subtract = [](double by, const Sides& from, Sides& to) {
-    for (std::size_t c = 0; c < columns; ++c) to[c] -= by * from[c];
+  const auto sides_at = [&](std::size_t position) {
+    return reinterpret_cast<Sides<columns>*>(x.data() + firsts_[position] * columns);
   };
   for (std::size_t p = 0; p < nodes_; ++p) {
-    const auto n = static_cast<std::size_t>(sizes_[p]);
-    Sides* own = rows_at(p);
-    const double* l = values_.data() + starts_[p];
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k < i; ++k) subtract(l[i * n + k], own[k], own[i]);
-      for (double& number : own[i]) number *= l[i * n + i];
-    }
+    const int n = sizes_[p];
+    const bool ball = n == 3;
+    (ball ? solve_lower<3, columns> : solve_lower<0, columns>)(values_.data() + starts_[p], n, sides_at(p));
     for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
          ++e) {
       const auto row = static_cast<std::size_t>(rows_[e]);
-      const double* b = values_.data() + starts_[nodes_ + e];
-      Sides* other = rows_at(row);
-      for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
-        for (std::size_t k = 0; k < n; ++k) subtract(b[i * n + k], own[k], other[i]);
+      const int rows = sizes_[row];
+      (ball && rows == 3
+           ? subtract_times<3, columns>
+           : subtract_times<0, columns>)(values_.data() + starts_[nodes_ + e], rows, n, sides_at(p), sides_at(row));
     }
   }
   for (std::size_t p = nodes_; p-- > 0;) {
-    const auto n = static_cast<std::size_t>(sizes_[p]);
-    Sides* own = rows_at(p);
+    const int n = sizes_[p];
+    const bool ball = n == 3;
     for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
          ++e) {
       const auto row = static_cast<std::size_t>(rows_[e]);
-      const double* b = values_.data() + starts_[nodes_ + e];
-      const Sides* other = rows_at(row);
-      for (std::size_t i = 0; i < static_cast<std::size_t>(sizes_[row]); ++i)
-        for (std::size_t k = 0; k < n; ++k) subtract(b[i * n + k], other[i], own[k]);
+      const int rows = sizes_[row];
+      (ball && rows == 3 ? subtract_transposed<3, columns>
+                         : subtract_transposed<0, columns>)(values_.data() + starts_[nodes_ + e], rows, n,
+                                                            sides_at(row), sides_at(p));
     }
-    const double* l = values_.data() + starts_[p];
-    for (std::size_t i = n; i-- > 0;) {
-      for (std::size_t k = i + 1; k < n; ++k) subtract(l[k * n + i], own[k], own[i]);
-      for (double& number : own[i]) number *= l[i * n + i];
-    }
+    (ball ? solve_upper<3, columns> : solve_upper<0, columns>)(values_.data() + starts_[p], n, sides_at(p));
   }
 }
 

@@ -45,6 +45,7 @@ struct FrameInstant {
   Vec3 turned = Vec3::Zero();       ///< Θ z; in the middle Θ Δz,
   Vec3 cayley = Vec3::Zero();       ///< the Cayley vector of the turn that it makes in the body,
   double inverse_square = 0.0;      ///< and 1/|Δz|², 0 where nothing bends
+  bool bends = false;               ///< modes show: what is in body axes counts
 
   /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
@@ -76,6 +77,8 @@ class MaterialFrame {
 
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
   Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
+  /// Both, at one of the step's ends.
+  JointFrame place(const BodyStates& states, StepTime when) const;
   Vec3 velocity(const BodyStates& states, StepTime when) const;  ///< of the point, world, m/s
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;

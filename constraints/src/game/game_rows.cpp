@@ -1,0 +1,241 @@
+#include "game_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber::internal {
+namespace {
+
+using Hold = GameRow::Hold;
+
+/// to += J x of rows of eight coordinates. @param count of rows; 0: `rows`
+template <std::size_t count>
+void add_products(const double* numbers, std::size_t rows, std::size_t stride, const double* x, double* to) {
+  for (std::size_t i = 0; i < (count == 0 ? rows : count); ++i, numbers += stride) {
+    double sum[2] = {};
+    for (std::size_t l = 0; l < 8; l += 2)
+      for (std::size_t m = 0; m < 2; ++m) sum[m] += numbers[l + m] * x[l + m];
+    to[i] += sum[0] + sum[1];
+  }
+}
+
+/// x += Jᵀ f of such rows.
+template <std::size_t count>
+void add_sums(const double* numbers, std::size_t rows, std::size_t stride, const double* forces, double* x) {
+  double sum[8] = {};
+  for (std::size_t i = 0; i < (count == 0 ? rows : count); ++i, numbers += stride)
+    for (std::size_t l = 0; l < 8; ++l) sum[l] += forces[i] * numbers[l];
+  for (std::size_t l = 0; l < 8; ++l) x[l] += sum[l];
+}
+
+}  // namespace
+
+void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
+                    int number) {
+  before_.clear();
+  for (const GameRow& row : rows_) before_.push_back({row.force, row.hold});
+  rows_.clear(), groups_.clear(), numbers_.clear(), led_.clear();
+  const SubstepPlan& plan = bodies.plan();
+  length_ = plan.length();
+  coordinates_ = 8 * bodies.motion().size();
+  scales_.assign(bodies.bodies().size(), {});
+  goes_on_ = number > 0;
+  for (Constraint* constraint : constraints) {
+    constraint->begin_part(
+        {.length = length_, .left = length_ * (plan.count - number), .whole = plan.step, .ahead = length_});
+    add_group(states, bodies, constraint);
+  }
+  hold_as_before();
+  scale_turns();
+}
+
+void GameRows::add_group(const BodyStates& states, const GameBodies& bodies, Constraint* constraint) {
+  made_.clear();
+  constraint->add_rows(states, StepTime::kStart, length_, made_);
+  const auto count = static_cast<std::size_t>(made_.size());
+  groups_.push_back({.constraint = constraint, .first = rows_.size(), .count = count, .sides = {}});
+  if (count == 0) return;
+  GameGroup& group = groups_.back();
+  for (std::size_t s = 0; s < 2; ++s) add_side(bodies, group, s);
+  yields_.assign(count, 0.0);
+  for (const ConstraintRows::Flexibility& f : made_.flexibility())
+    if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value;
+  for (std::size_t i = 0; i < count; ++i) add_row(bodies, group, i, yields_[i]);
+}
+
+void GameRows::add_side(const GameBodies& bodies, GameGroup& group, std::size_t s) {
+  GameSide& side = group.sides[s];
+  side.frame = bodies.of(made_.row(0).sides[s].body);
+  if (side.frame < 0) return;
+  const GameBody& body = bodies.body(side.frame);
+  side.body = body.first;
+  side.coordinates = 8 * body.blocks;
+  side.at = numbers_.size();
+  numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.coordinates));
+  for (std::size_t i = 0; i < group.count; ++i) {
+    const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
+    write_side(body, from, &numbers_[side.at + i * static_cast<std::size_t>(side.coordinates)]);
+    if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
+  }
+  stiffen(body, group, s);
+}
+
+void GameRows::write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const {
+  const double linear = body.root_mass > 0.0 ? length_ / body.root_mass : 0.0;
+  const Vec3 turn = body.turn_scale * (length_ * from.angular);
+  for (int i = 0; i < 3; ++i) to[i] = linear * from.linear[i], to[3 + i] = turn[i];
+  const std::span<const double> modal = made_.modal(from);
+  for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
+}
+
+double GameRows::last_force(const GameGroup& group, std::size_t i) const {
+  const std::size_t at = group.first + i;
+  return goes_on_ && at < before_.size() ? before_[at].force : made_.row(static_cast<Index>(i)).law.last_force;
+}
+
+/// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
+/// body's inertia, about the axes of its coordinates.
+void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t s) {
+  Vec3 force = Vec3::Zero(), arms = Vec3::Zero();
+  double directions = 0.0;
+  for (std::size_t i = 0; i < group.count; ++i) {
+    const ConstraintRows::Side& row = made_.row(static_cast<Index>(i)).sides[s];
+    force += last_force(group, i) * row.linear;
+    arms += row.linear.cross(row.angular);  // those across each direction: r again in all but one
+    directions += row.linear.squaredNorm();
+  }
+  const double outward = directions > 1.5 ? force.dot(arms) / (directions - 1.0) : 0.0;
+  if (!(outward > 0.0)) return;
+  const Vec3 along = body.turn_scale * (force / force.norm());
+  Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
+  for (int axis = 0; axis < 3; ++axis)
+    stiffness[static_cast<std::size_t>(axis)] +=
+        outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - along[axis] * along[axis]);
+}
+
+/// From stiffnesses.
+void GameRows::scale_turns() {
+  for (Turns& scale : scales_)
+    for (double& turn : scale) turn = turn > 0.0 ? std::sqrt(1.0 + 0.25 * length_ * length_ * turn) : 1.0;
+  for (const GameGroup& group : groups_)
+    for (const GameSide& side : group.sides) {
+      if (side.frame < 0) continue;
+      const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
+      const double by[3] = {1.0 / scale[0], 1.0 / scale[1], 1.0 / scale[2]};
+      double* row = &numbers_[side.at];
+      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
+        for (std::size_t k = 0; k < 3; ++k) row[3 + k] *= by[k];
+    }
+}
+
+void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields) {
+  const RowLaw& law = made_.row(static_cast<Index>(i)).law;
+  const double h = length_;
+  GameRow& row = rows_.emplace_back(GameRow{.lower = law.lower / h,
+                                            .upper = law.upper / h,
+                                            .target = h * law.end_rate,
+                                            .compliance = h * law.compliance + yields,
+                                            .rate = h * law.end_rate,
+                                            .force = law.last_force});
+  for (const GameSide& side : group.sides) {
+    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
+    for (std::int32_t k = 8; k < side.coordinates; ++k)
+      row.target +=
+          numbers[k] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)].v[k % 8]);
+  }
+  const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
+             gives_way = row.is_bounded() && !from_below && !from_above;
+  row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
+  row.gives_way = !law.goes_on && gives_way && row.compliance == 0.0;
+  if (row.compliance > 0.0) {
+    row.target += law.offset - law.gap;
+  } else if (row.keeps_place) {
+    const double inside = from_below ? std::max(law.gap, 0.0) : from_above ? std::min(law.gap, 0.0) : 0.0;
+    row.target -= inside;
+    row.error = law.gap - inside;
+  } else if (!law.goes_on) {  // a hand of limited force, which pulls until its point is where it is wanted
+    row.target -= std::clamp(law.gap, -h * kRecoverySpeed, h * kRecoverySpeed);
+  }
+}
+
+/// Rows with bounds begin as they ended the last substep.
+void GameRows::hold_as_before() {
+  const bool known = goes_on_ && before_.size() == rows_.size();
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    GameRow& row = rows_[i];
+    if (known)
+      row.hold = before_[i].hold;
+    else if (row.is_bounded())
+      row.hold = row.force <= row.lower ? Hold::kLower : row.force >= row.upper ? Hold::kUpper : Hold::kMet;
+    row.force = row.hold == Hold::kLower ? row.lower : row.hold == Hold::kUpper ? row.upper : 0.0;
+  }
+}
+
+void GameRows::add_what_leads(const GameBodies& bodies) {
+  for (const Led& led : led_) {
+    const FrameShift& shift = bodies.shifts()[static_cast<std::size_t>(led.frame)];
+    for (int i = 0; i < 3; ++i)
+      rows_[led.row].target -= led.linear[i] * static_cast<double>(shift.carried[i]) +
+                               led.angular[i] * static_cast<double>(shift.carried_turn[i]);
+  }
+}
+
+// Products ------------------------------------------------------------------------------------------------------------
+
+void GameRows::scale(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
+                     std::vector<double>& x) const {
+  x.resize(coordinates_);
+  for (const std::int32_t frame : frames) {
+    const GameBody& body = bodies.body(frame);
+    double* to = &x[static_cast<std::size_t>(8 * body.first)];
+    for (std::int32_t b = 0; b < body.blocks; ++b)
+      for (int l = 0; l < 8; ++l) to[8 * b + l] = static_cast<double>(y[static_cast<std::size_t>(body.first + b)].v[l]);
+    for (std::size_t k = 0; k < 3; ++k) to[3 + k] *= scales_[static_cast<std::size_t>(frame)][k];
+  }
+}
+
+void GameRows::scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames,
+                            std::vector<double>& x) const {
+  x.assign(coordinates_, 0.0);
+  for (const std::int32_t frame : frames) {
+    const auto at = static_cast<std::size_t>(frame);
+    double* to = &x[static_cast<std::size_t>(8 * bodies.body(frame).first)];
+    for (std::size_t l = 0; l < 6; ++l)
+      to[l] = static_cast<double>(bodies.pushes()[at].v[l]) * (l < 3 ? 1.0 : scales_[at][l - 3]);
+  }
+}
+
+void GameRows::unscale(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<double> y) const {
+  for (const std::int32_t frame : frames) {
+    double* turn = &y[static_cast<std::size_t>(8 * bodies.body(frame).first + 3)];
+    for (std::size_t k = 0; k < 3; ++k) turn[k] /= scales_[static_cast<std::size_t>(frame)][k];
+  }
+}
+
+void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
+  std::fill_n(product, group.count, 0.0);
+  for (const GameSide& side : group.sides)
+    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
+      const double *numbers = numbers_.data() + side.at + k, *from = x.data() + 8 * side.body + k;
+      const auto stride = static_cast<std::size_t>(side.coordinates);
+      if (group.count == 3)
+        add_products<3>(numbers, 3, stride, from, product);
+      else
+        add_products<0>(numbers, group.count, stride, from, product);
+    }
+}
+
+void GameRows::add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const {
+  for (const GameSide& side : group.sides)
+    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
+      const double* numbers = numbers_.data() + side.at + k;
+      double* to = x.data() + 8 * side.body + k;
+      const auto stride = static_cast<std::size_t>(side.coordinates);
+      if (group.count == 3)
+        add_sums<3>(numbers, 3, stride, forces, to);
+      else
+        add_sums<0>(numbers, group.count, stride, forces, to);
+    }
+}
+
+}  // namespace limber::internal

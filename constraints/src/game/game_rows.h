@@ -1,0 +1,120 @@
+// The rows of handles, joints and other Constraints in a substep.
+//
+// J counts in the bodies' coordinates y (game_bodies.h), but for turns of links that are pulled outward: those are
+// x = y √(1 + ¼h²k), k the stiffness against the turn in units of the inertia, so that they come as by the trapezoidal
+// rule. Without that a link that turns to and fro faster than 2 radians a substep would be thrown about.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "game_bodies.h"
+#include "limber/constraints/constraint.h"
+
+namespace limber::internal {
+
+/// One row of a constraint.
+struct GameRow {
+  enum class Hold : std::uint8_t { kMet, kLower, kUpper };
+
+  double lower = -kUnbounded, upper = kUnbounded;  // of its force
+  double target = 0.0;                             // what J y is to be, with what the modes had at the substep's start
+  double compliance = 0.0;                         // gap per force
+  double rate = 0.0;                               // what the gap is to change by in the substep
+  double error = 0.0;                              // of its gap at the substep's start, which displacements undo
+  double force = 0.0;                              // held over the substep
+  bool keeps_place = true;                         // the gap itself counts, and not its rate alone
+  bool gives_way = false;                          // of a hand of limited force, which closing does not wait for
+  bool cut = false;                                // whether the last solution asked for a force beyond a bound
+  Hold hold = Hold::kMet;
+
+  bool is_bounded() const { return lower != -kUnbounded || upper != kUnbounded; }
+};
+
+/// A body in the rows of one constraint: as many numbers a row as it has coordinates.
+struct GameSide {
+  std::int32_t frame = -1, coordinates = 0, body = 0;  // −1: none. body: the first block of its coordinates
+  std::size_t at = 0;                                  // of the first row in numbers()
+};
+
+/// The rows of one constraint.
+struct GameGroup {
+  Constraint* constraint = nullptr;
+  std::size_t first = 0, count = 0;  // of its rows
+  std::array<GameSide, 2> sides;
+};
+
+class GameRows {
+ public:
+  // Out of place, parts come together this fast, m/s and rad/s.
+  static constexpr double kRecoverySpeed = 1.0;
+
+  /// From where the substep begins. @param number of the substep, 0 …
+  void make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints, int number);
+  /// Once the bodies have begun the substep: what moves a led body in it whatever acts.
+  void add_what_leads(const GameBodies& bodies);
+
+  std::span<GameRow> rows() { return rows_; }
+  std::span<const GameRow> rows() const { return rows_; }
+  std::span<const GameGroup> groups() const { return groups_; }
+  std::span<GameRow> of(const GameGroup& group) { return std::span(rows_).subspan(group.first, group.count); }
+  std::size_t coordinates() const { return coordinates_; }  ///< of all bodies
+  /// s, the substep
+  double length() const { return length_; }
+  /// Of one row. @param side of its group
+  const double* numbers(const GameSide& side, std::int32_t row) const {
+    return numbers_.data() + side.at + static_cast<std::size_t>(row * side.coordinates);
+  }
+
+  // Vectors have eight numbers for each block of the bodies' coordinates.
+  /// x of y. @param frames where, others are left as they are
+  void scale(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
+             std::vector<double>& x) const;
+  /// The same of GameBodies::pushes().
+  void scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames, std::vector<double>& x) const;
+  /// y of x in its place.
+  void unscale(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<double> y) const;
+  /// J x of a group. @param product one number for each of its rows
+  void multiply(const GameGroup& group, std::span<const double> x, double* product) const;
+  /// x += Jᵀ f of a group. @param forces one number for each of its rows
+  void add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const;
+
+ private:
+  /// A body that something leads, in a row.
+  struct Led {
+    std::size_t row = 0;
+    std::int32_t frame = -1;
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  };
+  using Turns = std::array<double, 3>;  // by axis of the inertia
+
+  void add_group(const BodyStates& states, const GameBodies& bodies, Constraint* constraint);
+  void add_side(const GameBodies& bodies, GameGroup& group, std::size_t s);
+  void write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const;
+  void stiffen(const GameBody& body, const GameGroup& group, std::size_t s);
+  double last_force(const GameGroup& group, std::size_t i) const;
+  void add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields);
+  void hold_as_before();
+  void scale_turns();
+
+  /// Of a row, in the substep before.
+  struct Held {
+    double force = 0.0;
+    GameRow::Hold hold = GameRow::Hold::kMet;
+  };
+
+  std::vector<GameRow> rows_;
+  std::vector<Held> before_;
+  std::vector<GameGroup> groups_;
+  std::vector<double> numbers_;  // J
+  std::vector<Turns> scales_;    // by frame: x/y of its turn
+  std::vector<Led> led_;
+  ConstraintRows made_;
+  std::vector<double> yields_;  // scratch
+  std::size_t coordinates_ = 0;
+  double length_ = 0.0;
+  bool goes_on_ = false;  // the rows are those of the substep before
+};
+
+}  // namespace limber::internal

@@ -1,0 +1,169 @@
+#include "row_system.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace limber::internal {
+namespace {
+
+// Steps of conjugate gradients where the factor has left something out.
+constexpr int kMostGradients = 8;
+
+using Hold = GameRow::Hold;
+
+double dot(const double* a, const double* b, std::int32_t count) {
+  double sum[4] = {};
+  for (std::int32_t i = 0; i < count; i += 4)
+    for (int l = 0; l < 4; ++l) sum[l] += a[i + l] * b[i + l];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+/// to += a bᵀ of `count` rows each of a group whose rows all hold, one after the other.
+template <std::size_t count>
+void add_all_products(const double* a, const double* b, std::int32_t coordinates, double* to) {
+  for (std::int32_t k = 0; k < coordinates; k += 8)
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j) {
+        const double *row = a + static_cast<std::size_t>(coordinates) * i + k,
+                     *column = b + static_cast<std::size_t>(coordinates) * j + k;
+        double sum[2] = {};
+        for (std::size_t l = 0; l < 8; l += 2)
+          for (std::size_t m = 0; m < 2; ++m) sum[m] += row[l + m] * column[l + m];
+        to[count * i + j] += sum[0] + sum[1];
+      }
+}
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+}  // namespace
+
+// Graph ---------------------------------------------------------------------------------------------------------------
+
+void RowSystem::find_graph(const GameBodies& bodies, const GameRows& rows) {
+  const std::span<const GameGroup> groups = rows.groups();
+  incident_.clear(), graph_.clear(), frames_.clear();
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (const GameSide& side : groups[g].sides)
+      if (side.frame >= 0) incident_.push_back({side.frame, static_cast<std::int32_t>(g)});
+  std::ranges::sort(incident_);
+  for (const auto& [frame, group] : incident_)
+    if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
+  for (std::size_t i = 0; i < incident_.size(); ++i)
+    for (std::size_t j = i + 1; j < incident_.size() && incident_[j][0] == incident_[i][0]; ++j)
+      if (incident_[i][1] != incident_[j][1]) graph_.push_back({incident_[i][1], incident_[j][1]});
+  std::ranges::sort(graph_);
+  graph_.erase(std::unique(graph_.begin(), graph_.end()), graph_.end());
+  factor_.set_graph(groups.size(), graph_);
+  components_.reset(bodies.bodies().size());
+  for (const GameGroup& group : groups)
+    if (group.sides[0].frame >= 0 && group.sides[1].frame >= 0)
+      components_.join(group.sides[0].frame, group.sides[1].frame);
+}
+
+std::size_t RowSystem::component(const GameGroup& group) {
+  const std::int32_t frame = std::max(group.sides[0].frame, group.sides[1].frame);
+  return frame < 0 ? 0 : component(frame);
+}
+
+// Matrix --------------------------------------------------------------------------------------------------------------
+
+void RowSystem::list_met(const GameRows& rows, bool closing) {
+  met_.clear(), sizes_.clear(), first_met_.clear();
+  for (const GameGroup& group : rows.groups()) {
+    const std::size_t begin = met_.size();
+    for (std::size_t i = 0; i < group.count; ++i)
+      if (const GameRow& row = rows.rows()[group.first + i]; row.hold == Hold::kMet && !(closing && row.gives_way))
+        met_.push_back(static_cast<std::int32_t>(i));
+    first_met_.push_back(static_cast<std::int32_t>(begin));
+    sizes_.push_back(static_cast<std::int32_t>(met_.size() - begin));
+  }
+}
+
+void RowSystem::factor(const GameRows& rows, bool closing) {
+  list_met(rows, closing);
+  factor_.begin(sizes_);
+  const std::span<const GameGroup> groups = rows.groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    double* to = factor_.diagonal(g);
+    for (const GameSide& side : groups[g].sides)
+      if (side.frame >= 0) add_products(rows, g, g, side, side, to);
+    const std::span<const std::int32_t> met = this->met(g);
+    for (std::size_t i = 0; i < met.size(); ++i) {
+      double& own = to[i * met.size() + i];
+      own += rows.rows()[groups[g].first + static_cast<std::size_t>(met[i])].compliance;
+      if (!(own > 0.0)) own = 1.0;  // nothing that it acts on moves
+    }
+  }
+  for (std::size_t c = 0; c < graph_.size(); ++c) {
+    const std::int32_t of_rows = factor_.rows_of(c), of_columns = graph_[c][0] == of_rows ? graph_[c][1] : graph_[c][0];
+    const auto r = static_cast<std::size_t>(of_rows), s = static_cast<std::size_t>(of_columns);
+    for (const GameSide& a : groups[r].sides)
+      for (const GameSide& b : groups[s].sides)
+        if (a.frame >= 0 && a.frame == b.frame) add_products(rows, r, s, a, b, factor_.block(c));
+  }
+  factor_.factor();
+}
+
+void RowSystem::add_products(const GameRows& rows, std::size_t of_rows, std::size_t of_columns, const GameSide& a,
+                             const GameSide& b, double* to) const {
+  const std::span<const std::int32_t> r = met(of_rows), c = met(of_columns);
+  const auto is_ball = [&](std::size_t group) { return sizes_[group] == 3 && rows.groups()[group].count == 3; };
+  if (is_ball(of_rows) && is_ball(of_columns))
+    return add_all_products<3>(rows.numbers(a, 0), rows.numbers(b, 0), a.coordinates, to);
+  for (const std::int32_t i : r)
+    for (const std::int32_t j : c) *to++ += dot(rows.numbers(a, i), rows.numbers(b, j), a.coordinates);
+}
+
+// Conjugate gradients -------------------------------------------------------------------------------------------------
+
+void RowSystem::solve_fully(const GameRows& rows, std::vector<double>& x) {
+  if (factor_.is_complete()) return factor_.solve<1>(x);
+  Gradients& g = gradients_;
+  g.residual = x;
+  std::ranges::fill(x, 0.0);
+  g.direction = g.residual;
+  factor_.solve<1>(g.direction);
+  double square = dot(g.residual, g.direction);
+  g.product.resize(x.size());
+  for (int i = 0; i < kMostGradients && square > 0.0; ++i) {
+    multiply(rows, g.direction, g.product);
+    const double along = dot(g.direction, g.product);
+    if (!(along > 0.0)) break;
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      x[k] += square / along * g.direction[k];
+      g.residual[k] -= square / along * g.product[k];
+    }
+    g.conditioned = g.residual;
+    factor_.solve<1>(g.conditioned);
+    const double next = dot(g.residual, g.conditioned);
+    for (std::size_t k = 0; k < x.size(); ++k) g.direction[k] = g.conditioned[k] + next / square * g.direction[k];
+    square = next;
+  }
+}
+
+/// (J Jᵀ + C) x
+void RowSystem::multiply(const GameRows& rows, std::span<const double> x, std::span<double> product) {
+  const std::span<const GameGroup> groups = rows.groups();
+  std::vector<double>&moved = gradients_.moved, &forces = gradients_.forces;
+  moved.assign(rows.coordinates(), 0.0);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    forces.assign(groups[g].count, 0.0);
+    std::size_t k = first(g);
+    for (const std::int32_t i : met(g)) forces[static_cast<std::size_t>(i)] = x[k++];
+    rows.add_transposed(groups[g], forces.data(), moved);
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    forces.resize(groups[g].count);
+    rows.multiply(groups[g], moved, forces.data());
+    std::size_t k = first(g);
+    for (const std::int32_t i : met(g)) {
+      const auto row = static_cast<std::size_t>(i);
+      product[k] = rows.rows()[groups[g].first + row].compliance * x[k] + forces[row];
+      ++k;
+    }
+  }
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,62 @@
+// The linear system of the rows of a substep that hold:
+//
+//   (J Jᵀ + C) Δf = r        J: game_rows.h, C: compliance of springs and dampers
+//
+// by JointFactor, whose nodes are the groups, and where that has left something out by conjugate gradients, conditioned
+// by it.
+#pragma once
+
+#include "game_rows.h"
+#include "joint_factor.h"
+#include "limber/core/disjoint_sets.h"
+
+namespace limber::internal {
+
+class RowSystem {
+ public:
+  /// Which rows of which group meet at which bodies. The same groups come until it is called again.
+  void find_graph(const GameBodies& bodies, const GameRows& rows);
+  /// Of the rows that hold. @param closing whether places are to be closed: what a hand of limited force asks for may
+  /// contradict them
+  void factor(const GameRows& rows, bool closing);
+
+  std::size_t size() const { return factor_.size(); }
+  /// Where the numbers of a group's rows that hold begin among all.
+  std::size_t first(std::size_t group) const { return factor_.first(group); }
+  /// Those rows, by number in their group.
+  std::span<const std::int32_t> met(std::size_t group) const {
+    return {met_.data() + first_met_[group], static_cast<std::size_t>(sizes_[group])};
+  }
+  /// Bodies that rows join have one number, that of one of them.
+  std::size_t component(std::int32_t frame) { return static_cast<std::size_t>(components_.root(frame)); }
+  std::size_t component(const GameGroup& group);
+  /// What rows act on, ascending.
+  std::span<const std::int32_t> frames() const { return frames_; }
+
+  /// Overwrites right-hand sides. @param x size() rows of `columns` numbers
+  template <std::size_t columns>
+  void solve(std::span<double> x) const {
+    factor_.solve<columns>(x);
+  }
+  /// The same for one column, to the end where the factor is not complete.
+  void solve_fully(const GameRows& rows, std::vector<double>& x);
+
+ private:
+  void list_met(const GameRows& rows, bool closing);
+  void add_products(const GameRows& rows, std::size_t of_rows, std::size_t of_columns, const GameSide& a,
+                    const GameSide& b, double* to) const;
+  void multiply(const GameRows& rows, std::span<const double> x, std::span<double> product);
+
+  JointFactor factor_;
+  std::vector<JointFactor::Pair> graph_;
+  std::vector<std::array<std::int32_t, 2>> incident_;  // (frame, group)
+  std::vector<std::int32_t> frames_;
+  DisjointSets components_;                      // of frames
+  std::vector<std::int32_t> met_;                // rows that hold, by group
+  std::vector<std::int32_t> first_met_, sizes_;  // by group: in met_
+  struct Gradients {
+    std::vector<double> residual, direction, product, conditioned, moved, forces;
+  } gradients_;
+};
+
+}  // namespace limber::internal
