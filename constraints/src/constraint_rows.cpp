@@ -12,14 +12,23 @@ void ConstraintRows::clear() {
   ++makings_;
 }
 
+/// Rows are written where they stay: a copy of what was written a moment ago would wait for it.
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {
-  Row& row = rows_.emplace_back(Row{.sides = {}, .law = law});
+  row(add(a, b)).law = law;
+  return size() - 1;
+}
+
+Index ConstraintRows::add(const RowSide& a, const RowSide& b) {
+  Row& row = rows_.emplace_back();
   const bool itself = a.body >= 0 && a.body == b.body;
-  for (int s = 0; s < (itself ? 1 : 2); ++s) {
-    const RowSide& side = s == 0 ? a : b;
-    if (side.body < 0) continue;
-    row.sides[s] = {side.body, side.linear, side.angular, modal_.size(), side.modal.size()};
-    modal_.insert(modal_.end(), side.modal.begin(), side.modal.end());
+  for (std::size_t s = 0; s < (itself ? 1U : 2U); ++s) {
+    const RowSide& from = s == 0 ? a : b;
+    if (from.body < 0) continue;
+    Side& side = row.sides[s];
+    side.body = from.body;
+    side.linear = from.linear, side.angular = from.angular;
+    side.modal_begin = modal_.size(), side.modal_count = from.modal.size();
+    if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
   }
   if (itself) add_to(row.sides[0], b);
   return size() - 1;

@@ -61,6 +61,7 @@ void JointConstraint::set_actuation(int coordinate, const JointActuation& actuat
                           " joint");
   actuation.validate();
   actuation_[static_cast<std::size_t>(coordinate)] = actuation;
+  plan_actuation();
 }
 
 void JointConstraint::restore_state(StateReader& state) {
@@ -74,6 +75,7 @@ void JointConstraint::plan() {
   plan_.clear();
   plan_locked_rows();
   plan_limits();
+  plan_actuation();
 }
 
 void JointConstraint::plan_locked_rows() {
@@ -266,29 +268,26 @@ JointConstraint::Direction JointConstraint::mean_direction(const Placement& star
 
 // Rows of one step ----------------------------------------------------------------------------------------------------
 
-RowLaw JointConstraint::law_of(const RowPlan& plan, double gap) const {
-  if (plan.law >= Law::kMotor) return actuation_law(plan, gap);
+void JointConstraint::write_law(const RowPlan& plan, double gap, RowLaw& law) const {
+  law.gap = gap;
+  if (plan.law >= Law::kMotor) return write_actuation_law(plan, gap, law);
   const double recovery = internal::kConstraintsTuning.rows.joint_recovery_speed * step_;
-  RowLaw law{.holds = true};
+  law.holds = true;
   law.offset = gap - std::clamp(gap, -recovery, recovery);
   if (plan.law == Law::kLimit) law.lower = 0.0, law.offset = std::min(0.0, gap + recovery);
-  return law;
 }
 
-RowLaw JointConstraint::actuation_law(const RowPlan& plan, double gap) const {
+void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowLaw& law) const {
   const JointActuation& act = actuation(plan.coordinate);
-  RowLaw law{.goes_on = true, .last_force = force_.actuation[actuator(plan)]};
-  if (plan.law == Law::kDrive) {
-    law.make_spring(act.drive_stiffness, act.drive_damping, step_, gap);
-    return law;
-  }
+  law.goes_on = true;
+  law.last_force = force_.actuation[actuator(plan)];
+  if (plan.law == Law::kDrive) return law.make_spring(act.drive_stiffness, act.drive_damping, step_, gap);
   const bool motor = plan.law == Law::kMotor;
   law.upper = step_ * (motor ? act.motor_max_force : act.friction);
   law.lower = -law.upper;
   law.end_rate = motor ? act.motor_velocity : 0.0;
   law.agent_displacement = step_ * law.end_rate;
   law.offset = gap + law.agent_displacement;
-  return law;
 }
 
 /// Of axes and distances: exact for any step, in its middle too. @return whether it is such a row
@@ -324,24 +323,23 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   const Instant at = instant(states, when);
   if (when == StepTime::kStart) {
     step_ = step;
-    plan_actuation();
     axes_at_start_ = at.place.R_a;
   }
   const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.place.o_b - part.origin).norm(); };
   const double length = std::max(arm(at.a), arm(at.b)),
-               nearest = distance_tolerance(internal::kConstraintsTuning.rows.joint_tolerance, length, at.place.o_b);
+               nearest = distance_tolerance(internal::kConstraintsTuning.rows.joint_tolerance, length, at.place.o_b),
+               place_digits = digits_of(length + at.place.o_b.norm());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const bool distance = is_distance(plan);
-    const double gap = this->gap(at.place, plan);
-    RowLaw law = law_of(plan, gap);
-    law.gap = gap;
-    law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
-    law.digits = digits_of(distance ? length + at.place.o_b.norm() : 1.0 + std::abs(gap));
-    if (i < force_.plan.size()) law.last_force = force_.plan[i];
     FrameMeasure of_a, of_b;
     if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at.place, plan), of_a, of_b);
-    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_), law);
+    RowLaw& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
+    const double gap = this->gap(at.place, plan);
+    write_law(plan, gap, law);
+    law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
+    law.digits = distance ? place_digits : digits_of(1.0 + std::abs(gap));
+    if (i < force_.plan.size()) law.last_force = force_.plan[i];
   }
 }
 

@@ -123,6 +123,8 @@ class ConstraintRows {
   std::uint64_t makings() const { return makings_; }
   /// @return the row's index. Copies the modal parts. Two sides of one body become one, their sum.
   Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
+  /// The same with the law that a row has by itself, for whoever writes it in its place.
+  Index add(const RowSide& a, const RowSide& b);
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
   void add_flexibility(Index body, Index i, Index j, double value) { flexibility_.push_back({i, j, value, body}); }

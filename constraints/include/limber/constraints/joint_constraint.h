@@ -138,15 +138,15 @@ class JointConstraint final : public Constraint {
   void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
   bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
   static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
-  RowLaw law_of(const RowPlan& plan, double gap) const;
-  RowLaw actuation_law(const RowPlan& plan, double gap) const;
+  void write_law(const RowPlan& plan, double gap, RowLaw& law) const;
+  void write_actuation_law(const RowPlan& plan, double gap, RowLaw& law) const;
 
   MaterialFrame a_, b_;
   JointSpec spec_;
   std::array<JointActuation, 3> actuation_{};
   std::array<double, 3> last_{};  // coordinates at the last step's end: where angles are counted from
   std::vector<RowPlan> plan_;     // locked rows, then limits
-  std::vector<RowPlan> rows_;     // those of this step: plan_ and the actuation
+  std::vector<RowPlan> rows_;     // plan_ and the actuation
   Forces force_;
   double step_ = 0.0;
   bool ends_step_ = true, counts_turns_ = false;  // the part at hand does; a row measures an angle
