@@ -125,7 +125,7 @@ Asset bake_body(const std::string& name, const BodyOptions& body) {
   if (name == "bunny") options.collision_triangles = 300;
   Warnings warnings;
   Asset asset = bake(input, options, warnings).asset;
-  if (body.modes == 0) asset.bodies.front() = reduce_model(*asset.bodies.front(), {});
+  if (body.modes == 0) make_rigid(asset, 0);
   return asset;
 }
 

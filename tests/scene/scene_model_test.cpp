@@ -81,6 +81,20 @@ TEST(SceneModel, AReducedModelKeepsTheRestBitForBit) {
   EXPECT_THROW(reduce_model(*model, std::vector<Index>{5}), InvalidArgument);
 }
 
+TEST(SceneModel, ARigidBodyOfAnAssetTellsOfNoFrequencies) {
+  Asset asset = block_asset(3);
+  asset.bodies.push_back(testing::block_model(3, "brick"));
+  asset.frequency_errors = {{0.1, 0.2, 0.3}, {0.1, 0.2, 0.3}};
+  make_rigid(asset, 1);
+  const Asset read = asset_from_bytes(asset_bytes(asset), "test");
+  EXPECT_EQ(read.bodies[0]->modes(), 3);
+  EXPECT_EQ(read.frequency_errors[0].size(), 3u);
+  EXPECT_EQ(read.bodies[1]->modes(), 0);
+  EXPECT_TRUE(read.frequency_errors[1].empty());
+  EXPECT_EQ(read.bodies[1]->data().mass, read.bodies[0]->data().mass);
+  EXPECT_THROW(make_rigid(asset, 2), InvalidArgument);
+}
+
 TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidual) {
   ModalModelData data = testing::block_data(5);
   ResidualCompliance residual(ResidualCompliance::Form::kFull, data.render.vertices());

@@ -86,10 +86,7 @@ BakeResult bake_part(Program& program, const Component& part, const AssemblyOpti
     BakeResult result = bake(input, bake_options, program.warnings(), jobs);
     if (result.asset.bodies.size() != 1)
       throw ComputationError("its tets are " + std::to_string(result.asset.bodies.size()) + " pieces, expected one");
-    if (rigid) {
-      result.asset.bodies[0] = reduce_model(*result.asset.bodies[0], {});
-      result.asset.frequency_errors[0].clear();
-    }
+    if (rigid) make_rigid(result.asset, 0);
     return result;
   } catch (const ComputationError& e) {
     throw ComputationError("component \"" + part.name + "\": " + e.what());

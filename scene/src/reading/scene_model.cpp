@@ -356,6 +356,14 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   return lean_model(model, kept, damping, {.volume = false});
 }
 
+void make_rigid(Asset& asset, std::size_t body) {
+  if (body >= asset.bodies.size())
+    throw InvalidArgument("make_rigid: body is " + std::to_string(body) + ", expected less than " +
+                          std::to_string(asset.bodies.size()));
+  asset.bodies[body] = reduce_model(*asset.bodies[body], {});
+  if (body < asset.frequency_errors.size()) asset.frequency_errors[body].clear();
+}
+
 SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& assets, const SceneUse& use) {
   SceneModels models;
   std::map<std::pair<std::string, std::size_t>, std::vector<const SceneBody*>> own;

@@ -84,6 +84,10 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
 std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept,
                                                double damping = 1.0);
 
+/// Makes a body of an asset rigid: leaves out all its modes, as reduce_model() does, and their frequencies' errors.
+/// @throws InvalidArgument if the asset has no such body
+void make_rigid(Asset& asset, std::size_t body);
+
 /// Bytes of a model's surfaces, bases, vertex rows, volume block, residual compliance and skin in memory.
 std::size_t shape_bytes(const ModalModelData& data);
 
