@@ -228,5 +228,25 @@ TEST_F(PlyFormat, TakesFacesBeforeVerticesAndPolygons) {
   EXPECT_EQ(s.vertices[1], Vec3(1, 0, 0));
 }
 
+TEST_F(PlyFormat, TakesTriangleStripsEveryOtherTurned) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n2 1 "
+      "0\n";
+  EXPECT_THAT(surface("m.ply", head + "8 0 1 2 3 -1 2 3 4\n").triangles,
+              ElementsAre(Triangle{0, 1, 2}, Triangle{2, 1, 3}, Triangle{2, 3, 4}));
+  // Triangles of no area lead from one strip to the next and count.
+  EXPECT_THAT(surface("m.ply", head + "7 0 1 2 2 3 4 5\n").triangles,
+              ElementsAre(Triangle{0, 1, 2}, Triangle{3, 2, 4}, Triangle{3, 4, 5}));
+}
+
+TEST_F(ObjFormat, LeavesOutVerticesThatNoFaceUsesAndSaysSo) {
+  const Folder folder;
+  Warnings warnings;
+  const auto path = folder.write("far.obj", "v 0 0 0\nv 1e6 0 0\nv 1 0 0\nv 0 1 0\nf 1 3 4\n");
+  EXPECT_EQ(read_surface_mesh(path, warnings).vertices.size(), 3u);
+  EXPECT_THAT(warnings, ElementsAre(::testing::HasSubstr("1 vertices belong to no triangle")));
+}
+
 }  // namespace
 }  // namespace limber

@@ -56,6 +56,7 @@ MeshFile read_vtk(const FileBytes& file, Warnings& warnings);
 MeshFile read_obj(const FileBytes& file);
 MeshFile read_stl(const FileBytes& file);
 MeshFile read_ply(const FileBytes& file);
+MeshFile read_off(const FileBytes& file);
 /// @param path of the .node or the .ele file; the other lies beside it
 MeshFile read_tetgen(const std::filesystem::path& path);
 

@@ -1,4 +1,5 @@
 // PLY, text and binary of either byte order: any elements and properties; vertices and faces are kept.
+#include <array>
 #include <optional>
 
 #include "formats/file_scanner.h"
@@ -39,6 +40,8 @@ class PlyReader {
         read_vertices(e);
       else if (e.name == "face")
         read_faces(e);
+      else if (e.name == "tristrips")
+        read_strips(e);
       else
         for (std::int64_t i = 0; i < e.count; ++i) skip(e.properties);
     }
@@ -165,6 +168,30 @@ class PlyReader {
       mesh_.polygons.corners.push_back(static_cast<Index>(vertex));
     }
     mesh_.polygons.close();
+  }
+
+  /// Lists of vertices, each three in a row a triangle, every other one turned; −1 begins the next strip.
+  void read_strips(const Element& e) {
+    for (std::int64_t i = 0; i < e.count; ++i)
+      for (const Property& p : e.properties) is_corners(p) ? read_strip(p) : skip(p);
+  }
+  void read_strip(const Property& p) {
+    const auto length = list_length(p);
+    std::vector<Index> strip;
+    for (Index c = 0; c < length; ++c) {
+      const auto vertex = integer(p.type);
+      if (vertex < -1 || vertex > std::numeric_limits<Index>::max())
+        in_.fail("a strip names vertex " + std::to_string(vertex) + ", expected 0 or more, or -1 between strips");
+      strip.push_back(static_cast<Index>(vertex));
+      const std::size_t n = strip.size();
+      if (vertex == -1) {
+        strip.clear();
+      } else if (n >= 3) {
+        const Index a = strip[n - 3], b = strip[n - 2], last = strip[n - 1];
+        const bool degenerate = a == b || b == last || last == a;  // strips are joined by triangles of no area
+        if (!degenerate) mesh_.polygons.push(n % 2 == 1 ? std::array{a, b, last} : std::array{b, a, last});
+      }
+    }
   }
 
   /// After the last element: faces may stand before the vertices.

@@ -26,8 +26,16 @@ struct Polygons {
   void close() { ends.push_back(corners.size()); }
 };
 
-/// Triangles in the polygons' order, same sense of rotation. Convex polygons become fans, concave ones are cut ear by
-/// ear in the plane that fits them best. Polygons of fewer than three corners give none. @pre all corners are in range
-std::vector<Triangle> triangulated(const Polygons& polygons, std::span<const Vec3> vertices);
+/// Polygons cut into triangles.
+struct Triangulation {
+  std::vector<Triangle> triangles;
+  std::size_t crossing_polygons = 0;  ///< those that cross themselves, so that no cut of them is right
+};
+
+/// Triangles in the polygons' order, same sense of rotation; a polygon of n ≥ 3 corners gives n − 2, one of fewer none.
+/// Convex polygons become fans. Others are cut ear by ear in the plane that fits them best, whatever their number of
+/// corners; they may touch themselves, as a polygon with a hole does along the bridge from rim to hole. Takes a time
+/// that is about linear in the corners. @pre all corners are in range
+Triangulation triangulated(const Polygons& polygons, std::span<const Vec3> vertices);
 
 }  // namespace limber::internal

@@ -9,6 +9,7 @@
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/mesh/grouped_surface.h"
+#include "limber/mesh/unused_vertices.h"
 
 namespace limber {
 namespace {
@@ -19,10 +20,10 @@ using internal::PolygonGroup;
 using internal::Polygons;
 using internal::shown_path;
 
-enum class Format { kGmsh, kMedit, kVtk, kTetgen, kPly, kObj, kStl };
+enum class Format { kGmsh, kMedit, kVtk, kTetgen, kPly, kObj, kOff, kStl };
 
 constexpr const char* kKnownFormats =
-    "Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk, OBJ .obj, STL .stl or PLY .ply";
+    "Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk, OBJ .obj, OFF .off, STL .stl or PLY .ply";
 
 std::optional<Format> format_of_content(std::string_view head) {
   if (head.starts_with("\xef\xbb\xbf")) head.remove_prefix(3);
@@ -39,9 +40,9 @@ std::optional<Format> format_of_extension(const std::filesystem::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   constexpr std::pair<const char*, Format> kExtensions[] = {
-      {".msh", Format::kGmsh}, {".mesh", Format::kMedit},  {".meshb", Format::kMedit},
-      {".vtk", Format::kVtk},  {".node", Format::kTetgen}, {".ele", Format::kTetgen},
-      {".ply", Format::kPly},  {".obj", Format::kObj},     {".stl", Format::kStl}};
+      {".msh", Format::kGmsh},    {".mesh", Format::kMedit}, {".meshb", Format::kMedit}, {".vtk", Format::kVtk},
+      {".node", Format::kTetgen}, {".ele", Format::kTetgen}, {".ply", Format::kPly},     {".obj", Format::kObj},
+      {".off", Format::kOff},     {".stl", Format::kStl}};
   for (const auto& [known, format] : kExtensions)
     if (extension == known) return format;
   return std::nullopt;
@@ -67,6 +68,8 @@ MeshFile read_as(Format format, const std::filesystem::path& path, const FileByt
       return internal::read_ply(file);
     case Format::kObj:
       return internal::read_obj(file);
+    case Format::kOff:
+      return internal::read_off(file);
     case Format::kStl:
       return internal::read_stl(file);
   }
@@ -87,12 +90,21 @@ ReadFile read_any(const std::filesystem::path& path, Warnings& warnings) {
 
 bool has_tets(const ReadFile& file) { return file.format == Format::kTetgen || !file.content.tets.tets.empty(); }
 
+std::vector<Triangle> triangles_of(const MeshFile& content, const std::string& name, Warnings& warnings) {
+  internal::Triangulation cut = internal::triangulated(content.polygons, content.tets.nodes);
+  if (cut.crossing_polygons > 0)
+    warnings.push_back(name + ": " + std::to_string(cut.crossing_polygons) +
+                       " polygons cross themselves; no triangles of them are right");
+  return std::move(cut.triangles);
+}
+
 SurfaceMesh surface_of(ReadFile file, const std::string& name, Warnings& warnings) {
   SurfaceMesh surface;
-  surface.triangles = internal::triangulated(file.content.polygons, file.content.tets.nodes);
+  surface.triangles = triangles_of(file.content, name, warnings);
   surface.vertices = std::move(file.content.tets.nodes);
   if (file.format == Format::kStl) weld(surface);
   validate(surface, name, warnings);
+  drop_unused_vertices(surface, name, warnings);
   return surface;
 }
 
@@ -152,11 +164,12 @@ GroupedSurface read_grouped_surface(const std::filesystem::path& path, Warnings&
   auto file = read_any(path, warnings);
   if (has_tets(file)) throw InputError(shown_path(path) + ": holds tetrahedra, expected a surface");
   GroupedSurface out;
-  out.surface.triangles = internal::triangulated(file.content.polygons, file.content.tets.nodes);
+  out.surface.triangles = triangles_of(file.content, shown_path(path), warnings);
   out.surface.vertices = std::move(file.content.tets.nodes);
   out.face_of = polygon_of_triangles(file.content.polygons);
   out.groups = groups_of_triangles(file.content.groups, out.face_of);
   validate(out, shown_path(path), warnings);
+  drop_unused_vertices(out.surface, shown_path(path), warnings);
   return out;
 }
 

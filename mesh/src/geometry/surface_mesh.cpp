@@ -1,10 +1,9 @@
 #include "limber/mesh/surface_mesh.h"
 
 #include <algorithm>
-#include <bit>
-#include <unordered_map>
 #include <utility>
 
+#include "geometry/near_points.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "limber/mesh/ten_node_tet.h"
@@ -68,25 +67,13 @@ void validate(SurfaceMesh& surface, const std::string& name, Warnings& warnings)
 }
 
 Index weld(SurfaceMesh& surface) {
-  struct Hash {
-    std::size_t operator()(const std::array<std::uint64_t, 3>& bits) const {
-      std::uint64_t h = 0;
-      for (const auto b : bits)
-        h = (h ^ b ^ (b >> 29)) * 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio: spreads bits
-      return static_cast<std::size_t>(h ^ (h >> 32));
-    }
-  };
-  std::unordered_map<std::array<std::uint64_t, 3>, Index, Hash> index_at;
-  index_at.reserve(surface.vertices.size());
-  std::vector<Index> new_index;
+  const std::vector<Index> of = internal::representatives(surface.vertices, 0.0);
+  std::vector<Index> new_index(of.size());
   std::vector<Vec3> kept;
-  for (const Vec3& x : surface.vertices) {
-    const Vec3 positive_zero = x.array() + 0.0;
-    const auto bits =
-        std::bit_cast<std::array<std::uint64_t, 3>>(std::array{positive_zero[0], positive_zero[1], positive_zero[2]});
-    const auto [place, is_new] = index_at.try_emplace(bits, static_cast<Index>(kept.size()));
-    if (is_new) kept.push_back(x);
-    new_index.push_back(place->second);
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const bool stays = of[i] == static_cast<Index>(i);
+    new_index[i] = stays ? static_cast<Index>(kept.size()) : new_index[of[i]];
+    if (stays) kept.push_back(surface.vertices[i]);
   }
   const auto gone = static_cast<Index>(surface.vertices.size() - kept.size());
   for (Triangle& t : surface.triangles)

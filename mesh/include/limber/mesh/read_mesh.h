@@ -10,6 +10,7 @@
 /// | TetGen | tets | .node, .ele (name either; both must be there) |
 /// | PLY, text and binary | surface | `ply`, .ply |
 /// | OBJ | surface | .obj |
+/// | OFF, text and binary | surface | .off |
 /// | STL, text and binary | surface | .stl |
 ///
 /// Strict about meaning, lenient about form: comments, blank lines, CRLF, 0-based or 1-based numbering and polygons
