@@ -15,6 +15,7 @@
 #include "limber/core/error.h"
 #include "limber/core/version.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
+#include "limber/mesh/merge_nodes.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/model/sha256.h"
 #include "limber/precompute/bake.h"
@@ -47,6 +48,7 @@ struct Arguments {
   std::string load = "sudden";
   int modes = 64;
   double scale = 1.0;
+  std::optional<double> merge_nodes;
   int blas_threads = 1;
   bool volume_block = false, no_certify = false, list_materials = false;
   AssemblyOptions assembly;
@@ -138,10 +140,15 @@ void declare_geometry_options(CLI::App& app, Arguments& a) {
       ->type_name("N")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
-  app.add_option("--scale", a.scale, "multiplies all input lengths first, for files that are not in metres")
+  app.add_option("--scale", a.scale,
+                 "multiplies all input lengths, after the unit that the file states, for files that are not in metres")
       ->type_name("FACTOR")
       ->check(positive_number())
       ->capture_default_str();
+  app.add_option("--merge-nodes", a.merge_nodes,
+                 "tetrahedra: nodes that are no farther apart become one, for parts that were meshed one by one")
+      ->type_name("M")
+      ->check(CLI::NonNegativeNumber);
   app.add_option(
          "--residual", a.residuals,
          "what dropped modes still answer statically: at nodes (as --fix names them), three further modes each, "
@@ -427,18 +434,54 @@ void fill_with_tets(Program& program, const Arguments& a, const BakeOptions& bak
   input.mesh = std::move(t.mesh);
 }
 
+/// Joins nodes where that was asked for, and tells of those that look as if they were meant to be one.
+void join_parts(Program& program, const Arguments& a, TetMesh& mesh) {
+  const std::string name = "\"" + a.mesh + "\"";
+  if (a.merge_nodes) {
+    const Index merged = merge_nodes(mesh, *a.merge_nodes);
+    program.report()["merged_nodes"] = merged;
+    program.print(fmt::format("{} nodes merged\n", merged));
+    validate(mesh, name + " (--merge-nodes)", program.warnings());
+  }
+  if (const Index crowded = count_crowded_faces(mesh); crowded > 0)
+    program.warnings().push_back(
+        fmt::format("{}: {} triangles are faces of three or more tetrahedra, which overlap there", name, crowded));
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : mesh.nodes) box.extend(p);
+  constexpr double kTouch = 1e-6;  // of the diagonal: a few last bits of a float
+  const double touch = kTouch * box.diagonal().norm();
+  if (const Index touching = count_touching_nodes(mesh, touch); touching > 0)
+    program.warnings().push_back(fmt::format(
+        "{}: {} nodes lie on nodes of another body, and nothing ties them; if these are one part, --merge-nodes {:.1g} "
+        "joins them",
+        name, touching, touch));
+}
+
+/// Tells which unit of the file counts.
+void tell_unit(Program& program, const FileUnit& unit) {
+  nlohmann::ordered_json& told = program.report()["unit"];
+  told = {{"metres", unit.metres}, {"stated", unit.stated}, {"up", nullptr}};
+  if (unit.up != 0) told["up"] = std::string(1, unit.up);
+  if (unit.metres != 1.0) program.print(fmt::format("lengths: the file's unit is {:.6g} m\n", unit.metres));
+}
+
 BakeInput read_input(Program& program, const Arguments& a, const BakeOptions& bake, Stopwatch& stopwatch) {
   BakeInput input;
   input.name = fs::path(a.mesh).stem().string();
-  auto read = stopwatch.time("read", [&] { return read_any_mesh(a.mesh, program.warnings()); });
+  FileUnit unit;
+  auto read = stopwatch.time("read", [&] { return read_any_mesh(a.mesh, program.warnings(), &unit); });
+  tell_unit(program, unit);
   if (auto* mesh = std::get_if<TetMesh>(&read)) {
     input.mesh = std::move(*mesh);
     scale(input.mesh.nodes, a.scale);
+    join_parts(program, a, input.mesh);
     if (a.tets.cell_size > 0.0 || a.tets.alpha > 0.0 || !a.frequency_error.empty())
       program.warnings().push_back(
           "--cell-size, --frequency-error and --alpha have no effect: the input is made of tetrahedra already");
   } else {
     input.render = std::get<SurfaceMesh>(std::move(read));
+    if (a.merge_nodes)
+      program.warnings().push_back("--merge-nodes has no effect: the input is a surface, whose vertices are welded");
     scale(input.render->vertices, a.scale);
     fill_with_tets(program, a, bake, input, stopwatch);
   }
@@ -589,7 +632,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   program.options().add_option("MESH", arguments.mesh,
                                "tetrahedra (Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk) or a surface "
-                               "(OBJ, STL, PLY, glTF, OFF, 3DS, ...), which is filled with tetrahedra first");
+                               "(OBJ, STL, PLY, OFF, glTF, 3DS, ...), which is filled with tetrahedra first");
   program.options().add_option("-o,--output", arguments.output, "asset to write")->type_name("ASSET.glb");
   declare_material_options(program.options(), arguments);
   declare_mode_options(program.options(), arguments);

@@ -9,15 +9,12 @@
 #include "limber/core/file.h"
 
 namespace limber::internal {
-namespace {
 
 std::string one_line(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }, ' ');
   return text;
 }
-
-}  // namespace
 
 std::string quoted_path(const std::filesystem::path& path) {
   std::string name = one_line(path.string());
@@ -29,6 +26,8 @@ const aiScene& read_scene(Assimp::Importer& importer, const std::filesystem::pat
 
   // Without it a file of bones alone would come back as little diamonds around each bone.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  // Coordinates keep the file's axes, in COLLADA as in every other format.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   const aiScene* scene = nullptr;
   const std::string name = quoted_path(path);
   try {

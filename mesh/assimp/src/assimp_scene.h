@@ -9,6 +9,9 @@
 
 namespace limber::internal {
 
+/// Characters that would break a line of text become blanks.
+std::string one_line(std::string text);
+
 /// The path in quotes, on one line.
 std::string quoted_path(const std::filesystem::path& path);
 

@@ -5,7 +5,9 @@
 #include <unordered_map>
 
 #include "assimp_scene.h"
+#include "file_unit.h"
 #include "limber/core/error.h"
+#include "limber/mesh/unused_vertices.h"
 
 namespace limber {
 namespace {
@@ -17,6 +19,7 @@ using internal::read_scene;
 struct RawSurface {
   GroupedSurface grouped;              ///< a group per mesh of a node
   std::vector<std::size_t> node_ends;  ///< per node, one past its last triangle
+  FileUnit unit;                       ///< applied
 };
 
 /// Collects the meshes of a scene as its nodes show them.
@@ -80,8 +83,11 @@ class Collector {
 RawSurface read_raw(const std::filesystem::path& path, const std::string& name, Warnings& warnings) {
   Assimp::Importer importer;
   const aiScene& scene = read_scene(importer, path, aiProcess_Triangulate);
+  const internal::UnitOfScene unit = internal::unit_of(importer, scene, path);
   Collector collector(scene, name);
   collector.add(*scene.mRootNode, aiMatrix4x4t<double>());
+  for (Vec3& p : collector.read.grouped.surface.vertices) p *= unit.factor;
+  collector.read.unit = unit.unit;
   if (collector.points_and_lines > 0)
     warnings.push_back(name + ": " + std::to_string(collector.points_and_lines) +
                        " points and lines are no surface and have been left out");
@@ -114,30 +120,37 @@ void weld_nodes(SurfaceMesh& surface, const std::vector<std::size_t>& node_ends)
 
 }  // namespace
 
-SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings) {
+SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
   const std::string name = quoted_path(path);
-  SurfaceMesh surface = read_raw(path, name, warnings).grouped.surface;
+  RawSurface read = read_raw(path, name, warnings);
+  if (unit != nullptr) *unit = read.unit;
+  SurfaceMesh surface = std::move(read.grouped.surface);
   weld(surface);
   validate(surface, name, warnings);
+  drop_unused_vertices(surface, name, warnings);
   return surface;
 }
 
-GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings) {
+GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
   if (is_known_mesh_format(path)) return read_grouped_surface(path, warnings);
   const std::string name = quoted_path(path);
   RawSurface read = read_raw(path, name, warnings);
+  if (unit != nullptr) *unit = read.unit;
   weld_nodes(read.grouped.surface, read.node_ends);
   validate(read.grouped, name, warnings);
+  drop_unused_vertices(read.grouped.surface, name, warnings);
   return std::move(read.grouped);
 }
 
-SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings) {
-  return is_known_mesh_format(path) ? read_surface_mesh(path, warnings) : read_surface_mesh_with_assimp(path, warnings);
+SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
+  return is_known_mesh_format(path) ? read_surface_mesh(path, warnings)
+                                    : read_surface_mesh_with_assimp(path, warnings, unit);
 }
 
-std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings) {
+std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings,
+                                                 FileUnit* unit) {
   if (is_known_mesh_format(path)) return read_mesh(path, warnings);
-  return read_surface_mesh_with_assimp(path, warnings);
+  return read_surface_mesh_with_assimp(path, warnings, unit);
 }
 
 }  // namespace limber
