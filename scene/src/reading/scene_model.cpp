@@ -399,8 +399,10 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
   ShapeLoader shapes;
   for (const SceneBody& body : scene.bodies)
     models.shape_of_body.push_back(shapes.load(body.shape, body.where, models.warnings));
-  for (const SceneStatic& s : scene.statics)
+  for (const SceneStatic& s : scene.statics) {
     models.shape_of_static.push_back(shapes.load(s.shape, s.where, models.warnings));
+    internal::warn_of_facing(*models.shape_of_static.back(), s.pose, scene.gravity, s.where, models.warnings);
+  }
   return models;
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "limber/core/error.h"
+#include "limber/mesh/closed_shells.h"
 #include "limber/mesh/read_mesh.h"
 #include "reading/scene_reading.h"
 
@@ -85,6 +86,9 @@ Shape shape_of(const ShapeFile& file, Warnings& warnings) {
   SurfaceMesh surface = read_surface_mesh(file.path, warnings);
   for (Vec3& p : surface.vertices) p *= file.scale;
   if (file.hull) return ConvexHull{std::move(surface.vertices)};
+  if (const Index turned = turn_shells_outward(surface); turned > 0)
+    warnings.push_back("\"" + file.path.string() + "\": " + std::to_string(turned) +
+                       " closed shells were inside out for where they lie and have been turned");
   return TriangleMesh{std::move(surface.vertices), std::move(surface.triangles)};
 }
 
@@ -107,6 +111,25 @@ SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& fol
   inside.finish();
   o.finish();
   return shape;
+}
+
+void warn_of_facing(const Shape& shape, const RigidTransform& pose, const Vec3& gravity, const std::string& where,
+                    Warnings& warnings) {
+  const auto* mesh = std::get_if<TriangleMesh>(&shape);
+  if (mesh == nullptr) return;
+  Vec3 normals = Vec3::Zero();  // times areas; their sum over a closed surface is 0
+  double areas = 0.0;
+  for (const Triangle& t : mesh->triangles) {
+    const auto corner = [&](std::size_t i) -> const Vec3& { return mesh->vertices[static_cast<std::size_t>(t[i])]; };
+    const Vec3 normal = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    normals += normal;
+    areas += normal.norm();
+  }
+  constexpr double kRounding = 1e-9;
+  if ((pose.q * normals).dot(gravity) > kRounding * areas * gravity.norm())
+    warnings.push_back(where +
+                       ".shape: the mesh is open, and more of it looks along gravity than against it: what falls on it "
+                       "from above passes through; if that is not meant, turn its triangles");
 }
 
 std::shared_ptr<const Shape> ShapeLoader::load(const SceneShape& shape, const std::string& where, Warnings& warnings) {

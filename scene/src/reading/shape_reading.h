@@ -26,4 +26,8 @@ class ShapeLoader {
   std::vector<std::pair<ShapeFile, std::shared_ptr<const Shape>>> read_;
 };
 
+/// Warns of an open mesh that lets what falls on it pass: triangles are solid from in front alone.
+void warn_of_facing(const Shape& shape, const RigidTransform& pose, const Vec3& gravity, const std::string& where,
+                    Warnings& warnings);
+
 }  // namespace limber::internal
