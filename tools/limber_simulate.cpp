@@ -125,8 +125,6 @@ Json contact(const Scene& scene) {
           {"guard", to_string(rule.guard)},
           {"friction", c.friction},
           {"rolling_friction", c.rolling_friction},
-          {"impact", to_string(c.impact)},
-          {"impact_speed", c.impact_speed},
           {"recovery_speed", c.recovery_speed},
           {"residual_compliance", c.residual_compliance},
           {"penalty_frequency", rule.penalty_frequency},

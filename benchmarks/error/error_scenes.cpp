@@ -189,10 +189,9 @@ ErrorScene driven(ErrorScene scene, double times) {
 }
 
 std::string text(const ErrorSetting& s) {
-  return fmt::format("{} modes, step {:.6g} s, {}, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}{}", s.modes,
-                     s.step, s.method, s.impact, s.contacts == 0 ? "all" : std::to_string(s.contacts),
-                     s.residual ? "on" : "off", s.basis, s.mesh, s.drive,
-                     s.substeps > 0 ? fmt::format(", game {}", s.substeps) : "");
+  return fmt::format("{} modes, step {:.6g} s, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}{}", s.modes,
+                     s.step, s.method, s.contacts == 0 ? "all" : std::to_string(s.contacts), s.residual ? "on" : "off",
+                     s.basis, s.mesh, s.drive, s.substeps > 0 ? fmt::format(", game {}", s.substeps) : "");
 }
 
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,
@@ -207,10 +206,7 @@ std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,
     out["bodies"].push_back(body_json(body));
   }
   if (scene.has_contact())
-    out["contact"] = {{"method", setting.method},
-                      {"impact", setting.impact},
-                      {"friction", 0.0},
-                      {"residual_compliance", setting.residual}};
+    out["contact"] = {{"method", setting.method}, {"friction", 0.0}, {"residual_compliance", setting.residual}};
   if (scene.ground) out["statics"] = Json::array({{{"name", "ground"}, {"shape", {{"half_space", Json::object()}}}}});
   add_loads(scene, out);
   return out.dump(2) + "\n";

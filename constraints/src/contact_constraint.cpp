@@ -51,7 +51,6 @@ void ContactOptions::validate() const {
   if (!(solver == ContactSolver::kGame && friction >= 0.0)) number(friction, "friction");
   number(rolling_friction, "rolling_friction");
   number(recovery_speed, "recovery_speed");
-  number(impact_speed, "impact_speed");
   number(compliance, "compliance");
 }
 
@@ -61,37 +60,19 @@ struct ContactSet::Impl {
   std::vector<VertexShare> regions;  // of their sides
   std::vector<double> shapes;        // of these
   ContactHistory history;
-  std::vector<StrikeMemory> strikes;            // by (a, b), those that did so in the last step
-  std::vector<RollingMemory> rolling_memory;    // by (a, b), of the last step
-  std::vector<ContactMemory> foreseen;          // by id, where the step has been foreseen before
-  std::vector<RollingMemory> rolling_foreseen;  // by (a, b), the same
+  std::vector<RollingMemory> rolling_memory;  // by (a, b), of the last step
   Pool<PairContacts> pairs;
   Pool<RollingResistance> rolling;
   std::vector<Constraint*> constraints;
   ContactDents dents;
   std::vector<Index> touched;  // scratch of finish()
 
-  void remember_foreseen();
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
   void reserve_regions(const BodyStates& states, std::span<const ContactPoint> points);
   void add_region(PreparedSide& side, const ContactSide& found);
   void spread_shapes(PreparedSide& side);
 };
-
-/// Of contacts that are to be found anew for the step at hand.
-void ContactSet::Impl::remember_foreseen() {
-  foreseen.clear();
-  for (const PreparedContact& contact : contacts)
-    if (contact.foreseen)
-      foreseen.push_back({.id = contact.id, .force = contact.foreseen_force, .slip = contact.foreseen_slip});
-  std::ranges::sort(foreseen, kById);
-  rolling_foreseen.clear();
-  for (const auto& known : rolling.used())
-    if (known->is_foreseen())
-      rolling_foreseen.push_back({known->bodies()[0], known->bodies()[1], known->foreseen_moment()});
-  std::ranges::sort(rolling_foreseen, kByPair);
-}
 
 void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const Vec3& origin,
                            std::span<const double> friction) {
@@ -113,8 +94,6 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = history.find(point.id))
     contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
-  if (const ContactMemory* known = find_in(foreseen, point.id))
-    contact.foreseen = true, contact.foreseen_force = known->force, contact.foreseen_slip = known->slip;
 }
 
 /// So that spans of them stay where they are.
@@ -166,7 +145,6 @@ ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points, const Vec3& origin,
                         std::span<const double> friction) {
   Impl& s = *impl_;
-  s.remember_foreseen();
   s.contacts.clear();
   s.constraints.clear();
   std::size_t bodies = 0;
@@ -177,7 +155,6 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
-  s.foreseen.reserve(s.contacts.capacity());
   s.pairs.reuse(), s.rolling.reuse();
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
@@ -185,8 +162,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
     PairContacts& pair = s.pairs.next();
     const std::span<PreparedContact> of_pair = std::span(s.contacts).subspan(begin, i - begin);
-    const StrikeMemory* strike = find_in(s.strikes, {.a = first.a.body, .b = first.b.body}, kByPair);
-    pair.set(of_pair, s.options, s.dents, strike != nullptr ? strike->since : 0.0);
+    pair.set(of_pair, s.options, s.dents);
     s.constraints.push_back(&pair);
     s.resist_rolling(states, of_pair);
     begin = i;
@@ -204,10 +180,8 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
   if (largest == 0.0) return;
   const Index a = pair.front().a.body, b = pair.front().b.body;
   const RollingMemory* last = find_in(rolling_memory, {.a = a, .b = b}, kByPair);
-  const RollingMemory* known = find_in(rolling_foreseen, {.a = a, .b = b}, kByPair);
   RollingResistance& resistance = rolling.next();
-  resistance.set(a, b, largest, last != nullptr ? last->moment : Vec3(Vec3::Zero()),
-                 known != nullptr ? &known->moment : nullptr);
+  resistance.set(a, b, largest, last != nullptr ? last->moment : Vec3(Vec3::Zero()));
   constraints.push_back(&resistance);
 }
 
@@ -233,18 +207,12 @@ std::span<Constraint* const> ContactSet::constraints() const { return impl_->con
 void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
   Impl& s = *impl_;
   s.touched.clear();
-  for (PreparedContact& contact : s.contacts) {
-    contact.foreseen = false;
+  for (const PreparedContact& contact : s.contacts)
     for (const PreparedSide* side : {&contact.a, &contact.b})
       if (yields(*side)) s.touched.push_back(side->body);
-  }
   s.history.finish(s.contacts, asleep, some_woke);
   s.dents.finish(asleep, s.touched);
   const auto wakes = [&](const auto& m) { return !rests(asleep, m.a, m.b); };
-  std::erase_if(s.strikes, wakes);
-  for (const auto& pair : s.pairs.used())
-    if (pair->lasted() > 0.0) s.strikes.push_back({pair->bodies()[0], pair->bodies()[1], pair->lasted()});
-  std::ranges::sort(s.strikes, kByPair);
   std::erase_if(s.rolling_memory, wakes);
   for (const auto& rolling : s.rolling.used())
     s.rolling_memory.push_back({rolling->bodies()[0], rolling->bodies()[1], rolling->moment()});
@@ -256,28 +224,26 @@ const ContactOptions& ContactSet::options() const { return impl_->options; }
 std::span<const ContactEvent> ContactSet::events() const { return impl_->history.events(); }
 std::span<const ContactMemory> ContactSet::memory() const { return impl_->history.memory(); }
 std::span<const ContactMemory> ContactSet::resting() const { return impl_->history.resting(); }
-std::span<const StrikeMemory> ContactSet::strikes() const { return impl_->strikes; }
 std::span<const RollingMemory> ContactSet::rolling() const { return impl_->rolling_memory; }
 
 void ContactSet::clear() {
   impl_->contacts.clear();
   impl_->constraints.clear();
   impl_->history.clear();
-  impl_->strikes.clear();
   impl_->rolling_memory.clear();
   impl_->dents.clear();
 }
 
 void ContactSet::save_state(StateWriter& state) const {
   const Impl& s = *impl_;
-  state(s.options, s.history, s.strikes, s.rolling_memory, s.dents);
+  state(s.options, s.history, s.rolling_memory, s.dents);
 }
 
 void ContactSet::restore_state(StateReader& state) {
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
-  state(s.options, s.history, s.strikes, s.rolling_memory, s.dents);
+  state(s.options, s.history, s.rolling_memory, s.dents);
   s.dents.list_loaded();
   s.history.find_energies(s.dents.bodies());
 }

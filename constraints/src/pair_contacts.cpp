@@ -2,27 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "limber/core/cross_matrix.h"
 #include "tuning.h"
 
 namespace limber {
 namespace {
-
-/// The longest that two bodies take to spring back from each other, s: a period of the lowest mode of either.
-double longest_rebound(const PreparedSide& a, const PreparedSide& b) {
-  double longest = 0.0;
-  for (const PreparedSide* side : {&a, &b}) {
-    if (side->model == nullptr) continue;
-    for (const double lambda : side->model->data().eigenvalues)
-      if (lambda > 0.0) {
-        longest = std::max(longest, 2.0 * std::numbers::pi / std::sqrt(lambda));
-        break;
-      }
-  }
-  return longest;
-}
 
 /// A vertex of a surface, or what is round.
 bool is_pointed(const PreparedSide& side) {
@@ -40,14 +25,13 @@ Vec3 place(const BodyStates& states, StepTime when, const PreparedSide& side) {
   return 0.5 * (side.position(states, StepTime::kStart) + side.position(states, StepTime::kEnd));
 }
 
-/// How closely a gap can be met: by the arms of its points a and b, and their place; so much closer in a short part of
-/// a step that velocities come out as well.
+/// How closely a gap can be met: by the arms of its points a and b, and their place.
 double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
-                     const Vec3& b, double share) {
+                     const Vec3& b) {
   double arms = 0.0;
   if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
   if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
-  return distance_tolerance(share * internal::kConstraintsTuning.rows.contact_tolerance, arms, a);
+  return distance_tolerance(internal::kConstraintsTuning.rows.contact_tolerance, arms, a);
 }
 
 /// Of the place where both forces act, that of a side's point: the other's is 1 less.
@@ -80,12 +64,10 @@ double reduced_mass(const BodyStates& states, const PreparedContact& contact) {
 
 }  // namespace
 
-void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents,
-                       double lasted) {
+void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents) {
   contacts_ = contacts;
   options_ = &options;
   dents_ = &dents;
-  lasted_ = lasted;
   const PreparedContact& first = contacts.front();
   flexes_ = flexes(first.a) || flexes(first.b);
   yields_ = {options.residual_compliance && yields(first.a), options.residual_compliance && yields(first.b)};
@@ -123,22 +105,9 @@ void PairContacts::bias_accelerations(const BodyStates& states, std::span<double
   });
 }
 
-double PairContacts::next_cut(const BodyStates& states, const FreeMotions& motions, double within) {
-  const bool struck = options_->impact == ImpactModel::kHeldFromTouch && flexes_;
-  return struck ? next_touch(states, motions, within) : within;
-}
-
 double PairContacts::next_touch(const BodyStates& states, const FreeMotions& motions, double within) {
   for (const PreparedContact& contact : contacts_) within = touch(states, motions, contact, within);
   return within;
-}
-
-void PairContacts::foreseen(std::span<const double> impulses, std::span<const double> slip) {
-  visit_rows([&](PreparedContact& contact, std::size_t row) {
-    contact.foreseen = true;
-    contact.foreseen_slip = slip[row];
-    contact.foreseen_force = contact.impulse_of(impulses.subspan(row)) / step_;
-  });
 }
 
 void PairContacts::slid(std::span<const double> slip) {
@@ -146,13 +115,11 @@ void PairContacts::slid(std::span<const double> slip) {
 }
 
 void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
-  bool pressed = false;
   visit_rows([&](PreparedContact& contact, std::size_t row) {
     const Vec3 impulse = contact.impulse_of(impulses.subspan(row));
     contact.last_force = impulse / step_;
     contact.give = give_;
     contact.impulse += impulse;
-    pressed = pressed || !impulse.isZero(0.0);
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
       if (yields_[i])
@@ -160,12 +127,10 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
                       side.turned_back(turn_[i].conjugate() * (PreparedContact::sign(i) * contact.last_force)));
     }
   });
-  lasted_ = strikes_ && pressed ? lasted_ + step_ : 0.0;
 }
 
 void PairContacts::begin(const BodyStates& states) {
   for (PreparedContact& contact : contacts_) contact.offset = contact.apart(states, StepTime::kStart);
-  strikes_ = strikes(states);
   const PreparedContact& first = contacts_.front();
   for (std::size_t i = 0; i < 2; ++i)
     if (yields_[i]) turn_[i] = states.pose(first.side(i).body, StepTime::kStart).q;
@@ -231,7 +196,7 @@ void PairContacts::add_force_derivative(const BodyStates& states, std::span<cons
 
 double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
                            double within) {
-  constexpr const internal::ImpactTuning& tuning = internal::kConstraintsTuning.impacts;
+  constexpr const internal::TouchTuning& tuning = internal::kConstraintsTuning.touches;
   const Vec3 n = contact.axes.col(0);
   Vec3 a, b, velocity_a, velocity_b;
   const auto gap = [&](double time) {
@@ -240,7 +205,7 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
     return n.dot(a - b);
   };
   double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
-  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b, 1.0);
+  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b);
   if (!(gap_open > least && gap_closed < 0.0)) return within;
   for (int i = 0; i < tuning.touch_halvings && closed - open > tuning.touch_closed * within; ++i) {
     // Secants from both ends close in from one side alone: every third step halves.
@@ -253,26 +218,7 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
     if (seen > 0.0 && seen <= least) break;
   }
   gap(open);
-  return n.dot(velocity_b - velocity_a) > options_->impact_speed ? open : within;
-}
-
-bool PairContacts::strikes(const BodyStates& states) const {
-  const PreparedContact& first = contacts_.front();
-  if (options_->impact == ImpactModel::kAbsorbed || !flexes_) return false;
-  if (lasted_ > 0.0)
-    return lasted_ <
-           std::max(longest_rebound(first.a, first.b), internal::kConstraintsTuning.impacts.shortest_strike * step_);
-  return std::ranges::any_of(contacts_, [&](const PreparedContact& contact) {
-    if (!contact.last_force.isZero(0.0)) return false;  // it has begun before
-    const Vec3 n = contact.axes.col(0);
-    const double speed = n.dot(contact.a.motion(states).velocity - contact.b.motion(states).velocity);
-    return -speed > options_->impact_speed && n.dot(contact.offset) + step_ * speed < 0.0;
-  });
-}
-
-double PairContacts::time_to_rebound() const {
-  const double longest = longest_rebound(contacts_.front().a, contacts_.front().b);
-  return internal::kConstraintsTuning.impacts.longest_margin * longest + std::max(0.0, longest - lasted_);
+  return n.dot(velocity_b - velocity_a) > tuning.speed ? open : within;
 }
 
 void PairContacts::add_give(Index first, ConstraintRows& rows) const {
@@ -300,7 +246,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
                                ConstraintRows& rows) {
   const Vec3 a = place(states, when, contact.a), b = place(states, when, contact.b);
   const Vec3 end = point_of_action(contact, a, b);
-  const double tolerance = gap_tolerance(states, when, contact, a, b, part_.share());
+  const double tolerance = gap_tolerance(states, when, contact, a, b);
   for (Index axis = 0; axis < contact.rows(); ++axis) {
     const Vec3 n = contact.axes.col(axis);
     RowLaw law{.tolerance = tolerance, .contact = true};
@@ -310,31 +256,22 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
                                   ? 0.0
                                   : std::min(internal::kConstraintsTuning.rows.overlap_recovery * std::max(0.0, -gap),
                                              step_ * options_->recovery_speed);
-      law.offset = (when == StepTime::kStart ? closes_to(gap) : std::min(0.0, gap)) + recovery;
+      law.offset = std::min(0.0, gap) + recovery;
       law.agent_displacement = recovery;
       law.lower = 0.0;
       law.holds = true;
-      law.strikes = strikes_;
-      if (strikes_ && options_->impact == ImpactModel::kHeldFromTouch) law.lets_go_within = time_to_rebound();
       law.friction = contact.friction;
-      law.shift = contact.friction * (contact.foreseen ? contact.foreseen_slip : contact.slip);
+      law.shift = contact.friction * contact.slip;
     } else {
       law.offset = contact.dent[axis];
       law.slides = true;
       law.goes_on = true;
     }
     law.last_force = n.dot(contact.last_force);
-    law.foreseen = contact.foreseen;
-    law.foreseen_force = n.dot(contact.foreseen_force);
     const RowSide on_a = point_row(states, when, contact.a, end, n, modal_[0]);
     const RowSide on_b = point_row(states, when, contact.b, end, -n, modal_[1]);
     rows.add(on_a, on_b, law);
   }
-}
-
-double PairContacts::closes_to(double gap) const {
-  const double touching = std::min(gap, part_.clearance);
-  return touching + (1.0 - part_.share()) * (gap - touching);
 }
 
 }  // namespace limber

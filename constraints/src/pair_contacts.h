@@ -15,25 +15,18 @@ namespace limber {
 
 class PairContacts final : public Constraint {
  public:
-  /// @param lasted since when the bodies have struck each other, s
-  void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents, double lasted);
+  void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents);
 
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void bias_accelerations(const BodyStates& states, std::span<double> bias) const override;
   bool is_contact() const override { return true; }
-  void begin_part(const PartOfStep& part) override { part_ = part; }
-  double next_cut(const BodyStates& states, const FreeMotions& motions, double within) override;
   double next_touch(const BodyStates& states, const FreeMotions& motions, double within) override;
-  void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
   void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
                             ForceDerivative& sum) const override;
-
-  /// Since when the bodies have struck each other, after the step, s; 0: they have not.
-  double lasted() const { return lasted_; }
 
  private:
   /// A step, or part of one, starts from here.
@@ -56,14 +49,8 @@ class PairContacts final : public Constraint {
   /// apart they would press against each other without bound.
   bool is_caught() const;
 
-  /// When a contact that is open closes faster than what counts as an impact; `within` if it does not before.
+  /// When a contact that is open closes, not too slowly; `within` if it does not before.
   double touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact, double within);
-
-  /// Whether the bodies are in an impact in the coming step.
-  bool strikes(const BodyStates& states) const;
-
-  /// How long the impact that the bodies are in may go on, s, and a little longer.
-  double time_to_rebound() const;
 
   /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
   void add_give(Index first, ConstraintRows& rows) const;
@@ -73,17 +60,13 @@ class PairContacts final : public Constraint {
 
   void add_contact(const BodyStates& states, StepTime when, const PreparedContact& contact, ConstraintRows& rows);
 
-  /// What a gap may close to by the part's end: what is ahead comes to the clearance when all that is ahead has passed.
-  double closes_to(double gap) const;
-
   std::span<PreparedContact> contacts_;
   const ContactOptions* options_ = nullptr;
   ContactDents* dents_ = nullptr;
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
-  bool flexes_ = false, strikes_ = false, caught_ = false;
-  double step_ = 0.0, lasted_ = 0.0;
-  PartOfStep part_;
+  bool flexes_ = false, caught_ = false;
+  double step_ = 0.0;
   double give_ = 0.0;                         // of each contact of bodies that flex, m/N
   std::array<std::vector<double>, 2> modal_;  // scratch by side, as what follows
   std::array<Passage, 2> passage_;

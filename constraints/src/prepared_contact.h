@@ -86,11 +86,8 @@ struct PreparedContact {
   Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone
   double give = 0.0;               // what the contact yielded to it by itself, m/N
   double slip = 0.0;               // beyond what its spring gave, m
-  bool foreseen = false;           // the step has been foreseen before, with:
-  Vec3 foreseen_force = Vec3::Zero();
-  double foreseen_slip = 0.0;
-  Vec3 dent = Vec3::Zero();     // what the bodies yield at the step's start along the axes, m
-  Vec3 impulse = Vec3::Zero();  // of this step, world, on a
+  Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
+  Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 
   /// Its rows: along the normal, and along the tangents where it has friction.
   Index rows() const { return friction == 0.0 ? 1 : 3; }

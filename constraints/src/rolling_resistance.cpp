@@ -4,10 +4,8 @@
 #include "tuning.h"
 
 namespace limber {
-void RollingResistance::set(Index a, Index b, double largest, const Vec3& last, const Vec3* foreseen) {
+void RollingResistance::set(Index a, Index b, double largest, const Vec3& last) {
   a_ = a, b_ = b, largest_ = largest, moment_ = last;
-  is_foreseen_ = foreseen != nullptr;
-  foreseen_ = is_foreseen_ ? *foreseen : Vec3(Vec3::Zero());
 }
 
 /// About the world's axes: a ball looks the same from all sides.
@@ -25,8 +23,6 @@ void RollingResistance::add_rows(const BodyStates& states, StepTime, double step
               .tolerance = internal::kConstraintsTuning.rows.rolling_tolerance,
               .goes_on = true,
               .last_force = moment_[i],
-              .foreseen = is_foreseen_,
-              .foreseen_force = foreseen_[i],
               .radius = radius,
               .contact = true});
   }
@@ -38,14 +34,8 @@ void RollingResistance::gaps(const BodyStates& states, StepTime when, std::span<
   for (int i = 0; i < 3; ++i) gaps[static_cast<std::size_t>(i)] = turned[i];
 }
 
-void RollingResistance::foreseen(std::span<const double> impulses, std::span<const double>) {
-  foreseen_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
-  is_foreseen_ = true;
-}
-
 void RollingResistance::accept(const BodyStates&, std::span<const double> impulses) {
   moment_ = Vec3(impulses[0], impulses[1], impulses[2]) / step_;
-  is_foreseen_ = false;
 }
 
 }  // namespace limber

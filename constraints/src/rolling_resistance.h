@@ -15,27 +15,22 @@ namespace limber {
 
 class RollingResistance final : public Constraint {
  public:
-  /// @param largest C Σ R F_n, N·m, > 0. @param last what acted on a in the last step, world, N·m. @param foreseen what
-  /// has been foreseen of this one; null: nothing
-  void set(Index a, Index b, double largest, const Vec3& last, const Vec3* foreseen);
+  /// @param largest C Σ R F_n, N·m, > 0. @param last what acted on a in the last step, world, N·m
+  void set(Index a, Index b, double largest, const Vec3& last);
 
   std::array<Index, 2> bodies() const override { return {a_, b_}; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   bool is_contact() const override { return true; }
-  void foreseen(std::span<const double> impulses, std::span<const double> slip) override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
 
   /// On a, mean over the step, world, N·m.
   const Vec3& moment() const { return moment_; }
-  bool is_foreseen() const { return is_foreseen_; }
-  const Vec3& foreseen_moment() const { return foreseen_; }
 
  private:
   Index a_ = -1, b_ = -1;
   double largest_ = 0.0, step_ = 0.0;
-  Vec3 moment_ = Vec3::Zero(), foreseen_ = Vec3::Zero();
-  bool is_foreseen_ = false;
+  Vec3 moment_ = Vec3::Zero();
 };
 
 }  // namespace limber

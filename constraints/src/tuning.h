@@ -41,27 +41,18 @@ struct RowTuning {
   double rests_within = 2.0;
 };
 
-/// Impacts that are held, and steps cut where they begin and end (ImpactModel).
-struct ImpactTuning {
-  double shortest_strike = 2.0;    ///< steps that an impact may last in any case. [path]
-  double longest_margin = 0.25;    ///< of the longest impact: its end is to be seen
-  int most_cuts = 4;               ///< of a step; what strikes more often is held over the rest. [path] Bounds the work
+/// Steps that are cut where bodies touch, by [H03]'s velocity program.
+struct TouchTuning {
+  double speed = 0.25;             ///< m/s: what comes together more slowly cuts no step. [path]
+  int most_cuts = 4;               ///< of a step. [path] Bounds the work
   double shortest_part = 1e-3;     ///< of the step: no cut makes a part that is shorter. [path]
   int touch_halvings = 60;         ///< of the search for a touch: more than the digits of a double. [path]
   double touch_closed = 1e-12;     ///< of the way through the step: where that search ends
   double touch_least_part = 1e-3;  ///< of the bracket, from either end, that a secant may come to
-  int quick_newton_steps = 100;  ///< a part that settles in so many may be done ten times more. [path] Bounds the work
-  int release_trials = 8;        ///< place the release to a thirtieth of the part. [path]
-  double release_almost = 0.98;  ///< of the part: an impulse that still grows there lasts the part. [path]
-  double release_noticeable = 1e-6;     ///< of the impulse: growth by less is none. [path]
-  double release_soonest = 1.0 / 16.0;  ///< of the part: the first end that is tried where the impact begins
-  double release_later = 1.25;          ///< each end of the scan over that before it
 };
 
 /// The parts that a step is taken in.
 struct PartTuning {
-  int most_watched_looks = 3;  ///< parts shortened by the watch before the last one is taken. [path] Bounds the work
-  double shortest_watched = 1e-9;  ///< of the step: however short, its impulses act. [path]
   /// Of the step: parts are halved down to this where joints do not come together. [path] By judgement: below, what is
   /// left is taken as it comes.
   double shortest_divided = 1.0 / 64.0;
@@ -125,7 +116,7 @@ struct EnergyTuning {
 
 struct ConstraintsTuning {
   RowTuning rows{};
-  ImpactTuning impacts{};
+  TouchTuning touches{};
   PartTuning parts{};
   RoundsTuning rounds{};
   MidpointTuning midpoint{};

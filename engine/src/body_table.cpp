@@ -127,7 +127,7 @@ void BodyTable::advance_free(std::span<const Index> awake, std::uint64_t changes
 
 void BodyTable::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(entries_.size()));
-  for (const Entry& e : entries_) state(e.generation, e.placed, e.held);
+  for (const Entry& e : entries_) state(e.generation, e.placed);
   state(vacant_);
   for (const Entry& e : entries_)
     if (e.alive && e.group >= 0) group(e).save_state(e.slot, state);
@@ -135,7 +135,7 @@ void BodyTable::save_state(StateWriter& state) const {
 
 void BodyTable::restore_state(StateReader& state) {
   entries_.resize(static_cast<std::size_t>(state.read<std::uint64_t>()));
-  for (Entry& e : entries_) state(e.generation, e.placed, e.held);
+  for (Entry& e : entries_) state(e.generation, e.placed);
   state(vacant_);
   for (const Entry& e : entries_)
     if (e.alive && e.group >= 0) group(e).restore_state(e.slot, state);

@@ -31,7 +31,6 @@ class BodyTable {
     double friction = -1.0;  // negative: that of the contact options
     ShapeExtent extent{};    // of what moves
     bool placed = false;     // of a static one: the source has seen where it stands
-    bool held = false;       // in an island in the last step, or its last part
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {

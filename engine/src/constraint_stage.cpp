@@ -21,7 +21,6 @@ void ConstraintStage::set_body(Index body, const ConstrainedBody& at) {
 void ConstraintStage::set_island_solver(IslandSolverFactory make) {
   make_solver_ = std::move(make);
   solvers_.clear();
-  held_.solver = make_solver_();
   stale_ = true;
 }
 
@@ -113,7 +112,6 @@ void ConstraintStage::find_islands(std::span<const Index> awake) {
   if (!stale_) return;
   stale_ = false;
   release_bodies();
-  set_constrained(held_.bodies, true);
   islands_.begin(table_.size());
   reports_.clear();
   all_.clear();
@@ -123,89 +121,30 @@ void ConstraintStage::find_islands(std::span<const Index> awake) {
   if (all_.empty()) return;
 
   for (const Index body : awake)
-    if (acts(body)) islands_.let_act(body);
+    if (notes_[static_cast<std::size_t>(body)].asleep == 0) islands_.let_act(body);
   islands_.find(all_);
   set_constrained(islands_.members(), true);
   while (solvers_.size() < islands_.size()) solvers_.push_back(make_solver_());
   reports_.assign(islands_.size(), {});
 }
 
-void ConstraintStage::hold_back(std::span<const Index> bodies) {
-  held_.bodies.assign(bodies.begin(), bodies.end());
-  for (const Index body : bodies) notes_[static_cast<std::size_t>(body)].held_back = 1;
-  stale_ = stale_ || !bodies.empty();
-  held_.report = {};
-}
-
-void ConstraintStage::let_go() {
-  set_constrained(held_.bodies, false);
-  for (const Index body : held_.bodies) notes_[static_cast<std::size_t>(body)].held_back = 0;
-  held_.bodies.clear();
-  stale_ = true;
-}
-
-double ConstraintStage::step_together(std::span<const Index> members, std::span<Constraint* const> contacts,
-                                      const IslandOptions& options) {
-  held_.constraints.clear();
-  for (const Entry& entry : entries())
-    if (Constraint* constraint = entry.constraint())
-      if (std::ranges::any_of(constraint->bodies(),
-                              [&](Index body) { return std::ranges::binary_search(members, body); }))
-        held_.constraints.push_back(constraint);
-  held_.constraints.insert(held_.constraints.end(), contacts.begin(), contacts.end());
-  IslandOptions own = options;
-  own.energy_surplus = surplus_of(members);
-  const IslandReport report = held_.solver->step(table_, members, held_.constraints, own);
-  have_stepped(members, report);
-  add_report(report, held_.report);
-  return report.taken;
-}
-
-void ConstraintStage::end_together(std::span<const Index> members) {
-  for (const Index body : members) {
-    const ConstrainedBody& at = table_[static_cast<std::size_t>(body)];
-    at.group->end_step(at.slot);
-  }
-}
-
-void ConstraintStage::foresee(Jobs& jobs, const IslandOptions& options) {
+void ConstraintStage::step(Jobs& jobs, const IslandOptions& options) {
   if (islands_.empty()) return;
   options_ = options;
   // One captured pointer fits in std::function's own storage, so this allocates nothing.
   jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island) foresee_island(island);
+    for (std::size_t island = begin; island < end; ++island) step_island(island);
   });
 }
 
-void ConstraintStage::refine(Jobs& jobs) {
-  if (islands_.empty()) return;
-  jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island) solvers_[island]->refine();
-  });
-}
-
-bool ConstraintStage::are_accepted() const {
-  return std::all_of(solvers_.begin(), solvers_.begin() + static_cast<std::ptrdiff_t>(islands_.size()),
-                     [](const auto& solver) { return solver->foreseen().accepted; });
-}
-
-void ConstraintStage::foresee_island(std::size_t island) {
+void ConstraintStage::step_island(std::size_t island) {
   const std::span<const Index> members = islands_.members(island);
   IslandOptions own = options_;
   own.undisturbed =
       std::ranges::none_of(members, [&](Index body) { return notes_[static_cast<std::size_t>(body)].disturbed != 0; });
   own.energy_surplus = surplus_of(members);
-  solvers_[island]->foresee(table_, members, islands_.constraints(island), own);
-}
-
-void ConstraintStage::finish(Jobs& jobs) {
-  if (islands_.empty()) return;
-  jobs.parallel_for(islands_.size(), 1, [this](std::size_t begin, std::size_t end) {
-    for (std::size_t island = begin; island < end; ++island) {
-      reports_[island] = solvers_[island]->finish();
-      have_stepped(islands_.members(island), reports_[island]);
-    }
-  });
+  reports_[island] = solvers_[island]->step(table_, members, islands_.constraints(island), own);
+  have_stepped(members, reports_[island]);
 }
 
 double ConstraintStage::surplus_of(std::span<const Index> members) const {
@@ -223,14 +162,8 @@ void ConstraintStage::have_stepped(std::span<const Index> members, const IslandR
 }
 
 IslandReport ConstraintStage::report() const {
-  IslandReport sum = held_.report;
+  IslandReport sum;
   for (const IslandReport& r : reports_) add_report(r, sum);
-  return sum;
-}
-
-StageTimes ConstraintStage::foreseen_times() const {
-  StageTimes sum;
-  for (std::size_t island = 0; island < islands_.size(); ++island) sum.add(solvers_[island]->times());
   return sum;
 }
 

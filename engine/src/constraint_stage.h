@@ -43,26 +43,8 @@ class ConstraintStage {
   /// Islands of the bodies that constraints tie together; those bodies are left alone by BodyGroup::advance().
   /// @param awake all that move and do not sleep, ascending
   void find_islands(std::span<const Index> awake);
-  /// Finds where the step takes all islands, BodyGroup::predicted_frame() and the like; nothing moves yet.
-  void foresee(Jobs& jobs, const IslandOptions& options);
-  /// Whether all islands take the step as they are foreseen (IslandReport::accepted).
-  bool are_accepted() const;
-  /// Solves to the law what has been foreseen roughly.
-  void refine(Jobs& jobs);
-  /// Advances them.
-  void finish(Jobs& jobs);
-
-  // Bodies that take the step by themselves.
-  /// They and the constraints on them are left alone by what is above. @param bodies ascending by clusters
-  void hold_back(std::span<const Index> bodies);
-  bool is_held_back(Index body) const { return notes_[static_cast<std::size_t>(body)].held_back != 0; }
-  /// All of those that were held back take part again.
-  void let_go();
-  /// Advances some of them, as one problem, by one part of a step. @return its length, s
-  double step_together(std::span<const Index> members, std::span<Constraint* const> contacts,
-                       const IslandOptions& options);
-  /// After the last part.
-  void end_together(std::span<const Index> members);
+  /// Advances them by one step.
+  void step(Jobs& jobs, const IslandOptions& options);
 
   // All constraints, and what the coming step knows of bodies. Between steps.
   /// @param bodies how many, of those that set_body() named
@@ -72,39 +54,26 @@ class ConstraintStage {
 
   /// Sums over the islands of the last step.
   IslandReport report() const;
-  /// Time that the islands' threads spent on stages in foresee() and in finish(), with IslandOptions::timed.
-  StageTimes foreseen_times() const;
+  /// Time that the islands' threads spent on stages in step(), with IslandOptions::timed.
   StageTimes times() const;
   int island_count() const { return static_cast<int>(islands_.size()); }
   /// The bodies of one island, ascending.
   std::span<const Index> members(int island) const { return islands_.members(static_cast<std::size_t>(island)); }
   /// Whether a body is in an island.
   bool constrained(Index body) const { return islands_.contains(body); }
-  double energy_surplus(Index body) const { return notes_[static_cast<std::size_t>(body)].surplus; }
 
  private:
   /// State of a body between steps. Different threads write those of different bodies.
   struct Notes {
-    char asleep = 0, held_back = 0;
+    char asleep = 0;
     char disturbed = 0;
     double surplus = 0.0;  // J: its share of its island's
   };
-  /// Bodies that take the step by themselves.
-  struct HeldBack {
-    std::vector<Index> bodies;
-    std::vector<Constraint*> constraints;  // of the problem at hand
-    std::unique_ptr<IslandSolver> solver = make_island_solver();
-    IslandReport report;  // of all their parts
-  };
   std::uint32_t place(Entry&& entry);
-  void foresee_island(std::size_t island);
+  void step_island(std::size_t island);
   void release_bodies();
   double surplus_of(std::span<const Index> members) const;
   void have_stepped(std::span<const Index> members, const IslandReport& report);
-  bool acts(Index body) const {
-    const Notes& notes = notes_[static_cast<std::size_t>(body)];
-    return notes.asleep == 0 && notes.held_back == 0;
-  }
   void set_constrained(std::span<const Index> bodies, bool constrained);
   static void add_report(const IslandReport& report, IslandReport& sum);
 
@@ -119,7 +88,6 @@ class ConstraintStage {
   std::vector<std::unique_ptr<IslandSolver>> solvers_;  // one per island
   std::vector<IslandReport> reports_;
   IslandOptions options_;
-  HeldBack held_;
 };
 
 }  // namespace limber::internal

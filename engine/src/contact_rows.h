@@ -38,7 +38,6 @@ inline void add_memory_to(StateHash& hash, const ContactSet& contacts, std::size
       hash.add(contact.slip);
     }
   for (const RollingMemory& rolling : contacts.rolling()) hash.add(rolling.moment);
-  for (const StrikeMemory& strike : contacts.strikes()) hash.add(strike.since);
   for (std::size_t body = 0; body < bodies; ++body)
     for (const DentLoad& load : contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);
 }

@@ -67,7 +67,7 @@ void GameForecast::write_awake(Index body) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
   BodyState& state = states_[static_cast<std::size_t>(body)];
-  state = {.pose = group.frame(e.slot).pose(), .look_ahead = e.extent.thickness};
+  state = {.pose = group.frame(e.slot).pose()};
   if (!e.shape) state.amplitudes = group.amplitudes(e.slot);
   state.doubt = kSpeculativeMargin * e.extent.thickness;
   const bool steady = group.frame_constants().motion == FrameMotion::kFree && (e.shape || !group.skinned(e.slot));

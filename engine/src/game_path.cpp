@@ -10,20 +10,19 @@ void GamePath::reset(const ContactOptions& options) {
   constraints_->set_contacts({});
   rows_.set = std::move(contacts);
   solver_.clear();
-  forecast_.tell_all_anew();
+  search_.tell_all_anew();
 }
 
 void GamePath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, StageClock& clock) {
-  constraints_->hold_back({});
   if (registry_->source() != nullptr) {
-    find_contacts(substep, jobs, clock);
-    rows_.take(constraints_->states(), found_);
+    search_.find(substep, rows_.set.options().small_steps.substeps, rows_, jobs, clock);
+    rows_.take(constraints_->states(), search_.found());
     constraints_->set_contacts(rows_.set.constraints());
   }
   constraints_->find_islands(sleep_->awake());
   list_members();
   list_constraints();
-  clock.lap(Stage::kRows, static_cast<std::int64_t>(found_.size()));
+  clock.lap(Stage::kRows, std::ssize(search_.found()));
   bodies_->advance_free(sleep_->awake(), sleep_->changes(), substep.gravity, jobs);
   clock.lap(Stage::kAdvance, std::ssize(sleep_->awake()) - std::ssize(members_));
   solve(substep);
@@ -32,36 +31,6 @@ void GamePath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, S
   rows_.set.finish(sleep_->asleep(), std::exchange(wakings_, sleep_->wakings()) != sleep_->wakings());
   events.add(substep.index, rows_.set.events());
   clock.lap(Stage::kBookkeeping);
-}
-
-/// Bodies that sleep are not tested with each other, so those that wake are to be looked at again.
-void GamePath::find_contacts(const Substep& substep, Jobs& jobs, StageClock& clock) {
-  do {
-    const int substeps = rows_.set.options().small_steps.substeps;
-    const bool told_all = forecast_.write_states(substep.length, substeps, substep.gravity);
-    if (told_all) rows_.note_friction(*bodies_);
-    clock.lap(Stage::kLookAhead, std::ssize(sleep_->awake()));
-    StageTimes theirs;
-    registry_->source()->find_contacts({.states = forecast_.states(),
-                                        .fall = forecast_.fall(),
-                                        .awake = told_all ? std::span<const Index>() : sleep_->awake(),
-                                        .times = clock.runs() ? &theirs : nullptr},
-                                       found_, jobs);
-    if (registry_->has_veto())
-      std::erase_if(found_, [this](const ContactPoint& contact) { return !registry_->acts(contact); });
-    clock.lap(theirs, Stage::kNarrowPhase);
-  } while (wake_touched());
-}
-
-bool GamePath::wake_touched() {
-  bool woke = false;
-  for (const ContactPoint& contact : found_)
-    for (const Index body : {contact.a.body, contact.b.body})
-      if (sleep_->asleep(body)) {
-        sleep_->wake(body);
-        woke = true;
-      }
-  return woke;
 }
 
 void GamePath::list_members() {
@@ -86,7 +55,7 @@ void GamePath::solve(const Substep& substep) {
                                                .members = members_,
                                                .contacts = &rows_.set,
                                                .constraints = constraining_,
-                                               .thickness = forecast_.thickness(),
+                                               .thickness = search_.thickness(),
                                                .step = substep.length,
                                                .gravity = substep.gravity});
   report_ = {};

@@ -1,6 +1,6 @@
 // The path of a step by small steps: contacts once, then substeps over all rows (small_steps.h).
 //
-//   GameForecast → ContactSource → ContactRows → SmallStepSolver        bodies that nothing touches move exactly
+//   ContactSearch → ContactRows → SmallStepSolver        bodies that nothing touches move exactly
 //
 // Work is bounded: nothing is looked at twice but where sleepers wake.
 #pragma once
@@ -12,7 +12,7 @@
 #include "constraint_stage.h"
 #include "contact_registry.h"
 #include "contact_rows.h"
-#include "game_forecast.h"
+#include "contact_search.h"
 #include "limber/constraints/small_steps.h"
 #include "sleep_stage.h"
 #include "step_path.h"
@@ -22,7 +22,11 @@ namespace limber::internal {
 class GamePath final : public StepPath {
  public:
   GamePath(BodyTable& bodies, ConstraintStage& constraints, SleepStage& sleep, ContactRegistry& registry)
-      : bodies_(&bodies), constraints_(&constraints), sleep_(&sleep), registry_(&registry), forecast_(bodies, sleep) {}
+      : bodies_(&bodies),
+        constraints_(&constraints),
+        sleep_(&sleep),
+        registry_(&registry),
+        search_(bodies, sleep, registry) {}
 
   /// For another source: forgets all contacts. @throws InvalidArgument, and then changes nothing
   void reset(const ContactOptions& options);
@@ -37,8 +41,6 @@ class GamePath final : public StepPath {
   void restore_state(StateReader& state) override;
 
  private:
-  void find_contacts(const Substep& substep, Jobs& jobs, StageClock& clock);
-  bool wake_touched();
   void list_members();
   void list_constraints();
   void solve(const Substep& substep);
@@ -48,9 +50,8 @@ class GamePath final : public StepPath {
   SleepStage* sleep_;
   ContactRegistry* registry_;
   ContactRows rows_;
-  GameForecast forecast_;
+  ContactSearch search_;
   SmallStepSolver solver_;
-  std::vector<ContactPoint> found_;
   std::vector<Index> members_;             // all that rows touch and that move, ascending
   std::vector<Constraint*> constraining_;  // handles and joints that act
   std::uint64_t wakings_ = 0;              // SleepStage::wakings() of the last substep

@@ -42,21 +42,13 @@ class GroundedIsland : public Island {
 
   /// One step: contacts of all corners with the ground, and what is in `others`.
   IslandReport step() {
-    foresee_contacts();
-    return finish_contacts();
-  }
-  /// May be done again in the same step, with others.
-  void foresee_contacts() {
     table.resize(members.size());
     table.push_back({});  // the ground
     found.assign(others.begin(), others.end());
     for (const Index body : members) find_ground_contacts(body);
     contacts.update(states(), found);
     constraints.assign(contacts.constraints().begin(), contacts.constraints().end());
-    foresee();
-  }
-  IslandReport finish_contacts() {
-    const IslandReport report = finish();
+    const IslandReport report = Island::step();
     contacts.finish();
     return report;
   }

@@ -57,21 +57,14 @@ class Island {
   }
 
   IslandReport step() {
-    foresee();
-    return finish();
-  }
-  void foresee() {
-    solver->foresee(table, members, constraints,
-                    {.step = step_,
-                     .gravity = gravity_,
-                     .max_iterations = max_iterations,
-                     .guard_energy = guard_energy,
-                     .undisturbed = steps > 0,
-                     .energy_surplus = surplus});
-  }
-  IslandReport finish() {
+    const IslandReport report = solver->step(table, members, constraints,
+                                             {.step = step_,
+                                              .gravity = gravity_,
+                                              .max_iterations = max_iterations,
+                                              .guard_energy = guard_energy,
+                                              .undisturbed = steps > 0,
+                                              .energy_surplus = surplus});
     ++steps;
-    const IslandReport report = solver->finish();
     surplus = report.energy_surplus;
     return report;
   }

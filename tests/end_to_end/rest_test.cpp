@@ -80,7 +80,9 @@ TEST(Rest, RubberBoxesLaidUponEachOtherStand) {
   const double scale = kBoxes * tower.model->data().mass * kGravity * 0.4;
   const std::vector<Vec3> first = tower.places();
   std::vector<Vec3> late;
+  constexpr int kMeeting = 2;  // steps
   IslandStatusCounts statuses;
+  int limits = 0;
   double before = total_energy(tower.world, tower.boxes), rise = 0.0;
   const double nodes_first = tower.node_energy();
   double nodes_before = nodes_first, node_rise = 0.0, node_total = 0.0;
@@ -88,13 +90,14 @@ TEST(Rest, RubberBoxesLaidUponEachOtherStand) {
     if (i == std::max(0, kRestSteps - 60)) late = tower.places();
     tower.step(1);
     statuses.add(tower.world.constraint_report().statuses);
+    if (i >= kMeeting) limits += tower.world.constraint_report().statuses[IslandStatus::kLimit];
     const double now = total_energy(tower.world, tower.boxes), nodes_now = tower.node_energy();
     rise = std::max(rise, now - before), node_rise = std::max(node_rise, nodes_now - nodes_before);
     node_total = std::max(node_total, nodes_now - nodes_first);
     before = now, nodes_before = nodes_now;
   }
   EXPECT_EQ(statuses[IslandStatus::kFailed], 0);
-  EXPECT_LE(statuses[IslandStatus::kLimit], 1);  // one step as they meet ends at its limit of work
+  EXPECT_EQ(limits, 0);  // but as they meet
   EXPECT_LT(rise, kRise * scale);
   // By the nodes, too, there is never more than at first. In a step there may be: modes above the step's Nyquist rate
   // have static answers, whose strain World::energy counts apart. 1.4e-6 is measured; a regression guard.
@@ -109,19 +112,18 @@ TEST(Rest, RubberBoxesLaidUponEachOtherStand) {
 }
 
 TEST(Rest, ARubberBlockDroppedOnACornerFallsAsleep) {
-  for (const bool residual : {false, true})
-    for (const ImpactModel impact : {ImpactModel::kAbsorbed, ImpactModel::kHeld}) {
-      SCOPED_TRACE(::testing::Message() << "residual " << residual << ", held " << (impact == ImpactModel::kHeld));
-      GroundedWorld scene(exactly({.friction = 0.6, .impact = impact}), {.sleep = {.enabled = true}});
-      const BodyId block =
-          scene.world.add_body(bake_box({.residual = residual}),
-                               {.pose = {quaternion_from_rotation_vector({0.5, 0.6, 0.0}), {0.0, 0.0, 0.8}}});
-      scene.step(300);
-      EXPECT_TRUE(scene.world.is_asleep(block));
-      const Vec3 place = scene.world.body(block).pose.p;
-      scene.step(60);
-      EXPECT_EQ(scene.world.body(block).pose.p, place);
-    }
+  for (const bool residual : {false, true}) {
+    SCOPED_TRACE(::testing::Message() << "residual " << residual);
+    GroundedWorld scene(exactly({.friction = 0.6}), {.sleep = {.enabled = true}});
+    const BodyId block =
+        scene.world.add_body(bake_box({.residual = residual}),
+                             {.pose = {quaternion_from_rotation_vector({0.5, 0.6, 0.0}), {0.0, 0.0, 0.8}}});
+    scene.step(300);
+    EXPECT_TRUE(scene.world.is_asleep(block));
+    const Vec3 place = scene.world.body(block).pose.p;
+    scene.step(60);
+    EXPECT_EQ(scene.world.body(block).pose.p, place);
+  }
 }
 
 }  // namespace

@@ -53,8 +53,9 @@ std::shared_ptr<const ModalModel> baked(bool held, bool residual = false) {
 }
 
 struct Strip {
-  Strip(const std::shared_ptr<const ModalModel>& model, bool touches_itself, const WorldOptions& options = {})
-      : world(options) {
+  Strip(const std::shared_ptr<const ModalModel>& model, bool touches_itself, const WorldOptions& options = {},
+        const ContactFinderOptions& finding = {})
+      : finder(finding), world(options) {
     world.set_contact_source(&finder, {.solver = ContactSolver::kExact, .residual_compliance = true});
     body = world.add_body(model, {.filter = {.self = touches_itself}});
   }
@@ -86,7 +87,9 @@ struct Strip {
 TEST(SelfContact, AStripThatIsBentOntoItselfRestsOnItself) {
   for (const bool residual : {false, true}) {
     const auto model = baked(true, residual);
-    Strip through(model, false), resting(model, true);
+    // Of a patch that is thinned, vertices between the contacts that stay are held by nobody.
+    const ContactFinderOptions finding{.clusters = {.max_points = residual ? 4 : 0}};
+    Strip through(model, false), resting(model, true, {}, finding);
     for (Strip* strip : {&through, &resting}) strip->step(300);
     ASSERT_LT(through.gap(), -0.5 * kThickness) << "the arm is to be too soft to carry itself";
     // With residual compliance it is the mean over what a contact stands for that touches.

@@ -120,7 +120,7 @@ TEST(WorldContact, StacksOfRigidBoxesThatAreDroppedStand) {
 TEST(WorldContact, APileOfBoxesComesToRest) {
   constexpr double kPenetration = 1e-3 * kPileSize, kShift = 1e-4;  // m
   Pile pile(kPileBoxes, -1, false, exactly());
-  for (int i = 0; i < 90; ++i) pile.step_once();
+  for (int i = 0; i < 120; ++i) pile.step_once();
   std::vector<Vec3> before;
   for (const BodyId id : pile.bodies) before.push_back(pile.world.body(id).pose.p);
   for (int i = 0; i < 30; ++i) pile.step_once();

@@ -45,28 +45,6 @@ TEST(WorldContact, AWarmStepOfAPileAllocatesNothing) { expect_no_allocation_in_a
 
 TEST(WorldContact, AWarmStepOfAPileWithBodiesThatBendAllocatesNothing) { expect_no_allocation_in_a_warm_pile(6); }
 
-/// Where an impact lets go is found by doing parts of the step again, in memory that is there: a second fall from the
-/// same place, which is the same fall, needs no more.
-TEST(WorldContact, AWarmStepThatIsCutAllocatesNothing) {
-  const std::vector<double> still(20, 0.0);
-  const RigidTransform above{quaternion_from_rotation_vector({0.5, 0.4, 0.1}), {0.0, 0.0, 0.6}};
-  GroundedWorld scene(exactly({.friction = 0.0, .impact = ImpactModel::kHeldFromTouch}));
-  World& world = scene.world;
-  const BodyId box = world.add_body(sample_model({.modes = 20, .dropped = 30, .lowest_hz = 60.0}), {.pose = above});
-  scene.step(120);
-  world.set_pose(box, above);
-  world.set_velocity(box, Vec3::Zero(), Vec3::Zero());
-  world.set_amplitudes(box, still, still);
-  const long before = allocations();
-  int cuts = 0;
-  for (int i = 0; i < 120; ++i) {
-    world.step();
-    cuts += world.constraint_report().attempts.cuts();
-  }
-  EXPECT_EQ(allocations() - before, 0);
-  EXPECT_GT(cuts, 10);
-}
-
 TEST(WorldContact, EventsNameTheBodiesAndTheVetoLetsThemFall) {
   GroundedWorld scene;
   World& world = scene.world;

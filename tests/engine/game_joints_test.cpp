@@ -9,11 +9,11 @@
 namespace limber::testing {
 namespace {
 
-const ContactOptions kGame{.solver = ContactSolver::kGame};
+const ContactOptions kBySmallSteps{.solver = ContactSolver::kGame};
 
 /// Links on ball joints from a hook, level or straight down.
 struct Chain : GroundedWorld {
-  Chain(int links, const Vec3& along, double end_times, int modes = 0, const ContactOptions& options = kGame)
+  Chain(int links, const Vec3& along, double end_times, int modes = 0, const ContactOptions& options = kBySmallSteps)
       : GroundedWorld(options) {
     const auto model = sample_model({.modes = modes, .lowest_hz = 40.0, .decay = 5.0});
     ModalModelData end = sample_model_data({.modes = 0});
@@ -97,7 +97,7 @@ TEST(GameJoints, AHeavyEndLetGoLevelSwingsItsLightLinksWithoutGain) {
 TEST(GameJoints, AFastTopPrecessesAndDoesNotFall) {
   for (const double spin : {100.0, 300.0}) {
     constexpr double kRadius = 0.1, kArm = 0.1;
-    GroundedWorld scene(kGame);
+    GroundedWorld scene(kBySmallSteps);
     ModalModelData d = sample_model_data({.modes = 0});
     d.mass = 1.0;
     const double axial = 0.5 * kRadius * kRadius;
@@ -124,7 +124,7 @@ TEST(GameJoints, AFastTopPrecessesAndDoesNotFall) {
 
 /// Bars that hang side by side from the world and carry one beam: three bars and more say the same twice.
 TEST(GameJoints, FiveBarsInParallelSwingTheirBeamAsOnePendulum) {
-  GroundedWorld scene(kGame);
+  GroundedWorld scene(kBySmallSteps);
   const auto bar = sample_model({.modes = 0, .half_extent = {0.05, 0.05, 0.5}});
   const auto beam = sample_model({.modes = 0, .half_extent = {2.0, 0.1, 0.1}});
   const double angle = 0.3;

@@ -17,27 +17,27 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kSize = 0.2;  // least width of all shapes
+constexpr double kWidth = 0.2;  // least width of all shapes
 
 std::shared_ptr<const ModalModel> rigid() {
-  return sample_model({.modes = 0, .half_extent = Vec3::Constant(0.5 * kSize)});
+  return sample_model({.modes = 0, .half_extent = Vec3::Constant(0.5 * kWidth)});
 }
 
 ConvexHull random_hull(Random& random) {
   ConvexHull hull;
-  for (int i = 0; i < 6; ++i) hull.points.push_back(0.5 * kSize * (i % 2 == 0 ? 1.0 : -1.0) * Vec3::Unit(i / 2));
-  for (int i = 0; i < 10; ++i) hull.points.push_back(0.6 * kSize * random.vector(1.0).normalized());
+  for (int i = 0; i < 6; ++i) hull.points.push_back(0.5 * kWidth * (i % 2 == 0 ? 1.0 : -1.0) * Vec3::Unit(i / 2));
+  for (int i = 0; i < 10; ++i) hull.points.push_back(0.6 * kWidth * random.vector(1.0).normalized());
   return hull;
 }
 
 Shape random_shape(Random& random) {
   switch (random.index(4)) {
     case 0:
-      return Sphere{0.5 * kSize};
+      return Sphere{0.5 * kWidth};
     case 1:
-      return Capsule{0.5 * kSize, 0.4 * kSize};
+      return Capsule{0.5 * kWidth, 0.4 * kWidth};
     case 2:
-      return Box{kSize * Vec3(0.5, 0.6, 0.9)};
+      return Box{kWidth * Vec3(0.5, 0.6, 0.9)};
     default:
       return random_hull(random);
   }
@@ -52,8 +52,8 @@ double least_gap(const std::array<std::shared_ptr<const Shape>, 2>& shapes,
     states.push_back({.pose = poses[i]});
   }
   std::vector<ContactPoint> contacts;
-  finder.find_contacts({.states = states, .margin = 10.0 * kSize}, contacts, serial_jobs());
-  double least = 10.0 * kSize;
+  finder.find_contacts({.states = states, .margin = 10.0 * kWidth}, contacts, serial_jobs());
+  double least = 10.0 * kWidth;
   for (const ContactPoint& c : contacts) least = std::min(least, c.gap);
   return least;
 }
@@ -72,14 +72,14 @@ TEST(GameOverlap, TwoBodiesPartAlongOneDirectionAndStand) {
     const Vec3 beside = random.vector(1.0).normalized();
     std::array<BodyId, 2> bodies{
         world.add_body(rigid(), {.pose = random.pose(0.0), .shape = shapes[0]}),
-        world.add_body(rigid(), {.pose = {random.pose(0.0).q, 3.0 * kSize * beside}, .shape = shapes[1]})};
+        world.add_body(rigid(), {.pose = {random.pose(0.0).q, 3.0 * kWidth * beside}, .shape = shapes[1]})};
     const auto gap = [&] { return least_gap(shapes, {world.body(bodies[0]).pose, world.body(bodies[1]).pose}); };
     // Moved in until they are so deep.
-    double from = 0.0, to = 3.0 * kSize;
+    double from = 0.0, to = 3.0 * kWidth;
     for (int i = 0; i < 40; ++i) {
       const double middle = 0.5 * (from + to);
       world.set_pose(bodies[1], {world.body(bodies[1]).pose.q, middle * beside});
-      (gap() < -share * kSize ? from : to) = middle;
+      (gap() < -share * kWidth ? from : to) = middle;
     }
     const auto apart = [&] { return Vec3(world.body(bodies[1]).pose.p - world.body(bodies[0]).pose.p); };
     const Vec3 start = apart();
@@ -92,7 +92,7 @@ TEST(GameOverlap, TwoBodiesPartAlongOneDirectionAndStand) {
       fastest = std::max(fastest, (apart() - last).norm() * 60.0);
       last = apart();
     }
-    EXPECT_GT(gap(), -5e-3 * kSize) << trial << ": " << depth;
+    EXPECT_GT(gap(), -5e-3 * kWidth) << trial << ": " << depth;
     EXPECT_LT((apart() - start).norm(), 1.3 * depth) << trial << ": along one direction, " << depth;
     EXPECT_LT(fastest, 1.05 * options.small_steps.push_speed) << trial;
     for (const BodyId body : bodies) EXPECT_LT(world.body(body).velocity.norm(), 1e-3) << trial << ": they stand";
@@ -120,18 +120,18 @@ TEST(GameOverlap, WhatStartsInTheGroundComesOutOnItsOwnSide) {
     const Quaternion turned = random.pose(0.0).q;
     const Vec3 place(random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0.0);
     world.add_static(ground, {{}, at});
-    const BodyId body = world.add_body(rigid(), {.pose = {turned, place + kSize * Vec3::UnitZ()}, .shape = shapes[1]});
+    const BodyId body = world.add_body(rigid(), {.pose = {turned, place + kWidth * Vec3::UnitZ()}, .shape = shapes[1]});
     const auto gap = [&] { return least_gap(shapes, {RigidTransform{{}, at}, world.body(body).pose}); };
-    world.set_pose(body, {turned, place + (kSize - gap() - share * kSize) * Vec3::UnitZ()});
+    world.set_pose(body, {turned, place + (kWidth - gap() - share * kWidth) * Vec3::UnitZ()});
     double deepest = 0.0;
     for (int step = 0; step < 180; ++step) {
       world.step();
       if (step % 10 == 0) deepest = std::min(deepest, gap());
     }
-    EXPECT_GT(deepest, -1.1 * share * kSize) << trial << ": " << share;
-    EXPECT_GT(gap(), -5e-3 * kSize) << trial << ": " << share;
-    EXPECT_LT(gap(), 5e-3 * kSize) << trial << ": it lies on it, " << share;
-    EXPECT_GT(world.body(body).pose.p.z(), 0.2 * kSize) << trial << ": " << share;
+    EXPECT_GT(deepest, -1.1 * share * kWidth) << trial << ": " << share;
+    EXPECT_GT(gap(), -5e-3 * kWidth) << trial << ": " << share;
+    EXPECT_LT(gap(), 5e-3 * kWidth) << trial << ": it lies on it, " << share;
+    EXPECT_GT(world.body(body).pose.p.z(), 0.2 * kWidth) << trial << ": " << share;
   }
 }
 

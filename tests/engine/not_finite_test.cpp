@@ -193,8 +193,7 @@ void offer_contact(Offers& all) {
                                {{"friction", [](auto& c, double bad) { c.friction = bad; }},
                                 {"rolling_friction", [](auto& c, double bad) { c.rolling_friction = bad; }},
                                 {"recovery_speed", [](auto& c, double bad) { c.recovery_speed = bad; }},
-                                {"compliance", [](auto& c, double bad) { c.compliance = bad; }},
-                                {"impact_speed", [](auto& c, double bad) { c.impact_speed = bad; }}});
+                                {"compliance", [](auto& c, double bad) { c.compliance = bad; }}});
 }
 
 void offer_state(Offers& all) {

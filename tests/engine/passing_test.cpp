@@ -281,9 +281,9 @@ TEST(WorldPassing, ABallThatSkimsARoughFieldStaysAboveIt) {
   for (int i = 0; i < 441; ++i) field.heights.push_back(static_cast<float>(random.uniform(-0.01, 0.01)));
   for (const double speed : {3.0, 30.0, 300.0})
     for (int shot = 0; shot < 20; ++shot) {
-      ContactFinder finder;
+      ManifoldFinder finder;
       World world({.step = kWay / speed, .gravity = Vec3::Zero()});
-      world.set_contact_source(&finder, {.solver = ContactSolver::kExact});
+      world.set_contact_source(&finder, {.solver = ContactSolver::kGame});
       const RigidTransform at{{}, {-0.5 * kSide, -0.5 * kSide, 0.0}};
       world.add_static(std::make_shared<const Shape>(field), at);
       const Vec3 aim(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), 0.0);

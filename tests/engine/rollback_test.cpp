@@ -70,7 +70,7 @@ TEST(Rollback, APileGoesOnAsItDid) {
 }
 
 TEST(Rollback, ImpactsAndRollingGoOn) {
-  GroundedWorld scene(exactly({.rolling_friction = 0.05, .impact = ImpactModel::kHeldFromTouch}));
+  GroundedWorld scene(exactly({.rolling_friction = 0.05}));
   drop_boxes(scene, 4, 6);
   scene.world.add_body(damped_box(0, 60.0), {.pose = {{}, {1.0, 0.0, 0.3}},
                                              .velocity = {1.0, 0.0, 0.0},

@@ -115,7 +115,7 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
   const Scene s = parse(scene_with(
       R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},
           "layers": [0, 2], "meets": [1], "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
-      R"("contact": {"friction": 0.7, "guard": "none", "impact": "held_from_touch", "impact_speed": 0.5, "recovery_speed": 0.2, "rolling_friction": 0.04,
+      R"("contact": {"friction": 0.7, "guard": "none", "recovery_speed": 0.2, "rolling_friction": 0.04,
                      "residual_compliance": true, "penalty_frequency": 30, "penalty_damping": 0.5},
          "statics": [{"name": "ground", "shape": {"half_space": {"normal": [0, 3, 4], "offset": 2}}, "friction": 0,
                       "position": [1, 2, 3]},
@@ -124,10 +124,8 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
   ASSERT_TRUE(s.contact);
   EXPECT_TRUE(s.contact_rule.is_own());
   EXPECT_EQ(s.contact_rule.guard, SceneContactRule::Guard::kNone);
-  EXPECT_EQ(s.contact->impact, ImpactModel::kHeldFromTouch);
   EXPECT_EQ(s.contact->friction, 0.7);
   EXPECT_EQ(s.contact->rolling_friction, 0.04);
-  EXPECT_EQ(s.contact->impact_speed, 0.5);
   EXPECT_EQ(s.contact->recovery_speed, 0.2);
   EXPECT_TRUE(s.contact->residual_compliance);
   EXPECT_EQ(s.contact_rule.penalty_frequency, 30.0);
@@ -341,7 +339,6 @@ TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
       {contact(R"("guard": 1)"), "contact.guard", "text"},
       {scene_with(kBell, R"("solver": "soft")"), "solver", "\"exact\""},
       {scene_with(kBell, R"("small_steps": 0)"), "small_steps", "an integer from 1"},
-      {contact(R"("impact": "elastic")"), "contact.impact", "\"held_from_touch\""},
       {contact(R"("friction": -0.1)"), "contact.friction", ">= 0"},
       {contact(R"("penalty_frequency": 0)"), "contact.penalty_frequency", "> 0"},
       {contact(R"("residual_compliance": 1)"), "contact.residual_compliance", "true or false"},

@@ -34,8 +34,7 @@ constexpr double kNudge = 0.01;        // by how much what drives a scene is cha
 
 /// All that is varied: each setting takes one of each.
 struct ErrorAxes {
-  std::vector<std::string> methods{"complementary"}, impacts{"absorbed", "held_from_touch"}, residuals{"on"},
-      bases{"float"};
+  std::vector<std::string> methods{"complementary"}, residuals{"on"}, bases{"float"};
   std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1},
       substeps{0, 2, 4, 8, 16, 32};
   std::vector<double> drives{1.0};
@@ -102,7 +101,6 @@ std::string method_of(const ErrorSetting& at) {
   std::string out = fmt::format("{:.0f} steps/s", 1.0 / at.step);
   const ErrorSetting usual;
   if (at.method != usual.method) out += ", " + at.method;
-  if (at.impact != usual.impact) out += ", " + at.impact;
   if (at.contacts != usual.contacts)
     out += at.contacts == 0 ? ", all contacts" : fmt::format(", {} contacts", at.contacts);
   if (!at.residual) out += ", no residual";
@@ -150,27 +148,24 @@ std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
       for (const std::string& residual : a.axes.residuals)
         for (const int contacts : a.axes.contacts)
           for (const int substeps : a.axes.substeps)
-            for (const std::string& impact : a.axes.impacts)
-              for (const std::string& method : a.axes.methods)
-                for (const double drive : a.axes.drives)
-                  for (const int rate : a.axes.rates)
-                    for (const int modes : a.axes.modes)
-                      out.push_back({.modes = modes,
-                                     .step = 1.0 / rate,
-                                     .method = method,
-                                     .impact = impact,
-                                     .contacts = contacts,
-                                     .substeps = substeps,
-                                     .residual = residual == "on",
-                                     .basis = basis,
-                                     .mesh = mesh,
-                                     .drive = drive});
+            for (const std::string& method : a.axes.methods)
+              for (const double drive : a.axes.drives)
+                for (const int rate : a.axes.rates)
+                  for (const int modes : a.axes.modes)
+                    out.push_back({.modes = modes,
+                                   .step = 1.0 / rate,
+                                   .method = method,
+                                   .contacts = contacts,
+                                   .substeps = substeps,
+                                   .residual = residual == "on",
+                                   .basis = basis,
+                                   .mesh = mesh,
+                                   .drive = drive});
   return out;
 }
 
 bool is_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
-  return at.method == a.axes.methods.front() && at.impact == a.axes.impacts.front() &&
-         at.contacts == a.axes.contacts.front();
+  return at.method == a.axes.methods.front() && at.contacts == a.axes.contacts.front();
 }
 
 /// Whether no other setting makes the same run: rules of contact are the exact solver's, substeps those of what is
@@ -220,12 +215,12 @@ constexpr std::array<Column, 23> kColumns{{
 }};
 
 std::string csv_of(const std::vector<ErrorRow>& rows) {
-  std::string csv = "scene,line,modes,method,impact,contacts,residual,basis,mesh,drive";
+  std::string csv = "scene,line,modes,method,contacts,residual,basis,mesh,drive";
   for (const auto& [name, value] : kColumns) csv += fmt::format(",{}", name);
   csv += '\n';
   for (const ErrorRow& r : rows) {
-    csv += fmt::format("{},\"{}\",{},{},{},{},{},{},{},{:g}", r.scene, r.method, r.at.modes, r.at.method, r.at.impact,
-                       r.at.contacts, r.at.residual ? 1 : 0, r.at.basis, r.at.mesh, r.at.drive);
+    csv += fmt::format("{},\"{}\",{},{},{},{},{},{},{:g}", r.scene, r.method, r.at.modes, r.at.method, r.at.contacts,
+                       r.at.residual ? 1 : 0, r.at.basis, r.at.mesh, r.at.drive);
     for (const auto& [name, value] : kColumns) csv += fmt::format(",{:.6g}", value(r));
     csv += '\n';
   }
@@ -233,9 +228,9 @@ std::string csv_of(const std::vector<ErrorRow>& rows) {
 }
 
 Json json_of(const ErrorRow& r) {
-  Json row{{"scene", r.scene},      {"line", r.method},          {"modes", r.at.modes},       {"method", r.at.method},
-           {"impact", r.at.impact}, {"contacts", r.at.contacts}, {"residual", r.at.residual}, {"basis", r.at.basis},
-           {"mesh", r.at.mesh},     {"drive", r.at.drive}};
+  Json row{{"scene", r.scene},      {"line", r.method},          {"modes", r.at.modes},
+           {"method", r.at.method}, {"contacts", r.at.contacts}, {"residual", r.at.residual},
+           {"basis", r.at.basis},   {"mesh", r.at.mesh},         {"drive", r.at.drive}};
   for (const auto& [name, value] : kColumns) row[name] = value(r);
   return row;
 }
@@ -317,7 +312,7 @@ ErrorParts parts_of(ErrorRuns& runs, const ErrorScene& scene, const ErrorSetting
   ErrorSetting fine = at;
   fine.step = 1.0 / kFinestRate;
   ErrorSetting best = fine;
-  if (scene.has_contact()) best.method = "complementary", best.impact = "held_from_touch", best.contacts = 0;
+  if (scene.has_contact()) best.method = "complementary", best.contacts = 0;
   ErrorSetting many = best;
   many.modes *= kManyModes;
   const PlayedScene seen = runs.play(scene, at), without_step = runs.play(scene, fine),
@@ -466,8 +461,6 @@ void declare_axes(CLI::App& app, ErrorArguments& a) {
   list("--steps-per-second", a.axes.rates, "a multiple of 30", "N,...")->check(CLI::Range(30, 1'000'000));
   list("--method", a.axes.methods, "how contact forces are found", "NAME,...")
       ->check(CLI::IsMember({"complementary", "gap_program", "velocity_program", "penalty"}));
-  list("--impact", a.axes.impacts, "whether impacts rebound", "NAME,...")
-      ->check(CLI::IsMember({"absorbed", "held", "held_from_touch"}));
   list("--contacts", a.axes.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
   list("--substeps", a.axes.substeps, "of contact, handles and joints by small steps; 0: the exact solver", "N,...")
       ->check(CLI::Range(0, 1'000));

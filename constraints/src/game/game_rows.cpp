@@ -41,8 +41,7 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
   scales_.assign(bodies.bodies().size(), {});
   goes_on_ = number > 0;
   for (Constraint* constraint : constraints) {
-    constraint->begin_part(
-        {.length = length_, .left = length_ * (plan.count - number), .whole = plan.step, .ahead = length_});
+    constraint->begin_part({.length = length_, .left = length_ * (plan.count - number), .whole = plan.step});
     add_group(states, bodies, constraint);
   }
   hold_as_before();

@@ -13,9 +13,9 @@ void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   fill_units(step);
   begin_units(step);
   secants_.begin(step.size());
-  loads_change_ = !begun_;
+  begun_ = false, loads_change_ = true;
   report.iterations = 1;
-  go_on(step, report);
+  iterate(step, report);
 }
 
 void ConvexRounds::take_again(IslandStep& step) {
@@ -23,7 +23,7 @@ void ConvexRounds::take_again(IslandStep& step) {
   step.predict();
 }
 
-void ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
+void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
   report.accepted = true;
   for (;; ++report.iterations) {
     take_impulses(step);
@@ -33,8 +33,6 @@ void ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
     if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return;
-    report.rough = step.contacts_alone && begun_ && !loads_change_ && left.off < step.part.options.rough;
-    if (report.rough) return;
     const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kConstraintsTuning.rounds.most_solved;
     if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
     const ConvexContactOptions within{
@@ -57,10 +55,7 @@ void ConvexRounds::go_on(IslandStep& step, IslandReport& report) {
 void ConvexRounds::end_at_limit(IslandStep& step, IslandReport& report) {
   report.accepted = step.contacts_alone && report.iterations > 1;
   if (!step.contacts_alone) return take_best(step, report);
-  if (report.accepted) {
-    report.rough = step.part.options.rough > 0.0;
-    return;
-  }
+  if (report.accepted) return;
   for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = contacts_.impulse(u);
   take_impulses(step);
   take_motion(step);
@@ -149,10 +144,8 @@ void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
   }
 }
 
-/// From the motion without contacts; springs begin at the impulses of the last step. Where the step has been foreseen
-/// before, with fewer contacts: from where that ended.
+/// From the motion without contacts; springs begin at the impulses of the last step.
 void ConvexRounds::begin_units(const IslandStep& step) {
-  begun_ = step.contacts_alone && step.any_law([](const RowLaw& law) { return law.foreseen; });
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
     const RowLaw& law = step.law(unit.first);
@@ -161,14 +154,10 @@ void ConvexRounds::begin_units(const IslandStep& step) {
       unit.impulse[axis] = step.length() * step.reaction[unit.first + r];
       unit.anchor[axis] = law.contact ? step.length() * step.law(unit.first + r).last_force : unit.impulse[axis];
     }
-    for (std::size_t r = 0; begun_ && r < unit.rows; ++r)
-      unit.impulse[static_cast<int>(r)] = unit.anchor[static_cast<int>(r)] =
-          step.length() * step.law(unit.first + r).foreseen_force;
     unit.anchor = contacts_.potential(u).nearest(unit.anchor);
     unit.shift = law.shift;
     unit.changed = kUnbounded;
   }
-  if (begun_) contacts_.begin();
 }
 
 /// f of the units' impulses, and the motion that they make in the problem.
@@ -210,9 +199,7 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
     Vec3 yields = potential.compliance * unit.anchor;
     if (law.compliance > 0.0) yields[0] = 0.0;  // a spring of its own
     unit.moved = contacts_.moved(u);
-    const double off = distance_from_law(unit, law, potential, open);
-    distance.from_law = std::max(distance.from_law, off / law.tolerance);
-    if (law.radius == 0.0) distance.off = std::max(distance.off, off);
+    distance.from_law = std::max(distance.from_law, distance_from_law(unit, law, potential, open) / law.tolerance);
     contacts_.start(u) = open - yields - unit.moved;
     if (first_round) contacts_.impulse(u) = unit.anchor;
   }

@@ -18,8 +18,6 @@ class ConvexRounds {
   /// Finds step.f, with the step predicted and measured under it; how far that is from the law, and whether the step
   /// is to go on from it (IslandReport::change, accepted).
   void solve(IslandStep& step, IslandReport& report);
-  /// From where it ended, roughly, to the law. @pre step.part.options.rough has been taken back
-  void go_on(IslandStep& step, IslandReport& report);
   /// What was found last, after something else has been tried in the step. @pre its loads are as they were
   void take_again(IslandStep& step);
   /// Of contacts that press, where the next step is to begin with it, in their normal rows. @param slip by row
@@ -35,9 +33,10 @@ class ConvexRounds {
     double response = 0.0, shift = 0.0, changed = 0.0;
   };
   struct Distance {
-    double from_law = 0.0, moved = 0.0, off = 0.0;  // by tolerance; the last in m, of contacts
+    double from_law = 0.0, moved = 0.0;  // by tolerance
   };
 
+  void iterate(IslandStep& step, IslandReport& report);
   void place_units(const IslandStep& step);
   void fill_units(const IslandStep& step);
   void fill_rows(const IslandStep& step);

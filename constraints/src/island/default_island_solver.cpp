@@ -11,7 +11,6 @@ namespace {
 class DefaultIslandSolver final : public IslandParts {
  protected:
   IslandReport find(const StepPart& part) override;
-  void go_on(IslandReport& done) override;
   void write_slip(std::span<double> slip) const override;
 
  private:
@@ -32,14 +31,8 @@ IslandReport DefaultIslandSolver::find(const StepPart& part) {
   reaction_.find(step_, StepTime::kStart);
   rounds_.solve(step_, done);
   if (!done.accepted && find_middle(done)) return done;
-  if (part.options.watch != nullptr) step_.trace(motions_);
   act_at_end();
   return done;
-}
-
-void DefaultIslandSolver::go_on(IslandReport& done) {
-  rounds_.go_on(step_, done);
-  act_at_end();
 }
 
 void DefaultIslandSolver::write_slip(std::span<double> slip) const {
@@ -49,7 +42,7 @@ void DefaultIslandSolver::write_slip(std::span<double> slip) const {
 /// Joints beside contacts that rounds have not found: by rows of the middle of the step and true derivatives. @return
 /// whether that is found; else what the rounds came to stays
 bool DefaultIslandSolver::find_middle(IslandReport& done) {
-  if (!step_.touches || step_.contacts_alone || step_.part.options.watch != nullptr) return false;
+  if (!step_.touches || step_.contacts_alone) return false;
   if (step_.size() > kConstraintsTuning.parts.most_rows_in_the_middle) return false;
   const bool all_early = step_.loads.all_early;
   IslandReport middle;

@@ -32,18 +32,7 @@ void IslandParts::act_at_end() {
 /// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
 /// start, if all rows came together, or impulses are refused.
 IslandReport IslandParts::find_guarded(const StepPart& part) {
-  IslandReport done = find(part);
-  if (!done.rough) done = guard(part, done);
-  done.status = status_of(done);
-  return done;
-}
-
-/// What has been foreseen roughly, to the law, and guarded.
-IslandReport IslandParts::refined(const StepPart& part, IslandReport done) {
-  step_.part.options.rough = 0.0;
-  done.newton_steps = 0;  // bounded as those of the look were
-  go_on(done);
-  done = guard(part, done);
+  IslandReport done = guard(part, find(part));
   done.status = status_of(done);
   return done;
 }
@@ -82,7 +71,6 @@ void IslandParts::refuse_impulses(IslandReport& report) {
       step_.reaction[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * step_.reaction[i];
     }
     step_.predict();
-    if (step_.part.options.watch != nullptr) step_.trace(motions_);
     if (!(energy_.close(step_, report) > 0.0)) return;
   }
 }

@@ -2,7 +2,6 @@
 //
 //   island_solver.cpp   the step, its parts, and what is told when one has been taken
 //   island_attempts.cpp one part, and what is tried where its energy would rise
-//   island_release.cpp  where within a part an impact lets go
 //
 // How the impulses of one part are found is a solver's own: default_island_solver.cpp is limber's.
 #pragma once
@@ -18,17 +17,17 @@ namespace limber::internal {
 
 /// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
 inline bool is_part(double time, double left, double whole_step) {
-  return std::min(time, left - time) > kConstraintsTuning.impacts.shortest_part * whole_step;
+  return std::min(time, left - time) > kConstraintsTuning.touches.shortest_part * whole_step;
 }
 
 /// How far a step has come.
 struct StepInParts {
-  StepPart part;        // foreseen and not yet taken
+  StepPart part;        // found and not yet taken
   IslandReport done;    // what is to be told of it
   IslandReport report;  // of the parts taken
   double left = 0.0;    // s, with the part
   double length = 0.0;  // s, of a part, where the step is divided
-  bool may_cut = false, cuts = false, divides = false, gives_up = false;
+  bool may_cut = false, divides = false, gives_up = false;
 };
 
 /// All of a step but how the impulses of one part are found.
@@ -36,28 +35,18 @@ class IslandParts : public IslandSolver {
  public:
   IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                     std::span<Constraint* const> constraints, const IslandOptions& options) override;
-  void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-               std::span<Constraint* const> constraints, const IslandOptions& options) override;
-  const IslandReport& foreseen() const override { return parts_.done; }
-  void refine() override;
-  const StageTimes& times() const override { return times_; }
-  IslandReport finish() override;
 
  protected:
   /// What becomes of the members by the end of a part, all but the energy; from begin() to act_at_end().
   virtual IslandReport find(const StepPart& part) = 0;
-  /// What find() found roughly, to the law.
-  virtual void go_on(IslandReport&) {}
   /// What find() found last happens.
   virtual void taken() {}
   /// @param slip by row, zero
   virtual void write_slip(std::span<double>) const {}
-  /// Whether find() may be asked for the same part begun more slowly, or ended sooner.
+  /// Whether find() may be asked for the same part begun more slowly.
   virtual bool may_repeat() const { return true; }
   /// When within the rest of a step a constraint wants that cut, s from now.
-  virtual double wanted_cut(Constraint& constraint, const BodyStates& states, const FreeMotions& free, double within) {
-    return constraint.next_cut(states, free, within);
-  }
+  virtual double wanted_cut(Constraint&, const BodyStates&, const FreeMotions&, double within) { return within; }
 
   /// Makes step_ the part at hand. @param contacts_react as IslandStep::begin()
   void begin(const StepPart& part, bool contacts_react);
@@ -66,36 +55,24 @@ class IslandParts : public IslandSolver {
 
   IslandStep step_;  // the part at hand
   HeldReaction reaction_;
-  std::vector<ExactMotion> motions_;  // of the members, where a step may be cut or is watched
 
  private:
   // The step in parts.
-  void take_watched(StepPart part, IslandReport& report);
   void begin_times(bool timed);
-  void foresee_next();
-  void foresee_cut();
-  void end_cut();
-  void foresee_divided();
+  void find_cut();
+  void find_divided();
   double next_cut(const StepPart& part);
   void find_impulses();
-  void tell_foreseen();
   void commit(const StepPart& part, const IslandReport& done, IslandReport& report);
 
   // A part.
   IslandReport find_guarded(const StepPart& part);
-  IslandReport refined(const StepPart& part, IslandReport done);
   IslandReport guard(StepPart part, IslandReport done);
   void refuse_impulses(IslandReport& report);
 
-  // Where it ends, if an impact lets go within it.
-  void end_at_release(StepPart& part, IslandReport& done);
-  double longest_impact() const;
-  double last_impact_force() const;
-  double impact_impulse(double length) const;
-  double find_release(StepPart part);
-
   IslandEnergy energy_;
   std::vector<double> slip_, impulses_;  // by row
+  std::vector<ExactMotion> motions_;     // of the members, where a step may be cut
   StepInParts parts_;                    // the step at hand
   StageTimes times_;                     // of the step at hand
   StageClock clock_;

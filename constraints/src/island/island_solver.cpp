@@ -16,7 +16,7 @@ bool has_no_dates(const StepPart& part) {
   });
 }
 
-/// Whether a step may be cut where bodies strike: free ones that nothing but contacts acts on.
+/// Whether a step may be cut where bodies touch: free ones that nothing but contacts acts on.
 bool allows_cuts(const StepPart& part) {
   return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->is_contact(); }) &&
          std::ranges::all_of(part.members,
@@ -47,24 +47,6 @@ StepPart whole_step(std::span<const ConstrainedBody> table, std::span<const Inde
 
 IslandReport IslandParts::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                                std::span<Constraint* const> constraints, const IslandOptions& options) {
-  if (options.watch == nullptr) {
-    foresee(table, members, constraints, options);
-    const StageTimes foreseen = times_;
-    IslandReport report = finish();
-    report.times.add(foreseen);
-    return report;
-  }
-  IslandReport report{.bodies = static_cast<int>(members.size())};
-  begin_times(options.timed);
-  take_watched(whole_step(table, members, constraints, options), report);
-  clock_.lap(Stage::kSolve);
-  report.statuses[report.status] = 1;
-  report.times = times_;
-  return report;
-}
-
-void IslandParts::foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                          std::span<Constraint* const> constraints, const IslandOptions& options) {
   StepInParts& at = parts_;
   at.part = whole_step(table, members, constraints, options);
   at.report = {.bodies = static_cast<int>(members.size())};
@@ -73,32 +55,13 @@ void IslandParts::foresee(std::span<const ConstrainedBody> table, std::span<cons
   at.divides = may_divide(at.part);
   at.gives_up = false;
   begin_times(options.timed);
-  foresee_next();
-  if (at.part.ends) tell_foreseen();
-  clock_.lap(Stage::kSolve);
-}
-
-void IslandParts::refine() {
-  StepInParts& at = parts_;
-  begin_times(at.part.options.timed);
-  if (!at.done.rough) return;
-  at.part.options.rough = 0.0;
-  at.done = refined(at.part, at.done);
-  end_cut();
-  if (at.part.ends) tell_foreseen();
-  clock_.lap(Stage::kSolve);
-}
-
-IslandReport IslandParts::finish() {
-  StepInParts& at = parts_;
-  begin_times(at.part.options.timed);
   for (;;) {
+    at.divides ? find_divided() : find_cut();
     commit(at.part, at.done, at.report);
     if (at.part.ends) break;
     at.part.options.energy_surplus = at.report.energy_surplus;
     at.part.begins = false;
     at.left -= at.part.options.step;
-    foresee_next();
   }
   clock_.lap(Stage::kSolve);
   at.report.statuses[at.report.status] = 1;
@@ -111,49 +74,23 @@ void IslandParts::begin_times(bool timed) {
   clock_ = StageClock(timed ? &times_ : nullptr);
 }
 
-void IslandParts::foresee_next() { parts_.divides ? foresee_divided() : foresee_cut(); }
-
-/// One part, as long as the watch lets it be. The impulses of a shorter one are found anew. As they are those of a
-/// shorter part of the same step (PartOfStep::ahead), it moves as the longer one would have until then, but for how
-/// bodies bend; so the last one is not looked at again. However short, its impulses act.
-void IslandParts::take_watched(StepPart part, IslandReport& report) {
-  IslandOptions& options = part.options;
-  if (options.whole_step > 0.0) part.whole_step = options.whole_step;
-  part.begins = options.begins, part.ends = false;
-  IslandReport done = find_guarded(part);
-  for (int looks = 0; looks < kConstraintsTuning.parts.most_watched_looks; ++looks) {
-    const double clear = options.watch->clear_until({part.members, motions_}, options.step);
-    if (!(clear < options.step)) break;
-    options.step = std::max(clear, kConstraintsTuning.parts.shortest_watched * part.whole_step);
-    done = find_guarded(part);
-  }
-  report.taken = options.step;
-  commit(part, done, report);
-}
-
-/// What is left, or up to where an impact begins or lets go.
-void IslandParts::foresee_cut() {
+/// What is left, or up to where bodies touch.
+void IslandParts::find_cut() {
   StepPart& part = parts_.part;
   part.last_resort = true;
-  parts_.cuts = parts_.may_cut && parts_.report.attempts.cuts() < kConstraintsTuning.impacts.most_cuts;
+  const bool cuts = parts_.may_cut && parts_.report.attempts.cuts() < kConstraintsTuning.touches.most_cuts;
   part.options.step = part.left = parts_.left;
-  const double time = parts_.cuts ? next_cut(part) : parts_.left;
+  const double time = cuts ? next_cut(part) : parts_.left;
   if (is_part(time, parts_.left, part.whole_step)) part.options.step = time;
   part.ends = part.options.step == parts_.left;
   parts_.done = find_guarded(part);
-  end_cut();
-}
-
-void IslandParts::end_cut() {
-  if (parts_.done.rough) return;
-  parts_.done.attempts[StepAttempt::kCutAtTouch] = parts_.part.ends ? 0 : 1;
-  if (parts_.cuts) end_at_release(parts_.part, parts_.done);
+  parts_.done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
 }
 
 /// What is left, in halves, quarters and so on of the step from where the rows do not come together: impulses at a
 /// step's start bring joints together at its end only where bodies turn by less than a radian or so in between. Where
 /// the shortest part does not settle either, what is left is taken as it comes.
-void IslandParts::foresee_divided() {
+void IslandParts::find_divided() {
   StepPart& part = parts_.part;
   for (;; parts_.length *= 0.5) {
     if (parts_.gives_up || parts_.left < kConstraintsTuning.parts.last_part * parts_.length)
@@ -192,13 +129,7 @@ void IslandParts::find_impulses() {
   write_slip(slip_);
 }
 
-void IslandParts::tell_foreseen() {
-  find_impulses();
-  for (std::size_t i = 0; i < step_.part.constraints.size(); ++i)
-    step_.part.constraints[i]->foreseen(step_.of_constraint(impulses_, i), step_.of_constraint(slip_, i));
-}
-
-/// What has been foreseen happens.
+/// What has been found happens.
 void IslandParts::commit(const StepPart& part, const IslandReport& done, IslandReport& report) {
   taken();
   clock_.lap(Stage::kSolve, step_.rows.size());

@@ -41,12 +41,7 @@ void IslandStep::begin(const StepPart& of, bool contacts_react) {
   rows.clear();
   first_row.clear();
   const BodyStates states(part.table);
-  const MotionWatch* watch = part.options.watch;
-  const PartOfStep now{.length = length(),
-                       .left = part.left,
-                       .whole = part.whole_step,
-                       .ahead = watch != nullptr ? part.left : length(),
-                       .clearance = watch != nullptr ? watch->clearance() : 0.0};
+  const PartOfStep now{.length = length(), .left = part.left, .whole = part.whole_step};
   for (Constraint* constraint : part.constraints) {
     constraint->begin_part(now);
     first_row.push_back(rows.size());
@@ -80,16 +75,15 @@ bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
   return false;
 }
 
-/// Forces are truly held, θ = ½, while a contact strikes. Joints and hands keep θ = 1, for their velocities' sake.
 void IslandStep::find_kind(bool contacts_react) {
   contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
   touches = any_law([](const RowLaw& law) { return law.contact; });
-  mean = !contacts_react && part.options.watch == nullptr && !touches;
+  mean = !contacts_react && !touches;
   convex = !contacts_react && !mean;
   skinned = false;
   for (Index local = 0; local < bodies.count(); ++local)
     skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);
-  theta = contacts_alone && any_law([](const RowLaw& law) { return law.strikes; }) ? 0.5 : 1.0;
+  theta = 1.0;
 }
 
 /// Bodies that something pressed on in the last step.
@@ -99,24 +93,21 @@ void IslandStep::begin_early() {
   loads.all_early = false;
   if (!(convex || mean) || theta < 1.0) return;
   for (std::size_t row = 0; row < size(); ++row)
-    if (law(row).contact && (law(row).last_force != 0.0 || law(row).foreseen_force != 0.0))
+    if (law(row).contact && law(row).last_force != 0.0)
       for_bodies(row,
                  [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
   if (!contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; })) loads.take_all_early();
 }
 
-/// Makes the modes go through a part of a step, or through an impact or a part that is watched, in which all of them
-/// move: those that answer statically would lose what they store, take any blow of a short part as springs without a
-/// mass, and no hand is there to whip them.
+/// Makes the modes go through a part of a step.
 void IslandStep::set_modal_steps() {
-  const bool all_move = theta < 1.0 || part.options.watch != nullptr;
-  if (!all_move && length() == part.whole_step) return;
+  if (length() == part.whole_step) return;
   const auto count = static_cast<std::size_t>(bodies.count());
   if (loads.steps.size() < count) loads.steps.resize(count);
   for (Index local = 0; local < bodies.count(); ++local) {
     const ModalModelData& data = bodies.body(local).group->model().data();
     loads.steps[static_cast<std::size_t>(local)].set(data.eigenvalues, data.decays, length(),
-                                                     all_move ? ModalStep::kNone : std::numbers::pi / part.whole_step);
+                                                     std::numbers::pi / part.whole_step);
   }
   bodies.set_modal_steps(std::span(loads.steps).first(count));
 }
@@ -213,16 +204,6 @@ Vec3 IslandStep::held_gravity(Index local) const {
   if (loads.early[static_cast<std::size_t>(local)] == 0 || body.group->frame_constants().motion != FrameMotion::kFree)
     return part.options.gravity;
   return -body.group->held_force(body.slot) / body.group->frame_constants().mass;
-}
-
-void IslandStep::trace(std::vector<ExactMotion>& motions) const {
-  const auto count = static_cast<std::size_t>(bodies.count());
-  if (motions.size() < count) motions.resize(count);
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const ConstrainedBody& body = bodies.body(local);
-    const auto i = static_cast<std::size_t>(local);
-    body.group->predict_motion(body.slot, held_gravity(local), loads.frames[i], bodies.modal_step(local), motions[i]);
-  }
 }
 
 void IslandStep::linearise(StepTime when, ConstraintRows& to) const {

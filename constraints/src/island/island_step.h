@@ -73,7 +73,7 @@ struct IslandStep {
   IslandBodies bodies;
   ConstraintRows rows, end_rows, mean_rows;  // linearised at the start, at the predicted end and in the middle
   std::vector<Index> first_row;              // per constraint, and the end
-  bool convex = false;                       // in rounds: with contacts, or watched
+  bool convex = false;                       // in rounds: with contacts
   bool contacts_alone = false;               // among the rows
   bool skinned = false;                      // some bodies bend by their modal skins
   bool mean = false;                         // joints and the like: impulses act by the rows of the middle of the step
@@ -110,8 +110,6 @@ struct IslandStep {
   void predict();
   /// Under the loads as they are.
   void predict_under_loads();
-  /// How the bodies get to where they were predicted last. @param motions by body
-  void trace(std::vector<ExactMotion>& motions) const;
   /// Linearises the rows elsewhere than at the start.
   void linearise(StepTime when, ConstraintRows& to) const;
   void linearise_end();

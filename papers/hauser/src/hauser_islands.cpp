@@ -12,7 +12,6 @@ IslandReport ProgramIslands::find(const StepPart& part) {
   if (by_velocities) touch_.solve(step_, reaction_, rule_, found_);
   reaction_.find(step_, StepTime::kStart);
   done.accepted = newton_.solve(step_, rule_, done, found_) == SolveStatus::kSolved;
-  if (part.options.watch != nullptr) step_.trace(motions_);
   step_.linearise_end();
   if (by_velocities) touch_.hold_forces(step_.end_rows, step_.length());
   reaction_.find(step_, StepTime::kEnd);
@@ -23,20 +22,13 @@ IslandReport ProgramIslands::find(const StepPart& part) {
 /// The velocity program acts at the touch.
 double ProgramIslands::wanted_cut(Constraint& constraint, const BodyStates& states, const FreeMotions& free,
                                   double within) {
-  return rule_.method == ContactMethod::kVelocityProgram ? constraint.next_touch(states, free, within)
-                                                         : constraint.next_cut(states, free, within);
+  return rule_.method == ContactMethod::kVelocityProgram ? constraint.next_touch(states, free, within) : within;
 }
 
 IslandReport HauserIslands::step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                                  std::span<Constraint* const> constraints, const IslandOptions& options) {
   const std::span<Constraint* const> chosen = choose(constraints);
   return at_->step(table, members, chosen, adapted(options));
-}
-
-void HauserIslands::foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                            std::span<Constraint* const> constraints, const IslandOptions& options) {
-  const std::span<Constraint* const> chosen = choose(constraints);
-  at_->foresee(table, members, chosen, adapted(options));
 }
 
 /// The solver of the step, and the constraints as it is to see them.

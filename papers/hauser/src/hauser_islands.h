@@ -40,12 +40,6 @@ class HauserIslands final : public IslandSolver {
 
   IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                     std::span<Constraint* const> constraints, const IslandOptions& options) override;
-  void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-               std::span<Constraint* const> constraints, const IslandOptions& options) override;
-  const IslandReport& foreseen() const override { return at_->foreseen(); }
-  void refine() override { at_->refine(); }
-  const StageTimes& times() const override { return at_->times(); }
-  IslandReport finish() override { return at_->finish(); }
 
  private:
   std::span<Constraint* const> choose(std::span<Constraint* const> constraints);

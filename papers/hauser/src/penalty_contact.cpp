@@ -32,8 +32,7 @@ void PenaltyContact::add_rows(const BodyStates& states, StepTime when, double st
     const double mass = reduced_mass(states, rows.row(i)), omega = 2.0 * std::numbers::pi * frequency_;
     law.make_spring(mass * omega * omega, 2.0 * damping_ * mass * omega, step,
                     std::min(0.0, gaps_[static_cast<std::size_t>(i - first)]));
-    law.holds = law.strikes = false;
-    law.lets_go_within = 0.0;
+    law.holds = false;
     law.agent_displacement = 0.0;
   }
 }

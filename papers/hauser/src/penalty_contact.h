@@ -29,14 +29,8 @@ class PenaltyContact final : public Constraint {
   }
   bool is_contact() const override { return contact_->is_contact(); }
   bool may_be_divided() const override { return contact_->may_be_divided(); }
-  double next_cut(const BodyStates& states, const FreeMotions& free, double within) override {
-    return contact_->next_cut(states, free, within);
-  }
   double next_touch(const BodyStates& states, const FreeMotions& free, double within) override {
     return contact_->next_touch(states, free, within);
-  }
-  void foreseen(std::span<const double> impulses, std::span<const double> slip) override {
-    contact_->foreseen(impulses, slip);
   }
   void slid(std::span<const double> slip) override { contact_->slid(slip); }
   void accept(const BodyStates& states, std::span<const double> impulses) override {

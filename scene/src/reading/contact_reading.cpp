@@ -34,11 +34,6 @@ std::string_view to_string(ContactSolver solver) {
   return kWords[static_cast<std::size_t>(solver)];
 }
 
-std::string_view to_string(ImpactModel model) {
-  constexpr std::array kWords{"absorbed", "held", "held_from_touch"};
-  return kWords[static_cast<std::size_t>(model)];
-}
-
 }  // namespace limber
 
 namespace limber::internal {
@@ -102,14 +97,11 @@ SceneFinder read_finder(const JsonObject& o) {
 }
 
 ContactOptions read_contact_options(const JsonObject& o) {
-  using enum ImpactModel;
   ContactOptions c;
   c.friction = non_negative(o, "friction", c.friction);
   c.rolling_friction = non_negative(o, "rolling_friction", c.rolling_friction);
   c.recovery_speed = non_negative(o, "recovery_speed", c.recovery_speed);
   c.residual_compliance = o.boolean("residual_compliance", c.residual_compliance);
-  c.impact = choice_of(o, "impact", {kAbsorbed, kHeld, kHeldFromTouch}, c.impact);
-  c.impact_speed = non_negative(o, "impact_speed", c.impact_speed);
   o.finish();
   check_input(o.where(), [&] { c.validate(); });
   return c;

@@ -45,7 +45,7 @@ class BodyStates {
   std::span<const ConstrainedBody> table_;
 };
 
-/// How the bodies of an island would go through the rest of a step: if nothing touched them, or as it is told.
+/// How the bodies of an island would go through the rest of a step if nothing touched them.
 struct FreeMotions {
   std::span<const Index> members;        ///< bodies, ascending
   std::span<const ExactMotion> motions;  ///< one for each
@@ -58,24 +58,6 @@ struct PartOfStep {
   double length = 0.0;  ///< s, its own
   double left = 0.0;    ///< s, of the step, with it
   double whole = 0.0;   ///< s, the step
-  /// s, ≥ length: when what is ahead is reached at the soonest. Beyond the part's end where a watch may end it sooner
-  /// than it was meant to: bodies then go as fast towards each other whatever its length.
-  double ahead = 0.0;
-  double clearance = 0.0;  ///< m, of the watch
-
-  /// Of the time until then.
-  double share() const { return length < ahead ? length / ahead : 1.0; }
-};
-
-/// Looks at a motion before it happens.
-class MotionWatch {
- public:
-  virtual ~MotionWatch() = default;
-  /// @param motions of an island's members over the coming step, constraint forces and all
-  /// @return how far they may go, s; their length or more: all the way
-  virtual double clear_until(const FreeMotions& motions, double length) = 0;
-  /// How far contacts keep bodies apart that come nearer, m, so that it can tell what touches from what goes on.
-  virtual double clearance() const { return 0.0; }
 };
 
 /// How what rows exert on one body changes with where another one, or it itself, ends a step. World axes; shifts are of
@@ -116,19 +98,14 @@ class Constraint {
   /// J̇v of the rows at the step's start, in their order: what the gaps' rates change by while the bodies keep their
   /// velocities. For solvers that work with accelerations; contacts alone have it. @param bias as many numbers
   virtual void bias_accelerations(const BodyStates&, std::span<double> bias) const { std::ranges::fill(bias, 0.0); }
-  /// Whether it is contact: an island of nothing else may have its step cut where bodies strike and let go. Each part
-  /// is then a step for the functions here.
+  /// Whether it is contact: an island of nothing else may have its step cut where bodies touch. Each part is then a
+  /// step for the functions here.
   virtual bool is_contact() const { return false; }
   /// Whether islands of free bodies and nothing but such constraints may have a step that does not settle taken in
   /// shorter parts, each a step for the functions here.
   virtual bool may_be_divided() const { return false; }
-  /// When within the rest of a step it wants that cut, s from now; `within` or later: not at all.
-  virtual double next_cut(const BodyStates&, const FreeMotions&, double within) { return within; }
   /// When within the rest of a step it comes to touch, faster than what counts as an impact; `within`: not at all.
   virtual double next_touch(const BodyStates&, const FreeMotions&, double within) { return within; }
-  /// After the step has been foreseen, which may be done again with more rows beside these. @param impulses, slip as
-  /// for accept() and slid()
-  virtual void foreseen(std::span<const double> /*impulses*/, std::span<const double> /*slip*/) {}
   /// Before accept(): how far contacts that press slid, m, in their normal rows; 0 where forces did not come at the
   /// step's start.
   virtual void slid(std::span<const double> /*slip*/) {}

@@ -49,9 +49,6 @@ struct RowLaw {
   /// The row's force persists from step to step: springs, motors, friction.
   bool goes_on = false;
   double last_force = 0.0;  ///< that of the last step, from which solvers may begin
-  /// Of contacts: the step has been foreseen before, with this force (N).
-  bool foreseen = false;
-  double foreseen_force = 0.0;
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
   double agent_displacement = 0.0;
@@ -69,10 +66,6 @@ struct RowLaw {
   /// Of contacts that slide, their normal row: De Saxcé's shift μ |slip| of the last step.
   double shift = 0.0;
   bool contact = false;  ///< of a contact, its normal row or a tangent
-  /// The contact is an impact: where only contacts act, all the island's forces are then held over the step (θ = ½).
-  bool strikes = false;
-  /// > 0: and the step is to be cut where it lets go, this far into it at the latest, s.
-  double lets_go_within = 0.0;
   /// One of those tangents; its gap is the slip within the step, its bounds come from the cone.
   bool slides = false;
 

@@ -20,10 +20,6 @@
 /// *Contact compliance* (`give`): contacts of bodies that flex may yield by themselves, which makes the shares of a
 /// load among redundant contacts unique for island solvers that need it (ContactOptions::compliance).
 ///
-/// *Impacts* (ImpactModel): a pair of bodies, one of them able to flex, that begin to press at more than
-/// `impact_speed`, until none of their contacts presses, at most for a period of the lowest mode of either. Forces are
-/// held over the step (θ = ½) only in islands of nothing but contacts.
-///
 /// *Overlap* at the start, what dents leave of it, shrinks by a fifth a step, at most at `recovery_speed`; that is work
 /// done on the island, bounded by what lifts it at that speed.
 ///
@@ -43,23 +39,6 @@
 #include "limber/dynamics/surface_point.h"
 
 namespace limber {
-
-/// How long a contact force lasts, seen from the frames of the bodies; their modes always feel it held over the step.
-enum class ImpactModel {
-  /// All at the step's start, θ = 1: a rigid body does not rebound, an elastic one in contact for N steps loses about
-  /// 4/N of its energy.
-  kAbsorbed,
-  /// Held over the step, θ = ½, while an impact lasts; else θ = 1. Loses nothing but what the gap at the first step's
-  /// start costs, so that the rebound is that of the elastic bodies.
-  kHeld,
-  /// The same from the touch until they let go: the steps of islands of free bodies with nothing but contacts are cut
-  /// where an impact begins and where it ends, so that the rebound is that of the elastic bodies at any step. It begins
-  /// at the exact time at which the first of their contacts closes (exact_motion.h) faster than `impact_speed`. It ends
-  /// where the impulse that keeps its gaps closed is largest: from there on contacts would have to pull. That takes the
-  /// part some ten times, for all impacts of an island together. At most four cuts a step: what strikes and lets go
-  /// more often in it is kHeld. Contacts are those found at the step's start.
-  kHeldFromTouch,
-};
 
 /// Who answers contacts, and with them all handles and joints.
 enum class ContactSolver {
@@ -84,9 +63,6 @@ struct ContactOptions {
   /// yields by itself, a thirtieth of that beside a residual compliance. Island solvers of other methods ask for it;
   /// limber's own (make_island_solver()) needs none and leaves it out of its rows.
   double compliance = 0.0;
-  ImpactModel impact = ImpactModel::kAbsorbed;
-  /// m/s, ≥ 0: bodies that come together more slowly do not rebound, so that bouncing ends (θ = 1).
-  double impact_speed = 0.25;
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
@@ -94,7 +70,7 @@ template <class Self>
 requires std::is_same_v<std::remove_const_t<Self>, ContactOptions>
 auto state_fields(Self& s) {
   return std::tie(s.solver, s.small_steps, s.friction, s.rolling_friction, s.recovery_speed, s.residual_compliance,
-                  s.compliance, s.impact, s.impact_speed);
+                  s.compliance);
 }
 
 /// What became of a contact in the last step.
@@ -132,17 +108,6 @@ struct ContactMemory {
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.id, s.a, s.b, s.force, s.give, s.slip, s.yielding, s.position, s.normal);
-  }
-};
-
-/// And of a pair of bodies that strike each other.
-struct StrikeMemory {
-  Index a = -1, b = -1;  ///< bodies
-  double since = 0.0;    ///< how long they have been at it, s
-
-  template <class Self>
-  static auto state_fields(Self& s) {
-    return std::tie(s.a, s.b, s.since);
   }
 };
 
@@ -204,8 +169,6 @@ class ContactSet {
   std::span<const ContactMemory> memory() const;
   /// Those under which bodies fell asleep, ordered by id.
   std::span<const ContactMemory> resting() const;
-  /// Impacts under way, ordered by (a, b).
-  std::span<const StrikeMemory> strikes() const;
   /// Pairs that resisted rolling in the last step, ordered by (a, b).
   std::span<const RollingMemory> rolling() const;
   /// The forces behind a body's residual displacement, as the last step left them.

@@ -10,7 +10,7 @@
 /// brought in line with the rows at the end, which takes a little energy; where joints alone act it is given back. The
 /// rotation of such a body is of second order in the step; bodies without constraints rotate exactly.
 ///
-/// Islands with contacts, bodies that are fixed at a point or line or carried, and watched parts of steps
+/// Islands with contacts and bodies that are fixed at a point or line or carried
 ///   1. linearise the rows at the step's start (Constraint::add_rows),
 ///   2. find the constraint forces under gravity and held forces; they act on the frames half at the step's start and
 ///      half at its end, so that what rests has no velocity,
@@ -27,9 +27,8 @@
 /// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that ends by one of
 /// these limits keeps the best impulses found, or the motion found where there are none: IslandStatus::kLimit.
 ///
-/// A step is taken in parts where impacts begin and end, if asked for (Constraint::next_cut, RowLaw::lets_go_within;
-/// four times at most), and in halves down to 64ths where joints and handles alone act on free bodies and it does not
-/// settle. If that does not help, bodies turn and shift as the rows ask but do not bend in the rest of the step; if
+/// A step is taken in halves down to 64ths where joints and handles alone act on free bodies and it does not settle. If
+/// that does not help, bodies turn and shift as the rows ask but do not bend in the rest of the step; if
 /// that is not found either they stay where they are, and lose half their velocity: IslandStatus::kFailed.
 ///
 /// Free islands keep their linear and angular momentum. Not guarded: bodies whose parents move. Methods:
@@ -56,18 +55,9 @@ struct IslandOptions {
   /// are the same: what joints alone lose to the method is then given back.
   bool undisturbed = false;
   bool timed = false;  ///< fill IslandReport::times
-  /// m. Above 0 it is only to be seen where the members end: rounds among contacts stop once these are as near to the
-  /// law, or where their work ends, and no energy is guarded. See IslandSolver::foreseen().
-  double rough = 0.0;
   /// J: the energy error carried over from the last step, IslandReport::energy_surplus; at most 1e-7 of the energies
   /// at hand, of bodies that had no motion to take it from.
   double energy_surplus = 0.0;
-
-  // For a step that is one of several parts of a longer one. A watch is shown each motion that is found; where it may
-  // not go all the way, a shorter part is taken, until the watch is content. There are no other cuts then.
-  MotionWatch* watch = nullptr;
-  double whole_step = 0.0;  ///< s; 0: `step` is the whole one
-  bool begins = true;       ///< the whole step
 };
 
 struct IslandReport {
@@ -77,7 +67,6 @@ struct IslandReport {
   /// first (StepAttempt).
   bool accepted = true;
   int bodies = 0, rows = 0;
-  double taken = 0.0;  ///< s, where there is a watch
   StepAttempts attempts{};
   int iterations = 0;    ///< predictions made, in the part of the step that needed most
   int newton_steps = 0;  ///< for the contacts with friction, in the part that needed most
@@ -88,7 +77,6 @@ struct IslandReport {
   double energy_removed = 0.0;  ///< J, by the energy guard; negative: given back
   double energy_surplus = 0.0;  ///< J, to be passed to the island's next step
   StageTimes times{};           ///< kRows, kSolve and kCommit, with IslandOptions::timed
-  bool rough = false;           ///< foreseen as IslandOptions::rough asks, and not to the law
 };
 
 /// Takes the steps of islands, one at a time, and holds the memory for that, which grows to the largest island seen;
@@ -98,24 +86,10 @@ class IslandSolver {
  public:
   virtual ~IslandSolver() = default;
 
-  /// Advances the members by one step: foresee() and finish(), or one part of a step under a watch.
+  /// Advances the members by one step.
   /// @param table the bodies that rows name. @param members indices into it, ascending: every body the rows touch
   virtual IslandReport step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                             std::span<Constraint* const> constraints, const IslandOptions& options) = 0;
-
-  /// Finds where the step, or the first of its parts, takes the members (BodyGroup::predicted_frame() and the like).
-  /// They stay where they are; another call in place of finish() forgets this one. Arguments as for step(); they are
-  /// to last until finish(). @pre no watch
-  virtual void foresee(std::span<const ConstrainedBody> table, std::span<const Index> members,
-                       std::span<Constraint* const> constraints, const IslandOptions& options) = 0;
-  /// Of foresee().
-  virtual const IslandReport& foreseen() const = 0;
-  /// What has been foreseen roughly, to the law; nothing where it is not rough. @pre foresee()
-  virtual void refine() = 0;
-  /// What foresee() or refine() took, with IslandOptions::timed; finish() tells of itself.
-  virtual const StageTimes& times() const = 0;
-  /// Moves them there, and through the parts that are left. @pre foresee(), not rough
-  virtual IslandReport finish() = 0;
 };
 
 using IslandSolverFactory = std::function<std::unique_ptr<IslandSolver>()>;

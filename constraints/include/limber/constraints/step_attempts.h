@@ -9,15 +9,11 @@ namespace limber {
 
 /// What is tried where a step cannot be taken as it is; each has a cost and a cause.
 enum class StepAttempt {
-  kCutAtTouch,       ///< where bodies strike (ImpactModel::kHeldFromTouch)
-  kCutAtRelease,     ///< where an impact lets go
-  kDivided,          ///< into halves, down to 64ths: joints did not come together
-  kSlowed,           ///< relative motion was taken at its start: a swing would have ended too high
-  kCutAtFirstTouch,  ///< where fast bodies come to what they would have passed (docs/contact.md)
-  kHeldAtTouch,      ///< and stay for the rest of the step
-  kLookedFarther,    ///< contacts were found anew: bodies came farther than they had been looked for
-  kRefused,          ///< impulses or bending were given up: the step has failed (IslandStatus::kFailed)
-  kInTheMiddle,      ///< joints beside contacts by rows of the middle of the step, after rounds did not settle
+  kCutAtTouch,   ///< where bodies touch: by [H03]'s velocity program alone
+  kDivided,      ///< into halves, down to 64ths: joints did not come together
+  kSlowed,       ///< relative motion was taken at its start: a swing would have ended too high
+  kRefused,      ///< impulses or bending were given up: the step has failed (IslandStatus::kFailed)
+  kInTheMiddle,  ///< joints beside contacts by rows of the middle of the step, after rounds did not settle
 };
 /// How many parts of steps were taken so.
 class StepAttempts {
@@ -25,16 +21,13 @@ class StepAttempts {
   int& operator[](StepAttempt a) { return counts_[static_cast<std::size_t>(a)]; }
   int operator[](StepAttempt a) const { return counts_[static_cast<std::size_t>(a)]; }
   /// Of the step.
-  int cuts() const {
-    return (*this)[StepAttempt::kCutAtTouch] + (*this)[StepAttempt::kCutAtRelease] + (*this)[StepAttempt::kDivided] +
-           (*this)[StepAttempt::kCutAtFirstTouch];
-  }
+  int cuts() const { return (*this)[StepAttempt::kCutAtTouch] + (*this)[StepAttempt::kDivided]; }
   void add(const StepAttempts& other) {
     for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] += other.counts_[i];
   }
 
  private:
-  std::array<int, 9> counts_{};
+  std::array<int, 5> counts_{};
 };
 
 }  // namespace limber

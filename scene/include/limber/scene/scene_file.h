@@ -171,7 +171,6 @@ struct SceneContactRule {
 std::string_view to_string(SceneContactRule::Method method);
 std::string_view to_string(SceneContactRule::Friction friction);
 std::string_view to_string(SceneContactRule::Guard guard);
-std::string_view to_string(ImpactModel model);
 std::string_view to_string(ContactSolver solver);
 
 struct Scene {
