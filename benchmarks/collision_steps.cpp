@@ -3,7 +3,7 @@
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb [BESIDE]]]     part of the names of the scenes wanted ("": all), the asset of the
 //   bunnies ("": without them); beside ContactFinder: fcl (if nothing is given), alone (nothing), or manifolds
-//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned, and only queries of all bodies: what game
+//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned; what game
 //   contact asks, once a step)
 // Figures: docs/reports/benchmarks.md.
 #include <algorithm>
@@ -37,13 +37,12 @@ Beside beside = Beside::kFcl;  // whose finder is asked beside ContactFinder
 struct Query {
   std::vector<BodyState> states;
   std::vector<double> numbers;  // amplitudes, and those at the end, body after body
-  std::vector<Index> bodies, awake;
+  std::vector<Index> awake;
   double margin = 0.0;
   Vec3 origin = Vec3::Zero();
 
   explicit Query(const ContactQuery& q)
       : states(q.states.begin(), q.states.end()),
-        bodies(q.bodies.begin(), q.bodies.end()),
         awake(q.awake.begin(), q.awake.end()),
         margin(q.margin),
         origin(q.origin) {
@@ -62,9 +61,7 @@ struct Query {
   Query(Query&&) = default;
   Query(const Query&) = delete;
 
-  ContactQuery asked() const {
-    return {.states = states, .margin = margin, .origin = origin, .bodies = bodies, .awake = awake};
-  }
+  ContactQuery asked() const { return {.states = states, .margin = margin, .origin = origin, .awake = awake}; }
 };
 
 /// Hands all to a finder, and writes down its bodies and its queries.
@@ -81,11 +78,8 @@ class Recorder final : public ContactSource {
     replayed_.emplace_back([=](ContactSource& to) { to.exclude_pair(a, b, excluded); });
   }
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override {
-    if (beside != Beside::kManifolds || query.bodies.empty()) queries_.emplace_back(query);
+    queries_.emplace_back(query);
     finder_.find_contacts(query, contacts, jobs);
-  }
-  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override {
-    finder_.find_impacts(query, impacts, jobs);
   }
   void save_state(StateWriter& state) const override { finder_.save_state(state); }
   void restore_state(StateReader& state) override { finder_.restore_state(state); }

@@ -26,7 +26,6 @@ struct NoContacts final : ContactSource {
   void set_filter(Index, const CollisionFilter&) override {}
   void exclude_pair(Index, Index, bool) override {}
   void find_contacts(const ContactQuery&, std::vector<ContactPoint>& contacts, Jobs&) override { contacts.clear(); }
-  void find_impacts(const ImpactQuery&, std::vector<Impact>& impacts, Jobs&) override { impacts.clear(); }
 };
 
 constexpr ContactOptions kGame{.solver = ContactSolver::kGame, .small_steps = {8}};

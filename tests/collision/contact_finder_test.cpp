@@ -214,40 +214,6 @@ TEST(ContactFinder, ContactsOfASleeperAreThoseItHadAwake) {
   for (int twice = 0; twice < 2; ++twice) EXPECT_TRUE(same_bits(contacts_of(finder, scene, kMargin), expected));
 }
 
-TEST(ContactFinder, AFewBodiesHaveTheContactsThatTheyHaveAmongAll) {
-  const ContactScene scene = heap(60);
-  ContactFinder finder;
-  scene.add_all_to(finder);
-  const std::vector<ContactPoint> all = contacts_of(finder, scene, kMargin);
-  const std::vector<Index> some{3, 17, 18, 40};
-  const auto asked = [&](Index body) { return std::binary_search(some.begin(), some.end(), body); };
-  std::vector<ContactPoint> expected, found;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(expected),
-               [&](const ContactPoint& c) { return asked(c.a.body) || asked(c.b.body); });
-  ASSERT_FALSE(expected.empty());
-  finder.find_contacts({.states = scene.states(), .margin = kMargin, .bodies = some}, found, serial_jobs());
-  EXPECT_TRUE(same_bits(found, expected));
-  EXPECT_TRUE(same_bits(contacts_of(finder, scene, kMargin), all)) << "what was kept of the others is forgotten";
-}
-
-TEST(ContactFinder, FarAheadFeaturesHaveNoContactsAndHalfSpacesDo) {
-  for (const Shape& target : {Shape(Box{{1.0, 1.0, 0.1}}), Shape(HalfSpace{.offset = 0.1})}) {
-    ContactScene scene;
-    scene.add(target);
-    scene.add(Sphere{0.1}, {{}, {0.0, 0.0, 0.7}});  // 0.5 above
-    ContactFinder finder;
-    scene.add_all_to(finder);
-    std::vector<BodyState> states = scene.states();
-    states[1].reach = 0.6;
-    std::vector<ContactPoint> contacts;
-    for (const double ahead : {0.4, 0.55}) {
-      states[1].look_ahead = ahead;
-      finder.find_contacts({.states = states}, contacts, serial_jobs());
-      EXPECT_EQ(contacts.size(), std::holds_alternative<HalfSpace>(target) || ahead > 0.5 ? 1u : 0u);
-    }
-  }
-}
-
 TEST(ContactFinder, FiltersAndExcludedPairsAreObeyed) {
   ContactScene scene;
   for (int i = 0; i < 3; ++i) scene.add(Sphere{0.5}, {{}, {0.1 * i, 0, 0}});

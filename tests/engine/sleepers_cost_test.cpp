@@ -37,9 +37,6 @@ class ComparedSource final : public ContactSource {
       EXPECT_EQ(contacts[i].gap, others_[i].gap);
     }
   }
-  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override {
-    hinted_.find_impacts(query, impacts, jobs);
-  }
   void save_state(StateWriter& state) const override { hinted_.save_state(state); }
   void restore_state(StateReader& state) override { hinted_.restore_state(state); }
 

@@ -38,7 +38,6 @@ const char* unit_of(Stage stage) {
     case Stage::kBookkeeping:
       return "step";
     case Stage::kLookAhead:
-    case Stage::kFastBodies:
     case Stage::kAdvance:
     case Stage::kCommit:
       return "body";

@@ -80,7 +80,7 @@ export class Engine {
     return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, solved };
   }
   /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
-  stages() { return [...this.doubles(this.module._page_stage_seconds(), 9)]; }
+  stages() { return [...this.doubles(this.module._page_stage_seconds(), 8)]; }
   jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
 
   cast(from, along) {

@@ -123,8 +123,8 @@ export class Panel {
 
   /** @param stages seconds: the browser's clock is coarse, so that only means over many steps tell something */
   note(numbers, milliseconds, stages) {
-    const [begin, ahead, broad, narrow, fast, rows, advance, solve, commit] = stages;
-    [ahead + broad + narrow + fast, rows + solve + commit, begin + advance].forEach((seconds, i) => {
+    const [begin, ahead, broad, narrow, rows, advance, solve, commit] = stages;
+    [ahead + broad + narrow, rows + solve + commit, begin + advance].forEach((seconds, i) => {
       this.stages[i] += (1000 * seconds - this.stages[i]) / 30;
     });
     this.energy.add([numbers.rigid, numbers.modal + numbers.elastic, numbers.rigid + numbers.modal + numbers.elastic + numbers.potential]);

@@ -106,7 +106,7 @@ struct BroadPhase::Impl {
   int axis = 0;
 
   // Of the query under way.
-  double margin = 0.0, plane_margin = 0.0;
+  double margin = 0.0;
   std::vector<float> sides[6];  ///< low and high along the sweep's axis, then the two others
   std::vector<Chunk> chunks;
   std::vector<std::uint64_t> found, sorted;
@@ -251,8 +251,8 @@ void BroadPhase::Impl::meet_endless(Chunk& chunk, std::size_t first, std::size_t
     const Body& body = at(e);
     for (std::size_t row = first; row < last; ++row) {
       const auto a = awake_body(row);
-      const bool meet = body.bounds == Bounds::kHalfSpace ? near(body.half_space, box(a), plane_margin)
-                                                          : near(box(e), box(a), margin);
+      const bool meet =
+          body.bounds == Bounds::kHalfSpace ? near(body.half_space, box(a), margin) : near(box(e), box(a), margin);
       if (meet && may_meet(a, e)) chunk.pairs.push_back(pair_key(a, e));
     }
   }
@@ -264,15 +264,14 @@ void BroadPhase::Impl::endless_meet_the_rest(Chunk& chunk) const {
     const Index e = endless[i];
     const Body& body = at(e);
     const auto meets = [&](const Aabb& other) {
-      return body.bounds == Bounds::kHalfSpace ? near(body.half_space, other, plane_margin)
-                                               : near(box(e), other, margin);
+      return body.bounds == Bounds::kHalfSpace ? near(body.half_space, other, margin) : near(box(e), other, margin);
     };
     for (std::size_t j = 0; j < i; ++j) {
       const Body& other = at(endless[j]);
       if (body.asleep && other.asleep) continue;
       if (body.bounds == Bounds::kHalfSpace && other.bounds == Bounds::kHalfSpace) continue;
       const bool meet =
-          other.bounds == Bounds::kHalfSpace ? near(other.half_space, box(e), plane_margin) : meets(box(endless[j]));
+          other.bounds == Bounds::kHalfSpace ? near(other.half_space, box(e), margin) : meets(box(endless[j]));
       if (meet && may_meet(e, endless[j])) chunk.pairs.push_back(pair_key(e, endless[j]));
     }
     if (body.asleep) continue;
@@ -394,14 +393,12 @@ void BroadPhase::set_asleep(Index body, bool asleep) {
   impl_->place(body);
 }
 
-void BroadPhase::find_pairs(double margin, double plane_margin, std::vector<BodyPair>& pairs, Jobs& jobs) {
-  for (const double length : {margin, plane_margin})
-    if (!(length >= 0.0 && std::isfinite(length)))
-      throw InvalidArgument("BroadPhase::find_pairs: margin is " + std::to_string(length) +
-                            ", expected a finite number of at least 0");
+void BroadPhase::find_pairs(double margin, std::vector<BodyPair>& pairs, Jobs& jobs) {
+  if (!(margin >= 0.0 && std::isfinite(margin)))
+    throw InvalidArgument("BroadPhase::find_pairs: margin is " + std::to_string(margin) +
+                          ", expected a finite number of at least 0");
   Impl& m = *impl_;
   m.margin = margin;
-  m.plane_margin = plane_margin;
   m.drop_outdated_entries();
   m.choose_axis();
   m.sort_awake();
@@ -423,22 +420,6 @@ void BroadPhase::find_pairs(double margin, double plane_margin, std::vector<Body
   pairs.clear();
   for (const std::uint64_t key : m.sorted)
     pairs.push_back({static_cast<Index>(key >> 32), static_cast<Index>(key & 0xffffffffu)});
-}
-
-void BroadPhase::find_near(Index body, double margin, double plane_margin, std::vector<Index>& near_it) const {
-  const Impl& m = *impl_;
-  const Body& one = m.at(body);
-  const auto meets = [&](Index i, Index j) {
-    const Body& plane = m.at(i);
-    if (plane.bounds != Bounds::kHalfSpace) return near(m.box(i), m.box(j), margin);
-    return m.at(j).bounds != Bounds::kHalfSpace && near(plane.half_space, m.box(j), plane_margin);
-  };
-  for (std::size_t i = 0; i < m.bodies.size(); ++i) {
-    const Body& other = m.bodies[i];
-    const auto index = static_cast<Index>(i);
-    if (index == body || !other.present || other.bounds == Bounds::kNone || !m.may_meet(body, index)) continue;
-    if (one.bounds == Bounds::kHalfSpace ? meets(body, index) : meets(index, body)) near_it.push_back(index);
-  }
 }
 
 }  // namespace limber

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <tuple>
 
 #include "finder/contact_finder_impl.h"
 #include "finder/contact_id.h"
@@ -48,19 +47,13 @@ void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
 }
 
 CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
-  using Instant = internal::SurfacePool::Instant;
   const FoundBody& body = at(index);
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
   result.displacement = s.displacement, result.rotation = s.rotation;
   result.reach = s.reach + 0.5 * margin;
-  result.doubt = s.doubt + 0.5 * margin + fall;
-  result.end_X_WB = s.end_pose;
   if (body.modal) {
-    result.surface = &worker.pool.get(index, Instant::kNow, body.modal->surface, s.amplitudes, options.bounds);
-    if (std::isfinite(s.doubt))
-      result.end_surface =
-          &worker.pool.get(index, Instant::kEnd, body.modal->surface, s.end_amplitudes, BoundsChoice::kAmplitudes);
+    result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;
   } else {
     result.geometry = body.rigid.get();
@@ -103,14 +96,11 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
-    worker.narrow.find_self_contacts(a, margin + 2.0 * std::min(state(pair.a).reach, state(pair.a).look_ahead), origin,
-                                     contacts);
+    worker.narrow.find_self_contacts(a, margin + 2.0 * state(pair.a).reach, origin, contacts);
   } else {
-    const bool plane = at(pair.a).is_half_space() || at(pair.b).is_half_space();
     const BodyState &s = state(pair.a), &t = state(pair.b);
     const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
-    const double reaches = plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t));
-    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + reaches, origin, contacts, memory);
+    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + together, origin, contacts, memory);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
@@ -124,7 +114,7 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   const std::size_t per_chunk = internal::collision_tuning().finder.pairs_per_chunk;
   const std::size_t chunks = (pairs.size() + per_chunk - 1) / per_chunk;
-  memories.match(pairs, some.empty(), [this](const BodyPair& pair) { return remembers(pair); });
+  memories.match(pairs, [this](const BodyPair& pair) { return remembers(pair); });
   if (found.size() < chunks) found.resize(chunks);
   for (Found& part : found) part.contacts.clear(), part.regions.clear();
   jobs.parallel_for(chunks, 1, [this, per_chunk](std::size_t begin, std::size_t end) {
@@ -134,16 +124,14 @@ void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   });
 }
 
-void ContactFinder::Impl::keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids) {
+void ContactFinder::Impl::keep_id(const BodyPair& pair, std::uint64_t id) {
   if (kept_pairs.empty() || kept_pairs.back().pair != pair) kept_pairs.push_back({pair, kept_ids.size(), 0});
-  kept_pairs.back().count += ids.size();
-  kept_ids.insert(kept_ids.end(), ids.begin(), ids.end());
+  ++kept_pairs.back().count;
+  kept_ids.push_back(id);
 }
 
-/// What was kept of pairs that nobody asks for stays among the rest, in their order.
 void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
   contacts.clear();
-  ContactRegions& regions = some.empty() ? regions_of_all : regions_of_some;
   regions.clear();
   regions.counts.reserve(contacts.capacity());
   for (const Found& part : found) {
@@ -151,63 +139,9 @@ void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
     regions.append(part.regions);
   }
   regions.give_to(contacts);
-  kept_pairs.swap(last_pairs);
-  kept_ids.swap(last_ids);
   kept_pairs.clear();
   kept_ids.clear();
-  auto last = last_pairs.begin();
-  const auto keep_others = [&](const BodyPair* before) {
-    for (; !some.empty() && last != last_pairs.end() && (before == nullptr || last->pair < *before); ++last)
-      if (!asked_for(last->pair.a) && !asked_for(last->pair.b))
-        keep_ids(last->pair, std::span(last_ids).subspan(last->first, last->count));
-  };
-  for (const ContactPoint& c : contacts) {
-    const BodyPair pair{c.a.body, c.b.body};
-    keep_others(&pair);
-    keep_ids(pair, {&c.id, 1});
-  }
-  keep_others(nullptr);
-}
-
-/// What stands still, and what nobody asks for.
-void ContactFinder::Impl::drop_pairs(std::span<const std::pair<Index, Index>> except) {
-  std::erase_if(pairs, [&](const BodyPair& pair) {
-    return (motion(pair.a) == nullptr && motion(pair.b) == nullptr) ||
-           std::ranges::binary_search(except, std::pair(pair.a, pair.b));
-  });
-}
-
-MovingBody ContactFinder::Impl::moving_body(Index index) const {
-  const FoundBody& body = at(index);
-  MovingBody result{.geometry = body.rigid.get(), .motion = motion(index)};
-  if (body.modal) result.surface = body.modal->surface;
-  if (result.motion == nullptr) result.pose = state(index).pose, result.amplitudes = state(index).amplitudes;
-  return result;
-}
-
-ImpactTime ContactFinder::Impl::find_impact(const BodyPair& pair, Worker& worker) const {
-  return worker.time_of_impact.find(moving_body(pair.a), moving_body(pair.b), step, margin, least_margin);
-}
-
-void ContactFinder::Impl::find_impacts_in_pairs(Jobs& jobs) {
-  times.resize(pairs.size());
-  jobs.parallel_for(pairs.size(), internal::collision_tuning().finder.pairs_per_chunk,
-                    [this](std::size_t begin, std::size_t end) {
-                      const Workers::Lease worker(workers);
-                      for (std::size_t p = begin; p < end; ++p) times[p] = find_impact(pairs[p], *worker);
-                    });
-}
-
-void ContactFinder::Impl::gather(std::vector<Impact>& impacts) const {
-  using Status = ImpactTime::Status;
-  impacts.clear();
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const auto& [status, time, advancements] = times[p];
-    if (status == Status::kImpact || status == Status::kResting)
-      impacts.push_back({.a = pairs[p].a, .b = pairs[p].b, .time = time, .resting = status == Status::kResting});
-  }
-  std::sort(impacts.begin(), impacts.end(),
-            [](const Impact& i, const Impact& j) { return std::tie(i.time, i.a, i.b) < std::tie(j.time, j.a, j.b); });
+  for (const ContactPoint& c : contacts) keep_id({c.a.body, c.b.body}, c.id);
 }
 
 ContactFinder::ContactFinder(const ContactFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -272,10 +206,8 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   if (!query.origin.allFinite())
     throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
   m.states = query.states;
-  m.motions = {};
-  m.some = query.bodies;
   m.awake = query.awake;
-  m.margin = query.margin, m.fall = query.fall.norm();
+  m.margin = query.margin;
   m.origin = query.origin;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
@@ -284,23 +216,6 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   m.find_in_pairs(jobs);
   m.gather(contacts);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
-}
-
-void ContactFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) {
-  Impl& m = *impl_;
-  check_length("step", query.step);
-  check_length("margin", query.margin);
-  m.states = query.states;
-  m.motions = query.motions;
-  m.some = query.bodies;
-  m.awake = {};
-  m.step = query.step;
-  m.margin = query.margin, m.fall = 0.0;
-  m.least_margin = query.least_margin;
-  m.find_near_pairs(jobs);
-  m.drop_pairs(query.except);
-  m.find_impacts_in_pairs(jobs);
-  m.gather(impacts);
 }
 
 }  // namespace limber

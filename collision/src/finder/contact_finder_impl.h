@@ -1,10 +1,9 @@
-// What finds contacts and what finds impacts share:
+// What finds contacts:
 //
 //   contact_finder.cpp  the bodies, and what is found in each pair of them
 //   near_pairs.cpp      the states of a query, where they place the bodies, and which of these are near each other
 //
-// Its members are many since a query of contacts and one of impacts share its bodies and pairs, and keep all their
-// lists so that no query allocates.
+// Its members are many since all lists are kept, so that no query allocates.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +13,6 @@
 #include "finder/contact_regions.h"
 #include "finder/found_body.h"
 #include "finder/pair_memories.h"
-#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 
@@ -30,28 +28,23 @@ struct ContactFinder::Impl {
 
   // Of the query under way.
   std::span<const BodyState> states;
-  std::span<const ExactMotion* const> motions;  ///< none where contacts are asked for
-  std::span<const Index> some;                  ///< the bodies that are asked for; none: all
-  std::span<const Index> awake;                 ///< ContactQuery::awake
-  double farthest_beyond = 0.0;                 ///< by how much a reach exceeds that of features
-  double step = 0.0, margin = 0.0, least_margin = 0.0, fall = 0.0;
+  std::span<const Index> awake;  ///< ContactQuery::awake
+  double margin = 0.0;
   Vec3 origin = Vec3::Zero();
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
   internal::PairMemories memories;  ///< of pairs; they change nothing but the time
-  std::vector<Index> near;          ///< one body
   struct Found {
     std::vector<ContactPoint> contacts;
     internal::ContactRegions regions;
   };
-  std::vector<Found> found;                                  ///< by chunk of pairs
-  internal::ContactRegions regions_of_all, regions_of_some;  ///< what contacts' regions are kept in
-  std::vector<ImpactTime> times;                             ///< by pair
+  std::vector<Found> found;          ///< by chunk of pairs
+  internal::ContactRegions regions;  ///< what contacts' regions are kept in
 
   // Of the last query, ascending.
-  std::vector<internal::PairIds> kept_pairs, last_pairs;
-  std::vector<std::uint64_t> kept_ids, last_ids;
+  std::vector<internal::PairIds> kept_pairs;
+  std::vector<std::uint64_t> kept_ids;
 
   internal::FoundBody& present(Index body, const char* function) {
     if (!contains(body))
@@ -65,25 +58,16 @@ struct ContactFinder::Impl {
   internal::FoundBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
   const internal::FoundBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
   const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
-  /// How far contacts are looked for, where features decide.
-  static double reach_of_features(const BodyState& state) { return std::min(state.way(), state.look_ahead); }
-  const ExactMotion* motion(Index body) const {
-    return static_cast<std::size_t>(body) < motions.size() ? motions[static_cast<std::size_t>(body)] : nullptr;
-  }
 
   void set_finds_itself(Index body, bool finds);
   bool stays_in_place(Index body, const BodyState& state) const;
   void check_and_list();
-  void check_motion(Index index) const;
   void check_place(Index index);
   void find_near_pairs(Jobs& jobs);
-  void find_pairs_of_some();
   void make_boxes(Jobs& jobs);
   void make_box(std::size_t entry, internal::Worker& worker);
-  Aabb swept_box(Index index, internal::Worker& worker) const;
   void place();
   void merge_self_pairs();
-  void drop_pairs(std::span<const std::pair<Index, Index>> except);
   void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
   void find_in_pair(const BodyPair& pair, internal::PairMemory* memory, internal::Worker& worker, Found& into) const;
@@ -93,12 +77,7 @@ struct ContactFinder::Impl {
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
   std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
-  void keep_ids(const BodyPair& pair, std::span<const std::uint64_t> ids);
-  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
-  void find_impacts_in_pairs(Jobs& jobs);
-  ImpactTime find_impact(const BodyPair& pair, internal::Worker& worker) const;
-  MovingBody moving_body(Index index) const;
-  void gather(std::vector<Impact>& impacts) const;
+  void keep_id(const BodyPair& pair, std::uint64_t id);
 };
 
 }  // namespace limber

@@ -12,7 +12,6 @@
 #include "finder/surface_pool.h"
 #include "limber/collision/broad_phase.h"
 #include "limber/collision/contact_finder.h"
-#include "limber/collision/time_of_impact.h"
 #include "limber/core/error.h"
 
 namespace limber::internal {
@@ -42,8 +41,6 @@ struct Worker {
   RegionFinder regions;
   SurfacePool pool;
   DeformedSurface root;  ///< for boxes of whole bodies
-  TimeOfImpact time_of_impact;
-  std::vector<double> amplitudes, shape;
 };
 
 /// Lends workers to threads.

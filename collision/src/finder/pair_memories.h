@@ -19,17 +19,16 @@ class PairMemories {
     for (const auto& memory : all_) memory->reserve(modes_);
   }
 
-  /// Those of the pairs of a query, ascending. @param all whether pairs that are not among these are near no more, so
-  /// that what is known of them can go @param wants (const BodyPair&) → bool: whether a pair that is new is to have one
+  /// Those of the pairs of a query, ascending; others are near no more. @param wants (const BodyPair&) → bool: whether
+  /// a pair that is new is to have one
   template <class Wants>
-  void match(std::span<const BodyPair> pairs, bool all, const Wants& wants) {
+  void match(std::span<const BodyPair> pairs, const Wants& wants) {
     next_.clear();
     next_.reserve(all_.size());
     of_pair_.clear();
     auto known = known_.begin();
     const auto pass = [&](const BodyPair* before) {
-      for (; known != known_.end() && (before == nullptr || known->pair < *before); ++known)
-        all ? give_back(known->memory) : next_.push_back(*known);
+      for (; known != known_.end() && (before == nullptr || known->pair < *before); ++known) give_back(known->memory);
     };
     for (const BodyPair& pair : pairs) {
       pass(&pair);

@@ -15,19 +15,16 @@ class SurfacePool {
   /// Forgets all states.
   void start_query() { ++query_; }
 
-  enum class Instant { kNow, kEnd };
-
-  /// The surface of a body in the query's state, or where that ends; the last four that were asked for stay.
-  DeformedSurface& get(Index body, Instant instant, const std::shared_ptr<const CollisionSurface>& surface,
-                       std::span<const double> z, BoundsChoice choice) {
+  /// The surface of a body in the query's state; the last four that were asked for stay.
+  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+                       BoundsChoice choice) {
     Slot* oldest = slots_.data();
     for (Slot& slot : slots_) {
-      if (slot.body == body && slot.instant == instant && slot.query == query_) return slot.use(++clock_);
+      if (slot.body == body && slot.query == query_) return slot.use(++clock_);
       if (slot.used < oldest->used) oldest = &slot;
     }
     oldest->surface.bind(surface, z, choice);
     oldest->body = body;
-    oldest->instant = instant;
     oldest->query = query_;
     return oldest->use(++clock_);
   }
@@ -36,7 +33,6 @@ class SurfacePool {
   struct Slot {
     DeformedSurface surface;
     Index body = -1;
-    Instant instant = Instant::kNow;
     std::uint64_t query = 0, used = 0;
     DeformedSurface& use(std::uint64_t now) {
       used = now;

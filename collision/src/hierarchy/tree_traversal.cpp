@@ -104,7 +104,7 @@ double distance_to_box(const Vec3& p, const Aabb& box) {
 }
 
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
-                         std::vector<TrianglePair>& pairs, const Vec3& way_A, NodePairTest* test) {
+                         std::vector<TrianglePair>& pairs, const Vec3& way_A) {
   if (!(margin >= 0.0)) throw InvalidArgument("find_triangle_pairs: margin is negative or not a number, expected ≥ 0");
   const double way = way_A.norm();
   if (Separation(X_AB)(a.bounds(0), b.bounds(0)) > margin + way) return;
@@ -116,7 +116,6 @@ void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTran
   stack[count++] = {0, 0};
   while (count > 0) {
     const auto [m, n] = stack[--count];
-    if (test != nullptr && test->leaves_out(m, n)) continue;
     const TreeNode &ma = a.surface().node(m), &nb = b.surface().node(n);
     if (ma.leaf() && nb.leaf()) {
       append_leaf_pairs(boxes_a, boxes_b, m, n, frames, pairs);

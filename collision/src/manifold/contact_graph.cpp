@@ -2,13 +2,12 @@
 
 namespace limber::internal {
 
-void ContactGraph::match(std::span<const BodyPair> pairs, bool all) {
+void ContactGraph::match(std::span<const BodyPair> pairs) {
   next_.clear();
   matched_.clear();
   auto known = known_.begin();
   const auto pass = [&](const BodyPair* before) {
-    for (; known != known_.end() && (before == nullptr || known->pair < *before); ++known)
-      all ? give_back(known->slot) : next_.push_back(*known);
+    for (; known != known_.end() && (before == nullptr || known->pair < *before); ++known) give_back(known->slot);
   };
   for (const BodyPair& pair : pairs) {
     pass(&pair);

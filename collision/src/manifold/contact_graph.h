@@ -49,9 +49,8 @@ class ContactGraph {
  public:
   /// Bodies of so many modes may come.
   void reserve(Index modes);
-  /// Finds or makes the pairs of a query, ascending.
-  /// @param all whether pairs that are not among these are near no more
-  void match(std::span<const BodyPair> pairs, bool all);
+  /// Finds or makes the pairs of a query, ascending; others are near no more.
+  void match(std::span<const BodyPair> pairs);
   std::size_t size() const { return matched_.size(); }
   LivePair& at(std::size_t i) { return slots_[matched_[i]]; }  ///< of the i-th of the last match()
   const LivePair& at(std::size_t i) const { return slots_[matched_[i]]; }

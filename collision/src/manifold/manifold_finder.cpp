@@ -11,7 +11,6 @@
 #include "field/field_pairs.h"
 #include "finder/contact_id.h"
 #include "limber/collision/broad_phase.h"
-#include "limber/collision/contact_finder.h"
 #include "limber/core/error.h"
 #include "manifold/contact_graph.h"
 #include "manifold/manifold_points.h"
@@ -146,16 +145,15 @@ struct ManifoldFinder::Impl {
   std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
   BroadPhase broad_phase;
   ContactGraph graph;
-  ContactFinder impacts;                                ///< knows the same bodies
   std::unique_ptr<internal::DeformingPairs> deforming;  ///< null: NarrowPhase finds all contacts of what deforms
   ManifoldWorkers workers;
 
   // Of the query under way.
   std::span<const BodyState> states;
-  std::span<const Index> some, awake;
+  std::span<const Index> awake;
   double margin = 0.0;
   Vec3 origin = Vec3::Zero(), fall = Vec3::Zero();
-  std::vector<Index> to_place, near;
+  std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
   std::vector<std::uint8_t> recycled;                ///< by pair
@@ -177,7 +175,6 @@ struct ManifoldFinder::Impl {
   ManifoldBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
   const ManifoldBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
   const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
-  bool asked_for(Index body) const { return some.empty() || std::binary_search(some.begin(), some.end(), body); }
 
   void set_finds_itself(Index body, bool finds);
   void check_and_list();
@@ -241,10 +238,9 @@ void ManifoldFinder::Impl::check_and_list() {
     check_body_state(index, at(index), state(index));
     to_place.push_back(index);
   };
-  const std::span<const Index> known = some.empty() ? awake : some;
-  for (std::size_t i = 0; known.empty() && i < bodies.size(); ++i)
+  for (std::size_t i = 0; awake.empty() && i < bodies.size(); ++i)
     if (bodies[i].present) list(static_cast<Index>(i));
-  for (const Index index : known)
+  for (const Index index : awake)
     if (contains(index)) list(index);
 }
 
@@ -306,18 +302,7 @@ void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   if (deforming) deforming->start_query(bodies, states, to_place, jobs);
   make_boxes(jobs);
   place();
-  if (some.empty()) {
-    broad_phase.find_pairs(margin, pairs, jobs);
-  } else {
-    pairs.clear();
-    for (const Index index : to_place) {
-      near.clear();
-      broad_phase.find_near(index, margin, margin, near);
-      for (const Index other : near)
-        if (index < other || !asked_for(other)) pairs.push_back({std::min(index, other), std::max(index, other)});
-    }
-    std::sort(pairs.begin(), pairs.end());
-  }
+  broad_phase.find_pairs(margin, pairs, jobs);
   for (const auto& [a, b] : pairs)
     for (const Index index : {a, b})
       if (state(index).asleep) check_body_state(index, at(index), state(index));
@@ -329,7 +314,7 @@ void ManifoldFinder::Impl::merge_self_pairs() {
   merged_pairs.clear();
   auto next = pairs.begin();
   for (const Index body : self_touching) {
-    if (state(body).asleep || !asked_for(body)) continue;
+    if (state(body).asleep) continue;
     const BodyPair self{body, body};
     for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
     merged_pairs.push_back(self);
@@ -528,7 +513,7 @@ void ManifoldFinder::Impl::keep_inner_balls(const FeatureContact& deepest, const
 }
 
 void ManifoldFinder::Impl::find_manifolds(Jobs& jobs) {
-  graph.match(pairs, some.empty());
+  graph.match(pairs);
   recycled.resize(pairs.size());
   jobs.parallel_for(pairs.size(), internal::collision_tuning().finder.pairs_per_chunk,
                     [this](std::size_t begin, std::size_t end) {
@@ -745,7 +730,13 @@ ManifoldFinder& ManifoldFinder::operator=(ManifoldFinder&&) noexcept = default;
 void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Impl& m = *impl_;
-  m.impacts.add_body(body, geometry, filter);  // which checks
+  if ((geometry.model == nullptr) == (geometry.shape == nullptr))
+    throw InvalidArgument("ManifoldFinder::add_body: body " + std::to_string(body) + " has " +
+                          (geometry.model ? "both a model and a shape" : "neither a model nor a shape") +
+                          ", expected one of them");
+  if (body < 0 || m.contains(body))
+    throw InvalidArgument("ManifoldFinder::add_body: index " + std::to_string(body) +
+                          (body < 0 ? "" : " holds a body") + ", expected a free index of at least 0");
   ManifoldBody fresh{.present = true};
   if (geometry.model) {
     fresh.modal = m.geometries.get(geometry.model, geometry.skin);
@@ -772,7 +763,6 @@ void ManifoldFinder::remove_body(Index body) {
   impl_->set_finds_itself(body, false);
   impl_->graph.forget(body);
   impl_->broad_phase.remove(body);
-  impl_->impacts.remove_body(body);
   if (impl_->deforming) impl_->deforming->remove_body(body);
   impl_->at(body) = {};
 }
@@ -780,7 +770,6 @@ void ManifoldFinder::remove_body(Index body) {
 void ManifoldFinder::set_filter(Index body, const CollisionFilter& filter) {
   const ManifoldBody& known = impl_->present(body, "set_filter");
   impl_->broad_phase.set_filter(body, filter);
-  impl_->impacts.set_filter(body, filter);
   impl_->set_finds_itself(body, filter.self && known.modal);
 }
 
@@ -788,7 +777,6 @@ void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) {
   impl_->present(a, "exclude_pair");
   impl_->present(b, "exclude_pair");
   impl_->broad_phase.exclude_pair(a, b, excluded);
-  impl_->impacts.exclude_pair(a, b, excluded);
 }
 
 void ManifoldFinder::save_state(StateWriter& state) const {
@@ -813,7 +801,7 @@ void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<Contac
                           ", expected a finite number of at least 0");
   if (!query.origin.allFinite() || !query.fall.allFinite())
     throw InvalidArgument("ManifoldFinder: origin or fall is not finite, expected finite coordinates");
-  m.states = query.states, m.some = query.bodies, m.awake = query.awake;
+  m.states = query.states, m.awake = query.awake;
   m.margin = query.margin, m.origin = query.origin, m.fall = query.fall;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
@@ -823,16 +811,6 @@ void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<Contac
   m.level_seams();
   m.write_contacts(contacts, jobs);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
-}
-
-/// The places that it knows may be old where it is asked for a few bodies: it makes all of them anew.
-void ManifoldFinder::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) {
-  ImpactQuery all = query;
-  all.bodies = {};
-  impl_->impacts.find_impacts(all, impacts, jobs);
-  if (query.bodies.empty()) return;
-  const auto asked = [&](Index body) { return std::ranges::binary_search(query.bodies, body); };
-  std::erase_if(impacts, [&](const Impact& impact) { return !asked(impact.a) && !asked(impact.b); });
 }
 
 const ManifoldFinder::Counts& ManifoldFinder::counts() const { return impl_->told; }

@@ -72,8 +72,7 @@ class PairFinder {
 
   /// A body that deforms, in its state of this query.
   DeformedSurface& surface(Index index, const ManifoldBody& body, const BodyState& state) {
-    return pool_.get(index, SurfacePool::Instant::kNow, body.modal->surface, state.amplitudes,
-                     BoundsChoice::kAutomatic);
+    return pool_.get(index, body.modal->surface, state.amplitudes, BoundsChoice::kAutomatic);
   }
 
  private:

@@ -195,7 +195,6 @@ struct NarrowPhase::Impl {
             PairMemory* memory);
   void on_half_space(const CollisionBody& body, const RigidTransform& X_BH, const HalfSpace& shape, double margin);
   void against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core, double margin);
-  void expect_ends(const CollisionBody& a, const CollisionBody& b);
   void flip();
   void deliver(const CollisionBody& a, const RigidTransform& X_AF, const CollisionBody& b, const RigidTransform& X_BF,
                const RigidTransform& X_OF, std::vector<ContactPoint>& contacts);
@@ -273,17 +272,6 @@ std::array<OverlapRule*, 2> NarrowPhase::Impl::rules(const CollisionBody& a, con
   return chosen;
 }
 
-// As seen from a frame that goes with the origin of a, and does not turn.
-void NarrowPhase::Impl::expect_ends(const CollisionBody& a, const CollisionBody& b) {
-  const Quaternion to_a = a.X_WB.q.conjugate();
-  const CollisionBody* body[2] = {&a, &b};
-  for (std::size_t i = 0; i < 2; ++i) {
-    if (!std::isfinite(body[i]->doubt)) continue;
-    DeformedSurface& end = body[i]->end_surface != nullptr ? *body[i]->end_surface : surface[i].deformed();
-    surface[i].expect_end(end, {to_a * body[i]->end_X_WB.q, to_a * (body[i]->end_X_WB.p - a.end_X_WB.p)});
-  }
-}
-
 void NarrowPhase::Impl::flip() {
   for (FeatureContact& c : found) c = flipped(c);
 }
@@ -334,11 +322,10 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     surface[0].expect_motion(to_a * a.displacement, to_a * a.rotation);
     surface[1].expect_motion(to_a * b.displacement, to_a * b.rotation);
     const auto [rule_a, rule_b] = rules(a, b, X_AB);
-    expect_ends(a, b);
     const Vec3 way_A = to_a * (b.displacement - a.displacement);
     surface_contacts.find(surface[0], surface[1], X_AB,
-                          {margin, a.reach + b.reach, way_A, a.doubt + b.doubt, std::max(a.left_alone, b.left_alone)},
-                          rule_a, rule_b, memory, found);
+                          {margin, a.reach + b.reach, way_A, std::max(a.left_alone, b.left_alone)}, rule_a, rule_b,
+                          memory, found);
   }
 }
 

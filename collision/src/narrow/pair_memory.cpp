@@ -23,7 +23,7 @@ PairMemory::Advice PairMemory::advise(const State& now) {
   z_b_.assign(now.z_b.begin(), now.z_b.end());
   margin_ = now.margin;
   slack_ = tuning.slack * now.margin;
-  listed_ = std::max(moved, now.expected) <= tuning.when * slack_;
+  listed_ = moved <= tuning.when * slack_;
   return listed_ ? Advice::kList : Advice::kSearch;
 }
 

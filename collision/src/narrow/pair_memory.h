@@ -39,7 +39,6 @@ class PairMemory {
     RigidTransform X_AB;
     std::span<const double> z_a, z_b;
     double margin;
-    double expected;  // how far points are expected to move against each other until the next query; 0: not known
   };
   enum class Advice {
     kSearch,  // bodies that move: a list would not last

@@ -46,19 +46,12 @@ void PairSurface::bind(DeformedSurface& deformed, const RigidTransform& X_PS, do
   up_ = X_PS.q * solid_below;
   tolerance_ = tolerance, directionless_ = collision_tuning().narrow.directionless * tolerance;
   X_PS_ = X_PS, X_SP_ = X_PS.inverse();
-  turn_PS_ = to_matrix(X_PS.q);
   displacement_ = rotation_ = Vec3::Zero();
-  end_ = nullptr;
   sided_ = surface().closed() || surface().model() == nullptr;
   grow(vertices_, surface().vertices()), grow(vertex_stamp_, surface().vertices());
-  grow(end_vertices_, surface().vertices()), grow(end_vertex_stamp_, surface().vertices());
   grow(faces_, surface().triangles()), grow(face_stamp_, surface().triangles());
-  grow(swept_, surface().triangles()), grow(swept_stamp_, surface().triangles());
-  const auto nodes = static_cast<Index>(surface().nodes().size());
-  grow(swept_nodes_, nodes), grow(swept_node_stamp_, nodes);
   if (++generation_ == 0) {  // after 2³² queries the old stamps would come to life again
-    for (std::vector<std::uint32_t>* stamps :
-         {&vertex_stamp_, &face_stamp_, &swept_stamp_, &swept_node_stamp_, &end_vertex_stamp_})
+    for (std::vector<std::uint32_t>* stamps : {&vertex_stamp_, &face_stamp_})
       std::fill(stamps->begin(), stamps->end(), 0u);
     generation_ = 1;
   }
@@ -85,44 +78,6 @@ void PairSurface::make_face(Index t) {
     f.inward[c] = length > 0.0 ? Vec3(f.normal.cross(edge[c]) / length) : Vec3(Vec3::Zero());
   }
   face_stamp_[i] = generation_;
-}
-
-const Vec3& PairSurface::end_vertex(Index v) {
-  const auto i = static_cast<std::size_t>(v);
-  if (end_vertex_stamp_[i] != generation_) {
-    end_vertices_[i] = end_X_PS_ * end_->vertex(v);
-    end_vertex_stamp_[i] = generation_;
-  }
-  return end_vertices_[i];
-}
-
-const Aabb& PairSurface::swept_box(Index t) {
-  const auto i = static_cast<std::size_t>(t);
-  if (swept_stamp_[i] != generation_) {
-    swept_[i] = {};
-    for (const Index v : surface().triangle(t)) {
-      swept_[i].include(vertex(v));
-      swept_[i].include(end_vertex(v));
-    }
-    swept_stamp_[i] = generation_;
-  }
-  return swept_[i];
-}
-
-const Aabb& PairSurface::swept_node(Index n) {
-  const auto i = static_cast<std::size_t>(n);
-  if (swept_node_stamp_[i] != generation_) {
-    const auto placed = [](const RigidTransform& X, const Mat3& turn, const Aabb& box) {
-      const Vec3 center = X.p + turn * box.center(), half = turn.cwiseAbs() * box.half_extents();
-      return Aabb{center - half, center + half};
-    };
-    Aabb& swept = swept_nodes_[i];
-    swept = placed(X_PS_, turn_PS_, deformed_->bounds(n));
-    swept.include(placed(end_X_PS_, end_turn_PS_, end_->bounds(n)));
-    swept = swept.grown(tolerance_);
-    swept_node_stamp_[i] = generation_;
-  }
-  return swept_nodes_[i];
 }
 
 bool PairSurface::edge_minimum(const Vec3& p, Index e, double reach, Minimum& minimum) {

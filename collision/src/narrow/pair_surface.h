@@ -128,16 +128,6 @@ class PairSurface {
   void expect_motion(const Vec3& displacement, const Vec3& rotation) {
     displacement_ = displacement, rotation_ = rotation;
   }
-  // Where the surface is expected to be when contacts are looked for again. Until the next bind().
-  void expect_end(DeformedSurface& end, const RigidTransform& X_PS) {
-    end_ = &end;
-    end_X_PS_ = X_PS;
-    end_turn_PS_ = to_matrix(X_PS.q);
-  }
-  // What a face passes through on the straight way there. @pre expect_end()
-  const Aabb& swept_box(Index t);
-  // The same of all faces below a node of its tree.
-  const Aabb& swept_node(Index n);
   Vec3 expected_motion(const Vec3& point) const { return displacement_ + rotation_.cross(point - X_PS_.p); }
 
   // Faces that meet at a feature, whose key is that of a vertex, an edge or a face.
@@ -194,7 +184,6 @@ class PairSurface {
     return way.triangle >= 0 && way.distance > tolerance_;
   }
   void make_vertex(Index v);
-  const Vec3& end_vertex(Index v);
   void make_face(Index t);
   bool on_rim(Index t, const Feature& feature) const;
   bool edge_minimum(const Vec3& p, Index e, double reach, Minimum& minimum);
@@ -207,12 +196,6 @@ class PairSurface {
   Vec3 up_ = Vec3::Zero();  // in the pair's frame
   double tolerance_ = 0.0, directionless_ = 0.0;
   Vec3 displacement_ = Vec3::Zero(), rotation_ = Vec3::Zero();
-  DeformedSurface* end_ = nullptr;
-  RigidTransform end_X_PS_{};
-  Mat3 turn_PS_ = Mat3::Identity(), end_turn_PS_ = Mat3::Identity();
-  std::vector<std::uint32_t> swept_stamp_, swept_node_stamp_, end_vertex_stamp_;
-  std::vector<Vec3> end_vertices_;
-  std::vector<Aabb> swept_, swept_nodes_;
   std::uint32_t generation_ = 0;
   std::vector<std::uint32_t> vertex_stamp_, face_stamp_;
   std::vector<Vec3> vertices_;

@@ -21,19 +21,6 @@ bool planes_separate(const PairSurface::Face& s, const PairSurface::Face& t, dou
   return beyond(s, t.x) || beyond(t, s.x);
 }
 
-// Nodes that stay apart on the way to where the bodies are expected: stay_apart() holds for all triangles below.
-class OnTheWay final : public NodePairTest {
- public:
-  OnTheWay(PairSurface& a, PairSurface& b, double doubt) : a_(a), b_(b), doubt_(doubt) {}
-  bool leaves_out(Index node_a, Index node_b) override {
-    return apart(a_.swept_node(node_a), b_.swept_node(node_b), doubt_);
-  }
-
- private:
-  PairSurface &a_, &b_;
-  double doubt_;
-};
-
 }  // namespace
 
 void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool self,
@@ -92,44 +79,26 @@ void SurfaceContacts::test_pairs(const RigidTransform& X_AB, const ContactReach&
                              .X_AB = X_AB,
                              .z_a = side_[0]->deformed().amplitudes(),
                              .z_b = side_[1]->deformed().amplitudes(),
-                             .margin = margin_,
-                             .expected = reach.expected()});
+                             .margin = margin_});
   if (advice == PairMemory::Advice::kSearch) {
     find_pairs(X_AB, reach);
-    for (const auto& [s, t] : pairs_)
-      if (!stay_apart(s, t, reach.doubt)) test_pair(s, t, kAllTests);
+    for (const auto& [s, t] : pairs_) test_pair(s, t, kAllTests);
     return;
   }
   if (advice == PairMemory::Advice::kList) list_tests(X_AB, *memory);
-  // Most of a list's tests find nothing: whether its triangles stay apart is asked of those alone that do.
-  for (const auto& [s, t, tests] : memory->list()) {
-    undecided_ = {s, t, reach.doubt, std::isfinite(reach.doubt)};
-    test_pair(s, t, tests);
-  }
-  undecided_ = {};
-}
-
-bool SurfaceContacts::counts() {
-  if (undecided_.asked) undecided_ = {.counts = !stay_apart(undecided_.s, undecided_.t, undecided_.doubt)};
-  return undecided_.counts;
+  for (const auto& [s, t, tests] : memory->list()) test_pair(s, t, tests);
 }
 
 // The way counts as far as gaps go.
 void SurfaceContacts::find_pairs(const RigidTransform& X_AB, const ContactReach& reach) {
   DeformedSurface &a = side_[0]->deformed(), &b = side_[1]->deformed();
-  OnTheWay on_the_way(*side_[0], *side_[1], reach.doubt);
-  NodePairTest* test = std::isfinite(reach.doubt) ? &on_the_way : nullptr;
   if (reach.all_around()) {
-    find_triangle_pairs(a, b, X_AB, reach.margin, pairs_, Vec3::Zero(), test);
+    find_triangle_pairs(a, b, X_AB, reach.margin, pairs_);
     return;
   }
   const double way = reach.way_A.norm();
   const double share = way > 0.0 ? std::min(1.0, (reach.margin - reach.beside) / way) : 0.0;
-  find_triangle_pairs(a, b, X_AB, reach.beside, pairs_, share * reach.way_A, test);
-}
-
-bool SurfaceContacts::stay_apart(Index s, Index t, double doubt) {
-  return std::isfinite(doubt) && apart(side_[0]->swept_box(s), side_[1]->swept_box(t), doubt);
+  find_triangle_pairs(a, b, X_AB, reach.beside, pairs_, share * reach.way_A);
 }
 
 void SurfaceContacts::list_tests(const RigidTransform& X_AB, PairMemory& memory) {
@@ -192,7 +161,7 @@ void SurfaceContacts::test_vertices(int of, Index s, Index t, FeatureTests tests
 void SurfaceContacts::vertex_against_face(int of, Index v, Index t) {
   PairSurface &mine = *side_[of], &other = *side_[1 - of];
   other.for_each_minimum(mine.vertex(v), t, margin_, self_, [&](const PairSurface::Minimum& minimum) {
-    if (mine.sees(v, minimum.at.point) && counts()) add_vertex(of, v, minimum);
+    if (mine.sees(v, minimum.at.point)) add_vertex(of, v, minimum);
   });
 }
 
@@ -342,7 +311,7 @@ void SurfaceContacts::test_edges(Index s, Index t, FeatureTests tests) {
     for (int d = 0; d < 3; ++d) {
       if ((tests & edge_test(c, d)) == 0 || (!self_ && !side_[1]->owns_edge(t, d))) continue;
       const EdgePair pair = nearest_of_edges(side_[0]->surface().edge_of(s, c), side_[1]->surface().edge_of(t, d));
-      if (pair.distance <= margin_ && counts()) add_separated_edges(pair);
+      if (pair.distance <= margin_) add_separated_edges(pair);
     }
   }
 }

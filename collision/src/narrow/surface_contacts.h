@@ -34,18 +34,13 @@ class SelfOverlapRule {
 
 // How far apart two surfaces may be to have contacts, m.
 struct ContactReach {
-  double margin = 0.0;                                     // of gaps
-  double beside = 0.0;                                     // how near their boxes are to come to each other on the way
-  Vec3 way_A = Vec3::Zero();                               // of b as seen from a
-  double doubt = std::numeric_limits<double>::infinity();  // how near faces are to come to each other; finite: their
-                                                           // ends are known
-  double passed = 0.0;  // by how much a plane may have been passed and still keeps the bodies apart, at least
+  double margin = 0.0;        // of gaps
+  double beside = 0.0;        // how near their boxes are to come to each other on the way
+  Vec3 way_A = Vec3::Zero();  // of b as seen from a
+  double passed = 0.0;        // by how much a plane may have been passed and still keeps the bodies apart, at least
 
-  // How far points are expected to move against each other; 0: not known.
-  double expected() const { return std::isfinite(doubt) ? std::max(0.0, beside - doubt) + way_A.norm() : 0.0; }
-  // Whether boxes are looked at all around, as gaps go: of a way that is short beside what is on all sides of it there
-  // is little to save.
-  bool all_around() const { return beside >= margin || (std::isfinite(doubt) && margin <= 1.1 * beside); }
+  // Whether boxes are looked at all around, as gaps go.
+  bool all_around() const { return beside >= margin; }
 };
 
 class SurfaceContacts {
@@ -88,8 +83,6 @@ class SurfaceContacts {
   void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
   void test_pairs(const RigidTransform& X_AB, const ContactReach& reach, PairMemory* memory);
   void find_pairs(const RigidTransform& X_AB, const ContactReach& reach);
-  bool stay_apart(Index s, Index t, double doubt);
-  bool counts();
   void list_tests(const RigidTransform& X_AB, PairMemory& memory);
   FeatureTests tests_within(Index s, Index t, double reach, double slack);
   void test_pair(Index s, Index t, FeatureTests tests);
@@ -138,13 +131,6 @@ class SurfaceContacts {
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
   std::vector<ListedTests> listed_;
-  // The triangles under way: whether what they find counts, or how to tell once they have found something.
-  struct Undecided {
-    Index s = -1, t = -1;
-    double doubt = 0.0;
-    bool asked = false, counts = true;
-  };
-  Undecided undecided_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;
   DisjointSets loops_;

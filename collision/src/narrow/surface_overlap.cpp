@@ -25,7 +25,7 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   const Vec3 p = x0 + std::clamp(h0 / (h0 - h1), 0.0, 1.0) * (x1 - x0);
   double within = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
-  if (within < -tolerance_ || !counts()) return;
+  if (within < -tolerance_) return;
   if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], t});
   // An edge that only begins or ends on the face, or meets its rim, touches it.
   if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});

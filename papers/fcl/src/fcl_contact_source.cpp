@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 #include <string>
-#include <tuple>
 
 #include "fcl_body.h"
 #include "fcl_touches.h"
@@ -16,9 +14,7 @@
 #include "finder/contact_regions.h"
 #include "finder/found_body.h"
 #include "finder/world_bounds.h"
-#include "limber/collision/time_of_impact.h"
 #include "limber/core/error.h"
-#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 
@@ -47,9 +43,6 @@ void check_length(const char* name, double length) {
 bool finite(std::span<const double> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double z) { return std::isfinite(z); });
 }
-
-/// How far contacts of features are looked for, as ContactFinder does.
-double reach_of_features(const BodyState& state) { return std::min(state.way(), state.look_ahead); }
 
 }  // namespace
 
@@ -84,28 +77,15 @@ struct FclContactSource::Impl {
     return at(body);
   }
   const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
-  const ExactMotion* motion(Index body) const {
-    return static_cast<std::size_t>(body) < query.motions.size() ? query.motions[static_cast<std::size_t>(body)]
-                                                                 : nullptr;
-  }
-  bool asked_for(Index body) const {
-    return query.some.empty() || std::binary_search(query.some.begin(), query.some.end(), body);
-  }
   template <class Visit>
-  void for_each_asked(const Visit& visit) {
-    if (query.some.empty())
-      for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i) {
-        if (contains(i)) visit(i);
-      }
-    else
-      for (const Index i : query.some)
-        if (contains(i)) visit(i);
+  void for_each(const Visit& visit) {
+    for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i)
+      if (contains(i)) visit(i);
   }
 
   void check(Index body) const;
   void place_all();
   void set_box(Index body, const Aabb& box);
-  Aabb swept_box(Index body);
   bool may_meet(Index a, Index b) const;
   bool planes_meet(Index plane, Index body) const;
   void find_pairs();
@@ -113,9 +93,8 @@ struct FclContactSource::Impl {
   double reach(const BodyPair& pair) const;
   RegionSide region_side(Index body) const;
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
-  void find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts, ContactRegions& regions);
+  void find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts);
   void keep(const std::vector<ContactPoint>& contacts);
-  MovingBody moving_body(Index body) const;
 
   FclContactOptions options;
   internal::GeometryCache geometries;
@@ -126,30 +105,19 @@ struct FclContactSource::Impl {
   ContactClusters clusters;
   internal::RegionFinder region_finder;
   internal::FclTouches touches;
-  TimeOfImpact time_of_impact;
-  DeformedSurface root;
 
   struct Query {
     std::span<const BodyState> states;
-    std::span<const ExactMotion* const> motions;
-    std::span<const Index> some;
     double margin = 0.0;
     Vec3 origin = Vec3::Zero();
     std::vector<BodyPair> pairs;
-    std::vector<double> amplitudes, shape;
-    ContactRegions regions_of_all, regions_of_some;
+    ContactRegions regions;
   } query;  ///< under way
 
   std::map<BodyPair, std::vector<std::uint64_t>> kept;  ///< ids of the last query's contacts, ascending
 };
 
 void FclContactSource::Impl::check(Index body) const {
-  if (motion(body) != nullptr) {
-    if (motion(body)->modes() != at(body).fcl->modes())
-      refuse(body, "a motion of " + std::to_string(motion(body)->modes()) + " modes",
-             std::to_string(at(body).fcl->modes()));
-    return;
-  }
   if (static_cast<std::size_t>(body) >= query.states.size())
     throw InvalidArgument("FclContactSource: " + std::to_string(query.states.size()) +
                           " states, expected one for body " + std::to_string(body) + " too");
@@ -162,7 +130,6 @@ void FclContactSource::Impl::check(Index body) const {
   if (!s.displacement.allFinite()) refuse(body, "displacement is not finite", "finite numbers");
   if (!(s.reach >= 0.0 && std::isfinite(s.reach)))
     refuse(body, "reach is " + std::to_string(s.reach), "a finite number of at least 0");
-  if (!(s.look_ahead >= 0.0)) refuse(body, "look_ahead is " + std::to_string(s.look_ahead), "a number of at least 0");
 }
 
 void FclContactSource::Impl::set_box(Index body, const Aabb& box) {
@@ -176,67 +143,34 @@ void FclContactSource::Impl::set_box(Index body, const Aabb& box) {
   known.placed = true;
 }
 
-/// Of what moves, from the states or along the motions.
 void FclContactSource::Impl::place_all() {
   moved.clear();
-  for_each_asked([this](Index i) { check(i); });
-  for_each_asked([this](Index i) {
+  for_each([this](Index i) { check(i); });
+  for_each([this](Index i) {
     Known& known = at(i);
-    if (motion(i) != nullptr) {
-      set_box(i, swept_box(i));
-      known.placed_asleep = false;
-      return;
-    }
     const BodyState& s = state(i);
     if (s.asleep && known.placed_asleep) return;
     known.fcl->place(s.pose, s.amplitudes);
     // Half the margin on either side of a gap.
-    set_box(i, known.fcl->box().grown(reach_of_features(s) + 0.5 * query.margin));
+    set_box(i, known.fcl->box().grown(s.way() + 0.5 * query.margin));
     known.placed_asleep = s.asleep;
   });
   manager.update(moved);
 }
 
-Aabb FclContactSource::Impl::swept_box(Index body) {
-  const FclBody& b = *at(body).fcl;
-  if (b.half_space() != nullptr) return {};
-  const ExactMotion& m = *motion(body);
-  Aabb box;
-  if (b.modal() == nullptr) {
-    box = swept(b.rigid()->bounds(), {}, m);
-  } else {
-    RigidTransform pose;
-    query.amplitudes.resize(static_cast<std::size_t>(b.modes()));
-    m.at(0.0, pose, query.amplitudes);
-    root.bind(b.modal()->surface, query.amplitudes);
-    query.shape = b.modal()->surface->model()->collision_extent().shape;
-    if (b.modal()->surface->skin() != nullptr) {
-      m.changes(query.amplitudes);
-      root.skin_extent(query.amplitudes, query.shape);
-    }
-    box = swept(root.bounds(0), query.shape, m);
-  }
-  return box.grown(0.5 * query.margin);
-}
-
 bool FclContactSource::Impl::may_meet(Index a, Index b) const {
   const Known &s = at(a), &t = at(b);
-  const bool stay = motion(a) == nullptr && motion(b) == nullptr && s.placed_asleep && t.placed_asleep;
+  const bool stay = s.placed_asleep && t.placed_asleep;
   return (s.filter.layers & t.filter.mask) != 0 && (t.filter.layers & s.filter.mask) != 0 && !stay &&
          !s.apart.contains(b);
 }
 
 /// By the box of the body.
 bool FclContactSource::Impl::planes_meet(Index plane, Index body) const {
-  if (motion(plane) != nullptr) return true;
   const HalfSpace h = internal::world_half_space(*at(plane).fcl->half_space(), state(plane).pose);
   const auto& box = at(body).fcl->broad().getAABB();
   const Vec3 half = 0.5 * (box.max_ - box.min_);
-  const bool in_flight = motion(body) != nullptr;
-  // The box has been grown by what features are looked for; a plane is one for good.
-  const double farther = in_flight ? 0.0 : state(body).way() - reach_of_features(state(body));
-  const double beyond = query.margin + farther + (in_flight ? 0.0 : state(plane).way());
-  return h.normal.dot(box.center()) - h.offset - h.normal.cwiseAbs().dot(half) <= beyond;
+  return h.normal.dot(box.center()) - h.offset - h.normal.cwiseAbs().dot(half) <= query.margin + state(plane).way();
 }
 
 void FclContactSource::Impl::add_pair(Index a, Index b) {
@@ -250,26 +184,17 @@ void FclContactSource::Impl::find_pairs() {
     if (a != b) static_cast<Impl*>(self)->add_pair(a, b);
     return false;
   };
-  if (query.some.empty())
-    manager.collide(this, visit);
-  else
-    for_each_asked([&](Index i) {
-      if (at(i).placed) manager.collide(&at(i).fcl->broad(), this, visit);
-    });
+  manager.collide(this, visit);
   for (const Index plane : planes)
     for (Index i = 0; i < static_cast<Index>(bodies.size()); ++i)
-      if (contains(i) && at(i).placed && (asked_for(i) || asked_for(plane)) && may_meet(plane, i) &&
-          planes_meet(plane, i))
-        add_pair(plane, i);
+      if (contains(i) && at(i).placed && may_meet(plane, i) && planes_meet(plane, i)) add_pair(plane, i);
   std::ranges::sort(query.pairs);
   query.pairs.erase(std::unique(query.pairs.begin(), query.pairs.end()), query.pairs.end());
 }
 
 double FclContactSource::Impl::reach(const BodyPair& pair) const {
   const BodyState &s = state(pair.a), &t = state(pair.b);
-  const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
-  const bool plane = planes.contains(pair.a) || planes.contains(pair.b);
-  return query.margin + (plane ? together : std::min(together, reach_of_features(s) + reach_of_features(t)));
+  return query.margin + (s.displacement - t.displacement).norm() + s.reach + t.reach;
 }
 
 RegionSide FclContactSource::Impl::region_side(Index body) const {
@@ -285,8 +210,7 @@ ContactSpacing FclContactSource::Impl::spacing(const BodyPair& pair, bool by_reg
   return {.length = options.spacing * std::min(a.diagonal(), b.diagonal())};
 }
 
-void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts,
-                                          ContactRegions& regions) {
+void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts) {
   const std::size_t first = contacts.size();
   touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), query.origin, contacts);
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
@@ -295,21 +219,13 @@ void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<Cont
   const auto known = kept.find(pair);
   clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone),
                   known == kept.end() ? std::span<const std::uint64_t>() : std::span(known->second), shares);
-  region_finder.find(clusters, shares, sides, regions);
-  regions.counts.resize(contacts.size(), {0, 0});
+  region_finder.find(clusters, shares, sides, query.regions);
+  query.regions.counts.resize(contacts.size(), {0, 0});
 }
 
 void FclContactSource::Impl::keep(const std::vector<ContactPoint>& contacts) {
-  std::erase_if(kept, [this](const auto& entry) { return asked_for(entry.first.a) || asked_for(entry.first.b); });
+  kept.clear();
   for (const ContactPoint& c : contacts) kept[{c.a.body, c.b.body}].push_back(c.id);
-}
-
-MovingBody FclContactSource::Impl::moving_body(Index body) const {
-  const FclBody& b = *at(body).fcl;
-  MovingBody result{.geometry = b.rigid(), .motion = motion(body)};
-  if (b.modal() != nullptr) result.surface = b.modal()->surface;
-  if (result.motion == nullptr) result.pose = state(body).pose, result.amplitudes = state(body).amplitudes;
-  return result;
 }
 
 FclContactSource::FclContactSource(const FclContactOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -365,41 +281,18 @@ void FclContactSource::find_contacts(const ContactQuery& query, std::vector<Cont
   check_length("margin", query.margin);
   if (!query.origin.allFinite())
     throw InvalidArgument("FclContactSource: origin is not finite, expected finite coordinates");
-  m.query.states = query.states, m.query.motions = {}, m.query.some = query.bodies;
+  m.query.states = query.states;
   m.query.margin = query.margin, m.query.origin = query.origin;
   StageClock clock(query.times);
   m.place_all();
   m.find_pairs();
   clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.query.pairs.size()));
   contacts.clear();
-  ContactRegions& regions = m.query.some.empty() ? m.query.regions_of_all : m.query.regions_of_some;
-  regions.clear();
-  for (const BodyPair& pair : m.query.pairs) m.find_in_pair(pair, contacts, regions);
-  regions.give_to(contacts);
+  m.query.regions.clear();
+  for (const BodyPair& pair : m.query.pairs) m.find_in_pair(pair, contacts);
+  m.query.regions.give_to(contacts);
   m.keep(contacts);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
-}
-
-void FclContactSource::find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs&) {
-  Impl& m = *impl_;
-  check_length("step", query.step);
-  check_length("margin", query.margin);
-  m.query.states = query.states, m.query.motions = query.motions, m.query.some = query.bodies;
-  m.query.margin = query.margin;
-  m.place_all();
-  m.find_pairs();
-  impacts.clear();
-  for (const BodyPair& pair : m.query.pairs) {
-    if (m.motion(pair.a) == nullptr && m.motion(pair.b) == nullptr) continue;
-    if (std::ranges::binary_search(query.except, std::pair(pair.a, pair.b))) continue;
-    using Status = ImpactTime::Status;
-    const ImpactTime t = m.time_of_impact.find(m.moving_body(pair.a), m.moving_body(pair.b), query.step, query.margin,
-                                               query.least_margin);
-    if (t.status == Status::kImpact || t.status == Status::kResting)
-      impacts.push_back({.a = pair.a, .b = pair.b, .time = t.time, .resting = t.status == Status::kResting});
-  }
-  std::sort(impacts.begin(), impacts.end(),
-            [](const Impact& i, const Impact& j) { return std::tie(i.time, i.a, i.b) < std::tie(j.time, j.a, j.b); });
 }
 
 void FclContactSource::save_state(StateWriter& state) const {

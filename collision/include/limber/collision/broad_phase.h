@@ -59,13 +59,7 @@ class BroadPhase {
   /// Replaces `pairs` by those that come within `margin` (m, ≥ 0) of each other along each axis (of a half-space: along
   /// its normal), pass both filters, are not excluded and do not both sleep; ascending. Two half-spaces are no pair.
   /// The same pairs for any Jobs. Allocates nothing once warm.
-  void find_pairs(double margin, std::vector<BodyPair>& pairs, Jobs& jobs) { find_pairs(margin, margin, pairs, jobs); }
-  /// The same with another margin, m, ≥ 0, for half-spaces.
-  void find_pairs(double margin, double plane_margin, std::vector<BodyPair>& pairs, Jobs& jobs);
-
-  /// Adds to `near` the bodies, ascending, that find_pairs() would pair with one that is awake. Looks at every body
-  /// once, and keeps no lists: for a few bodies, between two calls of find_pairs().
-  void find_near(Index body, double margin, double plane_margin, std::vector<Index>& near) const;
+  void find_pairs(double margin, std::vector<BodyPair>& pairs, Jobs& jobs);
 
  private:
   struct Impl;

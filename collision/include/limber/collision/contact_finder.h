@@ -45,11 +45,11 @@ struct ContactFinderOptions {
 
 /// Used by one thread at a time; it spreads the work over the Jobs of the query itself.
 ///
-/// What find_contacts() and find_impacts() refuse (InvalidArgument naming body and member, found before anything is
-/// changed): a pose that is not finite or whose quaternion is not of length 1 within 1e-6, another number of amplitudes
-/// than the body has modes, amplitudes that are not finite or move a vertex beyond 1e30 m, a reach or margin that is
-/// negative or not finite, and `states` that do not reach to every body. States of bodies that sleep are looked at when
-/// they fall asleep and when something comes near.
+/// What find_contacts() refuses (InvalidArgument naming body and member, found before anything is changed): a pose that
+/// is not finite or whose quaternion is not of length 1 within 1e-6, another number of amplitudes than the body has
+/// modes, amplitudes that are not finite or move a vertex beyond 1e30 m, a reach or margin that is negative or not
+/// finite, and `states` that do not reach to every body. States of bodies that sleep are looked at when they fall
+/// asleep and when something comes near.
 ///
 /// Ids: equal for the same features of the same two body indices, whatever happened between; made by mixing 64 bits, so
 /// that two contacts of different pairs have the same one with probability 2⁻⁶⁴.
@@ -66,7 +66,6 @@ class ContactFinder final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
   /// The ids of the last query's contacts: which of a patch are kept depends on them.
   void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;

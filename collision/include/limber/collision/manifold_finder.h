@@ -16,7 +16,7 @@
 /// *Real-Time Collision Detection*, 2005, 5.5).
 ///
 /// Contacts are *speculative*: those are found whose gap the motion that BodyState::displacement and reach tell may
-/// close, and a solver gives way to them by their gap. BodyState::look_ahead is not read. Two bodies that
+/// close, and a solver gives way to them by their gap. Two bodies that
 /// come or turn farther against each other than the thinner is thick are followed along the expected motion to where
 /// they first touch (TimeOfImpact), and on along what they touch, up to four times: contacts are those of these places,
 /// with gaps as they are now. What turns has one more there, of a ball inside of it, whose row holds however far it
@@ -85,8 +85,6 @@ class ManifoldFinder final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  /// As ContactFinder does.
-  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
   /// The graph, with its manifolds.
   void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;

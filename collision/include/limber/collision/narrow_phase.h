@@ -112,11 +112,6 @@ struct CollisionBody {
   /// How far any of its points may come beside that displacement, m, ≥ 0. Features of two surfaces whose boxes stay
   /// farther apart than both reaches all along both displacements are no contacts. Infinite: not known.
   double reach = std::numeric_limits<double>::infinity();
-  /// Where the surface is expected to be then, and how far any of its points may come beside the straight way there, m.
-  /// Features that this keeps apart are no contacts. Infinite: not known.
-  double doubt = std::numeric_limits<double>::infinity();
-  RigidTransform end_X_WB{};
-  DeformedSurface* end_surface = nullptr;  ///< null where geometry has the triangles
   /// By how much it may stand in another body and still be kept apart by the plane that it stands in, m, ≥ 0: what a
   /// solver leaves of overlaps. Bodies that slide over flush boxes are then not stopped by their sides.
   double left_alone = 0.0;

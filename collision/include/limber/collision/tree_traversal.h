@@ -18,21 +18,11 @@ namespace limber {
 
 using TrianglePair = std::array<Index, 2>;
 
-/// What else is known of two nodes of two trees.
-class NodePairTest {
- public:
-  virtual ~NodePairTest() = default;
-  /// Whether no triangle below one is wanted with any below the other.
-  virtual bool leaves_out(Index node_a, Index node_b) = 0;
-};
-
 /// Triangles of a below and of b that may be within `margin` of each other; appended to `pairs`.
 /// @param X_AB frame of b in the frame of a  @param margin m, ≥ 0
 /// @param way_A of b, in the frame of a, straight on: within `margin` anywhere along it
-/// @param test of nodes; null: none
 void find_triangle_pairs(DeformedSurface& a, DeformedSurface& b, const RigidTransform& X_AB, double margin,
-                         std::vector<TrianglePair>& pairs, const Vec3& way_A = Vec3::Zero(),
-                         NodePairTest* test = nullptr);
+                         std::vector<TrianglePair>& pairs, const Vec3& way_A = Vec3::Zero());
 
 /// Triangles of one surface, t < u without a common vertex, that may be within `margin` of each other; appended.
 /// Parts of the body that the amplitudes cannot bring so near are left out without looking at their boxes: rest

@@ -13,28 +13,25 @@
 
 namespace limber {
 
-/// The parts of a step, in the order in which they are taken, and of drawing. Behind each what its `units` count, each
-/// time anew where contacts are looked for again (StepAttempt::kLookedFarther).
+/// The parts of a step, in the order in which they are taken, and of drawing. Behind each what its `units` count.
 enum class Stage : std::uint8_t {
   kBookkeeping,  ///< what begins and ends a step, sleep, events. Unit: step
   kLookAhead,    ///< how far bodies may come within the step. Unit: body awake
   kBroadPhase,   ///< boxes about bodies, pairs of near ones. Unit: near pair
   kNarrowPhase,  ///< contacts of near pairs, thinned. Unit: contact kept
-  kFastBodies,   ///< first touches of fast bodies, and their steps in parts (docs/contact.md). Unit: body that waits
   kRows,         ///< contacts, joints and handles as rows; islands. Unit: row
   kAdvance,      ///< bodies without constraints, exactly. Unit: body
   kSolve,        ///< forces of the rows, predicted motions, energy guard. Unit: row
   kCommit,       ///< the predicted motions happen; rows are told their impulses. Unit: body
   kReconstruct,  ///< World::reconstruct(); no part of a step. Unit: vertex, each instance's
 };
-inline constexpr std::size_t kStages = 10;
+inline constexpr std::size_t kStages = 9;
 
-/// "bookkeeping", "look_ahead", "broad_phase", "narrow_phase", "fast_bodies", "rows", "advance", "solve", "commit",
+/// "bookkeeping", "look_ahead", "broad_phase", "narrow_phase", "rows", "advance", "solve", "commit",
 /// "reconstruct".
 constexpr std::string_view to_string(Stage stage) {
-  constexpr std::array<std::string_view, kStages> kNames{"bookkeeping", "look_ahead", "broad_phase", "narrow_phase",
-                                                         "fast_bodies", "rows",       "advance",     "solve",
-                                                         "commit",      "reconstruct"};
+  constexpr std::array<std::string_view, kStages> kNames{
+      "bookkeeping", "look_ahead", "broad_phase", "narrow_phase", "rows", "advance", "solve", "commit", "reconstruct"};
   return kNames[static_cast<std::size_t>(stage)];
 }
 

@@ -20,8 +20,6 @@
 
 namespace limber {
 
-class ExactMotion;
-
 /// The geometry that others meet: exactly one of the two.
 struct BodyGeometry {
   std::shared_ptr<const ModalModel> model{};  ///< its collision surface, which deforms with the amplitudes
@@ -47,16 +45,12 @@ struct BodyState {
   /// Contacts of all that such motions may bring together (or within the query's margin) are found, so what a step may
   /// bring together is there before it.
   double reach = 0.0;
-  /// How far ahead a contact is worth finding: it is a plane between features, good near them alone. Where way() is
-  /// larger, contacts up to here are found in its place, but for half-spaces, which are planes for good; what comes
-  /// together beyond is a matter of find_impacts(). m, ≥ 0.
-  double look_ahead = std::numeric_limits<double>::infinity();
   /// The motion expected until the next query: of the body origin, m, straight on and evenly; and the rotation vector,
   /// rad; world. For two bodies that move on together only their reaches count. By both a source may choose
   /// normals of what is apart but would be passed; the rotation counts for nothing else.
   Vec3 displacement = Vec3::Zero(), rotation = Vec3::Zero();
   /// Its expected state at the next query. Its points are expected to go there straight on and evenly, and come
-  /// no farther than `doubt` beside: features that this keeps apart need not be found. m, ≥ 0; infinite: nothing is
+  /// no farther than `doubt` beside: contacts that this keeps apart need not be found. m, ≥ 0; infinite: nothing is
   /// expected, and the other two are not read.
   double doubt = std::numeric_limits<double>::infinity();
   RigidTransform end_pose{};
@@ -73,28 +67,10 @@ struct ContactQuery {
   /// Gravity moves any body by so much or not at all until the next query, beside its `doubt`, as something holds it or
   /// not; `reach` has it. Of two bodies the difference counts. World, m.
   Vec3 fall = Vec3::Zero();
-  /// Ascending; none: all. Otherwise only pairs of these bodies are looked at, among each other and with those that do
-  /// not move; all else is as it was in the last query.
-  std::span<const Index> bodies{};
   /// Ascending; none: not known. Otherwise all others are as they were in the last query, which they slept in: what a
   /// source may pass over without a look.
   std::span<const Index> awake{};
   StageTimes* times = nullptr;  ///< a source may add what it spends on its stages; null: nobody asks
-};
-
-struct ImpactQuery {
-  std::span<const BodyState> states{};            ///< by body index: where those are that have no motion
-  std::span<const ExactMotion* const> motions{};  ///< by body index; null: no such body, or one that does not move
-  double step = 0.0;                              ///< s, ≥ 0, at most that of the motions
-  double margin = 0.0;                            ///< m, ≥ 0: bodies this near each other touch
-  /// m: pairs that are within the margin from the start, but not this near, touch where they come nearer still: within
-  /// a half, a quarter and so on of the margin. As it is, they are not looked at.
-  double least_margin = std::numeric_limits<double>::infinity();
-  /// Ascending; none: all that have a motion. Otherwise pairs with one of these are looked at alone, and all others
-  /// stand where they were in the last query of all contacts, or go no farther than that was told: a few bodies cost
-  /// what they meet.
-  std::span<const Index> bodies{};
-  std::span<const std::pair<Index, Index>> except{};  ///< (a, b), a < b, ascending: pairs that are not looked at
 };
 
 /// The share of a contact's force that a vertex of the collision surface takes.
@@ -116,8 +92,7 @@ struct ContactSide {
   double radius = 0.0;
   /// For a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
   /// force is spread over; shares sum to 1. The frame feels it at the point nevertheless. None: it acts at the
-  /// point alone. Kept by the source until its next query of all bodies; of a query of some bodies until its next
-  /// query.
+  /// point alone. Kept by the source until its next query.
   std::span<const VertexShare> region{};
 };
 
@@ -130,14 +105,6 @@ struct ContactPoint {
   double gap = 0.0;              ///< m
   /// The same features of the same bodies have the same id in every query; different ones differ within a query.
   std::uint64_t id = 0;
-};
-
-/// Two bodies that come together within a step.
-struct Impact {
-  Index a = -1, b = -1;  ///< a < b
-  double time = 0.0;     ///< s from the start of the step: not touching before, within `margin` there
-  /// The approach did not end within the bounded number of advancements: touching from `time` on.
-  bool resting = false;
 };
 
 /// Finds contacts. Same calls, same contacts in the same order, for any Jobs. Once warm, a query allocates nothing.
@@ -155,10 +122,6 @@ class ContactSource {
   /// Replaces `contacts`, ordered by (a.body, b.body, id).
   /// @throws InvalidArgument for a state that is not finite or has the wrong number of amplitudes; nothing changes then
   virtual void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) = 0;
-
-  /// First times within [0, step] at which bodies that are farther apart than `margin` come within it, by conservative
-  /// advancement on the exact motion; ordered by (time, a, b).
-  virtual void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) = 0;
 
   /// Appends what the contacts of coming queries depend on beside the queries themselves, and restore_state() takes it
   /// back; nothing, for a source that remembers nothing. Bodies and pairs that are excluded are no part of it.

@@ -48,8 +48,6 @@ class FclContactSource final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  /// Near pairs by FCL; their times by TimeOfImpact, as FCL knows no bodies that flex on their way.
-  void find_impacts(const ImpactQuery& query, std::vector<Impact>& impacts, Jobs& jobs) override;
   void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;
 
