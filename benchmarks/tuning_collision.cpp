@@ -89,8 +89,6 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(narrow, directionless),
     LIMBER_NUMBER(narrow, parallel_touching),
     LIMBER_NUMBER(narrow, grazing),
-    LIMBER_NUMBER(lists, slack),
-    LIMBER_NUMBER(lists, when),
     LIMBER_NUMBER(narrow, rest_depth_steps),
     LIMBER_NUMBER(narrow, least_stretch),
     LIMBER_NUMBER(narrow, least_patch),

@@ -64,16 +64,6 @@ struct ConvexTuning {
   double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]; by judgement
 };
 
-/// Lists of tests that pairs of surfaces keep from query to query. These decide time alone.
-struct PairListTuning {
-  /// Part of the margin by which two surfaces may move against each other while one list of tests lasts [0.2 to 1]:
-  /// more lasts longer and holds more.
-  double slack = 0.5;
-  /// Part of that, moved since the last query and expected until the next, up to which a list is made [0.05 to 0.5]: it
-  /// is to serve some queries.
-  double when = 0.1;
-};
-
 /// Surfaces made of triangles. "Edges at hand" are the shortest ones around a vertex and of the face it meets.
 struct NarrowTuning {
   /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
@@ -170,7 +160,6 @@ struct CollisionTuning {
   HierarchyTuning hierarchy{};
   BroadTuning broad{};
   ConvexTuning convex{};
-  PairListTuning lists{};
   NarrowTuning narrow{};
   FinderTuning finder{};
   FieldTuning field{};

@@ -15,7 +15,6 @@ using internal::ContactRegions;
 using internal::FoundBody;
 using internal::ModalGeometry;
 using internal::PairIds;
-using internal::PairMemory;
 using internal::RegionSide;
 using internal::Worker;
 using internal::Workers;
@@ -81,17 +80,7 @@ RegionSide ContactFinder::Impl::region_side(Index index) const {
   return {body.modal->surface.get(), state(index).pose.q};
 }
 
-/// Of pairs of surfaces. With a skin, amplitudes alone do not tell how far a body's points have moved.
-bool ContactFinder::Impl::remembers(const BodyPair& pair) const {
-  const FoundBody &a = at(pair.a), &b = at(pair.b);
-  const auto is_surface = [](const FoundBody& body) {
-    return body.modal ? body.modal->surface->skin() == nullptr : body.rigid->surface() != nullptr;
-  };
-  const bool both_convex = a.is_convex() && b.is_convex();
-  return options.coherence && pair.a != pair.b && !both_convex && is_surface(a) && is_surface(b);
-}
-
-void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory, Worker& worker, Found& into) const {
+void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Found& into) const {
   std::vector<ContactPoint>& contacts = into.contacts;
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
@@ -100,7 +89,7 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
   } else {
     const BodyState &s = state(pair.a), &t = state(pair.b);
     const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
-    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + together, origin, contacts, memory);
+    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + together, origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
@@ -114,13 +103,12 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, PairMemory* memory,
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   const std::size_t per_chunk = internal::collision_tuning().finder.pairs_per_chunk;
   const std::size_t chunks = (pairs.size() + per_chunk - 1) / per_chunk;
-  memories.match(pairs, [this](const BodyPair& pair) { return remembers(pair); });
   if (found.size() < chunks) found.resize(chunks);
   for (Found& part : found) part.contacts.clear(), part.regions.clear();
   jobs.parallel_for(chunks, 1, [this, per_chunk](std::size_t begin, std::size_t end) {
     const Workers::Lease worker(workers);
     for (std::size_t p = begin * per_chunk; p < std::min(end * per_chunk, pairs.size()); ++p)
-      find_in_pair(pairs[p], memories.of(p), *worker, found[p / per_chunk]);
+      find_in_pair(pairs[p], *worker, found[p / per_chunk]);
   });
 }
 
@@ -168,7 +156,6 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
   }
   m.broad_phase.add(body, filter);
   if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
-  m.memories.reserve(fresh.modes());
   m.at(body) = std::move(fresh);
   m.set_finds_itself(body, filter.self && m.at(body).modal);
 }
@@ -176,7 +163,6 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
 void ContactFinder::remove_body(Index body) {
   impl_->present(body, "remove_body");
   impl_->set_finds_itself(body, false);
-  impl_->memories.forget(body);
   impl_->broad_phase.remove(body);
   impl_->at(body) = {};
 }

@@ -12,7 +12,6 @@
 
 #include "finder/contact_regions.h"
 #include "finder/found_body.h"
-#include "finder/pair_memories.h"
 
 namespace limber {
 
@@ -34,7 +33,6 @@ struct ContactFinder::Impl {
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
-  internal::PairMemories memories;  ///< of pairs; they change nothing but the time
   struct Found {
     std::vector<ContactPoint> contacts;
     internal::ContactRegions regions;
@@ -70,8 +68,7 @@ struct ContactFinder::Impl {
   void merge_self_pairs();
   void check_sleepers_in_pairs();
   void find_in_pairs(Jobs& jobs);
-  void find_in_pair(const BodyPair& pair, internal::PairMemory* memory, internal::Worker& worker, Found& into) const;
-  bool remembers(const BodyPair& pair) const;
+  void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
   internal::RegionSide region_side(Index body) const;
   CollisionBody collision_body(Index body, internal::Worker& worker) const;
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;

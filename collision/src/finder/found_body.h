@@ -26,10 +26,6 @@ struct FoundBody {
   double placed_reach = 0.0;
 
   Index modes() const { return modal ? modal->surface->modes() : 0; }
-  bool is_convex() const {
-    return rigid && !is_half_space() && !std::holds_alternative<TriangleMesh>(rigid->shape()) &&
-           !std::holds_alternative<HeightField>(rigid->shape());
-  }
   bool is_half_space() const { return rigid && std::holds_alternative<HalfSpace>(rigid->shape()); }
 };
 

@@ -28,7 +28,6 @@ using internal::FeatureSide;
 using internal::half_space_contacts;
 using internal::kRoundOff;
 using internal::OverlapRule;
-using internal::PairMemory;
 using internal::PairSurface;
 using internal::RestDepth;
 using internal::RestDepthRule;
@@ -191,8 +190,7 @@ struct NarrowPhase::Impl {
   void bind(const CollisionBody& body, const RigidTransform& X_PB, double tolerance, int side);
   static double size(const CollisionBody& body);
 
-  void find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin,
-            PairMemory* memory);
+  void find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin);
   void on_half_space(const CollisionBody& body, const RigidTransform& X_BH, const HalfSpace& shape, double margin);
   void against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core, double margin);
   void flip();
@@ -305,8 +303,8 @@ void NarrowPhase::Impl::against_core(const CollisionBody& body, const RigidTrans
 }
 
 // In the frame of a. @pre a is not a half-space; if only one has triangles and the other is no half-space, it is a
-void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB, double margin,
-                             PairMemory* memory) {
+void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, const RigidTransform& X_AB,
+                             double margin) {
   const ConvexCore *core_a = convex(a), *core_b = convex(b);
   if (core_a != nullptr && core_b != nullptr) {
     convex_contacts.find(*core_a, *core_b, X_AB, margin, found);
@@ -325,7 +323,7 @@ void NarrowPhase::Impl::find(const CollisionBody& a, const CollisionBody& b, con
     const Vec3 way_A = to_a * (b.displacement - a.displacement);
     surface_contacts.find(surface[0], surface[1], X_AB,
                           {margin, a.reach + b.reach, way_A, std::max(a.left_alone, b.left_alone)}, rule_a, rule_b,
-                          memory, found);
+                          found);
   }
 }
 
@@ -357,7 +355,7 @@ NarrowPhase::NarrowPhase(NarrowPhase&&) noexcept = default;
 NarrowPhase& NarrowPhase::operator=(NarrowPhase&&) noexcept = default;
 
 void NarrowPhase::find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
-                                std::vector<ContactPoint>& contacts, PairMemory* memory) {
+                                std::vector<ContactPoint>& contacts) {
   check(a), check(b);
   Impl& impl = *impl_;
   impl.found.clear();
@@ -368,7 +366,7 @@ void NarrowPhase::find_contacts(const CollisionBody& a, const CollisionBody& b, 
   const CollisionBody &first = exchange ? b : a, &second = exchange ? a : b;
   const Quaternion to_first = first.X_WB.q.conjugate();
   const RigidTransform X_FS{to_first * second.X_WB.q, to_first * (second.X_WB.p - first.X_WB.p)};
-  impl.find(first, second, X_FS, margin, memory);
+  impl.find(first, second, X_FS, margin);
   const RigidTransform X_SF = X_FS.inverse(), X_OF{first.X_WB.q, first.X_WB.p - origin};
   if (exchange) impl.flip();
   impl.deliver(a, exchange ? X_SF : RigidTransform{}, b, exchange ? RigidTransform{} : X_SF, X_OF, contacts);

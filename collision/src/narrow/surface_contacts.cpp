@@ -45,11 +45,11 @@ void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool 
 }
 
 void SurfaceContacts::find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach,
-                           OverlapRule* rule_a, OverlapRule* rule_b, PairMemory* memory,
-                           std::vector<FeatureContact>& contacts) {
+                           OverlapRule* rule_a, OverlapRule* rule_b, std::vector<FeatureContact>& contacts) {
   begin(a, b, reach.margin, false, contacts);
   passed_ = reach.passed;
-  test_pairs(X_AB, reach, memory);
+  find_pairs(X_AB, reach);
+  for (const auto& [s, t] : pairs_) test_pair(s, t);
   spread_inside(0, rule_b);
   spread_inside(1, rule_a);
   find_enclosed(0, rule_b);
@@ -62,31 +62,12 @@ void SurfaceContacts::find_self(PairSurface& a, double margin, SelfOverlapRule* 
                                 std::vector<FeatureContact>& contacts) {
   begin(a, a, margin, true, contacts);
   find_self_pairs(a.deformed(), margin, pairs_);
-  for (const auto& [s, t] : pairs_) test_pair(s, t, kAllTests);
+  for (const auto& [s, t] : pairs_) test_pair(s, t);
   if (places != nullptr) {
     spread_inside_itself(*places);
     cross_edges();
   }
   if (!a.sided()) push_out_of_faces();
-}
-
-// A list has the pairs of triangles in the order of a search.
-void SurfaceContacts::test_pairs(const RigidTransform& X_AB, const ContactReach& reach, PairMemory* memory) {
-  PairMemory::Advice advice = PairMemory::Advice::kSearch;
-  if (memory != nullptr && reach.all_around())
-    advice = memory->advise({.a = side_[0]->surface(),
-                             .b = side_[1]->surface(),
-                             .X_AB = X_AB,
-                             .z_a = side_[0]->deformed().amplitudes(),
-                             .z_b = side_[1]->deformed().amplitudes(),
-                             .margin = margin_});
-  if (advice == PairMemory::Advice::kSearch) {
-    find_pairs(X_AB, reach);
-    for (const auto& [s, t] : pairs_) test_pair(s, t, kAllTests);
-    return;
-  }
-  if (advice == PairMemory::Advice::kList) list_tests(X_AB, *memory);
-  for (const auto& [s, t, tests] : memory->list()) test_pair(s, t, tests);
 }
 
 // The way counts as far as gaps go.
@@ -101,60 +82,22 @@ void SurfaceContacts::find_pairs(const RigidTransform& X_AB, const ContactReach&
   find_triangle_pairs(a, b, X_AB, reach.beside, pairs_, share * reach.way_A);
 }
 
-void SurfaceContacts::list_tests(const RigidTransform& X_AB, PairMemory& memory) {
-  const double reach = memory.reach() + 2.0 * directionless_, slack = memory.slack() + 2.0 * directionless_;
-  find_triangle_pairs(side_[0]->deformed(), side_[1]->deformed(), X_AB, reach, pairs_);
-  listed_.clear();
-  for (const auto& [s, t] : pairs_)
-    if (const FeatureTests tests = tests_within(s, t, reach, slack); tests != 0) listed_.push_back({s, t, tests});
-  memory.keep(listed_);
-}
-
-// Of features that are within reach of each other, and edges that are within the slack of going through a face.
-FeatureTests SurfaceContacts::tests_within(Index s, Index t, double reach, double slack) {
-  const std::array<Index, 2> triangle{s, t};
-  const std::array<const PairSurface::Face*, 2> face{&side_[0]->face(s), &side_[1]->face(t)};
-  FeatureTests tests = 0;
-  if (apart(face[0]->box, face[1]->box, reach) || planes_separate(*face[0], *face[1], reach)) return tests;
-  for (int of = 0; of < 2; ++of) {
-    const PairSurface::Face &mine = *face[static_cast<std::size_t>(of)],
-                            &other = *face[static_cast<std::size_t>(1 - of)];
-    for (int i = 0; i < 3; ++i) {
-      const auto c = static_cast<std::size_t>(i);
-      const Vec3 &x0 = mine.x[c], &x1 = mine.x[(c + 1) % 3];
-      if (side_[of]->owns_vertex(triangle[static_cast<std::size_t>(of)], i) &&
-          (closest_on_triangle(x0, other.x).point - x0).norm() <= reach)
-        tests |= vertex_test(of, i);
-      const double h0 = other.normal.dot(x0 - other.x[0]), h1 = other.normal.dot(x1 - other.x[0]);
-      if (std::min(h0, h1) <= slack && std::max(h0, h1) >= -slack &&
-          !apart({x0.cwiseMin(x1), x0.cwiseMax(x1)}, other.box, slack))
-        tests |= piercing_test(of, i);
-    }
-  }
-  for (int c = 0; c < 3; ++c)
-    for (int d = 0; d < 3; ++d)
-      if (side_[0]->owns_edge(s, c) && side_[1]->owns_edge(t, d) &&
-          closest_points(edge_of(face[0]->x, c), edge_of(face[1]->x, d)).distance <= reach)
-        tests |= edge_test(c, d);
-  return tests;
-}
-
-void SurfaceContacts::test_pair(Index s, Index t, FeatureTests tests) {
+void SurfaceContacts::test_pair(Index s, Index t) {
   const PairSurface::Face &f = side_[0]->face(s), &g = side_[1]->face(t);
   if (apart(f.box, g.box, margin_) || planes_separate(f, g, margin_)) return;
-  test_vertices(0, s, t, tests);
-  test_vertices(1, t, s, tests);
-  test_edges(s, t, tests);
+  test_vertices(0, s, t);
+  test_vertices(1, t, s);
+  test_edges(s, t);
   if (apart(f.box, g.box, 0.0)) return;
-  find_piercings(0, s, t, tests);
-  find_piercings(self_ ? 0 : 1, t, s, tests);  // of itself a surface is one side
+  find_piercings(0, s, t);
+  find_piercings(self_ ? 0 : 1, t, s);  // of itself a surface is one side
 }
 
 // -- A vertex and a surface -------------------------------------------------------------------------------------------
 
-void SurfaceContacts::test_vertices(int of, Index s, Index t, FeatureTests tests) {
+void SurfaceContacts::test_vertices(int of, Index s, Index t) {
   for (int c = 0; c < 3; ++c)
-    if ((tests & vertex_test(of, c)) != 0 && (self_ || side_[of]->owns_vertex(s, c)))
+    if (self_ || side_[of]->owns_vertex(s, c))
       vertex_against_face(of, side_[of]->surface().triangle(s)[static_cast<std::size_t>(c)], t);
 }
 
@@ -305,11 +248,11 @@ SurfaceContacts::Touch SurfaceContacts::touch(int of, Index v, const FeatureSide
 
 // -- Two edges --------------------------------------------------------------------------------------------------------
 
-void SurfaceContacts::test_edges(Index s, Index t, FeatureTests tests) {
+void SurfaceContacts::test_edges(Index s, Index t) {
   for (int c = 0; c < 3; ++c) {
     if (!self_ && !side_[0]->owns_edge(s, c)) continue;
     for (int d = 0; d < 3; ++d) {
-      if ((tests & edge_test(c, d)) == 0 || (!self_ && !side_[1]->owns_edge(t, d))) continue;
+      if (!self_ && !side_[1]->owns_edge(t, d)) continue;
       const EdgePair pair = nearest_of_edges(side_[0]->surface().edge_of(s, c), side_[1]->surface().edge_of(t, d));
       if (pair.distance <= margin_) add_separated_edges(pair);
     }

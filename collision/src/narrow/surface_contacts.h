@@ -6,7 +6,6 @@
 
 #include "limber/collision/tree_traversal.h"
 #include "limber/core/disjoint_sets.h"
-#include "narrow/pair_memory.h"
 #include "narrow/pair_surface.h"
 #include "tuning.h"
 
@@ -47,9 +46,9 @@ class SurfaceContacts {
  public:
   // Appends all contacts of a and b, in the pair's frame. Both are bound with one tolerance; those found twice (two
   // vertices) are appended twice. @param X_AB frame of b's body in that of a's @param rule_a of vertices inside a;
-  // null: the nearest point @param memory of the pair; null: none is kept
+  // null: the nearest point
   void find(PairSurface& a, PairSurface& b, const RigidTransform& X_AB, const ContactReach& reach, OverlapRule* rule_a,
-            OverlapRule* rule_b, PairMemory* memory, std::vector<FeatureContact>& contacts);
+            OverlapRule* rule_b, std::vector<FeatureContact>& contacts);
   // Of a surface with itself. @param places of points inside; null: parts that have passed through each other are not
   // told from others
   void find_self(PairSurface& a, double margin, SelfOverlapRule* places, std::vector<FeatureContact>& contacts);
@@ -81,13 +80,10 @@ class SurfaceContacts {
   };
 
   void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
-  void test_pairs(const RigidTransform& X_AB, const ContactReach& reach, PairMemory* memory);
   void find_pairs(const RigidTransform& X_AB, const ContactReach& reach);
-  void list_tests(const RigidTransform& X_AB, PairMemory& memory);
-  FeatureTests tests_within(Index s, Index t, double reach, double slack);
-  void test_pair(Index s, Index t, FeatureTests tests);
+  void test_pair(Index s, Index t);
 
-  void test_vertices(int of, Index s, Index t, FeatureTests tests);
+  void test_vertices(int of, Index s, Index t);
   void vertex_against_face(int of, Index v, Index t);
   void add_vertex(int of, Index v, PairSurface::Minimum minimum);
   bool rests_on_faces(int of, Index v, const PairSurface::Minimum& minimum);
@@ -95,7 +91,7 @@ class SurfaceContacts {
   Touch touch(int of, Index v, const FeatureSide& at, Index t);
   double nearness(int of, Index v, Index t);
 
-  void test_edges(Index s, Index t, FeatureTests tests);
+  void test_edges(Index s, Index t);
   EdgePair nearest_of_edges(Index e, Index f);
   void add_separated_edges(EdgePair pair);
   double shorter_edge(const EdgePair& pair);
@@ -104,7 +100,7 @@ class SurfaceContacts {
   Vec3 unhindered(int of, Index v, const PairSurface::Minimum& minimum);
   Vec3 unhindered(const EdgePair& pair);
 
-  void find_piercings(int of, Index s, Index t, FeatureTests tests);
+  void find_piercings(int of, Index s, Index t);
   void find_piercing(int of, Index e, Index t);
   void spread_inside(int of, OverlapRule* rule);
   void add_inside(int of, Index v, const PairSurface::Nearest& nearest, OverlapRule* rule);
@@ -130,7 +126,6 @@ class SurfaceContacts {
   bool self_ = false, overlap_ = false;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
-  std::vector<ListedTests> listed_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;
   DisjointSets loops_;

@@ -7,10 +7,9 @@
 #include "narrow/surface_contacts.h"
 
 namespace limber::internal {
-void SurfaceContacts::find_piercings(int of, Index s, Index t, FeatureTests tests) {
+void SurfaceContacts::find_piercings(int of, Index s, Index t) {
   for (int c = 0; c < 3; ++c)
-    if ((tests & piercing_test(of, c)) != 0 && (self_ || side_[of]->owns_edge(s, c)))
-      find_piercing(of, side_[of]->surface().edge_of(s, c), t);
+    if (self_ || side_[of]->owns_edge(s, c)) find_piercing(of, side_[of]->surface().edge_of(s, c), t);
 }
 
 void SurfaceContacts::find_piercing(int of, Index e, Index t) {

@@ -26,9 +26,6 @@ namespace limber {
 struct ContactFinderOptions {
   /// How boxes within a body are made: changes the time, not the contacts.
   BoundsChoice bounds = BoundsChoice::kAutomatic;
-  /// Whether two surfaces that hardly move against each other are looked at by a list made before: changes the time,
-  /// not the contacts.
-  bool coherence = true;
   /// Depth and normal of overlaps. kRestDepth needs a volume block of the body that a vertex is in.
   NarrowPhaseOptions narrow_phase{};
   /// How contacts are thinned; {.max_points = 0} gives all.

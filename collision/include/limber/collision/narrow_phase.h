@@ -54,9 +54,6 @@ namespace limber {
 
 class CollisionSurface;
 class DeformedSurface;
-namespace internal {
-class PairMemory;
-}
 
 /// A rigid shape made ready to touch others. Immutable; shared by all bodies and threads.
 class RigidGeometry {
@@ -166,9 +163,8 @@ class NarrowPhase {
 
   /// All contacts of a and b with gap ≤ margin that their motions may bring together. Two half-spaces have none.
   /// @param origin positions come out relative to it, world @pre a.index < b.index, poses finite
-  /// @param memory of this pair of surfaces in earlier queries, for ContactFinder; it changes the time alone
   void find_contacts(const CollisionBody& a, const CollisionBody& b, double margin, const Vec3& origin,
-                     std::vector<ContactPoint>& contacts, internal::PairMemory* memory = nullptr);
+                     std::vector<ContactPoint>& contacts);
 
   /// Where a modal body touches itself: contacts of triangles that have no vertex in common, as of two bodies. Vertices
   /// that are inside another part are those that another point of the material coincides with, and leave it as

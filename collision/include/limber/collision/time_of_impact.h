@@ -13,7 +13,7 @@
 /// B from bounds on all accelerations (gravity, turning, flexing), F from what is bounded as a whole: modes that swing
 /// and bodies that turn within the stretch. Nodes and triangles are compared along sixteen directions at once; branch
 /// and bound finds the least time. From a gap g the next is O(g²): few advancements. Derivation:
-/// docs/derivations/collision.md, section 7; what comes out in touch, at rest or past grazing: docs/collision.md.
+/// docs/derivations/collision.md, section 6; what comes out in touch, at rest or past grazing: docs/collision.md.
 ///
 /// Surfaces, modal or rigid, are their triangles, two-sided, whether or not they bound a solid; balls, capsules and
 /// half-spaces are solid. Triangles of one body against itself are not looked at.
