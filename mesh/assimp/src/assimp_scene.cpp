@@ -21,9 +21,16 @@ std::string quoted_path(const std::filesystem::path& path) {
   return name.insert(0, 1, '"') + '"';
 }
 
-const aiScene& read_scene(Assimp::Importer& importer, const std::filesystem::path& path, unsigned steps) {
-  read_file(path);  // for its clear errors: missing, a directory, unreadable, empty
+ChildLimits limits_for(const std::filesystem::path& path) {
+  const std::size_t bytes = read_file(path).size();  // for its clear errors: missing, a directory, unreadable, empty
+  constexpr std::size_t kMegabyte = 1 << 20, kCopies = 64;
+  ChildLimits limits;
+  limits.cpu_seconds += static_cast<int>(bytes / kMegabyte);
+  limits.more_bytes += kCopies * bytes;
+  return limits;
+}
 
+const aiScene& read_scene(Assimp::Importer& importer, const std::filesystem::path& path, unsigned steps) {
   // Without it a file of bones alone would come back as little diamonds around each bone.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   // Coordinates keep the file's axes, in COLLADA as in every other format.

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <string>
 
+#include "in_child.h"
+
 namespace limber::internal {
 
 /// Characters that would break a line of text become blanks.
@@ -15,6 +17,10 @@ std::string one_line(std::string text);
 /// The path in quotes, on one line.
 std::string quoted_path(const std::filesystem::path& path);
 
+/// 10 s and 1 GB, and more for files of more than some megabytes. @throws InputError as read_file() does
+ChildLimits limits_for(const std::filesystem::path& path);
+
+/// Call it in a child process alone: Assimp breaks down on some damaged files.
 /// @param importer owns the scene @param steps of aiPostProcessSteps @throws InputError with Assimp's reason
 const aiScene& read_scene(Assimp::Importer& importer, const std::filesystem::path& path, unsigned steps);
 

@@ -85,14 +85,57 @@ class ClipReader {
   MotionClip clip_;
 };
 
+void put(const RigidTransform& X, internal::MessageWriter& message) {
+  for (const double c : {X.q.w, X.q.x, X.q.y, X.q.z}) message.put(c);
+  message.put(X.p);
+}
+
+RigidTransform get_transform(internal::MessageReader& message) {
+  RigidTransform X;
+  for (double* c : {&X.q.w, &X.q.x, &X.q.y, &X.q.z}) *c = message.get<double>();
+  X.p = message.get_vector();
+  return X;
+}
+
+/// In the child: reads the file and hands on what was read.
+void send_clip(const std::filesystem::path& path, const std::string& name, internal::MessageWriter& message) {
+  Assimp::Importer importer;
+  const aiScene& scene = internal::read_scene(importer, path, 0);
+  if (scene.mNumAnimations == 0) throw InputError(name + ": holds no motion, expected a BVH file");
+  const MotionClip clip = ClipReader(scene, name).read();
+  message.put(clip.joints.size());
+  for (const auto& joint : clip.joints) {
+    message.put(joint.name);
+    message.put(joint.parent);
+    put(joint.rest, message);
+  }
+  message.put(clip.times.size());
+  for (std::size_t f = 0; f < clip.times.size(); ++f) {
+    message.put(clip.times[f]);
+    for (const RigidTransform& X : clip.poses[f]) put(X, message);
+  }
+}
+
 }  // namespace
 
 MotionClip read_motion_clip(const std::filesystem::path& path) {
-  Assimp::Importer importer;
-  const aiScene& scene = internal::read_scene(importer, path, 0);
   const std::string name = internal::quoted_path(path);
-  if (scene.mNumAnimations == 0) throw InputError(name + ": holds no motion, expected a BVH file");
-  return ClipReader(scene, name).read();
+  internal::MessageReader message = internal::in_child(name, internal::limits_for(path),
+                                                       [&](internal::MessageWriter& to) { send_clip(path, name, to); });
+  MotionClip clip;
+  clip.joints.resize(message.get<std::size_t>());
+  for (auto& joint : clip.joints) {
+    joint.name = message.get_text();
+    joint.parent = message.get<Index>();
+    joint.rest = get_transform(message);
+  }
+  clip.times.resize(message.get<std::size_t>());
+  for (double& time : clip.times) {
+    time = message.get<double>();
+    std::vector<RigidTransform>& poses = clip.poses.emplace_back();
+    for (std::size_t j = 0; j < clip.joints.size(); ++j) poses.push_back(get_transform(message));
+  }
+  return clip;
 }
 
 }  // namespace limber

@@ -2,10 +2,13 @@
 
 #include <assimp/postprocess.h>
 
+#include <limits>
+#include <numeric>
 #include <unordered_map>
 
 #include "assimp_scene.h"
 #include "file_unit.h"
+#include "in_child.h"
 #include "limber/core/error.h"
 #include "limber/mesh/unused_vertices.h"
 
@@ -65,7 +68,6 @@ class Collector {
       }
       if (mirrored) std::swap(t[1], t[2]);
       surface.triangles.push_back(t);
-      read.grouped.face_of.push_back(static_cast<Index>(read.grouped.face_of.size()));
       ++read.grouped.groups.back().count;
     }
   }
@@ -80,18 +82,63 @@ class Collector {
   std::string name_;
 };
 
-RawSurface read_raw(const std::filesystem::path& path, const std::string& name, Warnings& warnings) {
+/// In the child: reads the file and hands on what was read.
+void send_raw(const std::filesystem::path& path, const std::string& name, internal::MessageWriter& message) {
   Assimp::Importer importer;
   const aiScene& scene = read_scene(importer, path, aiProcess_Triangulate);
   const internal::UnitOfScene unit = internal::unit_of(importer, scene, path);
   Collector collector(scene, name);
   collector.add(*scene.mRootNode, aiMatrix4x4t<double>());
-  for (Vec3& p : collector.read.grouped.surface.vertices) p *= unit.factor;
-  collector.read.unit = unit.unit;
-  if (collector.points_and_lines > 0)
-    warnings.push_back(name + ": " + std::to_string(collector.points_and_lines) +
+  message.put(unit.unit.metres);
+  message.put(unit.unit.stated);
+  message.put(unit.unit.up);
+  message.put(collector.points_and_lines);
+  const GroupedSurface& grouped = collector.read.grouped;
+  message.put(grouped.surface.vertices.size());
+  for (const Vec3& p : grouped.surface.vertices) message.put(Vec3(unit.factor * p));
+  message.put(grouped.surface.triangles.size());
+  for (const Triangle& t : grouped.surface.triangles)
+    for (const Index v : t) message.put(v);
+  message.put(grouped.groups.size());
+  for (const SurfaceGroup& group : grouped.groups) {
+    message.put(group.name);
+    message.put(group.material);
+    message.put(group.first);
+    message.put(group.count);
+  }
+  message.put(collector.read.node_ends.size());
+  for (const std::size_t end : collector.read.node_ends) message.put(end);
+}
+
+RawSurface read_raw(const std::filesystem::path& path, const std::string& name, Warnings& warnings) {
+  internal::MessageReader message = internal::in_child(name, internal::limits_for(path),
+                                                       [&](internal::MessageWriter& to) { send_raw(path, name, to); });
+  RawSurface read;
+  read.unit.metres = message.get<double>();
+  read.unit.stated = message.get<bool>();
+  read.unit.up = message.get<char>();
+  const auto left_out = message.get<std::size_t>();
+  if (left_out > 0)
+    warnings.push_back(name + ": " + std::to_string(left_out) +
                        " points and lines are no surface and have been left out");
-  return std::move(collector.read);
+  GroupedSurface& grouped = read.grouped;
+  grouped.surface.vertices.resize(message.get<std::size_t>());
+  for (Vec3& p : grouped.surface.vertices) p = message.get_vector();
+  grouped.surface.triangles.resize(message.get<std::size_t>());
+  for (Triangle& t : grouped.surface.triangles)
+    for (Index& v : t) v = message.get<Index>();
+  grouped.face_of.resize(grouped.surface.triangles.size());
+  std::iota(grouped.face_of.begin(), grouped.face_of.end(), Index{0});
+  grouped.groups.resize(message.get<std::size_t>());
+  for (SurfaceGroup& group : grouped.groups) {
+    group.name = message.get_text();
+    group.material = message.get_text();
+    group.first = message.get<Index>();
+    group.count = message.get<Index>();
+  }
+  read.node_ends.resize(message.get<std::size_t>());
+  for (std::size_t& end : read.node_ends) end = message.get<std::size_t>();
+  return read;
 }
 
 /// Joins equal vertices within each node.

@@ -15,7 +15,8 @@ namespace limber {
 /// Every mesh of the file in one surface: placed by the transforms of the nodes that show it, triangulated, welded (see
 /// weld(); vertices that differ in normal or texture alone become one). A node that mirrors keeps the outside out.
 /// Points and lines are left out, with a warning. Lengths are in metres where the file states its unit (see FileUnit);
-/// axes are the file's own. Nothing is logged. The result is validated.
+/// axes are the file's own. Nothing is logged. Assimp works in a forked child process with limits of time and memory,
+/// so that a damaged file cannot end the caller. The result is validated.
 /// @param unit if given, what was taken @throws InputError in one line, with Assimp's reason
 SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings,
                                           FileUnit* unit = nullptr);
