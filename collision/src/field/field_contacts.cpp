@@ -48,10 +48,16 @@ void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransf
 }
 
 const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const ClusterView& clusters,
-                                            std::vector<std::uint32_t>& found) {
+                                            std::vector<std::uint32_t>& found, const SampleBounds& bounds = {}) {
   found.resize(kFieldLanes * clusters.groups);
-  found.resize(near_clusters(query, clusters, found.data()));
+  found.resize(near_clusters(query, clusters, found.data(), bounds));
   return found;
+}
+
+SampleBounds bounds_of(const ClusterView& samples, std::vector<float>& room) {
+  const std::size_t most = kFieldLanes * kFieldLanes * samples.groups;
+  grow(room, 5 * most);
+  return {room.data(), room.data() + most, room.data() + 2 * most};
 }
 
 }  // namespace
@@ -173,19 +179,25 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, comes_near(0) + slack * a.shell->shell().cell());
   if (view_[0].apart() || view_[1].apart()) return;
   edges_.begin(view_[0], view_[1]);
-  for (int of = 0; of < 2; ++of) find_samples(of, find_near(view_[of].query, view_[of].mine->view().samples, near_));
+  SampleBounds bounds[2];
+  for (int of = 0; of < 2; ++of) {
+    const ClusterView samples = view_[of].mine->view().samples;
+    bounds[of] = bounds_of(samples, bounds_[of]);
+    find_samples(of, find_near(view_[of].query, samples, near_, bounds[of]), bounds[of]);
+  }
   if (find_near(view_[0].query, view_[0].mine->view().edges, near_).empty() ||
       find_near(view_[1].query, view_[1].mine->view().edges, other_near_).empty())
     return;  // an edge that meets another one is met
-  edges_.find(0, near_);
-  edges_.find(1, other_near_);
+  edges_.find(0, bounds[0], near_);
+  edges_.find(1, bounds[1], other_near_);
   edges_.finish(found_);
 }
 
-void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters) {
+void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters, const SampleBounds& bounds) {
   const FieldView& view = view_[of];
   grow(hits_, kHitsOfCluster * clusters.size());
-  const std::size_t count = near_samples(view.query, view.mine->view(), clusters.data(), clusters.size(), hits_.data());
+  const std::size_t count =
+      near_samples(view.query, view.mine->view(), clusters.data(), clusters.size(), hits_.data(), bounds);
   samples_.clear();
   Index last = -1;
   for (const FieldHit& hit : std::span(hits_).first(count)) {

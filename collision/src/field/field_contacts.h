@@ -59,7 +59,7 @@ class FieldContacts {
   void find_on_shape(const FieldBody& body, const FieldBody& shape, bool shape_is_a);
   void find_shape_in_field(const FieldBody& body, const Capsule& shape, const RigidTransform& X_BS, bool shape_is_a);
   void find_between(const FieldBody& a, const FieldBody& b);
-  void find_samples(int of, std::span<const std::uint32_t> clusters);
+  void find_samples(int of, std::span<const std::uint32_t> clusters, const SampleBounds& bounds);
   static void settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample);
   void leave_by_patches(const FieldView& view);
   void add_sample(int of, const SampleFoot& sample);
@@ -71,6 +71,7 @@ class FieldContacts {
   const FieldBody* bodies_[2] = {};
   FieldMotion motion_{};
   std::vector<std::uint32_t> near_, other_near_;  ///< clusters
+  std::vector<float> bounds_[2];                  ///< of samples: distances, motions, slopes
   std::vector<FieldHit> hits_;
   std::vector<SampleFoot> samples_;  ///< of one side
   std::vector<FeatureKey> feet_;     ///< of a ball or capsule

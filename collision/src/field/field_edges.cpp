@@ -31,19 +31,17 @@ void FieldEdges::set_exit(int of, Index vertex, const Vec3f& direction) {
   exit_[of][static_cast<std::size_t>(vertex)] = direction;
 }
 
-void FieldEdges::find(int of, std::span<const std::uint32_t> clusters) {
+void FieldEdges::find(int of, const SampleBounds& ends, std::span<const std::uint32_t> clusters) {
   const FieldView& view = view_[of];
   const Pointshell& mine = view.mine->shell();
   grow(hits_, kHitsOfEdge * kFieldLanes * clusters.size());
-  const std::size_t count = near_edges(view.query, view.mine->view(), clusters.data(), clusters.size(),
+  const std::size_t count = near_edges(view.query, view.mine->view(), ends, clusters.data(), clusters.size(),
                                        static_cast<float>(view.other->shell().cell()), hits_.data());
-  Index last = -1;
   for (const FieldHit& hit : std::span(hits_).first(count)) {
     const Index e = mine.edge(hit.feature);
-    if (hit.feature > 0 && mine.edge(hit.feature - 1) == e && last != hit.feature) continue;  // repeated to fill eights
-    last = hit.feature;
-    const auto& ends = mine.surface().edge(e).vertices;
-    const Vec3f from = view.placed(view.mine->vertex(ends[0])), to = view.placed(view.mine->vertex(ends[1]));
+    if (hit.feature > 0 && mine.edge(hit.feature - 1) == e) continue;  // repeated to fill eights
+    const auto& between = mine.surface().edge(e).vertices;
+    const Vec3f from = view.placed(view.mine->vertex(between[0])), to = view.placed(view.mine->vertex(between[1]));
     const Index near = view.other->shell().triangle_near(hit);
     const Pierced through = walk_to_face(*view.other, near, from, to);
     if (through.triangle >= 0 && through.along > 0.0f && through.along < 1.0f) {

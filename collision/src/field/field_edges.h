@@ -14,8 +14,8 @@ class FieldEdges {
   void begin(const FieldView& a_in_b, const FieldView& b_in_a);
   /// An inside vertex leaves along a direction, out of b into a.
   void set_exit(int of, Index vertex, const Vec3f& direction);
-  /// Edges of one side, in clusters that the other's field has near.
-  void find(int of, std::span<const std::uint32_t> clusters);
+  /// Edges of one side, in clusters that the other's field has near. @param ends bounds of all samples
+  void find(int of, const SampleBounds& ends, std::span<const std::uint32_t> clusters);
   /// Appends the contacts of all edges found since begin(), each once.
   void finish(std::vector<FoundContact>& found);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "field/field_kernels.cpp"
@@ -41,9 +43,16 @@ HWY_INLINE HWY_ATTR Points LoadCluster(const float* cluster, std::size_t lane) {
   return {hn::LoadU(d, cluster + lane), hn::LoadU(d, cluster + kFieldLanes + lane),
           hn::LoadU(d, cluster + 2 * kFieldLanes + lane)};
 }
-HWY_INLINE HWY_ATTR Points GatherEnds(const float* coordinates, const std::int32_t* ends) {
+HWY_INLINE HWY_ATTR void StoreCluster(const Points& points, float* cluster, std::size_t lane) {
   const Floats d;
-  const I at = hn::LoadU(Ints(), ends);
+  hn::StoreU(points.x, d, cluster + lane), hn::StoreU(points.y, d, cluster + kFieldLanes + lane);
+  hn::StoreU(points.z, d, cluster + 2 * kFieldLanes + lane);
+}
+// Coordinates of samples by their numbers.
+HWY_INLINE HWY_ATTR Points GatherSamples(const float* coordinates, I samples) {
+  const Floats d;
+  static_assert(kFieldLanes == 8 && kClusterFloats == 3 * kFieldLanes);
+  const I at = hn::Add(samples, hn::ShiftLeft<4>(hn::ShiftRight<3>(samples)));
   return {hn::GatherIndex(d, coordinates, at), hn::GatherIndex(d, coordinates + kFieldLanes, at),
           hn::GatherIndex(d, coordinates + 2 * kFieldLanes, at)};
 }
@@ -233,28 +242,48 @@ struct Lanes {
   }
 };
 
-HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found) {
+// How much of a distance a motion closes along its slope; 0 where it opens.
+HWY_INLINE HWY_ATTR F Closing(const Points& slope, const Points& moved) {
   const Floats d;
-  const F reach = All(query.reach + query.flex + query.swing);
+  const F steepness = hn::Max(hn::Sqrt(Dot(slope, slope)), All(1e-30f));
+  return hn::Max(hn::Div(hn::Neg(Dot(slope, moved)), steepness), hn::Zero(d));
+}
+
+HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found,
+                                  const SampleBounds& bounds) {
+  const Floats d;
+  const F others = All(query.flex + query.swing);
   std::size_t count = 0;
+  const F unknown = All(std::numeric_limits<float>::quiet_NaN());
+  HWY_ALIGN float distance[kLanes], motion[kLanes];
   for (std::size_t g = 0; g < clusters.groups; ++g)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const Points centre = LoadCluster(clusters.centres + g * kClusterFloats, lane), q = Placed(query, centre),
                    moved = Carried(query, centre);
       const F radius = hn::LoadU(d, clusters.radii + g * kFieldLanes + lane);
       const F beyond = hn::Sub(DistanceOf(query.field, q).value, radius);
-      const F comes = hn::MulAdd(All(query.turning), radius, hn::Add(hn::Sqrt(Dot(moved, moved)), reach));
-      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, comes)));
-      for (; near != 0; near &= near - 1) {
-        const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
+      const F comes = hn::MulAdd(All(query.turning), radius, hn::Add(hn::Sqrt(Dot(moved, moved)), others));
+      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, hn::Add(comes, All(query.reach)))));
+      for (unsigned left = near; left != 0; left &= left - 1) {
+        const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
         found[count++] = static_cast<std::uint32_t>(g * kFieldLanes + lane + at);
       }
+      if (bounds.distance == nullptr) continue;
+      hn::Store(hn::Max(hn::Sub(beyond, All(query.flex)), hn::Zero(d)), d, distance);
+      hn::Store(comes, d, motion);
+      for (std::size_t c = 0; c < kLanes; ++c)
+        for (std::size_t s = 0; s < kFieldLanes; s += kLanes) {
+          const std::size_t first = (g * kFieldLanes + lane + c) * kFieldLanes + s;
+          hn::StoreU(All(distance[c]), d, bounds.distance + first);
+          hn::StoreU(All(motion[c]), d, bounds.motion + first);
+          StoreCluster({unknown, unknown, unknown}, bounds.slope + kClusterFloats / kFieldLanes * (first - s), s);
+        }
     }
   return count;
 }
 
 HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                                 std::size_t count, FieldHit* hits) {
+                                 std::size_t count, FieldHit* hits, const SampleBounds& bounds) {
   const bool carried = query.lattice.place != nullptr && query.lattice.steps > 0;
   const Floats d;
   std::size_t found = 0;
@@ -266,13 +295,26 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
       Points moved = Carried(query, x);
       if (shell.swings != nullptr)
         moved = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), moved);
-      const F reach = hn::Add(hn::Sqrt(Dot(moved, moved)), All(query.reach));
+      const F motion = hn::Sqrt(Dot(moved, moved));
+      const auto keep_bounds = [&](F least, const Points& slope) HWY_ATTR {
+        if (bounds.distance == nullptr) return;
+        hn::StoreU(least, d, bounds.distance + cluster * kFieldLanes + lane);
+        hn::StoreU(motion, d, bounds.motion + cluster * kFieldLanes + lane);
+        StoreCluster(slope, bounds.slope + cluster * kClusterFloats, lane);
+      };
       // What is far off as seen from the rest shape is not worth the way back into it.
-      if (carried && hn::AllFalse(d, hn::Le(DistanceOf(query.field, q).value, hn::Add(reach, All(query.flex)))))
-        continue;
+      if (carried) {
+        const Distance at = DistanceOf(query.field, q);
+        const F least = hn::Sub(at.value, All(query.flex));
+        if (hn::AllFalse(d, hn::Le(least, hn::Add(motion, All(query.reach))))) {
+          keep_bounds(least, at.slope);
+          continue;
+        }
+      }
       const Points r = CarriedBack(query.lattice, q);
       const Distance distance = DistanceOf(query.field, r);
-      unsigned within = Bits(hn::Le(distance.value, reach));
+      keep_bounds(distance.value, distance.slope);
+      unsigned within = Bits(hn::Le(distance.value, hn::Add(All(query.reach), Closing(distance.slope, moved))));
       if (within == 0) continue;
       lanes.Store(q, r, distance);
       for (; within != 0; within &= within - 1) {
@@ -284,167 +326,256 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
   return found;
 }
 
-// A straight way, and where it lies in the rest shape: through three points.
-struct Way {
-  float from[3], to[3];
-  float rest[3][3];  // of its start, middle and end
-  float length;
-  float reach;  // m: distances up to here count
+// Eight straight ways, and where they lie in the rest shape: through three points of each.
+class Ways {
+ public:
+  HWY_ATTR Ways(const FieldQuery& query, const Points& a, const Points& b)
+      : from_(a), across_(Difference(b, a)), centre_(CarriedBack(query.lattice, At(All(0.5f)))) {}
+
+  HWY_INLINE HWY_ATTR F Length() const { return hn::Sqrt(Dot(across_, across_)); }
+  HWY_INLINE HWY_ATTR Points At(F along) const {
+    return {hn::MulAdd(along, across_.x, from_.x), hn::MulAdd(along, across_.y, from_.y),
+            hn::MulAdd(along, across_.z, from_.z)};
+  }
+  HWY_INLINE HWY_ATTR const Points& Across() const { return across_; }
+  HWY_INLINE HWY_ATTR const Points& Centre() const { return centre_; }
+  HWY_ATTR void CarryBackEnds(const FieldQuery& query) {
+    before_ = Difference(centre_, CarriedBack(query.lattice, from_));
+    behind_ = Difference(CarriedBack(query.lattice, At(All(1.0f))), centre_);
+  }
+  // In the rest shape, and the way there that half of the whole is. @pre CarryBackEnds()
+  HWY_INLINE HWY_ATTR Points Rest(F along) const {
+    const Floats d;
+    const F twice = hn::Sub(hn::Add(along, along), All(1.0f));
+    const F early = hn::Min(twice, hn::Zero(d)), late = hn::Max(twice, hn::Zero(d));
+    const auto axis = [&](F c, F b, F a) HWY_ATTR { return hn::MulAdd(early, b, hn::MulAdd(late, a, c)); };
+    return {axis(centre_.x, before_.x, behind_.x), axis(centre_.y, before_.y, behind_.y),
+            axis(centre_.z, before_.z, behind_.z)};
+  }
+  HWY_INLINE HWY_ATTR const Points& Half(bool second) const { return second ? behind_ : before_; }
+
+ private:
+  Points from_, across_, centre_, before_{}, behind_{};
 };
 
-// Distances along a way at points that are evenly spaced, eight at a time.
-class Profile {
+// What a distance rises along an edge of such a length while it counts as level: half a degree.
+HWY_INLINE HWY_ATTR F Level(F length) { return hn::Mul(All(0.01f), length); }
+
+// Whether a distance that rises so much at a start and an end falls and then does not, or does not and then rises.
+HWY_INLINE HWY_ATTR hn::Mask<Floats> TurnsUp(F start, F end, F level) {
+  const F down = hn::Neg(level);
+  return hn::Or(hn::And(hn::Lt(start, down), hn::Ge(end, down)), hn::And(hn::Le(start, level), hn::Gt(end, level)));
+}
+
+// Edges that wait until there is a vector of them.
+struct EdgeQueue {
+  HWY_ALIGN std::int32_t edge[kLanes], ends[2][kLanes];
+  std::size_t count = 0;
+
+  bool Full() const { return count == kLanes; }
+  // @pre not Full()
+  void Add(std::int32_t e, std::int32_t from, std::int32_t to) {
+    edge[count] = e, ends[0][count] = from, ends[1][count] = to;
+    ++count;
+  }
+  // Fills what is left with an edge of it. @pre some wait @return the lanes of those that do, a bit each
+  unsigned Take() {
+    for (std::size_t i = count; i < kLanes; ++i)
+      for (auto& e : ends) e[i] = e[0];
+    return (1u << std::exchange(count, 0)) - 1u;
+  }
+};
+
+// Of edges, a vector of them at a time.
+class EdgeBlock {
  public:
-  // @param hits room for kHitsOfEdge @return how many
-  HWY_ATTR std::size_t Find(const FieldQuery& query, const Way& way, std::int32_t feature, float step, FieldHit* hits) {
+  HWY_ATTR EdgeBlock(const FieldQuery& query, const ShellView& shell, const EdgeQueue& queue)
+      : query_(query),
+        edge_(queue.edge),
+        from_(hn::Load(Ints(), queue.ends[0])),
+        to_(hn::Load(Ints(), queue.ends[1])),
+        a_(GatherSamples(shell.coordinates, from_)),
+        b_(GatherSamples(shell.coordinates, to_)),
+        ways_(query, Placed(query, a_), Placed(query, b_)) {}
+
+  // Edges of which a half may have a point that is looked for, a bit each.
+  HWY_ATTR unsigned Look(const SampleBounds& bounds) const {
     const Floats d;
-    const auto blocks = static_cast<std::size_t>(
-        std::clamp(static_cast<int>(way.length / (step * static_cast<float>(kFieldLanes - 1))) + 1, 1, kMostBlocks));
-    const std::size_t points = blocks * kFieldLanes;
-    const float part = 1.0f / static_cast<float>(points - 1);
-    for (std::size_t first = 0; first < points; first += kLanes) {
-      const F along = hn::Mul(hn::Iota(d, static_cast<float>(first)), All(part));
-      hn::Store(DistanceOf(query.field, Rest(way, along)).value, d, distance_ + first);
-    }
-    std::size_t found = 0;
-    const auto add = [&](std::size_t i, float beyond) HWY_ATTR {
-      hits[found++] = HitAt(query, way, feature, (static_cast<float>(i) + beyond) * part);
+    const F length = ways_.Length(), zero = hn::Zero(d);
+    const F motion = hn::Max(hn::GatherIndex(d, bounds.motion, from_), hn::GatherIndex(d, bounds.motion, to_));
+    const F most = hn::MulAdd(All(2.0f), hn::Add(All(query_.reach), motion), hn::Mul(All(0.5f), length));
+    const Distance centre = DistanceOf(query_.field, ways_.Centre());
+    const auto inside = hn::Lt(centre.value, zero);
+    // Distances change by no more than the way. So may a slope that is not known.
+    const auto half = [&](I end, float way) HWY_ATTR {
+      const F distance = hn::GatherIndex(d, bounds.distance, end), out = hn::IfThenElse(inside, All(-way), All(way));
+      const auto near = hn::Le(hn::Add(hn::Abs(distance), hn::Abs(centre.value)), most);
+      const auto through = hn::Xor(inside, hn::Lt(distance, zero));
+      const Points slope = GatherSamples(bounds.slope, end);
+      const auto turns = TurnsUp(hn::Mul(out, Dot(slope, ways_.Across())),
+                                 hn::Mul(out, Dot(centre.slope, ways_.Across())), Level(length));
+      return hn::And(near, hn::Or(through, hn::Or(hn::Ne(slope.x, slope.x), turns)));
     };
-    for (std::size_t i = 0; i + 1 < points && found < kHitsOfEdge; ++i) {
-      const float here = distance_[i], next = distance_[i + 1];
-      if ((here < 0.0f) != (next < 0.0f)) {
-        add(i, here / (here - next));
-      } else if ((here <= way.reach) != (next <= way.reach)) {
-        add(i, (way.reach - here) / (next - here));
-      } else if (i > 0 && here >= 0.0f && here <= way.reach && here < distance_[i - 1] && here <= next) {
-        add(i, 0.0f);
+    return Bits(hn::And(hn::Gt(length, zero), hn::Or(half(from_, 1.0f), half(to_, -1.0f))));
+  }
+
+  HWY_ATTR std::size_t Find(const ShellView& shell, unsigned wanted, float step, FieldHit* hits) {
+    ways_.CarryBackEnds(query_);
+    const Points moved_a = Moved(shell, a_, from_), moved_b = Moved(shell, b_, to_);
+    const float longest = hn::GetLane(hn::MaxOfLanes(Floats(), ways_.Length()));
+    const int sections = std::clamp(static_cast<int>(0.5f * longest / step) + 1, 1, kMostSections);
+    return March(moved_a, moved_b, wanted, sections, hits);
+  }
+
+ private:
+  static constexpr int kMostSections = 24;  // of half an edge
+  static_assert(kHitsOfEdge == 2 * 2 * kMostSections);
+
+  // From point to point along the edges: between two of them the distance changes its sign, or is least where its slope
+  // does.
+  HWY_ATTR std::size_t March(const Points& moved_a, const Points& moved_b, unsigned wanted, int sections,
+                             FieldHit* hits) const {
+    const Floats d;
+    const F zero = hn::Zero(d);
+    std::size_t found = 0;
+    const auto add = [&](unsigned bits, F along, bool within_reach) HWY_ATTR {
+      if (bits == 0) return;
+      const Points r = ways_.Rest(along);
+      const Distance at = DistanceOf(query_.field, r);
+      if (within_reach) {
+        const Points moved{Mix(moved_a.x, moved_b.x, along), Mix(moved_a.y, moved_b.y, along),
+                           Mix(moved_a.z, moved_b.z, along)};
+        bits &= Bits(hn::Le(at.value, hn::Add(All(query_.reach), Closing(at.slope, moved))));
       }
+      found = Store(bits, along, r, at, hits, found);
+    };
+    Distance last = DistanceOf(query_.field, ways_.Rest(zero));
+    F start = zero;
+    for (int i = 1; i <= 2 * sections; ++i) {
+      const F end = All(static_cast<float>(i) / static_cast<float>(2 * sections));
+      const Distance next = DistanceOf(query_.field, ways_.Rest(end));
+      const Points& half = ways_.Half(i > sections);
+      const F falls = Dot(last.slope, half), rises = Dot(next.slope, half);
+      const auto outside = hn::Ge(last.value, zero), outside_then = hn::Ge(next.value, zero);
+      add(wanted & Bits(hn::Xor(outside, outside_then)), Between(start, end, last.value, next.value), false);
+      const auto turns = TurnsUp(falls, rises, Level(hn::Sqrt(Dot(half, half))));
+      const unsigned low = wanted & Bits(hn::And(turns, hn::And(outside, outside_then)));
+      if (low != 0) {
+        // Where the tangents meet: at a kink there, and between the two sides of what is round.
+        const F way = hn::Mul(All(2.0f), hn::Sub(end, start));
+        const F part =
+            hn::Div(hn::NegMulAdd(rises, way, hn::Sub(next.value, last.value)), hn::Mul(hn::Sub(falls, rises), way));
+        const F lowest = Mix(start, end, hn::Min(hn::Max(part, zero), All(1.0f)));
+        const F value = DistanceOf(query_.field, ways_.Rest(lowest)).value;
+        const unsigned inside = low & Bits(hn::Lt(value, zero));
+        add(low & ~inside, lowest, true);
+        add(inside, Between(start, lowest, last.value, value), false);
+        add(inside, Between(lowest, end, value, next.value), false);
+      }
+      last = next, start = end;
     }
     return found;
   }
 
- private:
-  static constexpr int kMostBlocks = 12;
-
-  static HWY_INLINE HWY_ATTR Points Rest(const Way& way, F along) {
-    const F late = hn::Max(hn::Sub(hn::Add(along, along), All(1.0f)), All(0.0f)),
-            early = hn::Min(hn::Add(along, along), All(1.0f));
-    const auto axis = [&](int a) HWY_ATTR {
-      return hn::MulAdd(late, All(way.rest[2][a] - way.rest[1][a]),
-                        Mix(All(way.rest[0][a]), All(way.rest[1][a]), early));
-    };
-    return {axis(0), axis(1), axis(2)};
+  // Where a number that is `first` at start and `second` at end is zero, were it linear. @pre of two signs
+  static HWY_INLINE HWY_ATTR F Between(F start, F end, F first, F second) {
+    return Mix(start, end, hn::Div(first, hn::Sub(first, second)));
   }
-  static HWY_ATTR FieldHit HitAt(const FieldQuery& query, const Way& way, std::int32_t feature, float along) {
-    const Points r = Rest(way, All(along));
+  HWY_INLINE HWY_ATTR Points Moved(const ShellView& shell, const Points& x, I samples) const {
+    const Points moved = Carried(query_, x);
+    return shell.swings != nullptr ? Rotated(query_.R, GatherSamples(shell.swings, samples), moved) : moved;
+  }
+  HWY_ATTR std::size_t Store(unsigned bits, F along, const Points& r, const Distance& at, FieldHit* hits,
+                             std::size_t found) const {
+    if (bits == 0) return found;
     Lanes lanes;
-    lanes.Store(r, r, DistanceOf(query.field, r));
-    FieldHit hit = lanes.Hit(0, feature, along);
-    for (int a = 0; a < 3; ++a) hit.at[a] = way.from[a] + along * (way.to[a] - way.from[a]);
-    return hit;
-  }
-
-  HWY_ALIGN float distance_[kMostBlocks * kFieldLanes];
-};
-
-// Eight edges at a time: their ends and middles in the field's frame, and carried back.
-class EdgeBlock {
- public:
-  // @return those that may come within reach, a bit each
-  HWY_ATTR unsigned Look(const FieldQuery& query, const ShellView& shell, const std::int32_t* ends) {
-    const Floats d;
-    const Points x = GatherEnds(shell.coordinates, ends), y = GatherEnds(shell.coordinates, ends + kFieldLanes);
-    const Points a = Placed(query, x), b = Placed(query, y);
-    const Points across = Difference(b, a);
-    const F length = hn::Sqrt(Dot(across, across)), half = hn::Mul(All(0.5f), length);
-    const Points middle{hn::MulAdd(All(0.5f), across.x, a.x), hn::MulAdd(All(0.5f), across.y, a.y),
-                        hn::MulAdd(All(0.5f), across.z, a.z)};
-    // Distances change by no more than the way: what is farther from the surface than half an edge does not reach it,
-    // from neither side.
-    const auto long_enough = hn::Gt(length, hn::Zero(d));
-    const F coarse = hn::Abs(DistanceOf(query.field, middle).value);
-    const F reach =
-        hn::Add(All(query.reach), hn::Max(Motion(query, shell, x, ends), Motion(query, shell, y, ends + kFieldLanes)));
-    const auto near = hn::And(long_enough, hn::Le(coarse, hn::Add(half, hn::Add(reach, All(query.flex)))));
-    if (hn::AllFalse(d, near)) return 0;
-    // The same of its two halves, in the rest shape.
-    const Points start = CarriedBack(query.lattice, a), centre = CarriedBack(query.lattice, middle),
-                 end = CarriedBack(query.lattice, b);
-    const F at_start = hn::Abs(DistanceOf(query.field, start).value),
-            at_end = hn::Abs(DistanceOf(query.field, end).value),
-            at_centre = hn::Abs(DistanceOf(query.field, centre).value);
-    const F most = hn::MulAdd(All(2.0f), reach, half);
-    const auto within =
-        hn::And(near, hn::Or(hn::Le(hn::Add(at_start, at_centre), most), hn::Le(hn::Add(at_centre, at_end), most)));
-    const unsigned bits = Bits(within);
-    if (bits == 0) return 0;
-    Store(a, from_), Store(b, to_);
-    Store(start, rest_[0]), Store(centre, rest_[1]), Store(end, rest_[2]);
-    hn::Store(length, d, length_), hn::Store(reach, d, reach_);
-    return bits;
-  }
-  Way At(unsigned lane) const {
-    Way way;
-    for (int a = 0; a < 3; ++a) {
-      way.from[a] = from_[a][lane], way.to[a] = to_[a][lane];
-      for (int i = 0; i < 3; ++i) way.rest[i][a] = rest_[i][a][lane];
+    HWY_ALIGN float where[kLanes];
+    lanes.Store(ways_.At(along), r, at);
+    hn::Store(along, Floats(), where);
+    for (; bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+      hits[found++] = lanes.Hit(lane, edge_[lane], where[lane]);
     }
-    way.length = length_[lane], way.reach = reach_[lane];
-    return way;
+    return found;
   }
 
- private:
-  // How far ends are expected to move.
-  static HWY_INLINE HWY_ATTR F Motion(const FieldQuery& query, const ShellView& shell, const Points& x,
-                                      const std::int32_t* ends) {
-    Points moved = Carried(query, x);
-    if (shell.swings != nullptr) moved = Rotated(query.R, GatherEnds(shell.swings, ends), moved);
-    return hn::Sqrt(Dot(moved, moved));
-  }
-  static HWY_INLINE HWY_ATTR void Store(const Points& p, float (&to)[3][kLanes]) {
-    const Floats d;
-    hn::Store(p.x, d, to[0]), hn::Store(p.y, d, to[1]), hn::Store(p.z, d, to[2]);
-  }
-  HWY_ALIGN float from_[3][kLanes], to_[3][kLanes], rest_[3][3][kLanes], length_[kLanes], reach_[kLanes];
+  const FieldQuery& query_;
+  const std::int32_t* edge_;
+  I from_, to_;
+  Points a_, b_;  // of the edges' body
+  Ways ways_;
 };
 
-HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                               std::size_t count, float step, FieldHit* hits) {
-  Profile profile;
-  EdgeBlock block;
+// Distances change by no more than the way: what is farther from the surface at both ends than half of an edge does not
+// reach it, from neither side. A bit each.
+HWY_INLINE HWY_ATTR unsigned MayReach(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
+                                      I from, I to) {
+  const Floats d;
+  const F apart =
+      hn::Add(hn::Abs(hn::GatherIndex(d, bounds.distance, from)), hn::Abs(hn::GatherIndex(d, bounds.distance, to)));
+  const F motion = hn::Max(hn::GatherIndex(d, bounds.motion, from), hn::GatherIndex(d, bounds.motion, to));
+  const Points across = Difference(GatherSamples(shell.coordinates, to), GatherSamples(shell.coordinates, from));
+  const F within = hn::Sub(apart, hn::MulAdd(All(2.0f), motion, All(2.0f * query.reach)));
+  return Bits(hn::Or(hn::Le(within, hn::Zero(d)), hn::Le(hn::Mul(within, within), Dot(across, across))));
+}
+
+HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
+                               const std::uint32_t* clusters, std::size_t count, float step, FieldHit* hits) {
+  EdgeQueue looked_at, marched;
   std::size_t found = 0;
-  for (std::size_t c = 0; c < count; ++c) {
-    const std::size_t cluster = clusters[c];
+  const auto march = [&]() HWY_ATTR {
+    if (marched.count == 0) return;
+    const unsigned wanted = marched.Take();
+    found += EdgeBlock(query, shell, marched).Find(shell, wanted, step, hits + found);
+  };
+  const auto look = [&]() HWY_ATTR {
+    if (looked_at.count == 0) return;
+    unsigned wanted = looked_at.Take();
+    for (wanted &= EdgeBlock(query, shell, looked_at).Look(bounds); wanted != 0; wanted &= wanted - 1) {
+      const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted));
+      marched.Add(looked_at.edge[at], looked_at.ends[0][at], looked_at.ends[1][at]);
+      if (marched.Full()) march();
+    }
+  };
+  for (std::size_t c = 0; c < count; ++c)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
-      unsigned within = block.Look(query, shell, shell.edge_ends + 2 * kFieldLanes * cluster + lane);
+      const std::int32_t* ends = shell.edge_ends + 2 * kFieldLanes * clusters[c] + lane;
+      unsigned within = MayReach(query, shell, bounds, hn::LoadU(Ints(), ends), hn::LoadU(Ints(), ends + kFieldLanes));
       for (; within != 0; within &= within - 1) {
         const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(within));
-        const auto edge = static_cast<std::int32_t>(cluster * kFieldLanes + lane + at);
-        found += profile.Find(query, block.At(at), edge, step, hits + found);
+        looked_at.Add(static_cast<std::int32_t>(clusters[c] * kFieldLanes + lane + at), ends[at],
+                      ends[kFieldLanes + at]);
+        if (looked_at.Full()) look();
       }
     }
-  }
+  look();
+  march();
   return found;
 }
 
 HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float* to, float step, FieldHit* exit) {
-  Way way;
-  Lanes lanes;
-  for (int i = 0; i < 3; ++i) {
-    const auto at = [&](int a) HWY_ATTR { return All(from[a] + 0.5f * static_cast<float>(i) * (to[a] - from[a])); };
-    const Points q{at(0), at(1), at(2)}, r = CarriedBack(query.lattice, q);
-    lanes.Store(q, r, Distance{All(0.0f), q});
-    for (int a = 0; a < 3; ++a) way.rest[i][a] = lanes.rest[a][0];
+  const Floats d;
+  Ways ways(query, {All(from[0]), All(from[1]), All(from[2])}, {All(to[0]), All(to[1]), All(to[2])});
+  ways.CarryBackEnds(query);
+  const float length = hn::GetLane(ways.Length());
+  const int points = std::clamp(static_cast<int>(length / step) + 2, 2, 96);
+  const F part = All(1.0f / static_cast<float>(points - 1));
+  // Each vector of points begins where the last one ended.
+  for (int first = 0; first + 1 < points; first += static_cast<int>(kLanes) - 1) {
+    HWY_ALIGN float values[kLanes];
+    const F along = hn::Mul(hn::Iota(d, static_cast<float>(first)), part);
+    hn::Store(DistanceOf(query.field, ways.Rest(along)).value, d, values);
+    for (int i = 0; i + 1 < static_cast<int>(kLanes); ++i) {
+      if ((values[i] < 0.0f) == (values[i + 1] < 0.0f)) continue;
+      const F at = hn::Mul(All(static_cast<float>(first + i) + values[i] / (values[i] - values[i + 1])), part);
+      const Points r = ways.Rest(at);
+      Lanes lanes;
+      lanes.Store(ways.At(at), r, DistanceOf(query.field, r));
+      *exit = lanes.Hit(0, 0, hn::GetLane(at));
+      return exit->along <= 1.0f;
+    }
   }
-  float squared = 0.0f;
-  for (int a = 0; a < 3; ++a)
-    way.from[a] = from[a], way.to[a] = to[a], squared += (to[a] - from[a]) * (to[a] - from[a]);
-  way.length = std::sqrt(squared), way.reach = query.reach;
-  Profile profile;
-  FieldHit hits[kHitsOfEdge];
-  if (profile.Find(query, way, 0, step, hits) == 0) return false;
-  *exit = hits[0];  // inside nothing but a change of sign counts
-  return true;
+  return false;
 }
 
 HWY_ATTR FieldHit FieldAt(const FieldQuery& query, const float* x) {
@@ -567,18 +698,19 @@ void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]) {
   HWY_DYNAMIC_DISPATCH(BoxOfClusters)(clusters, low, high);
 }
 
-std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found) {
-  return HWY_DYNAMIC_DISPATCH(NearClusters)(query, clusters, found);
+std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found,
+                          const SampleBounds& bounds) {
+  return HWY_DYNAMIC_DISPATCH(NearClusters)(query, clusters, found, bounds);
 }
 
 std::size_t near_samples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                         std::size_t count, FieldHit* hits) {
-  return HWY_DYNAMIC_DISPATCH(NearSamples)(query, shell, clusters, count, hits);
+                         std::size_t count, FieldHit* hits, const SampleBounds& bounds) {
+  return HWY_DYNAMIC_DISPATCH(NearSamples)(query, shell, clusters, count, hits, bounds);
 }
 
-std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                       std::size_t count, float step, FieldHit* hits) {
-  return HWY_DYNAMIC_DISPATCH(NearEdges)(query, shell, clusters, count, step, hits);
+std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const SampleBounds& ends,
+                       const std::uint32_t* clusters, std::size_t count, float step, FieldHit* hits) {
+  return HWY_DYNAMIC_DISPATCH(NearEdges)(query, shell, ends, clusters, count, step, hits);
 }
 
 bool first_exit(const FieldQuery& query, const float from[3], const float to[3], float step, FieldHit& exit) {

@@ -53,7 +53,8 @@ struct FieldQuery {
   LatticeView lattice{};
   float R[3][3] = {};  ///< rows
   float p[3] = {};
-  float reach = 0.0f;  ///< m: distances up to here count, and farther ones as the points' own motion closes them
+  float reach = 0.0f;  ///< m: distances up to here count, and farther ones as the points' own motion closes them along
+                       ///< the slope
   float flex = 0.0f;   ///< m: no point of the field's body is displaced farther
   /// How a point is expected to move in the field's frame until the step's end: turn x + shift + R u, u its swing.
   float turn[3][3] = {};
@@ -74,8 +75,17 @@ struct ShellView {
   const float* coordinates = nullptr;  ///< of samples, by cluster
   const float* swings = nullptr;       ///< how modes are expected to move these, m; null: they do not
   ClusterView samples{}, edges{};
-  /// Per cluster of edges, where x of their first eight ends stand in `coordinates`, then of their second.
+  /// Per cluster of edges, the samples at their first eight ends, then at their second. Sample s is lane s mod 8 of
+  /// cluster s div 8.
   const std::int32_t* edge_ends = nullptr;
+};
+
+/// Per sample of one surface, with room for whole groups of clusters. Where its cluster is far off, bounds take the
+/// place of its own numbers, and the slope is not a number.
+struct SampleBounds {
+  float* distance = nullptr;  ///< m: from the other surface, negative inside; or less than that, outside
+  float* motion = nullptr;    ///< m: it is expected to move at most so far
+  float* slope = nullptr;     ///< of the distance, by cluster: x[8] y[8] z[8], in the field's frame
 };
 
 /// A sample or a point of an edge near a field's surface.
@@ -90,7 +100,7 @@ struct FieldHit {
 
 /// The largest number of hits that a query of so many clusters or edges has.
 inline constexpr std::size_t kHitsOfCluster = kFieldLanes;
-inline constexpr std::size_t kHitsOfEdge = 8;
+inline constexpr std::size_t kHitsOfEdge = 96;
 
 /// Coordinates of up to `kBodiesAtOnce` bodies of one geometry: out[b] = rest + U z[b].
 /// @param U tiles of kRowTile rows, [tile][mode][kRowTile] @param rest, out 64-byte aligned
@@ -108,18 +118,22 @@ void largest_magnitudes(const float* points, std::size_t count, float largest[3]
 void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]);
 
 /// Clusters that may have something within reach, or come there. @param found room for 8 · groups @return how many
-std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found);
+/// @param bounds null members: not asked for; otherwise those of all samples, by what their clusters tell
+std::size_t near_clusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found,
+                          const SampleBounds& bounds = {});
 
 /// Samples of clusters that are within reach, or may come there. @param hits room for kHitsOfCluster each @return how
-/// many
+/// many @param bounds null members: not asked for; otherwise those of the clusters' samples
 std::size_t near_samples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                         std::size_t count, FieldHit* hits);
+                         std::size_t count, FieldHit* hits, const SampleBounds& bounds = {});
 
-/// Points of edges at which the distance along them changes its sign, comes within reach or is least within it, those
-/// at the ends excepted. The field is looked at in steps of a cell at most.
-/// @param step m: of a cell @param hits room for 8 · kHitsOfEdge each
-std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
-                       std::size_t count, float step, FieldHit* hits);
+/// Points of edges at which the distance along them changes its sign, or falls no longer or begins to rise where it is
+/// within reach or comes there, those at the ends excepted. Of each half of an edge the distances and slopes at its two
+/// ends tell whether it may have such a point; then the field is looked at in steps of `step`, or of a 48th of the
+/// edge.
+/// @param ends bounds of all samples @param step m: of a cell @param hits room for 8 · kHitsOfEdge each
+std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const SampleBounds& ends,
+                       const std::uint32_t* clusters, std::size_t count, float step, FieldHit* hits);
 
 /// Where a straight way from an inside point first leaves. @param step see near_edges() @return false: nowhere on it
 bool first_exit(const FieldQuery& query, const float from[3], const float to[3], float step, FieldHit& exit);

@@ -139,10 +139,15 @@ void Pointshell::order_edges() {
     return Vec3(0.5 * (surface_->rest(ends[0]) + surface_->rest(ends[1])));
   });
   edges_.resize(rounded_up(edges_.size(), kLanes), edges_.back());
+  const auto sample_of = [this](Index v) {
+    const std::int32_t at = slot_[static_cast<std::size_t>(v)];
+    constexpr auto kFloats = static_cast<std::int32_t>(kClusterFloats), kEight = static_cast<std::int32_t>(kLanes);
+    return at / kFloats * kEight + at % kFloats;
+  };
   for (std::size_t i = 0; i < edges_.size(); i += kLanes)
     for (std::size_t end = 0; end < 2; ++end)
       for (std::size_t lane = 0; lane < kLanes; ++lane)
-        edge_ends_.push_back(slot_[static_cast<std::size_t>(surface_->edge(edges_[i + lane]).vertices[end])]);
+        edge_ends_.push_back(sample_of(surface_->edge(edges_[i + lane]).vertices[end]));
 }
 
 void Pointshell::lay_out() {
