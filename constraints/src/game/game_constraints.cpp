@@ -226,28 +226,34 @@ void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
 }
 
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
-  if (last && !rows_.groups().empty()) {
-    residual_ = 0.0;
-    const double most = GameRows::kRecoverySpeed * rows_.length();
-    for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
-      for (const std::int32_t i : met) {
-        const GameRow& row = rows_.of(group)[static_cast<std::size_t>(i)];
-        if (row.keeps_place) {
-          const double open = gaps_[static_cast<std::size_t>(i)] - row.rate;
-          right[kPlace] = -std::clamp(open, -most, most);
-          residual_ = std::max(residual_, std::abs(open));
-        }
-        right += kColumns;
-      }
-    });
-    system_.solve<kColumns>(right_);
-    displace(bodies, false);
-  }
   for (const GameGroup& group : rows_.groups()) {
     forces_.clear();
     for (const GameRow& row : rows_.of(group)) forces_.push_back(rows_.length() * row.force);
     group.constraint->accept(states, forces_);
   }
+  if (last && !rows_.groups().empty()) close_step(states, bodies);
+}
+
+/// By rows made anew: those of the substep's start may even open what turns by a radian within it.
+void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
+  rows_.linearise_again(states, bodies);
+  system_.factor(rows_, true);
+  residual_ = 0.0;
+  right_.assign(kColumns * system_.size(), 0.0);
+  const std::span<const GameGroup> groups = rows_.groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    double* right = right_.data() + kColumns * system_.first(g);
+    for (const std::int32_t i : system_.met(g)) {
+      const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
+      if (row.keeps_place) {
+        right[kPlace] = -row.error;
+        residual_ = std::max(residual_, std::abs(row.error));
+      }
+      right += kColumns;
+    }
+  }
+  system_.solve<kColumns>(right_);
+  displace(bodies, false);
 }
 
 bool GameConstraints::all_finite() const {

@@ -18,7 +18,7 @@ class GameConstraints {
   void solve(GameBodies& bodies);
   /// Once the bodies have moved: closes what is open there. @param pushed whether GameBodies::pushes() moved them
   void close(const BodyStates& states, GameBodies& bodies, bool pushed);
-  /// Closes what close() has left, at the end of a step, and tells the constraints what acted.
+  /// Tells the constraints what acted, and at the end of a step closes what close() has left.
   void end_substep(const BodyStates& states, GameBodies& bodies, bool last);
 
   std::size_t size() const { return rows_.rows().size(); }
@@ -37,6 +37,7 @@ class GameConstraints {
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies, bool gains_speed);
+  void close_step(const BodyStates& states, GameBodies& bodies);
 
   GameRows rows_;
   RowSystem system_;

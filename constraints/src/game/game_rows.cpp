@@ -33,7 +33,7 @@ void add_sums(const double* numbers, std::size_t rows, std::size_t stride, const
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                     int number) {
   before_.clear();
-  for (const GameRow& row : rows_) before_.push_back({row.force, row.hold});
+  for (const GameRow& row : rows_) before_.push_back({row.force, row.left, row.hold});
   rows_.clear(), groups_.clear(), numbers_.clear(), led_.clear();
   const SubstepPlan& plan = bodies.plan();
   length_ = plan.length();
@@ -44,7 +44,7 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
     constraint->begin_part({.length = length_, .left = length_ * (plan.count - number), .whole = plan.step});
     add_group(states, bodies, constraint);
   }
-  hold_as_before();
+  hold_as_before(plan.step);
   scale_turns();
 }
 
@@ -158,15 +158,38 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
 }
 
 /// Rows with bounds begin as they ended the last substep.
-void GameRows::hold_as_before() {
+void GameRows::hold_as_before(double step) {
   const bool known = goes_on_ && before_.size() == rows_.size();
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     GameRow& row = rows_[i];
+    row.left =
+        known ? before_[i].left : row.error - std::clamp(row.error, -step * kRecoverySpeed, step * kRecoverySpeed);
     if (known)
       row.hold = before_[i].hold;
     else if (row.is_bounded())
       row.hold = row.force <= row.lower ? Hold::kLower : row.force >= row.upper ? Hold::kUpper : Hold::kMet;
     row.force = row.hold == Hold::kLower ? row.lower : row.hold == Hold::kUpper ? row.upper : 0.0;
+  }
+}
+
+void GameRows::linearise_again(const BodyStates& states, const GameBodies& bodies) {
+  for (const GameGroup& group : groups_) {
+    made_.clear();
+    group.constraint->add_rows(states, StepTime::kStart, length_, made_);
+    for (std::size_t s = 0; s < 2; ++s) {
+      const GameSide& side = group.sides[s];
+      if (side.frame < 0) continue;
+      const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
+      double* row = &numbers_[side.at];
+      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
+        write_side(bodies.body(side.frame), made_.row(static_cast<Index>(i)).sides[s], row);
+        for (std::size_t k = 0; k < 3; ++k) row[3 + k] /= scale[k];
+      }
+    }
+    for (std::size_t i = 0; i < group.count; ++i) {
+      GameRow& row = rows_[group.first + i];
+      row.error = made_.row(static_cast<Index>(i)).law.gap - row.left;
+    }
   }
 }
 

@@ -23,6 +23,7 @@ struct GameRow {
   double compliance = 0.0;                         // gap per force
   double rate = 0.0;                               // what the gap is to change by in the substep
   double error = 0.0;                              // of its gap at the substep's start, which displacements undo
+  double left = 0.0;                               // of the step's first error, what the step does not undo
   double force = 0.0;                              // held over the substep
   bool keeps_place = true;                         // the gap itself counts, and not its rate alone
   bool gives_way = false;                          // of a hand of limited force, which closing does not wait for
@@ -52,6 +53,9 @@ class GameRows {
 
   /// From where the substep begins. @param number of the substep, 0 …
   void make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints, int number);
+  /// J where the bodies are at the step's end, and errors: what is still to be closed there.
+  /// @pre the constraints have accepted the substep
+  void linearise_again(const BodyStates& states, const GameBodies& bodies);
   /// Once the bodies have begun the substep: what moves a led body in it whatever acts.
   void add_what_leads(const GameBodies& bodies);
 
@@ -95,12 +99,12 @@ class GameRows {
   void stiffen(const GameBody& body, const GameGroup& group, std::size_t s);
   double last_force(const GameGroup& group, std::size_t i) const;
   void add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields);
-  void hold_as_before();
+  void hold_as_before(double step);
   void scale_turns();
 
   /// Of a row, in the substep before.
   struct Held {
-    double force = 0.0;
+    double force = 0.0, left = 0.0;
     GameRow::Hold hold = GameRow::Hold::kMet;
   };
 
