@@ -17,6 +17,9 @@ std::string one_line(std::string text);
 /// The path in quotes, on one line.
 std::string quoted_path(const std::filesystem::path& path);
 
+/// Whether the importer of the format with this extension has read the file.
+bool was_read_as(const Assimp::Importer& importer, const char* extension);
+
 /// 10 s and 1 GB, and more for files of more than some megabytes. @throws InputError as read_file() does
 ChildLimits limits_for(const std::filesystem::path& path);
 

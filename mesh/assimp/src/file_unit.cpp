@@ -1,6 +1,5 @@
 #include "file_unit.h"
 
-#include <assimp/importerdesc.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -163,10 +162,7 @@ UnitOfScene unit_of_print(std::string_view xml, const char* root, const std::fil
 }  // namespace
 
 UnitOfScene unit_of(const Assimp::Importer& importer, const aiScene& scene, const std::filesystem::path& path) {
-  const int index = importer.GetPropertyInteger("importerIndex", -1);
-  const aiImporterDesc* description = index < 0 ? nullptr : importer.GetImporterInfo(static_cast<std::size_t>(index));
-  const std::string reads = " " + std::string(description == nullptr ? "" : description->mFileExtensions) + " ";
-  const auto is = [&](const char* extension) { return reads.find(" " + std::string(extension) + " ") != reads.npos; };
+  const auto is = [&](const char* extension) { return was_read_as(importer, extension); };
   const auto head = [&](std::string_view name_in_archive) {
     std::string bytes = read_file(path);
     if (bytes.starts_with("PK\3\4")) return head_in_archive(bytes, name_in_archive);
@@ -177,7 +173,7 @@ UnitOfScene unit_of(const Assimp::Importer& importer, const aiScene& scene, cons
   if (is("amf")) return unit_of_print(head(".amf"), "amf", path);
   if (is("dae")) return unit_of_collada(head(".dae"), path);
   if (is("fbx")) return unit_of_fbx(scene, path);
-  if (is("glb") || is("gltf2")) return {.unit = {.metres = 1.0, .stated = true, .up = 'y'}};
+  if (is("glb")) return {.unit = {.metres = 1.0, .stated = true, .up = 'y'}};
   return {};
 }
 

@@ -8,6 +8,7 @@
 
 #include "assimp_scene.h"
 #include "file_unit.h"
+#include "gltf.h"
 #include "in_child.h"
 #include "limber/core/error.h"
 #include "limber/mesh/unused_vertices.h"
@@ -28,7 +29,8 @@ struct RawSurface {
 /// Collects the meshes of a scene as its nodes show them.
 class Collector {
  public:
-  Collector(const aiScene& scene, std::string name) : scene_(scene), name_(std::move(name)) {}
+  Collector(const aiScene& scene, std::string name, bool is_gltf)
+      : scene_(scene), name_(std::move(name)), is_gltf_(is_gltf) {}
 
   void add(const aiNode& node, const aiMatrix4x4t<double>& parent) {
     const aiMatrix4x4t<double> pose = parent * aiMatrix4x4t<double>(node.mTransformation);
@@ -47,12 +49,9 @@ class Collector {
     read.grouped.groups.push_back({node, material_of(mesh), static_cast<Index>(surface.triangles.size()), 0});
     if (first + mesh.mNumVertices > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
       throw InputError(name_ + ": holds more than 2147483647 vertices");
-    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-      const aiVector3t<double> p =
-          pose * aiVector3t<double>(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
-      surface.vertices.emplace_back(p.x, p.y, p.z);
-    }
-    const bool mirrored = pose.Determinant() < 0.0;
+    for (const Vec3& p : vertices_of(mesh, pose)) surface.vertices.push_back(p);
+    const bool skinned = is_gltf_ && mesh.mNumBones > 0;  // its node counts for nothing
+    const bool mirrored = !skinned && pose.Determinant() < 0.0;
     for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
       const aiFace& face = mesh.mFaces[i];
       if (face.mNumIndices != 3) {
@@ -72,6 +71,17 @@ class Collector {
     }
   }
 
+  std::vector<Vec3> vertices_of(const aiMesh& mesh, const aiMatrix4x4t<double>& pose) const {
+    if (is_gltf_) return internal::shown_vertices(scene_, mesh, pose);
+    std::vector<Vec3> vertices;
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      const aiVector3t<double> p =
+          pose * aiVector3t<double>(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
+      vertices.emplace_back(p.x, p.y, p.z);
+    }
+    return vertices;
+  }
+
   std::string material_of(const aiMesh& mesh) const {
     aiString name;
     if (mesh.mMaterialIndex < scene_.mNumMaterials) scene_.mMaterials[mesh.mMaterialIndex]->Get(AI_MATKEY_NAME, name);
@@ -80,14 +90,16 @@ class Collector {
 
   const aiScene& scene_;
   std::string name_;
+  bool is_gltf_;
 };
 
 /// In the child: reads the file and hands on what was read.
 void send_raw(const std::filesystem::path& path, const std::string& name, internal::MessageWriter& message) {
+  internal::check_gltf(path, name);
   Assimp::Importer importer;
   const aiScene& scene = read_scene(importer, path, aiProcess_Triangulate);
   const internal::UnitOfScene unit = internal::unit_of(importer, scene, path);
-  Collector collector(scene, name);
+  Collector collector(scene, name, internal::was_read_as(importer, "glb"));
   collector.add(*scene.mRootNode, aiMatrix4x4t<double>());
   message.put(unit.unit.metres);
   message.put(unit.unit.stated);
