@@ -47,6 +47,10 @@ void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransf
   query.turning = static_cast<float>(turn.norm());
 }
 
+void set_fall(FieldQuery& query, const Vec3& fall) {
+  for (int i = 0; i < 3; ++i) query.fall[i] = static_cast<float>(fall[i]);
+}
+
 const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const ClusterView& clusters,
                                             std::vector<std::uint32_t>& found, const SampleBounds& bounds = {}) {
   found.resize(kFieldLanes * clusters.groups);
@@ -65,7 +69,7 @@ SampleBounds bounds_of(const ClusterView& samples, std::vector<float>& room) {
 // -- What is found ----------------------------------------------------------------------------------------------------
 
 void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
-                      const RigidTransform& end, double reach) {
+                      const RigidTransform& end, const Vec3& fall, double reach) {
   mine = &me, other = &field;
   turn = to_matrix(X_FS.q).cast<float>(), shift = X_FS.p.cast<float>();
   query.field = field.shell().distance();
@@ -75,6 +79,7 @@ void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& fi
   set_frame(query, turn, shift);
   set_motion(query, X_FS, end);
   query.swing = me.largest_swing();
+  set_fall(query, fall);
 }
 
 bool FieldView::apart() const {
@@ -83,7 +88,8 @@ bool FieldView::apart() const {
   const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&query.turn[0][0]);
   const Vec3f middle = 0.5f * (mine->low() + mine->high());
   const Vec3f moved = (turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2])).cwiseAbs();
-  const float spread = query.turning * 0.5f * (mine->high() - mine->low()).norm() + query.swing;
+  const float fall = std::hypot(query.fall[0], query.fall[1], query.fall[2]);
+  const float spread = query.turning * 0.5f * (mine->high() - mine->low()).norm() + query.swing + fall;
   return (centre.cwiseAbs() - half - moved).maxCoeff() > query.reach + spread;
 }
 
@@ -175,8 +181,9 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   // What lies within the margin is told by the foot; the field is off by a part of its cells.
   const double slack = collision_tuning().field.slack;
   view_[0].place(*a.shell, *b.shell, motion_.X_AB.inverse(), motion_.end.inverse(),
-                 comes_near(1) + slack * b.shell->shell().cell());
-  view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, comes_near(0) + slack * a.shell->shell().cell());
+                 motion_.X_AB.q.conjugate() * motion_.fall, comes_near(1) + slack * b.shell->shell().cell());
+  view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
+                 comes_near(0) + slack * a.shell->shell().cell());
   if (view_[0].apart() || view_[1].apart()) return;
   edges_.begin(view_[0], view_[1]);
   SampleBounds bounds[2];
@@ -273,7 +280,8 @@ void FieldContacts::add_sample(int of, const SampleFoot& sample) {
 void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape, bool shape_is_a) {
   const RigidTransform X_BS = shape_is_a ? motion_.X_AB.inverse() : motion_.X_AB, X_SB = X_BS.inverse();
   FieldQuery query;
-  query.reach = static_cast<float>(reach_ + motion_.fall.norm());
+  query.reach = static_cast<float>(reach_);
+  const Vec3 fall_S = shape_is_a ? motion_.fall : Vec3(motion_.X_AB.q.conjugate() * motion_.fall);
   query.swing = body.shell->largest_swing();
   Capsule capsule;
   const auto* half_space = std::get_if<HalfSpace>(&shape.geometry->shape());
@@ -287,6 +295,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     // In that frame the plane moves the other way.
     const RigidTransform moved = X_BS * (shape_is_a ? motion_.end : motion_.end.inverse());
     set_motion(query, {}, moved);
+    set_fall(query, X_BS.q * fall_S);
   } else {
     capsule_of(shape, capsule);
     query.field.kind = DistanceView::Kind::kSegment;
@@ -294,6 +303,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     query.field.radius = static_cast<float>(capsule.radius);
     set_frame(query, to_matrix(X_SB.q).cast<float>(), X_SB.p.cast<float>());
     set_motion(query, X_SB, shape_is_a ? motion_.end : motion_.end.inverse());
+    set_fall(query, fall_S);
   }
   const ShellView shell = body.shell->view();
   const std::vector<std::uint32_t>& clusters = find_near(query, shell.samples, near_);
@@ -391,9 +401,9 @@ void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& sh
   }
 }
 
-// m: gaps of the samples' own motion aside, up to which the other's points may come by its modes.
+// m: gaps, the samples' own motion and a fall aside, up to which the other's points may come by its modes.
 double FieldContacts::comes_near(int of) const {
-  return reach_ + motion_.fall.norm() + static_cast<double>(bodies_[of]->shell->largest_swing());
+  return reach_ + static_cast<double>(bodies_[of]->shell->largest_swing());
 }
 
 double FieldContacts::closing(const FieldBody& a, const FieldBody& b, const FieldMotion& motion,

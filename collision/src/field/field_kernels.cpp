@@ -242,17 +242,22 @@ struct Lanes {
   }
 };
 
-// How much of a distance a motion closes along its slope; 0 where it opens.
-HWY_INLINE HWY_ATTR F Closing(const Points& slope, const Points& moved) {
+// How much of a distance a motion and a fall close along its slope; 0 where they open it.
+HWY_INLINE HWY_ATTR F Closing(const FieldQuery& q, const Points& slope, const Points& moved) {
   const Floats d;
   const F steepness = hn::Max(hn::Sqrt(Dot(slope, slope)), All(1e-30f));
-  return hn::Max(hn::Div(hn::Neg(Dot(slope, moved)), steepness), hn::Zero(d));
+  const F falls = hn::Abs(Dot(slope, {All(q.fall[0]), All(q.fall[1]), All(q.fall[2])}));
+  return hn::Max(hn::Div(hn::Sub(falls, Dot(slope, moved)), steepness), hn::Zero(d));
+}
+
+HWY_INLINE HWY_ATTR F FallLength(const FieldQuery& q) {
+  return All(std::sqrt(q.fall[0] * q.fall[0] + q.fall[1] * q.fall[1] + q.fall[2] * q.fall[2]));
 }
 
 HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found,
                                   const SampleBounds& bounds) {
   const Floats d;
-  const F others = All(query.flex + query.swing);
+  const F others = hn::Add(All(query.flex + query.swing), FallLength(query));
   std::size_t count = 0;
   const F unknown = All(std::numeric_limits<float>::quiet_NaN());
   HWY_ALIGN float distance[kLanes], motion[kLanes];
@@ -295,7 +300,7 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
       Points moved = Carried(query, x);
       if (shell.swings != nullptr)
         moved = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), moved);
-      const F motion = hn::Sqrt(Dot(moved, moved));
+      const F motion = hn::Add(hn::Sqrt(Dot(moved, moved)), FallLength(query));
       const auto keep_bounds = [&](F least, const Points& slope) HWY_ATTR {
         if (bounds.distance == nullptr) return;
         hn::StoreU(least, d, bounds.distance + cluster * kFieldLanes + lane);
@@ -314,7 +319,7 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
       const Points r = CarriedBack(query.lattice, q);
       const Distance distance = DistanceOf(query.field, r);
       keep_bounds(distance.value, distance.slope);
-      unsigned within = Bits(hn::Le(distance.value, hn::Add(All(query.reach), Closing(distance.slope, moved))));
+      unsigned within = Bits(hn::Le(distance.value, hn::Add(All(query.reach), Closing(query, distance.slope, moved))));
       if (within == 0) continue;
       lanes.Store(q, r, distance);
       for (; within != 0; within &= within - 1) {
@@ -445,7 +450,7 @@ class EdgeBlock {
       if (within_reach) {
         const Points moved{Mix(moved_a.x, moved_b.x, along), Mix(moved_a.y, moved_b.y, along),
                            Mix(moved_a.z, moved_b.z, along)};
-        bits &= Bits(hn::Le(at.value, hn::Add(All(query_.reach), Closing(at.slope, moved))));
+        bits &= Bits(hn::Le(at.value, hn::Add(All(query_.reach), Closing(query_, at.slope, moved))));
       }
       found = Store(bits, along, r, at, hits, found);
     };

@@ -61,6 +61,7 @@ struct FieldQuery {
   float shift[3] = {};
   float turning = 0.0f;  ///< |turn|
   float swing = 0.0f;    ///< m: no |u| is larger
+  float fall[3] = {};    ///< or so much farther or less, in the field's frame
 };
 
 /// Clusters of eight in one state: balls that hold them.

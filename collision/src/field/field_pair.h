@@ -20,8 +20,9 @@ struct FieldView {
   Vec3f shift = Vec3f::Zero();
 
   /// @param X_FS, end where I am in the field's frame, and am expected to be at the step's end
+  /// @param fall one of us may do that beside it, field's frame, m
   void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
-             const RigidTransform& end, double reach);
+             const RigidTransform& end, const Vec3& fall, double reach);
   /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
   bool apart() const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }

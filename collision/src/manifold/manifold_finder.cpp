@@ -190,6 +190,8 @@ struct ManifoldFinder::Impl {
   void find_manifolds(Jobs& jobs);
   bool keeps(const LivePair& pair, const PairQuery& query) const;
   bool keeps_motion(const LivePair& pair, const PairQuery& query) const;
+  bool hardly_moved(const PairQuery& query, const RigidTransform& from, const RigidTransform& to) const;
+  bool lasts(const PairQuery& query) const;
   void expect(PairQuery& query) const;
   void make(LivePair& pair, const PairQuery& query, ManifoldWorker& worker);
   void follow(ManifoldWorker& worker) const;
@@ -375,9 +377,7 @@ double expected_change(const BodyState& state, std::size_t mode) {
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.near > pair.reach : q.reach > pair.reach + farthest)) return false;
-  const RigidTransform X_LS = smaller_in_larger(q, q.X_AB);
-  if (!((X_LS.p - pair.X_LS.p).norm() <= farthest)) return false;
-  if (!(2.0 * (X_LS.q * pair.X_LS.q.conjugate()).vector().norm() <= options.recycle_turn)) return false;
+  if (!hardly_moved(q, pair.X_LS, smaller_in_larger(q, q.X_AB))) return false;
   double bent = 0.0;
   const double* z = pair.amplitudes.data();
   for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
@@ -387,6 +387,23 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
       bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
     }
   return bent <= farthest && (!q.by_fields || keeps_motion(pair, q));
+}
+
+bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform& from,
+                                        const RigidTransform& to) const {
+  return (to.p - from.p).norm() <= farthest(q) &&
+         2.0 * (to.q * from.q.conjugate()).vector().norm() <= options.recycle_turn;
+}
+
+/// Whether a manifold that is made now can be kept in the next query, as far as the expected motion tells.
+bool ManifoldFinder::Impl::lasts(const PairQuery& q) const {
+  if (!q.by_fields) return true;
+  if (!hardly_moved(q, smaller_in_larger(q, q.X_AB), smaller_in_larger(q, q.X_AB_end))) return false;
+  double bends = 0.0;
+  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
+    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
+      bends += std::abs(expected_change(*state, i)) * body->modal->surface->largest_shape(static_cast<Index>(i));
+  return bends <= farthest(q);
 }
 
 /// Whether the expected motion closes at most so much more as manifolds are made for.
@@ -415,10 +432,11 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   for (const KeptPoint& point : pair.points)
     worker.last.push_back(static_cast<std::uint64_t>(point.a.key) << 32 | point.b.key);
   const bool follows = !q.by_fields && internal::SweptPath::is_needed(q);
+  const bool kept = !follows && lasts(q);
   PairQuery farther = q;
   if (follows)
     farther.reach = internal::SweptPath::near_at_start(q);
-  else
+  else if (kept)
     farther.reach += slack(q), farther.near += slack(q);
   worker.made.clear(), worker.gaps.clear();
   const std::span<const FeatureContact> found = worker.pairs.find(farther, worker.last);
@@ -432,7 +450,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   graph.make_room(pair, worker.made.size());
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
-  pair.known = !follows;
+  pair.known = kept;
   pair.X_LS = smaller_in_larger(q, q.X_AB);
   pair.X_LS_end = smaller_in_larger(q, q.X_AB_end);
   pair.reach = q.by_fields ? q.near : q.reach;
@@ -481,9 +499,10 @@ void ManifoldFinder::Impl::keep(const FeatureContact& c, double round_a, double 
   point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
   point.round_a = round_a, point.round_b = round_b, point.ahead = q.ahead;
   if (q.ahead > 0.0) point.normal = (point.turns_with_b ? q.b : q.a).pose.q.conjugate() * (q.state_a.pose.q * c.normal);
-  const auto known =
-      std::find_if(worker.made.begin(), worker.made.end(), [&](const KeptPoint& made) { return made.id == point.id; });
-  if (q.ahead == 0.0 || known == worker.made.end()) {
+  const auto known = q.ahead == 0.0 ? worker.made.end()
+                                    : std::find_if(worker.made.begin(), worker.made.end(),
+                                                   [&](const KeptPoint& made) { return made.id == point.id; });
+  if (known == worker.made.end()) {
     worker.made.push_back(point), worker.gaps.push_back(c.gap);
   } else if (double& gap = worker.gaps[static_cast<std::size_t>(known - worker.made.begin())];
              known->ahead == 0.0 && gap > internal::SweptPath::margin(q)) {
