@@ -13,7 +13,7 @@ function(limber_compile_options target)
   get_target_property(together ${target} UNITY_BUILD)
   if(together)
     # Of files compiled together: what one file's anonymous namespace holds is neither shared nor shadowed by another's.
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow)
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage> -Wno-shadow)
   endif()
   if(LIMBER_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
