@@ -1,6 +1,10 @@
 // What is particular to each format: docs/formats/meshes.md, claim by claim.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+
 #include "limber/core/error.h"
 #include "mesh_files.h"
 #include "same_mesh.h"
@@ -214,6 +218,21 @@ TEST_F(StlFormat, ReadsSeveralSolidsInCapitals) {
   const auto s = surface("m.stl", text);
   EXPECT_EQ(s.triangles.size(), 24u);
   EXPECT_EQ(s.vertices.size(), 8u);
+}
+
+TEST_F(StlFormat, IsTextInCapitalsThroughout) {
+  std::string text = stl_text(cube_surface());
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
+  EXPECT_NEAR(enclosed_volume(surface("m.stl", text)), 1.0, 1e-15);
+}
+
+TEST_F(StlFormat, TakesBinaryFilesWhoseCountWasLeftOpen) {
+  for (const std::uint32_t count : {0U, 0xffffffffU})
+    for (const char* head : {"made by hand", "solid cube", "SOLID"}) {
+      std::string bytes = stl_binary(cube_surface(), head);
+      std::memcpy(bytes.data() + 80, &count, 4);
+      EXPECT_EQ(surface("m.stl", bytes).triangles.size(), 12u) << head << count;
+    }
 }
 
 using PlyFormat = Format;

@@ -16,9 +16,9 @@ using Json = nlohmann::json;
 using Matrix = aiMatrix4x4t<double>;
 
 /// Extensions that say nothing of shapes begin so.
-constexpr std::string_view kOfLooks[] = {
-    "KHR_materials_", "KHR_texture_",          "EXT_texture_", "MSFT_texture_", "KHR_lights_",
-    "EXT_lights_",    "KHR_animation_pointer", "KHR_xmp",      "LIMBER_modal",  "KHR_techniques_webgl"};
+constexpr std::string_view kOfLooks[] = {"KHR_materials_",        "KHR_texture_", "EXT_texture_",
+                                         "MSFT_texture_",         "KHR_lights_",  "EXT_lights_",
+                                         "KHR_animation_pointer", "KHR_xmp",      "KHR_techniques_webgl"};
 
 /// The JSON of a .gltf or .glb file; discarded if it is none.
 Json json_of(std::string_view bytes) {

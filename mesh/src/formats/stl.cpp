@@ -1,6 +1,8 @@
 // STL, text and binary. A soup of triangles: the caller welds it.
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
+#include <limits>
 
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
@@ -9,6 +11,14 @@ namespace limber::internal {
 namespace {
 
 constexpr std::size_t kHead = 84, kFacet = 50;  // bytes of a binary file
+
+/// Programs that write facets as they come leave their count at 0 or at its largest.
+bool is_left_open(std::uint64_t facets) { return facets == 0 || facets == std::numeric_limits<std::uint32_t>::max(); }
+
+bool same(std::string_view word, std::string_view lower) {
+  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                    [](unsigned char a, char b) { return std::tolower(a) == b; });
+}
 
 /// "solid" does not tell: many binary files begin with it too. A length that fits the count does; no text has a count
 /// that fits, since four printable characters count half a thousand million facets or more.
@@ -20,7 +30,8 @@ bool is_binary(const FileBytes& file) {
     if (file.bytes.size() == kHead + kFacet * facets) return true;
   }
   const auto text = file.bytes.substr(0, 1024);
-  return !FileScanner(file.bytes, file.name, {}).peek_word().starts_with("solid") || text.find('\0') != text.npos;
+  const auto word = FileScanner(file.bytes, file.name, {}).peek_word();
+  return !same(word.substr(0, 5), "solid") || text.find('\0') != text.npos;
 }
 
 void push_facet(MeshFile& mesh) {
@@ -31,7 +42,9 @@ void push_facet(MeshFile& mesh) {
 MeshFile read_binary(const FileBytes& file) {
   FileScanner in(file.bytes, file.name, {});
   in.skip_bytes(80, "the 80 bytes of a binary STL file's head");
-  const auto facets = in.number<std::uint32_t>(Encoding::kLittleEndian, "the number of facets");
+  auto facets = in.number<std::uint32_t>(Encoding::kLittleEndian, "the number of facets");
+  if (is_left_open(facets) && in.remaining() % kFacet == 0)
+    facets = static_cast<std::uint32_t>(in.remaining() / kFacet);
   in.checked_count(facets, kFacet, "number of facets");
   MeshFile mesh;
   mesh.tets.nodes.reserve(3 * std::size_t{facets});
@@ -82,10 +95,6 @@ class StlText {
     push_facet(mesh_);
   }
 
-  static bool same(std::string_view word, std::string_view lower) {
-    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
-                      [](unsigned char a, char b) { return std::tolower(a) == b; });
-  }
   bool next_is(std::string_view lower) { return same(in_.peek_word(), lower); }
   void keyword(const char* lower) {
     const auto seen = in_.word(lower);
