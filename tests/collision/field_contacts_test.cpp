@@ -492,17 +492,9 @@ TEST(FieldContacts, NothingIsAllocatedOnceWarm) {
 
 TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
   const testing::ContactScene heap = testing::heap(40);
-  ManifoldFinder by_fields({.distance_fields = true}), by_triangles, by_threads({.distance_fields = true});
-  heap.add_all_to(by_fields), heap.add_all_to(by_triangles), heap.add_all_to(by_threads);
-  testing::ThreadJobs threads(3);
-  const auto found = contacts_of(by_fields, heap, 1e-2), exact = contacts_of(by_triangles, heap, 1e-2),
-             again = contacts_of(by_threads, heap, 1e-2, Vec3::Zero(), threads);
-  ASSERT_EQ(found.size(), again.size());
-  for (std::size_t c = 0; c < found.size(); ++c) {
-    EXPECT_EQ(found[c].id, again[c].id);
-    EXPECT_EQ(found[c].gap, again[c].gap);
-    EXPECT_EQ(found[c].normal, again[c].normal);
-  }
+  ManifoldFinder by_fields({.distance_fields = true}), by_triangles;
+  heap.add_all_to(by_fields), heap.add_all_to(by_triangles);
+  const auto found = contacts_of(by_fields, heap, 1e-2), exact = contacts_of(by_triangles, heap, 1e-2);
   // Bodies of 1 m, three hundredths deep in each other: no pair that triangles have deep is missing.
   std::map<std::pair<Index, Index>, std::pair<double, double>> depths;
   for (const ContactPoint& c : exact) {
@@ -521,6 +513,28 @@ TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
     }
   }
   EXPECT_GT(deep, 10);
+}
+
+TEST(FieldPairs, AnyNumberOfThreadsFindsTheSameBits) {
+  const testing::ContactScene heap = testing::heap(40);
+  const auto found_by = [&](int threads) {
+    ManifoldFinder finder({.distance_fields = true});
+    heap.add_all_to(finder);
+    testing::ThreadJobs jobs(threads);
+    return contacts_of(finder, heap, 1e-2, Vec3::Zero(), jobs);
+  };
+  const std::vector<ContactPoint> found = found_by(1);
+  EXPECT_GT(found.size(), 100u);
+  for (const int threads : {2, 3, 8}) {
+    const std::vector<ContactPoint> again = found_by(threads);
+    ASSERT_EQ(found.size(), again.size());
+    for (std::size_t c = 0; c < found.size(); ++c) {
+      EXPECT_EQ(found[c].id, again[c].id);
+      EXPECT_EQ(found[c].gap, again[c].gap);
+      EXPECT_EQ(found[c].normal, again[c].normal);
+      EXPECT_EQ(found[c].position, again[c].position);
+    }
+  }
 }
 
 TEST(FieldPairs, AWarmQueryAllocatesNothing) {
