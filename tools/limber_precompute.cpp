@@ -29,40 +29,63 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// The user's arguments, uninterpreted.
-struct Arguments {
-  std::string mesh, output;
-  std::string materials_file, material_name;
+// The user's arguments, uninterpreted.
+
+struct MaterialArguments {
+  std::string file, name;
   std::optional<double> youngs_modulus, poisson_ratio, density;
-  std::vector<std::string> fixes, residuals;
-  double residual_megabytes = 32.0;
-  int collision_triangles = 0;
-  std::string mass;
-  std::string elements;
-  std::string frequency_error;
-  std::vector<double> rayleigh;
-  std::string damping_ratio;
-  std::string render_surface, collision_surface, skin;
-  TetrahedralisationOptions tets;
-  SceneLimits limits;
-  std::string load = "sudden";
+};
+
+struct ModeArguments {
   int modes = 64;
+  std::string mass, elements, frequency_error, damping_ratio;
+  std::string load = "sudden";
+  std::vector<double> rayleigh;
+  SceneLimits limits;
+  int blas_threads = 1;
+  bool no_certify = false;
+};
+
+struct GeometryArguments {
+  std::vector<std::string> fixes;
+  std::string render_surface, collision_surface;
+  int collision_triangles = 0;
+  TetrahedralisationOptions tets;
   double scale = 1.0;
   std::optional<double> merge_nodes;
-  int blas_threads = 1;
-  bool volume_block = false, no_certify = false, list_materials = false;
-  AssemblyOptions assembly;
+};
+
+/// Of the blocks that an asset may have beside its modes.
+struct ResponseArguments {
+  std::vector<std::string> residuals;
+  double residual_megabytes = 32.0;
+  std::string skin;
+  bool volume_block = false;
+};
+
+struct AssemblyArguments {
+  AssemblyOptions options;
   bool auto_joints = false;
   std::string components = "connectivity";
   std::string scene;
 };
 
+struct Arguments {
+  std::string mesh, output;
+  bool list_materials = false;
+  MaterialArguments material;
+  ModeArguments modal;
+  GeometryArguments geometry;
+  ResponseArguments response;
+  AssemblyArguments assembly;
+};
+
 void declare_material_options(CLI::App& app, Arguments& a) {
-  app.add_option("--youngs-modulus", a.youngs_modulus, "Young's modulus E of the whole body")->type_name("PA");
-  app.add_option("--poisson-ratio", a.poisson_ratio, "Poisson's ratio, in (-1, 0.5)")->type_name("NU");
-  app.add_option("--density", a.density, "density of the whole body")->type_name("KG_M3");
-  app.add_option("--material", a.material_name, "a material by name, such as steel or rubber")->type_name("NAME");
-  app.add_option("--materials", a.materials_file,
+  app.add_option("--youngs-modulus", a.material.youngs_modulus, "Young's modulus E of the whole body")->type_name("PA");
+  app.add_option("--poisson-ratio", a.material.poisson_ratio, "Poisson's ratio, in (-1, 0.5)")->type_name("NU");
+  app.add_option("--density", a.material.density, "density of the whole body")->type_name("KG_M3");
+  app.add_option("--material", a.material.name, "a material by name, such as steel or rubber")->type_name("NAME");
+  app.add_option("--materials", a.material.file,
                  "materials by region: {\"REGION\": {\"youngs_modulus\", \"poisson_ratio\", \"density\"} or \"NAME\"}; "
                  "\"*\" is the rest")
       ->type_name("FILE.json");
@@ -70,123 +93,126 @@ void declare_material_options(CLI::App& app, Arguments& a) {
 }
 
 void declare_mode_options(CLI::App& app, Arguments& a) {
-  app.add_option("--modes", a.modes, "elastic modes computed, and the most kept, lowest first")
+  app.add_option("--modes", a.modal.modes, "elastic modes computed, and the most kept, lowest first")
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  app.add_option("--max-force", a.limits.max_force,
+  app.add_option("--max-force", a.modal.limits.max_force,
                  "largest force of the scene; with --min-displacement, drops what it cannot show")
       ->type_name("N")
       ->check(positive_number());
-  app.add_option("--min-displacement", a.limits.min_displacement, "smallest motion that anyone can see")
+  app.add_option("--min-displacement", a.modal.limits.min_displacement, "smallest motion that anyone can see")
       ->type_name("M")
       ->check(positive_number());
-  app.add_option("--load", a.load, "how the largest force comes")
+  app.add_option("--load", a.modal.load, "how the largest force comes")
       ->check(CLI::IsMember({"static", "sudden", "resonant"}))
       ->capture_default_str();
-  app.add_option("--frame-rate", a.limits.frame_rate, "drops modes whose damped frequency is above half of it")
+  app.add_option("--frame-rate", a.modal.limits.frame_rate, "drops modes whose damped frequency is above half of it")
       ->type_name("HZ")
       ->check(positive_number());
-  app.add_flag("--keep-all", a.limits.keep_all, "switches off the limits on force and frame rate");
-  app.add_option("--mass", a.mass, "mass matrix; default: lumped of linear elements, consistent of quadratic ones")
+  app.add_flag("--keep-all", a.modal.limits.keep_all, "switches off the limits on force and frame rate");
+  app.add_option("--mass", a.modal.mass,
+                 "mass matrix; default: lumped of linear elements, consistent of quadratic ones")
       ->check(CLI::IsMember({"lumped", "consistent"}));
-  app.add_option("--elements", a.elements,
+  app.add_option("--elements", a.modal.elements,
                  "four nodes a tet (linear) or ten (quadratic), which bend as they should; default: quadratic for tets "
                  "made from a surface, else as the file has them; parts of an assembly: linear")
       ->check(CLI::IsMember({"linear", "quadratic"}));
-  app.add_option("--rayleigh", a.rayleigh, "damping a1 K + a2 M: a1 in s, a2 in 1/s")
+  app.add_option("--rayleigh", a.modal.rayleigh, "damping a1 K + a2 M: a1 in s, a2 in 1/s")
       ->type_name("A1,A2")
       ->delimiter(',')
       ->expected(2);
-  app.add_option("--damping-ratio", a.damping_ratio, "damping ratio Z at two frequencies (1 is critical)")
+  app.add_option("--damping-ratio", a.modal.damping_ratio, "damping ratio Z at two frequencies (1 is critical)")
       ->type_name("Z@F1,F2");
-  app.add_option("--blas-threads", a.blas_threads,
+  app.add_option("--blas-threads", a.modal.blas_threads,
                  "threads of the linear algebra, 0 for all; more than one pays on huge meshes on a quiet machine")
       ->type_name("N")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  app.add_flag("--no-certify", a.no_certify, "skip the proof that no mode was missed (for huge meshes)");
+  app.add_flag("--no-certify", a.modal.no_certify, "skip the proof that no mode was missed (for huge meshes)");
 }
 
 void declare_geometry_options(CLI::App& app, Arguments& a) {
-  app.add_option("--fix", a.fixes,
+  app.add_option("--fix", a.geometry.fixes,
                  "hold nodes: group:NAME, box:x0,y0,z0,x1,y1,z1 (m) or nodes:I,J,... (0-based); repeatable")
       ->type_name("SELECTOR")
       ->allow_extra_args(false);
-  app.add_option("--render-surface", a.render_surface,
+  app.add_option("--render-surface", a.geometry.render_surface,
                  "surface to draw, embedded in the tets; default: the input surface, or the tets' boundary")
       ->type_name("FILE");
-  app.add_option("--collision-surface", a.collision_surface, "surface that touches; default: the tets' boundary")
+  app.add_option("--collision-surface", a.geometry.collision_surface,
+                 "surface that touches; default: the tets' boundary")
       ->type_name("FILE");
-  app.add_option("--collision-triangles", a.collision_triangles,
+  app.add_option("--collision-triangles", a.geometry.collision_triangles,
                  "most triangles of the surface that touches, by edge collapse; default: as many as it has")
       ->type_name("N")
       ->check(CLI::Range(4, 100'000'000));
-  app.add_option("--cell-size", a.tets.cell_size,
+  app.add_option("--cell-size", a.geometry.tets.cell_size,
                  "tets from a surface: largest circumradius; default: 1/40 of the diagonal, less where parts are thin")
       ->type_name("M")
       ->check(positive_number());
-  app.add_option("--frequency-error", a.frequency_error,
+  app.add_option("--frequency-error", a.modal.frequency_error,
                  "tets from a surface: cells so small that the ten lowest elastic frequencies are within this of the "
                  "continuum's, by the estimate that the asset keeps, as far as --max-nodes allows")
       ->type_name("PERCENT%");
-  app.add_option("--alpha", a.tets.alpha, "wrap of a soup: smallest hole it enters; default: 1/50 of the diagonal")
+  app.add_option("--alpha", a.geometry.tets.alpha,
+                 "wrap of a soup: smallest hole it enters; default: 1/50 of the diagonal")
       ->type_name("M")
       ->check(positive_number());
   app.add_option(
-         "--max-nodes", a.tets.max_nodes,
+         "--max-nodes", a.geometry.tets.max_nodes,
          "tets from a surface: nodes that cells smaller than --cell-size may cost, where parts or gaps are thin, or by "
          "--frequency-error")
       ->type_name("N")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
-  app.add_option("--scale", a.scale,
+  app.add_option("--scale", a.geometry.scale,
                  "multiplies all input lengths, after the unit that the file states, for files that are not in metres")
       ->type_name("FACTOR")
       ->check(positive_number())
       ->capture_default_str();
-  app.add_option("--merge-nodes", a.merge_nodes,
+  app.add_option("--merge-nodes", a.geometry.merge_nodes,
                  "tetrahedra: nodes that are no farther apart become one, for parts that were meshed one by one")
       ->type_name("M")
       ->check(CLI::NonNegativeNumber);
   app.add_option(
-         "--residual", a.residuals,
+         "--residual", a.response.residuals,
          "what dropped modes still answer statically: at nodes (as --fix names them), three further modes each, "
          "or of the whole 'surface' that touches, stored beside the modes; repeatable")
       ->type_name("SELECTOR|surface")
       ->allow_extra_args(false);
-  app.add_option("--residual-max-mb", a.residual_megabytes,
+  app.add_option("--residual-max-mb", a.response.residual_megabytes,
                  "largest table of --residual surface between all pairs of vertices; above, single vertices alone")
       ->type_name("MB")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_flag("--skin{auto}", a.skin,
+  app.add_flag("--skin{auto}", a.response.skin,
                "also bake a modal skin, which bends far without swelling; --skin=HANDLES with so many handles, else "
                "as many as it needs, 8 to 24");
-  app.add_flag("--volume", a.volume_block,
+  app.add_flag("--volume", a.response.volume_block,
                "also bake all nodes, so that any initial deformation can be given to the runtime");
 }
 
 void declare_assembly_options(CLI::App& app, Arguments& a) {
-  app.add_option("--joints", a.assembly.joints_file,
+  app.add_option("--joints", a.assembly.options.joints_file,
                  "the mesh is an assembly: a body for each component, joined as this file of limber-joints says; "
                  "materials are named by components")
       ->type_name("JOINTS.json");
-  app.add_flag("--auto-joints", a.auto_joints, "the same, with joints and limits found in the geometry");
-  app.add_option("--components", a.components, "what makes a component: shared vertices, or names of groups")
+  app.add_flag("--auto-joints", a.assembly.auto_joints, "the same, with joints and limits found in the geometry");
+  app.add_option("--components", a.assembly.components, "what makes a component: shared vertices, or names of groups")
       ->check(CLI::IsMember({"connectivity", "groups", "materials"}))
       ->capture_default_str();
-  app.add_option("--scene", a.scene, "of an assembly: the scene in which it stands and moves by its joints")
+  app.add_option("--scene", a.assembly.scene, "of an assembly: the scene in which it stands and moves by its joints")
       ->type_name("SCENE.json");
-  app.add_option("--rigid", a.assembly.rigid, "component that does not bend, or '*' for all; repeatable")
+  app.add_option("--rigid", a.assembly.options.rigid, "component that does not bend, or '*' for all; repeatable")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_option("--ground", a.assembly.ground, "component that stands still; repeatable; default: the first")
+  app.add_option("--ground", a.assembly.options.ground, "component that stands still; repeatable; default: the first")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_flag("--no-ground", a.assembly.free, "no component stands still");
+  app.add_flag("--no-ground", a.assembly.options.free, "no component stands still");
   app.add_flag(
-      "--no-joint-modes", [&a](std::int64_t) { a.assembly.joint_compliance = false; },
+      "--no-joint-modes", [&a](std::int64_t) { a.assembly.options.joint_compliance = false; },
       "of an assembly: leave out the up to six modes of a part for each of its joints, by which it answers exactly "
       "what "
       "the joint does to it at rest");
@@ -195,42 +221,43 @@ void declare_assembly_options(CLI::App& app, Arguments& a) {
 // Meaning -----------------------------------------------------------------------------------------------------------
 
 MaterialTable materials_of(const Arguments& a) {
-  const bool by_numbers = a.youngs_modulus || a.poisson_ratio || a.density;
-  const int ways = (by_numbers ? 1 : 0) + (a.material_name.empty() ? 0 : 1) + (a.materials_file.empty() ? 0 : 1);
+  const bool by_numbers = a.material.youngs_modulus || a.material.poisson_ratio || a.material.density;
+  const int ways = (by_numbers ? 1 : 0) + (a.material.name.empty() ? 0 : 1) + (a.material.file.empty() ? 0 : 1);
   if (ways != 1)
     throw InvalidArgument(
         std::string(ways == 0 ? "no material is given" : "the material is given twice") +
         "; give --material NAME, or --youngs-modulus, --poisson-ratio and --density, or --materials FILE");
-  if (!a.materials_file.empty()) return read_materials(a.materials_file);
-  if (!a.material_name.empty()) return {{"*", material_preset(a.material_name)}};
-  if (!a.youngs_modulus || !a.poisson_ratio || !a.density)
+  if (!a.material.file.empty()) return read_materials(a.material.file);
+  if (!a.material.name.empty()) return {{"*", material_preset(a.material.name)}};
+  if (!a.material.youngs_modulus || !a.material.poisson_ratio || !a.material.density)
     throw InvalidArgument("--youngs-modulus, --poisson-ratio and --density go together: one of them is missing");
-  const Material material{*a.youngs_modulus, *a.poisson_ratio, *a.density};
+  const Material material{*a.material.youngs_modulus, *a.material.poisson_ratio, *a.material.density};
   material.validate("material");
   return {{"*", material}};
 }
 
 RayleighDamping damping_of(const Arguments& a) {
-  if (!a.rayleigh.empty() && !a.damping_ratio.empty())
+  if (!a.modal.rayleigh.empty() && !a.modal.damping_ratio.empty())
     throw InvalidArgument("the damping is given twice: by --rayleigh and by --damping-ratio");
-  if (!a.rayleigh.empty()) return {.stiffness_proportional = a.rayleigh[0], .mass_proportional = a.rayleigh[1]};
-  if (a.damping_ratio.empty()) return {};
+  if (!a.modal.rayleigh.empty())
+    return {.stiffness_proportional = a.modal.rayleigh[0], .mass_proportional = a.modal.rayleigh[1]};
+  if (a.modal.damping_ratio.empty()) return {};
   double ratio = 0.0, first = 0.0, second = 0.0;
   char rest = 0;
-  if (std::sscanf(a.damping_ratio.c_str(), "%lf@%lf,%lf%c", &ratio, &first, &second, &rest) != 3)
-    throw InvalidArgument("--damping-ratio " + a.damping_ratio + ": expected Z@F1,F2, such as 0.02@100,1000");
+  if (std::sscanf(a.modal.damping_ratio.c_str(), "%lf@%lf,%lf%c", &ratio, &first, &second, &rest) != 3)
+    throw InvalidArgument("--damping-ratio " + a.modal.damping_ratio + ": expected Z@F1,F2, such as 0.02@100,1000");
   return RayleighDamping::from_ratio(ratio, first, second);
 }
 
 ResidualOptions residual_of(const Arguments& a) {
   ResidualOptions residual;
-  for (const std::string& text : a.residuals) {
+  for (const std::string& text : a.response.residuals) {
     if (text == "surface")
       residual.surface = true;
     else
       residual.nodes.push_back(parse_node_selector(text));
   }
-  residual.max_full_bytes = 1e6 * a.residual_megabytes;
+  residual.max_full_bytes = 1e6 * a.response.residual_megabytes;
   return residual;
 }
 
@@ -262,25 +289,25 @@ LoadKind load_of(const std::string& text) {
 BakeOptions options_of(const Arguments& a) {
   BakeOptions o;
   o.materials = materials_of(a);
-  for (const std::string& text : a.fixes) o.fixed.push_back(parse_node_selector(text));
-  if (!a.elements.empty()) o.elements = a.elements == "linear" ? Elements::kLinear : Elements::kQuadratic;
+  for (const std::string& text : a.geometry.fixes) o.fixed.push_back(parse_node_selector(text));
+  if (!a.modal.elements.empty()) o.elements = a.modal.elements == "linear" ? Elements::kLinear : Elements::kQuadratic;
   o.damping = damping_of(a);
-  o.analysis = {.modes = a.modes,
-                .mass = a.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
-                .certify = !a.no_certify,
-                .blas_threads = a.blas_threads};
-  o.limits = a.limits;
-  o.limits.max_modes = a.modes;
-  o.limits.load = load_of(a.load);
-  if ((a.limits.max_force > 0.0) != (a.limits.min_displacement > 0.0))
+  o.analysis = {.modes = a.modal.modes,
+                .mass = a.modal.mass == "consistent" ? MassKind::kConsistent : MassKind::kLumped,
+                .certify = !a.modal.no_certify,
+                .blas_threads = a.modal.blas_threads};
+  o.limits = a.modal.limits;
+  o.limits.max_modes = a.modal.modes;
+  o.limits.load = load_of(a.modal.load);
+  if ((a.modal.limits.max_force > 0.0) != (a.modal.limits.min_displacement > 0.0))
     throw InvalidArgument("--max-force and --min-displacement go together: one of them is missing");
   o.residual = residual_of(a);
-  o.skin = skin_of(a.skin);
-  o.collision_triangles = a.collision_triangles;
-  o.volume_block = a.volume_block;
+  o.skin = skin_of(a.response.skin);
+  o.collision_triangles = a.geometry.collision_triangles;
+  o.volume_block = a.response.volume_block;
   o.validate();
-  a.tets.validate();
-  (void)frequency_error_of(a.frequency_error);
+  a.geometry.tets.validate();
+  (void)frequency_error_of(a.modal.frequency_error);
   return o;
 }
 
@@ -339,9 +366,9 @@ nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahed
 /// Fills a surface with tets, told of failures by the file's name.
 Tetrahedralisation tets_of(Program& program, const Arguments& a, const SurfaceMesh& surface, double cell_size,
                            Warnings& warnings) {
-  TetrahedralisationOptions options = a.tets;
+  TetrahedralisationOptions options = a.geometry.tets;
   options.cell_size = cell_size;
-  options.quadratic = a.elements != "linear";
+  options.quadratic = a.modal.elements != "linear";
   options.progress = [&](const std::string& stage) { program.progress().stage(stage); };
   try {
     return tetrahedralise(surface, options, warnings);
@@ -354,10 +381,10 @@ Tetrahedralisation tets_of(Program& program, const Arguments& a, const SurfaceMe
 
 /// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
 void choose_elements(const Arguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options) {
-  if (a.elements.empty() && made_here) options.elements = Elements::kQuadratic;
+  if (a.modal.elements.empty() && made_here) options.elements = Elements::kQuadratic;
   const bool quadratic =
       options.elements == Elements::kQuadratic || (options.elements == Elements::kAsGiven && has_mid_edge_nodes);
-  if (a.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
+  if (a.modal.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
 }
 
 /// Tets, and what a bake of the lowest modes alone tells of them.
@@ -395,13 +422,13 @@ TriedCells try_cells(Program& program, const Arguments& a, const BakeInput& inpu
 /// Smaller and smaller cells until the error is what was asked for, or nodes run out.
 Tetrahedralisation cells_by_error(Program& program, const Arguments& a, const BakeInput& input,
                                   const BakeOptions& options) {
-  const double wanted = frequency_error_of(a.frequency_error);
+  const double wanted = frequency_error_of(a.modal.frequency_error);
   constexpr double kAim = 0.8, kLeast = 0.35, kMost = 0.9;  // of the size before, or of the error wanted
-  double order = a.elements == "linear" ? 2.0 : 3.0;
-  TriedCells tried = try_cells(program, a, input, options, a.tets.cell_size);
+  double order = a.modal.elements == "linear" ? 2.0 : 3.0;
+  TriedCells tried = try_cells(program, a, input, options, a.geometry.tets.cell_size);
   while (tried.error > wanted) {
     const double needed = std::clamp(std::pow(kAim * wanted / tried.error, 1.0 / order), kLeast, kMost);
-    const double affordable = std::cbrt(tried.nodes / static_cast<double>(a.tets.max_nodes));
+    const double affordable = std::cbrt(tried.nodes / static_cast<double>(a.geometry.tets.max_nodes));
     if (affordable > kMost) {
       program.warnings().push_back(fmt::format(
           "--frequency-error: {} nodes leave an error of {:.2g} %, and smaller cells would take more than --max-nodes",
@@ -421,8 +448,9 @@ Tetrahedralisation cells_by_error(Program& program, const Arguments& a, const Ba
 void fill_with_tets(Program& program, const Arguments& a, const BakeOptions& bake, BakeInput& input,
                     Stopwatch& stopwatch) {
   Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
-    return a.frequency_error.empty() ? tets_of(program, a, *input.render, a.tets.cell_size, program.warnings())
-                                     : cells_by_error(program, a, input, bake);
+    return a.modal.frequency_error.empty()
+               ? tets_of(program, a, *input.render, a.geometry.tets.cell_size, program.warnings())
+               : cells_by_error(program, a, input, bake);
   });
   stopwatch.add("wrap", t.seconds_wrap);
   stopwatch.add("thickness", t.seconds_thickness);
@@ -437,8 +465,8 @@ void fill_with_tets(Program& program, const Arguments& a, const BakeOptions& bak
 /// Joins nodes where that was asked for, and tells of those that look as if they were meant to be one.
 void join_parts(Program& program, const Arguments& a, TetMesh& mesh) {
   const std::string name = "\"" + a.mesh + "\"";
-  if (a.merge_nodes) {
-    const Index merged = merge_nodes(mesh, *a.merge_nodes);
+  if (a.geometry.merge_nodes) {
+    const Index merged = merge_nodes(mesh, *a.geometry.merge_nodes);
     program.report()["merged_nodes"] = merged;
     program.print(fmt::format("{} nodes merged\n", merged));
     validate(mesh, name + " (--merge-nodes)", program.warnings());
@@ -473,20 +501,22 @@ BakeInput read_input(Program& program, const Arguments& a, const BakeOptions& ba
   tell_unit(program, unit);
   if (auto* mesh = std::get_if<TetMesh>(&read)) {
     input.mesh = std::move(*mesh);
-    scale(input.mesh.nodes, a.scale);
+    scale(input.mesh.nodes, a.geometry.scale);
     join_parts(program, a, input.mesh);
-    if (a.tets.cell_size > 0.0 || a.tets.alpha > 0.0 || !a.frequency_error.empty())
+    if (a.geometry.tets.cell_size > 0.0 || a.geometry.tets.alpha > 0.0 || !a.modal.frequency_error.empty())
       program.warnings().push_back(
           "--cell-size, --frequency-error and --alpha have no effect: the input is made of tetrahedra already");
   } else {
     input.render = std::get<SurfaceMesh>(std::move(read));
-    if (a.merge_nodes)
+    if (a.geometry.merge_nodes)
       program.warnings().push_back("--merge-nodes has no effect: the input is a surface, whose vertices are welded");
-    scale(input.render->vertices, a.scale);
+    scale(input.render->vertices, a.geometry.scale);
     fill_with_tets(program, a, bake, input, stopwatch);
   }
-  if (!a.render_surface.empty()) input.render = read_surface(program, a.render_surface, a.scale);
-  if (!a.collision_surface.empty()) input.collision = read_surface(program, a.collision_surface, a.scale);
+  if (!a.geometry.render_surface.empty())
+    input.render = read_surface(program, a.geometry.render_surface, a.geometry.scale);
+  if (!a.geometry.collision_surface.empty())
+    input.collision = read_surface(program, a.geometry.collision_surface, a.geometry.scale);
   return input;
 }
 
@@ -542,29 +572,31 @@ std::string stage_line(const nlohmann::ordered_json& seconds) {
 
 /// Options for assemblies alone.
 void check_assembly(const Arguments& a) {
-  if (a.auto_joints && !a.assembly.joints_file.empty())
+  if (a.assembly.auto_joints && !a.assembly.options.joints_file.empty())
     throw InvalidArgument("the joints are given twice: by --joints and by --auto-joints");
-  const bool is_one = a.auto_joints || !a.assembly.joints_file.empty();
-  const bool asks = !a.scene.empty() || !a.assembly.rigid.empty() || !a.assembly.ground.empty() || a.assembly.free;
+  const bool is_one = a.assembly.auto_joints || !a.assembly.options.joints_file.empty();
+  const bool asks = !a.assembly.scene.empty() || !a.assembly.options.rigid.empty() ||
+                    !a.assembly.options.ground.empty() || a.assembly.options.free;
   if (asks && !is_one)
     throw InvalidArgument(
         "--scene, --rigid, --ground and --no-ground are for assemblies: give --joints or --auto-joints");
-  if (is_one && !(a.fixes.empty() && a.render_surface.empty() && a.collision_surface.empty()))
+  if (is_one &&
+      !(a.geometry.fixes.empty() && a.geometry.render_surface.empty() && a.geometry.collision_surface.empty()))
     throw InvalidArgument("--fix, --render-surface and --collision-surface are for single bodies, not for assemblies");
-  if (is_one && !a.frequency_error.empty())
+  if (is_one && !a.modal.frequency_error.empty())
     throw InvalidArgument("--frequency-error is for single surfaces, not for assemblies");
-  if (a.assembly.free && !a.assembly.ground.empty())
+  if (a.assembly.options.free && !a.assembly.options.ground.empty())
     throw InvalidArgument("--ground and --no-ground exclude each other");
 }
 
 void precompute_assembly(Program& program, const Arguments& a, const BakeOptions& options) {
-  AssemblyOptions assembly = a.assembly;
-  assembly.scale = a.scale;
-  assembly.tets = a.tets;
-  assembly.tets.quadratic = a.elements == "quadratic";
-  assembly.components = a.components == "groups"      ? ComponentRule::kGroups
-                        : a.components == "materials" ? ComponentRule::kMaterials
-                                                      : ComponentRule::kConnectivity;
+  AssemblyOptions assembly = a.assembly.options;
+  assembly.scale = a.geometry.scale;
+  assembly.tets = a.geometry.tets;
+  assembly.tets.quadratic = a.modal.elements == "quadratic";
+  assembly.components = a.assembly.components == "groups"      ? ComponentRule::kGroups
+                        : a.assembly.components == "materials" ? ComponentRule::kMaterials
+                                                               : ComponentRule::kConnectivity;
   program.add_input(a.mesh);
   TbbJobs jobs;
   BakedAssembly baked = bake_assembly(program, a.mesh, assembly, options, jobs);
@@ -578,10 +610,10 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
     program.print(fmt::format("{:<24} {:>10.4g} kg  {:>3} modes\n", body->name(), body->data().mass, body->modes()));
   program.print(fmt::format("{}: {} bodies, {} joints, {:.2f} MB\n", a.output, baked.asset.bodies.size(),
                             baked.asset.joints.size(), 1e-6 * static_cast<double>(bytes.size())));
-  if (a.scene.empty()) return;
-  const fs::path folder = fs::absolute(a.scene).parent_path();
-  program.write_file(a.scene, machine_scene(fs::path(a.mesh).stem().string(),
-                                            fs::absolute(a.output).lexically_relative(folder).string()));
+  if (a.assembly.scene.empty()) return;
+  const fs::path folder = fs::absolute(a.assembly.scene).parent_path();
+  program.write_file(a.assembly.scene, machine_scene(fs::path(a.mesh).stem().string(),
+                                                     fs::absolute(a.output).lexically_relative(folder).string()));
 }
 
 void precompute(Program& program, const Arguments& a) {
@@ -589,14 +621,14 @@ void precompute(Program& program, const Arguments& a) {
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
   check_assembly(a);
   BakeOptions options = options_of(a);
-  if (a.auto_joints || !a.assembly.joints_file.empty()) {
+  if (a.assembly.auto_joints || !a.assembly.options.joints_file.empty()) {
     choose_elements(a, false, false, options);
     return precompute_assembly(program, a, options);
   }
   nlohmann::ordered_json seconds;
   Stopwatch stopwatch(seconds);
 
-  for (const std::string& input : {a.mesh, a.materials_file, a.render_surface, a.collision_surface})
+  for (const std::string& input : {a.mesh, a.material.file, a.geometry.render_surface, a.geometry.collision_surface})
     if (!input.empty()) program.add_input(input);
   program.progress().stage("reading");
   BakeInput input = read_input(program, a, options, stopwatch);
