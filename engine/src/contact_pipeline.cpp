@@ -22,7 +22,8 @@ void ContactPipeline::advance(const Substep& substep, StepEvents& events, Jobs& 
   clock.lap(Stage::kRows);
   const std::span<const Index> awake = sleep_->awake();
   bodies_->advance_free(awake, sleep_->changes(), substep.gravity, jobs);
-  const auto constrained = std::ranges::count_if(awake, [&](Index body) { return constraints_->constrained(body); });
+  const auto constrained =
+      std::count_if(awake.begin(), awake.end(), [&](Index body) { return constraints_->constrained(body); });
   clock.lap(Stage::kAdvance, std::ssize(awake) - constrained);
   constraints_->step(jobs, {.step = substep.length, .gravity = substep.gravity, .timed = clock.runs()});
   if (clock.runs()) clock.lap(constraints_->times(), Stage::kSolve);
