@@ -19,13 +19,6 @@ namespace {
 
 constexpr char kDone = 'd', kThrown = 't';  // first byte of a message
 
-/// Bytes of address space that this process has.
-std::size_t address_space() {
-  std::size_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-}
-
 void set_limit(int resource, rlim_t soft, rlim_t hard) {
   rlimit limit{};
   getrlimit(static_cast<__rlimit_resource>(resource), &limit);
@@ -34,14 +27,23 @@ void set_limit(int resource, rlim_t soft, rlim_t hard) {
   setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
+#if defined(__SANITIZE_ADDRESS__)  // reserves terabytes of addresses
+void limit_addresses(std::size_t) {}
+#else
+/// @param more bytes of address space beside those that this process has
+void limit_addresses(std::size_t more) {
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t bytes = pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) + more;
+  set_limit(RLIMIT_AS, bytes, bytes);
+}
+#endif
+
 void limit_this_process(const ChildLimits& limits) {
   const auto seconds = static_cast<rlim_t>(limits.cpu_seconds);
   set_limit(RLIMIT_CPU, seconds, seconds + 1);
   set_limit(RLIMIT_CORE, 0, 0);
-#if !defined(__SANITIZE_ADDRESS__)  // which reserves terabytes
-  const rlim_t bytes = address_space() + limits.more_bytes;
-  set_limit(RLIMIT_AS, bytes, bytes);
-#endif
+  limit_addresses(limits.more_bytes);
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) std::signal(signal, SIG_DFL);
   const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
   dup2(nothing, STDOUT_FILENO);
