@@ -96,18 +96,22 @@ void Handle::add_force_derivative(const BodyStates& states, std::span<const doub
 }
 
 void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
-  if (left_ == whole_) force_ = Vec3::Zero(), work_ = 0.0;  // the step's first part
-  Vec3 off = Vec3::Zero();
+  if (left_ == whole_) force_ = Vec3::Zero(), work_ = 0.0;   // the step's first part
   const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     last_force_[i] = impulses[i] / step_;
     force_ += impulses[i] / whole_ * options_.directions[i];
     work_ += last_force_[i] * options_.directions[i].dot(p - from_);
-    off += options_.directions[i].dot(p - then_) * options_.directions[i];
   }
-  error_ = off.norm();
   now_ = then_;
   if (step_ == left_) next_.position += whole_ * next_.velocity;
+}
+
+double Handle::error(const BodyStates& states) const {
+  const Vec3 apart = point_.position(states, StepTime::kStart) - now_;
+  Vec3 off = Vec3::Zero();
+  for (const Vec3& direction : options_.directions) off += direction.dot(apart) * direction;
+  return off.norm();
 }
 
 }  // namespace limber

@@ -91,7 +91,7 @@ void World::set_island_solver(IslandSolverFactory make) {
 
 HandleView World::handle(HandleId id) const {
   const Handle& h = *named(impl_->constraints, id, "handle").handle;
-  return {.target = h.target(), .force = h.force(), .work = h.work(), .error = h.error()};
+  return {.target = h.target(), .force = h.force(), .work = h.work(), .error = h.error(impl_->constraints.states())};
 }
 
 ManipulationResult World::manipulate(std::span<const BodyWish> wishes, std::span<const BodyForce> forces,

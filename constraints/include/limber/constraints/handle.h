@@ -45,8 +45,8 @@ class Handle final : public Constraint {
   const Vec3& force() const { return force_; }
   /// What it did on the body over the last step, J: each substep's force along the point's way in it.
   double work() const { return work_; }
-  /// Distance from the target along the held directions at the end of the last step, m.
-  double error() const { return error_; }
+  /// Distance from the target along the held directions now, between steps, m.
+  double error(const BodyStates& states) const;
 
   std::array<Index, 2> bodies() const override { return {point_.body(), -1}; }
   bool may_be_divided() const override { return true; }
@@ -62,15 +62,15 @@ class Handle final : public Constraint {
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.point_, s.options_.directions, s.options_.max_force, s.options_.stiffness, s.options_.damping,
-                    s.now_, s.next_.position, s.next_.velocity, s.error_, s.work_, s.force_, s.last_force_);
+                    s.now_, s.next_.position, s.next_.velocity, s.work_, s.force_, s.last_force_);
   }
 
   MaterialFrame point_;
   HandleOptions options_;
   Vec3 now_, then_;  // the target at the start and at the end of the step's part at hand
   HandleTarget next_;
-  double step_ = 0.0, left_ = 0.0, whole_ = 0.0, error_ = 0.0, work_ = 0.0;  // of the part; of the step
-  Vec3 from_ = Vec3::Zero();  // where the point is at the start of the part
+  double step_ = 0.0, left_ = 0.0, whole_ = 0.0, work_ = 0.0;  // of the part; of the step
+  Vec3 from_ = Vec3::Zero();                                   // where the point is at the start of the part
   Vec3 force_ = Vec3::Zero();
   std::array<double, 3> last_force_{};
   std::vector<double> modal_;
