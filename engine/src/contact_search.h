@@ -8,8 +8,8 @@
 #include "body_table.h"
 #include "contact_registry.h"
 #include "contact_rows.h"
-#include "game_forecast.h"
 #include "limber/core/stage_times.h"
+#include "motion_forecast.h"
 #include "sleep_stage.h"
 #include "step_path.h"
 
@@ -36,7 +36,7 @@ class ContactSearch {
   BodyTable* bodies_;
   SleepStage* sleep_;
   ContactRegistry* registry_;
-  GameForecast forecast_;
+  MotionForecast forecast_;
   std::vector<ContactPoint> found_;
 };
 

@@ -1,6 +1,6 @@
-// What a contact source is asked with before a step by small steps: where bodies are, and how far they may come within
-// it. What is touched goes on as it does, for the most part; by a fall from rest and a speculative margin beside that
-// everything that is not is found as well.
+// What a contact source is asked with before a step: where bodies are, and how far they may come within it. What is
+// touched goes on as it does, for the most part; by a fall from rest and a speculative margin beside that everything
+// that is not is found as well.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +14,9 @@
 
 namespace limber::internal {
 
-class GameForecast {
+class MotionForecast {
  public:
-  GameForecast(BodyTable& bodies, SleepStage& sleep) : bodies_(&bodies), sleep_(&sleep) {}
+  MotionForecast(BodyTable& bodies, SleepStage& sleep) : bodies_(&bodies), sleep_(&sleep) {}
 
   /// What the source has been told is forgotten.
   void tell_all_anew() { told_ = {}; }

@@ -1,4 +1,4 @@
-#include "game_forecast.h"
+#include "motion_forecast.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ void expect_to_stay(BodyState& state) {
 
 }  // namespace
 
-bool GameForecast::write_states(double length, int substeps, const Vec3& gravity) {
+bool MotionForecast::write_states(double length, int substeps, const Vec3& gravity) {
   length_ = length;
   gravity_ = gravity;
   // Velocities change at each substep's start: Σ k g h² over n of them, h = T/n.
@@ -36,7 +36,7 @@ bool GameForecast::write_states(double length, int substeps, const Vec3& gravity
   return false;
 }
 
-void GameForecast::write_all() {
+void MotionForecast::write_all() {
   states_.resize(bodies_->size());
   end_amplitudes_.resize(bodies_->size());
   thickness_.assign(bodies_->size(), std::numeric_limits<double>::infinity());
@@ -63,7 +63,7 @@ void GameForecast::write_all() {
   }
 }
 
-void GameForecast::write_awake(Index body) {
+void MotionForecast::write_awake(Index body) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
   BodyState& state = states_[static_cast<std::size_t>(body)];
@@ -81,7 +81,7 @@ void GameForecast::write_awake(Index body) {
 
 /// A free body goes on with its velocities, its modes no farther than they would swing by these: what lies on something
 /// does not fall.
-void GameForecast::expect_steady(Index body, BodyState& state) {
+void MotionForecast::expect_steady(Index body, BodyState& state) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
   const RigidFrame& frame = group.frame(e.slot);
@@ -103,7 +103,7 @@ void GameForecast::expect_steady(Index body, BodyState& state) {
 }
 
 /// One that is led, hangs, or bends by its skin: by itself, as far as it comes.
-void GameForecast::expect_exact(Index body, BodyState& state) {
+void MotionForecast::expect_exact(Index body, BodyState& state) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
   group.predict_motion(e.slot, gravity_, length_, motion_);
