@@ -22,6 +22,13 @@ std::string plain_number(std::string_view word) {
 
 }  // namespace
 
+std::string lower_case(std::string_view word) {
+  std::string out(word);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; });
+  return out;
+}
+
 std::string shown(std::string_view seen) {
   constexpr std::size_t kShown = 40;
   constexpr char kHex[] = "0123456789abcdef";

@@ -25,6 +25,9 @@ std::string shown(std::string_view seen);
 /// A file's whole name for messages, in quotes, on one line whatever it is made of.
 std::string shown_path(const std::filesystem::path& path);
 
+/// A word with the capitals of ASCII made small.
+std::string lower_case(std::string_view word);
+
 class FileScanner {
  public:
   /// Special characters of a format's text; 0: none.

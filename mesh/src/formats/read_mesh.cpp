@@ -1,7 +1,6 @@
 #include "limber/mesh/read_mesh.h"
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 
 #include "formats/file_scanner.h"
@@ -36,9 +35,7 @@ std::optional<Format> format_of_content(std::string_view head) {
 }
 
 std::optional<Format> format_of_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = internal::lower_case(path.extension().string());
   constexpr std::pair<const char*, Format> kExtensions[] = {
       {".msh", Format::kGmsh},    {".mesh", Format::kMedit}, {".meshb", Format::kMedit}, {".vtk", Format::kVtk},
       {".node", Format::kTetgen}, {".ele", Format::kTetgen}, {".ply", Format::kPly},     {".obj", Format::kObj},

@@ -1,6 +1,5 @@
 // STL, text and binary. A soup of triangles: the caller welds it.
 #include <algorithm>
-#include <cctype>
 #include <cstdint>
 #include <limits>
 
@@ -15,11 +14,6 @@ constexpr std::size_t kHead = 84, kFacet = 50;  // bytes of a binary file
 /// Programs that write facets as they come leave their count at 0 or at its largest.
 bool is_left_open(std::uint64_t facets) { return facets == 0 || facets == std::numeric_limits<std::uint32_t>::max(); }
 
-bool same(std::string_view word, std::string_view lower) {
-  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
-                    [](unsigned char a, char b) { return std::tolower(a) == b; });
-}
-
 /// "solid" does not tell: many binary files begin with it too. A length that fits the count does; no text has a count
 /// that fits, since four printable characters count half a thousand million facets or more.
 bool is_binary(const FileBytes& file) {
@@ -31,7 +25,7 @@ bool is_binary(const FileBytes& file) {
   }
   const auto text = file.bytes.substr(0, 1024);
   const auto word = FileScanner(file.bytes, file.name, {}).peek_word();
-  return !same(word.substr(0, 5), "solid") || text.find('\0') != text.npos;
+  return lower_case(word.substr(0, 5)) != "solid" || text.find('\0') != text.npos;
 }
 
 void push_facet(MeshFile& mesh) {
@@ -95,10 +89,10 @@ class StlText {
     push_facet(mesh_);
   }
 
-  bool next_is(std::string_view lower) { return same(in_.peek_word(), lower); }
+  bool next_is(std::string_view lower) { return lower_case(in_.peek_word()) == lower; }
   void keyword(const char* lower) {
     const auto seen = in_.word(lower);
-    if (!same(seen, lower)) in_.fail("seen " + shown(seen) + ", expected " + lower);
+    if (lower_case(seen) != lower) in_.fail("seen " + shown(seen) + ", expected " + lower);
   }
 
   FileScanner in_;

@@ -33,13 +33,6 @@ struct CellField {
   std::vector<int> values;
 };
 
-std::string lower(std::string_view word) {
-  std::string out(word);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
-
 class VtkReader {
  public:
   VtkReader(const FileBytes& file, Warnings& warnings)
@@ -242,7 +235,7 @@ class VtkReader {
           "materialid", "materialids", "gmsh:physical", "medit:ref", "cellentityids", "cell_tags", "tag",
           "tags",       "label",       "labels",        "ref",       "attribute",     "attributes"})
       for (const CellField& f : fields_)
-        if (lower(f.name) == usual) return &f;
+        if (lower_case(f.name) == usual) return &f;
     if (fields_.size() == 1 && distinct_values(fields_[0]) <= kMostRegions) return &fields_[0];
     if (!fields_.empty())
       warnings_.push_back(in_.name() +
@@ -290,7 +283,7 @@ class VtkReader {
 
   void read_scalars() {
     const std::string name(in_.word("a name"));
-    const std::string type = lower(in_.word("a data type"));
+    const std::string type = lower_case(in_.word("a data type"));
     const auto components = in_.more_on_line() ? in_.integer(1, 4, "a number of components") : 1;
     start_data_line("a data type");
     if (next_is("LOOKUP_TABLE")) {
@@ -390,7 +383,7 @@ class VtkReader {
 
   /// A data type; the data begin on the next line.
   std::string data_type() {
-    std::string type = lower(in_.word("a data type"));
+    std::string type = lower_case(in_.word("a data type"));
     start_data_line("a data type");
     return type;
   }
