@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "limber/core/error.h"
 #include "sample_meshes.h"
 
 namespace limber {
@@ -27,6 +30,26 @@ SurfaceMesh as_stl_has_it(const SurfaceMesh& s) {
     out.triangles.push_back({n, n + 1, n + 2});
   }
   return out;
+}
+
+TEST(ClosedShells, AreSplitByTheirLabels) {
+  SurfaceMesh s;
+  add_cube(s, 3.0, {0, 0, 0}, false);
+  add_cube(s, 1.0, {1, 1, 1}, true);
+  std::vector<Index> label(24, 0);
+  std::fill(label.begin() + 12, label.end(), 1);
+  const std::vector<SurfaceShell> shells = split_into_shells(s, label);
+  ASSERT_EQ(shells.size(), 2u);
+  EXPECT_NEAR(shells[0].volume, 27.0, 1e-12);
+  EXPECT_NEAR(shells[1].volume, -1.0, 1e-12);
+  EXPECT_EQ(shells[1].surface.vertices.size(), 8u);
+  EXPECT_EQ(shells[1].triangles.front(), 12);
+  EXPECT_EQ(shells[1].box.max(), Vec3(2, 2, 2));
+  EXPECT_TRUE(holds(shells[0], shells[1]));
+  EXPECT_FALSE(holds(shells[1], shells[0]));
+  EXPECT_THROW(split_into_shells(s, std::vector<Index>(23, 0)), InvalidArgument);
+  label[3] = -1;
+  EXPECT_THROW(split_into_shells(s, label), InvalidArgument);
 }
 
 TEST(ClosedShells, OneInsideOutIsTurned) {

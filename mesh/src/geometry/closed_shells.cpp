@@ -3,21 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <string>
 #include <utility>
 
 #include "geometry/near_points.h"
 #include "limber/core/disjoint_sets.h"
+#include "limber/core/error.h"
 #include "limber/mesh/winding_number.h"
 
 namespace limber {
 namespace {
-
-struct Shell {
-  SurfaceMesh surface;          // with vertices of its own
-  std::vector<Index> triangle;  // of the whole
-  Eigen::AlignedBox3d box;
-  double volume = 0.0;  // signed
-};
 
 /// Per triangle the number of its shell. @param surface vertices at equal coordinates are one
 std::vector<Index> shells_of(const SurfaceMesh& surface) {
@@ -32,13 +27,36 @@ std::vector<Index> shells_of(const SurfaceMesh& surface) {
   return sets.labels();
 }
 
-std::vector<Shell> closed_shells(const SurfaceMesh& surface) {
-  const std::vector<Index> label = shells_of(surface);
-  std::vector<Shell> shells(1 + *std::max_element(label.begin(), label.end()));
-  for (std::size_t i = 0; i < label.size(); ++i) shells[label[i]].triangle.push_back(static_cast<Index>(i));
+std::vector<SurfaceShell> closed_shells(const SurfaceMesh& surface) {
+  std::vector<SurfaceShell> shells = split_into_shells(surface, shells_of(surface));
+  std::erase_if(shells, [](const SurfaceShell& s) { return !surface_quality(s.surface).closed_manifold(); });
+  return shells;
+}
+
+bool is_cavity(const SurfaceShell& shell, const std::vector<SurfaceShell>& shells) {
+  const auto holders = std::count_if(
+      shells.begin(), shells.end(), [&](const SurfaceShell& other) { return &other != &shell && holds(other, shell); });
+  return holders % 2 == 1;
+}
+
+}  // namespace
+
+std::vector<SurfaceShell> split_into_shells(const SurfaceMesh& surface, std::span<const Index> label) {
+  if (label.size() != surface.triangles.size())
+    throw InvalidArgument("split_into_shells: label has " + std::to_string(label.size()) +
+                          " numbers, expected one for " + "each of " + std::to_string(surface.triangles.size()) +
+                          " triangles");
+  std::vector<SurfaceShell> shells;
+  for (std::size_t i = 0; i < label.size(); ++i) {
+    if (label[i] < 0)
+      throw InvalidArgument("split_into_shells: label[" + std::to_string(i) + "] is " + std::to_string(label[i]) +
+                            ", expected 0 or more");
+    shells.resize(std::max(shells.size(), static_cast<std::size_t>(label[i]) + 1));
+    shells[label[i]].triangles.push_back(static_cast<Index>(i));
+  }
   std::vector<Index> own(surface.vertices.size(), -1);  // in the shell at hand
-  for (Shell& shell : shells) {
-    for (const Index i : shell.triangle) {
+  for (SurfaceShell& shell : shells) {
+    for (const Index i : shell.triangles) {
       Triangle t = surface.triangles[i];
       for (Index& v : t) {
         if (own[v] < 0) {
@@ -50,24 +68,16 @@ std::vector<Shell> closed_shells(const SurfaceMesh& surface) {
       }
       shell.surface.triangles.push_back(t);
     }
-    for (const Index i : shell.triangle)
+    for (const Index i : shell.triangles)
       for (const Index v : surface.triangles[i]) own[v] = -1;
     shell.volume = enclosed_volume(shell.surface);
   }
-  std::erase_if(shells, [](const Shell& s) { return !surface_quality(s.surface).closed_manifold(); });
   return shells;
 }
 
-bool is_cavity(const Shell& shell, const std::vector<Shell>& shells) {
-  const Vec3& p = shell.surface.vertices.front();
-  bool inside = false;
-  for (const Shell& other : shells)
-    if (&other != &shell && other.box.contains(shell.box) && std::abs(winding_number(other.surface, p)) > 0.5)
-      inside = !inside;
-  return inside;
+bool holds(const SurfaceShell& outer, const SurfaceShell& inner) {
+  return outer.box.contains(inner.box) && std::abs(winding_number(outer.surface, inner.surface.vertices.front())) > 0.5;
 }
-
-}  // namespace
 
 Index turn_shells_outward(SurfaceMesh& surface) {
   if (surface.triangles.empty()) return 0;
@@ -75,12 +85,12 @@ Index turn_shells_outward(SurfaceMesh& surface) {
   const std::vector<Index> of = internal::representatives(surface.vertices, 0.0);
   for (Triangle& t : joined.triangles)
     for (Index& v : t) v = of[v];
-  const std::vector<Shell> shells = closed_shells(joined);
+  const std::vector<SurfaceShell> shells = closed_shells(joined);
   Index turned = 0;
-  for (const Shell& shell : shells) {
+  for (const SurfaceShell& shell : shells) {
     if (shell.volume == 0.0 || (shell.volume < 0.0) == is_cavity(shell, shells)) continue;
     ++turned;
-    for (const Index i : shell.triangle) std::swap(surface.triangles[i][1], surface.triangles[i][2]);
+    for (const Index i : shell.triangles) std::swap(surface.triangles[i][1], surface.triangles[i][2]);
   }
   return turned;
 }

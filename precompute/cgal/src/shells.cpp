@@ -3,24 +3,25 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "limber/core/disjoint_sets.h"
-#include "limber/mesh/winding_number.h"
+#include "limber/mesh/closed_shells.h"
 
 namespace limber::internal {
 namespace {
 
 constexpr std::size_t kSeedsPerShell = 48;
 
-struct Shell {
-  SurfaceMesh surface;
-  Eigen::AlignedBox3d box;
-  double volume = 0.0;  ///< signed
-  int depth = 0;        ///< how many shells hold it
-  int parent = -1;      ///< the smallest of them
+/// A shell, and where it lies among the others.
+struct Nested {
+  SurfaceShell shell;
+  int depth = 0;    ///< how many shells hold it
+  int parent = -1;  ///< the smallest of them
 };
 
-std::vector<Shell> separate_shells(const SurfaceMesh& surface) {
+/// What hangs together by vertices.
+std::vector<Index> shells_of(const SurfaceMesh& surface) {
   DisjointSets sets(surface.triangles.size());
   std::vector<Index> triangle_at(surface.vertices.size(), -1);
   for (std::size_t i = 0; i < surface.triangles.size(); ++i)
@@ -28,36 +29,21 @@ std::vector<Shell> separate_shells(const SurfaceMesh& surface) {
       if (triangle_at[v] >= 0) sets.join(static_cast<Index>(i), triangle_at[v]);
       triangle_at[v] = static_cast<Index>(i);
     }
-  const std::vector<Index> label = sets.labels();
-  std::vector<Shell> shells(1 + *std::max_element(label.begin(), label.end()));
-  std::vector<Index> new_index(surface.vertices.size(), -1);  // a vertex belongs to one shell only
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    Shell& shell = shells[label[i]];
-    Triangle t = surface.triangles[i];
-    for (Index& v : t) {
-      if (new_index[v] < 0) {
-        new_index[v] = static_cast<Index>(shell.surface.vertices.size());
-        shell.surface.vertices.push_back(surface.vertices[v]);
-        shell.box.extend(surface.vertices[v]);
-      }
-      v = new_index[v];
-    }
-    shell.surface.triangles.push_back(t);
-  }
-  for (Shell& shell : shells) shell.volume = enclosed_volume(shell.surface);
-  return shells;
+  return sets.labels();
 }
 
-void find_nesting(std::vector<Shell>& shells) {
-  for (Shell& inner : shells)
-    for (std::size_t o = 0; o < shells.size(); ++o) {
-      const Shell& outer = shells[o];
-      if (&outer == &inner || !outer.box.contains(inner.box)) continue;
-      if (std::abs(winding_number(outer.surface, inner.surface.vertices.front())) < 0.5) continue;
+std::vector<Nested> nested(std::vector<SurfaceShell> shells) {
+  std::vector<Nested> out;
+  for (SurfaceShell& shell : shells) out.push_back({.shell = std::move(shell)});
+  for (Nested& inner : out)
+    for (std::size_t o = 0; o < out.size(); ++o) {
+      const Nested& outer = out[o];
+      if (&outer == &inner || !holds(outer.shell, inner.shell)) continue;
       ++inner.depth;
-      if (inner.parent < 0 || std::abs(outer.volume) < std::abs(shells[inner.parent].volume))
+      if (inner.parent < 0 || std::abs(outer.shell.volume) < std::abs(out[inner.parent].shell.volume))
         inner.parent = static_cast<int>(o);
     }
+  return out;
 }
 
 /// Vertices far from each other, each next one the farthest from those taken.
@@ -74,7 +60,7 @@ std::vector<Vec3> spread_vertices(const SurfaceMesh& surface) {
   return taken;
 }
 
-void add_shell(const Shell& shell, bool outward, Body& body) {
+void add_shell(const SurfaceShell& shell, bool outward, Body& body) {
   const bool turn = (shell.volume > 0.0) != outward;
   const auto base = static_cast<Index>(body.boundary.vertices.size());
   body.boundary.vertices.insert(body.boundary.vertices.end(), shell.surface.vertices.begin(),
@@ -90,23 +76,23 @@ void add_shell(const Shell& shell, bool outward, Body& body) {
 }  // namespace
 
 Bodies split_into_bodies(const SurfaceMesh& surface) {
-  std::vector<Shell> shells = separate_shells(surface);
-  find_nesting(shells);
+  const std::vector<Nested> shells = nested(split_into_shells(surface, shells_of(surface)));
   Bodies out;
   std::vector<std::size_t> body_of(shells.size());
   for (std::size_t s = 0; s < shells.size(); ++s) {
-    const bool outward = shells[s].depth % 2 == 0;
-    if ((shells[s].volume > 0.0) != outward) ++out.turned;
+    const auto& [shell, depth, parent] = shells[s];
+    const bool outward = depth % 2 == 0;
+    if ((shell.volume > 0.0) != outward) ++out.turned;
     if (!outward) continue;
     body_of[s] = out.bodies.size();
     Body& body = out.bodies.emplace_back();
-    body.diagonal = shells[s].box.diagonal().norm();
-    add_shell(shells[s], true, body);
+    body.diagonal = shell.box.diagonal().norm();
+    add_shell(shell, true, body);
   }
-  for (const Shell& shell : shells) {
-    if (shell.depth % 2 == 0) continue;
+  for (const Nested& inner : shells) {
+    if (inner.depth % 2 == 0) continue;
     ++out.cavities;
-    add_shell(shell, false, out.bodies[body_of[shell.parent]]);
+    add_shell(inner.shell, false, out.bodies[body_of[inner.parent]]);
   }
   return out;
 }

@@ -1,10 +1,29 @@
 /// @file limber/mesh/closed_shells.h
-/// Which way the triangles of closed shells run.
+/// The shells of a surface, which holds which, and which way the triangles of closed ones run.
 #pragma once
+
+#include <span>
+#include <vector>
 
 #include "limber/mesh/surface_mesh.h"
 
 namespace limber {
+
+/// A part of a surface, with vertices of its own.
+struct SurfaceShell {
+  SurfaceMesh surface;           ///< triangles in the whole's order, vertices in the order in which these name them
+  std::vector<Index> triangles;  ///< their numbers in the whole
+  Eigen::AlignedBox3d box;       ///< of the vertices, m
+  double volume = 0.0;           ///< enclosed_volume(), m³; < 0 where the triangles run the wrong way round
+};
+
+/// @param label per triangle of a valid surface the number of its shell, 0 … n − 1, as DisjointSets::labels() gives
+/// @return n shells @throws InvalidArgument if there are not as many labels as triangles, or one is negative
+std::vector<SurfaceShell> split_into_shells(const SurfaceMesh& surface, std::span<const Index> label);
+
+/// Whether a closed shell holds another that it does not cross, whichever way its triangles run.
+/// @pre the inner one has a vertex
+bool holds(const SurfaceShell& outer, const SurfaceShell& inner);
 
 /// Turns the closed shells whose triangles run the wrong way round. A shell is what hangs together by edges; vertices
 /// at equal coordinates count as one. Shells bound solids by the even-odd rule: one that lies in no other runs
