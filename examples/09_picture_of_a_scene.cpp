@@ -7,11 +7,11 @@
 #include <cstdlib>
 #include <map>
 
+#include "limber/collision/shape_surface.h"
 #include "limber/core/file.h"
 #include "limber/dynamics/reconstruct.h"
 #include "limber/model/morph_targets.h"
 #include "limber/scene/run.h"
-#include "limber/scene/shape_surface.h"
 #include "povray.h"
 
 namespace {

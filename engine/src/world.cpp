@@ -89,6 +89,20 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   return id;
 }
 
+BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, const MassProperties& mass,
+                        const BodyPlacement& placement) {
+  if (placement.shape) throw InvalidArgument("World::add_rigid: placement.shape is given, expected none");
+  const RigidModel rigid = impl_->rigid.get(shape, mass);
+  BodyPlacement placed = placement;
+  placed.shape = rigid.shape;
+  return add_body(rigid.model, placed);
+}
+
+BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement) {
+  if (!shape) throw InvalidArgument("World::add_rigid: the shape is null");
+  return add_rigid(shape, mass_properties(*shape, density), placement);
+}
+
 BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose, const CollisionFilter& filter,
                          std::optional<double> friction) {
   if (!shape) throw InvalidArgument("World::add_static: the shape is null");

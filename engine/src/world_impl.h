@@ -20,6 +20,7 @@
 #include "drawing.h"
 #include "game_path.h"
 #include "limber/engine/world.h"
+#include "rigid_models.h"
 #include "sleep_stage.h"
 #include "snapshot.h"
 #include "step_events.h"
@@ -60,6 +61,7 @@ struct World::Impl {
   WorldOptions options;
   Jobs& jobs;
   internal::BodyTable bodies;
+  internal::RigidModels rigid;
   internal::ConstraintStage constraints;  // bodies by their entries' indices
   internal::SleepStage sleep;
   internal::ContactRegistry registry;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "limber/scene/shape_surface.h"
+#include "limber/collision/shape_surface.h"
 
 namespace limber::internal {
 namespace {

@@ -7,12 +7,12 @@
 #include <numbers>
 
 #include "largest_shape.h"
+#include "limber/collision/shape_surface.h"
 #include "limber/core/error.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
 #include "limber/model/pose_keys.h"
 #include "limber/model/skin_pose.h"
-#include "limber/scene/shape_surface.h"
 
 namespace limber {
 namespace {

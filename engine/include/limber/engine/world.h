@@ -33,6 +33,7 @@
 #include <span>
 #include <vector>
 
+#include "limber/collision/rigid_model.h"
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/island_solver.h"
@@ -211,7 +212,15 @@ class World {
 
   // Bodies -----------------------------------------------------------------------------------------------------------
   BodyId add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement = {});
-  /// A rigid shape that never moves. Only contains() and remove_body() take its id.
+  /// A rigid body of a shape that bounds a solid, without a bake: rigid_model.h. `placement.pose` places its centre of
+  /// mass, which need not be the shape's own origin (RigidModel); `placement.shape` is not given. Bodies that share
+  /// their shape and mass share a model.
+  BodyId add_rigid(const std::shared_ptr<const Shape>& shape, const MassProperties& mass,
+                   const BodyPlacement& placement = {});
+  /// The same, of even density. @param density kg/m³, > 0
+  BodyId add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement = {});
+  /// A rigid shape that never moves: the ground, a triangle mesh, a height field. Only contains() and remove_body()
+  /// take its id.
   /// @param friction as in BodyPlacement
   BodyId add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose = {},
                     const CollisionFilter& filter = {}, std::optional<double> friction = {});

@@ -1,4 +1,4 @@
-#include "limber/scene/shape_surface.h"
+#include "limber/collision/shape_surface.h"
 
 #include <cmath>
 #include <numbers>

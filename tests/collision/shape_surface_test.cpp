@@ -1,5 +1,5 @@
 // Shapes as they are drawn: closed, seen from outside, and as large as they are.
-#include "limber/scene/shape_surface.h"
+#include "limber/collision/shape_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// @file limber/scene/shape_surface.h
+/// @file limber/collision/shape_surface.h
 /// Rigid shapes as triangles to look at, for those who draw scenes.
 #pragma once
 

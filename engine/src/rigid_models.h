@@ -1,0 +1,26 @@
+// Models of rigid bodies, made once of each shape and mass, so that bodies of one kind are one group.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "limber/collision/rigid_model.h"
+
+namespace limber::internal {
+
+class RigidModels {
+ public:
+  /// That of a body that has it still, or a new one.
+  RigidModel get(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
+
+ private:
+  struct Made {
+    std::weak_ptr<const Shape> of{};
+    MassProperties mass{};
+    std::weak_ptr<const ModalModel> model{};
+    std::weak_ptr<const Shape> shape{};
+  };
+  std::vector<Made> made_;
+};
+
+}  // namespace limber::internal
