@@ -25,7 +25,7 @@ void GamePath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, S
   clock.lap(Stage::kRows, std::ssize(search_.found()));
   bodies_->advance_free(sleep_->awake(), sleep_->changes(), substep.gravity, jobs);
   clock.lap(Stage::kAdvance, std::ssize(sleep_->awake()) - std::ssize(members_));
-  solve(substep);
+  solve(substep, jobs);
   clock.lap(Stage::kSolve, report_.rows);
   if (registry_->source() == nullptr) return;
   rows_.set.finish(sleep_->asleep(), std::exchange(wakings_, sleep_->wakings()) != sleep_->wakings());
@@ -50,14 +50,15 @@ void GamePath::list_constraints() {
   }
 }
 
-void GamePath::solve(const Substep& substep) {
+void GamePath::solve(const Substep& substep, Jobs& jobs) {
   const SmallStepReport report = solver_.step({.table = constraints_->table(),
                                                .members = members_,
                                                .contacts = &rows_.set,
                                                .constraints = constraining_,
                                                .thickness = search_.thickness(),
                                                .step = substep.length,
-                                               .gravity = substep.gravity});
+                                               .gravity = substep.gravity},
+                                              jobs);
   report_ = {};
   report_.status = report.solved ? IslandStatus::kSolved : IslandStatus::kFailed;
   report_.statuses[report_.status] = 1;

@@ -43,7 +43,7 @@ class GamePath final : public StepPath {
  private:
   void list_members();
   void list_constraints();
-  void solve(const Substep& substep);
+  void solve(const Substep& substep, Jobs& jobs);
 
   BodyTable* bodies_;
   ConstraintStage* constraints_;

@@ -260,6 +260,33 @@ TEST(GameContact, AFallIsTheSameBitsForAnyThreadsAndEveryInstructionSet) {
   });
 }
 
+/// Of towers of two side by side: more pairs share no body than one thread takes at once.
+std::uint64_t hash_of_towers(Jobs& jobs) {
+  GroundedWorld scene({.solver = ContactSolver::kGame}, {}, jobs);
+  const Vec3 half = Vec3(0.5, 0.5, 0.4) * kSize;
+  const auto bent = sample_model({.modes = 6, .lowest_hz = 60.0, .decay = 12.0, .half_extent = half});
+  const auto brick = std::make_shared<const Shape>(Box{.half_extents = half});
+  constexpr int kSide = 8;
+  for (int i = 0; i < 2 * kSide * kSide; ++i) {
+    const int place = i / 2, level = i % 2;
+    const Vec3 at(1.02 * kSize * (place % kSide), 1.02 * kSize * (place / kSide), (0.42 + 0.85 * level) * kSize);
+    BodyPlacement placement{
+        .pose = {quaternion_from_rotation_vector({0.02 * std::sin(i), 0.02 * std::cos(i), 0.0}), at}};
+    if (i % 5 != 0) placement.shape = brick;
+    scene.world.add_body(bent, placement);
+  }
+  for (int i = 0; i < 8; ++i) scene.world.step();
+  return scene.world.state_hash();
+}
+
+TEST(GameContact, ManyPairsAtOnceAreTheSameBitsForAnyThreads) {
+  const std::uint64_t serial = hash_of_towers(serial_jobs());
+  for (const int threads : {1, 2, 3, 8}) {
+    TbbJobs jobs(threads);
+    EXPECT_EQ(hash_of_towers(jobs), serial) << threads << " threads";
+  }
+}
+
 // Bundles hold the contacts of bodies of up to 32 modes; the others are swept one by one. Balls that do not bend by
 // theirs go either way.
 TEST(GameContact, BundlesOfPairsSweepAsOneContactAfterTheOtherDoes) {

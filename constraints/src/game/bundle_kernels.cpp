@@ -362,6 +362,28 @@ HWY_INLINE HWY_ATTR void MakeMasses(const PairBundle& bundle, BundleContact& c, 
   Put(hn::Sub(Get(c.rest, lane), bent[0]), c.rest, lane);
 }
 
+HWY_ATTR void MakeModeRows(const ModePoint& point, Block8* rows) {
+  const Lanes d;
+  for (std::size_t k = 0; k < point.blocks; ++k, rows += 3)
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      const std::size_t mode = 8 * k + lane;
+      const Vector root = hn::LoadU(d, point.roots + mode);
+      Vector shape[3];
+      for (std::size_t i = 0; i < 3; ++i) {
+        shape[i] = hn::Mul(hn::Set(d, point.weight[0]), hn::LoadU(d, point.rows[0][i] + mode));
+        for (std::size_t c = 1; c < 3; ++c)
+          shape[i] = hn::MulAdd(hn::Set(d, point.weight[c]), hn::LoadU(d, point.rows[c][i] + mode), shape[i]);
+        shape[i] = hn::Mul(root, shape[i]);
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float* n = point.axes[axis];
+        const Vector sum = hn::MulAdd(hn::Set(d, n[1]), shape[1],
+                                      hn::MulAdd(hn::Set(d, n[2]), shape[2], hn::Mul(hn::Set(d, n[0]), shape[0])));
+        Put(sum, rows[axis], lane);
+      }
+    }
+}
+
 HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
@@ -433,10 +455,9 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   return !hn::AllTrue(d, hn::Le(part, zero));
 }
 
-HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, const Block8* shapes, float share,
+HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, const Block8* shapes, float share,
                              float most) {
   const Lanes d;
-  bool any = false;
   for (std::size_t b = 0; b < all.count; ++b) {
     PairBundle& bundle = all.bundles[b];
     bundle.overlaps = false;
@@ -455,9 +476,7 @@ HWY_ATTR bool MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
         if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane)) bundle.overlaps = true;
       }
     }
-    any = any || bundle.overlaps;
   }
-  return any;
 }
 
 HWY_INLINE HWY_ATTR void PushOne(BundleContact& c, Sides& sides, std::size_t lane) {
@@ -483,11 +502,11 @@ HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, Block8* pushes
   }
 }
 
-HWY_ATTR float ResidualOfBundles(const BundleArrays& all, const Block8* motion) {
+HWY_ATTR void FindResiduals(const BundleArrays& all, const Block8* motion) {
   const Lanes d;
-  Vector largest = hn::Zero(d);
   for (std::size_t b = 0; b < all.count; ++b) {
-    const PairBundle& bundle = all.bundles[b];
+    PairBundle& bundle = all.bundles[b];
+    Vector largest = hn::Zero(d);
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Coordinates y;
       ReadCoordinates(all, bundle, motion, lane, y);
@@ -502,8 +521,8 @@ HWY_ATTR float ResidualOfBundles(const BundleArrays& all, const Block8* motion) 
         largest = hn::Max(largest, left);
       }
     }
+    bundle.residual = hn::GetLane(hn::MaxOfLanes(d, largest));
   }
-  return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
 
 HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
@@ -540,21 +559,24 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace limber::internal {
 
+HWY_EXPORT(MakeModeRows);
 HWY_EXPORT(MakeBundleRows);
 HWY_EXPORT(MeasureBundles);
 HWY_EXPORT(SweepBundles);
 HWY_EXPORT(PushBundles);
-HWY_EXPORT(ResidualOfBundles);
+HWY_EXPORT(FindResiduals);
 HWY_EXPORT(ApplyBundleForces);
 HWY_EXPORT(AddUpBundles);
+
+void make_mode_rows(const ModePoint& point, Block8* rows) { HWY_DYNAMIC_DISPATCH(MakeModeRows)(point, rows); }
 
 void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes) {
   HWY_DYNAMIC_DISPATCH(MakeBundleRows)(bundles, shapes);
 }
 
-bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
+void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
                      float most) {
-  return HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, shapes, share, most);
+  HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, shapes, share, most);
 }
 
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion) {
@@ -565,8 +587,8 @@ void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes) {
   HWY_DYNAMIC_DISPATCH(PushBundles)(bundles, backward, pushes);
 }
 
-float residual_of_bundles(const BundleArrays& bundles, const Block8* motion) {
-  return HWY_DYNAMIC_DISPATCH(ResidualOfBundles)(bundles, motion);
+void find_residuals(const BundleArrays& bundles, const Block8* motion) {
+  HWY_DYNAMIC_DISPATCH(FindResiduals)(bundles, motion);
 }
 
 void apply_bundle_forces(const BundleArrays& bundles, Block8* motion) {

@@ -25,6 +25,7 @@ struct PairBundle {
   Block8 inverse_turn;    // as RollingRow::inverse
   bool rolls = false;     // whether any resists rolling
   bool overlaps = false;  // whether any is to be pushed apart
+  float residual = 0.0f;  // as residual_of_contacts()
 };
 
 /// One contact in each lane; fields as those of ContactRow. A lane without a contact has masses and rows of 0.
@@ -39,6 +40,7 @@ struct BundleContact {
   Block8 radius, moment[3];  // as those of RollingRow
 };
 
+/// Kernels of different bundles may run at once, but for those that change coordinates: these where no body is shared.
 struct BundleArrays {
   PairBundle* bundles = nullptr;
   BundleContact* contacts = nullptr;
@@ -46,21 +48,36 @@ struct BundleArrays {
   std::size_t count = 0;      // of bundles
   std::int32_t zeros = 0;     // the block of coordinates that stands
   std::int32_t standing = 0;  // number of frames: where what stands is found
+
+  BundleArrays part(std::size_t begin, std::size_t end) const {
+    return {bundles + begin, contacts, rows, end - begin, zeros, standing};
+  }
 };
+
+/// What a point of a surface that bends by its modes moves by: U of its triangle's corners.
+struct ModePoint {
+  const float* rows[3][3] = {};  // by corner and axis of the body, padded to whole blocks
+  float weight[3] = {};          // of the corners
+  float axes[3][3] = {};         // the contact's, in those of the body: [axis][component]
+  const float* roots = nullptr;  // √ρ, padded likewise
+  std::size_t blocks = 0;
+};
+/// √ρ n·R U: three blocks, one an axis, of each eight modes.
+void make_mode_rows(const ModePoint& point, Block8* rows);
 
 /// Rows of frames and effective masses, from axes, levers and the rows of modes; takes from the gaps in `rest` what the
 /// modes give them. @param shapes with a block of zeros at their end
 void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
-/// As measure_contacts(). @param frames with one that stands at their end. @param shapes with a block of zeros at
-/// theirs
-bool measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
+/// As measure_contacts(), and whether any is to be pushed apart is told to each bundle. @param frames with one that
+/// stands at their end. @param shapes with a block of zeros at theirs
+void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
                      float most);
 /// As sweep_contacts(). @param motion with a block of zeros at its end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
 /// As push_contacts(). @param pushes with a block of zeros at their end
 void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);
-/// As residual_of_contacts().
-float residual_of_bundles(const BundleArrays& bundles, const Block8* motion);
+/// Tells each bundle its residual.
+void find_residuals(const BundleArrays& bundles, const Block8* motion);
 /// As apply_forces().
 void apply_bundle_forces(const BundleArrays& bundles, Block8* motion);
 /// Adds up forces.

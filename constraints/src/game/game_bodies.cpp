@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "limber/constraints/constraint.h"
 
@@ -125,25 +126,36 @@ FrameLoad GameBodies::load_of(const GameBody& body) const {
   return {plan_.gravity, body.group->held_force(body.slot), body.group->held_torque(body.slot)};
 }
 
-void GameBodies::begin_substep(int number) {
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    GameBody& body = bodies_[i];
-    tell_shift(i);
-    FrameExcitation excitation;
-    if (body.led < 0)
-      fall(body);
-    else
-      excitation = lead(body, number, shifts_[i]);
-    if (body.modes != nullptr) {
-      body.group->advance_modes(body.slot, body.modes->flow(), number, plan_.count, excitation);
-      write_modes(body, free_);
-    }
-    if (body.led >= 0) swing(body);
-    Block8& frame = free_[static_cast<std::size_t>(body.first)];
-    write_vector(body.root_mass * body.v, frame.v);
-    write_vector(body.turn, frame.v + 3);
+template <class Visit>
+void GameBodies::for_all(Jobs& jobs, const Visit& visit) const {
+  constexpr std::size_t kBodiesAtOnce = 32;
+  const auto part = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) visit(i);
+  };
+  jobs.parallel_for(bodies_.size(), kBodiesAtOnce, std::ref(part));
+}
+
+void GameBodies::begin_substep(int number, Jobs& jobs) {
+  for_all(jobs, [&](std::size_t i) { begin_substep_of(i, number); });
+}
+
+void GameBodies::begin_substep_of(std::size_t at, int number) {
+  GameBody& body = bodies_[at];
+  tell_shift(at);
+  FrameExcitation excitation;
+  if (body.led < 0)
+    fall(body);
+  else
+    excitation = lead(body, number, shifts_[at]);
+  if (body.modes != nullptr) {
+    body.group->advance_modes(body.slot, body.modes->flow(), number, plan_.count, excitation);
+    write_modes(body, free_);
   }
-  for (std::size_t i = 0; i < motion_.size(); ++i)
+  if (body.led >= 0) swing(body);
+  Block8& frame = free_[static_cast<std::size_t>(body.first)];
+  write_vector(body.root_mass * body.v, frame.v);
+  write_vector(body.turn, frame.v + 3);
+  for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
     for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
 }
 
@@ -191,13 +203,16 @@ void GameBodies::write_modes(const GameBody& body, std::vector<Block8>& to) cons
   for (std::size_t i = 0; i < z.size(); ++i) blocks[i / 8].v[i % 8] = static_cast<float>(z[i]) * inverse[i];
 }
 
-void GameBodies::end_substep(bool pushed) {
-  for (std::size_t i = 0; i < motion_.size(); ++i)
+void GameBodies::end_substep(bool pushed, Jobs& jobs) {
+  for_all(jobs, [&](std::size_t i) { end_substep_of(i, pushed); });
+}
+
+void GameBodies::end_substep_of(std::size_t at, bool pushed) {
+  GameBody& body = bodies_[at];
+  for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
     for (int l = 0; l < 8; ++l) answers_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (bodies_[i].modes != nullptr) move_modes(bodies_[i]);
-    move_frame(i, pushed);
-  }
+  if (body.modes != nullptr) move_modes(body);
+  move_frame(at, pushed);
 }
 
 void GameBodies::move_modes(GameBody& body) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "limber/constraints/body_response.h"
+#include "limber/core/jobs.h"
 #include "limber/dynamics/surface_point.h"
 #include "substep_modes.h"
 #include "sweep_kernels.h"
@@ -63,9 +64,9 @@ class GameBodies {
   /// The inertia of the others becomes that of the coming substep's middle.
   void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
-  void begin_substep(int number);
+  void begin_substep(int number, Jobs& jobs);
   /// Moves them by what the sweeps found, and by pushes.
-  void end_substep(bool pushed);
+  void end_substep(bool pushed, Jobs& jobs);
   /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
   /// without
   void displace(std::int32_t at, const double* speed, const double* place);
@@ -93,6 +94,11 @@ class GameBodies {
   bool all_finite() const;
 
  private:
+  /// Calls visit(i) of each body, in parts.
+  template <class Visit>
+  void for_all(Jobs& jobs, const Visit& visit) const;
+  void begin_substep_of(std::size_t at, int number);
+  void end_substep_of(std::size_t at, bool pushed);
   void place_frame(GameBody& body, const RigidFrame& frame);
   static void set_axes(GameBody& body, const Quaternion& attitude);
   void fall(GameBody& body) const;

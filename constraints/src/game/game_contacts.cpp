@@ -1,6 +1,7 @@
 #include "game_contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "limber/model/vertex_rows.h"
@@ -32,6 +33,43 @@ double yield_of(const PreparedSide& side, const Vec3& n) {
   return n.dot(sum * n);
 }
 
+/// √ρ n·R U of each mode, three blocks of each eight.
+/// @param axes along which the side is pushed, world. @param modal scratch, a number a mode
+void write_mode_rows(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
+                     std::span<double> modal, Block8* rows) {
+  if (body.modes == nullptr || side.model == nullptr) return;
+  const std::vector<float>& roots = body.modes->roots();
+  const Mat3 axes_B = body.R_start.transpose() * axes;
+  if (side.skin == nullptr && side.shapes.empty()) {
+    const VertexRows& vertices = side.model->collision_rows();
+    const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
+    ModePoint point{.roots = roots.data(), .blocks = roots.size() / 8};
+    for (std::size_t c = 0; c < 3; ++c) {
+      point.weight[c] = static_cast<float>(side.at.weight[c]);
+      for (int x = 0; x < 3; ++x) point.rows[c][x] = vertices.row(corners[c], x);
+    }
+    for (int axis = 0; axis < 3; ++axis) write_axis(axes_B.col(axis), point.axes[axis]);
+    make_mode_rows(point, rows);
+    return;
+  }
+  modal = modal.first(static_cast<std::size_t>(side.model->modes()));
+  for (Index axis = 0; axis < 3; ++axis) {
+    std::ranges::fill(modal, 0.0);
+    side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes_B.col(axis), modal, side.shapes);
+    for (std::size_t m = 0; m < modal.size(); ++m)
+      rows[3 * (m / 8) + static_cast<std::size_t>(axis)].v[m % 8] = static_cast<float>(modal[m]) * roots[m];
+  }
+}
+
+/// What a contact of a body with a skin is made by works on that skin's memory.
+bool shares_memory(const PreparedContact& contact) { return contact.a.skin != nullptr || contact.b.skin != nullptr; }
+
+/// m; 0: none.
+double rolling_radius(const BodyStates& states, const PreparedContact& contact, const GameContacts::Options& options) {
+  if (!(options.rolling_friction > 0.0) || !(is_round(contact.a) || is_round(contact.b))) return 0.0;
+  return options.rolling_friction * shorter_arm(states, contact);
+}
+
 /// Whether a force pushes, is in its cone, and is finite.
 bool meets_law(const Vec3& f, double friction) {
   constexpr double kRounded = 1e-5;  // of a force, in single precision
@@ -42,46 +80,77 @@ bool meets_law(const Vec3& f, double friction) {
 }  // namespace
 
 void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
-                              const Options& options) {
+                              const Options& options, Jobs& jobs) {
   contacts_ = contacts;
   rows_.clear();
   numbers_.clear();
   blocks_.clear();
   rolling_.clear();
-  const bool rolls = options.rolling_friction > 0.0;
+  for (const PreparedContact& contact : contacts)
+    for (const Index body : {contact.a.body, contact.b.body})
+      if (bodies.of(body) >= 0 && contact.a.body != contact.b.body) bodies.keep_axes(bodies.of(body));
   bundles_.arrange(bodies, contacts);
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PreparedContact& contact = contacts[i];
-    const std::size_t known = blocks_.size();
-    ContactRow row = make(states, bodies, contact, options, !bundles_.holds(i));
-    for (const ContactSideRows& side : row.side)
-      if (side.frame >= 0) bodies.keep_axes(side.frame);
-    const bool resists = rolls && (is_round(contact.a) || is_round(contact.b));
-    const double radius = resists ? options.rolling_friction * shorter_arm(states, contact) : 0.0;
-    if (bundles_.holds(i)) {
-      bundles_.put(i, row, blocks_.data());
-      blocks_.resize(known);
-      if (resists) bundles_.resist_rolling(i, radius, last_moment(contact));
-      continue;
-    }
-    find_masses(bodies, row);
-    rows_.push_back(row);
-    numbers_.push_back(i);
-    if (resists) add_rolling(bodies, contact, radius);
-  }
-  make_bundle_rows(bundles_.arrays(), bodies.shapes().data());
+  bundles_.fill(jobs, [&](std::size_t i) {
+    if (!shares_memory(contacts[i])) put_in_bundle(states, bodies, i, options);
+  });
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (!bundles_.holds(i))
+      add_row(states, bodies, i, options);
+    else if (shares_memory(contacts[i]))
+      put_in_bundle(states, bodies, i, options);
+  bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
   sums_.assign(rows_.size(), Vec3::Zero());
 }
 
-/// All but its masses; `rest` is the gap.
+void GameContacts::put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t i,
+                                 const Options& options) {
+  const PreparedContact& contact = contacts_[i];
+  const ContactRow row = make(states, bodies, contact, options);
+  bundles_.put(i, row);
+  for (std::size_t s = 0; s < 2; ++s) {
+    if (row.side[s].blocks <= 1) continue;
+    std::array<Block8, 3 * kMostBundledModes / 8> rows{};
+    std::array<double, kMostBundledModes> modal;
+    write_mode_rows(states, bodies.body(row.side[s].frame), contact.side(s), PreparedContact::sign(s) * contact.axes,
+                    modal, rows.data());
+    bundles_.put_modes(i, s, rows.data());
+  }
+  if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
+    bundles_.resist_rolling(i, radius, last_moment(contact));
+}
+
+/// Of a contact that bundles do not hold.
+void GameContacts::add_row(const BodyStates& states, GameBodies& bodies, std::size_t i, const Options& options) {
+  const PreparedContact& contact = contacts_[i];
+  ContactRow row = make(states, bodies, contact, options);
+  for (std::size_t s = 0; s < 2; ++s) {
+    ContactSideRows& at = row.side[s];
+    if (at.frame < 0) continue;
+    const Mat3 axes = PreparedContact::sign(s) * contact.axes;
+    at.rows = static_cast<std::int32_t>(blocks_.size());
+    blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * at.blocks));
+    write_frame_rows(bodies, at, axes);
+    modal_.resize(static_cast<std::size_t>(8 * at.blocks));
+    write_mode_rows(states, bodies.body(at.frame), contact.side(s), axes, modal_,
+                    &blocks_[static_cast<std::size_t>(at.rows)] + 3);
+  }
+  if (contact.a.body == contact.b.body) join_sides(row);
+  find_masses(bodies, row);
+  rows_.push_back(row);
+  numbers_.push_back(i);
+  if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
+    add_rolling(bodies, contact, radius);
+}
+
+/// All but rows of coordinates and masses; `rest` is the gap.
 ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                              const Options& options, bool with_frames) {
+                              const Options& options) const {
   ContactRow row;
   double thinnest = std::numeric_limits<double>::infinity(), yields = 0.0;
   for (int i = 0; i < 3; ++i) write_axis(contact.axes.col(i), row.axes[i]);
   for (std::size_t s = 0; s < 2; ++s) {
-    add_side(states, bodies, contact, s, with_frames, row);
     const PreparedSide& side = contact.side(s);
+    place_side(states, bodies, side, row.side[s]);
     const auto number = static_cast<std::size_t>(side.body);
     if (!states.is_static(side.body) && number < options.thickness.size())
       thinnest = std::min(thinnest, options.thickness[number]);
@@ -89,7 +158,6 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
       yields += yield_of(
           side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() * contact.axes.col(0)));
   }
-  if (contact.a.body == contact.b.body) join_sides(row);
   row.friction = static_cast<float>(contact.friction);
   row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
   row.compliance = static_cast<float>(yields);
@@ -100,60 +168,23 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
   return row;
 }
 
-void GameContacts::add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                            std::size_t s, bool with_frames, ContactRow& row) {
-  const PreparedSide& side = contact.side(s);
-  ContactSideRows& at = row.side[s];
+void GameContacts::place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
+                              ContactSideRows& at) {
   at.frame = bodies.of(side.body);
   if (at.frame < 0) return;
   const GameBody& body = bodies.body(at.frame);
   at.body = body.first;
   at.blocks = body.blocks;
-  at.rows = static_cast<std::int32_t>(blocks_.size());
-  const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart)),
-             arm = body.R_start * carried_B + side.rim;
+  const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart));
   write_axis(carried_B, at.arm);
-  write_axis(arm, at.lever);
-  blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * body.blocks));
-  const Mat3 axes = PreparedContact::sign(s) * contact.axes;
-  for (Index i = 0; i < 3 && with_frames; ++i)
-    bodies.write_frame_row(body, axes.col(i), arm.cross(axes.col(i)), blocks_[static_cast<std::size_t>(at.rows + i)]);
-  if (body.modes != nullptr && side.model != nullptr)
-    add_modes(states, body, side, axes, static_cast<std::size_t>(at.rows));
+  write_axis(body.R_start * carried_B + side.rim, at.lever);
 }
 
-/// √ρ n·R U of each mode, from the rows of the three corners where the body bends by its modes alone.
-void GameContacts::add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
-                             std::size_t rows) {
-  const std::vector<float>& roots = body.modes->roots();
-  const auto at = [&](Index axis, std::size_t mode) -> float& {
-    return blocks_[rows + 3 * (1 + mode / 8) + static_cast<std::size_t>(axis)].v[mode % 8];
-  };
-  const Mat3 axes_B = body.R_start.transpose() * axes;
-  const auto modes = static_cast<std::size_t>(side.model->modes());
-  if (side.skin == nullptr && side.shapes.empty()) {
-    const VertexRows& vertices = side.model->collision_rows();
-    const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
-    const Eigen::Matrix3f directions = axes_B.cast<float>();
-    for (std::size_t c = 0; c < 3; ++c) {
-      if (side.at.weight[c] == 0.0) continue;
-      const auto weight = static_cast<float>(side.at.weight[c]);
-      for (int x = 0; x < 3; ++x) {
-        const float* u = vertices.row(corners[c], x);
-        for (Index axis = 0; axis < 3; ++axis) {
-          const float by = weight * directions(x, axis);
-          for (std::size_t m = 0; m < modes; ++m) at(axis, m) += by * u[m] * roots[m];
-        }
-      }
-    }
-    return;
-  }
-  for (Index axis = 0; axis < 3; ++axis) {
-    modal_.assign(modes, 0.0);
-    side.shape(states.amplitudes(side.body, StepTime::kStart))
-        .add_force(side.at, axes_B.col(axis), modal_, side.shapes);
-    for (std::size_t m = 0; m < modes; ++m) at(axis, m) = static_cast<float>(modal_[m]) * roots[m];
-  }
+void GameContacts::write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes) {
+  const Vec3 lever(at.lever[0], at.lever[1], at.lever[2]);
+  for (Index i = 0; i < 3; ++i)
+    bodies.write_frame_row(bodies.body(at.frame), axes.col(i), lever.cross(axes.col(i)),
+                           blocks_[static_cast<std::size_t>(at.rows + i)]);
 }
 
 /// A body that touches itself: its frame feels nothing of that, and its modes both sides.
@@ -220,35 +251,43 @@ void GameContacts::add_rolling(const GameBodies& bodies, const PreparedContact& 
   rolling_.push_back(rolling);
 }
 
-void GameContacts::apply_last_forces(GameBodies& bodies) {
-  apply_bundle_forces(bundles_.arrays(), bodies.answers().data());
+void GameContacts::apply_last_forces(GameBodies& bodies, Jobs& jobs) {
+  bundles_.in_order(jobs, false, [&](const BundleArrays& part) { apply_bundle_forces(part, bodies.answers().data()); });
   apply_forces(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), {blocks_.data(), bodies.answers().data()});
 }
 
-bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps) {
+bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs) {
   const auto most = static_cast<float>(steps.push_speed * bodies.plan().length());
-  const bool bundles_overlap =
-      measure_bundles(bundles_.arrays(), bodies.shifts().data(), bodies.shapes().data(), kPushShare, most);
+  bundles_.for_all(jobs, [&](const BundleArrays& part) {
+    measure_bundles(part, bodies.shifts().data(), bodies.shapes().data(), kPushShare, most);
+  });
   const bool rows_overlap = measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(),
                                              bodies.shifts().data(), kPushShare, most);
-  return bundles_overlap || rows_overlap;
+  return bundles_.overlap() || rows_overlap;
 }
 
-void GameContacts::sweep(GameBodies& bodies, bool backward) {
-  const SweepArrays arrays{blocks_.data(), bodies.motion().data()};
-  if (!backward) sweep_bundles(bundles_.arrays(), backward, bodies.motion().data());
-  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward, arrays);
-  if (backward) sweep_bundles(bundles_.arrays(), backward, bodies.motion().data());
+void GameContacts::sweep(GameBodies& bodies, bool backward, Jobs& jobs) {
+  Block8* motion = bodies.motion().data();
+  const auto bundles = [&] {
+    bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { sweep_bundles(part, backward, motion); });
+  };
+  if (!backward) bundles();
+  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward, {blocks_.data(), motion});
+  if (backward) bundles();
 }
 
-void GameContacts::push_apart(GameBodies& bodies, bool backward) {
-  if (!backward) push_bundles(bundles_.arrays(), backward, bodies.pushes().data());
-  push_contacts(rows_.data(), rows_.size(), backward, blocks_.data(), bodies.pushes().data());
-  if (backward) push_bundles(bundles_.arrays(), backward, bodies.pushes().data());
+void GameContacts::push_apart(GameBodies& bodies, bool backward, Jobs& jobs) {
+  Block8* pushes = bodies.pushes().data();
+  const auto bundles = [&] {
+    bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { push_bundles(part, backward, pushes); });
+  };
+  if (!backward) bundles();
+  push_contacts(rows_.data(), rows_.size(), backward, blocks_.data(), pushes);
+  if (backward) bundles();
 }
 
-void GameContacts::end_substep() {
-  add_up_bundles(bundles_.arrays());
+void GameContacts::end_substep(Jobs& jobs) {
+  bundles_.for_all(jobs, add_up_bundles);
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);
 }
@@ -283,10 +322,11 @@ void GameContacts::tell(PreparedContact& contact, const Told& told, const Subste
   contact.slip = 0.0;
 }
 
-double GameContacts::residual(GameBodies& bodies) {
+double GameContacts::residual(GameBodies& bodies, Jobs& jobs) {
+  Block8* motion = bodies.motion().data();
+  bundles_.for_all(jobs, [&](const BundleArrays& part) { find_residuals(part, motion); });
   return static_cast<double>(
-      std::max(residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), bodies.motion().data()}),
-               residual_of_bundles(bundles_.arrays(), bodies.motion().data())));
+      std::max(residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), motion}), bundles_.residual()));
 }
 
 bool GameContacts::meet_law() const {

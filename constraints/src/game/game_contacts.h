@@ -33,20 +33,20 @@ class GameContacts {
   /// Rows of contacts between bodies that move, or with what stands. They begin with the forces that contacts had in
   /// the last step. @param contacts kept by reference
   void begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
-                  const Options& options);
+                  const Options& options, Jobs& jobs);
   /// What the bodies of a substep get of the forces of the last step. @pre the first substep has not begun
-  void apply_last_forces(GameBodies& bodies);
+  void apply_last_forces(GameBodies& bodies, Jobs& jobs);
   /// Measures gaps. @return whether something is to be pushed apart
-  bool begin_substep(const GameBodies& bodies, const SmallSteps& steps);
-  void sweep(GameBodies& bodies, bool backward);
-  void push_apart(GameBodies& bodies, bool backward);
+  bool begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs);
+  void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
+  void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
   /// Adds up forces.
-  void end_substep();
+  void end_substep(Jobs& jobs);
   /// Tells the contacts what acted on them.
   void end_step(const SubstepPlan& plan);
 
   /// m: how far from their law the last sweep left the rows.
-  double residual(GameBodies& bodies);
+  double residual(GameBodies& bodies, Jobs& jobs);
   /// Whether no force pulls, is outside its cone, or is not finite.
   bool meet_law() const;
   std::size_t size() const { return contacts_.size(); }
@@ -56,17 +56,18 @@ class GameContacts {
 
  private:
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
-                  const Options& options, bool with_frames);
+                  const Options& options) const;
+  void add_row(const BodyStates& states, GameBodies& bodies, std::size_t contact, const Options& options);
+  void put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t contact, const Options& options);
   /// Of a contact after the step: the last substep's force along its axes, the sum of all, and its compliance.
   struct Told {
     Vec3 last, sum;
     double compliance = 0.0;
   };
   void tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const;
-  void add_side(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact, std::size_t side,
-                bool with_frames, ContactRow& row);
-  void add_modes(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
-                 std::size_t rows);
+  static void place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
+                         ContactSideRows& at);
+  void write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes);
   void join_sides(ContactRow& row);
   void find_masses(const GameBodies& bodies, ContactRow& row);
   Vec3 last_moment(const PreparedContact& contact) const;

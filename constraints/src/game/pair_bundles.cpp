@@ -77,8 +77,11 @@ void PairBundles::order_by_level() {
 
 void PairBundles::pack(const GameBodies& bodies) {
   bundles_.clear();
+  lanes_.clear();
+  runs_.clear();
   std::int32_t size = 0, rows = 0;
-  for (std::size_t level = 0; level + 1 < begins_.size(); ++level)
+  for (std::size_t level = 0; level + 1 < begins_.size(); ++level) {
+    const std::size_t first = bundles_.size();
     for (std::int32_t begin = begins_[level]; begin < begins_[level + 1]; begin += kBundleLanes) {
       PairBundle& bundle = bundles_.emplace_back();
       bundle.first = size, bundle.rows = rows;
@@ -90,8 +93,25 @@ void PairBundles::pack(const GameBodies& bodies) {
       size += bundle.count;
       rows += 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]);
     }
-  packed_.assign(static_cast<std::size_t>(size), {});
-  rows_.assign(static_cast<std::size_t>(rows), {});
+    add_to_runs(first);
+  }
+  if (packed_.size() < static_cast<std::size_t>(size)) packed_.resize(static_cast<std::size_t>(size));
+  if (rows_.size() < static_cast<std::size_t>(rows)) rows_.resize(static_cast<std::size_t>(rows));
+}
+
+/// The bundles of a level, the last so far.
+void PairBundles::add_to_runs(std::size_t begin) {
+  const Run level{begin, bundles_.size(), bundles_.size() - begin > kBundlesAtOnce};
+  if (!level.apart && !runs_.empty() && !runs_.back().apart)
+    runs_.back().end = level.end;
+  else
+    runs_.push_back(level);
+}
+
+void PairBundles::empty(std::size_t at) {
+  const PairBundle& bundle = bundles_[at];
+  std::fill_n(packed_.begin() + bundle.first, bundle.count, BundleContact{});
+  std::fill_n(rows_.begin() + bundle.rows, 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]), Block8{});
 }
 
 void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane) {
@@ -112,9 +132,10 @@ void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBu
     places_[static_cast<std::size_t>(chunk.first + k)] = {bundle.first + k, static_cast<std::int32_t>(lane),
                                                           static_cast<std::int32_t>(bundles_.size() - 1)};
   bundle.count = std::max(bundle.count, chunk.count);
+  lanes_.push_back({chunk.first, chunk.count});
 }
 
-void PairBundles::put(std::size_t contact, const ContactRow& row, const Block8* rows) {
+void PairBundles::put(std::size_t contact, const ContactRow& row) {
   const auto lane = static_cast<std::size_t>(places_[contact].lane);
   BundleContact& c = packed_[static_cast<std::size_t>(places_[contact].at)];
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -122,20 +143,25 @@ void PairBundles::put(std::size_t contact, const ContactRow& row, const Block8* 
   for (std::size_t s = 0; s < 2; ++s)
     for (std::size_t i = 0; i < 3 && row.side[s].blocks > 0; ++i)
       c.arm[s][i].v[lane] = row.side[s].arm[i], c.lever[s][i].v[lane] = row.side[s].lever[i];
-  for (std::size_t s = 0; s < 2; ++s) put_modes(places_[contact], s, rows + row.side[s].rows);
   c.rest.v[lane] = row.rest, c.friction.v[lane] = row.friction, c.slop.v[lane] = row.slop;
   c.compliance.v[lane] = row.compliance;
   for (std::size_t axis = 0; axis < 3; ++axis) c.force[axis].v[lane] = row.force[axis];
 }
 
-/// @param rows three blocks of the frame, then three of each eight modes
-void PairBundles::put_modes(const Place& place, std::size_t side, const Block8* rows) {
+void PairBundles::put_modes(std::size_t contact, std::size_t side, const Block8* rows) {
+  const Place& place = places_[contact];
   const PairBundle& bundle = bundles_[static_cast<std::size_t>(place.bundle)];
   Block8* to = rows_.data() + bundle.rows + 3 * (place.at - bundle.first) * (bundle.modes[0] + bundle.modes[1]) +
                (side == 0 ? 0 : 3 * bundle.modes[0]);
   for (std::int32_t k = 0; k < bundle.blocks[side][place.lane]; ++k)
     for (std::int32_t axis = 0; axis < 3; ++axis)
-      for (std::int32_t i = 0; i < 8; ++i) to[3 * (8 * k + i) + axis].v[place.lane] = rows[3 * (1 + k) + axis].v[i];
+      for (std::int32_t i = 0; i < 8; ++i) to[3 * (8 * k + i) + axis].v[place.lane] = rows[3 * k + axis].v[i];
+}
+
+float PairBundles::residual() const {
+  float largest = 0.0f;
+  for (const PairBundle& bundle : bundles_) largest = std::max(largest, bundle.residual);
+  return largest;
 }
 
 void PairBundles::resist_rolling(std::size_t contact, double radius, const Vec3& moment) {

@@ -8,12 +8,15 @@
 // substeps again.
 #pragma once
 
+#include <algorithm>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "../prepared_contact.h"
 #include "bundle_kernels.h"
 #include "game_bodies.h"
+#include "limber/core/jobs.h"
 
 namespace limber::internal {
 
@@ -23,9 +26,13 @@ class PairBundles {
   void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts);
   /// Whether a contact has a place, by its number.
   bool holds(std::size_t contact) const { return places_[contact].lane >= 0; }
-  /// Fills the place of a contact, but for its masses; `rest` is the gap. @param rows blocks of each side that moves,
-  /// as the row says; those of frames are not read
-  void put(std::size_t contact, const ContactRow& row, const Block8* rows);
+  /// Empties all places and visits them: visit(contact) for each that has one, those of a bundle one after the other.
+  template <class Visit>
+  void fill(Jobs& jobs, const Visit& visit);
+  /// Fills the place of a contact, but for its masses and the rows of modes; `rest` is the gap.
+  void put(std::size_t contact, const ContactRow& row);
+  /// @param rows of a side's modes: three blocks of each eight
+  void put_modes(std::size_t contact, std::size_t side, const Block8* rows);
   /// Gives a contact in its place resistance to rolling. @param radius m, > 0. @param moment N·m, to begin with
   void resist_rolling(std::size_t contact, double radius, const Vec3& moment);
 
@@ -38,8 +45,14 @@ class PairBundles {
   double friction(std::size_t contact) const { return read(contact, &BundleContact::friction); }
   double compliance(std::size_t contact) const { return read(contact, &BundleContact::compliance); }
 
-  /// For the kernels.
-  BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
+  /// Runs a kernel over all bundles, in parts.
+  template <class Kernel>
+  void for_all(Jobs& jobs, const Kernel& kernel);
+  /// The same in the order of levels, or against it: for kernels that change coordinates.
+  template <class Kernel>
+  void in_order(Jobs& jobs, bool backward, const Kernel& kernel);
+  bool overlap() const { return std::ranges::any_of(bundles_, &PairBundle::overlaps); }
+  float residual() const;
 
  private:
   /// Up to four contacts of a pair.
@@ -49,6 +62,18 @@ class PairBundles {
     std::int32_t blocks[2] = {};  // of modes
     std::int32_t width() const { return blocks[0] + blocks[1]; }
   };
+  /// The contacts of a lane, in their order.
+  struct Lane {
+    std::int32_t first = 0, count = 0;
+  };
+  /// Bundles that share no body that moves, or few, which are not worth a second thread.
+  struct Run {
+    std::size_t begin = 0, end = 0;
+    bool apart = false;
+  };
+  static constexpr std::size_t kBundlesAtOnce = 4;  // of one thread
+  BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
+  void add_to_runs(std::size_t begin);
   struct Place {
     std::int32_t at = -1, lane = -1;  // in `packed_`; −1: none
     std::int32_t bundle = -1;
@@ -57,7 +82,7 @@ class PairBundles {
   void order_by_level();
   void pack(const GameBodies& bodies);
   void fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane);
-  void put_modes(const Place& place, std::size_t side, const Block8* rows);
+  void empty(std::size_t bundle);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
   double read(std::size_t contact, Block8 BundleContact::*field) const;
 
@@ -66,9 +91,45 @@ class PairBundles {
   std::vector<BundleContact> packed_;
   std::vector<Block8> rows_;   // of modes
   std::vector<Place> places_;  // by contact
+  std::vector<Lane> lanes_;    // by bundle
   std::vector<Chunk> chunks_, ordered_;
   std::vector<std::int32_t> next_level_;  // by frame
   std::vector<std::int32_t> begins_;      // by level, in `ordered_`
+  std::vector<Run> runs_;                 // of bundles, level by level
 };
+
+template <class Visit>
+void PairBundles::fill(Jobs& jobs, const Visit& visit) {
+  const auto part = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      empty(b);
+      const std::size_t first = b * kBundleLanes;
+      for (std::size_t lane = first; lane < first + kBundleLanes; ++lane)
+        for (std::int32_t k = 0; k < lanes_[lane].count; ++k) visit(static_cast<std::size_t>(lanes_[lane].first + k));
+    }
+  };
+  jobs.parallel_for(bundles_.size(), kBundlesAtOnce, std::ref(part));
+}
+
+template <class Kernel>
+void PairBundles::for_all(Jobs& jobs, const Kernel& kernel) {
+  const auto part = [&](std::size_t begin, std::size_t end) { kernel(arrays().part(begin, end)); };
+  jobs.parallel_for(bundles_.size(), 4 * kBundlesAtOnce, std::ref(part));
+}
+
+template <class Kernel>
+void PairBundles::in_order(Jobs& jobs, bool backward, const Kernel& kernel) {
+  if (jobs.concurrency() == 1) return kernel(arrays());
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[backward ? runs_.size() - 1 - i : i];
+    const auto part = [&](std::size_t begin, std::size_t end) {
+      kernel(arrays().part(run.begin + begin, run.begin + end));
+    };
+    if (run.apart)
+      jobs.parallel_for(run.end - run.begin, kBundlesAtOnce, std::ref(part));
+    else
+      part(0, run.end - run.begin);
+  }
+}
 
 }  // namespace limber::internal

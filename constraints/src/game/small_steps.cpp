@@ -33,7 +33,7 @@ struct SmallStepSolver::Impl {
   GameContacts contacts;
   GameConstraints constraints;
 
-  void take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number);
+  void take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number, Jobs& jobs);
 };
 
 SmallStepSolver::SmallStepSolver() : impl_(std::make_unique<Impl>()) {}
@@ -41,7 +41,7 @@ SmallStepSolver::~SmallStepSolver() = default;
 SmallStepSolver::SmallStepSolver(SmallStepSolver&&) noexcept = default;
 SmallStepSolver& SmallStepSolver::operator=(SmallStepSolver&&) noexcept = default;
 
-SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
+SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem, Jobs& jobs) {
   Impl& m = *impl_;
   const BodyStates states(problem.table);
   const SmallSteps steps = problem.contacts != nullptr ? problem.contacts->options().small_steps : SmallSteps{};
@@ -57,11 +57,11 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
     options.residual_compliance = problem.contacts->options().residual_compliance;
     contacts = problem.contacts->prepared();
   }
-  m.contacts.begin_step(states, m.bodies, contacts, options);
-  m.contacts.apply_last_forces(m.bodies);
-  for (int number = 0; number < steps.substeps; ++number) m.take_substep(problem, steps, number);
+  m.contacts.begin_step(states, m.bodies, contacts, options, jobs);
+  m.contacts.apply_last_forces(m.bodies, jobs);
+  for (int number = 0; number < steps.substeps; ++number) m.take_substep(problem, steps, number, jobs);
   SmallStepReport report{.rows = static_cast<int>(3 * m.contacts.size() + m.constraints.size()),
-                         .residual = std::max(m.contacts.residual(m.bodies), m.constraints.residual())};
+                         .residual = std::max(m.contacts.residual(m.bodies, jobs), m.constraints.residual())};
   report.solved = m.contacts.meet_law() && m.constraints.all_finite() && m.bodies.all_finite();
   m.contacts.end_step(m.bodies.plan());
   m.bodies.end_step();
@@ -69,21 +69,22 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem) {
   return report;
 }
 
-void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number) {
+void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const SmallSteps& steps, int number,
+                                         Jobs& jobs) {
   const BodyStates states(problem.table);
   bodies.turn_axes();
   constraints.make_rows(states, bodies, problem.constraints, number);
-  bodies.begin_substep(number);
-  const bool overlap = contacts.begin_substep(bodies, steps);
+  bodies.begin_substep(number, jobs);
+  const bool overlap = contacts.begin_substep(bodies, steps, jobs);
   constraints.solve(bodies);
-  for (const bool backward : {false, true}) contacts.sweep(bodies, backward);
+  for (const bool backward : {false, true}) contacts.sweep(bodies, backward, jobs);
   if (overlap) {
     std::ranges::fill(bodies.pushes(), internal::Block8{});
-    for (const bool backward : {false, true}) contacts.push_apart(bodies, backward);
+    for (const bool backward : {false, true}) contacts.push_apart(bodies, backward, jobs);
   }
-  bodies.end_substep(overlap);
+  bodies.end_substep(overlap, jobs);
   constraints.close(states, bodies, overlap);
-  contacts.end_substep();
+  contacts.end_substep(jobs);
   constraints.end_substep(states, bodies, number + 1 == steps.substeps);
 }
 

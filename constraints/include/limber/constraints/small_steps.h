@@ -26,6 +26,7 @@
 #include <type_traits>
 
 #include "limber/constraints/constraint.h"
+#include "limber/core/jobs.h"
 #include "limber/core/state_archive.h"
 
 namespace limber {
@@ -71,8 +72,8 @@ class SmallStepSolver {
   SmallStepSolver(SmallStepSolver&&) noexcept;
   SmallStepSolver& operator=(SmallStepSolver&&) noexcept;
 
-  /// Advances the members by one step and tells contacts and constraints what acted.
-  SmallStepReport step(const SmallStepProblem& problem);
+  /// Advances the members by one step and tells contacts and constraints what acted. The same bits whatever `jobs` is.
+  SmallStepReport step(const SmallStepProblem& problem, Jobs& jobs = serial_jobs());
 
   /// Forgets what it knows of earlier steps beside the contacts' own memory.
   void clear();
