@@ -354,11 +354,13 @@ const char* route_of(const Tetrahedralisation& t) {
 nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahedralisation& t) {
   return {{"vertices", surface.vertices.size()},
           {"triangles", surface.triangles.size()},
+          {"mended", t.mending.text()},
           {"wrapped", t.wrapped},
           {"why_wrapped", t.why_wrapped},
           {"route", route_of(t)},
           {"smallest_cell", t.smallest_cell},
           {"tries", t.tries},
+          {"wrap_adds", t.wrap_adds},
           {"volume_before", t.volume_before},
           {"volume_after", t.volume_after}};
 }
@@ -456,9 +458,11 @@ void fill_with_tets(Program& program, const Arguments& a, const BakeOptions& bak
   stopwatch.add("thickness", t.seconds_thickness);
   stopwatch.add("mesh", t.seconds_mesh);
   program.report()["surface"] = surface_report(*input.render, t);
+  const std::string done = t.wrapped         ? ", wrapped (" + t.why_wrapped + ")"
+                           : t.mending.any() ? ", mended (" + t.mending.text() + ")"
+                                             : "";
   program.print(fmt::format("surface: {} triangles{}; it encloses {:.6g} m^3, its tets {:.6g} m^3\n",
-                            input.render->triangles.size(), t.wrapped ? ", wrapped (" + t.why_wrapped + ")" : "",
-                            t.volume_before, t.volume_after));
+                            input.render->triangles.size(), done, t.volume_before, t.volume_after));
   input.mesh = std::move(t.mesh);
 }
 

@@ -112,6 +112,45 @@ TEST(Tetrahedralise, ASoupIsWrappedAndFillsTheSolidItStandsFor) {
   EXPECT_NEAR(r.volume_after, shapes::soup_volume(), kBoundaryError * cell_size * surface_area(boundary.surface));
 }
 
+TEST(Tetrahedralise, ABlockWithOneFaultIsMendedAndKeepsItsVolume) {
+  const double volume = 0.2 * 0.1 * 0.02;
+  SurfaceMesh twice = shapes::box({0, 0, 0}, {0.2, 0.1, 0.02}), flipped = twice, jitter;
+  for (const Triangle& t : twice.triangles) {
+    const auto base = static_cast<Index>(jitter.vertices.size());
+    for (const Index v : t) jitter.vertices.push_back(twice.vertices[v] * (1.0 + 1e-7 * (v % 3)));
+    jitter.triangles.push_back({base, base + 1, base + 2});
+  }
+  twice.triangles.push_back(twice.triangles[4]);
+  std::swap(flipped.triangles[4][0], flipped.triangles[4][1]);
+  for (const auto& [block, what] :
+       {std::pair(twice, "1 doubled triangle dropped"), std::pair(flipped, "1 triangle turned")}) {
+    Warnings warnings;
+    const auto r = tetrahedralise(block, {.cell_size = 0.03}, warnings);
+    EXPECT_FALSE(r.wrapped) << r.why_wrapped;
+    EXPECT_TRUE(r.sharp_edges_kept);
+    EXPECT_NEAR(r.volume_after, volume, kRoundOff * volume);
+    EXPECT_THAT(warnings, ElementsAre(HasSubstr(what)));
+    EXPECT_EQ(r.mending.text(), what);
+  }
+  Warnings warnings;
+  const auto r = tetrahedralise(jitter, {.cell_size = 0.03}, warnings);
+  EXPECT_FALSE(r.wrapped) << r.why_wrapped;
+  EXPECT_NEAR(r.volume_after, volume, 1e-5 * volume);
+}
+
+// The offset is 1/1500 of the diagonal, 1.9 % of the thickness, on both sides.
+TEST(Tetrahedralise, AWrapTellsTheVolumeThatItAdds) {
+  const double volume = 0.2 * 0.2 * 0.01;
+  SurfaceMesh block = shapes::box({0, 0, 0}, {0.2, 0.2, 0.01});
+  shapes::append(shapes::box({0.05, 0.05, 0.005}, {0.06, 0.06, 0.01}), block);  // overlaps it and adds nothing
+  Warnings warnings;
+  const auto r = tetrahedralise(block, {.cell_size = 0.03}, warnings);
+  EXPECT_TRUE(r.wrapped);
+  EXPECT_NEAR(r.wrap_adds, r.volume_before - volume, 0.1 * r.wrap_adds);
+  EXPECT_GT(r.wrap_adds, 0.03 * volume);
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("% of volume and mass")));
+}
+
 TEST(Tetrahedralise, AShellInsideIsACavityWhicheverWayItRuns) {
   for (const bool inner_outward : {true, false}) {
     SurfaceMesh hollow = shapes::sphere({0, 0, 0}, 1.0, 3);

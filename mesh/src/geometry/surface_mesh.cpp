@@ -3,33 +3,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "geometry/near_points.h"
+#include "geometry/edge_sides.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "limber/mesh/mend_surface.h"
 #include "limber/mesh/ten_node_tet.h"
 
 namespace limber {
 namespace {
-
-/// An edge between two vertices, the lower first, with the direction its triangle runs through it.
-struct Edge {
-  Index low, high;
-  bool forward;
-  friend bool operator<(const Edge& a, const Edge& b) { return std::pair(a.low, a.high) < std::pair(b.low, b.high); }
-  bool same_place(const Edge& o) const { return low == o.low && high == o.high; }
-};
-
-std::vector<Edge> sorted_edges(const SurfaceMesh& surface) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * surface.triangles.size());
-  for (const Triangle& t : surface.triangles)
-    for (int a = 0; a < 3; ++a) {
-      const Index i = t[a], j = t[(a + 1) % 3];
-      edges.push_back({std::min(i, j), std::max(i, j), i < j});
-    }
-  std::sort(edges.begin(), edges.end());
-  return edges;
-}
 
 Index count_components(const SurfaceMesh& surface) {
   DisjointSets sets(surface.vertices.size());
@@ -66,21 +47,7 @@ void validate(SurfaceMesh& surface, const std::string& name, Warnings& warnings)
   if (surface.triangles.empty()) throw InputError(name + ": holds no triangles");
 }
 
-Index weld(SurfaceMesh& surface) {
-  const std::vector<Index> of = internal::representatives(surface.vertices, 0.0);
-  std::vector<Index> new_index(of.size());
-  std::vector<Vec3> kept;
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    const bool stays = of[i] == static_cast<Index>(i);
-    new_index[i] = stays ? static_cast<Index>(kept.size()) : new_index[of[i]];
-    if (stays) kept.push_back(surface.vertices[i]);
-  }
-  const auto gone = static_cast<Index>(surface.vertices.size() - kept.size());
-  for (Triangle& t : surface.triangles)
-    for (Index& v : t) v = new_index[v];
-  surface.vertices = std::move(kept);
-  return gone;
-}
+Index weld(SurfaceMesh& surface) { return weld_within(surface, 0.0); }
 
 BoundarySurface boundary_surface(const TetMesh& mesh) {
   if (mesh.has_mid_edge_nodes()) return boundary_surface(split_into_eight(mesh));
@@ -158,15 +125,11 @@ SolidProperties solid_properties(const SurfaceMesh& surface) {
 
 SurfaceQuality surface_quality(const SurfaceMesh& surface) {
   SurfaceQuality q;
-  const auto edges = sorted_edges(surface);
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t j = i + 1;
-    while (j < edges.size() && edges[j].same_place(edges[i])) ++j;
-    if (j - i == 1) ++q.boundary_edges;
-    if (j - i > 2) ++q.non_manifold_edges;
-    if (j - i == 2 && edges[i].forward == edges[i + 1].forward) ++q.misoriented_edges;
-    i = j;
-  }
+  internal::for_each_edge(internal::edge_sides(surface), [&](std::span<const internal::EdgeSide> at) {
+    if (at.size() == 1) ++q.boundary_edges;
+    if (at.size() > 2) ++q.non_manifold_edges;
+    if (at.size() == 2 && at[0].forward == at[1].forward) ++q.misoriented_edges;
+  });
   q.components = count_components(surface);
   return q;
 }

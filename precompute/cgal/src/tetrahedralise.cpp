@@ -160,6 +160,28 @@ void refuse_huge_wrap(const SurfaceMesh& surface, double alpha) {
                            text(alpha * std::sqrt(expected / kMostTets) * 2.0));
 }
 
+/// Mends what it can, and tells it; `why_wrapped` is then of the surface as mended.
+void mend(SurfaceMesh& surface, Tetrahedralisation& result, Warnings& warnings) {
+  const std::string before = result.why_wrapped;
+  result.mending = mend_surface(surface, weld_tolerance(surface));
+  if (!result.mending.any()) return;
+  refuse_flat(surface);
+  result.why_wrapped = what_is_not_clean(surface);
+  if (result.why_wrapped.empty())
+    warnings.push_back("tetrahedralise: the surface has been mended (" + result.mending.text() + "); it had " + before);
+}
+
+/// What the offset adds, by Steiner's formula to first order: the volume between parallel surfaces is their area times
+/// the distance.
+void warn_of_wrap(const SurfaceMesh& wrap, double offset, Tetrahedralisation& result, Warnings& warnings) {
+  const double volume = enclosed_volume(wrap);
+  result.wrap_adds = std::min(offset * area(wrap), volume);
+  warnings.push_back("tetrahedralise: the surface has been wrapped, since it has " + result.why_wrapped +
+                     "; the wrap stands " + text(offset) + " m off, which makes about " + text(result.wrap_adds) +
+                     " of its " + text(volume) + " m^3 (" + text(std::round(100.0 * result.wrap_adds / volume)) +
+                     " % of volume and mass); a smaller alpha adds less");
+}
+
 void refuse_huge_mesh(const std::vector<MeasuredBody>& bodies, double cell_size) {
   double expected = 0.0;
   for (const MeasuredBody& b : bodies) expected += kTetsPerCubicCell * b.body->volume / std::pow(b.cell_size, 3);
@@ -257,6 +279,10 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
   refuse_flat(input);
   tell(options, "checking the surface");
   result.why_wrapped = what_is_not_clean(input);
+  if (!result.why_wrapped.empty()) {
+    tell(options, "mending the surface");
+    mend(input, result, warnings);
+  }
   result.wrapped = !result.why_wrapped.empty();
   if (result.wrapped) {
     tell(options, "wrapping");
@@ -265,6 +291,7 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
     const auto start = std::chrono::steady_clock::now();
     input = internal::wrap(input, alpha, kOffsetPerAlpha * alpha);
     result.seconds_wrap = seconds_since(start);
+    warn_of_wrap(input, kOffsetPerAlpha * alpha, result, warnings);
   }
 
   const Bodies bodies = internal::split_into_bodies(input);

@@ -1,6 +1,7 @@
 /// @file limber/precompute/tetrahedralise.h
-/// A tetrahedral mesh from a surface: a clean closed surface is meshed as it is, anything else (holes, crossing or
-/// non-manifold pieces, flipped faces) is wrapped first. docs/tetrahedralisation.md tells how and what was measured.
+/// A tetrahedral mesh from a surface: a clean closed surface is meshed as it is. Another is mended where that moves no
+/// vertex (see mend_surface()); what is not clean then (holes, crossing or non-manifold pieces) is wrapped.
+/// docs/tetrahedralisation.md tells how and what was measured.
 ///
 /// Clean means: closed, manifold, oriented, no flat triangles, no self-intersections; vertices at equal coordinates
 /// count as one. Its shells bound bodies by the even-odd rule: a shell inside another is a cavity, a shell inside that
@@ -12,6 +13,7 @@
 #include <functional>
 #include <string>
 
+#include "limber/mesh/mend_surface.h"
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 
@@ -37,9 +39,11 @@ struct TetrahedralisationOptions {
 
 struct Tetrahedralisation {
   TetMesh mesh;                   ///< one region named "*"; every node used
-  bool wrapped = false;           ///< the surface was not clean, so a wrap of it was meshed
+  SurfaceMending mending;         ///< what was mended of a surface that was not clean
+  bool wrapped = false;           ///< the surface could not be mended, so a wrap of it was meshed
   std::string why_wrapped;        ///< "12 boundary edges, 3 pairs of crossing triangles", empty if not wrapped
-  double volume_before = 0.0;     ///< enclosed by the surface as given, m³ (for a soup: of its wrap)
+  double wrap_adds = 0.0;         ///< estimate of the volume that the wrap's offset adds, m³
+  double volume_before = 0.0;     ///< enclosed by the surface as meshed, m³ (if wrapped: by the wrap)
   double volume_after = 0.0;      ///< of the tets, m³
   double smallest_cell = 0.0;     ///< bound on cells where parts are thin or close, m; may exceed the cell size
   bool sharp_edges_kept = false;  ///< edges sharper than 60° are edges of the mesh
