@@ -79,7 +79,9 @@ TEST(EveryFormat, IsToldByItsContentWhateverItsName) {
   expect_same(testing::read_tets(folder.write("cubes.dat", msh4(two_cubes(), true)), warnings), two_cubes());
   expect_same(testing::read_tets(folder.write("cubes.msh", medit(two_cubes())), warnings), two_cubes());
   EXPECT_TRUE(is_known_mesh_format(folder / "cubes.dat"));
-  EXPECT_FALSE(is_known_mesh_format(folder.write("cubes.glb", "glTF")));
+  EXPECT_EQ(corner_positions(read_surface_mesh(folder.write("cube.dat", glb(cube_surface())), warnings)),
+            corner_positions(cube_surface()));
+  EXPECT_FALSE(is_known_mesh_format(folder.write("cubes.3ds", "MM")));
 }
 
 TEST(WriteGmsh, ReadsBackToTheSameBits) {

@@ -389,6 +389,41 @@ inline std::string ply(const SurfaceMesh& s, PlyForm form) {
   return b.str();
 }
 
+/// Vertices as floats, then triangles as 16-bit numbers.
+inline std::string gltf_buffer(const SurfaceMesh& s) {
+  Bytes b;
+  for (const Vec3& x : s.vertices)
+    for (const double c : x) b.raw(static_cast<float>(c));
+  for (const Triangle& t : s.triangles)
+    for (const Index v : t) b.raw(static_cast<std::uint16_t>(v));
+  return b.str();
+}
+
+/// @param uri of gltf_buffer(), as JSON and with a comma; empty in a GLB file
+inline std::string gltf_text(const SurfaceMesh& s, const std::string& uri) {
+  const std::string vertices = std::to_string(12 * s.vertices.size()), corners = std::to_string(6 * s.triangles.size());
+  return R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1], "count": )" +
+         std::to_string(s.vertices.size()) + R"(},
+  {"bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": )" +
+         std::to_string(3 * s.triangles.size()) + R"(}],
+ "bufferViews": [{"buffer": 0, "byteLength": )" +
+         vertices + R"(}, {"buffer": 0, "byteOffset": )" + vertices + R"(, "byteLength": )" + corners + R"(}],
+ "buffers": [{)" +
+         uri + R"("byteLength": )" + std::to_string(gltf_buffer(s).size()) + "}]}";
+}
+
+inline std::string glb(const SurfaceMesh& s) {
+  std::string text = gltf_text(s, "");
+  text.append((4 - text.size() % 4) % 4, ' ');
+  const std::string buffer = gltf_buffer(s);
+  Bytes b;
+  b.text("glTF").raw(std::uint32_t{2}).raw(static_cast<std::uint32_t>(28 + text.size() + buffer.size()));
+  b.raw(static_cast<std::uint32_t>(text.size())).text("JSON").text(text);
+  return b.raw(static_cast<std::uint32_t>(buffer.size())).text(std::string("BIN\0", 4)).text(buffer).str();
+}
+
 /// A valid file; TetGen's is a pair.
 struct Sample {
   std::string name, bytes;
@@ -426,7 +461,9 @@ inline std::vector<Sample> surface_samples() {
           {"binary.stl", stl_binary(s)},
           {"text.ply", ply(s, PlyForm::kText)},
           {"little.ply", ply(s, PlyForm::kLittle)},
-          {"big.ply", ply(s, PlyForm::kBig)}};
+          {"big.ply", ply(s, PlyForm::kBig)},
+          {"cube.gltf", gltf_text(s, R"("uri": "cube.bin", )"), "cube.bin", gltf_buffer(s)},
+          {"cube.glb", glb(s)}};
 }
 
 }  // namespace limber::samples

@@ -1,13 +1,10 @@
 #include "assimp_scene.h"
 
-#include <assimp/DefaultIOSystem.h>
 #include <assimp/config.h>
 #include <assimp/importerdesc.h>
 
 #include <algorithm>
-#include <charconv>
 #include <exception>
-#include <string_view>
 
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -41,39 +38,7 @@ ChildLimits limits_for(const std::filesystem::path& path) {
   return limits;
 }
 
-namespace {
-
-/// Opens files by the names that URIs write with per cent (RFC 3986, 2.1), where the name as it stands is not there.
-class UriFiles : public Assimp::DefaultIOSystem {
- public:
-  bool Exists(const char* file) const override {
-    return DefaultIOSystem::Exists(file) || DefaultIOSystem::Exists(decoded(file).c_str());
-  }
-  Assimp::IOStream* Open(const char* file, const char* mode) override {
-    return DefaultIOSystem::Open(DefaultIOSystem::Exists(file) ? file : decoded(file).c_str(), mode);
-  }
-
- private:
-  static std::string decoded(std::string_view uri) {
-    std::string out;
-    for (std::size_t i = 0; i < uri.size(); ++i) {
-      unsigned byte = 0;
-      const char* const digits = uri.data() + i + 1;
-      if (uri[i] == '%' && i + 2 < uri.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2) {
-        out += static_cast<char>(byte);
-        i += 2;
-      } else {
-        out += uri[i];
-      }
-    }
-    return out;
-  }
-};
-
-}  // namespace
-
 const aiScene& read_scene(Assimp::Importer& importer, const std::filesystem::path& path, unsigned steps) {
-  importer.SetIOHandler(new UriFiles);  // the importer owns it
   // Without it a file of bones alone would come back as little diamonds around each bone.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   // Coordinates keep the file's axes, in COLLADA as in every other format.

@@ -173,7 +173,6 @@ UnitOfScene unit_of(const Assimp::Importer& importer, const aiScene& scene, cons
   if (is("amf")) return unit_of_print(head(".amf"), "amf", path);
   if (is("dae")) return unit_of_collada(head(".dae"), path);
   if (is("fbx")) return unit_of_fbx(scene, path);
-  if (is("glb")) return {.unit = {.metres = 1.0, .stated = true, .up = 'y'}};
   return {};
 }
 

@@ -2,13 +2,13 @@
 
 #include <assimp/postprocess.h>
 
+#include <cctype>
 #include <limits>
 #include <numeric>
 #include <unordered_map>
 
 #include "assimp_scene.h"
 #include "file_unit.h"
-#include "gltf.h"
 #include "in_child.h"
 #include "limber/core/error.h"
 #include "limber/mesh/unused_vertices.h"
@@ -29,8 +29,7 @@ struct RawSurface {
 /// Collects the meshes of a scene as its nodes show them.
 class Collector {
  public:
-  Collector(const aiScene& scene, std::string name, bool is_gltf)
-      : scene_(scene), name_(std::move(name)), is_gltf_(is_gltf) {}
+  Collector(const aiScene& scene, std::string name) : scene_(scene), name_(std::move(name)) {}
 
   void add(const aiNode& node, const aiMatrix4x4t<double>& parent) {
     const aiMatrix4x4t<double> pose = parent * aiMatrix4x4t<double>(node.mTransformation);
@@ -49,9 +48,12 @@ class Collector {
     read.grouped.groups.push_back({node, material_of(mesh), static_cast<Index>(surface.triangles.size()), 0});
     if (first + mesh.mNumVertices > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
       throw InputError(name_ + ": holds more than 2147483647 vertices");
-    for (const Vec3& p : vertices_of(mesh, pose)) surface.vertices.push_back(p);
-    const bool skinned = is_gltf_ && mesh.mNumBones > 0;  // its node counts for nothing
-    const bool mirrored = !skinned && pose.Determinant() < 0.0;
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      const aiVector3t<double> p =
+          pose * aiVector3t<double>(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
+      surface.vertices.emplace_back(p.x, p.y, p.z);
+    }
+    const bool mirrored = pose.Determinant() < 0.0;
     for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
       const aiFace& face = mesh.mFaces[i];
       if (face.mNumIndices != 3) {
@@ -71,17 +73,6 @@ class Collector {
     }
   }
 
-  std::vector<Vec3> vertices_of(const aiMesh& mesh, const aiMatrix4x4t<double>& pose) const {
-    if (is_gltf_) return internal::shown_vertices(scene_, mesh, pose);
-    std::vector<Vec3> vertices;
-    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-      const aiVector3t<double> p =
-          pose * aiVector3t<double>(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
-      vertices.emplace_back(p.x, p.y, p.z);
-    }
-    return vertices;
-  }
-
   std::string material_of(const aiMesh& mesh) const {
     aiString name;
     if (mesh.mMaterialIndex < scene_.mNumMaterials) scene_.mMaterials[mesh.mMaterialIndex]->Get(AI_MATKEY_NAME, name);
@@ -90,16 +81,14 @@ class Collector {
 
   const aiScene& scene_;
   std::string name_;
-  bool is_gltf_;
 };
 
 /// In the child: reads the file and hands on what was read.
 void send_raw(const std::filesystem::path& path, const std::string& name, internal::MessageWriter& message) {
-  internal::check_gltf(path, name);
   Assimp::Importer importer;
   const aiScene& scene = read_scene(importer, path, aiProcess_Triangulate);
   const internal::UnitOfScene unit = internal::unit_of(importer, scene, path);
-  Collector collector(scene, name, internal::was_read_as(importer, "glb"));
+  Collector collector(scene, name);
   collector.add(*scene.mRootNode, aiMatrix4x4t<double>());
   message.put(unit.unit.metres);
   message.put(unit.unit.stated);
@@ -177,6 +166,14 @@ void weld_nodes(SurfaceMesh& surface, const std::vector<std::size_t>& node_ends)
   surface = std::move(all);
 }
 
+/// Of a format that limber reads itself: glTF has one, the others state none.
+void tell_unit_of_known(const std::filesystem::path& path, FileUnit* unit) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (unit != nullptr && (extension == ".gltf" || extension == ".glb"))
+    *unit = {.metres = 1.0, .stated = true, .up = 'y'};
+}
+
 }  // namespace
 
 SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
@@ -191,7 +188,10 @@ SurfaceMesh read_surface_mesh_with_assimp(const std::filesystem::path& path, War
 }
 
 GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
-  if (is_known_mesh_format(path)) return read_grouped_surface(path, warnings);
+  if (is_known_mesh_format(path)) {
+    tell_unit_of_known(path, unit);
+    return read_grouped_surface(path, warnings);
+  }
   const std::string name = quoted_path(path);
   RawSurface read = read_raw(path, name, warnings);
   if (unit != nullptr) *unit = read.unit;
@@ -202,14 +202,16 @@ GroupedSurface read_any_grouped_surface(const std::filesystem::path& path, Warni
 }
 
 SurfaceMesh read_any_surface_mesh(const std::filesystem::path& path, Warnings& warnings, FileUnit* unit) {
-  return is_known_mesh_format(path) ? read_surface_mesh(path, warnings)
-                                    : read_surface_mesh_with_assimp(path, warnings, unit);
+  if (!is_known_mesh_format(path)) return read_surface_mesh_with_assimp(path, warnings, unit);
+  tell_unit_of_known(path, unit);
+  return read_surface_mesh(path, warnings);
 }
 
 std::variant<TetMesh, SurfaceMesh> read_any_mesh(const std::filesystem::path& path, Warnings& warnings,
                                                  FileUnit* unit) {
-  if (is_known_mesh_format(path)) return read_mesh(path, warnings);
-  return read_surface_mesh_with_assimp(path, warnings, unit);
+  if (!is_known_mesh_format(path)) return read_surface_mesh_with_assimp(path, warnings, unit);
+  tell_unit_of_known(path, unit);
+  return read_mesh(path, warnings);
 }
 
 }  // namespace limber

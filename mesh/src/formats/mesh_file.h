@@ -57,6 +57,10 @@ MeshFile read_obj(const FileBytes& file);
 MeshFile read_stl(const FileBytes& file);
 MeshFile read_ply(const FileBytes& file);
 MeshFile read_off(const FileBytes& file);
+/// Whether a glTF file says to be of version 1, which is another format.
+bool is_gltf_1(std::string_view bytes);
+/// @param path beside which buffers lie
+MeshFile read_gltf(const std::filesystem::path& path, const FileBytes& file, Warnings& warnings);
 /// @param path of the .node or the .ele file; the other lies beside it
 MeshFile read_tetgen(const std::filesystem::path& path);
 

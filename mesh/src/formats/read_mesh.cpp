@@ -19,12 +19,14 @@ using internal::PolygonGroup;
 using internal::Polygons;
 using internal::shown_path;
 
-enum class Format { kGmsh, kMedit, kVtk, kTetgen, kPly, kObj, kOff, kStl };
+enum class Format { kGmsh, kMedit, kVtk, kTetgen, kPly, kObj, kOff, kStl, kGltf };
 
 constexpr const char* kKnownFormats =
-    "Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk, OBJ .obj, OFF .off, STL .stl or PLY .ply";
+    "Gmsh .msh, MEDIT .mesh, TetGen .node/.ele, VTK legacy .vtk, OBJ .obj, OFF .off, STL .stl, PLY .ply or glTF "
+    ".gltf/.glb";
 
 std::optional<Format> format_of_content(std::string_view head) {
+  if (head.starts_with("glTF")) return Format::kGltf;
   if (head.starts_with("\xef\xbb\xbf")) head.remove_prefix(3);
   const auto text = head.substr(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
   if (text.starts_with("$MeshFormat")) return Format::kGmsh;
@@ -39,7 +41,7 @@ std::optional<Format> format_of_extension(const std::filesystem::path& path) {
   constexpr std::pair<const char*, Format> kExtensions[] = {
       {".msh", Format::kGmsh},    {".mesh", Format::kMedit}, {".meshb", Format::kMedit}, {".vtk", Format::kVtk},
       {".node", Format::kTetgen}, {".ele", Format::kTetgen}, {".ply", Format::kPly},     {".obj", Format::kObj},
-      {".off", Format::kOff},     {".stl", Format::kStl}};
+      {".off", Format::kOff},     {".stl", Format::kStl},    {".gltf", Format::kGltf},   {".glb", Format::kGltf}};
   for (const auto& [known, format] : kExtensions)
     if (extension == known) return format;
   return std::nullopt;
@@ -69,6 +71,8 @@ MeshFile read_as(Format format, const std::filesystem::path& path, const FileByt
       return internal::read_off(file);
     case Format::kStl:
       return internal::read_stl(file);
+    case Format::kGltf:
+      return internal::read_gltf(path, file, warnings);
   }
   throw InputError(file.name + ": unknown format");
 }
@@ -99,7 +103,7 @@ SurfaceMesh surface_of(ReadFile file, const std::string& name, Warnings& warning
   SurfaceMesh surface;
   surface.triangles = triangles_of(file.content, name, warnings);
   surface.vertices = std::move(file.content.tets.nodes);
-  if (file.format == Format::kStl) weld(surface);
+  if (file.format == Format::kStl || file.format == Format::kGltf) weld(surface);
   validate(surface, name, warnings);
   drop_unused_vertices(surface, name, warnings);
   return surface;
@@ -142,7 +146,8 @@ bool is_known_mesh_format(const std::filesystem::path& path) {
   file.read(head, sizeof head);
   // A missing file, a directory and the like are told by read_file() in one voice.
   if (file.gcount() == 0) read_file(path);
-  return format_of(path, std::string_view(head, static_cast<std::size_t>(file.gcount()))).has_value();
+  const auto format = format_of(path, std::string_view(head, static_cast<std::size_t>(file.gcount())));
+  return format && !(format == Format::kGltf && internal::is_gltf_1(read_file(path)));
 }
 
 std::variant<TetMesh, SurfaceMesh> read_mesh(const std::filesystem::path& path, Warnings& warnings) {

@@ -9,7 +9,7 @@
 /// | VTK legacy 1 to 5.1, text and binary | tets or surface | `# vtk DataFile`, .vtk |
 /// | TetGen | tets | .node, .ele (name either; both must be there) |
 /// | PLY, text and binary | surface | `ply`, .ply |
-/// | OBJ | surface | .obj |
+/// | OBJ; glTF 2.0, text and binary | surface | .obj; `glTF`, .gltf, .glb |
 /// | OFF, text and binary | surface | .off |
 /// | STL, text and binary | surface | .stl |
 ///
@@ -36,9 +36,9 @@ bool is_known_mesh_format(const std::filesystem::path& path);
 /// these are sorted by name, and every region whose name no group has is a group too. @throws InputError
 std::variant<TetMesh, SurfaceMesh> read_mesh(const std::filesystem::path& path, Warnings& warnings);
 
-/// A surface, polygons cut into triangles. Vertices in the order of the file, but for STL, a soup of triangles, which
-/// is welded (see weld()). Other formats: limber::mesh_assimp. @throws InputError, also for a file that holds
-/// tetrahedra
+/// A surface, polygons cut into triangles. Vertices in the order of the file, but for STL, a soup of triangles, and
+/// glTF, which are welded (see weld()). Other formats: limber::mesh_assimp. @throws InputError, also for a file that
+/// holds tetrahedra
 SurfaceMesh read_surface_mesh(const std::filesystem::path& path, Warnings& warnings);
 
 }  // namespace limber

@@ -1,5 +1,5 @@
 /// @file limber/mesh_assimp/read_surface_mesh.h
-/// Surfaces from every format that the Assimp library reads: glTF, 3DS, COLLADA, FBX and some forty more. A target
+/// Surfaces from every format that the Assimp library reads: 3DS, COLLADA, FBX, 3MF and some forty more. A target
 /// of its own (limber::mesh_assimp), so that only those who ask for it link Assimp.
 #pragma once
 
