@@ -157,15 +157,15 @@ FreeRotation::FreeRotation(const PrincipalInertia& body, const Quaternion& q_WB,
 }
 
 void FreeRotation::set_up_steady(const Vec3& l, double rate) {
-  l1_ = l2_ = std::hypot(l.x(), l.y());
-  l3_ = l.z();
+  theta_.l1 = theta_.l2 = std::hypot(l.x(), l.y());
+  theta_.l3 = l.z();
   angle_ = std::atan2(l.y(), l.x());
   spin_ = 0.5 * rate;
 }
 
 void FreeRotation::set_up_series_in_nome(const Orbit& o) {
   const double log_nome = o.m > 0.0 ? -pi * o.K_prime / o.K : 0.0;
-  const double q = nome_ = o.m > 0.0 ? std::exp(log_nome) : 0.0;
+  const double q = theta_.nome = o.m > 0.0 ? std::exp(log_nome) : 0.0;
   const double to_angle = pi / (2.0 * o.K);
   angle_ = to_angle * o.u0;
   rate_ = to_angle * o.p;
@@ -173,9 +173,9 @@ void FreeRotation::set_up_series_in_nome(const Orbit& o) {
   const double q4 = square(square(q));
   const double theta2 = 1.0 + q * q * (1.0 + q4), theta3 = 1.0 + 2.0 * q * (1.0 + q * q * q + q4 * q4),
                theta4 = 1.0 - 2.0 * q * (1.0 - q * q * q + q4 * q4);
-  l1_ = o.l1 * theta4 / theta2;
-  l2_ = o.l2 * theta3 / theta2;
-  l3_ = o.l3 * theta4 / theta3;
+  theta_.l1 = o.l1 * theta4 / theta2;
+  theta_.l2 = o.l2 * theta3 / theta2;
+  theta_.l3 = o.l3 * theta4 / theta3;
   // θ₄(v + iκ | q²) = 1 + Σ_n cosine_n cos 2nv + i sine_n sin 2nv, n from 1.
   double value = 1.0, slope = 0.0;
   const double kappa = to_angle * o.y;
@@ -184,39 +184,39 @@ void FreeRotation::set_up_series_in_nome(const Orbit& o) {
     const double growing = std::exp(2.0 * n * n * log_nome + 2.0 * n * kappa);
     const double falling = std::exp(2.0 * n * n * log_nome - 2.0 * n * kappa);
     const auto i = static_cast<std::size_t>(n);
-    cosine_[i] = parity * (growing + falling);
-    sine_[i] = -parity * (growing - falling);
-    value += cosine_[i];
-    slope += 2.0 * n * sine_[i];
+    theta_.cosine[i] = parity * (growing + falling);
+    theta_.sine[i] = -parity * (growing - falling);
+    value += theta_.cosine[i];
+    slope += 2.0 * n * theta_.sine[i];
   }
   spin_ = 0.5 * o.psi_rate + rate_ * slope / value;
 }
 
 void FreeRotation::set_up_series_in_complementary_nome(const Orbit& o) {
-  log_nome_ = -pi * o.K / o.K_prime;
-  nome_ = std::exp(log_nome_);
+  theta_.log_nome = -pi * o.K / o.K_prime;
+  theta_.nome = std::exp(theta_.log_nome);
   angle_ = o.u0 / (2.0 * o.K);
   rate_ = o.p / (2.0 * o.K);
-  const double q = nome_, q4 = square(square(q));
+  const double q = theta_.nome, q4 = square(square(q));
   const double theta2 = 2.0 * (1.0 + q * q * (1.0 + q4)), theta3 = 1.0 + 2.0 * q * (1.0 + q * q * q + q4 * q4),
                theta4 = 1.0 - 2.0 * q * (1.0 - q * q * q + q4 * q4);
-  l1_ = o.l1 * theta2 / theta4;
-  l2_ = o.l2 * theta3 / theta4;
-  l3_ = o.l3 * theta2 / theta3;
+  theta_.l1 = o.l1 * theta2 / theta4;
+  theta_.l2 = o.l2 * theta3 / theta4;
+  theta_.l3 = o.l3 * theta2 / theta3;
   // θ₄(v + iκ | q²) ∝ e^{−i tilt·(u/2K)} Σ_n √q'^{(n+½)²} cos((2n+1)(iw − μ)), w = πu/4K'.
   const double mu = pi * o.y / (4.0 * o.K_prime);
-  tilt_ = pi * o.y / (2.0 * o.K_prime);
+  theta_.tilt = pi * o.y / (2.0 * o.K_prime);
   const double root = std::sqrt(q);
   double value = 0.0, slope = 0.0, power = 1.0;  // power: √q'^{n(n+1)}
   for (std::size_t n = 0; n < kTerms; ++n) {
     const double odd = 2.0 * static_cast<double>(n) + 1.0;
-    cosine_[n] = std::cos(odd * mu);
-    sine_[n] = std::sin(odd * mu);
-    value += power * cosine_[n];
-    slope += power * odd * sine_[n];
+    theta_.cosine[n] = std::cos(odd * mu);
+    theta_.sine[n] = std::sin(odd * mu);
+    value += power * theta_.cosine[n];
+    slope += power * odd * theta_.sine[n];
     power *= std::pow(root, odd + 1.0);
   }
-  const double per_u = pi / (4.0 * o.K_prime) * slope / value - tilt_ / (2.0 * o.K);
+  const double per_u = pi / (4.0 * o.K_prime) * slope / value - theta_.tilt / (2.0 * o.K);
   spin_ = 0.5 * o.psi_rate + o.p * per_u;
 }
 
@@ -233,16 +233,16 @@ FreeRotation::Phase FreeRotation::phase_in_nome(double t) const {
   const double c4 = c2 * c2 - s2 * s2, s4 = 2.0 * s2 * c2;
   const double c5 = c3 * c2 - s3 * s2, s5 = s3 * c2 + c3 * s2;
   const double c6 = c3 * c3 - s3 * s3, s6 = 2.0 * s3 * c3;
-  const double q = nome_, q2 = q * q, q4 = q2 * q2, q6 = q4 * q2, q9 = q4 * q4 * q;
+  const double q = theta_.nome, q2 = q * q, q4 = q2 * q2, q6 = q4 * q2, q9 = q4 * q4 * q;
   const double theta1 = s1 - q2 * s3 + q6 * s5;
   const double theta2 = c1 + q2 * c3 + q6 * c5;
   const double even = 1.0 + 2.0 * q4 * c4, odd = 2.0 * (q * c2 + q9 * c6);
   const double theta3 = even + odd, inverse_theta4 = 1.0 / (even - odd);
-  const double re = 1.0 + cosine_[1] * c2 + cosine_[2] * c4 + cosine_[3] * c6;
-  const double im = sine_[1] * s2 + sine_[2] * s4 + sine_[3] * s6;
+  const double re = 1.0 + theta_.cosine[1] * c2 + theta_.cosine[2] * c4 + theta_.cosine[3] * c6;
+  const double im = theta_.sine[1] * s2 + theta_.sine[2] * s4 + theta_.sine[3] * s6;
   const double c = std::cos(spin_ * t), s = std::sin(spin_ * t);
-  return {l1_ * theta2 * inverse_theta4, l2_ * theta1 * inverse_theta4, l3_ * theta3 * inverse_theta4, c * re + s * im,
-          s * re - c * im};
+  return {theta_.l1 * theta2 * inverse_theta4, theta_.l2 * theta1 * inverse_theta4, theta_.l3 * theta3 * inverse_theta4,
+          c * re + s * im, s * re - c * im};
 }
 
 FreeRotation::Phase FreeRotation::phase_in_complementary_nome(double t) const {
@@ -252,11 +252,11 @@ FreeRotation::Phase FreeRotation::phase_in_complementary_nome(double t) const {
   const double parity = std::fmod(whole, 2.0) == 0.0 ? 1.0 : -1.0;
   const double sign = r < 0.0 ? -1.0 : 1.0;
   // e = e^{−2|w|} and g = √q' e^{2|w|} are both in [√q', 1]: no exponential grows.
-  const double root = std::sqrt(nome_);
-  const double e = std::exp(log_nome_ * std::abs(r));
+  const double root = std::sqrt(theta_.nome);
+  const double e = std::exp(theta_.log_nome * std::abs(r));
   const double g = root / e;
   const double E = e * e, G = g * g;  // e^{−2w'}, q' e^{2w'}
-  const double q = nome_, q2 = q * q, q4 = q2 * q2, q6 = q4 * q2, q9 = q4 * q4 * q;
+  const double q = theta_.nome, q2 = q * q, q4 = q2 * q2, q6 = q4 * q2, q9 = q4 * q4 * q;
   // θ₁', θ₂' less e^{w'} q'^¼ and θ₃', θ₄' of imaginary argument iw'.
   const double theta1 = (1.0 - q * G + q4 * G * G - q9 * G * G * G) - E * (1.0 - q2 * E + q6 * E * E);
   const double theta2 = (1.0 + q * G + q4 * G * G + q9 * G * G * G) + E * (1.0 + q2 * E + q6 * E * E);
@@ -265,18 +265,18 @@ FreeRotation::Phase FreeRotation::phase_in_complementary_nome(double t) const {
   // The complex theta function in √q'.
   double re = 0.0, im = 0.0, rising = 1.0, falling = e, power = 1.0;
   for (std::size_t n = 0; n < kTerms; ++n) {
-    re += (rising + falling) * cosine_[n];
-    im += (rising - falling) * sine_[n];
+    re += (rising + falling) * theta_.cosine[n];
+    im += (rising - falling) * theta_.sine[n];
     // rising: √q'^{n²} gⁿ, falling: √q'^{n(n+1)} e^{n+1}
     rising *= power * root * g;
     falling *= power * q * e;
     power *= q;
   }
   im *= sign;
-  const double angle = spin_ * t + tilt_ * r;
+  const double angle = spin_ * t + theta_.tilt * r;
   const double c = std::cos(angle), s = std::sin(angle);
-  return {parity * l1_ * e * (even - odd) * inverse, parity * sign * l2_ * theta1 * inverse,
-          l3_ * e * (even + odd) * inverse, c * re + s * im, s * re - c * im};
+  return {parity * theta_.l1 * e * (even - odd) * inverse, parity * sign * theta_.l2 * theta1 * inverse,
+          theta_.l3 * e * (even + odd) * inverse, c * re + s * im, s * re - c * im};
 }
 
 Quaternion FreeRotation::attitude(double t) const {

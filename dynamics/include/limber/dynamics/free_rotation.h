@@ -56,8 +56,9 @@ class FreeRotation {
   friend struct StateFields;
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.q_WF_, s.q_QB_, s.parameter_, s.complementary_, s.spin_, s.angle_, s.rate_, s.l1_, s.l2_, s.l3_,
-                    s.nome_, s.log_nome_, s.tilt_, s.cosine_, s.sine_);
+    auto& t = s.theta_;
+    return std::tie(s.q_WF_, s.q_QB_, s.parameter_, s.complementary_, s.spin_, s.angle_, s.rate_, t.l1, t.l2, t.l3,
+                    t.nome, t.log_nome, t.tilt, t.cosine, t.sine);
   }
 
   static constexpr int kTerms = 5;
@@ -66,6 +67,15 @@ class FreeRotation {
   void set_up_steady(const Vec3& l, double rate);
   void set_up_series_in_nome(const Orbit& orbit);
   void set_up_series_in_complementary_nome(const Orbit& orbit);
+
+  /// The theta functions of the motion.
+  struct ThetaSeries {
+    double l1 = 0.0, l2 = 0.0, l3 = 1.0;          // factors of the quotients
+    double nome = 0.0;                            // q, or q'
+    double log_nome = 0.0;                        // complementary: ln q'
+    double tilt = 0.0;                            // complementary: phase per period of the Gaussian factor, rad
+    std::array<double, kTerms> cosine{}, sine{};  // coefficients of the complex one
+  };
 
   /// Direction of L in the sorted principal frame Q, and e^{iΨ/2} up to a positive factor.
   struct Phase {
@@ -76,18 +86,14 @@ class FreeRotation {
   Phase phase_in_nome(double t) const;
   Phase phase_in_complementary_nome(double t) const;
 
-  Quaternion q_WF_;                               // frame F: z along L, turned so that Ψ fits the attitude at t = 0
-  Quaternion q_QB_;                               // sorted principal frame Q: the axis that L circles is +z
-  double parameter_ = 0.0;                        // m
-  bool complementary_ = false;                    // series in q' = exp(−πK/K'), used for m > ½
-  double spin_ = 0.0;                             // σ/2, rad/s
-  double angle_ = 0.0;                            // argument of the series at t = 0: v = πu/2K, or u/2K
-  double rate_ = 0.0;                             // its rate, 1/s
-  double l1_ = 0.0, l2_ = 0.0, l3_ = 1.0;         // factors of the theta quotients
-  double nome_ = 0.0;                             // q, or q'
-  double log_nome_ = 0.0;                         // complementary: ln q'
-  double tilt_ = 0.0;                             // complementary: phase per period of the Gaussian factor, rad
-  std::array<double, kTerms> cosine_{}, sine_{};  // coefficients of the complex theta function
+  Quaternion q_WF_;             // frame F: z along L, turned so that Ψ fits the attitude at t = 0
+  Quaternion q_QB_;             // sorted principal frame Q: the axis that L circles is +z
+  double parameter_ = 0.0;      // m
+  bool complementary_ = false;  // series in q' = exp(−πK/K'), used for m > ½
+  double spin_ = 0.0;           // σ/2, rad/s
+  double angle_ = 0.0;          // argument of the series at t = 0: v = πu/2K, or u/2K
+  double rate_ = 0.0;           // its rate, 1/s
+  ThetaSeries theta_;
 };
 
 }  // namespace limber
