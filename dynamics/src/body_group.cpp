@@ -38,15 +38,9 @@ void BodyGroup::ModeRows::copy_from(const ModeRows& other, Index slot) {
 BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
     : model_(required(std::move(model))),
       constants_(model_->data()),
-      amplitudes_(model_->modes()),
-      rates_(model_->modes()),
       previous_amplitudes_(model_->modes()),
-      forces_(model_->modes()),
-      static_amplitudes_(model_->modes()),
-      predicted_amplitudes_(model_->modes()),
-      predicted_rates_(model_->modes()),
-      predicted_forces_(model_->modes()),
-      predicted_static_(model_->modes()) {
+      now_(model_->modes()),
+      predicted_(model_->modes()) {
   set_step_length(step);
   if (constants_.motion == FrameMotion::kFree) return;
   const ModalModelData& data = model_->data();
@@ -67,11 +61,11 @@ void BodyGroup::set_step_length(double step) {
 /// static displacement under what held it in the last step.
 void BodyGroup::split_static_answer(Index slot) {
   Body& b = body(slot);
-  const std::span<double> answer = static_amplitudes_.modes(slot);
+  const std::span<double> answer = now_.answers.modes(slot);
   for (std::size_t i = 0; i < answer.size(); ++i) {
     const bool was = were_static_[i] == 0.0, is = whole_.velocity_response()[i] == 0.0;
     if (was == is) continue;
-    answer[i] = is && b.held ? predicted_forces_.modes(slot)[i] / model_->data().eigenvalues[i] : 0.0;
+    answer[i] = is && b.held ? predicted_.forces.modes(slot)[i] / model_->data().eigenvalues[i] : 0.0;
     b.modes_static = b.modes_static || answer[i] != 0.0;
   }
 }
@@ -115,9 +109,9 @@ void BodyGroup::set_velocity(Index slot, const Vec3& velocity, const Vec3& angul
 }
 
 void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, std::span<const double> rates) {
-  std::copy(amplitudes.begin(), amplitudes.end(), amplitudes_.modes(slot).begin());
-  std::copy(rates.begin(), rates.end(), rates_.modes(slot).begin());
-  previous_amplitudes_.copy_from(amplitudes_, slot);
+  std::copy(amplitudes.begin(), amplitudes.end(), now_.amplitudes.modes(slot).begin());
+  std::copy(rates.begin(), rates.end(), now_.rates.modes(slot).begin());
+  previous_amplitudes_.copy_from(now_.amplitudes, slot);
   forget_static_answer(slot);
 }
 
@@ -138,7 +132,7 @@ void BodyGroup::apply_force(Index slot, const SurfacePoint& at, const Vec3& newt
   const Quaternion& q_WB = b.frame.pose().q;
   b.force += newtons;
   b.torque += (q_WB * shape(slot).position(at)).cross(newtons);
-  shape(slot).add_force(at, q_WB.conjugate() * newtons, forces_.modes(slot));
+  shape(slot).add_force(at, q_WB.conjugate() * newtons, now_.forces.modes(slot));
   b.modes_loaded = true;
 }
 
@@ -147,7 +141,7 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
   const Quaternion q_WB = b.frame.pose().q;
   b.frame.apply_impulse(constants_, newton_seconds, (q_WB * shape(slot).position(at)).cross(newton_seconds));
   const Vec3 impulse_B = q_WB.conjugate() * newton_seconds;
-  if (delay == 0.0) return shape(slot).add_force(at, impulse_B, rates_.modes(slot));
+  if (delay == 0.0) return shape(slot).add_force(at, impulse_B, now_.rates.modes(slot));
   if (whole_.table().modes() == 0) return;
   b.delayed.push_back({at, impulse_B, delay});
   if (!skinned(slot)) return;
@@ -179,15 +173,15 @@ void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
 void BodyGroup::keep_previous_state(Index slot) {
   if (within_step_) return;
   body(slot).previous_pose = body(slot).frame.pose();
-  previous_amplitudes_.copy_from(amplitudes_, slot);
+  previous_amplitudes_.copy_from(now_.amplitudes, slot);
 }
 
 void BodyGroup::put_to_sleep(Index slot) {
   Body& b = body(slot);
   b.frame.set_velocity(constants_, Vec3::Zero(), Vec3::Zero());
-  rates_.clear(slot);
+  now_.rates.clear(slot);
   b.previous_pose = b.frame.pose();
-  previous_amplitudes_.copy_from(amplitudes_, slot);
+  previous_amplitudes_.copy_from(now_.amplitudes, slot);
   clear_loads(slot);
   b.asleep = true;
 }
@@ -198,7 +192,7 @@ void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
 
   const FrameLoad load{gravity, b.force, b.torque};
   const double h = step_length();
-  const ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
+  const ModeArrays modes{now_.amplitudes.row(slot), now_.rates.row(slot), now_.forces.row(slot)};
   const FrameExcitation excitation = b.frame.begin_step(constants_, load, first_moment(slot), h);
   if (!couplings_.empty()) excite_modes(modes.forces, excitation);
   if (b.modes_static) {
@@ -215,13 +209,13 @@ void BodyGroup::predict(Index slot, const Vec3& gravity, const ConstraintLoad& l
   const Body& b = body(slot);
   Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   p.frame = b.frame;
-  predicted_amplitudes_.copy_from(amplitudes_, slot);
-  predicted_rates_.copy_from(rates_, slot);
-  predicted_forces_.copy_from(forces_, slot);
+  predicted_.amplitudes.copy_from(now_.amplitudes, slot);
+  predicted_.rates.copy_from(now_.rates, slot);
+  predicted_.forces.copy_from(now_.forces, slot);
 
   const FrameLoad frame_load{gravity, b.force + load.force, b.torque + load.torque};
   const double h = step.length();
-  const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
+  const ModeArrays modes{predicted_.amplitudes.row(slot), predicted_.rates.row(slot), predicted_.forces.row(slot)};
   // An impulse of zero would still set the closed rotation up anew, and cost it its last bits.
   if (!load.impulse.isZero(0.0) || !load.moment.isZero(0.0))
     p.frame.apply_impulse(constants_, load.impulse, load.moment);
@@ -239,10 +233,10 @@ void BodyGroup::predict(Index slot, const RigidFrame& end, const FrameExcitation
                         std::span<const double> modal, const ModalStep& step) {
   Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   p.frame = end;
-  predicted_amplitudes_.copy_from(amplitudes_, slot);
-  predicted_rates_.copy_from(rates_, slot);
-  predicted_forces_.copy_from(forces_, slot);
-  const ModeArrays modes{predicted_amplitudes_.row(slot), predicted_rates_.row(slot), predicted_forces_.row(slot)};
+  predicted_.amplitudes.copy_from(now_.amplitudes, slot);
+  predicted_.rates.copy_from(now_.rates, slot);
+  predicted_.forces.copy_from(now_.forces, slot);
+  const ModeArrays modes{predicted_.amplitudes.row(slot), predicted_.rates.row(slot), predicted_.forces.row(slot)};
   if (!couplings_.empty()) excite_modes(modes.forces, excitation);
   const bool constrained = add_modal_load(modal, modes.forces, step);
   if (body(slot).modes_static) leave_static_answer(slot, modes.z);
@@ -256,9 +250,9 @@ void BodyGroup::predict_rest(Index slot, const RigidFrame& end) {
   p.frame = end;
   p.held = false;
   p.modes_static = body(slot).modes_static;
-  predicted_amplitudes_.copy_from(amplitudes_, slot);
-  predicted_rates_.copy_from(rates_, slot);
-  predicted_static_.copy_from(static_amplitudes_, slot);
+  predicted_.amplitudes.copy_from(now_.amplitudes, slot);
+  predicted_.rates.copy_from(now_.rates, slot);
+  predicted_.answers.copy_from(now_.answers, slot);
 }
 
 void BodyGroup::commit(Index slot, bool begins, bool ends) {
@@ -266,10 +260,10 @@ void BodyGroup::commit(Index slot, bool begins, bool ends) {
   const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   if (begins) keep_previous_state(slot);
   b.frame = p.frame;
-  amplitudes_.copy_from(predicted_amplitudes_, slot);
-  rates_.copy_from(predicted_rates_, slot);
-  if (p.modes_static) static_amplitudes_.copy_from(predicted_static_, slot);
-  if (b.modes_static && !p.modes_static) static_amplitudes_.clear(slot);
+  now_.amplitudes.copy_from(predicted_.amplitudes, slot);
+  now_.rates.copy_from(predicted_.rates, slot);
+  if (p.modes_static) now_.answers.copy_from(predicted_.answers, slot);
+  if (b.modes_static && !p.modes_static) now_.answers.clear(slot);
   b.modes_static = p.modes_static;
   b.held = p.held;
   if (ends) clear_loads(slot);
@@ -277,14 +271,14 @@ void BodyGroup::commit(Index slot, bool begins, bool ends) {
 
 void BodyGroup::adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal) {
   predictions_[static_cast<std::size_t>(slot)].frame.apply_impulse(constants_, impulse, moment);
-  const std::span<double> rates = predicted_rates_.modes(slot);
+  const std::span<double> rates = predicted_.rates.modes(slot);
   for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += modal[i];
 }
 
 void BodyGroup::apply_generalized_impulse(Index slot, const Vec3& impulse, const Vec3& moment,
                                           std::span<const double> modal) {
   body(slot).frame.apply_impulse(constants_, impulse, moment);
-  const std::span<double> rates = rates_.modes(slot);
+  const std::span<double> rates = now_.rates.modes(slot);
   for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += modal[i];
 }
 
@@ -293,7 +287,7 @@ void BodyGroup::apply_generalized_force(Index slot, const Vec3& force, const Vec
   Body& b = body(slot);
   b.force += force;
   b.torque += torque;
-  const std::span<double> g = forces_.modes(slot);
+  const std::span<double> g = now_.forces.modes(slot);
   for (std::size_t i = 0; i < modal.size(); ++i) g[i] += modal[i];
   b.modes_loaded = b.modes_loaded || !modal.empty();
 }
@@ -322,7 +316,7 @@ void BodyGroup::begin_parts(Index slot) {
   keep_previous_state(slot);
   Body& b = body(slot);
   if (b.modes_static) {
-    leave_static_answer(slot, amplitudes_.row(slot));
+    leave_static_answer(slot, now_.amplitudes.row(slot));
     forget_static_answer(slot);
   }
   b.held = false;
@@ -331,10 +325,10 @@ void BodyGroup::begin_parts(Index slot) {
 void BodyGroup::advance_modes(Index slot, const ModalStep& part, int number, int count,
                               const FrameExcitation& excitation) {
   if (part.table().modes() == 0) return;
-  ModeArrays modes{amplitudes_.row(slot), rates_.row(slot), forces_.row(slot)};
+  ModeArrays modes{now_.amplitudes.row(slot), now_.rates.row(slot), now_.forces.row(slot)};
   if (!couplings_.empty()) {
-    predicted_forces_.copy_from(forces_, slot);
-    modes.forces = predicted_forces_.row(slot);
+    predicted_.forces.copy_from(now_.forces, slot);
+    modes.forces = predicted_.forces.row(slot);
     excite_modes(modes.forces, excitation);
   }
   if (body(slot).modes_loaded || !couplings_.empty())
@@ -362,7 +356,7 @@ void BodyGroup::predict_motion(Index slot, const Vec3& gravity, double h, const 
     frame.apply_impulse(constants_, constrained.impulse, constrained.moment);
   const FrameExcitation excitation = frame.begin_step(constants_, load, first_moment(slot), h, &motion.path());
   motion.set_modes(data.eigenvalues, data.decays, amplitudes(slot), rates(slot));
-  if (b.modes_loaded) std::ranges::copy(forces_.modes(slot), motion.forces().begin());
+  if (b.modes_loaded) std::ranges::copy(now_.forces.modes(slot), motion.forces().begin());
   for (std::size_t i = 0; i < constrained.modal.size(); ++i)
     motion.forces()[i] += answers[i] * constrained.modal[i] / h;
   if (!couplings_.empty()) excite_modes(motion.forces().data(), excitation);
@@ -384,12 +378,12 @@ Vec3 BodyGroup::first_moment_at_end(const ExactMotion& motion) const {
 
 /// Modes that answered the last step's constraints statically do not vibrate when they let go.
 void BodyGroup::leave_static_answer(Index slot, double* z) const {
-  const std::span<const double> answer = static_amplitudes_.modes(slot);
+  const std::span<const double> answer = now_.answers.modes(slot);
   for (std::size_t i = 0; i < answer.size(); ++i) z[i] -= answer[i];
 }
 
 void BodyGroup::forget_static_answer(Index slot) {
-  static_amplitudes_.clear(slot);
+  now_.answers.clear(slot);
   body(slot).modes_static = false;
 }
 
@@ -405,7 +399,7 @@ bool BodyGroup::add_modal_load(std::span<const double> modal, double* forces, co
 
 /// @return whether a mode did
 bool BodyGroup::answer_statically(Index slot, std::span<const double> modal, const ModalStep& step) {
-  const std::span<double> z = predicted_amplitudes_.modes(slot), answer = predicted_static_.modes(slot);
+  const std::span<double> z = predicted_.amplitudes.modes(slot), answer = predicted_.answers.modes(slot);
   bool any = false;
   for (std::size_t i = 0; i < modal.size(); ++i) {
     answer[i] = step.velocity_response()[i] == 0.0 ? step.position_response()[i] * modal[i] : 0.0;
@@ -426,7 +420,7 @@ void BodyGroup::excite_modes(double* forces, const FrameExcitation& excitation) 
 void BodyGroup::clear_loads(Index slot) {
   Body& b = body(slot);
   b.force = b.torque = Vec3::Zero();
-  if (b.modes_loaded || !couplings_.empty()) forces_.clear(slot);
+  if (b.modes_loaded || !couplings_.empty()) now_.forces.clear(slot);
   b.modes_loaded = false;
   b.delayed.clear();
 }
@@ -440,18 +434,18 @@ BodyEnergy BodyGroup::energy(Index slot, const Vec3& gravity) const {
 BodyEnergy BodyGroup::predicted_energy(Index slot, const Vec3& gravity) const {
   const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
   return energy_of(p.frame, predicted_amplitudes(slot), predicted_rates(slot),
-                   p.modes_static ? predicted_static_.modes(slot) : std::span<const double>(), gravity);
+                   p.modes_static ? predicted_.answers.modes(slot) : std::span<const double>(), gravity);
 }
 
 double BodyGroup::predicted_dissipation(Index slot) const {
   const std::span<const double> z0 = amplitudes(slot), z1 = predicted_amplitudes(slot), v0 = rates(slot),
-                                v1 = predicted_rates(slot), g = predicted_forces_.modes(slot);
+                                v1 = predicted_rates(slot), g = predicted_.forces.modes(slot);
   const bool had = bodies_[static_cast<std::size_t>(slot)].modes_static;
   const bool has = predictions_[static_cast<std::size_t>(slot)].modes_static;
   double taken = 0.0;
   for (std::size_t i = 0; i < z0.size(); ++i) {
     const double before = z0[i] - (had ? static_amplitudes(slot)[i] : 0.0);
-    const double after = z1[i] - (has ? predicted_static_.modes(slot)[i] : 0.0);
+    const double after = z1[i] - (has ? predicted_.answers.modes(slot)[i] : 0.0);
     taken += g[i] * (after - before) + 0.5 * (v0[i] * v0[i] - v1[i] * v1[i]) +
              0.5 * model_->data().eigenvalues[i] * (before * before - after * after);
   }
@@ -473,20 +467,20 @@ BodyEnergy BodyGroup::energy_of(const RigidFrame& frame, std::span<const double>
 void BodyGroup::save_state(Index slot, StateWriter& state) const {
   const Body& b = bodies_[static_cast<std::size_t>(slot)];
   state(b);
-  for (const ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_}) state.numbers(rows->modes(slot));
-  if (b.modes_loaded) state.numbers(forces_.modes(slot));
-  if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
-  if (b.held) state.numbers(predicted_forces_.modes(slot));
+  for (const ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  if (b.modes_loaded) state.numbers(now_.forces.modes(slot));
+  if (b.modes_static) state.numbers(now_.answers.modes(slot));
+  if (b.held) state.numbers(predicted_.forces.modes(slot));
 }
 
 void BodyGroup::restore_state(Index slot, StateReader& state) {
   Body& b = body(slot);
   state(b);
-  for (ModeRows* rows : {&amplitudes_, &rates_, &previous_amplitudes_}) state.numbers(rows->modes(slot));
-  for (ModeRows* rows : {&forces_, &static_amplitudes_}) rows->clear(slot);
-  if (b.modes_loaded) state.numbers(forces_.modes(slot));
-  if (b.modes_static) state.numbers(static_amplitudes_.modes(slot));
-  if (b.held) state.numbers(predicted_forces_.modes(slot));
+  for (ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  for (ModeRows* rows : {&now_.forces, &now_.answers}) rows->clear(slot);
+  if (b.modes_loaded) state.numbers(now_.forces.modes(slot));
+  if (b.modes_static) state.numbers(now_.answers.modes(slot));
+  if (b.held) state.numbers(predicted_.forces.modes(slot));
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }

@@ -70,8 +70,8 @@ class BodyGroup {
 
   // State of one body. Setting it sets its previous state too: nothing is drawn between.
   const RigidFrame& frame(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].frame; }
-  std::span<const double> amplitudes(Index slot) const { return amplitudes_.modes(slot); }  ///< z
-  std::span<const double> rates(Index slot) const { return rates_.modes(slot); }            ///< ż
+  std::span<const double> amplitudes(Index slot) const { return now_.amplitudes.modes(slot); }  ///< z
+  std::span<const double> rates(Index slot) const { return now_.rates.modes(slot); }            ///< ż
   void set_pose(Index slot, const RigidTransform& X_WB);
   void set_velocity(Index slot, const Vec3& velocity, const Vec3& angular_velocity);
   void set_amplitudes(Index slot, std::span<const double> amplitudes, std::span<const double> rates);
@@ -153,8 +153,8 @@ class BodyGroup {
   /// A step in which the modes do not move: as the body is, but for the frame.
   void predict_rest(Index slot, const RigidFrame& end);
   const RigidFrame& predicted_frame(Index slot) const { return predictions_[static_cast<std::size_t>(slot)].frame; }
-  std::span<const double> predicted_amplitudes(Index slot) const { return predicted_amplitudes_.modes(slot); }
-  std::span<const double> predicted_rates(Index slot) const { return predicted_rates_.modes(slot); }
+  std::span<const double> predicted_amplitudes(Index slot) const { return predicted_.amplitudes.modes(slot); }
+  std::span<const double> predicted_rates(Index slot) const { return predicted_.rates.modes(slot); }
   /// Changes the predicted velocities of frame and modes. Arguments as for apply_generalized_impulse().
   void adjust_prediction(Index slot, const Vec3& impulse, const Vec3& moment, std::span<const double> modal);
   /// Makes the last prediction the state, and clears the loads, as advance() does.
@@ -171,8 +171,8 @@ class BodyGroup {
   /// feel of their frame over it
   void advance_modes(Index slot, const ModalStep& part, int number, int count, const FrameExcitation& excitation);
   RigidFrame& frame_in_parts(Index slot) { return body(slot).frame; }
-  std::span<double> amplitudes_in_parts(Index slot) { return amplitudes_.modes(slot); }
-  std::span<double> rates_in_parts(Index slot) { return rates_.modes(slot); }
+  std::span<double> amplitudes_in_parts(Index slot) { return now_.amplitudes.modes(slot); }
+  std::span<double> rates_in_parts(Index slot) { return now_.rates.modes(slot); }
   void end_parts(Index slot) { clear_loads(slot); }
 
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
@@ -183,14 +183,14 @@ class BodyGroup {
   /// The sum of apply_force() for the next step: world, N, and about the body origin, N·m.
   const Vec3& held_force(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].force; }
   const Vec3& held_torque(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].torque; }
-  std::span<const double> held_modal_forces(Index slot) const { return forces_.modes(slot); }
+  std::span<const double> held_modal_forces(Index slot) const { return now_.forces.modes(slot); }
 
   // The modes' answers to a constraint over a whole step, one number per mode; see ModalStep.
   std::span<const double> position_response() const { return whole_.position_response(); }
   std::span<const double> velocity_response() const { return whole_.velocity_response(); }
   /// The part of amplitudes() that is the static answer to the last step's constraints; zero for modes below the
   /// Nyquist rate. The mode's energy is ½(ż² + λ(z − c)²) + ½λc².
-  std::span<const double> static_amplitudes(Index slot) const { return static_amplitudes_.modes(slot); }
+  std::span<const double> static_amplitudes(Index slot) const { return now_.answers.modes(slot); }
 
   BodyEnergy energy(Index slot, const Vec3& gravity) const;
   BodyEnergy predicted_energy(Index slot, const Vec3& gravity) const;
@@ -238,6 +238,14 @@ class BodyGroup {
     std::vector<Block> storage_;
   };
 
+  /// The modes of all bodies at one time.
+  struct ModalState {
+    explicit ModalState(Index modes) : amplitudes(modes), rates(modes), forces(modes), answers(modes) {}
+    ModeRows amplitudes, rates;
+    ModeRows forces;   // g, held over the step that begins then
+    ModeRows answers;  // c, of the amplitudes: the static answer to the last step's constraints
+  };
+
   struct DelayedImpulse {
     SurfacePoint at;
     Vec3 impulse_B;               // N·s
@@ -257,8 +265,8 @@ class BodyGroup {
     bool occupied = true;
     bool constrained = false;
     bool asleep = false;
-    bool modes_loaded = false;              // forces_ is not zero
-    bool modes_static = false;              // static_amplitudes_ are not zero
+    bool modes_loaded = false;              // forces of modes are not zero
+    bool modes_static = false;              // their static answers are not zero
     bool held = false;                      // a constraint acted on the modes in the last step
     std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
 
@@ -304,8 +312,8 @@ class BodyGroup {
   Vec3 first_moment_of(std::span<const double> z) const;
   Vec3 first_moment_at_end(const ExactMotion& motion) const;
   std::array<ModeRows*, 9> mode_rows() {
-    return {&amplitudes_,           &rates_,           &previous_amplitudes_, &forces_,          &static_amplitudes_,
-            &predicted_amplitudes_, &predicted_rates_, &predicted_forces_,    &predicted_static_};
+    return {&now_.amplitudes,       &now_.rates,       &now_.forces,       &now_.answers,      &previous_amplitudes_,
+            &predicted_.amplitudes, &predicted_.rates, &predicted_.forces, &predicted_.answers};
   }
 
   std::shared_ptr<const ModalModel> model_;
@@ -323,12 +331,9 @@ class BodyGroup {
   std::vector<std::unique_ptr<Skin>> skins_;  // by slot
   std::vector<Index> vacant_;
   bool within_step_ = false;
-  ModeRows amplitudes_, rates_, previous_amplitudes_;
-  ModeRows forces_;             // g, held over the next step
-  ModeRows static_amplitudes_;  // c, of amplitudes_: the static answer to the last step's constraints
-
+  ModeRows previous_amplitudes_;
+  ModalState now_, predicted_;
   std::vector<Prediction> predictions_;
-  ModeRows predicted_amplitudes_, predicted_rates_, predicted_forces_, predicted_static_;
 };
 
 }  // namespace limber
