@@ -117,9 +117,9 @@ Json loads(const std::vector<LoadReport>& reports) {
 }
 
 Json contact(const Scene& scene) {
-  const ContactOptions& c = *scene.contact;
-  const SceneContactRule& rule = scene.contact_rule;
-  return {{"finder", to_string(scene.finder)},
+  const ContactOptions& c = *scene.contacts.options;
+  const SceneContactRule& rule = scene.contacts.rule;
+  return {{"finder", to_string(scene.contacts.finder)},
           {"method", to_string(rule.method)},
           {"friction_model", to_string(rule.friction)},
           {"guard", to_string(rule.guard)},
@@ -194,8 +194,8 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["step"] = scene.step;
   report["steps"] = result.steps;
   report["substeps"] = scene.substeps;
-  report["solver"] = to_string(scene.solver);
-  report["small_steps"] = scene.small_steps.substeps;
+  report["solver"] = to_string(scene.contacts.solver);
+  report["small_steps"] = scene.contacts.small_steps.substeps;
   report["gravity"] = vector(scene.gravity);
   report["models"] = Json::array();
   for (const ModelManifest& m : models.manifest) report["models"].push_back(manifest(m));
@@ -205,7 +205,7 @@ void report_run(Json& report, const Scene& scene, const SceneModels& models, con
   report["forces"] = loads(result.forces);
   report["handles"] = handles(result.handles);
   report["joints"] = joints(result.joints);
-  report["contact"] = scene.contact ? contact(scene) : Json();
+  report["contact"] = scene.contacts.options ? contact(scene) : Json();
   report["constraints"] = constraints(result.constraints);
   report["energy_before"] = result.energy_before;
   report["energy_after"] = result.energy_after;
@@ -250,7 +250,7 @@ std::string constraints_text(const Scene& scene, const RunResult& r) {
   for (const JointReport& j : r.joints)
     text += fmt::format("  joint   {} to {}, off by at most {:.3g} m\n", j.a.empty() ? "the world" : j.a, j.b,
                         j.largest_distance_error);
-  if (scene.contact)
+  if (scene.contacts.options)
     text += fmt::format("  contact {} begun, {} ended, largest impulse {:.4g} N s\n", r.constraints.begun,
                         r.constraints.ended, r.constraints.largest_impulse);
   return text;

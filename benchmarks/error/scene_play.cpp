@@ -138,7 +138,7 @@ class Playing {
  private:
   /// Before anything moves.
   void choose_contacts() {
-    ContactOptions options = *scene_.contact;
+    ContactOptions options = *scene_.contacts.options;
     options.solver = ContactSolver::kExact;
     player_.world().set_contact_source(&own_finder_, options);
   }

@@ -116,18 +116,19 @@ TEST(ShippedScenes, PlayAsPhysicsSays) {
     for (const ContactSolver solver : {ContactSolver::kGame, ContactSolver::kExact}) {
       SCOPED_TRACE(solver == ContactSolver::kExact ? "exact" : "game");
       limber::Scene scene = read_scene(entry.path());
-      scene.solver = solver;
+      scene.contacts.solver = solver;
       const RunResult r = played(scene);
       EXPECT_EQ(static_cast<double>(r.steps) * scene.step, kSeconds);
       ASSERT_EQ(r.trajectory.bodies.size(), scene.bodies.size());
       for (const BodyTrack& body : r.trajectory.bodies) ASSERT_NO_FATAL_FAILURE(expect_finite(body));
       const bool flies =
-          scene.gravity == Vec3::Zero() && !scene.contact && scene.joints.empty() && scene.handles.empty();
+          scene.gravity == Vec3::Zero() && !scene.contacts.options && scene.joints.empty() && scene.handles.empty();
       EXPECT_EQ(r.constraints.failed_steps, 0);  // exact: bodies that fall on each other may end at a limit of work
       if (flies) expect_momenta_of_free_flight(scene, r);
       // Small steps leave joints apart and may add energy, each to a share of its own.
-      if (scene.contact) solver == ContactSolver::kExact ? expect_a_fall(r, 1e-6, 1e-6) : expect_a_fall(r, 1e-3, 1e-2);
-      EXPECT_TRUE(flies || scene.contact) << "expected a scene that this test can judge";
+      if (scene.contacts.options)
+        solver == ContactSolver::kExact ? expect_a_fall(r, 1e-6, 1e-6) : expect_a_fall(r, 1e-3, 1e-2);
+      EXPECT_TRUE(flies || scene.contacts.options) << "expected a scene that this test can judge";
     }
   }
   EXPECT_GE(scenes, 2);

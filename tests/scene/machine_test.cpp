@@ -155,7 +155,7 @@ TEST_F(MachineScene, CopiesAreMachinesOfTheirOwnAndLoadsNameTheirBodies) {
   EXPECT_EQ(scene.joints[1].a, "m[1]/upper");
   EXPECT_EQ(scene.joints[1].coordinates[0].motor_max_force, 5.0);
   EXPECT_EQ(scene.joints[1].coordinates[0].friction, 0.0) << "the asset's own is replaced";
-  EXPECT_EQ(scene.apart.size(), 3u);
+  EXPECT_EQ(scene.contacts.apart.size(), 3u);
   const SceneModels models = load_models(scene);
   EXPECT_EQ(ScenePlayer(scene, models, 10).strikes().size(), 3u);
 }

@@ -83,10 +83,10 @@ TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
                                       R"("contact": {"method": "gap_program", "friction_model": "heuristic_no_slip"})");
 #if LIMBER_HAS_HAUSER
   const Scene s = parse(told);
-  EXPECT_EQ(s.contact_rule.method, SceneContactRule::Method::kGapProgram);
-  EXPECT_EQ(s.contact_rule.friction, SceneContactRule::Friction::kHeuristicNoSlip);
-  EXPECT_FALSE(s.contact_rule.is_own());
-  EXPECT_EQ(s.solver, ContactSolver::kExact);
+  EXPECT_EQ(s.contacts.rule.method, SceneContactRule::Method::kGapProgram);
+  EXPECT_EQ(s.contacts.rule.friction, SceneContactRule::Friction::kHeuristicNoSlip);
+  EXPECT_FALSE(s.contacts.rule.is_own());
+  EXPECT_EQ(s.contacts.solver, ContactSolver::kExact);
   EXPECT_THROW(parse(scene_with(R"({"name": "bell", "asset": "bell"})",
                                 R"("solver": "game", "contact": {"method": "gap_program"})")),
                InputError);
@@ -104,11 +104,11 @@ TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
 TEST(SceneFile, TheSolverIsGameUnlessTheFileChoosesTheExactOne) {
   const std::string bell = R"({"name": "bell", "asset": "bell"})";
   const Scene usual = parse(scene_with(bell));
-  EXPECT_EQ(usual.solver, ContactSolver::kGame);
-  EXPECT_EQ(usual.small_steps.substeps, SmallSteps{}.substeps);
+  EXPECT_EQ(usual.contacts.solver, ContactSolver::kGame);
+  EXPECT_EQ(usual.contacts.small_steps.substeps, SmallSteps{}.substeps);
   const Scene chosen = parse(scene_with(bell, R"("solver": "exact", "small_steps": 16)"));
-  EXPECT_EQ(chosen.solver, ContactSolver::kExact);
-  EXPECT_EQ(chosen.small_steps.substeps, 16);
+  EXPECT_EQ(chosen.contacts.solver, ContactSolver::kExact);
+  EXPECT_EQ(chosen.contacts.small_steps.substeps, 16);
 }
 
 TEST(SceneFile, ContactIsReadWhereItBelongs) {
@@ -121,15 +121,15 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
                       "position": [1, 2, 3]},
                      {"name": "hill", "shape": {"height_field": {"spacing": [2, 3], "heights": [[0, 1, 2], [3, 4, 5]]}}},
                      {"name": "rock", "shape": {"mesh": {"file": "rock.obj", "scale": 0.1}}}])"));
-  ASSERT_TRUE(s.contact);
-  EXPECT_TRUE(s.contact_rule.is_own());
-  EXPECT_EQ(s.contact_rule.guard, SceneContactRule::Guard::kNone);
-  EXPECT_EQ(s.contact->friction, 0.7);
-  EXPECT_EQ(s.contact->rolling_friction, 0.04);
-  EXPECT_EQ(s.contact->recovery_speed, 0.2);
-  EXPECT_TRUE(s.contact->residual_compliance);
-  EXPECT_EQ(s.contact_rule.penalty_frequency, 30.0);
-  EXPECT_EQ(s.contact_rule.penalty_damping, 0.5);
+  ASSERT_TRUE(s.contacts.options);
+  EXPECT_TRUE(s.contacts.rule.is_own());
+  EXPECT_EQ(s.contacts.rule.guard, SceneContactRule::Guard::kNone);
+  EXPECT_EQ(s.contacts.options->friction, 0.7);
+  EXPECT_EQ(s.contacts.options->rolling_friction, 0.04);
+  EXPECT_EQ(s.contacts.options->recovery_speed, 0.2);
+  EXPECT_TRUE(s.contacts.options->residual_compliance);
+  EXPECT_EQ(s.contacts.rule.penalty_frequency, 30.0);
+  EXPECT_EQ(s.contacts.rule.penalty_damping, 0.5);
   ASSERT_EQ(s.statics.size(), 3u);
   const auto shape_of = [&](int i) { return *std::get<std::shared_ptr<const Shape>>(s.statics[i].shape); };
   EXPECT_LT((std::get<HalfSpace>(shape_of(0)).normal - Vec3(0, 0.6, 0.8)).norm(), kRoundOff);
@@ -151,9 +151,9 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
 }
 
 TEST(SceneFile, NothingTouchesWhereTheSceneSaysNothingOfIt) {
-  EXPECT_FALSE(parse(scene_with(kBell)).contact);
-  EXPECT_TRUE(parse(scene_with(kBell, R"("contact": {})")).contact);
-  EXPECT_TRUE(parse(scene_with(kBell, R"("statics": [{"name": "g", "shape": {"half_space": {}}}])")).contact);
+  EXPECT_FALSE(parse(scene_with(kBell)).contacts.options);
+  EXPECT_TRUE(parse(scene_with(kBell, R"("contact": {})")).contacts.options);
+  EXPECT_TRUE(parse(scene_with(kBell, R"("statics": [{"name": "g", "shape": {"half_space": {}}}])")).contacts.options);
 }
 
 TEST(SceneFile, HandlesAndJointsAreReadWhereTheyBelong) {

@@ -61,7 +61,7 @@ double beyond(const SceneJoint& joint, const JointView& at) {
 TEST_F(AssemblyProgram, ALampSwingsByTheJointsFoundInIt) {
   bake({"--auto-joints", "--material", "nylon", "--scene", "lamp.json"});
   Scene scene = read_scene(folder_ / "lamp.json");
-  scene.solver = ContactSolver::kExact;
+  scene.contacts.solver = ContactSolver::kExact;
   const SceneModels models = load_models(scene);
   ASSERT_EQ(scene.bodies.size(), 5u);
   ASSERT_EQ(scene.joints.size(), 5u) << "three hinges, a ball, and the base on the ground";
@@ -122,7 +122,7 @@ TEST_P(BakedMachine, HoldsTogetherWithinItsLimitsAndGainsNoEnergy) {
   ASSERT_EQ(baked.exit_code, 0) << baked.err;
   EXPECT_THAT(baked.err, ::testing::Not(HasSubstr("hangs on nothing")));
   Scene scene = read_scene(folder / "m.json");
-  scene.solver = ContactSolver::kExact;
+  scene.contacts.solver = ContactSolver::kExact;
   const RunResult result = run_scene(scene, load_models(scene), {.steps = 120, .key_rate = 60.0});
   fs::remove_all(folder);
 
@@ -185,7 +185,7 @@ TEST_F(AssemblyProgram, SteelAndRubberMoveInOneMachine) {
   write_file(folder_ / "m.json", R"({"shade": "rubber", "*": "steel"})");
   bake({"--auto-joints", "--materials", "m.json", "--scene", "lamp.json"});
   Scene scene = read_scene(folder_ / "lamp.json");
-  scene.solver = ContactSolver::kExact;
+  scene.contacts.solver = ContactSolver::kExact;
   const RunResult result = run_scene(scene, load_models(scene), {.steps = 120, .key_rate = 60.0});
   for (const JointReport& joint : result.joints) {
     EXPECT_LT(joint.largest_distance_error, 1e-9) << joint.a << joint.b;

@@ -69,7 +69,7 @@ TEST(PageFile, AnAssetFallsOnTheGround) {
     write_file(folder.path / std::filesystem::path(file.path).filename(), file.bytes);
   const Scene scene = read_scene(folder.path / std::filesystem::path(content.scene).filename());
   ASSERT_EQ(scene.bodies.size(), 2u);
-  EXPECT_TRUE(scene.contact.has_value());
+  EXPECT_TRUE(scene.contacts.options.has_value());
   EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), 1.0, 1e-6);
   EXPECT_GT(scene.bodies[1].placement.pose.p.x() - scene.bodies[0].placement.pose.p.x(), testing::kBlockLength);
 }
@@ -98,7 +98,7 @@ TEST(PageFile, AMachineStandsAsDrawnOrFallsAsAWhole) {
     EXPECT_NEAR((scene.bodies[1].placement.pose.p - scene.bodies[0].placement.pose.p - Vec3(3, 0, 0)).norm(), 0.0,
                 1e-12);
     EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), tied ? 0.0 : 1.0, 1e-6) << "falls from half its height";
-    EXPECT_EQ(scene.contact.has_value(), !tied);
+    EXPECT_EQ(scene.contacts.options.has_value(), !tied);
   }
 }
 

@@ -49,14 +49,14 @@ struct LibraryPile {
 LibraryPile library_pile(scenes::SceneLibrary& library, const std::string& name, int bodies) {
   const scenes::LibraryScene made = library.scene(name, {.bodies = bodies});
   LibraryPile out{.scene = made.parsed(), .models = {}, .pile = {}};
-  out.scene.contact->rolling_friction = 0.0;
+  out.scene.contacts.options->rolling_friction = 0.0;
   const auto brick = std::make_shared<const Shape>(Box{.half_extents = 0.5 * scenes::body_size("brick")});
   for (SceneBody& body : out.scene.bodies) {
     auto& shape = std::get<std::shared_ptr<const Shape>>(body.shape);
     if (!shape) shape = brick;
   }
   out.models = make_models(out.scene, made.assets);
-  out.pile.friction = out.scene.contact->friction;
+  out.pile.friction = out.scene.contacts.options->friction;
   out.pile.step = out.scene.step;
   out.pile.gravity = out.scene.gravity;
   for (std::size_t i = 0; i < out.scene.bodies.size(); ++i) {
@@ -80,7 +80,7 @@ class LimberPile final : public PileEngine {
  public:
   LimberPile(const LibraryPile& made, ContactSolver solver, int substeps)
       : finder_(finder_for(solver)), world_({.step = made.scene.step, .gravity = made.scene.gravity}) {
-    ContactOptions options = *made.scene.contact;
+    ContactOptions options = *made.scene.contacts.options;
     options.solver = solver;
     options.small_steps.substeps = substeps;
     world_.set_contact_source(finder_.get(), options);

@@ -42,9 +42,11 @@ struct DrawnBodies {
 };
 
 Scene with(const ContactChoice& choice, Scene scene) {
-  if (!scene.contact) return scene;
-  if (choice.solver) scene.contact->solver = *choice.solver;
-  if (choice.substeps > 0) scene.contact->small_steps.substeps = choice.substeps;
+  if (!scene.contacts.options) return scene;
+  if (choice.solver) scene.contacts.solver = *choice.solver;
+  if (choice.substeps > 0) scene.contacts.small_steps.substeps = choice.substeps;
+  scene.contacts.options->solver = scene.contacts.solver;
+  scene.contacts.options->small_steps = scene.contacts.small_steps;
   return scene;
 }
 
@@ -57,7 +59,7 @@ class Measurement {
         scene_(with(options.contact, timed.scene)),
         player_(scene_, timed.models, scene_.steps, options.jobs ? *options.jobs : serial_jobs()),
         drawn_(player_) {
-    if (finder_ && scene_.contact) player_.world().set_contact_source(finder_.get(), *scene_.contact);
+    if (finder_ && scene_.contacts.options) player_.world().set_contact_source(finder_.get(), *scene_.contacts.options);
     cost_.scene = timed.name;
     cost_.size.bodies = player_.bodies().size();
     cost_.size.vertices = static_cast<Index>(drawn_.positions.size() / 3);

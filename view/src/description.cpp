@@ -79,7 +79,7 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
                      {"substeps", settings.substeps},       {"modes", settings.modes},
                      {"damping", settings.damping},         {"friction", settings.friction},
                      {"solver", to_string(settings.solver)}};
-  out["contact"] = scene.contact.has_value();
+  out["contact"] = scene.contacts.options.has_value();
   out["models"] = Json::array();
   for (const PageModel& model : shown)
     out["models"].push_back({{"name", model.name},

@@ -45,8 +45,8 @@ struct PageWorld::Impl {
     settings.gravity = told.gravity;
     settings.step = told.step;
     settings.substeps = told.substeps;
-    settings.solver = told.solver;
-    if (told.contact) settings.friction = told.contact->friction;
+    settings.solver = told.contacts.solver;
+    if (told.contacts.options) settings.friction = told.contacts.options->friction;
   }
 
   void start();
@@ -86,8 +86,8 @@ void PageWorld::Impl::start() {
   scene.step = settings.step;
   scene.substeps = settings.substeps;
   scene.gravity = settings.gravity;
-  if (scene.contact) scene.contact->friction = settings.friction;
-  if (scene.contact_rule.is_own()) scene.solver = settings.solver;
+  if (scene.contacts.options) scene.contacts.options->friction = settings.friction;
+  if (scene.contacts.rule.is_own()) scene.contacts.solver = settings.solver;
   models = baked;
   std::map<const ModalModel*, int> kind_of;
   kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();

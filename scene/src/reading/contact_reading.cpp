@@ -111,23 +111,23 @@ ContactOptions read_contact_options(const JsonObject& o) {
 
 /// [H03]'s rules stand in place of the exact solver.
 void read_solver(const JsonObject& o, Scene& scene) {
-  scene.solver = choice_of(o, "solver", {ContactSolver::kGame, ContactSolver::kExact}, scene.solver);
-  scene.small_steps.substeps =
-      static_cast<int>(o.integer("small_steps", 1, kMaxSmallSteps, scene.small_steps.substeps));
-  if (scene.contact_rule.is_own()) return;
-  if (o.has("solver") && scene.solver == ContactSolver::kGame)
+  scene.contacts.solver = choice_of(o, "solver", {ContactSolver::kGame, ContactSolver::kExact}, scene.contacts.solver);
+  scene.contacts.small_steps.substeps =
+      static_cast<int>(o.integer("small_steps", 1, kMaxSmallSteps, scene.contacts.small_steps.substeps));
+  if (scene.contacts.rule.is_own()) return;
+  if (o.has("solver") && scene.contacts.solver == ContactSolver::kGame)
     refuse(o.where("solver"), "\"game\", and \"contact\" has a rule of [H03]", "\"exact\"");
-  scene.solver = ContactSolver::kExact;
+  scene.contacts.solver = ContactSolver::kExact;
 }
 
 void read_contact(const JsonObject& o, Scene& scene) {
   if (o.has("contact")) {
     const JsonObject contact(o.at("contact"), o.where("contact"));
-    scene.finder = read_finder(contact);
-    scene.contact_rule = read_rule(contact);
-    scene.contact = read_contact_options(contact);
+    scene.contacts.finder = read_finder(contact);
+    scene.contacts.rule = read_rule(contact);
+    scene.contacts.options = read_contact_options(contact);
   } else if (o.has("statics")) {
-    scene.contact.emplace();
+    scene.contacts.options.emplace();
   }
   read_solver(o, scene);
 }
@@ -146,7 +146,7 @@ SceneStatic read_static(const Json& value, const std::string& where, const std::
 
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
   for (const char* key : {"friction", "shape", "layers", "meets", "touches_itself"})
-    if (o.has(key) && !scene.contact)
+    if (o.has(key) && !scene.contacts.options)
       throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
                        "\"statics\" beside \"bodies\"");
   body.placement.friction = read_friction(o);

@@ -105,7 +105,7 @@ void add_machine(const SceneMachine& machine, const Asset& asset, Scene& scene) 
                                 .coordinates = joint.coordinates,
                                 .where = machine.where});
     for (const auto& [a, b] : asset.apart)
-      scene.apart.push_back({body_name(name, asset, a), body_name(name, asset, b)});
+      scene.contacts.apart.push_back({body_name(name, asset, a), body_name(name, asset, b)});
   });
 }
 

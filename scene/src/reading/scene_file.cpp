@@ -140,8 +140,8 @@ void require_one_body(const Scene& scene, const std::string& name, const std::st
 void read_apart(const Json& value, const std::string& where, Scene& scene) {
   if (!value.is_array() || value.size() != 2 || !value[0].is_string() || !value[1].is_string() || value[0] == value[1])
     refuse(where, JsonObject::shown(value), "the names of two bodies");
-  scene.apart.push_back({value[0].get<std::string>(), value[1].get<std::string>()});
-  for (const std::string& name : scene.apart.back()) require_one_body(scene, name, where);
+  scene.contacts.apart.push_back({value[0].get<std::string>(), value[1].get<std::string>()});
+  for (const std::string& name : scene.contacts.apart.back()) require_one_body(scene, name, where);
 }
 
 void require_joined_bodies(const Scene& scene, const SceneJoint& joint) {

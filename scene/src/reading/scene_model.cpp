@@ -211,11 +211,11 @@ ModelNeeds needs_of(const Scene& scene, const std::set<std::string>& bodies, con
     const bool wears = std::holds_alternative<ShapeFile>(body->shape) ||
                        std::get<std::shared_ptr<const Shape>>(body->shape) != nullptr;
     const bool in_reach = filter.self || (filter.layers != 0 && filter.mask != 0);
-    needs.meets = needs.meets || (scene.contact && in_reach && !wears);
+    needs.meets = needs.meets || (scene.contacts.options && in_reach && !wears);
     needs.bends = needs.bends || body->placement.modal_skin;
     needs.meets_itself = needs.meets_itself || filter.self;
   }
-  needs.yields = needs.meets && scene.contact->residual_compliance;
+  needs.yields = needs.meets && scene.contacts.options->residual_compliance;
   const auto names = [&](const auto& all) {
     return std::any_of(all.begin(), all.end(), [&](const auto& acts) { return bodies.contains(acts.body); });
   };

@@ -103,7 +103,7 @@ class Comparison {
   /// The dropped modes' largest displacements bound what one force at a time can show of them; contacts, joints and
   /// several loads are forces beside it.
   std::optional<double> modes_bound() const {
-    const bool one_force = !scene_.contact && scene_.joints.empty() && scene_.handles.empty() &&
+    const bool one_force = !scene_.contacts.options && scene_.joints.empty() && scene_.handles.empty() &&
                            scene_.strikes.empty() && scene_.forces.size() <= 1;
     double bound = kRoundOff;
     for (const ModelManifest& m : models_.front().manifest) {
@@ -127,7 +127,8 @@ class Comparison {
     using Method = SceneContactRule::Method;
     for (const Method method :
          {Method::kComplementary, Method::kGapProgram, Method::kVelocityProgram, Method::kPenalty})
-      if (!scene_.contact || scene_.contact_rule.method != method) out.unused_methods.emplace_back(to_string(method));
+      if (!scene_.contacts.options || scene_.contacts.rule.method != method)
+        out.unused_methods.emplace_back(to_string(method));
   }
 
   void compare_with_all(SceneManifest& out) {

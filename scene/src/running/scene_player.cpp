@@ -68,15 +68,15 @@ std::unique_ptr<ContactSource> make_finder(SceneFinder which, ContactSolver solv
 }
 
 ContactOptions options_of(const Scene& scene) {
-  ContactOptions options = scene.contact.value_or(ContactOptions{});
-  options.solver = scene.solver;
-  options.small_steps = scene.small_steps;
+  ContactOptions options = scene.contacts.options.value_or(ContactOptions{});
+  options.solver = scene.contacts.solver;
+  options.small_steps = scene.contacts.small_steps;
   return options;
 }
 
 /// [H03]'s way for the islands of a scene that asks for it. @return the options of its contacts
 ContactOptions take_rule(const Scene& scene, World& world) {
-  const SceneContactRule& told = scene.contact_rule;
+  const SceneContactRule& told = scene.contacts.rule;
   if (told.is_own()) return options_of(scene);
 #if LIMBER_HAS_HAUSER
   // The same constants in the same order.
@@ -108,7 +108,7 @@ struct ScenePlayer::Impl {
       : scene(s),
         models(m),
         steps(n),
-        finder(make_finder(s.finder, s.solver)),
+        finder(make_finder(s.contacts.finder, s.contacts.solver)),
         world({.step = s.step, .substeps = s.substeps, .gravity = s.gravity, .sleep = s.sleep}, jobs) {
     add_bodies();
     for (std::size_t i = 0; i < scene.statics.size(); ++i) {
@@ -152,7 +152,7 @@ struct ScenePlayer::Impl {
 };
 
 void ScenePlayer::Impl::add_bodies() {
-  world.set_contact_source(scene.contact ? finder.get() : nullptr, take_rule(scene, world));
+  world.set_contact_source(scene.contacts.options ? finder.get() : nullptr, take_rule(scene, world));
   if (models.of_body.size() != scene.bodies.size())
     throw InvalidArgument("ScenePlayer: there are " + std::to_string(models.of_body.size()) +
                           " models, expected one per body, " + std::to_string(scene.bodies.size()));
@@ -176,7 +176,7 @@ void ScenePlayer::Impl::add_joints() {
     for (std::size_t c = 0; c < j.coordinates.size(); ++c)
       world.set_joint_actuation(joints.back(), static_cast<int>(c), j.coordinates[c]);
   }
-  for (const auto& [a, b] : scene.apart) world.set_apart(body_named(a), body_named(b), true);
+  for (const auto& [a, b] : scene.contacts.apart) world.set_apart(body_named(a), body_named(b), true);
 }
 
 void ScenePlayer::Impl::plan_loads() {

@@ -173,6 +173,17 @@ std::string_view to_string(SceneContactRule::Friction friction);
 std::string_view to_string(SceneContactRule::Guard guard);
 std::string_view to_string(ContactSolver solver);
 
+/// Which bodies meet, how their contacts are found, and who answers these.
+struct SceneContacts {
+  ContactSolver solver = kDefaultContactSolver;  ///< of handles and joints, too
+  SmallSteps small_steps{};                      ///< of ContactSolver::kGame
+  /// Absent: bodies pass through each other. Its solver and small steps are those above.
+  std::optional<ContactOptions> options{};
+  SceneFinder finder = SceneFinder::kLimber;
+  SceneContactRule rule{};
+  std::vector<std::array<std::string, 2>> apart{};  ///< bodies without contacts with each other
+};
+
 struct Scene {
   std::string name{};                                     ///< the file's name without folder and extension
   double step = 1.0 / 60.0;                               ///< s
@@ -182,19 +193,13 @@ struct Scene {
   Vec3 gravity = {0.0, 0.0, -9.80665};                    ///< m/s²
   std::map<std::string, std::filesystem::path> assets{};  ///< name → file, resolved
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
-  ContactSolver solver = kDefaultContactSolver;           ///< of contacts, handles and joints
-  SmallSteps small_steps{};                               ///< of ContactSolver::kGame
-  /// Absent: bodies pass through each other. Its solver and small steps are those above.
-  std::optional<ContactOptions> contact{};
-  SceneFinder finder = SceneFinder::kLimber;  ///< of contacts
-  SceneContactRule contact_rule{};            ///< of contacts
-  std::vector<SceneStatic> statics{};         ///< none without contact
-  std::vector<SceneBody> bodies{};            ///< those of machines last
+  SceneContacts contacts{};
+  std::vector<SceneStatic> statics{};  ///< none without contact
+  std::vector<SceneBody> bodies{};     ///< those of machines last
   std::vector<Strike> strikes{};
   std::vector<HeldForce> forces{};
   std::vector<SceneHandle> handles{};
   std::vector<SceneJoint> joints{};
-  std::vector<std::array<std::string, 2>> apart{};  ///< bodies without contacts with each other
 
   double duration() const { return step * static_cast<double>(steps); }
 };
