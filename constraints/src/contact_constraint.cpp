@@ -93,7 +93,7 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = history.find(point.id))
-    contact.last_force = known->force, contact.give = known->give, contact.slip = known->slip;
+    contact.last_force = known->force, contact.compliance = known->compliance, contact.slip = known->slip;
 }
 
 /// So that spans of them stay where they are.

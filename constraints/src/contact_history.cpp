@@ -3,11 +3,11 @@
 namespace limber {
 namespace {
 
-/// ½ give F² of each, to the body that yields.
+/// ½ c F² of each, to the body that yields.
 void find_energy(std::span<const ContactMemory> of, std::vector<double>& energy) {
   std::ranges::fill(energy, 0.0);
   for (const ContactMemory& m : of)
-    if (m.give > 0.0) energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.give * m.force.squaredNorm();
+    if (m.compliance > 0.0) energy[static_cast<std::size_t>(m.yielding)] += 0.5 * m.compliance * m.force.squaredNorm();
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ void ContactHistory::take(const PreparedContact& contact, bool lasts) {
                       .a = contact.a.body,
                       .b = contact.b.body,
                       .force = contact.last_force,
-                      .give = contact.give,
+                      .compliance = contact.compliance,
                       .slip = contact.slip,
                       .yielding = contact.yielding,
                       .position = contact.start_position,

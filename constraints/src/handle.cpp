@@ -65,13 +65,13 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
                .digits = digits_of(arm + p.norm() + target.norm()),
                .last_force = last_force_[i]};
     law.gap = gap;
-    law.agent_displacement = n.dot(then_ - target);
+    law.prescribed_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;
     if (options_.stiffness > 0.0) {
       law.make_spring(options_.stiffness, options_.damping, step, gap);
     } else {
       law.holds = true;
-      law.agent_displacement -= gap;  // the hand takes the point to where it is wanted
+      law.prescribed_displacement -= gap;  // the hand takes the point to where it is wanted
     }
     FrameMeasure velocity;
     at.add_point(p, n, velocity);

@@ -286,8 +286,8 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowLa
   law.upper = step_ * (motor ? act.motor_max_force : act.friction);
   law.lower = -law.upper;
   law.end_rate = motor ? act.motor_velocity : 0.0;
-  law.agent_displacement = step_ * law.end_rate;
-  law.offset = gap + law.agent_displacement;
+  law.prescribed_displacement = step_ * law.end_rate;
+  law.offset = gap + law.prescribed_displacement;
 }
 
 /// Of axes and distances: exact for any step, in its middle too. @return whether it is such a row

@@ -118,7 +118,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
   visit_rows([&](PreparedContact& contact, std::size_t row) {
     const Vec3 impulse = contact.impulse_of(impulses.subspan(row));
     contact.last_force = impulse / step_;
-    contact.give = give_;
+    contact.compliance = compliance_;
     contact.impulse += impulse;
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
@@ -138,7 +138,7 @@ void PairContacts::begin(const BodyStates& states) {
     for (PreparedSide* side : {&contact.a, &contact.b})
       if (side->skin != nullptr)
         side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
-  give_ = options_->compliance > 0.0 && flexes_ ? give(states) : 0.0;
+  compliance_ = options_->compliance > 0.0 && flexes_ ? compliance(states) : 0.0;
   for (PreparedContact& contact : contacts_) {
     Vec3 dent = Vec3::Zero();
     for (std::size_t i = 0; i < 2; ++i) {
@@ -147,12 +147,12 @@ void PairContacts::begin(const BodyStates& states) {
         dent +=
             PreparedContact::sign(i) * (turn_[i] * side.turned(dents_->displacement(states, side.body, side.region)));
     }
-    contact.dent = contact.axes.transpose() * (dent + contact.give * contact.last_force);
+    contact.dent = contact.axes.transpose() * (dent + contact.compliance * contact.last_force);
   }
   caught_ = flexes_ && is_caught();
 }
 
-double PairContacts::give(const BodyStates& states) const {
+double PairContacts::compliance(const BodyStates& states) const {
   const double share = yields_[0] || yields_[1] ? internal::kConstraintsTuning.rows.compliance_beside_residual : 1.0;
   return share * options_->compliance * step_ * step_ / reduced_mass(states, contacts_.front());
 }
@@ -221,15 +221,16 @@ double PairContacts::touch(const BodyStates& states, const FreeMotions& motions,
   return n.dot(velocity_b - velocity_a) > tuning.speed ? open : within;
 }
 
-void PairContacts::add_give(Index first, ConstraintRows& rows) const {
-  for (Index row = first; give_ > 0.0 && row < rows.size(); ++row) rows.add_give(row, give_);
+void PairContacts::add_compliance(Index first, ConstraintRows& rows) const {
+  for (Index row = first; compliance_ > 0.0 && row < rows.size(); ++row) rows.add_compliance(row, compliance_);
   double stored = 0.0;
-  for (const PreparedContact& contact : contacts_) stored += 0.5 * contact.give * contact.last_force.squaredNorm();
+  for (const PreparedContact& contact : contacts_)
+    stored += 0.5 * contact.compliance * contact.last_force.squaredNorm();
   rows.add_stored_energy(stored);
 }
 
 void PairContacts::add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows) {
-  add_give(first, rows);
+  add_compliance(first, rows);
   for (std::size_t i = 0; i < 2; ++i) {
     if (!yields_[i]) continue;
     const Mat3 R = to_matrix(turn_[i]);
@@ -257,7 +258,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
                                   : std::min(internal::kConstraintsTuning.rows.overlap_recovery * std::max(0.0, -gap),
                                              step_ * options_->recovery_speed);
       law.offset = std::min(0.0, gap) + recovery;
-      law.agent_displacement = recovery;
+      law.prescribed_displacement = recovery;
       law.lower = 0.0;
       law.holds = true;
       law.friction = contact.friction;

@@ -43,7 +43,7 @@ class PairContacts final : public Constraint {
   }
 
   /// What each contact yields by itself in the coming step, m/N.
-  double give(const BodyStates& states) const;
+  double compliance(const BodyStates& states) const;
 
   /// Whether a part of one body is caught between two of the other: contacts that overlap and push either way. To come
   /// apart they would press against each other without bound.
@@ -53,7 +53,7 @@ class PairContacts final : public Constraint {
   double touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact, double within);
 
   /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
-  void add_give(Index first, ConstraintRows& rows) const;
+  void add_compliance(Index first, ConstraintRows& rows) const;
 
   /// @param first row of the first contact
   void add_flexibility(const BodyStates& states, Index first, ConstraintRows& rows);
@@ -67,7 +67,7 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool flexes_ = false, caught_ = false;
   double step_ = 0.0;
-  double give_ = 0.0;                         // of each contact of bodies that flex, m/N
+  double compliance_ = 0.0;                   // of each contact of bodies that flex, m/N
   std::array<std::vector<double>, 2> modal_;  // scratch by side, as what follows
   std::array<Passage, 2> passage_;
 };

@@ -84,7 +84,7 @@ struct PreparedContact {
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
   Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone
-  double give = 0.0;               // what the contact yielded to it by itself, m/N
+  double compliance = 0.0;         // what the contact yielded to it by itself, m/N
   double slip = 0.0;               // beyond what its spring gave, m
   Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
   Vec3 impulse = Vec3::Zero();     // of this step, world, on a

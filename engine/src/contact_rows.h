@@ -34,7 +34,7 @@ inline void add_memory_to(StateHash& hash, const ContactSet& contacts, std::size
     for (const ContactMemory& contact : known) {
       hash.add(contact.id);
       hash.add(contact.force);
-      hash.add(contact.give);
+      hash.add(contact.compliance);
       hash.add(contact.slip);
     }
   for (const RollingMemory& rolling : contacts.rolling()) hash.add(rolling.moment);

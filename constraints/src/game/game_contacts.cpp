@@ -312,13 +312,13 @@ void GameContacts::end_step(const SubstepPlan& plan) {
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
 }
 
-/// Its spring stores what the row's law does, by the normal force of the last substep: ½ give F².
+/// Its spring stores what the row's law does, by the normal force of the last substep: ½ c F².
 void GameContacts::tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const {
   contact.last_force = contact.axes * told.last;
   contact.mean_force = contact.axes * (told.sum / plan.count);
   contact.impulse = plan.step * contact.mean_force;
   const double square = told.last.squaredNorm();
-  contact.give = square > 0.0 ? told.compliance * told.last[0] * told.last[0] / square : 0.0;
+  contact.compliance = square > 0.0 ? told.compliance * told.last[0] * told.last[0] / square : 0.0;
   contact.slip = 0.0;
 }
 

@@ -20,7 +20,7 @@ double largest_recovery_work(const IslandStep& step, double distance) {
 double force(const IslandStep& step, std::size_t row) { return step.f[row] / step.length() + step.reaction[row]; }
 
 double given(const IslandStep& step, std::size_t row) {
-  return std::max(0.0, force(step, row) * step.law(row).agent_displacement);
+  return std::max(0.0, force(step, row) * step.law(row).prescribed_displacement);
 }
 
 /// A hand, a motor or a spring whose force is at its limit: what it moves does not go where it is wanted.
@@ -28,16 +28,16 @@ bool is_at_limit(const IslandStep& step, std::size_t row) {
   const RowLaw& law = step.law(row);
   constexpr double kAlmost = 1.0 - 1e-9;  // reactions and impulses are added up
   const double impulse = step.f[row] + step.length() * step.reaction[row];
-  return law.lower < 0.0 && (law.agent_displacement != 0.0 || law.stiffness > 0.0) &&
+  return law.lower < 0.0 && (law.prescribed_displacement != 0.0 || law.stiffness > 0.0) &&
          (impulse <= kAlmost * law.lower || impulse >= kAlmost * law.upper);
 }
 
-/// The force times the way of its point. RowLaw::agent_displacement is that way where a spring keeps its length, or
-/// where a hard row's gap is met.
+/// The force times the way of its point. RowLaw::prescribed_displacement is that way where a spring keeps its length,
+/// or where a hard row's gap is met.
 double limited_work(const IslandStep& step, std::size_t row) {
   const RowLaw& law = step.law(row);
   const double missed = step.gap[row] - (law.stiffness > 0.0 ? step.start_gap[row] : law.offset);
-  return force(step, row) * (law.agent_displacement + missed);
+  return force(step, row) * (law.prescribed_displacement + missed);
 }
 
 /// Of what pushes apart what overlaps.
@@ -46,7 +46,7 @@ double recovery_work(const IslandStep& step) {
   for (std::size_t i = 0; i < step.size(); ++i) {
     if (step.law(i).lower != 0.0) continue;
     work += given(step, i);
-    recovery = std::max(recovery, step.law(i).agent_displacement);
+    recovery = std::max(recovery, step.law(i).prescribed_displacement);
   }
   return std::min(work, largest_recovery_work(step, recovery));
 }
@@ -95,7 +95,7 @@ bool is_workless(const IslandStep& step) {
     const RowLaw& law = step.law(i);
     if (step.touch_impulse[i] != 0.0) return false;
     if (step.f[i] == 0.0 && step.reaction[i] == 0.0) continue;
-    if (!is_equality(law) || law.compliance > 0.0 || law.agent_displacement != 0.0) return false;
+    if (!is_equality(law) || law.compliance > 0.0 || law.prescribed_displacement != 0.0) return false;
   }
   return true;
 }

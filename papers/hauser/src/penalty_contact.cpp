@@ -33,7 +33,7 @@ void PenaltyContact::add_rows(const BodyStates& states, StepTime when, double st
     law.make_spring(mass * omega * omega, 2.0 * damping_ * mass * omega, step,
                     std::min(0.0, gaps_[static_cast<std::size_t>(i - first)]));
     law.holds = false;
-    law.agent_displacement = 0.0;
+    law.prescribed_displacement = 0.0;
   }
 }
 

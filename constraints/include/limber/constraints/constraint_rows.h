@@ -51,7 +51,7 @@ struct RowLaw {
   double last_force = 0.0;  ///< that of the last step, from which solvers may begin
   /// Prescribed motion of the row's actuator (a handle, a motor) within the step, in the gap's unit: the work f/Δt
   /// times this may enter the system.
-  double agent_displacement = 0.0;
+  double prescribed_displacement = 0.0;
   /// What the gap is to change by per second at the step's end, where the row has been met: 0, but for prescribed
   /// motion.
   double end_rate = 0.0;
@@ -122,7 +122,7 @@ class ConstraintRows {
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
   void add_flexibility(Index body, Index i, Index j, double value) { flexibility_.push_back({i, j, value, body}); }
   /// Contact compliance: what a row yields to its own force alone, whatever it acts on, m/N; value ≥ 0.
-  void add_give(Index row, double value) { flexibility_.push_back({row, row, value, -1}); }
+  void add_compliance(Index row, double value) { flexibility_.push_back({row, row, value, -1}); }
   /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
   void add_stored_energy(double energy) { stored_energy_ += energy; }
 

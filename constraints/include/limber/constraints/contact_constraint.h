@@ -17,7 +17,7 @@
 /// residual displacement is a state of the body: what its last step pressed its vertices with, in its own frame
 /// (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
-/// *Contact compliance* (`give`): contacts of bodies that flex may yield by themselves, which makes the shares of a
+/// *Contact compliance* c: contacts of bodies that flex may yield by themselves, which makes the shares of a
 /// load among redundant contacts unique for island solvers that need it (ContactOptions::compliance).
 ///
 /// *Overlap* at the start, what dents leave of it, shrinks by a fifth a step, at most at `recovery_speed`; that is work
@@ -100,14 +100,14 @@ struct ContactMemory {
   std::uint64_t id = 0;                                 ///< of the ContactPoint
   Index a = -1, b = -1;                                 ///< bodies
   Vec3 force = Vec3::Zero();                            ///< on a, mean over the step, world, N
-  double give = 0.0;                                    ///< contact compliance, m/N; ½ give F² is stored there
+  double compliance = 0.0;                              ///< contact compliance c, m/N; ½ c F² is stored there
   double slip = 0.0;                                    ///< how far the point slid in the step, m
   Index yielding = -1;                                  ///< the body that this energy is counted with
   Vec3 position = Vec3::Zero(), normal = Vec3::Zero();  ///< as in ContactEvent
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.id, s.a, s.b, s.force, s.give, s.slip, s.yielding, s.position, s.normal);
+    return std::tie(s.id, s.a, s.b, s.force, s.compliance, s.slip, s.yielding, s.position, s.normal);
   }
 };
 
@@ -173,7 +173,7 @@ class ContactSet {
   std::span<const RollingMemory> rolling() const;
   /// The forces behind a body's residual displacement, as the last step left them.
   std::span<const DentLoad> dent_loads(Index body) const;
-  /// The energy in a body's residual and contact compliance, ½ FᵀG F and ½ give F², J: beside that of its modes.
+  /// The energy in a body's residual and contact compliance, ½ FᵀG F and ½ c F², J: beside that of its modes.
   double dent_energy(const BodyStates& states, Index body) const;
   const ContactOptions& options() const;
   /// A body that is removed: its residual displacement goes with it.
