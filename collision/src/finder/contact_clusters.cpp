@@ -40,6 +40,142 @@ struct Span {
   }
 };
 
+bool near(const PlanePoint& p, const PlanePoint& q, double distance) {
+  const double x = p.x - q.x, y = p.y - q.y;
+  return x * x + y * y <= distance * distance;
+}
+
+bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) {
+  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) { return near(p, q, distance); });
+}
+
+/// Which contacts of one patch are kept, as its mean normal shows them; see the header.
+class PatchChoice {
+ public:
+  explicit PatchChoice(const ContactClusterOptions& options) : options_(options) {}
+
+  /// @param members of the patch, ascending. @param previous ids that were kept last time, ascending
+  void choose(std::span<const ContactPoint> contacts, std::span<const Index> members, const ContactSpacing& wanted,
+              std::span<const std::uint64_t> previous);
+
+  double gap(const PlanePoint& p) const { return contacts_[static_cast<std::size_t>(p.item)].gap; }
+  const std::vector<PlanePoint>& all() const { return place_; }
+  const std::vector<PlanePoint>& kept() const { return kept_; }
+  double extent() const { return diameter(corners_); }
+
+ private:
+  bool deep(const PlanePoint& p) const { return gap(p) <= deep_gap_; }
+  const PlanePoint& deepest(const std::vector<PlanePoint>& some) const {
+    return *std::min_element(some.begin(), some.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
+  }
+  void project(std::span<const Index> members);
+  void add_corners();
+  void cover();
+  bool previous_will_do(std::span<const std::uint64_t> previous, std::size_t corners);
+  Span span_of(const std::vector<PlanePoint>& some, bool deep_only);
+
+  ContactClusterOptions options_;
+  std::span<const ContactPoint> contacts_;
+  std::vector<PlanePoint> place_, kept_;
+  std::vector<PlanePoint> corners_;  // of all
+  double deep_gap_ = 0.0;            // contacts with gaps up to here are deep
+  double spacing_ = 0.0;             // m
+  std::vector<PlanePoint> points_, hull_, old_, trial_, trial_hull_;
+};
+
+void PatchChoice::project(std::span<const Index> members) {
+  const ContactPoint& leader = contacts_[static_cast<std::size_t>(members.front())];
+  Vec3 normal = Vec3::Zero();
+  for (const Index m : members) normal += contacts_[static_cast<std::size_t>(m)].normal;
+  if (normal.norm() > 0.0) normal.normalize();
+  const Vec3 x = normal.unitOrthogonal(), y = normal.cross(x);
+  place_.clear();
+  for (const Index m : members) {
+    const Vec3 p = contacts_[static_cast<std::size_t>(m)].position - leader.position;
+    place_.push_back({x.dot(p), y.dot(p), m});
+  }
+}
+
+Span PatchChoice::span_of(const std::vector<PlanePoint>& some, bool deep_only) {
+  trial_.clear();
+  for (const PlanePoint& p : some)
+    if (!deep_only || deep(p)) trial_.push_back(p);
+  convex_hull(trial_, trial_hull_);
+  return {area(trial_hull_), diameter(trial_hull_)};
+}
+
+/// Adds corners of the whole patch until there are max_points, as long as what they span grows.
+void PatchChoice::add_corners() {
+  while (kept_.size() < static_cast<std::size_t>(options_.max_points)) {
+    Span best = span_of(kept_, false);
+    const PlanePoint* chosen = nullptr;
+    for (const PlanePoint& corner : corners_) {
+      kept_.push_back(corner);
+      const Span span = span_of(kept_, false);
+      kept_.pop_back();
+      if (span.area > best.area || (span.area == best.area && span.diameter > best.diameter))
+        best = span, chosen = &corner;
+    }
+    if (chosen == nullptr) return;
+    kept_.push_back(*chosen);
+  }
+}
+
+/// Adds what is farther than the spacing from all that are kept, the deepest first.
+void PatchChoice::cover() {
+  if (std::isinf(spacing_)) return;
+  points_.clear();  // that are not covered yet
+  for (const PlanePoint& p : place_)
+    if (!near_any(p, kept_, spacing_)) points_.push_back(p);
+  while (!points_.empty()) {
+    const PlanePoint chosen = deepest(points_);
+    kept_.push_back(chosen);
+    std::erase_if(points_, [&](const PlanePoint& p) { return near(p, chosen, spacing_); });
+  }
+}
+
+/// @param corners how many of the best choice are corners; the others cover what lies between
+bool PatchChoice::previous_will_do(std::span<const std::uint64_t> previous, std::size_t corners) {
+  const internal::ClusterTuning& tuning = internal::collision_tuning().clusters;
+  old_.clear();
+  for (const PlanePoint& p : place_)
+    if (std::binary_search(previous.begin(), previous.end(), contacts_[static_cast<std::size_t>(p.item)].id))
+      old_.push_back(p);
+  const auto surplus = static_cast<std::size_t>(tuning.kept_surplus * static_cast<double>(kept_.size() - corners));
+  return old_.size() >= corners && old_.size() <= kept_.size() + surplus &&
+         std::any_of(old_.begin(), old_.end(), [&](const auto& p) { return deep(p); }) &&
+         span_of(old_, true).at_least(options_.hysteresis, span_of(kept_, true)) &&
+         span_of(old_, false).at_least(options_.hysteresis, span_of(kept_, false)) &&
+         (std::isinf(spacing_) || std::all_of(place_.begin(), place_.end(), [&](const PlanePoint& p) {
+            return near_any(p, old_, tuning.kept_spacing * spacing_);
+          }));
+}
+
+void PatchChoice::choose(std::span<const ContactPoint> contacts, std::span<const Index> members,
+                         const ContactSpacing& wanted, std::span<const std::uint64_t> previous) {
+  contacts_ = contacts;
+  project(members);
+  points_.assign(place_.begin(), place_.end());
+  convex_hull(points_, corners_);
+  largest_polygon(corners_, static_cast<int>(kMostCorners), hull_);  // thins the corners
+
+  spacing_ = std::isinf(wanted.share) ? wanted.length : std::min(wanted.length, wanted.share * diameter(corners_));
+  const PlanePoint first = deepest(place_);
+  deep_gap_ = gap(first) + options_.depth_tolerance * diameter(corners_);
+  if (options_.max_points == 1) {
+    kept_.assign(1, first);
+  } else {
+    points_.clear();
+    std::copy_if(place_.begin(), place_.end(), std::back_inserter(points_), [&](const auto& p) { return deep(p); });
+    convex_hull(points_, hull_);
+    largest_polygon(hull_, options_.max_points, kept_);
+    add_corners();
+  }
+  const std::size_t corners = kept_.size();
+  cover();
+  if (previous_will_do(previous, corners)) kept_.swap(old_);
+}
+
 }  // namespace
 
 void ContactClusterOptions::validate() const {
@@ -52,51 +188,40 @@ void ContactClusterOptions::validate() const {
 }
 
 struct ContactClusters::Impl {
-  explicit Impl(const ContactClusterOptions& o) : options(o), min_cosine(std::cos(o.max_normal_angle)) {
+  explicit Impl(const ContactClusterOptions& o) : options(o), min_cosine(std::cos(o.max_normal_angle)), choice(o) {
     options.validate();
   }
+
+  /// What is told of contacts beside which are kept.
+  struct Told {
+    ContactShares shares = ContactShares::kNone;
+    std::vector<ContactPoint> all;
+    std::vector<ContactWeight> weights;
+    std::vector<double> cells;  ///< by contact
+  };
 
   ContactClusterOptions options;
   double min_cosine;
 
   // Of the pair under way.
   std::span<ContactPoint> contacts;
-  std::span<const std::uint64_t> previous;
   std::vector<std::pair<std::uint64_t, std::size_t>> order;
   std::vector<ContactPoint> sorted;
   std::vector<Index> leaders;   ///< by patch: its first contact
   std::vector<Index> patch_of;  ///< by contact
   std::vector<Index> members;   ///< of one patch, ascending
   std::vector<std::uint8_t> keep;
+  Told told;
 
-  // Of the patch under way: its contacts in the plane across the mean normal.
-  double deep_gap = 0.0;  ///< contacts with gaps up to here are deep
-  std::vector<PlanePoint> place, points, hull, all_corners, kept, old, trial, trial_hull;
-
-  ContactSpacing wanted;
-  double spacing = 0.0;  ///< of the patch under way, m
-
-  ContactShares shares = ContactShares::kNone;
-  std::vector<ContactPoint> all;
-  std::vector<ContactWeight> weights;
+  PatchChoice choice;
   PatchWeights patch_weights;
   PatchCells patch_cells;
-  std::vector<double> cells;  ///< by contact
 
   void sort_by_id();
   void find_patches();
-  void reduce_patch();
+  void reduce_patch(const ContactSpacing& wanted, std::span<const std::uint64_t> previous);
   void weigh_patch();
   void find_cells();
-  void project();
-  void choose();
-  void add_corners();
-  void cover();
-  static bool near(const PlanePoint& p, const PlanePoint& q, double distance);
-  static bool near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance);
-  bool previous_will_do(std::size_t corners);
-  Span span_of(const std::vector<PlanePoint>& some, bool deep_only);
-  bool deep(const PlanePoint& p) const { return contacts[static_cast<std::size_t>(p.item)].gap <= deep_gap; }
 };
 
 /// Contacts are large: places are sorted, and each contact is moved once.
@@ -125,138 +250,32 @@ void ContactClusters::Impl::find_patches() {
   }
 }
 
-void ContactClusters::Impl::project() {
-  const ContactPoint& leader = contacts[static_cast<std::size_t>(members.front())];
-  Vec3 normal = Vec3::Zero();
-  for (const Index m : members) normal += contacts[static_cast<std::size_t>(m)].normal;
-  if (normal.norm() > 0.0) normal.normalize();
-  const Vec3 x = normal.unitOrthogonal(), y = normal.cross(x);
-  place.clear();
-  for (const Index m : members) {
-    const Vec3 p = contacts[static_cast<std::size_t>(m)].position - leader.position;
-    place.push_back({x.dot(p), y.dot(p), m});
-  }
-}
-
-Span ContactClusters::Impl::span_of(const std::vector<PlanePoint>& some, bool deep_only) {
-  trial.clear();
-  for (const PlanePoint& p : some)
-    if (!deep_only || deep(p)) trial.push_back(p);
-  convex_hull(trial, trial_hull);
-  return {area(trial_hull), diameter(trial_hull)};
-}
-
-/// Adds corners of the whole patch until there are max_points, as long as what they span grows.
-void ContactClusters::Impl::add_corners() {
-  while (kept.size() < static_cast<std::size_t>(options.max_points)) {
-    Span best = span_of(kept, false);
-    const PlanePoint* chosen = nullptr;
-    for (const PlanePoint& corner : all_corners) {
-      kept.push_back(corner);
-      const Span span = span_of(kept, false);
-      kept.pop_back();
-      if (span.area > best.area || (span.area == best.area && span.diameter > best.diameter))
-        best = span, chosen = &corner;
-    }
-    if (chosen == nullptr) return;
-    kept.push_back(*chosen);
-  }
-}
-
-bool ContactClusters::Impl::near(const PlanePoint& p, const PlanePoint& q, double distance) {
-  const double x = p.x - q.x, y = p.y - q.y;
-  return x * x + y * y <= distance * distance;
-}
-
-bool ContactClusters::Impl::near_any(const PlanePoint& p, const std::vector<PlanePoint>& some, double distance) {
-  return std::any_of(some.begin(), some.end(), [&](const PlanePoint& q) { return near(p, q, distance); });
-}
-
-/// Adds what is farther than the spacing from all that are kept, the deepest first.
-void ContactClusters::Impl::cover() {
-  if (std::isinf(spacing)) return;
-  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
-  points.clear();  // that are not covered yet
-  for (const PlanePoint& p : place)
-    if (!near_any(p, kept, spacing)) points.push_back(p);
-  while (!points.empty()) {
-    const PlanePoint chosen =
-        *std::min_element(points.begin(), points.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
-    kept.push_back(chosen);
-    std::erase_if(points, [&](const PlanePoint& p) { return near(p, chosen, spacing); });
-  }
-}
-
-/// @param corners how many of the best choice are corners; the others cover what lies between
-bool ContactClusters::Impl::previous_will_do(std::size_t corners) {
-  const internal::FinderTuning& tuning = internal::collision_tuning().finder;
-  old.clear();
-  for (const PlanePoint& p : place)
-    if (std::binary_search(previous.begin(), previous.end(), contacts[static_cast<std::size_t>(p.item)].id))
-      old.push_back(p);
-  const auto surplus = static_cast<std::size_t>(tuning.kept_surplus * static_cast<double>(kept.size() - corners));
-  return old.size() >= corners && old.size() <= kept.size() + surplus &&
-         std::any_of(old.begin(), old.end(), [&](const auto& p) { return deep(p); }) &&
-         span_of(old, true).at_least(options.hysteresis, span_of(kept, true)) &&
-         span_of(old, false).at_least(options.hysteresis, span_of(kept, false)) &&
-         (std::isinf(spacing) || std::all_of(place.begin(), place.end(), [&](const PlanePoint& p) {
-            return near_any(p, old, tuning.kept_spacing * spacing);
-          }));
-}
-
-/// Fills `kept` from `place`; see the header.
-void ContactClusters::Impl::choose() {
-  points.assign(place.begin(), place.end());
-  convex_hull(points, all_corners);
-  largest_polygon(all_corners, static_cast<int>(kMostCorners), hull);  // thins the corners
-
-  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
-  spacing = std::isinf(wanted.share) ? wanted.length : std::min(wanted.length, wanted.share * diameter(all_corners));
-  const auto deepest =
-      std::min_element(place.begin(), place.end(), [&](const auto& p, const auto& q) { return gap(p) < gap(q); });
-  deep_gap = gap(*deepest) + options.depth_tolerance * diameter(all_corners);
-  if (options.max_points == 1) {
-    kept.assign(1, *deepest);
-  } else {
-    points.clear();
-    std::copy_if(place.begin(), place.end(), std::back_inserter(points), [&](const auto& p) { return deep(p); });
-    convex_hull(points, hull);
-    largest_polygon(hull, options.max_points, kept);
-    add_corners();
-  }
-  const std::size_t corners = kept.size();
-  cover();
-  if (previous_will_do(corners)) kept.swap(old);
-}
-
-void ContactClusters::Impl::reduce_patch() {
+void ContactClusters::Impl::reduce_patch(const ContactSpacing& wanted, std::span<const std::uint64_t> previous) {
   if (members.size() <= static_cast<std::size_t>(options.max_points)) {
     for (const Index m : members) keep[static_cast<std::size_t>(m)] = 1;
     return;
   }
-  project();
-  choose();
-  for (const PlanePoint& p : kept) keep[static_cast<std::size_t>(p.item)] = 1;
-  if (shares != ContactShares::kNone) weigh_patch();
-  if (shares == ContactShares::kWeightsAndCells) find_cells();
+  choice.choose(contacts, members, wanted, previous);
+  for (const PlanePoint& p : choice.kept()) keep[static_cast<std::size_t>(p.item)] = 1;
+  if (told.shares != ContactShares::kNone) weigh_patch();
+  if (told.shares == ContactShares::kWeightsAndCells) find_cells();
 }
 
 void ContactClusters::Impl::weigh_patch() {
-  const auto gap = [&](const PlanePoint& p) { return contacts[static_cast<std::size_t>(p.item)].gap; };
-  const double pressed_with = internal::collision_tuning().finder.pressed_with * diameter(all_corners);
-  patch_weights.set(kept);
-  for (const PlanePoint& p : place)
+  const double pressed_with = internal::collision_tuning().clusters.pressed_with * choice.extent();
+  patch_weights.set(choice.kept());
+  for (const PlanePoint& p : choice.all())
     for (const PatchWeights::Weight& w : patch_weights.find(p)) {
-      const PlanePoint& r = kept[w.kept];
-      const double farther = gap(p) - gap(r);
+      const PlanePoint& r = choice.kept()[w.kept];
+      const double farther = choice.gap(p) - choice.gap(r);
       const double part = farther <= pressed_with ? 1.0 : std::max(0.0, 2.0 - farther / pressed_with);
-      if (part > 0.0) weights.push_back({.contact = p.item, .kept = r.item, .weight = part * w.value});
+      if (part > 0.0) told.weights.push_back({.contact = p.item, .kept = r.item, .weight = part * w.value});
     }
 }
 
 void ContactClusters::Impl::find_cells() {
-  const std::vector<double>& parts = patch_cells.find(place);
-  for (std::size_t i = 0; i < place.size(); ++i) cells[static_cast<std::size_t>(place[i].item)] = parts[i];
+  const std::vector<double>& parts = patch_cells.find(choice.all());
+  for (std::size_t i = 0; i < parts.size(); ++i) told.cells[static_cast<std::size_t>(choice.all()[i].item)] = parts[i];
 }
 
 ContactClusters::ContactClusters(const ContactClusterOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -267,24 +286,22 @@ ContactClusters& ContactClusters::operator=(ContactClusters&&) noexcept = defaul
 void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t first, const ContactSpacing& spacing,
                              std::span<const std::uint64_t> previous, ContactShares shares) {
   Impl& m = *impl_;
-  m.shares = shares;
-  m.weights.clear();
+  m.told.shares = shares;
+  m.told.weights.clear();
   m.contacts = std::span(contacts).subspan(first);
-  m.previous = previous;
   m.sort_by_id();
   m.keep.assign(m.contacts.size(), 1);
-  if (shares != ContactShares::kNone) m.all.assign(m.contacts.begin(), m.contacts.end());
+  if (shares != ContactShares::kNone) m.told.all.assign(m.contacts.begin(), m.contacts.end());
   if (shares == ContactShares::kWeightsAndCells)
-    m.cells.assign(m.contacts.size(), std::numeric_limits<double>::infinity());
+    m.told.cells.assign(m.contacts.size(), std::numeric_limits<double>::infinity());
   if (m.options.max_points == 0 || m.contacts.size() <= static_cast<std::size_t>(m.options.max_points)) return;
-  m.wanted = spacing;
   m.find_patches();
   m.keep.assign(m.contacts.size(), 0);
   for (std::size_t patch = 0; patch < m.leaders.size(); ++patch) {
     m.members.clear();
     for (std::size_t c = 0; c < m.patch_of.size(); ++c)
       if (m.patch_of[c] == static_cast<Index>(patch)) m.members.push_back(static_cast<Index>(c));
-    m.reduce_patch();
+    m.reduce_patch(spacing, previous);
   }
   std::size_t end = first;
   for (std::size_t c = 0; c < m.keep.size(); ++c)
@@ -292,9 +309,9 @@ void ContactClusters::reduce(std::vector<ContactPoint>& contacts, std::size_t fi
   contacts.resize(end);
 }
 
-std::span<const ContactPoint> ContactClusters::all() const { return impl_->all; }
+std::span<const ContactPoint> ContactClusters::all() const { return impl_->told.all; }
 bool ContactClusters::kept(Index contact) const { return impl_->keep[static_cast<std::size_t>(contact)] != 0; }
-double ContactClusters::cell(Index contact) const { return impl_->cells[static_cast<std::size_t>(contact)]; }
-std::span<const ContactWeight> ContactClusters::weights() const { return impl_->weights; }
+double ContactClusters::cell(Index contact) const { return impl_->told.cells[static_cast<std::size_t>(contact)]; }
+std::span<const ContactWeight> ContactClusters::weights() const { return impl_->told.weights; }
 
 }  // namespace limber

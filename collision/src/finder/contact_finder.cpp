@@ -14,7 +14,6 @@ using internal::contact_id;
 using internal::ContactRegions;
 using internal::FoundBody;
 using internal::ModalGeometry;
-using internal::PairIds;
 using internal::RegionSide;
 using internal::Worker;
 using internal::Workers;
@@ -50,9 +49,9 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
   result.displacement = s.displacement, result.rotation = s.rotation;
-  result.reach = s.reach + 0.5 * margin;
+  result.reach = s.reach + 0.5 * query.margin;
   if (body.modal) {
-    result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes, options.bounds);
+    result.surface = &worker.pool.get(index, body.modal->surface, s.amplitudes);
     result.volume = body.modal->volume ? &*body.modal->volume : nullptr;
   } else {
     result.geometry = body.rigid.get();
@@ -67,13 +66,6 @@ ContactSpacing ContactFinder::Impl::spacing(const BodyPair& pair, bool by_region
   return {.length = options.spacing * std::min(a.diagonal, b.diagonal)};
 }
 
-std::span<const std::uint64_t> ContactFinder::Impl::kept_last_time(const BodyPair& pair) const {
-  const auto known = std::lower_bound(kept_pairs.begin(), kept_pairs.end(), pair,
-                                      [](const PairIds& entry, const BodyPair& p) { return entry.pair < p; });
-  if (known == kept_pairs.end() || known->pair != pair) return {};
-  return std::span(kept_ids).subspan(known->first, known->count);
-}
-
 RegionSide ContactFinder::Impl::region_side(Index index) const {
   const FoundBody& body = at(index);
   if (!body.modal || !body.modal->surface->model()->data().residual_compliance) return {};
@@ -85,16 +77,16 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Fou
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
-    worker.narrow.find_self_contacts(a, margin + 2.0 * state(pair.a).reach, origin, contacts);
+    worker.narrow.find_self_contacts(a, query.margin + 2.0 * state(pair.a).reach, query.origin, contacts);
   } else {
     const BodyState &s = state(pair.a), &t = state(pair.b);
     const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
-    worker.narrow.find_contacts(a, collision_body(pair.b, worker), margin + together, origin, contacts);
+    worker.narrow.find_contacts(a, collision_body(pair.b, worker), query.margin + together, query.origin, contacts);
   }
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
   const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
-  worker.clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept_last_time(pair), shares);
+  worker.clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept.of(pair), shares);
   worker.regions.find(worker.clusters, shares, sides, into.regions);
   into.regions.counts.reserve(contacts.capacity());
   into.regions.counts.resize(contacts.size(), {0, 0});
@@ -112,12 +104,6 @@ void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   });
 }
 
-void ContactFinder::Impl::keep_id(const BodyPair& pair, std::uint64_t id) {
-  if (kept_pairs.empty() || kept_pairs.back().pair != pair) kept_pairs.push_back({pair, kept_ids.size(), 0});
-  ++kept_pairs.back().count;
-  kept_ids.push_back(id);
-}
-
 void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
   contacts.clear();
   regions.clear();
@@ -127,9 +113,7 @@ void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
     regions.append(part.regions);
   }
   regions.give_to(contacts);
-  kept_pairs.clear();
-  kept_ids.clear();
-  for (const ContactPoint& c : contacts) keep_id({c.a.body, c.b.body}, c.id);
+  kept.keep(contacts);
 }
 
 ContactFinder::ContactFinder(const ContactFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -179,10 +163,10 @@ void ContactFinder::exclude_pair(Index a, Index b, bool excluded) {
   impl_->broad_phase.exclude_pair(a, b, excluded);
 }
 
-void ContactFinder::save_state(StateWriter& state) const { state(impl_->kept_pairs, impl_->kept_ids); }
+void ContactFinder::save_state(StateWriter& state) const { state(impl_->kept.pairs, impl_->kept.ids); }
 
 void ContactFinder::restore_state(StateReader& state) {
-  state(impl_->kept_pairs, impl_->kept_ids);
+  state(impl_->kept.pairs, impl_->kept.ids);
   for (FoundBody& body : impl_->bodies) body.placed_asleep = false;
 }
 
@@ -191,10 +175,7 @@ void ContactFinder::find_contacts(const ContactQuery& query, std::vector<Contact
   check_length("margin", query.margin);
   if (!query.origin.allFinite())
     throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
-  m.states = query.states;
-  m.awake = query.awake;
-  m.margin = query.margin;
-  m.origin = query.origin;
+  m.query = query;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
   m.merge_self_pairs();

@@ -2,8 +2,6 @@
 //
 //   contact_finder.cpp  the bodies, and what is found in each pair of them
 //   near_pairs.cpp      the states of a query, where they place the bodies, and which of these are near each other
-//
-// Its members are many since all lists are kept, so that no query allocates.
 #pragma once
 
 #include <algorithm>
@@ -26,10 +24,7 @@ struct ContactFinder::Impl {
   internal::Workers workers;
 
   // Of the query under way.
-  std::span<const BodyState> states;
-  std::span<const Index> awake;  ///< ContactQuery::awake
-  double margin = 0.0;
-  Vec3 origin = Vec3::Zero();
+  ContactQuery query;
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs, merged_pairs;
@@ -40,9 +35,7 @@ struct ContactFinder::Impl {
   std::vector<Found> found;          ///< by chunk of pairs
   internal::ContactRegions regions;  ///< what contacts' regions are kept in
 
-  // Of the last query, ascending.
-  std::vector<internal::PairIds> kept_pairs;
-  std::vector<std::uint64_t> kept_ids;
+  internal::KeptIds kept;  ///< of the last query
 
   internal::FoundBody& present(Index body, const char* function) {
     if (!contains(body))
@@ -55,7 +48,7 @@ struct ContactFinder::Impl {
   }
   internal::FoundBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
   const internal::FoundBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
-  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
 
   void set_finds_itself(Index body, bool finds);
   bool stays_in_place(Index body, const BodyState& state) const;
@@ -72,9 +65,7 @@ struct ContactFinder::Impl {
   internal::RegionSide region_side(Index body) const;
   CollisionBody collision_body(Index body, internal::Worker& worker) const;
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
-  std::span<const std::uint64_t> kept_last_time(const BodyPair& pair) const;
   void gather(std::vector<ContactPoint>& contacts);
-  void keep_id(const BodyPair& pair, std::uint64_t id);
 };
 
 }  // namespace limber

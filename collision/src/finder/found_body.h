@@ -1,8 +1,11 @@
 // A body as the finder of contacts knows it, and what a thread works on bodies with.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <tuple>
 #include <variant>
 #include <vector>
@@ -84,6 +87,30 @@ struct PairIds {
   template <class Self>
   static auto state_fields(Self& s) {
     return std::tie(s.pair.a, s.pair.b, s.first, s.count);
+  }
+};
+
+/// The ids of the contacts that were kept of each pair, ascending.
+struct KeptIds {
+  std::vector<PairIds> pairs;
+  std::vector<std::uint64_t> ids;
+
+  std::span<const std::uint64_t> of(const BodyPair& pair) const {
+    const auto known = std::lower_bound(pairs.begin(), pairs.end(), pair,
+                                        [](const PairIds& entry, const BodyPair& p) { return entry.pair < p; });
+    if (known == pairs.end() || known->pair != pair) return {};
+    return std::span(ids).subspan(known->first, known->count);
+  }
+  /// @param contacts by pair and id, ascending
+  void keep(std::span<const ContactPoint> contacts) {
+    pairs.clear();
+    ids.clear();
+    for (const ContactPoint& c : contacts) {
+      const BodyPair pair{c.a.body, c.b.body};
+      if (pairs.empty() || pairs.back().pair != pair) pairs.push_back({pair, ids.size(), 0});
+      ++pairs.back().count;
+      ids.push_back(c.id);
+    }
   }
 };
 

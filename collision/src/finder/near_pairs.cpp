@@ -54,19 +54,19 @@ bool ContactFinder::Impl::stays_in_place(Index body, const BodyState& s) const {
 /// Refuses states before anything is changed, and lists the bodies whose place in the broad phase is to be made anew.
 void ContactFinder::Impl::check_and_list() {
   to_place.clear();
-  for (std::size_t i = 0; awake.empty() && i < bodies.size(); ++i)
+  for (std::size_t i = 0; query.awake.empty() && i < bodies.size(); ++i)
     if (bodies[i].present) check_place(static_cast<Index>(i));
-  for (const Index index : awake)
+  for (const Index index : query.awake)
     if (contains(index)) check_place(index);
 }
 
 void ContactFinder::Impl::check_place(Index index) {
   const auto i = static_cast<std::size_t>(index);
-  if (i >= states.size())
-    throw InvalidArgument("ContactFinder: " + std::to_string(states.size()) + " states, expected one for body " +
+  if (i >= query.states.size())
+    throw InvalidArgument("ContactFinder: " + std::to_string(query.states.size()) + " states, expected one for body " +
                           std::to_string(i) + " too");
-  if (stays_in_place(index, states[i])) return;
-  check_state(index, bodies[i], states[i]);
+  if (stays_in_place(index, state(index))) return;
+  check_state(index, bodies[i], state(index));
   to_place.push_back(index);
 }
 
@@ -114,7 +114,7 @@ void ContactFinder::Impl::find_near_pairs(Jobs& jobs) {
   workers.start_query(options, jobs.concurrency());
   make_boxes(jobs);
   place();
-  broad_phase.find_pairs(margin, pairs, jobs);
+  broad_phase.find_pairs(query.margin, pairs, jobs);
   check_sleepers_in_pairs();
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "manifold/manifold_points.h"
+#include "narrow/primitive_contacts.h"
 
 namespace limber::internal {
 namespace {
@@ -61,7 +62,10 @@ void PairFinder::between_convex(const PairQuery& q, const ConvexCore& a, const C
 /// @param way of the body against the ground
 void PairFinder::against_ground(const PairQuery& q, const ManifoldBody& body, const ManifoldBody& ground,
                                 const RigidTransform& X_BG, const Vec3& way) {
-  if (const HalfSpace* plane = ground.half_space()) return on_half_space(*body.core(), X_BG, *plane, q.reach);
+  if (const HalfSpace* plane = ground.half_space()) {
+    const Vec3 normal = X_BG.q * plane->normal;
+    return half_space_contacts(*body.core(), normal, plane->offset + normal.dot(X_BG.p), q.reach, found_);
+  }
   const RigidGeometry& geometry = ground.rigid->geometry;
   rigid_.bind(geometry.surface(), {});
   const double size = internal::farthest_of(geometry.bounds()) + body.radius + X_BG.p.norm();
@@ -70,21 +74,6 @@ void PairFinder::against_ground(const PairQuery& q, const ManifoldBody& body, co
   mesh_contacts_.find(
       {*body.core(), mesh_, *ground.rigid->facets, q.reach, {way, q.passing.touching}, is_a ? q.planes_a : q.planes_b},
       found_);
-}
-
-void PairFinder::on_half_space(const ConvexCore& core, const RigidTransform& X_BH, const HalfSpace& shape,
-                               double reach) {
-  const Vec3 normal = X_BH.q * shape.normal;
-  const double offset = shape.offset + normal.dot(X_BH.p);
-  for (std::size_t i = 0; i < core.points.size(); ++i) {
-    const Vec3 p = core.points[i] - core.radius * normal;
-    const double height = normal.dot(p) - offset;
-    if (height <= reach)
-      found_.push_back({{feature_key(Feature::Kind::kVertex, static_cast<Index>(i)), -1, {}, p},
-                        {feature_key(Feature::Kind::kFace, 0), -1, {}, p - height * normal},
-                        normal,
-                        height});
-  }
 }
 
 DeformedSurface& PairFinder::surface_of(const PairQuery& q, Side side) {

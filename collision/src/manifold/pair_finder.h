@@ -72,14 +72,13 @@ class PairFinder {
 
   /// A body that deforms, in its state of this query.
   DeformedSurface& surface(Index index, const ManifoldBody& body, const BodyState& state) {
-    return pool_.get(index, body.modal->surface, state.amplitudes, BoundsChoice::kAutomatic);
+    return pool_.get(index, body.modal->surface, state.amplitudes);
   }
 
  private:
   void between_convex(const PairQuery& query, const ConvexCore& a, const ConvexCore& b);
   void against_ground(const PairQuery& query, const ManifoldBody& body, const ManifoldBody& ground,
                       const RigidTransform& X_BG, const Vec3& way);
-  void on_half_space(const ConvexCore& core, const RigidTransform& X_BH, const HalfSpace& shape, double reach);
   void keep_each_once();
   void by_narrow_phase(const PairQuery& query);
   enum class Side { kA, kB };

@@ -22,7 +22,6 @@ using internal::convex_core;
 using internal::ConvexContacts;
 using internal::ConvexCore;
 using internal::CoreContacts;
-using internal::feature_key;
 using internal::FeatureContact;
 using internal::FeatureSide;
 using internal::half_space_contacts;
@@ -279,21 +278,9 @@ void NarrowPhase::Impl::on_half_space(const CollisionBody& body, const RigidTran
                                       double margin) {
   const Vec3 normal = X_BH.q * shape.normal;
   const double offset = shape.offset + normal.dot(X_BH.p);
-  if (convex(body) == nullptr) {
-    bind(body, {}, kRoundOff * size(body), 0);
-    half_space_contacts(surface[0], normal, offset, margin, triangles, found);
-    return;
-  }
-  const ConvexCore& core = *convex(body);
-  for (std::size_t i = 0; i < core.points.size(); ++i) {
-    const Vec3 p = core.points[i] - core.radius * normal;
-    const double height = normal.dot(p) - offset;
-    if (height <= margin)
-      found.push_back({{feature_key(Feature::Kind::kVertex, static_cast<Index>(i)), -1, {}, p},
-                       {feature_key(Feature::Kind::kFace, 0), -1, {}, p - height * normal},
-                       normal,
-                       height});
-  }
+  if (const ConvexCore* core = convex(body)) return half_space_contacts(*core, normal, offset, margin, found);
+  bind(body, {}, kRoundOff * size(body), 0);
+  half_space_contacts(surface[0], normal, offset, margin, triangles, found);
 }
 
 void NarrowPhase::Impl::against_core(const CollisionBody& body, const RigidTransform& X_BC, const ConvexCore& core,

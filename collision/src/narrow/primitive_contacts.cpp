@@ -29,6 +29,19 @@ void half_space_contacts(PairSurface& surface, const Vec3& normal, double offset
     }
 }
 
+void half_space_contacts(const ConvexCore& core, const Vec3& normal, double offset, double margin,
+                         std::vector<FeatureContact>& contacts) {
+  for (std::size_t i = 0; i < core.points.size(); ++i) {
+    const Vec3 p = core.points[i] - core.radius * normal;
+    const double height = normal.dot(p) - offset;
+    if (height <= margin)
+      contacts.push_back({{feature_key(Feature::Kind::kVertex, static_cast<Index>(i)), -1, {}, p},
+                          {feature_key(Feature::Kind::kFace, 0), -1, {}, p - height * normal},
+                          normal,
+                          height});
+  }
+}
+
 void CoreContacts::find(PairSurface& surface, const RoundedCore& core, double margin,
                         std::vector<FeatureContact>& contacts) {
   surface_ = &surface, core_ = core, contacts_ = &contacts;

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "convex/convex_core.h"
 #include "narrow/pair_surface.h"
 
 namespace limber::internal {
@@ -17,6 +18,10 @@ struct RoundedCore {
 // Every vertex of the surface with height ≤ margin over normal · x = offset.
 void half_space_contacts(PairSurface& surface, const Vec3& normal, double offset, double margin,
                          std::vector<Index>& scratch, std::vector<FeatureContact>& contacts);
+
+// Every point of a convex core, in its frame, with height ≤ margin over normal · x = offset.
+void half_space_contacts(const ConvexCore& core, const Vec3& normal, double offset, double margin,
+                         std::vector<FeatureContact>& contacts);
 
 // Contacts of a surface and a rounded core; a of each is the surface's.
 class CoreContacts {

@@ -29,16 +29,17 @@ void SurfaceContacts::begin(PairSurface& a, PairSurface& b, double margin, bool 
   side_[0] = &a, side_[1] = &b;
   margin_ = margin, tolerance_ = a.tolerance(), directionless_ = a.directionless(), self_ = self, overlap_ = false;
   contacts_ = &contacts;
-  pairs_.clear(), piercings_.clear();
+  pairs_.clear(), cut_.piercings.clear();
   for (int of = 0; of < 2; ++of) {
-    seeds_[of].clear();
+    inside_[of].seeds.clear();
     const auto vertices = static_cast<std::size_t>(side_[of]->surface().vertices());
     constexpr std::size_t kSeedsOfAVertex = 8;  // its neighbours, and where edges come through the other surface
-    if (visited_[of].size() < vertices) visited_[of].resize(vertices), exit_normal_[of].resize(vertices);
-    seeds_[of].reserve(kSeedsOfAVertex * vertices);
+    if (inside_[of].visited.size() < vertices)
+      inside_[of].visited.resize(vertices), inside_[of].exit_normal.resize(vertices);
+    inside_[of].seeds.reserve(kSeedsOfAVertex * vertices);
   }
   if (generation_ > std::numeric_limits<std::uint32_t>::max() - 4) {
-    for (std::vector<std::uint32_t>& stamps : visited_) std::fill(stamps.begin(), stamps.end(), 0u);
+    for (Inside& side : inside_) std::fill(side.visited.begin(), side.visited.end(), 0u);
     generation_ = 0;
   }
   generation_ += 2;

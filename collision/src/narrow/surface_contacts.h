@@ -71,12 +71,27 @@ class SurfaceContacts {
     Index vertex;
     Index near;  // a triangle of the other surface next to it; −1: none is known
   };
+  // Which vertices of one side are inside the other.
+  struct Inside {
+    std::vector<Seed> seeds;
+    std::vector<std::uint32_t> visited;  // generation_: looked at, outside; generation_ + 1: inside
+    std::vector<Vec3> exit_normal;       // of those inside: out of the other
+  };
   struct EdgePair {
     Index e, f;   // of side 0 and 1
     double s, t;  // along each
     Vec3 on_e, on_f;
     Vec3 direction;  // unit, from f to e
     double distance;
+  };
+
+  // Where the surfaces go through each other.
+  struct Intersection {
+    std::vector<Piercing> piercings;
+    std::vector<Crossed> crossed;
+    DisjointSets loops;
+    std::vector<EdgePair> crossings;  // of one loop
+    std::vector<Vec3> ways_out;       // of one loop: normals out of b
   };
 
   void begin(PairSurface& a, PairSurface& b, double margin, bool self, std::vector<FeatureContact>& contacts);
@@ -126,14 +141,8 @@ class SurfaceContacts {
   bool self_ = false, overlap_ = false;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::vector<TrianglePair> pairs_;
-  std::vector<Piercing> piercings_;
-  std::vector<Crossed> crossed_;
-  DisjointSets loops_;
-  std::vector<EdgePair> crossings_;  // of one loop
-  std::vector<Vec3> ways_out_;       // of one loop: normals out of b
-  std::vector<Seed> seeds_[2];
-  std::vector<std::uint32_t> visited_[2];  // generation_: looked at, outside; generation_ + 1: inside
-  std::vector<Vec3> exit_normal_[2];       // of vertices inside: out of the other
+  Intersection cut_;
+  Inside inside_[2];
   std::uint32_t generation_ = 0;
 };
 

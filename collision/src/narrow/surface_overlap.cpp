@@ -25,18 +25,18 @@ void SurfaceContacts::find_piercing(int of, Index e, Index t) {
   double within = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < 3; ++c) within = std::min(within, (p - f.x[c]).dot(f.inward[c]));
   if (within < -tolerance_) return;
-  if (side_[1 - of]->sided()) seeds_[of].push_back({ends[behind], t});
+  if (side_[1 - of]->sided()) inside_[of].seeds.push_back({ends[behind], t});
   // An edge that only begins or ends on the face, or meets its rim, touches it.
-  if (front > tolerance_ && within > tolerance_) piercings_.push_back({of, e, t, {h0, h1}, p, 0});
+  if (front > tolerance_ && within > tolerance_) cut_.piercings.push_back({of, e, t, {h0, h1}, p, 0});
 }
 
 // From the ends of piercing edges over the mesh to every vertex that is inside the other surface.
 void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
-  std::vector<Seed>& seeds = seeds_[of];
+  std::vector<Seed>& seeds = inside_[of].seeds;
   while (!seeds.empty()) {
     const Seed seed = seeds.back();
     seeds.pop_back();
-    std::uint32_t& visited = visited_[of][static_cast<std::size_t>(seed.vertex)];
+    std::uint32_t& visited = inside_[of].visited[static_cast<std::size_t>(seed.vertex)];
     if (visited >= generation_) continue;
     visited = generation_;
     const Vec3& p = side_[of]->vertex(seed.vertex);
@@ -53,17 +53,17 @@ void SurfaceContacts::spread_inside(int of, OverlapRule* rule) {
 // The same of one surface. Its nearest point tells nothing there: that is the vertex itself.
 void SurfaceContacts::spread_inside_itself(SelfOverlapRule& places) {
   PairSurface& mine = *side_[0];
-  std::vector<Seed>& seeds = seeds_[0];
+  std::vector<Seed>& seeds = inside_[0].seeds;
   OverlapRule::Exit exit;
   while (!seeds.empty()) {
     const auto [v, near] = seeds.back();
     seeds.pop_back();
-    std::uint32_t& visited = visited_[0][static_cast<std::size_t>(v)];
+    std::uint32_t& visited = inside_[0].visited[static_cast<std::size_t>(v)];
     if (visited > generation_) continue;
     visited = generation_;
     if (!places.exit_of(v, mine, mine.on_face(near, mine.vertex(v)), exit)) continue;
     visited = generation_ + 1;
-    exit_normal_[0][static_cast<std::size_t>(v)] = exit.normal;
+    inside_[0].exit_normal[static_cast<std::size_t>(v)] = exit.normal;
     add(0, mine.at_vertex(v), exit.at, exit.normal, exit.normal.dot(mine.vertex(v) - exit.at.point));
     for (const Index w : mine.surface().vertex_neighbours(v)) seeds.push_back({w, exit.at.triangle});
   }
@@ -81,7 +81,7 @@ void SurfaceContacts::add_inside(int of, Index v, const PairSurface::Nearest& ne
   if (nearest.distance <= nearness(of, v, nearest.triangle) && !side_[of]->in_front(v, exit.normal, tuning_->steep))
     find_supporting_face(of, v, nearest.triangle, flush(of, v, exit.at), exit);
   overlap_ = true;
-  exit_normal_[of][static_cast<std::size_t>(v)] = exit.normal;
+  inside_[of].exit_normal[static_cast<std::size_t>(v)] = exit.normal;
   add(of, side_[of]->at_vertex(v), exit.at, exit.normal, exit.normal.dot(p - exit.at.point));
 }
 
@@ -122,9 +122,9 @@ bool SurfaceContacts::find_supporting_face(int of, Index v, Index near, bool ali
 // Parts of one surface that are inside the other without meeting it.
 void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
   for (const Index v : side_[of]->surface().component_vertices()) {
-    if (visited_[of][static_cast<std::size_t>(v)] >= generation_) continue;
+    if (inside_[of].visited[static_cast<std::size_t>(v)] >= generation_) continue;
     if (!side_[1 - of]->may_hold(side_[of]->vertex(v))) continue;
-    seeds_[of].push_back({v, -1});
+    inside_[of].seeds.push_back({v, -1});
     spread_inside(of, rule);
   }
 }
@@ -135,8 +135,8 @@ void SurfaceContacts::find_enclosed(int of, OverlapRule* rule) {
 void SurfaceContacts::cross_edges() {
   if (!side_[0]->sided() || !side_[1]->sided()) return;
   find_loops();
-  for (std::size_t first = 0, next = 0; first < piercings_.size(); first = next) {
-    while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
+  for (std::size_t first = 0, next = 0; first < cut_.piercings.size(); first = next) {
+    while (next < cut_.piercings.size() && cut_.piercings[next].loop == cut_.piercings[first].loop) ++next;
     cross_edges_of_loop(first, next);
   }
 }
@@ -145,38 +145,40 @@ void SurfaceContacts::cross_edges() {
 // common belong to one loop. Sorts them by loop.
 void SurfaceContacts::find_loops() {
   const auto sort_piercings = [this] {
-    std::sort(piercings_.begin(), piercings_.end(), [](const Piercing& a, const Piercing& b) {
+    std::sort(cut_.piercings.begin(), cut_.piercings.end(), [](const Piercing& a, const Piercing& b) {
       return std::tie(a.loop, a.of, a.edge, a.face) < std::tie(b.loop, b.of, b.edge, b.face);
     });
   };
   sort_piercings();
-  crossed_.clear();
-  for (std::size_t i = 0; i < piercings_.size(); ++i) {
-    const Piercing& p = piercings_[i];
+  cut_.crossed.clear();
+  for (std::size_t i = 0; i < cut_.piercings.size(); ++i) {
+    const Piercing& p = cut_.piercings[i];
     for (const Index t : side_[p.of]->surface().edge_triangles(p.edge)) {
       const bool in_order = self_ ? t < p.face : p.of == 0;
-      crossed_.push_back({in_order ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
+      cut_.crossed.push_back({in_order ? TrianglePair{t, p.face} : TrianglePair{p.face, t}, static_cast<Index>(i)});
     }
   }
-  std::sort(crossed_.begin(), crossed_.end(), [](const Crossed& a, const Crossed& b) {
+  std::sort(cut_.crossed.begin(), cut_.crossed.end(), [](const Crossed& a, const Crossed& b) {
     return std::tie(a.triangles, a.piercing) < std::tie(b.triangles, b.piercing);
   });
-  loops_.reset(piercings_.size());
-  for (std::size_t i = 1; i < crossed_.size(); ++i)
-    if (crossed_[i].triangles == crossed_[i - 1].triangles) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
-  for (std::size_t i = 0; i < piercings_.size(); ++i) piercings_[i].loop = loops_.root(static_cast<Index>(i));
+  cut_.loops.reset(cut_.piercings.size());
+  for (std::size_t i = 1; i < cut_.crossed.size(); ++i)
+    if (cut_.crossed[i].triangles == cut_.crossed[i - 1].triangles)
+      cut_.loops.join(cut_.crossed[i].piercing, cut_.crossed[i - 1].piercing);
+  for (std::size_t i = 0; i < cut_.piercings.size(); ++i)
+    cut_.piercings[i].loop = cut_.loops.root(static_cast<Index>(i));
   sort_piercings();
 }
 
 void SurfaceContacts::cross_edges_of_loop(std::size_t first, std::size_t end) {
-  crossings_.clear();
-  for (std::size_t i = first; i < end; ++i) find_crossings(piercings_[i]);
+  cut_.crossings.clear();
+  for (std::size_t i = first; i < end; ++i) find_crossings(cut_.piercings[i]);
   find_ways_out(first, end);
   const double same_way = tuning_->same_way;
-  for (const EdgePair& crossing : crossings_) {
+  for (const EdgePair& crossing : cut_.crossings) {
     const Vec3 n = -crossing.direction;
     // Of one surface either part may be the one that an edge is of; its cones have told which way is out.
-    if (std::none_of(ways_out_.begin(), ways_out_.end(),
+    if (std::none_of(cut_.ways_out.begin(), cut_.ways_out.end(),
                      [&](const Vec3& way) { return (self_ ? std::abs(n.dot(way)) : n.dot(way)) > same_way; }))
       continue;
     overlap_ = true;
@@ -191,34 +193,34 @@ void SurfaceContacts::find_crossings(const Piercing& piercing) {
     const EdgePair pair = piercing.of == 0 ? nearest_of_edges(piercing.edge, f) : nearest_of_edges(f, piercing.edge);
     if (pair.distance < std::numeric_limits<double>::infinity() && side_[1]->in_normal_cone(pair.f, -pair.direction) &&
         side_[0]->in_normal_cone(pair.e, pair.direction))
-      crossings_.push_back(pair);
+      cut_.crossings.push_back(pair);
   }
 }
 
 // The directions in which vertices leave that are inside next to the loop. Without any, the direction of the crossing
 // along which the loop, and with it the region that both bodies share, is least wide.
 void SurfaceContacts::find_ways_out(std::size_t first, std::size_t end) {
-  ways_out_.clear();
+  cut_.ways_out.clear();
   for (std::size_t i = first; i < end; ++i) {
-    const int of = piercings_[i].of;
-    for (const Index v : side_[of]->surface().edge(piercings_[i].edge).vertices)
-      if (visited_[of][static_cast<std::size_t>(v)] == generation_ + 1)
-        ways_out_.push_back((of == 0 ? 1.0 : -1.0) * exit_normal_[of][static_cast<std::size_t>(v)]);
+    const int of = cut_.piercings[i].of;
+    for (const Index v : side_[of]->surface().edge(cut_.piercings[i].edge).vertices)
+      if (inside_[of].visited[static_cast<std::size_t>(v)] == generation_ + 1)
+        cut_.ways_out.push_back((of == 0 ? 1.0 : -1.0) * inside_[of].exit_normal[static_cast<std::size_t>(v)]);
   }
-  if (!ways_out_.empty() || crossings_.empty()) return;
+  if (!cut_.ways_out.empty() || cut_.crossings.empty()) return;
   const EdgePair* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (const EdgePair& crossing : crossings_) {
+  for (const EdgePair& crossing : cut_.crossings) {
     const double width = std::max(width_of_loop(first, end, crossing.direction), crossing.distance);
     if (width < least) least = width, best = &crossing;
   }
-  ways_out_.push_back(-best->direction);
+  cut_.ways_out.push_back(-best->direction);
 }
 
 double SurfaceContacts::width_of_loop(std::size_t first, std::size_t end, const Vec3& n) const {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (std::size_t i = first; i < end; ++i) {
-    const double height = n.dot(piercings_[i].point);
+    const double height = n.dot(cut_.piercings[i].point);
     low = std::min(low, height), high = std::max(high, height);
   }
   return high - low;
@@ -227,7 +229,7 @@ double SurfaceContacts::width_of_loop(std::size_t first, std::size_t end, const 
 // Surfaces that intersect where nothing tells inside from outside, such as a sheet: back out of the pierced face, the
 // shorter way.
 void SurfaceContacts::push_out_of_faces() {
-  for (const Piercing& piercing : piercings_) {
+  for (const Piercing& piercing : cut_.piercings) {
     PairSurface& other = *side_[1 - piercing.of];
     const PairSurface::Face& f = other.face(piercing.face);
     const std::size_t end = std::abs(piercing.heights[0]) <= std::abs(piercing.heights[1]) ? 0 : 1;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <string>
 
@@ -21,7 +20,6 @@ namespace limber {
 using internal::ContactRegions;
 using internal::FclBody;
 using internal::FclPlace;
-using internal::PairIds;
 using internal::RegionSide;
 
 namespace {
@@ -94,7 +92,6 @@ struct FclContactSource::Impl {
   RegionSide region_side(Index body) const;
   ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
   void find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts);
-  void keep(const std::vector<ContactPoint>& contacts);
 
   FclContactOptions options;
   internal::GeometryCache geometries;
@@ -114,7 +111,7 @@ struct FclContactSource::Impl {
     ContactRegions regions;
   } query;  ///< under way
 
-  std::map<BodyPair, std::vector<std::uint64_t>> kept;  ///< ids of the last query's contacts, ascending
+  internal::KeptIds kept;  ///< of the last query's contacts
 };
 
 void FclContactSource::Impl::check(Index body) const {
@@ -216,16 +213,9 @@ void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<Cont
   for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
   const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
   const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
-  const auto known = kept.find(pair);
-  clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone),
-                  known == kept.end() ? std::span<const std::uint64_t>() : std::span(known->second), shares);
+  clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept.of(pair), shares);
   region_finder.find(clusters, shares, sides, query.regions);
   query.regions.counts.resize(contacts.size(), {0, 0});
-}
-
-void FclContactSource::Impl::keep(const std::vector<ContactPoint>& contacts) {
-  kept.clear();
-  for (const ContactPoint& c : contacts) kept[{c.a.body, c.b.body}].push_back(c.id);
 }
 
 FclContactSource::FclContactSource(const FclContactOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -256,7 +246,6 @@ void FclContactSource::remove_body(Index body) {
   Impl::Known& known = impl_->present(body, "remove_body");
   if (known.placed) impl_->manager.unregisterObject(&known.fcl->broad());
   for (const Index other : known.apart) impl_->at(other).apart.erase(body);
-  std::erase_if(impl_->kept, [&](const auto& entry) { return entry.first.a == body || entry.first.b == body; });
   impl_->planes.erase(body);
   known = {};
 }
@@ -291,29 +280,14 @@ void FclContactSource::find_contacts(const ContactQuery& query, std::vector<Cont
   m.query.regions.clear();
   for (const BodyPair& pair : m.query.pairs) m.find_in_pair(pair, contacts);
   m.query.regions.give_to(contacts);
-  m.keep(contacts);
+  m.kept.keep(contacts);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
 }
 
-void FclContactSource::save_state(StateWriter& state) const {
-  std::vector<PairIds> pairs;
-  std::vector<std::uint64_t> ids;
-  for (const auto& [pair, of] : impl_->kept) {
-    pairs.push_back({pair, ids.size(), of.size()});
-    ids.insert(ids.end(), of.begin(), of.end());
-  }
-  state(pairs, ids);
-}
+void FclContactSource::save_state(StateWriter& state) const { state(impl_->kept.pairs, impl_->kept.ids); }
 
 void FclContactSource::restore_state(StateReader& state) {
-  std::vector<PairIds> pairs;
-  std::vector<std::uint64_t> ids;
-  state(pairs, ids);
-  impl_->kept.clear();
-  for (const PairIds& p : pairs) {
-    const auto first = ids.begin() + static_cast<std::ptrdiff_t>(p.first);
-    impl_->kept[p.pair].assign(first, first + static_cast<std::ptrdiff_t>(p.count));
-  }
+  state(impl_->kept.pairs, impl_->kept.ids);
   for (Impl::Known& known : impl_->bodies) known.placed_asleep = false;
 }
 

@@ -24,8 +24,6 @@
 namespace limber {
 
 struct ContactFinderOptions {
-  /// How boxes within a body are made: changes the time, not the contacts.
-  BoundsChoice bounds = BoundsChoice::kAutomatic;
   /// Depth and normal of overlaps. kRestDepth needs a volume block of the body that a vertex is in.
   NarrowPhaseOptions narrow_phase{};
   /// How contacts are thinned; {.max_points = 0} gives all.
