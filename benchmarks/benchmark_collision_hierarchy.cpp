@@ -155,15 +155,12 @@ struct Pair {
 struct Query {
   DeformedSurface a, b;
   std::vector<TrianglePair> pairs;
-  DeformedSurface::Counters last_a, last_b;
 
-  /// @param remembers the boxes are chosen by what the step before asked for
-  void run(const Pair& pair, const State& state, BoundsChoice choice, bool remembers = false) {
-    a.bind(pair.a, state.z_a, choice, remembers ? &last_a : nullptr);
-    b.bind(pair.b, state.z_b, choice, remembers ? &last_b : nullptr);
+  void run(const Pair& pair, const State& state, BoundsChoice choice) {
+    a.bind(pair.a, state.z_a, choice);
+    b.bind(pair.b, state.z_b, choice);
     pairs.clear();
     find_triangle_pairs(a, b, state.X_AB, 0.0, pairs);
-    last_a = a.counters(), last_b = b.counters();
   }
 };
 
@@ -235,12 +232,12 @@ struct Wave {
   double mean = 0.0;            // of all
   std::vector<double> of_step;  // with the clock's own time, half a microsecond
 
-  Wave(const Pair& bodies, BoundsChoice choice, bool remembers) : of_step(kSteps) {
+  Wave(const Pair& bodies, BoundsChoice choice) : of_step(kSteps) {
     std::vector<State> states;
     for (int step = 0; step < kSteps; ++step) states.push_back(bodies.at(step));
     constexpr int kRounds = 4;
     Query query;
-    const auto answer = [&](std::size_t i) { query.run(bodies, states[i], choice, remembers); };
+    const auto answer = [&](std::size_t i) { query.run(bodies, states[i], choice); };
     LeastTime all;
     std::vector<LeastTime> each(kSteps);
     for (int round = 0; round < kRounds; ++round) {
@@ -256,13 +253,13 @@ struct Wave {
 };
 
 /// range(0) scene, range(1) large, range(2) modes. `best` takes the cheaper of boxes from amplitudes and refit in each
-/// step; `forgetful` is automatic without what the step before asked for.
+/// step.
 void pair(benchmark::State& state) {
   const auto scene = static_cast<Scene>(state.range(0));
   const Pair bodies(scene, state.range(1) != 0, static_cast<Index>(state.range(2)));
   for (auto _ : state) {
-    const Wave lazy(bodies, BoundsChoice::kAmplitudes, false), refit(bodies, BoundsChoice::kRefit, false),
-        automatic(bodies, BoundsChoice::kAutomatic, true), forgetful(bodies, BoundsChoice::kAutomatic, false);
+    const Wave lazy(bodies, BoundsChoice::kAmplitudes), refit(bodies, BoundsChoice::kRefit),
+        automatic(bodies, BoundsChoice::kAutomatic);
     double best = 0.0;
     int lazy_wins = 0;
     for (std::size_t i = 0; i < kSteps; ++i) {
@@ -274,7 +271,6 @@ void pair(benchmark::State& state) {
     state.counters["automatic_us"] = 1e6 * automatic.mean;
     state.counters["automatic_over_refit"] = automatic.mean / refit.mean;
     state.counters["automatic_over_best"] = automatic.sum() / best;
-    state.counters["forgetful_over_best"] = forgetful.sum() / best;
     state.counters["lazy_is_best_percent"] = 100.0 * lazy_wins / kSteps;
   }
   state.SetLabel(kSceneNames[scene]);
@@ -293,7 +289,7 @@ void fcl_pair(benchmark::State& state) {
     for (int i = 0; i < 3; ++i) collide_time.measure([&] { fcl.collide(); });
     refit = refit_time.seconds(), collide = collide_time.seconds();
     own = least_seconds(
-        state, [&] { automatic.run(bodies, now, BoundsChoice::kAutomatic, true); }, 3);
+        state, [&] { automatic.run(bodies, now, BoundsChoice::kAutomatic); }, 3);
   }
   state.SetLabel(kSceneNames[scene]);
   state.counters["fcl_refit_us"] = 1e6 * refit;

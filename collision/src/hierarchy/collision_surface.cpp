@@ -24,25 +24,22 @@ std::vector<Triangle> grid_triangles(Index columns, Index rows) {
   return triangles;
 }
 
-/// For items sorted by key: where each key's items start, and their end behind the last.
-std::vector<Index> starts(const std::vector<std::pair<Index, Index>>& sorted, Index keys) {
-  std::vector<Index> start(static_cast<std::size_t>(keys) + 1, 0);
-  for (const auto& [key, item] : sorted) ++start[static_cast<std::size_t>(key) + 1];
-  for (std::size_t i = 1; i < start.size(); ++i) start[i] += start[i - 1];
-  return start;
-}
+}  // namespace
 
-/// Adjacency lists of pairs (key, item), ascending and without repetition.
-std::pair<std::vector<Index>, std::vector<Index>> lists(std::vector<std::pair<Index, Index>> pairs, Index keys) {
+/// Of pairs (key, item): the items of each key, ascending and without repetition.
+CollisionSurface::Lists<Index> CollisionSurface::lists(std::vector<std::pair<Index, Index>> pairs, Index keys) {
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  std::vector<Index> items;
-  items.reserve(pairs.size());
-  for (const auto& pair : pairs) items.push_back(pair.second);
-  return {std::move(items), starts(pairs, keys)};
+  Lists<Index> result;
+  result.items.reserve(pairs.size());
+  result.start.assign(static_cast<std::size_t>(keys) + 1, 0);
+  for (const auto& [key, item] : pairs) {
+    result.items.push_back(item);
+    ++result.start[static_cast<std::size_t>(key) + 1];
+  }
+  for (std::size_t i = 1; i < result.start.size(); ++i) result.start[i] += result.start[i - 1];
+  return result;
 }
-
-}  // namespace
 
 CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, const CollisionSurfaceOptions& options)
     : model_(std::move(model)) {
@@ -54,17 +51,26 @@ CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, cons
   for (const Vec3f& r : surface.rest) rest_.push_back(r.cast<double>());
   if (options.skin && !model_->data().skin)
     throw InvalidArgument("CollisionSurface: model \"" + model_->name() + "\" has no modal skin, expected one");
-  skinned_ = options.skin && modes_ > 0;
-  if (skinned_) find_undeformed_rows();
+  if (options.skin && modes_ > 0) {
+    skin_.emplace(*model_);
+    find_undeformed_rows();
+  }
+  scale_modes();
+  build(surface.triangles, options);
+}
+
+CollisionSurface::Skin::Skin(const ModalModel& model)
+    : tiles(skin_influences(model, SurfacePoint::Surface::kCollision)), extent(model) {}
+
+void CollisionSurface::scale_modes() {
   for (Index m = 0; m < modes_; ++m) {
     double largest = 0.0;
-    for (Index v = 0; v < surface.vertices(); ++v) {
+    for (Index v = 0; v < vertices(); ++v) {
       const auto u = [&](int axis) { return static_cast<double>(bounded_row(v, axis)[m]); };
-      largest =
-          std::max(largest, skinned_ ? Vec3(u(0), u(1), u(2)).norm() : surface.basis.shape(v, m).cast<double>().norm());
+      largest = std::max(largest, Vec3(u(0), u(1), u(2)).norm());
     }
-    largest_shape_.push_back(largest * (1.0 + 1e-15));
-    scale_.push_back(largest > 0.0 ? std::exp2(std::ceil(std::log2(largest))) : 1.0);
+    bounds_.largest_shape.push_back(largest * (1.0 + 1e-15));
+    bounds_.scale.push_back(largest > 0.0 ? std::exp2(std::ceil(std::log2(largest))) : 1.0);
   }
   double positive = 1.0;
   for (const double lambda : model_->data().eigenvalues)
@@ -72,17 +78,14 @@ CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, cons
       positive = lambda;  // ascending: the first is the least
       break;
     }
-  for (const double lambda : model_->data().eigenvalues) weights_.push_back(lambda > 0.0 ? lambda : positive);
-  build(surface.triangles, options);
+  for (const double lambda : model_->data().eigenvalues) bounds_.weights.push_back(lambda > 0.0 ? lambda : positive);
 }
 
-/// Ũ of every vertex, from what the skin makes of unit amplitudes; and what else it takes to bend by it.
+/// Ũ of every vertex, from what the skin makes of unit amplitudes.
 void CollisionSurface::find_undeformed_rows() {
   const ModalSurface& surface = model_->collision();
   const auto k = static_cast<std::size_t>(modes_);
-  undeformed_.resize(3 * k * rest_.size());
-  extent_.emplace(*model_);
-  tiles_ = SkinTiles(skin_influences(*model_, SurfacePoint::Surface::kCollision));
+  skin_->undeformed.resize(3 * k * rest_.size());
   SkinPose pose(*model_->data().skin);
   std::vector<double> unit(k, 0.0);
   for (std::size_t m = 0; m < k; ++m) {
@@ -93,7 +96,7 @@ void CollisionSurface::find_undeformed_rows() {
       const Vec3 u = surface.basis.shape(at, static_cast<Index>(m)).cast<double>();
       const Vec3 own = pose.undeformed_part(influences(at), rest_[v], u) - rest_[v];
       for (std::size_t axis = 0; axis < 3; ++axis)
-        undeformed_[(3 * v + axis) * k + m] = static_cast<float>(own[static_cast<Index>(axis)]);
+        skin_->undeformed[(3 * v + axis) * k + m] = static_cast<float>(own[static_cast<Index>(axis)]);
     }
     unit[m] = 0.0;
   }
@@ -171,10 +174,10 @@ void CollisionSurface::find_canonical_vertices() {
   std::vector<Index> order(rest_.size());
   for (std::size_t v = 0; v < order.size(); ++v) order[v] = static_cast<Index>(v);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return before(a, b) || (!before(b, a) && a < b); });
-  canonical_.resize(rest_.size());
+  topology_.canonical.resize(rest_.size());
   for (std::size_t i = 0, first = 0; i < order.size(); ++i) {
     if (before(order[first], order[i])) first = i;
-    canonical_[static_cast<std::size_t>(order[i])] = order[first];  // the first of equals is the lowest
+    topology_.canonical[static_cast<std::size_t>(order[i])] = order[first];  // the first of equals is the lowest
   }
   for (Triangle& t : triangles_)
     for (Index& v : t) v = canonical_vertex(v);
@@ -197,23 +200,24 @@ void CollisionSurface::build_edges() {
   std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& x, const HalfEdge& y) {
     return std::tie(x.vertices, x.triangle, x.corner) < std::tie(y.vertices, y.triangle, y.corner);
   });
-  triangle_edges_.resize(triangles_.size());
-  closed_ = true;
+  topology_.triangle_edges.resize(triangles_.size());
+  topology_.closed = true;
   for (std::size_t first = 0, last; first < half_edges.size(); first = last) {
     SurfaceEdge edge{.vertices = half_edges[first].vertices,
-                     .first_triangle = static_cast<Index>(edge_triangles_.size())};
+                     .first_triangle = static_cast<Index>(topology_.edge_triangles.size())};
     Index reversed = 0;
     for (last = first; last < half_edges.size() && half_edges[last].vertices == edge.vertices; ++last) {
       const HalfEdge& half = half_edges[last];
-      triangle_edges_[static_cast<std::size_t>(half.triangle)][static_cast<std::size_t>(half.corner)] = edges();
+      topology_.triangle_edges[static_cast<std::size_t>(half.triangle)][static_cast<std::size_t>(half.corner)] =
+          edges();
       const auto& [a, b, c] = triangle(half.triangle);
       if (a == b || b == c || c == a) continue;  // a needle without inside connects nothing
-      edge_triangles_.push_back(half.triangle);
+      topology_.edge_triangles.push_back(half.triangle);
       ++edge.triangle_count;
       reversed += half.reversed ? 1 : 0;
     }
-    if (edge.triangle_count != 2 * reversed) closed_ = false;
-    edges_.push_back(edge);
+    if (edge.triangle_count != 2 * reversed) topology_.closed = false;
+    topology_.edges.push_back(edge);
   }
 }
 
@@ -222,16 +226,16 @@ void CollisionSurface::build_vertex_adjacency() {
   DisjointSets parts(rest_.size());
   for (Index t = 0; t < triangles(); ++t)
     for (const Index v : triangle(t)) of_triangles.emplace_back(v, t);
-  for (const SurfaceEdge& e : edges_)
+  for (const SurfaceEdge& e : topology_.edges)
     if (e.vertices[0] != e.vertices[1]) {
       of_vertices.emplace_back(e.vertices[0], e.vertices[1]);
       of_vertices.emplace_back(e.vertices[1], e.vertices[0]);
       parts.join(e.vertices[0], e.vertices[1]);
     }
-  std::tie(vertex_triangles_, vertex_triangles_start_) = lists(std::move(of_triangles), vertices());
-  std::tie(vertex_neighbours_, vertex_neighbours_start_) = lists(std::move(of_vertices), vertices());
+  topology_.vertex_triangles = lists(std::move(of_triangles), vertices());
+  topology_.vertex_neighbours = lists(std::move(of_vertices), vertices());
   for (Index v = 0; v < vertices(); ++v)
-    if (parts.root(v) == v && !vertex_neighbours(v).empty()) component_vertices_.push_back(v);
+    if (parts.root(v) == v && !vertex_neighbours(v).empty()) topology_.component_vertices.push_back(v);
 }
 
 Index CollisionSurface::neighbour(Index t, int corner) const {

@@ -64,7 +64,7 @@ class BoxReader {
   double farthest() const { return scratch_.farthest; }  ///< no vertex is moved by more, m
   /// c ± h: the box at rest.
   Aabb rest_box(Index node) const {
-    const float* c = surface().constants_.data() + static_cast<std::size_t>(node) * kNodeConstants;
+    const float* c = surface().bounds_.constants.data() + static_cast<std::size_t>(node) * kNodeConstants;
     const Vec3 center(c[0], c[1], c[2]), half(c[4], c[5], c[6]);
     return {center - half, center + half};
   }

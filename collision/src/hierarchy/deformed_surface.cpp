@@ -38,12 +38,6 @@ long boxes_per_refit(const CollisionSurface& surface) {
   return static_cast<long>((vertex * surface.vertices() + cost.triangle_cost * surface.triangles()) / box);
 }
 
-/// Boxes that a query would have asked for without a refit, whose tighter ones end the walk earlier.
-double wanted_boxes(const DeformedSurface::Counters& last) {
-  const double boxes = static_cast<double>(last.boxes);
-  return last.refits > 0 ? internal::collision_tuning().hierarchy.boxes_without_refit * boxes : boxes;
-}
-
 void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
   for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
   box.stamp = stamp;
@@ -61,16 +55,16 @@ std::span<const double> DeformedSurface::amplitudes() const {
 }
 
 void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-                           BoundsChoice choice, const Counters* last) {
+                           BoundsChoice choice) {
   if (!surface) throw InvalidArgument("DeformedSurface::bind: the surface is null, expected one");
   if (z.size() != static_cast<std::size_t>(surface->modes()))
     throw InvalidArgument("DeformedSurface::bind: " + std::to_string(z.size()) + " amplitudes, expected " +
                           std::to_string(surface->modes()));
   reserve(*surface);
   Scratch& s = *scratch_;
-  const StateSums sums =
-      prepare_state(z.data(), z.size(), surface->stride_, surface->largest_shape_.data(), surface->weights_.data(),
-                    surface->scale_.data(), s.amplitudes.data(), s.magnitudes.data());
+  const StateSums sums = prepare_state(z.data(), z.size(), surface->bounds_.stride,
+                                       surface->bounds_.largest_shape.data(), surface->bounds_.weights.data(),
+                                       surface->bounds_.scale.data(), s.amplitudes.data(), s.magnitudes.data());
   const double norm = std::sqrt(sums.squared_norm);
   if (!(sums.farthest <= kFarthest && norm <= kLargestNorm)) {
     surface_ = nullptr;
@@ -79,7 +73,7 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
   }
   s.norm = static_cast<float>(norm * (1.0 + 4.0 * kUnitRoundOff));
   s.farthest = sums.farthest;
-  std::fill(std::copy(z.begin(), z.end(), s.z.data()), s.z.data() + surface->stride_, 0.0);
+  std::fill(std::copy(z.begin(), z.end(), s.z.data()), s.z.data() + surface->bounds_.stride, 0.0);
   const bool same_surface = surface_ == surface;
   if (!same_surface) surface_ = surface;
   set_skin(z, same_surface);
@@ -88,9 +82,7 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
 
   const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
   s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
-  const bool expected =
-      choice == BoundsChoice::kAutomatic && last != nullptr && wanted_boxes(*last) > static_cast<double>(worth);
-  if (choice == BoundsChoice::kRefit || expected) refit();
+  if (choice == BoundsChoice::kRefit) refit();
 }
 
 void DeformedSurface::reserve(const CollisionSurface& surface) {
@@ -101,10 +93,10 @@ void DeformedSurface::reserve(const CollisionSurface& surface) {
   if (s.triangle_boxes.size() < triangles) s.triangle_boxes = AlignedArray<NodeBox>(triangles);
   if (s.vertices.size() < vertices) s.vertices.resize(vertices);
   if (surface.modes() > 0 && s.positions.size() < 3 * vertices + 1) s.positions.resize(3 * vertices + 1);
-  if (s.amplitudes.size() < surface.stride_) {
-    s.amplitudes = AlignedArray<float>(surface.stride_);
-    s.magnitudes = AlignedArray<float>(surface.stride_);
-    s.z = AlignedArray<double>(surface.stride_);
+  if (s.amplitudes.size() < surface.bounds_.stride) {
+    s.amplitudes = AlignedArray<float>(surface.bounds_.stride);
+    s.magnitudes = AlignedArray<float>(surface.bounds_.stride);
+    s.z = AlignedArray<double>(surface.bounds_.stride);
   }
 }
 
@@ -133,7 +125,7 @@ const SkinPose* DeformedSurface::skin() const { return surface_->skin() ? &*scra
 
 double DeformedSurface::skin_extent(std::span<const double> change, std::span<double> shape) {
   scratch_->skinned.pose->differentiate();
-  return surface_->extent_->find(*scratch_->skinned.pose, amplitudes(), change, shape, scratch_->skinned.rates);
+  return surface_->skin_->extent.find(*scratch_->skinned.pose, amplitudes(), change, shape, scratch_->skinned.rates);
 }
 
 /// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
@@ -160,9 +152,9 @@ void DeformedSurface::make_box(Index node) {
   if (boxes->stamp == (s.stamp | Scratch::kRefitted))
     for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
   else
-    make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->stride_},
-               surface_->constants_.data() + first * kNodeConstants,
-               surface_->coefficients_.data() + first * 6 * surface_->stride_, count, s.stamp, boxes);
+    make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->bounds_.stride},
+               surface_->bounds_.constants.data() + first * kNodeConstants,
+               surface_->bounds_.coefficients.data() + first * 6 * surface_->bounds_.stride, count, s.stamp, boxes);
   if (surface_->skin() && boxes->stamp == s.stamp && counters_.refits == 0)
     for (std::size_t i = 0; i < count; ++i) carry_box(static_cast<Index>(first + i));
   counters_.boxes += static_cast<long>(count);
@@ -175,7 +167,7 @@ void DeformedSurface::carry_box(Index node) {
   const Vec3 low(box.low[0], box.low[1], box.low[2]), high(box.high[0], box.high[1], box.high[2]);
   const Vec3 center = 0.5 * (low + high), half = 0.5 * (high - low);
   Aabb all;
-  for (const std::uint8_t h : surface_->node_handles(static_cast<std::size_t>(node))) {
+  for (const std::uint8_t h : surface_->skin_->node_handles[node]) {
     const SkinPose::Handle& handle = s.skinned.pose->handles()[h];
     const Mat3 R = Mat3::Identity() + handle.turn;
     const Vec3 c = R * center + handle.shift, reach = R.cwiseAbs() * half;
@@ -211,7 +203,7 @@ const Vec3& DeformedSurface::vertex(Index v) {
   if (surface_->modes() == 0) return vertex.p;
   const VertexRows& rows = surface_->model()->collision_rows();
   double u[3];
-  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->stride_, u);
+  make_displacement(rows.row(v, 0), static_cast<std::size_t>(rows.stride()), s.z.data(), surface_->bounds_.stride, u);
   if (surface_->skin())
     vertex.p = s.skinned.pose->position(surface_->influences(v), vertex.p, {u[0], u[1], u[2]});
   else
@@ -230,7 +222,7 @@ void DeformedSurface::refit() {
   Scratch& s = *scratch_;
   const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data(), .skin = skin()};
   if (surface_->skin())
-    reconstruct(surface_->model()->collision(), surface_->tiles_, std::span(&target, 1));
+    reconstruct(surface_->model()->collision(), surface_->skin_->tiles, std::span(&target, 1));
   else
     reconstruct(surface_->model()->collision(), std::span(&target, 1));
   // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
@@ -239,8 +231,9 @@ void DeformedSurface::refit() {
   const double pad = kUnitRoundOff * (terms * flexed + 24.0 * surface_->rest_radius_ +
                                       (surface_->skin() ? 64.0 * (flexed + surface_->rest_radius_) : 0.0)) +
                      internal::kBoxUnderflow;
-  refit_boxes(surface_->vertex_tree_.data(), surface_->vertex_tree_.size(), surface_->leaf_vertices_.data(),
-              s.positions.data(), static_cast<float>(pad), s.stamp | Scratch::kRefitted, s.boxes.data());
+  refit_boxes(surface_->tree_.by_vertices.data(), surface_->tree_.by_vertices.size(),
+              surface_->tree_.leaf_vertices.data(), s.positions.data(), static_cast<float>(pad),
+              s.stamp | Scratch::kRefitted, s.boxes.data());
 }
 
 }  // namespace limber

@@ -45,16 +45,16 @@ std::uint16_t half_rounded_up(double x) {
 void CollisionSurface::build_tree(int leaf_triangles) {
   std::vector<Vec3> centers;
   for (const auto& [a, b, c] : triangles_) centers.push_back((rest(a) + rest(b) + rest(c)) / 3.0);
-  triangle_order_.resize(triangles_.size());
-  std::iota(triangle_order_.begin(), triangle_order_.end(), 0);
-  nodes_.push_back({.child = -1, .first = 0, .count = triangles()});
+  tree_.triangle_order.resize(triangles_.size());
+  std::iota(tree_.triangle_order.begin(), tree_.triangle_order.end(), 0);
+  tree_.nodes.push_back({.child = -1, .first = 0, .count = triangles()});
   std::vector<Index> open{0};
   while (!open.empty()) {
     const auto n = static_cast<std::size_t>(open.back());
     open.pop_back();
-    const auto [child, first, count] = nodes_[n];
+    const auto [child, first, count] = tree_.nodes[n];
     if (count <= leaf_triangles) continue;
-    const auto begin = triangle_order_.begin() + first;
+    const auto begin = tree_.triangle_order.begin() + first;
     Aabb box;
     for (auto t = begin; t != begin + count; ++t) box.include(centers[static_cast<std::size_t>(*t)]);
     int axis = 0;
@@ -66,14 +66,15 @@ void CollisionSurface::build_tree(int leaf_triangles) {
       const double x = centers[static_cast<std::size_t>(t)][axis], y = centers[static_cast<std::size_t>(u)][axis];
       return x != y ? x < y : t < u;
     });
-    nodes_[n].child = static_cast<Index>(nodes_.size());
-    nodes_.push_back({.child = -1, .first = first, .count = left});
-    nodes_.push_back({.child = -1, .first = first + left, .count = count - left});
-    open.push_back(nodes_[n].child + 1);
-    open.push_back(nodes_[n].child);
+    tree_.nodes[n].child = static_cast<Index>(tree_.nodes.size());
+    tree_.nodes.push_back({.child = -1, .first = first, .count = left});
+    tree_.nodes.push_back({.child = -1, .first = first + left, .count = count - left});
+    open.push_back(tree_.nodes[n].child + 1);
+    open.push_back(tree_.nodes[n].child);
   }
-  for (const TreeNode& node : nodes_)  // ascending within a leaf, whatever nth_element left
-    if (node.leaf()) std::sort(triangle_order_.begin() + node.first, triangle_order_.begin() + node.first + node.count);
+  for (const TreeNode& node : tree_.nodes)  // ascending within a leaf, whatever nth_element left
+    if (node.leaf())
+      std::sort(tree_.triangle_order.begin() + node.first, tree_.triangle_order.begin() + node.first + node.count);
   for (const Vec3& r : rest_) {
     rest_bounds_.include(r);
     rest_radius_ = std::max(rest_radius_, r.norm());
@@ -81,42 +82,49 @@ void CollisionSurface::build_tree(int leaf_triangles) {
 }
 
 void CollisionSurface::list_leaf_vertices() {
-  vertex_tree_ = nodes_;
-  for (TreeNode& node : vertex_tree_) {
+  tree_.by_vertices = tree_.nodes;
+  for (TreeNode& node : tree_.by_vertices) {
     if (!node.leaf()) continue;
-    const auto first = static_cast<Index>(leaf_vertices_.size());
+    const auto first = static_cast<Index>(tree_.leaf_vertices.size());
     for (Index i = node.first; i < node.first + node.count; ++i)
-      for (const Index v : triangle(triangle_order_[static_cast<std::size_t>(i)])) leaf_vertices_.push_back(v);
-    std::sort(leaf_vertices_.begin() + first, leaf_vertices_.end());
-    leaf_vertices_.erase(std::unique(leaf_vertices_.begin() + first, leaf_vertices_.end()), leaf_vertices_.end());
+      for (const Index v : triangle(tree_.triangle_order[static_cast<std::size_t>(i)]))
+        tree_.leaf_vertices.push_back(v);
+    std::sort(tree_.leaf_vertices.begin() + first, tree_.leaf_vertices.end());
+    tree_.leaf_vertices.erase(std::unique(tree_.leaf_vertices.begin() + first, tree_.leaf_vertices.end()),
+                              tree_.leaf_vertices.end());
     node.first = first;
-    node.count = static_cast<Index>(leaf_vertices_.size()) - first;
+    node.count = static_cast<Index>(tree_.leaf_vertices.size()) - first;
   }
 }
 
 void CollisionSurface::build_bounds() {
   const auto k = static_cast<std::size_t>(modes_);
-  stride_ = (k + kBoundsLanes - 1) / kBoundsLanes * kBoundsLanes;
-  constants_ = AlignedArray<float>(nodes_.size() * kNodeConstants);
-  coefficients_ = AlignedArray<std::uint16_t>(nodes_.size() * 6 * stride_);
+  bounds_.stride = (k + kBoundsLanes - 1) / kBoundsLanes * kBoundsLanes;
+  bounds_.constants = AlignedArray<float>(tree_.nodes.size() * kNodeConstants);
+  bounds_.coefficients = AlignedArray<std::uint16_t>(tree_.nodes.size() * 6 * bounds_.stride);
   std::vector<Index> below;
-  std::vector<std::size_t> seen(rest_.size(), nodes_.size());
-  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+  std::vector<std::size_t> seen(rest_.size(), tree_.nodes.size());
+  for (std::size_t n = 0; n < tree_.nodes.size(); ++n) {
     below.clear();
     for (const Index t : node_triangles(static_cast<Index>(n)))
       for (const Index v : triangle(t))
         if (std::exchange(seen[static_cast<std::size_t>(v)], n) != n) below.push_back(v);
     for (int axis = 0; axis < 3; ++axis) bound_node(n, axis, below);
-    if (!skinned_) continue;
-    node_handles_start_.push_back(node_handles_.size());
-    std::array<bool, ModalSkin::kMaxHandles + 1> named{};
-    for (const Index v : below)
-      for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
-        if (influences(v).weight[i] > 0.0f) named[influences(v).handle[i]] = true;
-    for (std::size_t h = 0; h < named.size(); ++h)
-      if (named[h]) node_handles_.push_back(static_cast<std::uint8_t>(h));
+    if (skin_) list_handles(below);
   }
-  node_handles_start_.push_back(node_handles_.size());
+}
+
+/// Those of the next node.
+void CollisionSurface::list_handles(std::span<const Index> below) {
+  Lists<std::uint8_t>& lists = skin_->node_handles;
+  if (lists.start.empty()) lists.start.push_back(0);
+  std::array<bool, ModalSkin::kMaxHandles + 1> named{};
+  for (const Index v : below)
+    for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
+      if (influences(v).weight[i] > 0.0f) named[influences(v).handle[i]] = true;
+  for (std::size_t h = 0; h < named.size(); ++h)
+    if (named[h]) lists.items.push_back(static_cast<std::uint8_t>(h));
+  lists.start.push_back(lists.items.size());
 }
 
 /// c, h, C and d are the middles and half ranges of the vertices' rest positions and of their rows; e is the largest
@@ -125,8 +133,8 @@ void CollisionSurface::build_bounds() {
 void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index> below) {
   const auto k = static_cast<std::size_t>(modes_);
   const double error = sum_error(modes_);
-  std::uint16_t* const C = coefficients_.data() + (n * 6 + static_cast<std::size_t>(axis)) * stride_;
-  std::uint16_t* const d = C + 3 * stride_;
+  std::uint16_t* const C = bounds_.coefficients.data() + (n * 6 + static_cast<std::size_t>(axis)) * bounds_.stride;
+  std::uint16_t* const d = C + 3 * bounds_.stride;
   std::vector<double> middle(k);
   double underflow = (static_cast<double>(modes_) + 8.0) * kUnderflow, center_energy = 0.0, energy = 0.0;
 
@@ -142,12 +150,12 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
   }
   for (std::size_t i = 0; i < k; ++i) {
     const Eigen::half C_i(
-        static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])) / scale_[i]));
+        static_cast<float>(0.5 * (static_cast<double>(low[i]) + static_cast<double>(high[i])) / bounds_.scale[i]));
     C[i] = C_i.x;
-    middle[i] = static_cast<double>(static_cast<float>(C_i)) * scale_[i];
+    middle[i] = static_cast<double>(static_cast<float>(C_i)) * bounds_.scale[i];
     const double spread = std::max(high[i] - middle[i], middle[i] - low[i]) + error * std::abs(middle[i]);
-    d[i] = half_rounded_up(spread * (1.0 + error) / scale_[i]);
-    center_energy += middle[i] * middle[i] / weights_[i];
+    d[i] = half_rounded_up(spread * (1.0 + error) / bounds_.scale[i]);
+    center_energy += middle[i] * middle[i] / bounds_.weights[i];
     underflow += kUnderflow * 4.0;  // of terms that are at most about the scale's
   }
   for (const Index v : below) {
@@ -155,11 +163,11 @@ void CollisionSurface::bound_node(std::size_t n, int axis, std::span<const Index
     double sum = 0.0;
     for (std::size_t i = 0; i < k; ++i) {
       const double difference = static_cast<double>(u[i]) - middle[i];
-      sum += difference * difference / weights_[i];
+      sum += difference * difference / bounds_.weights[i];
     }
     energy = std::max(energy, sum);
   }
-  float* const constants = constants_.data() + n * kNodeConstants + static_cast<std::size_t>(axis);
+  float* const constants = bounds_.constants.data() + n * kNodeConstants + static_cast<std::size_t>(axis);
   constants[0] = c;
   constants[4] = nearest_above((half + error * (std::abs(static_cast<double>(c)) + half)) * (1.0 + error) + underflow);
   constants[8] = nearest_above((std::sqrt(energy) + error * std::sqrt(center_energy)) * (1.0 + error));

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "limber/collision/aabb.h"
@@ -47,7 +48,6 @@ struct CollisionSurfaceOptions {
 /// that. Vertices at equal places with equal shapes (a seam of a render surface) are one: canonical_vertex() is the
 /// lowest of them, and triangles name that one only.
 ///
-/// Its members are many since each is one array of the same geometry: all are made together and none changes.
 class CollisionSurface {
  public:
   /// The model's collision surface, k modes. @throws InvalidArgument also for a model that is not touchable, and for a
@@ -62,73 +62,68 @@ class CollisionSurface {
   /// Null for a rigid surface.
   const std::shared_ptr<const ModalModel>& model() const { return model_; }
   /// Null for one that bends by its modes alone.
-  const ModalSkin* skin() const { return skinned_ ? &*model_->data().skin : nullptr; }
+  const ModalSkin* skin() const { return skin_ ? &*model_->data().skin : nullptr; }
   const SkinInfluences& influences(Index vertex) const {
     return skin_influences(*model_, SurfacePoint::Surface::kCollision)[static_cast<std::size_t>(vertex)];
   }
-  const SkinExtent* skin_extent() const { return extent_ ? &*extent_ : nullptr; }
+  const SkinExtent* skin_extent() const { return skin_ ? &skin_->extent : nullptr; }
   Index modes() const { return modes_; }
   Index vertices() const { return static_cast<Index>(rest_.size()); }
   Index triangles() const { return static_cast<Index>(triangles_.size()); }
 
   const Vec3& rest(Index vertex) const { return rest_[static_cast<std::size_t>(vertex)]; }
   const Aabb& rest_bounds() const { return rest_bounds_; }
-  double rest_radius() const { return rest_radius_; }  ///< largest distance of a vertex from the origin, m
   /// modes() floats (and zeros up to VertexRows::stride()): u along a body axis per unit amplitude; null for k = 0.
   const float* row(Index vertex, int axis) const {
     return modes_ > 0 ? model_->collision_rows().row(vertex, axis) : nullptr;
   }
   /// Largest |u_i| of any vertex, rounded up, kg^−½: no vertex moves by more than Σ_i |z_i| of these. With a skin
   /// largest |Ũ_i|: what moves vertices beside their handles.
-  double largest_shape(Index mode) const { return largest_shape_[static_cast<std::size_t>(mode)]; }
+  double largest_shape(Index mode) const { return bounds_.largest_shape[static_cast<std::size_t>(mode)]; }
 
   // -- Topology ------------------------------------------------------------------------------------------------------
   /// Canonical vertices, counter-clockwise seen from outside. Triangle t is triangle t of the asset or shape.
   const Triangle& triangle(Index t) const { return triangles_[static_cast<std::size_t>(t)]; }
-  Index canonical_vertex(Index v) const { return canonical_[static_cast<std::size_t>(v)]; }
-  Index edges() const { return static_cast<Index>(edges_.size()); }
-  const SurfaceEdge& edge(Index e) const { return edges_[static_cast<std::size_t>(e)]; }
+  Index canonical_vertex(Index v) const { return topology_.canonical[static_cast<std::size_t>(v)]; }
+  Index edges() const { return static_cast<Index>(topology_.edges.size()); }
+  const SurfaceEdge& edge(Index e) const { return topology_.edges[static_cast<std::size_t>(e)]; }
   /// Triangles that share an edge, ascending.
   std::span<const Index> edge_triangles(Index e) const {
-    return std::span(edge_triangles_)
+    return std::span(topology_.edge_triangles)
         .subspan(static_cast<std::size_t>(edge(e).first_triangle), static_cast<std::size_t>(edge(e).triangle_count));
   }
   /// The edge from corner `corner` to the next one of a triangle.
   Index edge_of(Index t, int corner) const {
-    return triangle_edges_[static_cast<std::size_t>(t)][static_cast<std::size_t>(corner)];
+    return topology_.triangle_edges[static_cast<std::size_t>(t)][static_cast<std::size_t>(corner)];
   }
   /// The other triangle at edge_of(t, corner); −1 where there is none, or more than one.
   Index neighbour(Index t, int corner) const;
   /// Triangles that have a canonical vertex as a corner, ascending; none for any other vertex.
-  std::span<const Index> vertex_triangles(Index v) const {
-    return range(vertex_triangles_, vertex_triangles_start_, v);
-  }
+  std::span<const Index> vertex_triangles(Index v) const { return topology_.vertex_triangles[v]; }
   /// Canonical vertices joined to one by an edge, ascending.
-  std::span<const Index> vertex_neighbours(Index v) const {
-    return range(vertex_neighbours_, vertex_neighbours_start_, v);
-  }
+  std::span<const Index> vertex_neighbours(Index v) const { return topology_.vertex_neighbours[v]; }
   /// The lowest vertex of each part that hangs together by edges, ascending.
-  std::span<const Index> component_vertices() const { return component_vertices_; }
+  std::span<const Index> component_vertices() const { return topology_.component_vertices; }
   /// Bounds a solid: as many triangles run through an edge one way as the other. They are two, or more where parts of
   /// the solid meet in an edge, as simplification may leave them.
-  bool closed() const { return closed_; }
+  bool closed() const { return topology_.closed; }
   /// Whether two triangles have a (canonical) vertex in common.
   bool adjacent(Index t, Index u) const;
 
   // -- Tree ----------------------------------------------------------------------------------------------------------
   /// Node 0 is the root. The tree is balanced: no deeper than kMaxDepth.
-  std::span<const TreeNode> nodes() const { return nodes_; }
-  const TreeNode& node(Index n) const { return nodes_[static_cast<std::size_t>(n)]; }
+  std::span<const TreeNode> nodes() const { return tree_.nodes; }
+  const TreeNode& node(Index n) const { return tree_.nodes[static_cast<std::size_t>(n)]; }
   static constexpr int kMaxDepth = 32;
   /// Distinct vertices of a leaf's triangles, ascending.
   std::span<const Index> leaf_vertices(Index n) const {
-    const TreeNode& leaf = vertex_tree_[static_cast<std::size_t>(n)];
-    return std::span(leaf_vertices_)
+    const TreeNode& leaf = tree_.by_vertices[static_cast<std::size_t>(n)];
+    return std::span(tree_.leaf_vertices)
         .subspan(static_cast<std::size_t>(leaf.first), static_cast<std::size_t>(leaf.count));
   }
   /// Triangles below a node.
   std::span<const Index> node_triangles(Index n) const {
-    return std::span(triangle_order_)
+    return std::span(tree_.triangle_order)
         .subspan(static_cast<std::size_t>(node(n).first), static_cast<std::size_t>(node(n).count));
   }
 
@@ -136,10 +131,57 @@ class CollisionSurface {
   friend class DeformedSurface;
   friend class internal::BoxReader;
 
-  static std::span<const Index> range(const std::vector<Index>& all, const std::vector<Index>& start, Index v) {
-    const auto begin = static_cast<std::size_t>(start[static_cast<std::size_t>(v)]);
-    return std::span(all).subspan(begin, static_cast<std::size_t>(start[static_cast<std::size_t>(v) + 1]) - begin);
-  }
+  /// One list per key, one behind the other in `items`.
+  template <class Item>
+  struct Lists {
+    std::vector<Item> items;
+    std::vector<std::size_t> start;  // of each key's list, and the end of the last
+    std::span<const Item> operator[](Index key) const {
+      const auto k = static_cast<std::size_t>(key);
+      return std::span(items).subspan(start[k], start[k + 1] - start[k]);
+    }
+  };
+  static Lists<Index> lists(std::vector<std::pair<Index, Index>> pairs, Index keys);
+
+  struct Topology {
+    std::vector<Index> canonical;
+    std::vector<SurfaceEdge> edges;
+    std::vector<Index> edge_triangles;
+    std::vector<std::array<Index, 3>> triangle_edges;
+    Lists<Index> vertex_triangles, vertex_neighbours;
+    std::vector<Index> component_vertices;
+    bool closed = false;
+  };
+
+  struct Tree {
+    std::vector<TreeNode> nodes;
+    std::vector<Index> triangle_order;  ///< nodes' ranges are of it
+    std::vector<Index> leaf_vertices;   ///< distinct vertices of each leaf
+    std::vector<TreeNode> by_vertices;  ///< the same nodes; a leaf's range is of leaf_vertices
+  };
+
+  /// What a body that bends by a modal skin has beside.
+  struct Skin {
+    explicit Skin(const ModalModel& model);
+    std::vector<float> undeformed;  ///< Ũ, [vertex][axis][mode]
+    SkinTiles tiles;
+    SkinExtent extent;
+    Lists<std::uint8_t> node_handles;  ///< that the vertices below a node hang on
+  };
+
+  /// Bounds of a node as a function of the amplitudes, see docs/collision.md; with a skin those of r + Ũ z, for the
+  /// node's handles to turn and carry:
+  ///   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
+  /// rounded so that the box, evaluated in single precision, encloses the vertices evaluated in double.
+  struct Bounds {
+    std::vector<double> largest_shape;
+    std::vector<double> weights;    ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
+    std::vector<double> scale;      ///< of each mode, a power of two: C and d are stored divided by it
+    std::size_t stride = 0;         ///< of the rows of C and d: modes, padded
+    AlignedArray<float> constants;  ///< per node c, h, e
+    /// Per node six rows, C x, y, z, d x, y, z, as half floats: the boxes of a large body are bound by reading them.
+    AlignedArray<std::uint16_t> coefficients;
+  };
 
   void build(std::vector<Triangle> triangles, const CollisionSurfaceOptions& options);
   void check_range() const;
@@ -148,57 +190,27 @@ class CollisionSurface {
   void build_vertex_adjacency();
   void build_tree(int leaf_triangles);
   void list_leaf_vertices();
+  void scale_modes();
   void build_bounds();
   void bound_node(std::size_t n, int axis, std::span<const Index> below);
+  void list_handles(std::span<const Index> below);
   void find_undeformed_rows();
   const float* bounded_row(Index vertex, int axis) const {
-    return skinned_ ? undeformed_.data() + (3 * static_cast<std::size_t>(vertex) + static_cast<std::size_t>(axis)) *
-                                               static_cast<std::size_t>(modes_)
-                    : row(vertex, axis);
-  }
-  std::span<const std::uint8_t> node_handles(std::size_t n) const {
-    return std::span(node_handles_)
-        .subspan(node_handles_start_[n], node_handles_start_[n + 1] - node_handles_start_[n]);
+    if (!skin_) return row(vertex, axis);
+    const std::size_t at = 3 * static_cast<std::size_t>(vertex) + static_cast<std::size_t>(axis);
+    return skin_->undeformed.data() + at * static_cast<std::size_t>(modes_);
   }
 
   std::shared_ptr<const ModalModel> model_;
   Index modes_ = 0;
-  bool skinned_ = false;
   std::vector<Vec3> rest_;
   Aabb rest_bounds_;
   double rest_radius_ = 0.0;  ///< largest distance of a vertex from the origin, m
-  std::vector<double> largest_shape_;
   std::vector<Triangle> triangles_;
-  std::vector<Index> canonical_;
-  std::vector<SurfaceEdge> edges_;
-  std::vector<Index> edge_triangles_;
-  std::vector<std::array<Index, 3>> triangle_edges_;
-  std::vector<Index> vertex_triangles_, vertex_triangles_start_, vertex_neighbours_, vertex_neighbours_start_;
-  std::vector<Index> component_vertices_;
-  bool closed_ = false;
-
-  std::vector<TreeNode> nodes_;
-  std::vector<Index> triangle_order_;  ///< nodes' ranges are of it
-  std::vector<Index> leaf_vertices_;   ///< distinct vertices of each leaf
-  std::vector<TreeNode> vertex_tree_;  ///< the same nodes; a leaf's range is of leaf_vertices_
-
-  // With a skin.
-  std::vector<float> undeformed_;  ///< Ũ, [vertex][axis][mode]
-  SkinTiles tiles_;
-  std::optional<SkinExtent> extent_;
-  std::vector<std::uint8_t> node_handles_;  ///< that the vertices below a node hang on
-  std::vector<std::size_t> node_handles_start_;
-
-  // Bounds of a node as a function of the amplitudes, see docs/collision.md; with a skin those of r + Ũ z, for the
-  // node's handles to turn and carry:
-  //   center = c + C z,  half extents = h + min(Σ_i d_i |z_i|, e ‖z‖_w)         per axis
-  // rounded so that the box, evaluated in single precision, encloses the vertices evaluated in double.
-  std::vector<double> weights_;    ///< w of the norm ‖z‖_w² = Σ w_i z_i²: λ_i where positive
-  std::vector<double> scale_;      ///< of each mode, a power of two: C and d are stored divided by it
-  std::size_t stride_ = 0;         ///< of the rows of C and d: modes, padded
-  AlignedArray<float> constants_;  ///< per node c, h, e
-  /// Per node six rows, C x, y, z, d x, y, z, as half floats: the boxes of a large body are bound by reading them.
-  AlignedArray<std::uint16_t> coefficients_;
+  Topology topology_;
+  Tree tree_;
+  Bounds bounds_;
+  std::optional<Skin> skin_;
 };
 
 }  // namespace limber

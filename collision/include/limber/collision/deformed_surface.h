@@ -47,11 +47,9 @@ class DeformedSurface {
 
   /// A new state; forgets the last one. O(k). Allocates only for a surface larger than any before.
   /// @param surface not null; kept until the next bind()  @param z its k amplitudes, read here only
-  /// @param last for kAutomatic: counters() of a query that this one is probably like, such as the same body's last
-  /// one; null if none is known. A surface that is expected to need many boxes is refitted at once.
   /// @throws InvalidArgument if z has another size, is not finite, or moves a vertex by more than 1e30 m
   void bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-            BoundsChoice choice = BoundsChoice::kAmplitudes, const Counters* last = nullptr);
+            BoundsChoice choice = BoundsChoice::kAmplitudes);
 
   const CollisionSurface& surface() const { return *surface_; }
   std::span<const double> amplitudes() const;
