@@ -16,10 +16,10 @@
 #include "cpu_time.h"
 #include "finder_scenes.h"
 #include "limber/collision/broad_phase.h"
-#include "limber/collision/time_of_impact.h"
 #include "limber/collision/tree_traversal.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/tet_overlap/tet_overlap_normals.h"
+#include "manifold/time_of_impact.h"
 #include "narrow_phase_reference.h"
 #include "random_states.h"
 #include "scoped_value.h"
@@ -63,7 +63,6 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(hierarchy, box_cost_per_mode),
     LIMBER_NUMBER(hierarchy, vertex_cost_per_mode),
     LIMBER_NUMBER(hierarchy, triangle_cost),
-    LIMBER_NUMBER(hierarchy, boxes_without_refit),
     LIMBER_NUMBER(broad, moves_before_sort),
     LIMBER_NUMBER(broad, rows_per_chunk),
     LIMBER_NUMBER(convex, hull_thickness),
@@ -95,16 +94,17 @@ const std::vector<Number> kNumbers{
     LIMBER_NUMBER(finder, unit_quaternion),
     LIMBER_NUMBER(finder, pairs_per_chunk),
     LIMBER_NUMBER(finder, bodies_per_chunk),
-    LIMBER_NUMBER(finder, kept_spacing),
-    LIMBER_NUMBER(finder, kept_surplus),
-    LIMBER_NUMBER_BY(finder, kept_gap, between_bounds),
-    LIMBER_NUMBER(finder, good_advancement),
-    LIMBER_NUMBER(finder, look_nearer),
-    LIMBER_NUMBER(finder, look_again),
-    LIMBER_NUMBER(finder, look_farther),
-    LIMBER_NUMBER(finder, visits_of_a_look),
-    LIMBER_NUMBER(finder, fine_doubt),
-    LIMBER_NUMBER_BY(finder, worth_a_look, between_bounds),
+    LIMBER_NUMBER(clusters, kept_spacing),
+    LIMBER_NUMBER(clusters, kept_surplus),
+    LIMBER_NUMBER_BY(impact, kept_gap, between_bounds),
+    LIMBER_NUMBER(impact, good_advancement),
+    LIMBER_NUMBER(impact, look_nearer),
+    LIMBER_NUMBER(impact, look_again),
+    LIMBER_NUMBER(impact, look_farther),
+    LIMBER_NUMBER(impact, visits_of_a_look),
+    LIMBER_NUMBER(impact, fine_doubt),
+    LIMBER_NUMBER(impact, most_advancements),
+    LIMBER_NUMBER_BY(impact, worth_a_look, between_bounds),
 };
 
 // -- What comes out ---------------------------------------------------------------------------------------------------
@@ -137,8 +137,8 @@ class Scenes {
     }
     ask_heap(&r.contacts);
     for (const Shot& shot : shots_) {
-      const ImpactTime t = shoot(shot);
-      r.times.push_back(t.status == ImpactTime::Status::kImpact ? t.time : kStep);
+      const internal::ImpactTime t = shoot(shot);
+      r.times.push_back(t.status == internal::ImpactTime::Status::kImpact ? t.time : kStep);
       r.advancements += t.advancements;
     }
     return r;
@@ -155,8 +155,8 @@ class Scenes {
   static constexpr double kStep = 1.0 / 60.0;
 
   struct Shot {
-    std::shared_ptr<const CollisionSurface> surface;
-    ExactMotion sheet, ball;
+    internal::MovingBody sheet, ball;
+    std::vector<double> z, rates;  // of the sheet
   };
 
   static void judge(const TuningPair& pair, const Contacts& contacts, Outcome& r) {
@@ -220,44 +220,39 @@ class Scenes {
     const auto model = testing::sheet_model(12, 8);
     const auto surface = std::make_shared<const CollisionSurface>(model);
     for (int i = 0; i < 60; ++i) {
-      BodyGroup group(model, kStep);
-      const Index slot = group.add({}, random.vector(0.5), random.vector(3.0));
-      std::vector<double> z, rates;
-      for (const double lambda : model->data().eigenvalues)
-        z.push_back(random.uniform(-1e-3, 1e-3)), rates.push_back(1e-3 * std::sqrt(lambda) * random.uniform(-1.0, 1.0));
-      group.set_amplitudes(slot, z, rates);
-      Shot shot{surface, {}, {}};
-      group.predict_motion(slot, {0.0, 0.0, -9.80665}, shot.sheet);
+      Shot shot{{.surface = surface, .displacement = random.vector(0.5), .rotation = random.vector(3.0)}, {}, {}, {}};
+      for (const double lambda : model->data().eigenvalues) {
+        shot.z.push_back(random.uniform(-1e-3, 1e-3));
+        shot.rates.push_back(1e-3 * std::sqrt(lambda) * random.uniform(-1.0, 1.0));
+      }
       const double speed = std::pow(10.0, random.uniform(0.7, 2.0));
       const Vec3 aim = random.vector(0.6), from = aim.cwiseProduct(Vec3(1, 1, 0)) + Vec3(0, 0, 0.6 * speed * kStep);
-      shot.ball.set_frame({.pose = {.p = from},
-                           .velocity = speed * (Vec3(random.uniform(-1, 1), random.uniform(-1, 1), -1.0)).normalized(),
-                           .acceleration = {0.0, 0.0, -9.80665}},
-                          kStep);
+      shot.ball = {.geometry = &ball_,
+                   .pose = {.p = from},
+                   .displacement = speed * Vec3(random.uniform(-1, 1), random.uniform(-1, 1), -1.0).normalized()};
       shots_.push_back(std::move(shot));
     }
   }
-  ImpactTime shoot(const Shot& shot) {
-    return impact_.find({.geometry = &ball_, .motion = &shot.ball}, {.surface = shot.surface, .motion = &shot.sheet},
-                        kStep, 1e-4);
+  internal::ImpactTime shoot(const Shot& shot) {
+    internal::MovingBody sheet = shot.sheet;
+    sheet.amplitudes = shot.z, sheet.rates = shot.rates;
+    return impact_.find(shot.ball, sheet, kStep, 1e-4);
   }
 
   /// Two vibrating balls of 1,280 triangles that come near, touch and part, by the automatic choice of boxes.
   void walk_trees() {
     for (const auto& surface : {spheres_[0], spheres_[1]}) {
       DeformedSurface a, b;
-      DeformedSurface::Counters last_a, last_b;
       std::vector<TrianglePair> pairs;
       for (int step = 0; step < 100; ++step) {
         std::vector<double> z;
         for (Index i = 0; i < surface->modes(); ++i)
           z.push_back(0.02 * std::sin(0.2 * step * (1 + i)) / (1.0 + 0.6 * i));
-        a.bind(surface, z, BoundsChoice::kAutomatic, &last_a), b.bind(surface, z, BoundsChoice::kAutomatic, &last_b);
+        a.bind(surface, z, BoundsChoice::kAutomatic), b.bind(surface, z, BoundsChoice::kAutomatic);
         pairs.clear();
         const RigidTransform X{quaternion_from_rotation_vector({0.1, 0.2, 0.01 * step}),
                                {1.0 + 0.06 * std::sin(0.1 * step), 0.0, 0.0}};
         find_triangle_pairs(a, b, X, 0.0, pairs);
-        last_a = a.counters(), last_b = b.counters();
       }
     }
   }
@@ -291,7 +286,7 @@ class Scenes {
       rest_{{.overlap = OverlapMethod::kRestDepth}};
   const RigidGeometry ball_{Sphere{0.01}};
   const std::shared_ptr<const ModalModel> sheet_ = testing::sheet_model(16, 4);
-  TimeOfImpact impact_;
+  internal::TimeOfImpact impact_;
 };
 
 /// How one outcome differs from another.

@@ -20,8 +20,6 @@ struct HierarchyTuning {
   double box_cost_per_mode = 48.0;    ///< of a box, times k: 6 half floats, scattered in memory [6 to 100]
   double vertex_cost_per_mode = 3.0;  ///< of a vertex of a refit, times k: three floats, which stream [3]
   double triangle_cost = 32.0;        ///< of a triangle of a refit, with its share of vertices and nodes [10 to 100]
-  /// Boxes that a walk asks for without a refit, per box with one: tighter boxes end it earlier [1 to 2]. Counted.
-  double boxes_without_refit = 2.0;
 };
 
 /// Lists of many bodies. These decide time alone. Steady.
@@ -101,17 +99,14 @@ struct NarrowTuning {
   double least_patch = 1e-6;
 };
 
-/// Whole queries: thinning, and the first time of impact.
+/// Whole queries.
 struct FinderTuning {
-  /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
-  /// meets nothing.
-  double touch = 1e-3;
-  int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]: bounds its time
-  /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
-  /// followed to its end counts as touching there. Steady.
-  int looks_on_the_way = 64;
   double unit_quaternion = 1e-6;  ///< by which the length of an orientation may differ from 1: a promise of the header
   std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
+};
+
+/// Contacts of a patch, thinned to a few.
+struct ClusterTuning {
   /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets
   /// of the benchmark change their contacts from step to step at 0.55.
   double kept_spacing = 1.1;
@@ -120,6 +115,17 @@ struct FinderTuning {
   /// Part of a patch's extent by which a contact may be farther than one that stands for it and still be pressed with
   /// it in full; at twice of it not at all [1e-3 to 2e-2]: the depth of dents.
   double pressed_with = 5e-3;
+};
+
+/// Bodies that come far, and the first time of impact.
+struct ImpactTuning {
+  /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
+  /// meets nothing.
+  double touch = 1e-3;
+  int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]: bounds its time
+  /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
+  /// followed to its end counts as touching there. Steady.
+  int looks_on_the_way = 64;
   double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
   /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
   /// `look_again` [1 to 4] times what the bounds gave, at least `look_nearer` [0.01 to 0.2] of the time before. After
@@ -130,6 +136,7 @@ struct FinderTuning {
   /// is not known of the motion is more than a part [0.1 to 1] of the least gap seen.
   int visits_of_a_look = 48;
   double fine_doubt = 0.25;
+  int most_advancements = 128;  ///< of a pair of surfaces, like `looks_on_the_way` [64 to 1,000]. Steady.
   /// What comes later than this part [0.5 to 0.95] of the best time seen is left for the next look.
   double worth_a_look = 0.9;
 };
@@ -162,6 +169,8 @@ struct CollisionTuning {
   ConvexTuning convex{};
   NarrowTuning narrow{};
   FinderTuning finder{};
+  ClusterTuning clusters{};
+  ImpactTuning impact{};
   FieldTuning field{};
 };
 

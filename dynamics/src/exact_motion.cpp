@@ -58,13 +58,6 @@ void ExactMotion::modes_at(double t, std::size_t first, std::size_t count, doubl
       internal::add_impulse_flow(modes, t - impulse_times_[n], impulses_at(n).data() + first, z, rates);
 }
 
-ModeState ExactMotion::start(std::size_t i) const {
-  ModeState s{z_[i], rates_[i]};
-  for (std::size_t n = 0; n < impulse_times_.size(); ++n)
-    if (impulse_times_[n] <= 0.0) s.zdot += impulses_at(n)[i];
-  return s;
-}
-
 double ExactMotion::amplitude(Index mode, double t) const {
   double z = 0.0, rate = 0.0;
   modes_at(t, static_cast<std::size_t>(mode), 1, &z, &rate);
@@ -96,34 +89,16 @@ void ExactMotion::evaluate(double t, MotionState& state) const {
   modes_at(t, 0, z_.size(), state.amplitudes.data(), state.rates.data());
 }
 
-double ExactMotion::smooth_until(double t) const {
-  double until = path_.smooth_until(t);
-  for (const double time : impulse_times_)
-    if (time > t) until = std::min(until, time);
-  return until;
-}
-
-/// An impulse j that acts inside adds its own motion to that without it: |ż| ≤ |j|, and |z| is at most that of the
-/// mode struck at rest.
-ModeBound ExactMotion::bound(std::size_t i, const ModeState& from, double t0, double t1) const {
-  ModeBound b = bound_motion(mode(i), from, force_[i], t1 - t0);
-  for (std::size_t n = 0; n < impulse_times_.size(); ++n) {
-    const double time = impulse_times_[n], j = impulses_at(n)[i];
-    if (time <= t0 || time > t1 || j == 0.0) continue;
-    const ModeBound answer = bound_motion(mode(i), {.z = 0.0, .zdot = j}, 0.0, t1 - time);
-    b.change += answer.change;
-    b.size += answer.size;
-    b.rate += answer.rate;
-    if (time < t1) b.acceleration = std::numeric_limits<double>::infinity();
-  }
-  return b;
-}
-
-void ExactMotion::bounds(const MotionState& from, double until, MotionBounds& bounds) const {
-  bounds.frame = path_.bounds(from.time, until);
-  bounds.modes.resize(z_.size());
-  for (std::size_t i = 0; i < z_.size(); ++i)
-    bounds.modes[i] = bound(i, {from.amplitudes[i], from.rates[i]}, from.time, until);
+/// An impulse j that acts inside adds to the motion without it that of the mode struck at rest.
+double ExactMotion::change(std::size_t i) const {
+  ModeState start{z_[i], rates_[i]};
+  for (std::size_t n = 0; n < impulse_times_.size(); ++n)
+    if (impulse_times_[n] <= 0.0) start.zdot += impulses_at(n)[i];
+  double most = largest_change(mode(i), start, force_[i], step()) + released(i);
+  for (std::size_t n = 0; n < impulse_times_.size(); ++n)
+    if (const double time = impulse_times_[n], j = impulses_at(n)[i]; time > 0.0 && j != 0.0)
+      most += largest_change(mode(i), {.z = 0.0, .zdot = j}, 0.0, step() - time);
+  return most;
 }
 
 double ExactMotion::reach(double distance, std::span<const double> shape, const Vec3& displacement) const {
@@ -132,15 +107,14 @@ double ExactMotion::reach(double distance, std::span<const double> shape, const 
   return path_.travel_beside(displacement) + sway(arm, shape);
 }
 
-void ExactMotion::changes(std::span<double> change) const {
-  for (std::size_t i = 0; i < z_.size(); ++i) change[i] = bound(i, start(i), 0.0, step()).change + released(i);
+void ExactMotion::changes(std::span<double> changes) const {
+  for (std::size_t i = 0; i < z_.size(); ++i) changes[i] = change(i);
 }
 
 double ExactMotion::sway(double arm, std::span<const double> shape) const {
   double flexing = 0.0;
-  for (std::size_t i = 0; i < z_.size(); ++i)
-    flexing += shape[i] * (bound(i, start(i), 0.0, step()).change + released(i));
-  return 2.0 * std::sin(0.5 * path_.bounds(0.0, step()).turn) * arm + flexing;
+  for (std::size_t i = 0; i < z_.size(); ++i) flexing += shape[i] * change(i);
+  return 2.0 * std::sin(0.5 * path_.turn()) * arm + flexing;
 }
 
 }  // namespace limber

@@ -8,25 +8,13 @@
 namespace limber {
 namespace {
 
-/// sup |ω| and sup |ω̇| over a free rotation, from one point of it.
-struct RotationBounds {
-  double angular_speed, angular_acceleration;
-};
-
-/// With x_i = l_i², the polhode is the segment x + s (α, −(α+γ), γ), α = 1/I₂ − 1/I₃, γ = 1/I₁ − 1/I₂: on it |ω|² grows
-/// with s up to where x₂ = 0, and each x_i is largest at one of its ends.
-RotationBounds rotation_bounds(const Vec3& moments, const Vec3& momentum_P) {
-  const Vec3 inverse = moments.cwiseInverse(), x = momentum_P.cwiseAbs2();
+/// sup |ω| over a free rotation, from one point of it. With x_i = l_i², the polhode is the segment
+/// x + s (α, −(α+γ), γ), α = 1/I₂ − 1/I₃, γ = 1/I₁ − 1/I₂: on it |ω|² grows with s up to where x₂ = 0.
+double largest_angular_speed(const Vec3& moments, const Vec3& momentum_P) {
+  const Vec3 inverse = moments.cwiseInverse();
   const double alpha = std::max(inverse.y() - inverse.z(), 0.0), gamma = std::max(inverse.x() - inverse.y(), 0.0);
-  const double sum = alpha + gamma;
-  const double speed = std::sqrt(momentum_P.cwiseProduct(inverse).squaredNorm() + x.y() * alpha * gamma);
-  if (sum == 0.0) return {speed, 0.0};
-  const double back = std::min(alpha > 0.0 ? x.x() / alpha : std::numeric_limits<double>::infinity(),
-                               gamma > 0.0 ? x.z() / gamma : std::numeric_limits<double>::infinity());
-  const Vec3 most(x.x() + alpha / sum * x.y(), x.y() + sum * back, x.z() + gamma / sum * x.y());
-  const Vec3 gain = Vec3(alpha, sum, gamma).cwiseProduct(inverse);  // I_i ω̇_i = l_j l_k (1/I_k − 1/I_j)
-  const Vec3 products(most.y() * most.z(), most.z() * most.x(), most.x() * most.y());
-  return {speed, std::sqrt(gain.cwiseAbs2().dot(products))};
+  const double middle = momentum_P.y() * momentum_P.y();
+  return std::sqrt(momentum_P.cwiseProduct(inverse).squaredNorm() + middle * alpha * gamma);
 }
 
 }  // namespace
@@ -61,22 +49,18 @@ void FramePath::start_carried(const RigidMotion& parent, double step, const Vec3
 
 void FramePath::add_free(double begin, const FreeRotation& rotation, double since, const Vec3& momentum_W) {
   const Quaternion q_WP = rotation.attitude(since) * inertia_.q_BP;
-  const RotationBounds b = rotation_bounds(inertia_.moments, q_WP.conjugate() * momentum_W);
   parts_.push_back({.begin = begin,
                     .rotation = rotation,
                     .since = since,
                     .momentum = momentum_W,
-                    .angular_speed = b.angular_speed,
-                    .bend = b.angular_acceleration + b.angular_speed * b.angular_speed});
+                    .angular_speed = largest_angular_speed(inertia_.moments, q_WP.conjugate() * momentum_W)});
 }
 
 void FramePath::add_carried(double begin, double angle, double angle_rate) {
-  const double carried = start_.angular_velocity.norm(), own = std::abs(angle_rate), speed = carried + own;
   parts_.push_back({.begin = begin,
                     .angle = angle,
                     .angle_rate = angle_rate,
-                    .angular_speed = speed,
-                    .bend = carried * own + speed * speed});
+                    .angular_speed = start_.angular_velocity.norm() + std::abs(angle_rate)});
 }
 
 void FramePath::finish(const RigidMotion& motion) { end_ = motion; }
@@ -113,30 +97,16 @@ Vec3 FramePath::angular_velocity(double t) const {
   return q_WP * (q_WP.conjugate() * part.momentum).cwiseQuotient(inertia_.moments);
 }
 
-double FramePath::smooth_until(double t) const { return end_of(part_at(t)); }
-
 /// t |v₀ − d/T + ½ a t| is largest at the end, or where t is and the rest is not.
 double FramePath::travel_beside(const Vec3& displacement) const {
   const Vec3 start = step_ * start_.velocity - displacement;
   return std::max(start.norm(), (start + 0.5 * step_ * step_ * acceleration_).norm());
 }
 
-FrameBounds FramePath::bounds(double t0, double t1) const {
-  const double s = t1 - t0;
-  const Vec3 v0 = start_.velocity + t0 * acceleration_;
-  FrameBounds b{.speed = std::max(v0.norm(), (v0 + s * acceleration_).norm()),
-                .travel = s * std::max(v0.norm(), (v0 + 0.5 * s * acceleration_).norm())};
-  const Part* part = &part_at(t0);
-  if (end_of(*part) < t1) b.bend = std::numeric_limits<double>::infinity();
-  for (;; ++part) {
-    const double end = end_of(*part);
-    b.angular_speed = std::max(b.angular_speed, part->angular_speed);
-    b.turn += (std::min(end, t1) - std::max(part->begin, t0)) * part->angular_speed;
-    b.bend = std::max(b.bend, part->bend);
-    if (end >= t1) break;
-  }
-  b.turn = std::min(b.turn, std::numbers::pi);
-  return b;
+double FramePath::turn() const {
+  double turn = 0.0;
+  for (const Part& part : parts_) turn += (end_of(part) - part.begin) * part.angular_speed;
+  return std::min(turn, std::numbers::pi);
 }
 
 }  // namespace limber

@@ -54,7 +54,7 @@ double parabola_bound(double v, double a, double s) {
 
 }  // namespace
 
-ModeBound bound_motion(const Mode& mode, const ModeState& start, double g, double duration) {
+double largest_change(const Mode& mode, const ModeState& start, double g, double duration) {
   const Constants c(mode);
   const auto [z, v] = start;
   const double s = duration;
@@ -63,16 +63,12 @@ ModeBound bound_motion(const Mode& mode, const ModeState& start, double g, doubl
   const double a = -pull - 2.0 * c.xi * v, jerk = -c.lambda * v - 2.0 * c.xi * a;
   const double elastic = elastic_bound(c, pull, v);
   const double most_jerk = rate_bound(c, c.lambda * a, jerk, elastic_bound(c, c.lambda * a, jerk));
-  ModeBound b;
-  b.acceleration =
+  const double acceleration =
       std::min(rate_bound(c, c.lambda * v, a, elastic_bound(c, c.lambda * v, a)), std::abs(a) + s * most_jerk);
-  b.rate = std::min({rate_bound(c, pull, v, elastic), std::abs(v) + s * b.acceleration,
-                     std::max(std::abs(v), std::abs(v + s * a)) + 0.5 * s * s * most_jerk});
-  b.change = std::min({s * b.rate, s * (std::abs(v) + 0.5 * s * b.acceleration),
-                       parabola_bound(v, a, s) + s * s * s / 6.0 * most_jerk, travel_bound(c, pull, v, elastic, s)});
-  b.size = std::abs(z) + b.change;
-  if (c.lambda > 0.0) b.size = std::min(b.size, (std::abs(g) + elastic) * c.period * c.period);
-  return b;
+  const double rate = std::min({rate_bound(c, pull, v, elastic), std::abs(v) + s * acceleration,
+                                std::max(std::abs(v), std::abs(v + s * a)) + 0.5 * s * s * most_jerk});
+  return std::min({s * rate, s * (std::abs(v) + 0.5 * s * acceleration),
+                   parabola_bound(v, a, s) + s * s * s / 6.0 * most_jerk, travel_bound(c, pull, v, elastic, s)});
 }
 
 }  // namespace limber

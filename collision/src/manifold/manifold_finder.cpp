@@ -463,7 +463,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
 
 /// Adds the contacts of all places where two bodies come to touch on their way.
 void ManifoldFinder::Impl::follow(ManifoldWorker& worker) const {
-  const int most = internal::collision_tuning().finder.touches_on_the_way;
+  const int most = internal::collision_tuning().impact.touches_on_the_way;
   for (int n = 0; n < most && worker.path.advance(); ++n) {
     const PairQuery there = worker.path.query();
     const std::span<const FeatureContact> found = worker.pairs.find(there, worker.last);

@@ -23,8 +23,7 @@ void SweptPath::Side::begin(const BodyState& from) {
   state = from;
   amplitudes.assign(from.amplitudes.begin(), from.amplitudes.end());
   state.amplitudes = amplitudes;
-  still.assign(amplitudes.size(), 0.0);
-  rates = still;
+  rates.assign(amplitudes.size(), 0.0);
   if (std::isfinite(from.doubt) && from.end_amplitudes.size() == amplitudes.size())
     for (std::size_t i = 0; i < rates.size(); ++i) rates[i] = from.end_amplitudes[i] - from.amplitudes[i];
   moves = !(state.displacement.isZero(0.0) && state.rotation.isZero(0.0) &&
@@ -46,16 +45,16 @@ std::span<const Vec3> SweptPath::Side::points_after(double share, const ConvexCo
   return points;
 }
 
-MovingBody SweptPath::Side::moving(const ManifoldBody& body, double left) {
-  MovingBody moving{.pose = state.pose, .amplitudes = amplitudes};
+MovingBody SweptPath::Side::moving(const ManifoldBody& body) const {
+  MovingBody moving{.pose = state.pose,
+                    .displacement = state.displacement,
+                    .rotation = state.rotation,
+                    .amplitudes = amplitudes,
+                    .rates = rates};
   if (body.modal)
     moving.surface = body.modal->surface;
   else
     moving.geometry = &body.rigid->geometry;
-  if (!moves) return moving;
-  motion.set_frame({.pose = state.pose, .velocity = state.displacement, .angular_velocity = state.rotation}, left);
-  motion.set_modes(still, still, amplitudes, rates);
-  moving.motion = &motion;
   return moving;
 }
 
@@ -72,7 +71,7 @@ double SweptPath::near_at_start(const PairQuery& q) {
          doubt_of(q.state_b) + margin(q);
 }
 
-double SweptPath::margin(const PairQuery& q) { return collision_tuning().finder.touch * thinner(q); }
+double SweptPath::margin(const PairQuery& q) { return collision_tuning().impact.touch * thinner(q); }
 
 void SweptPath::begin(const PairQuery& q) {
   pair_ = &q;
@@ -89,7 +88,7 @@ bool SweptPath::advance() {
   const ImpactTime touch =
       pair_->a.core() != nullptr && pair_->b.core() != nullptr
           ? touch_of_cores(left, least)
-          : impacts_.find(sides_[0].moving(pair_->a, left), sides_[1].moving(pair_->b, left), left, margin_, least);
+          : impacts_.find(sides_[0].moving(pair_->a), sides_[1].moving(pair_->b), left, margin_, least);
   if (touch.status == ImpactTime::Status::kNone || touch.status == ImpactTime::Status::kTouching) return false;
   for (Side& side : sides_) side.go(touch.time);
   time_ += touch.time;
@@ -101,7 +100,7 @@ bool SweptPath::advance() {
 ImpactTime SweptPath::touch_of_cores(double left, double least) {
   using Status = ImpactTime::Status;
   const ConvexCore &a = *pair_->a.core(), &b = *pair_->b.core();
-  const int most = collision_tuning().finder.looks_on_the_way;
+  const int most = collision_tuning().impact.looks_on_the_way;
   double margin = margin_, t = 0.0;
   for (int n = 1; n <= most; ++n) {
     const ConvexDistance d =
@@ -111,7 +110,7 @@ ImpactTime SweptPath::touch_of_cores(double left, double least) {
     double closing = -d.normal.dot(way());
     closing += d.normal.cross(sides_[0].state.rotation).norm() * pair_->a.radius;
     closing += d.normal.cross(sides_[1].state.rotation).norm() * pair_->b.radius;
-    const double open = d.distance - collision_tuning().finder.kept_gap * margin;
+    const double open = d.distance - collision_tuning().impact.kept_gap * margin;
     if (!(closing * (left - t) > open)) return {Status::kNone, left, n};
     t += open / closing;
   }

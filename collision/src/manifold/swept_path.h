@@ -9,9 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "limber/collision/time_of_impact.h"
-#include "limber/dynamics/exact_motion.h"
 #include "manifold/pair_finder.h"
+#include "manifold/time_of_impact.h"
 
 namespace limber::internal {
 
@@ -38,15 +37,14 @@ class SweptPath {
   /// One body: as it is on its way, with what is left of it.
   struct Side {
     BodyState state;
-    std::vector<double> amplitudes, rates, still;
+    std::vector<double> amplitudes, rates;
     bool moves = false;
-    ExactMotion motion;
     std::vector<Vec3> points;  // of its core, world
 
     void begin(const BodyState& from);
     void go(double share);
     std::span<const Vec3> points_after(double share, const ConvexCore& core);
-    MovingBody moving(const ManifoldBody& body, double left);
+    MovingBody moving(const ManifoldBody& body) const;
   };
 
   ImpactTime touch_of_cores(double left, double least);

@@ -50,13 +50,6 @@ class ExactMotion {
   /// Both at once.
   void evaluate(double t, MotionState& state) const;
 
-  /// Up to when, from t on, no kick or impulse acts: there the bounds of second order hold (FrameBounds::bend,
-  /// ModeBound::acceleration). > t for t < step
-  double smooth_until(double t) const;
-
-  /// Bounds over [from.time, until]. O(k). @param from what evaluate() gave. @pre from.time ≤ until ≤ step
-  void bounds(const MotionState& from, double until, MotionBounds& bounds) const;
-
   /// How far any point with |r| ≤ distance, |U_i| ≤ shape_i may be within the step from its place at the start, moved
   /// straight on and evenly by `displacement`, m: with the numbers of ModalModel::collision_extent(), BodyState::reach.
   /// O(k).
@@ -65,8 +58,8 @@ class ExactMotion {
   /// the frame moved straight on. @param arm |r + U z| ≤ arm at the start, m
   double sway(double arm, std::span<const double> shape) const;
 
-  /// By how much each amplitude may differ from its value at the start, within the step. @param change modes() numbers
-  void changes(std::span<double> change) const;
+  /// By how much each amplitude may differ from its value at the start, within the step. @param changes modes() numbers
+  void changes(std::span<double> changes) const;
 
   // For those who make one by hand: the frame first, then its modes, then the impulses on them.
   FramePath& path() { return path_; }
@@ -84,8 +77,7 @@ class ExactMotion {
   double released(std::size_t i) const { return released_.empty() ? 0.0 : std::abs(released_[i]); }
   /// z, ż at t of `count` modes from `first` on.
   void modes_at(double t, std::size_t first, std::size_t count, double* z, double* rates) const;
-  ModeState start(std::size_t i) const;
-  ModeBound bound(std::size_t i, const ModeState& from, double t0, double t1) const;
+  double change(std::size_t i) const;
   std::span<const double> impulses_at(std::size_t n) const { return {impulses_.data() + n * z_.size(), z_.size()}; }
 
   FramePath path_;

@@ -25,17 +25,6 @@ struct RigidMotion {
   Vec3 angular_velocity = Vec3::Zero();  ///< held, world, rad/s
 };
 
-/// Bounds on a frame over [t₀, t₁].
-struct FrameBounds {
-  double speed = 0.0;          ///< sup |v(t)|, m/s
-  double travel = 0.0;         ///< ≥ sup |p(t) − p(t₀)|, m
-  double angular_speed = 0.0;  ///< ≥ sup |ω(t)|, rad/s
-  double turn = 0.0;           ///< ≥ sup of the angle between R(t) and R(t₀), rad; ≤ π
-  /// ≥ sup |ω̇| + |ω|², 1/s²: times its distance from the origin the acceleration of a point that the frame turns.
-  /// Infinite where a kick lies inside: see smooth_until().
-  double bend = 0.0;
-};
-
 /// The path of one frame over one step. Holds its parts; setting a path of no more parts again allocates nothing.
 class FramePath {
  public:
@@ -53,11 +42,8 @@ class FramePath {
   Vec3 angular_velocity(double t) const;                      ///< world, rad/s; where a kick acts at t: after it
   const Vec3& acceleration() const { return acceleration_; }  ///< of the origin, held over the step, world, m/s²
 
-  /// The end of the part that begins at or before t: up to there the angular velocity is continuous. > t for t < step
-  double smooth_until(double t) const;
-
-  /// @pre 0 ≤ t0 ≤ t1 ≤ step
-  FrameBounds bounds(double t0, double t1) const;
+  /// ≥ sup of the angle between R(t) and R(0) over the step, rad; ≤ π
+  double turn() const;
   /// ≥ sup |p(t) − p(0) − t/step displacement| over the step, m.
   double travel_beside(const Vec3& displacement) const;
 
@@ -76,8 +62,8 @@ class FramePath {
     FreeRotation rotation{};  // free: attitude at t is rotation.attitude(since + t − begin)
     double since = 0.0;
     Vec3 momentum = Vec3::Zero();
-    double angle = 0.0, angle_rate = 0.0;    // carried: θ = angle + (t − begin) angle_rate
-    double angular_speed = 0.0, bend = 0.0;  // bounds over the part
+    double angle = 0.0, angle_rate = 0.0;  // carried: θ = angle + (t − begin) angle_rate
+    double angular_speed = 0.0;            // ≥ sup |ω| over the part
   };
 
   void start(const RigidMotion& motion, double step);
