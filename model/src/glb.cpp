@@ -1,7 +1,6 @@
 #include "limber/model/glb.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -10,17 +9,20 @@
 #include <set>
 
 #include "accessor_type.h"
+#include "glb_container.h"
 #include "limber/core/error.h"
 
 namespace limber {
 namespace {
 
+using internal::kBinChunk;
+using internal::kChunkHeaderSize;
+using internal::kGlbHeaderSize;
+using internal::kGlbMagic;
+using internal::kGlbVersion;
+using internal::kJsonChunk;
 using nlohmann::json;
 
-static_assert(std::endian::native == std::endian::little, "GLB is little-endian and is copied from memory as it is");
-
-constexpr std::uint32_t kMagic = 0x46546C67, kVersion = 2, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
-constexpr std::size_t kHeaderSize = 12, kChunkHeaderSize = 8;
 constexpr int kVertexBuffer = 34962, kIndexBuffer = 34963;
 constexpr float kUnitTolerance = 5e-4f;  // what the Khronos validator grants unit vectors
 
@@ -67,12 +69,6 @@ void append_u32(std::string& out, std::size_t value) {
   char bytes[4];
   std::memcpy(bytes, &v, 4);
   out.append(bytes, 4);
-}
-
-std::uint32_t u32_at(std::string_view bytes, std::size_t offset) {
-  std::uint32_t v;
-  std::memcpy(&v, bytes.data() + offset, 4);
-  return v;
 }
 
 json parse_object(const std::string& text, const std::string& where) {
@@ -469,13 +465,13 @@ std::string GlbBuilder::bytes() const {
   std::string text = impl_->document().dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');
   const std::size_t total =
-      kHeaderSize + kChunkHeaderSize + text.size() + (binary.empty() ? 0 : kChunkHeaderSize + binary.size());
+      kGlbHeaderSize + kChunkHeaderSize + text.size() + (binary.empty() ? 0 : kChunkHeaderSize + binary.size());
   if (total > std::numeric_limits<std::uint32_t>::max())
     refuse("the file would have " + std::to_string(total) + " bytes, expected at most 4294967295 as GLB allows");
   std::string out;
   out.reserve(total);
   for (const std::size_t word :
-       {std::size_t{kMagic}, std::size_t{kVersion}, total, text.size(), std::size_t{kJsonChunk}})
+       {std::size_t{kGlbMagic}, std::size_t{kGlbVersion}, total, text.size(), std::size_t{kJsonChunk}})
     append_u32(out, word);
   out += text;
   if (!binary.empty()) {
@@ -484,35 +480,6 @@ std::string GlbBuilder::bytes() const {
     out += binary;
   }
   return out;
-}
-
-GlbChunks glb_chunks(std::string_view bytes, const std::string& name) {
-  const auto fail = [&](const std::string& what) { throw InputError(name + ": " + what); };
-  if (bytes.size() < kHeaderSize || u32_at(bytes, 0) != kMagic)
-    fail("is not a GLB file (it does not begin with \"glTF\")");
-  if (u32_at(bytes, 4) != kVersion)
-    fail("is a GLB of version " + std::to_string(u32_at(bytes, 4)) + ", expected version 2");
-  if (u32_at(bytes, 8) != bytes.size())
-    fail("its header tells " + std::to_string(u32_at(bytes, 8)) + " bytes, the file has " +
-         std::to_string(bytes.size()) + ": it is cut short or was changed");
-  GlbChunks chunks;
-  std::size_t offset = kHeaderSize;
-  for (const std::uint32_t type : {kJsonChunk, kBinChunk}) {
-    if (offset == bytes.size() && type == kBinChunk) break;
-    if (bytes.size() - offset < kChunkHeaderSize) fail("ends inside a chunk header, at byte " + std::to_string(offset));
-    const std::uint32_t size = u32_at(bytes, offset);
-    if (u32_at(bytes, offset + 4) != type)
-      fail("the chunk at byte " + std::to_string(offset) + " is not the " + (type == kJsonChunk ? "JSON" : "BIN") +
-           " chunk that was expected there");
-    offset += kChunkHeaderSize;
-    if (size > bytes.size() - offset || size % 4 != 0)
-      fail("the chunk at byte " + std::to_string(offset) + " has " + std::to_string(size) +
-           " bytes, expected a multiple of 4 and at most " + std::to_string(bytes.size() - offset));
-    (type == kJsonChunk ? chunks.json : chunks.binary) = bytes.substr(offset, size);
-    offset += size;
-  }
-  if (offset != bytes.size()) fail("has bytes after its last chunk, at byte " + std::to_string(offset));
-  return chunks;
 }
 
 }  // namespace limber
