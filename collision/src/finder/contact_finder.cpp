@@ -4,8 +4,12 @@
 #include <cmath>
 #include <string>
 
-#include "finder/contact_finder_impl.h"
+#include "finder/body_register.h"
 #include "finder/contact_id.h"
+#include "finder/contact_regions.h"
+#include "finder/found_body.h"
+#include "finder/worker_pool.h"
+#include "finder/world_bounds.h"
 #include "tuning.h"
 
 namespace limber {
@@ -16,17 +20,9 @@ using internal::FoundBody;
 using internal::ModalGeometry;
 using internal::RegionSide;
 using internal::Worker;
-using internal::Workers;
-
-namespace {
-
-void check_length(const char* name, double length) {
-  if (!(length >= 0.0 && std::isfinite(length)))
-    throw InvalidArgument("ContactFinder: " + std::string(name) + " is " + std::to_string(length) +
-                          ", expected a finite number of at least 0");
-}
-
-}  // namespace
+using internal::world_box;
+using internal::world_half_space;
+using Workers = internal::WorkerPool<Worker>;
 
 void ContactFinderOptions::validate() const {
   clusters.validate();
@@ -36,16 +32,96 @@ void ContactFinderOptions::validate() const {
                             ", expected above 0");
 }
 
-void ContactFinder::Impl::set_finds_itself(Index body, bool finds) {
-  const auto where = std::lower_bound(self_touching.begin(), self_touching.end(), body);
-  const bool listed = where != self_touching.end() && *where == body;
-  if (finds && !listed) self_touching.insert(where, body);
-  if (!finds && listed) self_touching.erase(where);
-  at(body).finds_itself = finds;
+struct ContactFinder::Impl {
+  explicit Impl(const ContactFinderOptions& o) : options(o) { options.validate(); }
+
+  ContactFinderOptions options;
+  internal::GeometryCache geometries;
+  internal::BodyRegister<internal::FoundBody> bodies{"ContactFinder"};
+  Workers workers;
+
+  // Of the query under way.
+  ContactQuery query;
+  std::vector<Index> to_place;
+  std::vector<Aabb> boxes;  ///< by entry of to_place
+  std::vector<BodyPair> pairs;
+  struct Found {
+    std::vector<ContactPoint> contacts;
+    internal::ContactRegions regions;
+  };
+  std::vector<Found> found;          ///< by chunk of pairs
+  internal::ContactRegions regions;  ///< what contacts' regions are kept in
+
+  internal::KeptIds kept;  ///< of the last query
+
+  const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
+
+  void find_near_pairs(Jobs& jobs);
+  void make_boxes(Jobs& jobs);
+  void make_box(std::size_t entry, internal::Worker& worker);
+  void place();
+  void find_in_pairs(Jobs& jobs);
+  void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
+  internal::RegionSide region_side(Index body) const;
+  CollisionBody collision_body(Index body, internal::Worker& worker) const;
+  ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
+  void gather(std::vector<ContactPoint>& contacts);
+};
+
+// -- Which bodies are near each other ---------------------------------------------------------------------------------
+
+void ContactFinder::Impl::make_boxes(Jobs& jobs) {
+  boxes.resize(to_place.size());
+  jobs.parallel_for(to_place.size(), internal::collision_tuning().finder.bodies_per_chunk,
+                    [this](std::size_t begin, std::size_t end) {
+                      const Workers::Lease worker(workers);
+                      for (std::size_t i = begin; i < end; ++i) make_box(i, *worker);
+                    });
 }
 
+/// Of a body to be placed, in the world, from its amplitudes alone.
+void ContactFinder::Impl::make_box(std::size_t entry, Worker& worker) {
+  const Index index = to_place[entry];
+  const FoundBody& body = bodies[index];
+  if (body.modal) {
+    internal::bind_state("ContactFinder", index, worker.root, body.modal->surface, state(index).amplitudes);
+    boxes[entry] = world_box(worker.root.bounds(0), state(index).pose).grown(state(index).way());
+  } else if (!body.is_half_space()) {
+    boxes[entry] = world_box(*body.rigid, state(index).pose).grown(state(index).way());
+  }
+}
+
+void ContactFinder::Impl::place() {
+  BroadPhase& broad_phase = bodies.broad_phase();
+  for (std::size_t i = 0; i < to_place.size(); ++i) {
+    const Index index = to_place[i];
+    FoundBody& body = bodies[index];
+    if (body.is_half_space()) {
+      HalfSpace half_space = world_half_space(std::get<HalfSpace>(body.rigid->shape()), state(index).pose);
+      half_space.offset += state(index).way();
+      broad_phase.set_half_space(index, half_space);
+    } else {
+      broad_phase.set_box(index, boxes[i]);
+    }
+    body.placed_asleep = state(index).asleep;
+    broad_phase.set_asleep(index, body.placed_asleep);
+  }
+}
+
+void ContactFinder::Impl::find_near_pairs(Jobs& jobs) {
+  bodies.list_to_place(query, to_place);
+  workers.start_query(
+      jobs.concurrency(), [this] { return std::make_unique<Worker>(options); },
+      [](Worker& worker) { worker.pool.start_query(); });
+  make_boxes(jobs);
+  place();
+  bodies.find_pairs(query, pairs, jobs);
+}
+
+// -- Pairs ------------------------------------------------------------------------------------------------------------
+
 CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) const {
-  const FoundBody& body = at(index);
+  const FoundBody& body = bodies[index];
   const BodyState& s = state(index);
   CollisionBody result{.index = index, .X_WB = s.pose};
   result.displacement = s.displacement, result.rotation = s.rotation;
@@ -60,14 +136,14 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
 }
 
 ContactSpacing ContactFinder::Impl::spacing(const BodyPair& pair, bool by_regions) const {
-  const FoundBody &a = at(pair.a), &b = at(pair.b);
+  const FoundBody &a = bodies[pair.a], &b = bodies[pair.b];
   if (a.modes() == 0 && b.modes() == 0) return {};
   if (by_regions) return {.share = options.region_spacing};
   return {.length = options.spacing * std::min(a.diagonal, b.diagonal)};
 }
 
 RegionSide ContactFinder::Impl::region_side(Index index) const {
-  const FoundBody& body = at(index);
+  const FoundBody& body = bodies[index];
   if (!body.modal || !body.modal->surface->model()->data().residual_compliance) return {};
   return {body.modal->surface.get(), state(index).pose.q};
 }
@@ -123,13 +199,7 @@ ContactFinder& ContactFinder::operator=(ContactFinder&&) noexcept = default;
 
 void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
   Impl& m = *impl_;
-  if ((geometry.model == nullptr) == (geometry.shape == nullptr))
-    throw InvalidArgument("ContactFinder::add_body: body " + std::to_string(body) + " has " +
-                          (geometry.model ? "both a model and a shape" : "neither a model nor a shape") +
-                          ", expected one of them");
-  if (body < 0 || m.contains(body))
-    throw InvalidArgument("ContactFinder::add_body: index " + std::to_string(body) + (body < 0 ? "" : " holds a body") +
-                          ", expected a free index of at least 0");
+  m.bodies.check_new(body, geometry);
   FoundBody fresh{.present = true};
   if (geometry.model) {
     fresh.modal = m.geometries.get(geometry.model, geometry.skin);
@@ -138,47 +208,28 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
     fresh.rigid = m.geometries.get(geometry.shape);
     fresh.diagonal = 2.0 * fresh.rigid->bounds().half_extents().norm();
   }
-  m.broad_phase.add(body, filter);
-  if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
-  m.at(body) = std::move(fresh);
-  m.set_finds_itself(body, filter.self && m.at(body).modal);
+  m.bodies.add(body, std::move(fresh), filter);
 }
 
-void ContactFinder::remove_body(Index body) {
-  impl_->present(body, "remove_body");
-  impl_->set_finds_itself(body, false);
-  impl_->broad_phase.remove(body);
-  impl_->at(body) = {};
-}
+void ContactFinder::remove_body(Index body) { impl_->bodies.remove(body); }
 
-void ContactFinder::set_filter(Index body, const CollisionFilter& filter) {
-  const FoundBody& known = impl_->present(body, "set_filter");
-  impl_->broad_phase.set_filter(body, filter);
-  impl_->set_finds_itself(body, filter.self && known.modal);
-}
+void ContactFinder::set_filter(Index body, const CollisionFilter& filter) { impl_->bodies.set_filter(body, filter); }
 
-void ContactFinder::exclude_pair(Index a, Index b, bool excluded) {
-  impl_->present(a, "exclude_pair");
-  impl_->present(b, "exclude_pair");
-  impl_->broad_phase.exclude_pair(a, b, excluded);
-}
+void ContactFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodies.exclude_pair(a, b, excluded); }
 
 void ContactFinder::save_state(StateWriter& state) const { state(impl_->kept.pairs, impl_->kept.ids); }
 
 void ContactFinder::restore_state(StateReader& state) {
   state(impl_->kept.pairs, impl_->kept.ids);
-  for (FoundBody& body : impl_->bodies) body.placed_asleep = false;
+  impl_->bodies.forget_places();
 }
 
 void ContactFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
   Impl& m = *impl_;
-  check_length("margin", query.margin);
-  if (!query.origin.allFinite())
-    throw InvalidArgument("ContactFinder: origin is not finite, expected finite coordinates");
+  internal::check_query("ContactFinder", query);
   m.query = query;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
-  m.merge_self_pairs();
   clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
   m.find_in_pairs(jobs);
   m.gather(contacts);

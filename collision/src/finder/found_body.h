@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <tuple>
 #include <variant>
@@ -15,7 +14,6 @@
 #include "finder/surface_pool.h"
 #include "limber/collision/broad_phase.h"
 #include "limber/collision/contact_finder.h"
-#include "limber/core/error.h"
 
 namespace limber::internal {
 
@@ -23,16 +21,14 @@ struct FoundBody {
   bool present = false;
   std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
   std::shared_ptr<const RigidGeometry> rigid{};
-  bool finds_itself = false;
   double diagonal = 0.0;       ///< of its box at rest, m; infinite for a half-space
   bool placed_asleep = false;  ///< as its place in the broad phase was made
-  double placed_reach = 0.0;
 
   Index modes() const { return modal ? modal->surface->modes() : 0; }
   bool is_half_space() const { return rigid && std::holds_alternative<HalfSpace>(rigid->shape()); }
 };
 
-/// What one thread works with. Which of them does a task changes nothing but the time.
+/// What one thread works with.
 struct Worker {
   explicit Worker(const ContactFinderOptions& options) : narrow(options.narrow_phase), clusters(options.clusters) {}
   NarrowPhase narrow;
@@ -40,43 +36,6 @@ struct Worker {
   RegionFinder regions;
   SurfacePool pool;
   DeformedSurface root;  ///< for boxes of whole bodies
-};
-
-/// Lends workers to threads.
-class Workers {
- public:
-  void start_query(const ContactFinderOptions& options, int concurrency) {
-    while (all_.size() < static_cast<std::size_t>(concurrency)) all_.push_back(std::make_unique<Worker>(options));
-    free_.clear();
-    for (const auto& worker : all_) worker->pool.start_query(), free_.push_back(worker.get());
-  }
-  class Lease {
-   public:
-    explicit Lease(Workers& from) : from_(from), worker_(from.take()) {}
-    ~Lease() {
-      const std::lock_guard lock(from_.mutex_);
-      from_.free_.push_back(worker_);
-    }
-    Lease(const Lease&) = delete;
-    Lease& operator=(const Lease&) = delete;
-    Worker& operator*() const { return *worker_; }
-
-   private:
-    Workers& from_;
-    Worker* worker_;
-  };
-
- private:
-  Worker* take() {
-    const std::lock_guard lock(mutex_);
-    if (free_.empty()) throw ComputationError("ContactFinder: Jobs runs more loop bodies at once than concurrency()");
-    Worker* worker = free_.back();
-    free_.pop_back();
-    return worker;
-  }
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<Worker>> all_;
-  std::vector<Worker*> free_;
 };
 
 /// What was kept of one pair: a range of ids.

@@ -19,40 +19,47 @@ struct ModalGeometry {
   std::optional<RestVolume> volume;
 };
 
-/// Lives as long as a body has it.
+/// What is made once of each key, and lives as long as someone has it. A value keeps its key alive, so that its address
+/// is not another's.
+template <class Key, class Value>
+class SharedByKey {
+ public:
+  template <class Make>
+  std::shared_ptr<const Value> get(const Key* key, const Make& make) {
+    if (const auto known = map_.find(key); known != map_.end())
+      if (auto value = known->second.lock()) return value;
+    std::shared_ptr<const Value> value = make();
+    std::erase_if(map_, [](const auto& entry) { return entry.second.expired(); });
+    map_[key] = value;
+    return value;
+  }
+
+ private:
+  std::unordered_map<const Key*, std::weak_ptr<const Value>> map_;
+};
+
 class GeometryCache {
  public:
   std::shared_ptr<const ModalGeometry> get(const std::shared_ptr<const ModalModel>& model, bool skin) {
-    return find(skin ? skinned_ : modal_, model.get(),
-                [&] { return std::make_shared<const ModalGeometry>(model, skin); });
+    return (skin ? skinned_ : modal_).get(model.get(), [&] {
+      return std::make_shared<const ModalGeometry>(model, skin);
+    });
   }
-  /// The entry keeps the shape alive, so that its address is not another's.
   std::shared_ptr<const RigidGeometry> get(const std::shared_ptr<const Shape>& shape) {
     struct Entry {
       explicit Entry(std::shared_ptr<const Shape> s) : shape(std::move(s)), geometry(*shape) {}
       std::shared_ptr<const Shape> shape;
       RigidGeometry geometry;
     };
-    return find(rigid_, shape.get(), [&] {
+    return rigid_.get(shape.get(), [&] {
       auto entry = std::make_shared<const Entry>(shape);
       return std::shared_ptr<const RigidGeometry>(entry, &entry->geometry);
     });
   }
 
  private:
-  template <class Key, class Value, class Make>
-  static std::shared_ptr<const Value> find(std::unordered_map<const Key*, std::weak_ptr<const Value>>& map,
-                                           const Key* key, const Make& make) {
-    if (const auto known = map.find(key); known != map.end())
-      if (auto value = known->second.lock()) return value;
-    std::shared_ptr<const Value> value = make();
-    std::erase_if(map, [](const auto& entry) { return entry.second.expired(); });
-    map[key] = value;
-    return value;
-  }
-
-  std::unordered_map<const ModalModel*, std::weak_ptr<const ModalGeometry>> modal_, skinned_;
-  std::unordered_map<const Shape*, std::weak_ptr<const RigidGeometry>> rigid_;
+  SharedByKey<ModalModel, ModalGeometry> modal_, skinned_;
+  SharedByKey<Shape, RigidGeometry> rigid_;
 };
 
 }  // namespace limber::internal

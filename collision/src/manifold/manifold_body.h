@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <variant>
 
@@ -33,21 +32,6 @@ struct ManifoldShape {
   std::optional<MeshFacets> facets{};  ///< of meshes and height fields
 };
 
-class ManifoldShapes {
- public:
-  std::shared_ptr<const ManifoldShape> get(const std::shared_ptr<const Shape>& shape) {
-    if (const auto known = map_.find(shape.get()); known != map_.end())
-      if (auto value = known->second.lock()) return value;
-    auto value = std::make_shared<const ManifoldShape>(shape);
-    std::erase_if(map_, [](const auto& entry) { return entry.second.expired(); });
-    map_[shape.get()] = value;
-    return value;
-  }
-
- private:
-  std::unordered_map<const Shape*, std::weak_ptr<const ManifoldShape>> map_;
-};
-
 /// The size that motions are measured by: of solids and sheets the least extent, but a hundredth of the largest; of
 /// meshes that others stand on the largest.
 inline double thickness_of(const Aabb& box, bool ground) {
@@ -59,8 +43,7 @@ struct ManifoldBody {
   bool present = false;
   std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
   std::shared_ptr<const ManifoldShape> rigid{};
-  std::optional<InnerBall> inner{};  ///< none: the shape holds no ball that is known
-  bool finds_itself = false;
+  std::optional<InnerBall> inner{};      ///< none: the shape holds no ball that is known
   double thickness = 0.0, radius = 0.0;  ///< thickness_of() its box at rest; farthest point from the origin, m
 
   // As it was placed for the last query.

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "field/field_pairs.h"
+#include "finder/body_register.h"
 #include "finder/contact_id.h"
-#include "limber/collision/broad_phase.h"
+#include "finder/worker_pool.h"
 #include "limber/core/error.h"
 #include "manifold/contact_graph.h"
 #include "manifold/manifold_points.h"
@@ -34,47 +34,7 @@ namespace {
 constexpr double kSameNormal = 1e-3;                   // length of the difference of two normals that are one
 constexpr internal::FeatureKey kInside = 0xffffffffu;  // a body's inner ball: of a kind that no feature has
 
-[[noreturn]] void refuse_state(Index body, const std::string& seen, const std::string& expected) {
-  throw InvalidArgument("ManifoldFinder: state of body " + std::to_string(body) + ": " + seen + ", expected " +
-                        expected);
-}
-
-void check_body_state(Index index, const ManifoldBody& body, const BodyState& state) {
-  const double unit = internal::collision_tuning().finder.unit_quaternion;
-  if (!state.pose.p.allFinite()) refuse_state(index, "pose.p is not finite", "finite coordinates");
-  if (!(std::abs(state.pose.q.norm() - 1.0) <= unit))
-    refuse_state(index, "pose.q has length " + std::to_string(state.pose.q.norm()), "1");
-  if (!state.displacement.allFinite() || !state.rotation.allFinite())
-    refuse_state(index, "displacement or rotation is not finite", "finite numbers");
-  if (!(state.reach >= 0.0 && std::isfinite(state.reach)))
-    refuse_state(index, "reach is " + std::to_string(state.reach), "a finite number of at least 0");
-  if (state.amplitudes.size() != static_cast<std::size_t>(body.modes()))
-    refuse_state(index, std::to_string(state.amplitudes.size()) + " amplitudes", std::to_string(body.modes()));
-  const auto check_finite = [index](std::span<const double> numbers, const char* name) {
-    for (std::size_t i = 0; i < numbers.size(); ++i)
-      if (!std::isfinite(numbers[i]))
-        refuse_state(index, std::string(name) + "[" + std::to_string(i) + "] is not finite", "finite numbers");
-  };
-  check_finite(state.amplitudes, "amplitudes");
-  if (!std::isfinite(state.doubt)) return;
-  if (!(state.doubt >= 0.0)) refuse_state(index, "doubt is " + std::to_string(state.doubt), "at least 0");
-  if (!state.end_pose.p.allFinite() || !(std::abs(state.end_pose.q.norm() - 1.0) <= unit))
-    refuse_state(index, "end_pose is not a pose", "finite coordinates and a quaternion of length 1");
-  if (state.end_amplitudes.size() != state.amplitudes.size())
-    refuse_state(index, std::to_string(state.end_amplitudes.size()) + " end_amplitudes", std::to_string(body.modes()));
-  check_finite(state.end_amplitudes, "end_amplitudes");
-}
-
-/// Binds amplitudes that nobody has looked at yet; what is wrong with them is told with the body's name.
-void bind_body_state(DeformedSurface& surface, Index index, const ManifoldBody& body, const BodyState& state) {
-  try {
-    surface.bind(body.modal->surface, state.amplitudes, BoundsChoice::kAmplitudes);
-  } catch (const InvalidArgument& e) {
-    refuse_state(index, e.what(), "smaller amplitudes");
-  }
-}
-
-/// What one thread works with. Which of them does a task changes nothing but the time.
+/// What one thread works with.
 struct ManifoldWorker {
   explicit ManifoldWorker(const NarrowPhaseOptions& options) : pairs(options) {}
   PairFinder pairs;
@@ -84,43 +44,7 @@ struct ManifoldWorker {
   std::vector<KeptPoint> made{};  // a manifold under way
   std::vector<double> gaps{};     // of these, where they were found
 };
-
-class ManifoldWorkers {
- public:
-  void start_query(const NarrowPhaseOptions& options, internal::DeformingPairs* deforming, int concurrency) {
-    while (all_.size() < static_cast<std::size_t>(concurrency))
-      all_.push_back(std::make_unique<ManifoldWorker>(options));
-    free_.clear();
-    for (const auto& worker : all_) worker->pairs.start_query(deforming), free_.push_back(worker.get());
-  }
-  class Lease {
-   public:
-    explicit Lease(ManifoldWorkers& from) : from_(from), worker_(from.take()) {}
-    ~Lease() {
-      const std::lock_guard lock(from_.mutex_);
-      from_.free_.push_back(worker_);
-    }
-    Lease(const Lease&) = delete;
-    Lease& operator=(const Lease&) = delete;
-    ManifoldWorker& operator*() const { return *worker_; }
-
-   private:
-    ManifoldWorkers& from_;
-    ManifoldWorker* worker_;
-  };
-
- private:
-  ManifoldWorker* take() {
-    const std::lock_guard lock(mutex_);
-    if (free_.empty()) throw ComputationError("ManifoldFinder: Jobs runs more loop bodies at once than concurrency()");
-    ManifoldWorker* worker = free_.back();
-    free_.pop_back();
-    return worker;
-  }
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<ManifoldWorker>> all_;
-  std::vector<ManifoldWorker*> free_;
-};
+using ManifoldWorkers = internal::WorkerPool<ManifoldWorker>;
 
 }  // namespace
 
@@ -140,22 +64,17 @@ struct ManifoldFinder::Impl {
 
   ManifoldFinderOptions options;
   internal::GeometryCache geometries;
-  internal::ManifoldShapes shapes;
-  std::vector<ManifoldBody> bodies;
-  std::vector<Index> self_touching;  ///< bodies that find themselves, ascending
-  BroadPhase broad_phase;
+  internal::SharedByKey<Shape, internal::ManifoldShape> shapes;
+  internal::BodyRegister<ManifoldBody> bodies{"ManifoldFinder"};
   ContactGraph graph;
   std::unique_ptr<internal::DeformingPairs> deforming;  ///< null: NarrowPhase finds all contacts of what deforms
   ManifoldWorkers workers;
 
   // Of the query under way.
-  std::span<const BodyState> states;
-  std::span<const Index> awake;
-  double margin = 0.0;
-  Vec3 origin = Vec3::Zero(), fall = Vec3::Zero();
+  ContactQuery query;
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
-  std::vector<BodyPair> pairs, merged_pairs;
+  std::vector<BodyPair> pairs;
   std::vector<std::uint8_t> recycled;                ///< by pair
   std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
   std::vector<internal::SupportPlane> planes_a, planes_b;
@@ -163,26 +82,14 @@ struct ManifoldFinder::Impl {
   std::vector<std::size_t> first_of, counts;  ///< by pair: of its contacts, and how many
   Counts told;
 
-  ManifoldBody& present(Index body, const char* function) {
-    if (!contains(body))
-      throw InvalidArgument("ManifoldFinder::" + std::string(function) + ": index " + std::to_string(body) +
-                            " holds no body, expected one that was added");
-    return at(body);
-  }
-  bool contains(Index body) const {
-    return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).present;
-  }
-  ManifoldBody& at(Index body) { return bodies[static_cast<std::size_t>(body)]; }
-  const ManifoldBody& at(Index body) const { return bodies[static_cast<std::size_t>(body)]; }
-  const BodyState& state(Index body) const { return states[static_cast<std::size_t>(body)]; }
+  ManifoldBody& at(Index body) { return bodies[body]; }
+  const ManifoldBody& at(Index body) const { return bodies[body]; }
+  const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
 
-  void set_finds_itself(Index body, bool finds);
-  void check_and_list();
   void make_boxes(Jobs& jobs);
   Aabb swept_box(Index body) const;
   void place();
   void find_near_pairs(Jobs& jobs);
-  void merge_self_pairs();
   bool by_fields(const BodyPair& pair) const {
     return deforming && (at(pair.a).modal || at(pair.b).modal) && deforming->takes(pair.a, pair.b);
   }
@@ -221,38 +128,13 @@ struct ManifoldFinder::Impl {
 
 // -- Bodies in the broad phase ----------------------------------------------------------------------------------------
 
-void ManifoldFinder::Impl::set_finds_itself(Index body, bool finds) {
-  const auto where = std::lower_bound(self_touching.begin(), self_touching.end(), body);
-  const bool listed = where != self_touching.end() && *where == body;
-  if (finds && !listed) self_touching.insert(where, body);
-  if (!finds && listed) self_touching.erase(where);
-  at(body).finds_itself = finds;
-}
-
-/// Refuses states before anything is changed, and lists the bodies whose place is to be made anew.
-void ManifoldFinder::Impl::check_and_list() {
-  to_place.clear();
-  const auto list = [this](Index index) {
-    if (static_cast<std::size_t>(index) >= states.size())
-      throw InvalidArgument("ManifoldFinder: " + std::to_string(states.size()) + " states, expected one for body " +
-                            std::to_string(index) + " too");
-    if (state(index).asleep && at(index).placed_asleep) return;
-    check_body_state(index, at(index), state(index));
-    to_place.push_back(index);
-  };
-  for (std::size_t i = 0; awake.empty() && i < bodies.size(); ++i)
-    if (bodies[i].present) list(static_cast<Index>(i));
-  for (const Index index : awake)
-    if (contains(index)) list(index);
-}
-
 /// About all that a deforming body is expected to pass through until the next query, straight on.
 Aabb ManifoldFinder::Impl::swept_box(Index body) const {
   const BodyState& s = state(body);
   const Aabb bounds = deforming->bounds(body);
   Aabb box = internal::world_box(bounds, s.pose);
   box.include(internal::world_box(bounds.grown(deforming->largest_swing(body)), s.end_pose));
-  return box.grown(s.doubt + fall.norm());
+  return box.grown(s.doubt + query.fall.norm());
 }
 
 /// About all that a body may pass through until the next query.
@@ -265,7 +147,9 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                         const ManifoldBody& body = at(to_place[i]);
                         const BodyState& s = state(to_place[i]);
                         if (body.half_space() != nullptr) continue;
-                        if (body.modal) bind_body_state((*worker).root, to_place[i], body, s);
+                        if (body.modal)
+                          internal::bind_state("ManifoldFinder", to_place[i], (*worker).root, body.modal->surface,
+                                               s.amplitudes);
                         Aabb& box = boxes[i];
                         if (body.modal && deforming && deforming->has(to_place[i]) && std::isfinite(s.doubt)) {
                           box = swept_box(to_place[i]);
@@ -280,6 +164,7 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
 }
 
 void ManifoldFinder::Impl::place() {
+  BroadPhase& broad_phase = bodies.broad_phase();
   for (std::size_t i = 0; i < to_place.size(); ++i) {
     const Index index = to_place[i];
     ManifoldBody& body = at(index);
@@ -299,30 +184,14 @@ void ManifoldFinder::Impl::place() {
 }
 
 void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
-  check_and_list();
-  workers.start_query(options.narrow_phase, deforming.get(), jobs.concurrency());
-  if (deforming) deforming->start_query(bodies, states, to_place, jobs);
+  bodies.list_to_place(query, to_place);
+  workers.start_query(
+      jobs.concurrency(), [this] { return std::make_unique<ManifoldWorker>(options.narrow_phase); },
+      [this](ManifoldWorker& worker) { worker.pairs.start_query(deforming.get()); });
+  if (deforming) deforming->start_query(bodies.all(), query.states, to_place, jobs);
   make_boxes(jobs);
   place();
-  broad_phase.find_pairs(margin, pairs, jobs);
-  for (const auto& [a, b] : pairs)
-    for (const Index index : {a, b})
-      if (state(index).asleep) check_body_state(index, at(index), state(index));
-}
-
-/// Bodies that find themselves and are awake, among the pairs in their order.
-void ManifoldFinder::Impl::merge_self_pairs() {
-  if (self_touching.empty()) return;
-  merged_pairs.clear();
-  auto next = pairs.begin();
-  for (const Index body : self_touching) {
-    if (state(body).asleep) continue;
-    const BodyPair self{body, body};
-    for (; next != pairs.end() && *next < self; ++next) merged_pairs.push_back(*next);
-    merged_pairs.push_back(self);
-  }
-  merged_pairs.insert(merged_pairs.end(), next, pairs.end());
-  pairs.swap(merged_pairs);
+  bodies.find_pairs(query, pairs, jobs);
 }
 
 // -- Manifolds --------------------------------------------------------------------------------------------------------
@@ -334,7 +203,7 @@ PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
   q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
   if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
-  q.reach = margin + a.reach + b.reach + q.passing.way.norm();
+  q.reach = query.margin + a.reach + b.reach + q.passing.way.norm();
   if (by_fields(pair)) expect(q);
   return q;
 }
@@ -347,8 +216,8 @@ void ManifoldFinder::Impl::expect(PairQuery& q) const {
   const auto beside = [](const BodyState& s) { return std::isfinite(s.doubt) ? s.doubt : s.reach; };
   q.by_fields = true;
   q.X_AB_end = end_of(q.state_a).inverse() * end_of(q.state_b);
-  q.near = margin + beside(q.state_a) + beside(q.state_b);
-  q.fall = q.state_a.pose.q.conjugate() * fall;
+  q.near = query.margin + beside(q.state_a) + beside(q.state_b);
+  q.fall = q.state_a.pose.q.conjugate() * query.fall;
 }
 
 RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q, const RigidTransform& X_AB) const {
@@ -605,8 +474,8 @@ std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pa
   const bool by_fields = this->by_fields(pair);
   const PairQuery q =
       by_fields ? query_of(pair) : PairQuery{.a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
-  const double near_enough = by_fields ? q.near : margin + a.reach + b.reach;
-  const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - origin;
+  const double near_enough = by_fields ? q.near : query.margin + a.reach + b.reach;
+  const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - query.origin;
   std::size_t count = 0;
   for (const KeptPoint& point : live.points) {
     const Measured m = measure(point, pair, worker);
@@ -749,18 +618,13 @@ ManifoldFinder& ManifoldFinder::operator=(ManifoldFinder&&) noexcept = default;
 void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const CollisionFilter& filter) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Impl& m = *impl_;
-  if ((geometry.model == nullptr) == (geometry.shape == nullptr))
-    throw InvalidArgument("ManifoldFinder::add_body: body " + std::to_string(body) + " has " +
-                          (geometry.model ? "both a model and a shape" : "neither a model nor a shape") +
-                          ", expected one of them");
-  if (body < 0 || m.contains(body))
-    throw InvalidArgument("ManifoldFinder::add_body: index " + std::to_string(body) +
-                          (body < 0 ? "" : " holds a body") + ", expected a free index of at least 0");
+  m.bodies.check_new(body, geometry);
   ManifoldBody fresh{.present = true};
   if (geometry.model) {
     fresh.modal = m.geometries.get(geometry.model, geometry.skin);
   } else {
-    fresh.rigid = m.shapes.get(geometry.shape);
+    fresh.rigid = m.shapes.get(geometry.shape.get(),
+                               [&] { return std::make_shared<const internal::ManifoldShape>(geometry.shape); });
   }
   const Aabb box = fresh.modal ? fresh.modal->surface->rest_bounds() : fresh.rigid->geometry.bounds();
   fresh.thickness = fresh.half_space() ? kInfinity : internal::thickness_of(box, fresh.rigid && !fresh.core());
@@ -769,34 +633,20 @@ void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const Co
   else if (fresh.core())
     fresh.inner = internal::inner_ball(*fresh.core());
   fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
-  m.broad_phase.add(body, filter);
-  if (static_cast<std::size_t>(body) >= m.bodies.size()) m.bodies.resize(static_cast<std::size_t>(body) + 1);
   m.graph.reserve(fresh.modes());
-  m.at(body) = std::move(fresh);
-  m.set_finds_itself(body, filter.self && m.at(body).modal);
+  m.bodies.add(body, std::move(fresh), filter);
   if (m.deforming) m.deforming->add_body(body, m.at(body));
 }
 
 void ManifoldFinder::remove_body(Index body) {
-  impl_->present(body, "remove_body");
-  impl_->set_finds_itself(body, false);
+  impl_->bodies.remove(body);
   impl_->graph.forget(body);
-  impl_->broad_phase.remove(body);
   if (impl_->deforming) impl_->deforming->remove_body(body);
-  impl_->at(body) = {};
 }
 
-void ManifoldFinder::set_filter(Index body, const CollisionFilter& filter) {
-  const ManifoldBody& known = impl_->present(body, "set_filter");
-  impl_->broad_phase.set_filter(body, filter);
-  impl_->set_finds_itself(body, filter.self && known.modal);
-}
+void ManifoldFinder::set_filter(Index body, const CollisionFilter& filter) { impl_->bodies.set_filter(body, filter); }
 
-void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) {
-  impl_->present(a, "exclude_pair");
-  impl_->present(b, "exclude_pair");
-  impl_->broad_phase.exclude_pair(a, b, excluded);
-}
+void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodies.exclude_pair(a, b, excluded); }
 
 void ManifoldFinder::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(impl_->graph.living()));
@@ -810,21 +660,15 @@ void ManifoldFinder::restore_state(StateReader& state) {
     const auto b = state.read<Index>();
     state(impl_->graph.append({a, b}));
   }
-  for (ManifoldBody& body : impl_->bodies) body.placed_asleep = false;
+  impl_->bodies.forget_places();
 }
 
 void ManifoldFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
   Impl& m = *impl_;
-  if (!(query.margin >= 0.0 && std::isfinite(query.margin)))
-    throw InvalidArgument("ManifoldFinder: margin is " + std::to_string(query.margin) +
-                          ", expected a finite number of at least 0");
-  if (!query.origin.allFinite() || !query.fall.allFinite())
-    throw InvalidArgument("ManifoldFinder: origin or fall is not finite, expected finite coordinates");
-  m.states = query.states, m.awake = query.awake;
-  m.margin = query.margin, m.origin = query.origin, m.fall = query.fall;
+  internal::check_query("ManifoldFinder", query);
+  m.query = query;
   StageClock clock(query.times);
   m.find_near_pairs(jobs);
-  m.merge_self_pairs();
   clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.pairs.size()));
   m.find_manifolds(jobs);
   m.level_seams();
