@@ -136,7 +136,7 @@ void pose(Program& program, const Arguments& a) {
   report["joints"] = session.model().joints.size();
   report["cells"] = session.cells().size();
   report["frames"] = Json::array();
-  std::size_t converged = 0;
+  std::size_t converged = 0, away = 0;
   double seconds = 0.0;
   program.progress().stage("posing");
   for (std::size_t f = 0; f < handles.frames.size(); ++f) {
@@ -148,7 +148,8 @@ void pose(Program& program, const Arguments& a) {
     if (result.status == PoseResult::Status::kInfeasible)
       throw ComputationError(
           fmt::format("{} frames[{}]: joints, limits and pins contradict each other", handles_name, f));
-    converged += result.status == PoseResult::Status::kConverged ? 1 : 0;
+    away += result.status == PoseResult::Status::kLocalMinimum ? 1 : 0;
+    converged += result.status == PoseResult::Status::kConverged || result.status == PoseResult::Status::kLocalMinimum;
     report["frames"].push_back(json_of(result, frame.time));
     recording.add(frame.time, session);
     if (!a.obj.empty()) {
@@ -169,8 +170,9 @@ void pose(Program& program, const Arguments& a) {
         fmt::format("A part that bends has {} morph targets, one a frame, but many viewers hold at most {}.",
                     recording.most_targets(), kMaxMorphTargets));
   report["seconds"] = {{"posing", seconds}};
-  program.print(fmt::format("{} parts, {} joints, {} cells; {} frames, {} converged\n", session.model().parts.size(),
-                            session.model().joints.size(), session.cells().size(), handles.frames.size(), converged));
+  program.print(fmt::format("{} parts, {} joints, {} cells; {} frames, {} converged{}\n", session.model().parts.size(),
+                            session.model().joints.size(), session.cells().size(), handles.frames.size(), converged,
+                            away > 0 ? fmt::format(", a handle out of reach in {}", away) : ""));
 }
 
 }  // namespace

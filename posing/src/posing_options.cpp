@@ -25,6 +25,8 @@ std::string_view to_string(PoseResult::Status status) {
   switch (status) {
     case PoseResult::Status::kConverged:
       return "converged";
+    case PoseResult::Status::kLocalMinimum:
+      return "local minimum";
     case PoseResult::Status::kIterationLimit:
       return "iteration limit";
     case PoseResult::Status::kStalled:

@@ -64,7 +64,7 @@ export class PoseEngine {
     const at = this.module._pose_solve();
     this.check(at !== 0);
     const [status, iterations, energy, jointError, limitViolation, handleError] = this.doubles(at, 6);
-    return { status: ['converged', 'going on', 'stalled', 'infeasible'][status], iterations, energy, jointError, limitViolation, handleError };
+    return { status: ['converged', 'local minimum', 'going on', 'stalled', 'infeasible'][status], iterations, energy, jointError, limitViolation, handleError };
   }
   modelText() { return this.module.UTF8ToString(this.module._pose_model_text()); }
   jointsText() { return this.module.UTF8ToString(this.module._pose_joints_text()); }

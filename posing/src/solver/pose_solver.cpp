@@ -88,24 +88,19 @@ Feasibility feasibility(const PoseStructure& structure, const Pose& pose) {
   return out;
 }
 
-/// Rows at a pose: joints, then limits.
-struct PoseSolver::Linearised {
-  /// Energy that the pose has for not quite meeting joints and limits.
-  double worth(const VectorX& multipliers) const {
-    double out = 0.0;
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      out += std::abs(multipliers[static_cast<Eigen::Index>(i)]) *
-             (pushes[i] ? std::max(0.0, rows[i].value) : std::abs(rows[i].value));
-    return out;
-  }
-  std::vector<Row> rows{};
-  std::vector<bool> pushes{};
-  VectorX values() const {
-    VectorX out(static_cast<Eigen::Index>(rows.size()));
-    for (std::size_t i = 0; i < rows.size(); ++i) out[static_cast<Eigen::Index>(i)] = rows[i].value;
-    return out;
-  }
-};
+double PoseSolver::Linearised::worth(const VectorX& multipliers) const {
+  double out = 0.0;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    out += std::abs(multipliers[static_cast<Eigen::Index>(i)]) *
+           (pushes[i] ? std::max(0.0, rows[i].value) : std::abs(rows[i].value));
+  return out;
+}
+
+VectorX PoseSolver::Linearised::values() const {
+  VectorX out(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) out[static_cast<Eigen::Index>(i)] = rows[i].value;
+  return out;
+}
 
 PoseSolver::PoseSolver(const PoseStructure& structure, const PosingOptions& options, std::vector<HandleTerm> handles)
     : structure_(&structure),
@@ -224,23 +219,25 @@ void PoseSolver::bring_along(const VectorX& interface, VectorX& all, Pose& pose)
       pose.bodies[b] = moved(pose.bodies[b], all.segment<6>(d));
 }
 
-/// The matrix. All second derivatives of energy and joints make steps Newton's; joints' own rows are added as stiff
-/// springs, which changes no step that keeps them and makes the matrix positive where only the joints hold it. Where it
-/// still is not, far from where it is going, it is that of single bodies: the positive part of what all forces on each,
-/// its joints' too, give its turning.
-void PoseSolver::make_matrix(const Pose& pose, const BodyLoads& acting, const Linearised& at,
-                             const std::vector<Mat3>& R) {
-  if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
-    multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
+/// All second derivatives of energy and joints make steps Newton's; joints' own rows are added as stiff springs, which
+/// changes no step that keeps them and makes the matrix positive where only the joints hold it. Where it still is not,
+/// far from where it is going, it is that of single bodies: the positive part of what all forces on each, its joints'
+/// too, give its turning.
+PoseSolver::Curvature PoseSolver::curvature(const Pose& pose, const BodyLoads& acting, const Linearised& at) const {
   const Moments moments = joint_moments(acting, at);
-  std::vector<TwistMatrix> whole = handle_stiffness(), single = whole;
-  for (std::size_t b = 0; b < whole.size(); ++b) {
+  Curvature out{.whole = handle_stiffness(), .single = {}, .joints = joint_terms(pose, at)};
+  out.single = out.whole;
+  for (std::size_t b = 0; b < out.whole.size(); ++b) {
     const Mat3 damping = damping_ * moments.most[b] * Mat3::Identity();
-    whole[b].topLeftCorner<3, 3>() += turning_stiffness(acting.moments[b]) + damping;
-    single[b].topLeftCorner<3, 3>() += positive_part(turning_stiffness(moments.all[b])) + damping;
+    out.whole[b].topLeftCorner<3, 3>() += turning_stiffness(acting.moments[b]) + damping;
+    out.single[b].topLeftCorner<3, 3>() += positive_part(turning_stiffness(moments.all[b])) + damping;
   }
-  if (system_.factor(R, whole, joint_terms(pose, at))) return;
-  if (!system_.factor(R, single, {}))
+  return out;
+}
+
+void PoseSolver::make_matrix(const Curvature& curvature, const std::vector<Mat3>& R) {
+  factor_.whole = system_.factor(R, curvature.whole, curvature.joints);
+  if (!factor_.whole && !system_.factor(R, curvature.single, {}))
     throw ComputationError("posing: the strain matrix is not positive definite, expected finite poses");
 }
 
@@ -305,8 +302,10 @@ struct PoseSolver::Direction {
 PoseSolver::Direction PoseSolver::direction(const Pose& pose, const Linearised& at) {
   const std::vector<Mat3> R = rotations_of(pose.bodies);
   const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
+  if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
+    multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
   if (factor_.age < 0) {
-    make_matrix(pose, acting, at, R);
+    make_matrix(curvature(pose, acting, at), R);
     pairs_.clear();
     last_.moved.resize(0);
   }
@@ -316,8 +315,6 @@ PoseSolver::Direction PoseSolver::direction(const Pose& pose, const Linearised& 
     if (const Index d = system_.dof(static_cast<Index>(b)); d >= 0) out.residual.segment<6>(d) = acting.gradient[b];
   VectorX interface;
   system_.reduce(-out.residual, interface);
-  if (multipliers_.size() != static_cast<Eigen::Index>(at.rows.size()))
-    multipliers_.setZero(static_cast<Eigen::Index>(at.rows.size()));
   solve_bounded(system_.compliance(at.rows), at.values() + system_.apply(at.rows, interface), at.pushes, multipliers_);
   system_.subtract_response(at.rows, multipliers_, interface);
   system_.expand(interface, out.plain);
@@ -405,6 +402,25 @@ PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
   return out;
 }
 
+double PoseSolver::handle_error(const Pose& pose) const {
+  double out = 0.0;
+  for (const HandleTerm& h : handles_)
+    out = std::max(out, (pose.bodies[static_cast<std::size_t>(h.body)] * h.arm - h.target).norm());
+  return out;
+}
+
+/// Whether a handle is not where it is led although nothing is strained: joints and limits alone keep it away.
+bool PoseSolver::misses(const Pose& pose, double value) const {
+  return handle_error(pose) > options_.tolerance * structure_->size &&
+         strain_energy(*structure_, pose.bodies, rotations_of(pose.bodies)) <= options_.energy_tolerance * value;
+}
+
+/// Whether a pose at which steps end needs no look at its second derivative: it meets its handles, or it is strained
+/// and the last matrix was whole.
+bool PoseSolver::is_sure(const Pose& pose, double value) const {
+  return !misses(pose, value) && (factor_.whole || handle_error(pose) <= options_.tolerance * structure_->size);
+}
+
 PoseResult PoseSolver::solve(Pose& pose) {
   using Status = PoseResult::Status;
   PoseResult result;
@@ -415,9 +431,7 @@ PoseResult PoseSolver::solve(Pose& pose) {
     result.energy = energy(at);
     const Feasibility f = feasibility(*structure_, at);
     result.joint_error = f.joints, result.limit_violation = std::max(0.0, f.limits);
-    for (const HandleTerm& h : handles_)
-      result.handle_error =
-          std::max(result.handle_error, (at.bodies[static_cast<std::size_t>(h.body)] * h.arm - h.target).norm());
+    result.handle_error = handle_error(at);
     return result;
   };
   if (damping_ > 0.0) factor_.age = kAnew;
@@ -438,7 +452,8 @@ PoseResult PoseSolver::solve(Pose& pose) {
     const Step done = step(trial, value);
     ++result.iterations;
     result.last_step = done.moved;
-    if (done.outcome == Step::Outcome::kLast) status = Status::kConverged;
+    if (done.outcome == Step::Outcome::kLast && (is_sure(trial, value) || !leave_saddle(trial, value)))
+      status = misses(trial, value) ? Status::kLocalMinimum : Status::kConverged;
     if (done.outcome == Step::Outcome::kRejected && damping_ > kLargestDamping) status = Status::kStalled;
   }
   pose = std::move(trial);

@@ -28,7 +28,8 @@ Feasibility feasibility(const PoseStructure& structure, const Pose& pose);
 /// stiffness of all loads, so that it is Newton's but for negative curvature). The step follows from a dense problem in
 /// the multipliers of joints and limits alone; the trial pose is put back onto the joints and taken if
 /// its energy is lower; else the step is shortened, or the next damped more. Poses between are feasible too. The matrix
-/// is kept from call to call, with what steps since have told of it, and made anew where that saves time.
+/// is kept from call to call, with what steps since have told of it, and made anew where that saves time. Where steps
+/// end at a saddle, the pose goes on along its way of negative curvature.
 class PoseSolver {
  public:
   /// The structure must outlive the solver.
@@ -41,7 +42,14 @@ class PoseSolver {
   void set_targets(const std::vector<Vec3>& targets);
 
  private:
-  struct Linearised;
+  /// Rows at a pose: joints, then limits.
+  struct Linearised {
+    /// Energy that the pose has for not quite meeting joints and limits.
+    double worth(const VectorX& multipliers) const;
+    VectorX values() const;
+    std::vector<Row> rows{};
+    std::vector<bool> pushes{};
+  };
   struct Step {
     double moved = 0.0;  // a point at most, of the size
     enum class Outcome { kTaken, kRejected, kLast } outcome = Outcome::kTaken;
@@ -51,7 +59,23 @@ class PoseSolver {
   void bring_along(const VectorX& interface, VectorX& all, Pose& pose);
   void tell_turns(Pose& pose) const;
   Linearised linearise(const Pose& pose) const;
-  void make_matrix(const Pose& pose, const BodyLoads& acting, const Linearised& at, const std::vector<Mat3>& R);
+  /// Second derivatives of what is not strain: their whole, and what is sure to be positive, of single bodies.
+  struct Curvature {
+    std::vector<TwistMatrix> whole{}, single{};
+    std::vector<PairTerm> joints{};
+  };
+  Curvature curvature(const Pose& pose, const BodyLoads& acting, const Linearised& at) const;
+  void make_matrix(const Curvature& curvature, const std::vector<Mat3>& R);
+  VectorX surplus(const Curvature& curvature, const VectorX& twists) const;
+  struct Descent {
+    VectorX way{};
+    double curvature = 0.0;  // wayᵀ H way, < 0; 0: there is no such way
+  };
+  Descent way_of_descent(const Pose& pose);
+  bool leave_saddle(Pose& pose, double& value);
+  double handle_error(const Pose& pose) const;
+  bool misses(const Pose& pose, double value) const;
+  bool is_sure(const Pose& pose, double value) const;
   struct Moments {
     std::vector<Mat3> all{};
     std::vector<double> most{};
@@ -80,6 +104,7 @@ class PoseSolver {
   struct {
     int age = -1;           // steps that the matrix has been used for; −1: it is to be made anew
     double promised = 0.0;  // decrease by the step before
+    bool whole = false;     // made of all second derivatives, and positive definite: the pose was near a minimum
   } factor_;
   SecantPairs pairs_;  // since the matrix was made, of steps along the rows that are held now
   struct {

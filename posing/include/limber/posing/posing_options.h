@@ -28,7 +28,9 @@ struct PosingOptions {
 
 struct PoseResult {
   enum class Status {
-    kConverged,       ///< one of the two tolerances was met
+    kConverged,     ///< a minimum: one of the two tolerances was met
+    kLocalMinimum,  ///< a minimum, and a handle is further off than the tolerance although nothing is strained: out of
+                    ///< reach, or met by a pose that no steady decrease leads to from here
     kIterationLimit,  ///< max_iterations were done; the pose is feasible, and better than the one before
     kStalled,         ///< no step lowers the energy any further: round-off, or a kink where a limit begins
     kInfeasible,      ///< joints, limits and pins contradict each other: the pose is the one before
@@ -42,7 +44,7 @@ struct PoseResult {
   double last_step = 0.0;        ///< how far the last step moved a point at most; of the diagonal
 };
 
-/// "converged", "iteration limit", "stalled", "infeasible".
+/// "converged", "local minimum", "iteration limit", "stalled", "infeasible".
 std::string_view to_string(PoseResult::Status status);
 
 }  // namespace limber
