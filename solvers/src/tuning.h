@@ -15,13 +15,12 @@ struct ConvexSolverTuning {
   double longest_jump = 4.0;  ///< a step of the search at most over that before it
 };
 
-/// RowEquilibrium: the cone complementarity problem beside joints.
+/// RowEquilibrium: interior points.
 struct EquilibriumTuning {
-  double yield = 1e-5;  ///< of what an impulse moves its own unit by, what the unit yields to a change of it in a round
-  double pivot = 1e-7;  ///< of the largest: less is cut from the factor, and all of W makes up for it
-  double met = 1e-3;    ///< of tolerances
-  int most_newton_steps = 60;  ///< [path] Bounds the work
-  double enough = 0.03;        ///< of what is left at first, to which the gaps asked for are linear
+  double met = 1e-3;             ///< of tolerances
+  int most_steps = 100;          ///< of Newton's method. [path] Bounds the work
+  double least_centring = 0.1;   ///< of the mean product, what a step aims at: less leaves the middle of the sets
+  double part_of_longest = 0.9;  ///< of the step to the nearest bound, what is taken
 };
 
 /// ContactQpSolver: active sets.

@@ -4,8 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <iostream>
 #include <random>
 #include <vector>
+
+#include "cone_problems.h"
 
 namespace limber::internal {
 namespace {
@@ -26,17 +32,46 @@ Square random_matrix(std::mt19937& random, Eigen::Index rows, Eigen::Index freed
 }
 
 /// |F − P(F − (u + shift)/ρ)| ρ, the largest of all contacts.
-double left_of_law(const Square& W, const Eigen::VectorXd& b, const Eigen::VectorXd& f, double friction) {
+double left_of_law(const Square& W, const Eigen::VectorXd& b, const Eigen::VectorXd& f,
+                   const std::vector<double>& friction) {
   const Eigen::VectorXd u = b + W * f;
   double left = 0.0;
-  for (Eigen::Index i = 0; i < f.size(); i += 3) {
-    const double response = W.diagonal().segment<3>(i).mean();
-    const ContactPotential set{.set = Set::kCone, .compliance = response, .bound = friction};
-    Vec3 open = u.segment<3>(i);
-    open[0] += friction * open.tail<2>().norm();
-    left = std::max(left, response * (set.at(open - response * f.segment<3>(i)).impulse - f.segment<3>(i)).norm());
+  Eigen::Index i = 0;
+  for (const double mu : friction) {
+    const Eigen::Index rows = mu > 0.0 ? 3 : 1;
+    const ContactPotential set{.set = mu > 0.0 ? Set::kCone : Set::kInterval,
+                               .compliance = W.diagonal().segment(i, rows).mean(),
+                               .bound = mu,
+                               .upper = kUnbounded};
+    Vec3 open = Vec3::Zero(), F = Vec3::Zero();
+    for (Eigen::Index r = 0; r < rows; ++r) open[r] = u[i + r], F[r] = f[i + r];
+    open[0] += mu * open.tail<2>().norm();
+    left = std::max(left, set.compliance * (set.natural(open, F) - F).norm());
+    i += rows;
   }
   return left;
+}
+
+/// To a thousandth of the tolerance. @return f
+Eigen::VectorXd solve(const Square& W, const Eigen::VectorXd& b, const std::vector<double>& friction,
+                      double tolerance) {
+  RowEquilibrium equilibrium;
+  Eigen::Index i = 0;
+  for (const double mu : friction) {
+    const Eigen::Index rows = mu > 0.0 ? 3 : 1;
+    equilibrium.add_unit(static_cast<std::size_t>(rows),
+                         {.set = mu > 0.0 ? Set::kCone : Set::kInterval,
+                          .compliance = W.diagonal().segment(i, rows).mean(),
+                          .bound = mu,
+                          .upper = kUnbounded},
+                         tolerance);
+    i += rows;
+  }
+  equilibrium.set_matrix({W.data(), static_cast<std::size_t>(W.size())});
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(i);
+  const auto size = static_cast<std::size_t>(i);
+  equilibrium.solve({b.data(), size}, {f.data(), size});
+  return f;
 }
 
 TEST(RowEquilibrium, MeetsTheLawOfContactsAtAnyRatioOfMasses) {
@@ -47,16 +82,10 @@ TEST(RowEquilibrium, MeetsTheLawOfContactsAtAnyRatioOfMasses) {
   for (const double ratio : {1.0, 1e3, 1e6})
     for (int trial = 0; trial < 30; ++trial) {
       const Square W = random_matrix(random, kRows, 12, ratio, 0.2);
-      Eigen::VectorXd b(kRows), f = Eigen::VectorXd::Zero(kRows);
+      Eigen::VectorXd b(kRows);
       for (double& x : b) x = number(random);
-      RowEquilibrium equilibrium;
-      for (Eigen::Index i = 0; i < kRows; i += 3)
-        equilibrium.add_unit(
-            3, {.set = Set::kCone, .compliance = W.diagonal().segment<3>(i).mean(), .bound = kFriction}, kTolerance);
-      equilibrium.factor({W.data(), static_cast<std::size_t>(W.size())});
-      // Each solve leaves a part of what is left at first.
-      for (int i = 0; i < 10; ++i) equilibrium.solve({b.data(), kRows}, {f.data(), kRows});
-      EXPECT_LE(left_of_law(W, b, f, kFriction), kTolerance) << ratio << ' ' << trial;
+      const std::vector<double> friction(kContacts, kFriction);
+      EXPECT_LE(left_of_law(W, b, solve(W, b, friction, kTolerance), friction), kTolerance) << ratio << ' ' << trial;
     }
 }
 
@@ -65,10 +94,49 @@ TEST(RowEquilibrium, ImpulsesAtTheirBoundsAreThere) {
   std::vector<double> f{0.0};
   RowEquilibrium equilibrium;
   equilibrium.add_unit(1, {.set = Set::kInterval, .compliance = 1.0, .lower = -0.3, .upper = 0.3}, 1e-9);
-  equilibrium.factor(W);
+  equilibrium.set_matrix(W);
   equilibrium.solve(b, f);
   EXPECT_EQ(f[0], 0.3);
 }
+
+TEST(RowEquilibrium, ABallSlidesAtItsRadiusAgainstTheSlip) {
+  const Square W = Square::Identity(3, 3);
+  const std::vector<double> b{3.0, 0.0, 4.0};
+  std::vector<double> f(3, 0.0);
+  RowEquilibrium equilibrium;
+  equilibrium.add_unit(3, {.set = Set::kBall, .compliance = 1.0, .bound = 2.0}, 1e-9);
+  equilibrium.set_matrix({W.data(), 9});
+  equilibrium.solve(b, f);
+  EXPECT_NEAR(f[0], -1.2, 1e-12);
+  EXPECT_NEAR(f[1], 0.0, 1e-12);
+  EXPECT_NEAR(f[2], -1.6, 1e-12);
+}
+
+/// Problems of some kinds (ConeProblems::make) that are not met to 1e-6 of the gaps in ten seconds each. The
+/// environment variable LIMBER_CONTACTS asks for three hundred of up to that many contacts.
+double part_missed(int first_kind, int kinds) {
+  const char* wanted = std::getenv("LIMBER_CONTACTS");
+  const int most = wanted == nullptr ? 10 : std::atoi(wanted), count = (wanted == nullptr ? 20 : 60) * kinds;
+  int missed = 0;
+  for (int i = 0; i < count; ++i) {
+    testing::ConeProblems problems(static_cast<unsigned>(i + 1));
+    const int contacts = 1 + static_cast<int>(std::pow(problems.part(), 1.5) * most) % most;
+    const testing::ConeProblem p = problems.make(first_kind + i % kinds, contacts);
+    const double size = p.b.cwiseAbs().maxCoeff();
+    const std::clock_t begin = std::clock();
+    const double left = left_of_law(p.W, p.b, solve(p.W, p.b, p.friction, 1e-6 * size), p.friction) / size;
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    if (left <= 1e-6 && seconds <= 10.0) continue;
+    ++missed;
+    std::cout << "problem " << i << ": " << contacts << " contacts, " << left << " left, " << seconds << " s\n";
+  }
+  return static_cast<double>(missed) / count;
+}
+
+TEST(RowEquilibrium, MeetsCoulombsLawOfHeapedBoxes) { EXPECT_LE(part_missed(3, 2), 0.01); }
+
+// Rows without any order: the path to the answer may turn back before it comes there.
+TEST(RowEquilibrium, MeetsCoulombsLawOfMostDenseMatrices) { EXPECT_LE(part_missed(0, 3), 0.05); }
 
 }  // namespace
 }  // namespace limber::internal

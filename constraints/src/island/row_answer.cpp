@@ -120,7 +120,7 @@ void RowAnswer::find_equilibrium(const IslandStep& step, const MeanProblem& prob
     set.compliance = problem.response(row);
     equilibrium_.add_unit(count, set, law.tolerance);
   }
-  equilibrium_.factor(W_);
+  equilibrium_.set_matrix(W_);
 }
 
 /// Δ of all rows that take part.
