@@ -42,7 +42,7 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
   std::int32_t blocks = 0;
   for (const Index member : members) {
     const ConstrainedBody& at = table[static_cast<std::size_t>(member)];
-    GameBody body{.number = member, .group = at.group, .slot = at.slot, .first = blocks};
+    GameBody body{.group = at.group, .slot = at.slot, .first = blocks};
     const ModalModel& model = at.group->model();
     if (model.modes() > 0) {
       SubstepModes& modes = modes_of(model);
@@ -72,9 +72,9 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
 /// Its inertia is that of the step's middle, as far as can be told from how it turns now.
 void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
   const FrameConstants& c = body.group->frame_constants();
-  body.start = frame.pose();
+  body.start.p = frame.pose().p;
   body.q = frame.pose().q;
-  body.R_start = to_matrix(body.q);
+  body.start.R = to_matrix(body.q);
   body.v = frame.velocity();
   if (c.motion == FrameMotion::kKinematic) return;
   if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
@@ -249,7 +249,7 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
 void GameBodies::tell_shift(std::size_t at) {
   const GameBody& body = bodies_[at];
   write_vector(body.shift, shifts_[at].shift);
-  write_matrix(to_matrix(body.q) - body.R_start, shifts_[at].turned);
+  write_matrix(to_matrix(body.q) - body.start.R, shifts_[at].turned);
 }
 
 void GameBodies::displace(std::int32_t at, const double* speed, const double* place) {

@@ -37,7 +37,6 @@ struct LedBody {
 };
 
 struct GameBody {
-  Index number = -1;  // in the table
   BodyGroup* group = nullptr;
   Index slot = 0;
   const SubstepModes* modes = nullptr;  // null: none
@@ -47,8 +46,10 @@ struct GameBody {
   double root_mass = 0.0;               // √m; 0: its origin is carried
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
   Mat3 momentum_scale = Mat3::Zero();   // L = momentum_scale coordinates
-  RigidTransform start{};               // pose at the step's start
-  Mat3 R_start = Mat3::Identity();
+  struct Start {
+    Vec3 p = Vec3::Zero();
+    Mat3 R = Mat3::Identity();
+  } start{};                  // pose at the step's start
   Vec3 shift = Vec3::Zero();  // of the origin since then
   Quaternion q{};             // attitude now
   Vec3 v = Vec3::Zero();      // of the origin

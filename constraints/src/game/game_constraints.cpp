@@ -10,6 +10,8 @@ namespace {
 constexpr int kMostRounds = 4;
 // What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
 constexpr double kRounded = 1e-9;
+// Newton's steps that close what is open at a step's end. One is enough but where links buckle.
+constexpr int kMostClosings = 8;
 
 using Hold = GameRow::Hold;
 
@@ -206,7 +208,7 @@ void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
     double *forces = forces_.data(), *yields = forces + rows.size();
     for (const std::int32_t at : system_.met(g)) {
       GameRow& row = rows[static_cast<std::size_t>(at)];
-      yields[at] = found[kPlace] + (1.0 - share) * found[kCurve];
+      yields[at] = row.closing = found[kPlace] + (1.0 - share) * found[kCurve];
       if (gains_speed) {
         const double force = std::clamp(row.force + found[kRate] + share * found[kCurve], row.lower, row.upper);
         forces[at] = force - row.force;
@@ -234,26 +236,27 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
   if (last && !rows_.groups().empty()) close_step(states, bodies);
 }
 
-/// By rows made anew: those of the substep's start may even open what turns by a radian within it.
+/// By rows made anew: those of the substep's start may even open what turns by a radian within it. Newton's method, as
+/// of least displacement: a chain all but straight is closed by its heavy end, not by links thrown out sideways.
 void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
-  rows_.linearise_again(states, bodies);
-  system_.factor(rows_, true);
-  residual_ = 0.0;
-  right_.assign(kColumns * system_.size(), 0.0);
-  const std::span<const GameGroup> groups = rows_.groups();
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    double* right = right_.data() + kColumns * system_.first(g);
-    for (const std::int32_t i : system_.met(g)) {
-      const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
-      if (row.keeps_place) {
-        right[kPlace] = -row.error;
-        residual_ = std::max(residual_, std::abs(row.error));
+  for (GameRow& row : rows_.rows()) row.closing = 0.0;
+  for (int round = 0;; ++round) {
+    residual_ = 0.0;
+    for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
+      for (const std::int32_t at : met) {
+        const auto i = static_cast<std::size_t>(at);
+        const GameRow& row = rows_.of(group)[i];
+        if (row.keeps_place) right[kPlace] = row.left - gaps_[i];
+        residual_ = std::max(residual_, std::abs(right[kPlace]));
+        right += kColumns;
       }
-      right += kColumns;
-    }
+    });
+    if (residual_ <= kRounded || round == kMostClosings) return;
+    rows_.linearise_again(states, bodies);
+    system_.factor(rows_, true);
+    system_.solve<kColumns>(right_);
+    displace(bodies, false);
   }
-  system_.solve<kColumns>(right_);
-  displace(bodies, false);
 }
 
 bool GameConstraints::all_finite() const {

@@ -39,7 +39,7 @@ void write_mode_rows(const BodyStates& states, const GameBody& body, const Prepa
                      std::span<double> modal, Block8* rows) {
   if (body.modes == nullptr || side.model == nullptr) return;
   const std::vector<float>& roots = body.modes->roots();
-  const Mat3 axes_B = body.R_start.transpose() * axes;
+  const Mat3 axes_B = body.start.R.transpose() * axes;
   if (side.skin == nullptr && side.shapes.empty()) {
     const VertexRows& vertices = side.model->collision_rows();
     const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
@@ -177,7 +177,7 @@ void GameContacts::place_side(const BodyStates& states, const GameBodies& bodies
   at.blocks = body.blocks;
   const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart));
   write_axis(carried_B, at.arm);
-  write_axis(body.R_start * carried_B + side.rim, at.lever);
+  write_axis(body.start.R * carried_B + side.rim, at.lever);
 }
 
 void GameContacts::write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes) {

@@ -92,24 +92,42 @@ double GameRows::last_force(const GameGroup& group, std::size_t i) const {
   return goes_on_ && at < before_.size() ? before_[at].force : made_.row(static_cast<Index>(i)).law.last_force;
 }
 
-/// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
-/// body's inertia, about the axes of its coordinates.
-void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t s) {
-  Vec3 force = Vec3::Zero(), arms = Vec3::Zero();
+template <class Force>
+GameRows::Pull GameRows::pull(const GameGroup& group, std::size_t s, const Force& force) const {
+  Pull sum;
   double directions = 0.0;
   for (std::size_t i = 0; i < group.count; ++i) {
     const ConstraintRows::Side& row = made_.row(static_cast<Index>(i)).sides[s];
-    force += last_force(group, i) * row.linear;
-    arms += row.linear.cross(row.angular);  // those across each direction: r again in all but one
+    sum.force += force(i) * row.linear;
+    sum.arm += row.linear.cross(row.angular);  // across each direction: r again in all but one
     directions += row.linear.squaredNorm();
   }
-  const double outward = directions > 1.5 ? force.dot(arms) / (directions - 1.0) : 0.0;
+  if (!(directions > 1.5)) return {};
+  sum.arm /= directions - 1.0;
+  return sum;
+}
+
+/// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
+/// body's inertia, about the axes of its coordinates.
+void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t s) {
+  const Pull at = pull(group, s, [&](std::size_t i) { return last_force(group, i); });
+  const double outward = at.force.dot(at.arm);
   if (!(outward > 0.0)) return;
-  const Vec3 along = body.turn_scale * (force / force.norm());
+  const Vec3 along = body.turn_scale * at.force.normalized();
   Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
   for (int axis = 0; axis < 3; ++axis)
     stiffness[static_cast<std::size_t>(axis)] +=
         outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - along[axis] * along[axis]);
+}
+
+/// The second derivative of the gaps times their forces, by a turn, is r·F 1 − ½(r Fᵀ + F rᵀ): no more than |r| |F| in
+/// any direction.
+void GameRows::resist(const GameBody& body, const GameGroup& group, std::size_t s) {
+  const Pull at = pull(group, s, [&](std::size_t i) { return rows_[group.first + i].closing; });
+  const double most = at.force.norm() * at.arm.norm();
+  Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
+  for (int axis = 0; axis < 3; ++axis)
+    stiffness[static_cast<std::size_t>(axis)] += 4.0 * most * body.turn_scale.row(axis).squaredNorm();
 }
 
 /// From stiffnesses.
@@ -173,24 +191,21 @@ void GameRows::hold_as_before(double step) {
 }
 
 void GameRows::linearise_again(const BodyStates& states, const GameBodies& bodies) {
+  scales_.assign(bodies.bodies().size(), {});
   for (const GameGroup& group : groups_) {
     made_.clear();
     group.constraint->add_rows(states, StepTime::kStart, length_, made_);
     for (std::size_t s = 0; s < 2; ++s) {
       const GameSide& side = group.sides[s];
       if (side.frame < 0) continue;
-      const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
+      const GameBody& body = bodies.body(side.frame);
       double* row = &numbers_[side.at];
-      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
-        write_side(bodies.body(side.frame), made_.row(static_cast<Index>(i)).sides[s], row);
-        for (std::size_t k = 0; k < 3; ++k) row[3 + k] /= scale[k];
-      }
-    }
-    for (std::size_t i = 0; i < group.count; ++i) {
-      GameRow& row = rows_[group.first + i];
-      row.error = made_.row(static_cast<Index>(i)).law.gap - row.left;
+      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
+        write_side(body, made_.row(static_cast<Index>(i)).sides[s], row);
+      resist(body, group, s);
     }
   }
+  scale_turns();
 }
 
 void GameRows::add_what_leads(const GameBodies& bodies) {

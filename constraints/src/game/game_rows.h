@@ -25,6 +25,7 @@ struct GameRow {
   double error = 0.0;                              // of its gap at the substep's start, which displacements undo
   double left = 0.0;                               // of the step's first error, what the step does not undo
   double force = 0.0;                              // held over the substep
+  double closing = 0.0;                            // displaces the bodies at the step's end: the last such force
   bool keeps_place = true;                         // the gap itself counts, and not its rate alone
   bool gives_way = false;                          // of a hand of limited force, which closing does not wait for
   bool cut = false;                                // whether the last solution asked for a force beyond a bound
@@ -53,8 +54,8 @@ class GameRows {
 
   /// From where the substep begins. @param number of the substep, 0 …
   void make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints, int number);
-  /// J where the bodies are at the step's end, and errors: what is still to be closed there.
-  /// @pre the constraints have accepted the substep
+  /// J where the bodies are at the step's end, for displacements: turns resist what GameRow::closing would do to them
+  /// beyond first order. @pre the constraints have accepted the substep
   void linearise_again(const BodyStates& states, const GameBodies& bodies);
   /// Once the bodies have begun the substep: what moves a led body in it whatever acts.
   void add_what_leads(const GameBodies& bodies);
@@ -96,7 +97,14 @@ class GameRows {
   void add_group(const BodyStates& states, const GameBodies& bodies, Constraint* constraint);
   void add_side(const GameBodies& bodies, GameGroup& group, std::size_t s);
   void write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const;
+  /// Of one side of the rows at hand: what their forces pull with, and where they act from the body's origin, world.
+  struct Pull {
+    Vec3 force = Vec3::Zero(), arm = Vec3::Zero();  // zero where they hold less than two directions
+  };
+  template <class Force>
+  Pull pull(const GameGroup& group, std::size_t s, const Force& force) const;
   void stiffen(const GameBody& body, const GameGroup& group, std::size_t s);
+  void resist(const GameBody& body, const GameGroup& group, std::size_t s);
   double last_force(const GameGroup& group, std::size_t i) const;
   void add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields);
   void hold_as_before(double step);

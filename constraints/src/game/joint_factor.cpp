@@ -136,18 +136,18 @@ void JointFactor::order() {
     std::ranges::sort(neighbours[i]);
     push(static_cast<std::int32_t>(i));
   }
-  position_.assign(nodes_, -1);
-  node_at_.clear();
+  pattern_.position.assign(nodes_, -1);
+  pattern_.node_at.clear();
   std::vector<std::int32_t> merged;
-  while (node_at_.size() < nodes_) {
+  while (pattern_.node_at.size() < nodes_) {
     std::pop_heap(heap.begin(), heap.end(), later);
     const std::int32_t degree = heap.back()[0], node = heap.back()[1];
     heap.pop_back();
     const auto at = static_cast<std::size_t>(node);
-    if (position_[at] >= 0 || degree != static_cast<std::int32_t>(neighbours[at].size())) continue;
-    position_[at] = static_cast<std::int32_t>(node_at_.size());
-    columns[node_at_.size()] = neighbours[at];
-    node_at_.push_back(node);
+    if (pattern_.position[at] >= 0 || degree != static_cast<std::int32_t>(neighbours[at].size())) continue;
+    pattern_.position[at] = static_cast<std::int32_t>(pattern_.node_at.size());
+    columns[pattern_.node_at.size()] = neighbours[at];
+    pattern_.node_at.push_back(node);
     const bool joins = neighbours[at].size() <= kMostJoined;
     for (const std::int32_t other : neighbours[at]) {
       std::vector<std::int32_t>& theirs = neighbours[static_cast<std::size_t>(other)];
@@ -162,49 +162,50 @@ void JointFactor::order() {
       push(other);
     }
   }
-  column_starts_.assign(1, 0);
-  rows_.clear();
+  pattern_.column_starts.assign(1, 0);
+  pattern_.rows.clear();
   for (std::vector<std::int32_t>& column : columns) {
-    for (std::int32_t& node : column) node = position_[static_cast<std::size_t>(node)];
+    for (std::int32_t& node : column) node = pattern_.position[static_cast<std::size_t>(node)];
     std::ranges::sort(column);
-    rows_.insert(rows_.end(), column.begin(), column.end());
-    column_starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+    pattern_.rows.insert(pattern_.rows.end(), column.begin(), column.end());
+    pattern_.column_starts.push_back(pattern_.rows.size());
   }
-  places_.clear();
+  pattern_.places.clear();
   for (const auto& [a, b] : graph_) {
-    const std::int32_t p = position_[static_cast<std::size_t>(a)], q = position_[static_cast<std::size_t>(b)];
-    places_.push_back(find(std::max(p, q), std::min(p, q)));
+    const std::int32_t p = pattern_.position[static_cast<std::size_t>(a)],
+                       q = pattern_.position[static_cast<std::size_t>(b)];
+    pattern_.places.push_back(find(std::max(p, q), std::min(p, q)));
   }
-  target_starts_.clear(), targets_.clear();
+  pattern_.target_starts.clear(), pattern_.targets.clear();
   for (const std::vector<std::int32_t>& column : columns) {
-    target_starts_.push_back(static_cast<std::int32_t>(targets_.size()));
+    pattern_.target_starts.push_back(static_cast<std::int32_t>(pattern_.targets.size()));
     for (std::size_t a = 0; a < column.size(); ++a)
-      for (std::size_t b = a; b < column.size(); ++b) targets_.push_back(find(column[b], column[a]));
+      for (std::size_t b = a; b < column.size(); ++b) pattern_.targets.push_back(find(column[b], column[a]));
   }
-  complete_ = std::ranges::find(targets_, -1) == targets_.end();
+  pattern_.complete = std::ranges::find(pattern_.targets, -1) == pattern_.targets.end();
 }
 
 /// The number of a block of L; −1: there is none.
 std::int32_t JointFactor::find(std::int32_t row, std::int32_t column) const {
   if (row == column) return row;
-  const auto begin = rows_.begin() + column_starts_[static_cast<std::size_t>(column)],
-             end = rows_.begin() + column_starts_[static_cast<std::size_t>(column) + 1];
+  const auto begin = pattern_.rows.begin() + pattern_.column_starts[static_cast<std::size_t>(column)],
+             end = pattern_.rows.begin() + pattern_.column_starts[static_cast<std::size_t>(column) + 1];
   const auto found = std::lower_bound(begin, end, row);
   if (found == end || *found != row) return -1;
-  return static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(found - rows_.begin());
+  return static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(found - pattern_.rows.begin());
 }
 
 std::int32_t JointFactor::rows_of(std::size_t coupling) const {
   const auto [a, b] = graph_[coupling];
-  return position_[static_cast<std::size_t>(a)] > position_[static_cast<std::size_t>(b)] ? a : b;
+  return pattern_.position[static_cast<std::size_t>(a)] > pattern_.position[static_cast<std::size_t>(b)] ? a : b;
 }
 
 void JointFactor::begin(std::span<const std::int32_t> sizes) {
-  sizes_.resize(nodes_), firsts_.resize(nodes_), starts_.resize(nodes_ + rows_.size());
+  sizes_.resize(nodes_), firsts_.resize(nodes_), starts_.resize(nodes_ + pattern_.rows.size());
   std::size_t numbers = 0;
   size_ = 0;
   for (std::size_t p = 0; p < nodes_; ++p) {
-    sizes_[p] = sizes[static_cast<std::size_t>(node_at_[p])];
+    sizes_[p] = sizes[static_cast<std::size_t>(pattern_.node_at[p])];
     const auto n = static_cast<std::size_t>(sizes_[p]);
     firsts_[p] = size_;
     size_ += n;
@@ -212,10 +213,9 @@ void JointFactor::begin(std::span<const std::int32_t> sizes) {
     numbers += n * n;
   }
   for (std::size_t p = 0; p < nodes_; ++p)
-    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
-         ++e) {
+    for (std::size_t e = pattern_.column_starts[p]; e < pattern_.column_starts[p + 1]; ++e) {
       starts_[nodes_ + e] = numbers;
-      numbers += static_cast<std::size_t>(sizes_[p] * sizes_[static_cast<std::size_t>(rows_[e])]);
+      numbers += static_cast<std::size_t>(sizes_[p] * sizes_[static_cast<std::size_t>(pattern_.rows[e])]);
     }
   values_.assign(numbers, 0.0);
 }
@@ -236,21 +236,21 @@ void JointFactor::eliminate(std::size_t column) {
   double* l = &values_[starts_[column]];
   const bool ball = n == 3;
   (ball ? factor_dense<3> : factor_dense<0>)(l, n, &own_[firsts_[column]]);
-  const auto begin = static_cast<std::size_t>(column_starts_[column]),
-             end = static_cast<std::size_t>(column_starts_[column + 1]);
-  auto target = static_cast<std::size_t>(target_starts_[column]);
+  const std::size_t begin = pattern_.column_starts[column], end = pattern_.column_starts[column + 1];
+  auto target = static_cast<std::size_t>(pattern_.target_starts[column]);
   for (std::size_t e = begin; e < end; ++e) {
-    const int rows = sizes_[static_cast<std::size_t>(rows_[e])];
+    const int rows = sizes_[static_cast<std::size_t>(pattern_.rows[e])];
     (ball && rows == 3 ? solve_rows<3> : solve_rows<0>)(l, n, &values_[starts_[nodes_ + e]], rows);
   }
   for (std::size_t a = begin; a < end; ++a)
     for (std::size_t b = a; b < end; ++b) {
-      const std::int32_t to = targets_[target++];
+      const std::int32_t to = pattern_.targets[target++];
       if (to < 0) {
         leave_out(column, a, b);
         continue;
       }
-      const int rows = sizes_[static_cast<std::size_t>(rows_[b])], columns = sizes_[static_cast<std::size_t>(rows_[a])];
+      const int rows = sizes_[static_cast<std::size_t>(pattern_.rows[b])],
+                columns = sizes_[static_cast<std::size_t>(pattern_.rows[a])];
       (ball && rows == 3 && columns == 3 ? subtract_product<3>
                                          : subtract_product<0>)(&values_[starts_[nodes_ + b]], rows,
                                                                 &values_[starts_[nodes_ + a]], columns, n,
@@ -261,7 +261,7 @@ void JointFactor::eliminate(std::size_t column) {
 /// The product of two blocks of a column: its size goes to both diagonals.
 void JointFactor::leave_out(std::size_t column, std::size_t a, std::size_t b) {
   const int n = sizes_[column];
-  const auto row_a = static_cast<std::size_t>(rows_[a]), row_b = static_cast<std::size_t>(rows_[b]);
+  const auto row_a = static_cast<std::size_t>(pattern_.rows[a]), row_b = static_cast<std::size_t>(pattern_.rows[b]);
   double square = 0.0;
   for (int i = 0; i < sizes_[row_b]; ++i)
     for (int j = 0; j < sizes_[row_a]; ++j) {
@@ -285,9 +285,8 @@ void JointFactor::solve(std::span<double> x) const {
     const int n = sizes_[p];
     const bool ball = n == 3;
     (ball ? solve_lower<3, columns> : solve_lower<0, columns>)(values_.data() + starts_[p], n, sides_at(p));
-    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
-         ++e) {
-      const auto row = static_cast<std::size_t>(rows_[e]);
+    for (std::size_t e = pattern_.column_starts[p]; e < pattern_.column_starts[p + 1]; ++e) {
+      const auto row = static_cast<std::size_t>(pattern_.rows[e]);
       const int rows = sizes_[row];
       (ball && rows == 3
            ? subtract_times<3, columns>
@@ -297,9 +296,8 @@ void JointFactor::solve(std::span<double> x) const {
   for (std::size_t p = nodes_; p-- > 0;) {
     const int n = sizes_[p];
     const bool ball = n == 3;
-    for (auto e = static_cast<std::size_t>(column_starts_[p]); e < static_cast<std::size_t>(column_starts_[p + 1]);
-         ++e) {
-      const auto row = static_cast<std::size_t>(rows_[e]);
+    for (std::size_t e = pattern_.column_starts[p]; e < pattern_.column_starts[p + 1]; ++e) {
+      const auto row = static_cast<std::size_t>(pattern_.rows[e]);
       const int rows = sizes_[row];
       (ball && rows == 3 ? subtract_transposed<3, columns>
                          : subtract_transposed<0, columns>)(values_.data() + starts_[nodes_ + e], rows, n,

@@ -29,16 +29,16 @@ class JointFactor {
   /// Begins a matrix of zeros. @param sizes rows of each node, 0 too
   void begin(std::span<const std::int32_t> sizes);
   /// The lower part counts, row by row.
-  double* diagonal(std::size_t node) { return &values_[starts_[position_[node]]]; }
+  double* diagonal(std::size_t node) { return &values_[starts_[pattern_.position[node]]]; }
   /// Rows of the one node by columns of the other, row by row: that with rows is rows_of(coupling).
-  double* block(std::size_t coupling) { return &values_[starts_[places_[coupling]]]; }
+  double* block(std::size_t coupling) { return &values_[starts_[pattern_.places[coupling]]]; }
   std::int32_t rows_of(std::size_t coupling) const;
   void factor();
   /// Where the numbers of a node begin in a right-hand side of one column.
-  std::size_t first(std::size_t node) const { return firsts_[position_[node]]; }
+  std::size_t first(std::size_t node) const { return firsts_[pattern_.position[node]]; }
   std::size_t size() const { return size_; }
   /// Whether nothing has been left out.
-  bool is_complete() const { return complete_; }
+  bool is_complete() const { return pattern_.complete; }
   /// Overwrites right-hand sides by their solutions. @param x size() rows of `columns` numbers, 1 or 3
   template <std::size_t columns>
   void solve(std::span<double> x) const;
@@ -49,16 +49,22 @@ class JointFactor {
   void leave_out(std::size_t column, std::size_t a, std::size_t b);
   std::int32_t find(std::int32_t row, std::int32_t column) const;
 
+  /// Which blocks L has, whatever its numbers.
+  struct Pattern {
+    std::vector<std::int32_t> position, node_at;       // by node; by position
+    std::vector<std::size_t> column_starts;            // in rows
+    std::vector<std::int32_t> rows;                    // of L below its diagonal: positions, ascending in each column
+    std::vector<std::int32_t> places;                  // by coupling: its block
+    std::vector<std::int32_t> target_starts, targets;  // by column: the block that each pair of its rows changes
+    bool complete = true;
+  };
+
   std::size_t nodes_ = 0, size_ = 0;
-  bool complete_ = true;
   std::vector<Pair> graph_;
-  std::vector<std::int32_t> position_, node_at_;       // by node; by position
-  std::vector<std::int32_t> column_starts_, rows_;     // of L below its diagonal: positions, ascending in each column
-  std::vector<std::int32_t> places_;                   // by coupling: its block
-  std::vector<std::int32_t> target_starts_, targets_;  // by column: the block that each pair of its rows changes
-  std::vector<std::size_t> starts_;                    // by block, the diagonal ones first: of its numbers
-  std::vector<std::int32_t> sizes_;                    // by position
-  std::vector<std::size_t> firsts_;                    // by position
+  Pattern pattern_;
+  std::vector<std::size_t> starts_;  // by block, the diagonal ones first: of its numbers
+  std::vector<std::int32_t> sizes_;  // by position
+  std::vector<std::size_t> firsts_;  // by position
   std::vector<double> values_;
   std::vector<double> own_;  // by row: its diagonal before elimination
 };
