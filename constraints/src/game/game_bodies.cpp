@@ -23,6 +23,11 @@ void write_vector(const Vec3& v, float* to) {
   for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
 }
 
+/// q turned by a Cayley vector, which is a rotation vector to second order.
+Quaternion turned(const Quaternion& q, const Vec3& cayley) {
+  return normalized(Quaternion{1.0, 0.5 * cayley.x(), 0.5 * cayley.y(), 0.5 * cayley.z()} * q);
+}
+
 Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
 
 }  // namespace
@@ -78,39 +83,28 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
   body.v = frame.velocity();
   if (c.motion == FrameMotion::kKinematic) return;
   if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
-  set_axes(body, quaternion_from_rotation_vector(0.5 * plan_.step * frame.angular_velocity(c)) * body.q);
+  body.roots = c.motion == FrameMotion::kLine ? Vec3(std::sqrt(line_inertia(c)), 0.0, 0.0)
+                                              : Vec3(c.principal.moments.cwiseSqrt());
+  set_axes(body, turned(body.q, 0.5 * plan_.step * frame.angular_velocity(c)));
   if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * frame.angular_momentum(c);
 }
 
 void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
   const FrameConstants& c = body.group->frame_constants();
-  if (c.motion == FrameMotion::kLine) {
-    const Vec3 axis = attitude * c.line_axis;
-    const double root = std::sqrt(line_inertia(c));
-    body.turn_scale.row(0) = axis.transpose() / root;
-    body.momentum_scale.col(0) = axis * root;
-    return;
-  }
-  const Mat3 axes = to_matrix(attitude * c.principal.q_BP);
-  const Vec3 roots = c.principal.moments.cwiseSqrt();
-  body.turn_scale = roots.cwiseInverse().asDiagonal() * axes.transpose();
-  body.momentum_scale = axes * roots.asDiagonal();
+  if (c.motion == FrameMotion::kLine)
+    body.turn_scale.row(0) = (attitude * c.line_axis).transpose() / body.roots.x();
+  else
+    body.turn_scale = body.roots.cwiseInverse().asDiagonal() * to_matrix(attitude * c.principal.q_BP).transpose();
 }
 
 void GameBodies::turn_axes() {
   for (GameBody& body : bodies_) {
     const FrameConstants& c = body.group->frame_constants();
     if (body.keeps_axes || c.motion == FrameMotion::kKinematic) continue;
-    const Vec3 momentum = body.momentum_scale * body.turn;
-    Vec3 omega;
-    if (c.motion == FrameMotion::kLine) {
-      set_axes(body, body.q);
-      omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
-    } else {
-      const Mat3 axes = to_matrix(body.q * c.principal.q_BP);
-      omega = axes * (axes.transpose() * momentum).cwiseQuotient(c.principal.moments);
-    }
-    set_axes(body, quaternion_from_rotation_vector(0.5 * plan_.length() * omega) * body.q);
+    const Vec3 momentum = body.momentum();
+    set_axes(body, body.q);
+    const Vec3 omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
+    set_axes(body, turned(body.q, 0.5 * plan_.length() * omega));
     if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * momentum;
   }
 }
@@ -257,9 +251,7 @@ void GameBodies::displace(std::int32_t at, const double* speed, const double* pl
   const double h = plan_.length();
   const auto vector = [](const double* from) { return Vec3(from[0], from[1], from[2]); };
   body.turn += vector(speed + 3);
-  body.q = normalized(
-      quaternion_from_rotation_vector(h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3)))) *
-      body.q);
+  body.q = turned(body.q, h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3))));
   if (body.led < 0) {
     body.v += vector(speed) / body.root_mass;
     body.shift += h / body.root_mass * (vector(speed) + vector(place));
@@ -279,8 +271,7 @@ void GameBodies::displace(std::int32_t at, const double* speed, const double* pl
 
 /// To its group.
 void GameBodies::show(GameBody& body) const {
-  body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v,
-                                                   body.momentum_scale * body.turn);
+  body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v, body.momentum());
 }
 
 /// Where its parent has brought it, turned as constraints have it.
@@ -300,7 +291,7 @@ void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
 void GameBodies::tell_led(GameBody& body) {
   const FrameConstants& c = body.group->frame_constants();
   RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
-  if (c.motion == FrameMotion::kPoint) end.set_turn(c, body.q, body.momentum_scale * body.turn);
+  if (c.motion == FrameMotion::kPoint) end.set_turn(c, body.q, body.momentum());
   if (c.motion == FrameMotion::kLine) {
     const Vec3 omega =
         end.parent().angular_velocity + body.turn.x() / std::sqrt(line_inertia(c)) * (body.q * c.line_axis);

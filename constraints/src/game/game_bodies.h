@@ -45,7 +45,7 @@ struct GameBody {
   bool keeps_axes = false;              // its coordinates are those of the whole step
   double root_mass = 0.0;               // √m; 0: its origin is carried
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
-  Mat3 momentum_scale = Mat3::Zero();   // L = momentum_scale coordinates
+  Vec3 roots = Vec3::Zero();            // of the inertia about the axes of the turn's coordinates
   struct Start {
     Vec3 p = Vec3::Zero();
     Mat3 R = Mat3::Identity();
@@ -54,6 +54,8 @@ struct GameBody {
   Quaternion q{};             // attitude now
   Vec3 v = Vec3::Zero();      // of the origin
   Vec3 turn = Vec3::Zero();   // coordinates of the turn
+
+  Vec3 momentum() const { return turn_scale.transpose() * roots.cwiseProduct(roots.cwiseProduct(turn)); }
 };
 
 class GameBodies {

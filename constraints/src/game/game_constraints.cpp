@@ -67,18 +67,20 @@ void GameConstraints::solve_once() {
     rows_.add_transposed(groups[g], forces_.data(), moved_);
   }
   right_.resize(system_.size());
+  asked_.resize(system_.size());
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::span<const GameRow> rows = rows_.of(groups[g]);
     products_.assign(2 * rows.size(), 0.0);
     rows_.multiply(groups[g], motion_, products_.data());
     if (bound) rows_.multiply(groups[g], moved_, products_.data() + rows.size());
-    double* right = right_.data() + system_.first(g);
+    double *right = right_.data() + system_.first(g), *guess = asked_.data() + system_.first(g);
     for (const std::int32_t at : system_.met(g)) {
       const auto i = static_cast<std::size_t>(at);
       *right++ = rows[i].target - products_[i] - products_[rows.size() + i];
+      *guess++ = rows[i].force;
     }
   }
-  system_.solve_fully(rows_, right_);
+  system_.solve_fully(rows_, asked_, right_);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::span<GameRow> rows = rows_.of(groups[g]);
     const double* right = right_.data() + system_.first(g);
@@ -141,19 +143,19 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   asked_ = right_;
   system_.solve<kColumns>(right_);
   find_shares();
-  displace(bodies, true);
+  displace(bodies);
 }
 
 /// Right-hand sides of zeros, and the gaps as they are now.
-/// @param visit (group, rows of it that hold, right) with right of kColumns numbers for each of them
+/// @param visit (group, rows of it that hold, right) with right of `columns` numbers for each of them
 template <class Visit>
-void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit) {
+void GameConstraints::for_met_gaps(const BodyStates& states, std::size_t columns, const Visit& visit) {
   const std::span<const GameGroup> groups = rows_.groups();
-  right_.assign(kColumns * system_.size(), 0.0);
+  right_.assign(columns * system_.size(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     gaps_.resize(groups[g].count);
     groups[g].constraint->gaps(states, StepTime::kStart, gaps_);
-    visit(groups[g], system_.met(g), right_.data() + kColumns * system_.first(g));
+    visit(groups[g], system_.met(g), right_.data() + columns * system_.first(g));
   }
 }
 
@@ -162,7 +164,7 @@ void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies
   const double most = GameRows::kRecoverySpeed * rows_.length();
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   if (pushed) rows_.scale_pushes(bodies, system_.frames(), pushes_);
-  for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
+  for_met_gaps(states, kColumns, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
     const std::span<const GameRow> rows = rows_.of(group);
     products_.assign(2 * rows.size(), 0.0);
     rows_.multiply(group, motion_, products_.data());
@@ -196,29 +198,33 @@ void GameConstraints::find_shares() {
     given_[c] = given_[c] > taken_[c] ? std::sqrt(taken_[c] / given_[c]) : 1.0;
 }
 
-void GameConstraints::displace(GameBodies& bodies, bool gains_speed) {
+/// By what close() has found.
+void GameConstraints::displace(GameBodies& bodies) {
   const std::span<const GameGroup> groups = rows_.groups();
   speed_.assign(rows_.coordinates(), 0.0);
   place_.assign(rows_.coordinates(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::span<GameRow> rows = rows_.of(groups[g]);
-    const double share = gains_speed ? given_[system_.component(groups[g])] : 0.0;
+    const double share = given_[system_.component(groups[g])];
     const double* found = right_.data() + kColumns * system_.first(g);
     forces_.assign(2 * rows.size(), 0.0);
     double *forces = forces_.data(), *yields = forces + rows.size();
     for (const std::int32_t at : system_.met(g)) {
       GameRow& row = rows[static_cast<std::size_t>(at)];
-      yields[at] = row.closing = found[kPlace] + (1.0 - share) * found[kCurve];
-      if (gains_speed) {
-        const double force = std::clamp(row.force + found[kRate] + share * found[kCurve], row.lower, row.upper);
-        forces[at] = force - row.force;
-        row.force = force;
-      }
+      const double force = std::clamp(row.force + found[kRate] + share * found[kCurve], row.lower, row.upper);
+      forces[at] = force - row.force;
+      row.force = force;
+      yields[at] = found[kPlace] + (1.0 - share) * found[kCurve];
       found += kColumns;
     }
-    if (gains_speed) rows_.add_transposed(groups[g], forces, speed_);
+    rows_.add_transposed(groups[g], forces, speed_);
     rows_.add_transposed(groups[g], yields, place_);
   }
+  move(bodies);
+}
+
+/// By speed_ and place_.
+void GameConstraints::move(GameBodies& bodies) {
   rows_.unscale(bodies, system_.frames(), speed_);
   rows_.unscale(bodies, system_.frames(), place_);
   for (const std::int32_t frame : system_.frames()) {
@@ -241,22 +247,44 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
 void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
   for (GameRow& row : rows_.rows()) row.closing = 0.0;
   for (int round = 0;; ++round) {
-    residual_ = 0.0;
-    for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
-      for (const std::int32_t at : met) {
-        const auto i = static_cast<std::size_t>(at);
-        const GameRow& row = rows_.of(group)[i];
-        if (row.keeps_place) right[kPlace] = row.left - gaps_[i];
-        residual_ = std::max(residual_, std::abs(right[kPlace]));
-        right += kColumns;
-      }
-    });
+    measure_places(states);
     if (residual_ <= kRounded || round == kMostClosings) return;
     rows_.linearise_again(states, bodies);
     system_.factor(rows_, true);
-    system_.solve<kColumns>(right_);
-    displace(bodies, false);
+    asked_.assign(right_.size(), 0.0);
+    system_.solve_fully(rows_, asked_, right_);
+    close_places(bodies);
   }
+}
+
+void GameConstraints::measure_places(const BodyStates& states) {
+  residual_ = 0.0;
+  for_met_gaps(states, 1, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
+    for (const std::int32_t at : met) {
+      const auto i = static_cast<std::size_t>(at);
+      const GameRow& row = rows_.of(group)[i];
+      if (row.keeps_place) *right = row.left - gaps_[i];
+      residual_ = std::max(residual_, std::abs(*right++));
+    }
+  });
+}
+
+/// By one column of what rows yield.
+void GameConstraints::close_places(GameBodies& bodies) {
+  const std::span<const GameGroup> groups = rows_.groups();
+  speed_.assign(rows_.coordinates(), 0.0);
+  place_.assign(rows_.coordinates(), 0.0);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const std::span<GameRow> rows = rows_.of(groups[g]);
+    const double* found = right_.data() + system_.first(g);
+    forces_.assign(rows.size(), 0.0);
+    for (const std::int32_t at : system_.met(g)) {
+      const auto i = static_cast<std::size_t>(at);
+      forces_[i] = rows[i].closing = *found++;
+    }
+    rows_.add_transposed(groups[g], forces_.data(), place_);
+  }
+  move(bodies);
 }
 
 bool GameConstraints::all_finite() const {

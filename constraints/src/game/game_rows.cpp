@@ -113,11 +113,12 @@ void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t
   const Pull at = pull(group, s, [&](std::size_t i) { return last_force(group, i); });
   const double outward = at.force.dot(at.arm);
   if (!(outward > 0.0)) return;
-  const Vec3 along = body.turn_scale * at.force.normalized();
+  const Vec3 along = body.turn_scale * at.force;
+  const double by = 1.0 / at.force.squaredNorm();
   Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
   for (int axis = 0; axis < 3; ++axis)
     stiffness[static_cast<std::size_t>(axis)] +=
-        outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - along[axis] * along[axis]);
+        outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - by * along[axis] * along[axis]);
 }
 
 /// The second derivative of the gaps times their forces, by a turn, is r·F 1 − ½(r Fᵀ + F rᵀ): no more than |r| |F| in
@@ -186,7 +187,10 @@ void GameRows::hold_as_before(double step) {
       row.hold = before_[i].hold;
     else if (row.is_bounded())
       row.hold = row.force <= row.lower ? Hold::kLower : row.force >= row.upper ? Hold::kUpper : Hold::kMet;
-    row.force = row.hold == Hold::kLower ? row.lower : row.hold == Hold::kUpper ? row.upper : 0.0;
+    if (row.hold != Hold::kMet)
+      row.force = row.hold == Hold::kLower ? row.lower : row.upper;
+    else if (known)
+      row.force = before_[i].force;
   }
 }
 

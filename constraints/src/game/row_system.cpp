@@ -118,15 +118,17 @@ void RowSystem::add_products(const GameRows& rows, std::size_t of_rows, std::siz
 
 // Conjugate gradients -------------------------------------------------------------------------------------------------
 
-void RowSystem::solve_fully(const GameRows& rows, std::vector<double>& x) {
+void RowSystem::solve_fully(const GameRows& rows, std::span<const double> guess, std::vector<double>& x) {
   if (factor_.is_complete()) return factor_.solve<1>(x);
   Gradients& g = gradients_;
   g.residual = x;
-  std::ranges::fill(x, 0.0);
+  x.assign(guess.begin(), guess.end());
+  g.product.resize(x.size());
+  multiply(rows, x, g.product);
+  for (std::size_t k = 0; k < x.size(); ++k) g.residual[k] -= g.product[k];
   g.direction = g.residual;
   factor_.solve<1>(g.direction);
   double square = dot(g.residual, g.direction);
-  g.product.resize(x.size());
   for (int i = 0; i < kMostGradients && square > 0.0; ++i) {
     multiply(rows, g.direction, g.product);
     const double along = dot(g.direction, g.product);

@@ -38,8 +38,8 @@ class RowSystem {
   void solve(std::span<double> x) const {
     factor_.solve<columns>(x);
   }
-  /// The same for one column, to the end where the factor is not complete.
-  void solve_fully(const GameRows& rows, std::vector<double>& x);
+  /// The same for one column; where the factor is not complete, from a first guess. @param x right-hand sides
+  void solve_fully(const GameRows& rows, std::span<const double> guess, std::vector<double>& x);
 
  private:
   void list_met(const GameRows& rows, bool closing);
