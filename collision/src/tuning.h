@@ -107,6 +107,11 @@ struct FinderTuning {
 
 /// Contacts of a patch, thinned to a few.
 struct ClusterTuning {
+  double normal_angle = 0.35;  ///< rad, 20°, between a contact and its patch's first [0.1 to 0.7]; by judgement
+  /// Part of the patch's extent within which contacts are as deep as the deepest [1e-5 to 1e-2]: what is pressed beside
+  /// it when bodies of some stiffness rest on each other. By judgement.
+  double deep = 1e-3;
+  double hysteresis = 0.9;  ///< part of the best choice's area that last time's must have [0.5 to 1]; by judgement
   /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets
   /// of the benchmark change their contacts from step to step at 0.55.
   double kept_spacing = 1.1;

@@ -14,6 +14,7 @@
 #include "finder_scenes.h"
 #include "limber/core/error.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
+#include "tuning.h"
 
 namespace limber {
 namespace {
@@ -387,7 +388,7 @@ TEST(ContactFinder, ThinnedContactsAreAmongAllAndHoldTheDeepestOfEachPair) {
       const auto [entry, fresh] = deepest->try_emplace({c.a.body, c.b.body}, c.gap);
       entry->second = std::min(entry->second, c.gap);
     }
-  const double tolerance = ContactClusterOptions{}.depth_tolerance * 2.0;  // of a patch's extent, which is below 2 m
+  const double tolerance = internal::collision_tuning().clusters.deep * 2.0;  // of a patch's extent, which is below 2 m
   for (const auto& [pair, gap] : deepest_of_all) EXPECT_LE(deepest_of_few.at(pair), gap + tolerance);
 }
 

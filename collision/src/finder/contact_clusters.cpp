@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <utility>
 
@@ -25,12 +24,6 @@ using internal::PatchWeights;
 using internal::PlanePoint;
 
 namespace {
-
-void require(bool holds, const char* field, double value, const char* expected) {
-  if (!holds)
-    throw InvalidArgument(std::string("ContactClusterOptions: ") + field + " is " + std::to_string(value) +
-                          ", expected " + expected);
-}
 
 /// How much of a patch some of its contacts span.
 struct Span {
@@ -144,8 +137,8 @@ bool PatchChoice::previous_will_do(std::span<const std::uint64_t> previous, std:
   const auto surplus = static_cast<std::size_t>(tuning.kept_surplus * static_cast<double>(kept_.size() - corners));
   return old_.size() >= corners && old_.size() <= kept_.size() + surplus &&
          std::any_of(old_.begin(), old_.end(), [&](const auto& p) { return deep(p); }) &&
-         span_of(old_, true).at_least(options_.hysteresis, span_of(kept_, true)) &&
-         span_of(old_, false).at_least(options_.hysteresis, span_of(kept_, false)) &&
+         span_of(old_, true).at_least(tuning.hysteresis, span_of(kept_, true)) &&
+         span_of(old_, false).at_least(tuning.hysteresis, span_of(kept_, false)) &&
          (std::isinf(spacing_) || std::all_of(place_.begin(), place_.end(), [&](const PlanePoint& p) {
             return near_any(p, old_, tuning.kept_spacing * spacing_);
           }));
@@ -161,7 +154,7 @@ void PatchChoice::choose(std::span<const ContactPoint> contacts, std::span<const
 
   spacing_ = std::isinf(wanted.share) ? wanted.length : std::min(wanted.length, wanted.share * diameter(corners_));
   const PlanePoint first = deepest(place_);
-  deep_gap_ = gap(first) + options_.depth_tolerance * diameter(corners_);
+  deep_gap_ = gap(first) + internal::collision_tuning().clusters.deep * diameter(corners_);
   if (options_.max_points == 1) {
     kept_.assign(1, first);
   } else {
@@ -179,18 +172,13 @@ void PatchChoice::choose(std::span<const ContactPoint> contacts, std::span<const
 }  // namespace
 
 void ContactClusterOptions::validate() const {
-  require(max_points >= 0, "max_points", max_points, "0 or more");
-  require(max_normal_angle > 0.0 && max_normal_angle <= 0.5 * std::numbers::pi, "max_normal_angle", max_normal_angle,
-          "above 0 and at most π/2");
-  require(depth_tolerance >= 0.0 && std::isfinite(depth_tolerance), "depth_tolerance", depth_tolerance,
-          "a finite number of at least 0");
-  require(hysteresis >= 0.0 && hysteresis <= 1.0, "hysteresis", hysteresis, "0 to 1");
+  if (max_points < 0)
+    throw InvalidArgument("ContactClusterOptions: max_points is " + std::to_string(max_points) +
+                          ", expected 0 or more");
 }
 
 struct ContactClusters::Impl {
-  explicit Impl(const ContactClusterOptions& o) : options(o), min_cosine(std::cos(o.max_normal_angle)), choice(o) {
-    options.validate();
-  }
+  explicit Impl(const ContactClusterOptions& o) : options(o), choice(o) { options.validate(); }
 
   /// What is told of contacts beside which are kept.
   struct Told {
@@ -201,7 +189,6 @@ struct ContactClusters::Impl {
   };
 
   ContactClusterOptions options;
-  double min_cosine;
 
   // Of the pair under way.
   std::span<ContactPoint> contacts;
@@ -237,13 +224,14 @@ void ContactClusters::Impl::sort_by_id() {
 /// In ascending id, each joins the first patch whose first contact is like it, or begins one: as long as the same ids
 /// are there, the same ones lead.
 void ContactClusters::Impl::find_patches() {
+  const double least_cosine = std::cos(internal::collision_tuning().clusters.normal_angle);
   leaders.clear();
   patch_of.clear();
   for (const ContactPoint& c : contacts) {
     Index patch = 0;
     for (; static_cast<std::size_t>(patch) < leaders.size(); ++patch) {
       const ContactPoint& leader = contacts[static_cast<std::size_t>(leaders[static_cast<std::size_t>(patch)])];
-      if (c.normal.dot(leader.normal) >= min_cosine) break;
+      if (c.normal.dot(leader.normal) >= least_cosine) break;
     }
     if (static_cast<std::size_t>(patch) == leaders.size()) leaders.push_back(static_cast<Index>(&c - contacts.data()));
     patch_of.push_back(patch);

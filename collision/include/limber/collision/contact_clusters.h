@@ -1,12 +1,12 @@
 /// @file limber/collision/contact_clusters.h
 /// Many contacts of two bodies, thinned to the few that carry the same forces and torques.
 ///
-/// Contacts of like normals are a *patch*. A patch is pushed by forces along its normal, and
+/// Contacts of like normals, within 20° of the first, are a *patch*. A patch is pushed by forces along its normal, and
 /// whatever pressure acts within a convex region, some forces at the corners of that region have the same sum and the
 /// same torque. So of each patch the corners are kept:
 ///
-///  1. The *deep* contacts are those whose gap is within `depth_tolerance` times the patch's extent of its smallest
-///     gap. Of the corners of their convex hull, seen along the normal, those n are kept that span the largest area. It
+///  1. The *deep* contacts are those whose gap is within a thousandth of the patch's extent of its smallest gap. Of the
+///  corners of their convex hull, seen along the normal, those n are kept that span the largest area. It
 ///     is at least (n/2π) sin(2π/n) of the hull's: 0.63 for n = 4 (E. Sas, *Über eine Extremumeigenschaft der Ellipsen*,
 ///     1939), and exactly the hull where this has no more than n corners. (For n > 4, corners are added to the largest
 ///     quadrilateral one by one.)
@@ -15,7 +15,7 @@
 ///  3. Bodies that bend sag between four corners. Where a contact is farther than a given spacing from all that are
 ///     kept, the deepest of such is kept as well, until there are none.
 ///
-/// Contacts that were kept last time are kept again as long as their areas are at least `hysteresis` times those of the
+/// Contacts that were kept last time are kept again as long as their areas are at least 0.9 of those of the
 /// best choice, and they cover the patch with a tenth more spacing and not many more contacts, so that warm starts find
 /// them again. Two cylinders that touch along a line keep the line's ends.
 #pragma once
@@ -31,11 +31,8 @@
 namespace limber {
 
 struct ContactClusterOptions {
-  int max_points = 4;              ///< n, most corners of a patch, ≥ 1; 0: all contacts are kept
-  double max_normal_angle = 0.35;  ///< rad, between a contact and its patch's first, (0, π/2]; 0.35: 20°
-  double depth_tolerance = 1e-3;   ///< of the patch's extent; ≥ 0
-  double hysteresis = 0.9;         ///< in [0, 1]; 1: last time's only where nothing is better
-  void validate() const;           ///< @throws InvalidArgument naming the field and its value
+  int max_points = 4;     ///< n, most corners of a patch, ≥ 1; 0: all contacts are kept
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
 /// Seen along a patch's normal, none of its contacts that is left out is farther than this (by a tenth more where those
