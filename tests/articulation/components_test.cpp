@@ -62,6 +62,37 @@ TEST(Components, SoupIsJoinedWithinPartsButNotAcrossATouchingFace) {
   }
 }
 
+// Each corner is displaced by up to 1e-6 of the size along each axis.
+TEST(Components, ATornSoupIsAsTheWeldedOne) {
+  GroupedSurface torn = as_soup(touching_boxes());
+  double phase = 0.0;
+  const double tear = 1e-6 * std::sqrt(6.0);
+  for (Vec3& v : torn.surface.vertices) {
+    phase += 1.0;
+    v += tear * Vec3(std::sin(phase), std::sin(2.3 * phase), std::cos(phase));
+  }
+  const Assembly assembly = find_components(torn);
+  ASSERT_EQ(assembly.components.size(), 2u);
+  for (const Component& c : assembly.components) {
+    EXPECT_EQ(c.surface.vertices.size(), 8u);
+    EXPECT_TRUE(c.closed);
+    EXPECT_NEAR(enclosed_volume(c.surface), 1.0, 1e-4);
+  }
+}
+
+TEST(Components, QuadrilateralsThatShareNoCornerAreASoupToo) {
+  GroupedSurface quads = as_soup(touching_boxes());
+  for (std::size_t i = 0; i < quads.face_of.size(); ++i) quads.face_of[i] = static_cast<Index>(i / 2);
+  for (std::size_t i = 0; i + 1 < quads.surface.triangles.size(); i += 2) {
+    // The second triangle of each takes the first one's corners where they are the same.
+    for (Index& v : quads.surface.triangles[i + 1])
+      for (const Index w : quads.surface.triangles[i])
+        if (quads.surface.vertices[static_cast<std::size_t>(w)] == quads.surface.vertices[static_cast<std::size_t>(v)])
+          v = w;
+  }
+  EXPECT_EQ(find_components(quads).components.size(), 2u);
+}
+
 TEST(Components, ShellsUnderOneNameAreProposedForMerging) {
   const Assembly assembly = find_components(together({{"bolt", box({0, 0, 0}, {1, 1, 1})},
                                                       {"bolt", box({3, 0, 0}, {4, 1, 1})},

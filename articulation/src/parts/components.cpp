@@ -7,6 +7,7 @@
 #include "limber/articulation/assembly.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "limber/mesh/mend_surface.h"
 #include "parts/hole_caps.h"
 #include "parts/soup.h"
 
@@ -57,14 +58,16 @@ std::vector<Index> group_of_triangles(const GroupedSurface& input) {
   return of;
 }
 
-bool is_soup(const SurfaceMesh& surface) {
-  std::vector<char> used(surface.vertices.size(), 0);
-  for (const Triangle& t : surface.triangles)
-    for (const Index v : t) {
-      if (used[static_cast<std::size_t>(v)]) return false;
-      used[static_cast<std::size_t>(v)] = 1;
+/// Whether no two faces share a vertex.
+bool is_soup(const GroupedSurface& input) {
+  std::vector<Index> face_at(input.surface.vertices.size(), -1);
+  for (std::size_t i = 0; i < input.surface.triangles.size(); ++i)
+    for (const Index v : input.surface.triangles[i]) {
+      Index& face = face_at[static_cast<std::size_t>(v)];
+      if (face >= 0 && face != input.face_of[i]) return false;
+      face = input.face_of[i];
     }
-  return surface.triangles.size() > 1;
+  return input.face_of.front() != input.face_of.back();
 }
 
 std::vector<Index> shells_by_index(const SurfaceMesh& surface) {
@@ -108,10 +111,10 @@ std::vector<std::string> shell_names(const GroupedSurface& input, const std::vec
   return names;
 }
 
-Partition by_connectivity(const GroupedSurface& input, double weld_tolerance) {
+/// @param tolerance of vertices of a soup
+Partition by_connectivity(const GroupedSurface& input, bool soup, double tolerance) {
   Partition out;
-  out.label =
-      is_soup(input.surface) ? internal::shells_of_soup(input.surface, weld_tolerance) : shells_by_index(input.surface);
+  out.label = soup ? internal::shells_of_soup(input.surface, tolerance) : shells_by_index(input.surface);
   out.name = shell_names(input, out.label);
   return out;
 }
@@ -176,7 +179,8 @@ std::vector<FaceRange> face_ranges(const std::vector<Index>& triangles, const st
   return ranges;
 }
 
-SurfaceMesh own_surface(const SurfaceMesh& source, const std::vector<Index>& triangles, std::vector<Index>& scratch) {
+SurfaceMesh own_surface(const SurfaceMesh& source, const std::vector<Index>& triangles, double tolerance,
+                        std::vector<Index>& scratch) {
   SurfaceMesh out;
   std::vector<Index> used;
   for (const Index index : triangles) {
@@ -193,7 +197,7 @@ SurfaceMesh own_surface(const SurfaceMesh& source, const std::vector<Index>& tri
     out.triangles.push_back(t);
   }
   for (const Index v : used) scratch[static_cast<std::size_t>(v)] = -1;
-  weld(out);
+  weld_within(out, tolerance);
   return out;
 }
 
@@ -223,9 +227,11 @@ Assembly find_components(const GroupedSurface& input, const ComponentOptions& op
   out.source = input.surface;
   out.diagonal = box_diagonal(input.surface.vertices);
 
+  const bool soup = is_soup(input);
+  const double tolerance = soup ? options.weld_tolerance * out.diagonal : 0.0;
   Partition partition =
       options.rule == ComponentRule::kConnectivity
-          ? by_connectivity(input, options.weld_tolerance * out.diagonal)
+          ? by_connectivity(input, soup, tolerance)
           : by_name(input, options.rule == ComponentRule::kGroups ? &SurfaceGroup::name : &SurfaceGroup::material);
   apply_wishes(options, partition);
 
@@ -237,7 +243,7 @@ Assembly find_components(const GroupedSurface& input, const ComponentOptions& op
     Component& component = out.components[c];
     component.name = std::move(partition.name[c]);
     component.faces = face_ranges(component.triangles, input.face_of);
-    component.surface = own_surface(input.surface, component.triangles, scratch);
+    component.surface = own_surface(input.surface, component.triangles, tolerance, scratch);
     component.closed = surface_quality(component.surface).closed_manifold();
     if (auto caps = component.closed ? std::nullopt : internal::small_hole_caps(component.surface))
       component.closed = true, component.caps = std::move(*caps);

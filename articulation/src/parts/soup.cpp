@@ -5,48 +5,13 @@
 #include <map>
 #include <numbers>
 #include <span>
-#include <unordered_map>
 
 #include "limber/core/disjoint_sets.h"
+#include "limber/mesh/mend_surface.h"
 #include "tuning.h"
 
 namespace limber::internal {
 namespace {
-
-struct CellHash {
-  std::size_t operator()(const std::array<std::int64_t, 3>& cell) const {
-    std::uint64_t h = 0;
-    for (const auto c : cell) h = (h ^ static_cast<std::uint64_t>(c) ^ (h >> 29)) * 0x9e3779b97f4a7c15u;
-    return static_cast<std::size_t>(h ^ (h >> 32));
-  }
-};
-
-/// Per vertex the first vertex within the tolerance of it (chains are not followed).
-std::vector<Index> representatives(const std::vector<Vec3>& vertices, double tolerance) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& v : vertices) box.extend(v);
-  // Cells are never finer than what 53 bits tell apart, so that the cell numbers stay whole.
-  constexpr double kRoundOff = 1e-15, kNotZero = 1e-300;
-  const double size = std::max({tolerance, box.diagonal().norm() * kRoundOff, kNotZero});
-  std::unordered_map<std::array<std::int64_t, 3>, std::vector<Index>, CellHash> cells;
-  std::vector<Index> of(vertices.size());
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Vec3 scaled = (vertices[i] - box.min()) / size;
-    const std::array<std::int64_t, 3> home = {static_cast<std::int64_t>(std::floor(scaled[0])),
-                                              static_cast<std::int64_t>(std::floor(scaled[1])),
-                                              static_cast<std::int64_t>(std::floor(scaled[2]))};
-    Index found = -1;
-    for (int k = 0; k < 27 && found < 0; ++k) {
-      const auto near = cells.find({home[0] + k % 3 - 1, home[1] + k / 3 % 3 - 1, home[2] + k / 9 - 1});
-      if (near == cells.end()) continue;
-      for (const Index j : near->second)
-        if ((vertices[static_cast<std::size_t>(j)] - vertices[i]).norm() <= tolerance) found = j;
-    }
-    of[i] = found < 0 ? static_cast<Index>(i) : found;
-    if (found < 0) cells[home].push_back(static_cast<Index>(i));
-  }
-  return of;
-}
 
 /// One triangle at an edge.
 struct SoupSide {
@@ -57,13 +22,11 @@ struct SoupSide {
   Vec3 normal;  ///< outward, unit
 };
 
-std::vector<SoupSide> sides_of(const SurfaceMesh& surface, const std::vector<Index>& representative) {
+std::vector<SoupSide> sides_of(const SurfaceMesh& surface) {
   std::vector<SoupSide> sides;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)
     for (std::size_t a = 0; a < 3; ++a) {
-      const auto at = [&](std::size_t k) {
-        return representative[static_cast<std::size_t>(surface.triangles[t][(a + k) % 3])];
-      };
+      const auto at = [&](std::size_t k) { return surface.triangles[t][(a + k) % 3]; };
       const Index i = at(0), j = at(1);
       if (i == j) continue;
       const Vec3 &p = surface.vertices[static_cast<std::size_t>(i)], &q = surface.vertices[static_cast<std::size_t>(j)],
@@ -109,8 +72,9 @@ void join_at_edge(std::span<const SoupSide> sides, DisjointSets& sets) {
 
 }  // namespace
 
-std::vector<Index> shells_of_soup(const SurfaceMesh& surface, double tolerance) {
-  const auto sides = sides_of(surface, representatives(surface.vertices, tolerance));
+std::vector<Index> shells_of_soup(SurfaceMesh surface, double tolerance) {
+  weld_within(surface, tolerance);
+  const auto sides = sides_of(surface);
   DisjointSets sets(surface.triangles.size());
   for (std::size_t i = 0; i < sides.size();) {
     std::size_t j = i + 1;

@@ -2,7 +2,7 @@
 /// A CAD-like model taken apart: the rigid components that a pile of triangles consists of.
 ///
 /// Components are found by what shares vertices (index connectivity), never by position: parts that touch exactly would
-/// become one. Only a triangle soup, in which no two triangles share a vertex, is joined by position: across edges
+/// become one. Only a soup, in which no two faces share a vertex, is joined by position: across edges
 /// whose two triangles continue each other, so that a pin that fills its hole still stays apart from it. Lengths are in
 /// the file's own unit throughout; nothing depends on which it is. Source: [X09] 3.1.
 #pragma once
@@ -63,7 +63,8 @@ enum class ComponentRule {
 
 struct ComponentOptions {
   ComponentRule rule = ComponentRule::kConnectivity;
-  double weld_tolerance = 1e-6;  ///< of the whole's diagonal; vertices of a soup that are nearer count as one; ≥ 0
+  /// Of the whole's diagonal; vertices of a soup that are nearer count as one. ≥ 0; by default 32 last bits of a float.
+  double weld_tolerance = 0x1p-18;
   /// Each list becomes one component under the first name, after the rule has been applied. Names as the rule gives
   /// them.
   std::vector<std::vector<std::string>> merge = {};
