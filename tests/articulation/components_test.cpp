@@ -93,6 +93,25 @@ TEST(Components, QuadrilateralsThatShareNoCornerAreASoupToo) {
   EXPECT_EQ(find_components(quads).components.size(), 2u);
 }
 
+TEST(Components, TrianglesWithTwoCornersAtOnePlaceBelongToNoPart) {
+  for (const bool soup : {false, true}) {
+    GroupedSurface input = touching_boxes();
+    SurfaceMesh& s = input.surface;
+    s.vertices.push_back(s.vertices[0]);  // another vertex at the first one's place
+    s.triangles.push_back({0, static_cast<Index>(s.vertices.size()) - 1, 1});
+    input.face_of.push_back(24);
+    ++input.groups.back().count;
+    if (soup) input = as_soup(input);
+    const Assembly assembly = find_components(input);
+    ASSERT_EQ(assembly.components.size(), 2u);
+    for (const Component& c : assembly.components) {
+      EXPECT_EQ(c.surface.triangles.size(), 12u);
+      EXPECT_EQ(c.triangles.size(), 12u);
+      EXPECT_TRUE(c.closed);
+    }
+  }
+}
+
 TEST(Components, ShellsUnderOneNameAreProposedForMerging) {
   const Assembly assembly = find_components(together({{"bolt", box({0, 0, 0}, {1, 1, 1})},
                                                       {"bolt", box({3, 0, 0}, {4, 1, 1})},

@@ -179,7 +179,8 @@ std::vector<FaceRange> face_ranges(const std::vector<Index>& triangles, const st
   return ranges;
 }
 
-SurfaceMesh own_surface(const SurfaceMesh& source, const std::vector<Index>& triangles, double tolerance,
+/// @param triangles of the source; those that name a vertex twice once it is welded go
+SurfaceMesh own_surface(const SurfaceMesh& source, double tolerance, std::vector<Index>& triangles,
                         std::vector<Index>& scratch) {
   SurfaceMesh out;
   std::vector<Index> used;
@@ -198,6 +199,15 @@ SurfaceMesh own_surface(const SurfaceMesh& source, const std::vector<Index>& tri
   }
   for (const Index v : used) scratch[static_cast<std::size_t>(v)] = -1;
   weld_within(out, tolerance);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = out.triangles[i];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    triangles[kept] = triangles[i];
+    out.triangles[kept++] = t;
+  }
+  triangles.resize(kept);
+  out.triangles.resize(kept);
   return out;
 }
 
@@ -243,12 +253,13 @@ Assembly find_components(const GroupedSurface& input, const ComponentOptions& op
     Component& component = out.components[c];
     component.name = std::move(partition.name[c]);
     component.faces = face_ranges(component.triangles, input.face_of);
-    component.surface = own_surface(input.surface, component.triangles, tolerance, scratch);
+    component.surface = own_surface(input.surface, tolerance, component.triangles, scratch);
     component.closed = surface_quality(component.surface).closed_manifold();
     if (auto caps = component.closed ? std::nullopt : internal::small_hole_caps(component.surface))
       component.closed = true, component.caps = std::move(*caps);
     component.diagonal = box_diagonal(component.surface.vertices);
   }
+  std::erase_if(out.components, [](const Component& c) { return c.triangles.empty(); });
   if (options.rule == ComponentRule::kConnectivity) {
     propose_by_name(input, out);
     internal::propose_by_open_edges(out);
