@@ -608,6 +608,7 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
   const std::string bytes = asset_bytes(baked.asset);
   program.write_file(a.output, bytes);
   add_bake(program.report(), baked.bodies);
+  warn_of_stiff_elements(baked.bodies, program.warnings());
   program.report()["joints"] = nlohmann::ordered_json::parse(joints_text(baked.joints))["joints"];
   program.report()["asset_bytes"] = bytes.size();
   for (const auto& body : baked.asset.bodies)
@@ -647,6 +648,7 @@ void precompute(Program& program, const Arguments& a) {
   program.write_file(a.output, bytes);
 
   add_bake(program.report(), result.bodies);
+  warn_of_stiff_elements(result.bodies, program.warnings());
   add_bake_seconds(seconds, result.bodies);
   add_surface_mass(program.report(), options.materials);
   program.report()["asset_bytes"] = bytes.size();

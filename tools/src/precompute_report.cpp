@@ -188,6 +188,19 @@ double largest_frequency_error(const BodyReport& b) {
   return largest;
 }
 
+void warn_of_stiff_elements(const std::vector<BodyReport>& bodies, Warnings& warnings) {
+  constexpr double kTold = 0.05;
+  std::string stiff;
+  for (const BodyReport& b : bodies)
+    if (const double error = largest_frequency_error(b); b.nodes_per_tet == 4 && error > kTold)
+      stiff += fmt::format("{}\"{}\" by {:.0f} %", stiff.empty() ? "" : ", ", b.name, 100.0 * error);
+  if (!stiff.empty())
+    warnings.push_back(
+        "the lowest frequencies are too high by estimate, and by more where that is much: " + stiff +
+        "; linear elements are too stiff where parts bend with fewer than four cells across, and near nu = 1/2: "
+        "--elements quadratic or a smaller --cell-size mends it");
+}
+
 void add_bake(Json& report, const std::vector<BodyReport>& bodies) {
   const Total total = total_of(bodies);
   report["nodes"] = sum(bodies, [](const BodyReport& b) { return b.nodes; });

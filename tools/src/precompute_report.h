@@ -26,6 +26,9 @@ inline constexpr int kModesTold = 10;
 /// The largest estimated error of these frequencies, relative, without its sign.
 double largest_frequency_error(const BodyReport& body);
 
+/// Warns of bodies of linear elements whose lowest frequencies are estimated to be more than 5 % too high.
+void warn_of_stiff_elements(const std::vector<BodyReport>& bodies, Warnings& warnings);
+
 /// A few lines for people: what was baked and what was left out.
 std::string bake_summary(const std::vector<BodyReport>& bodies);
 
