@@ -66,7 +66,7 @@ struct ResponseArguments {
 struct AssemblyArguments {
   AssemblyOptions options;
   bool auto_joints = false;
-  std::string components = "connectivity";
+  std::string components = "auto";
   std::string scene;
 };
 
@@ -199,8 +199,10 @@ void declare_assembly_options(CLI::App& app, Arguments& a) {
                  "materials are named by components")
       ->type_name("JOINTS.json");
   app.add_flag("--auto-joints", a.assembly.auto_joints, "the same, with joints and limits found in the geometry");
-  app.add_option("--components", a.assembly.components, "what makes a component: shared vertices, or names of groups")
-      ->check(CLI::IsMember({"connectivity", "groups", "materials"}))
+  app.add_option("--components", a.assembly.components,
+                 "what makes a component: shared vertices, or names in the file; auto: groups, where joints are to be "
+                 "found and no part's triangles belong to two, else shared vertices")
+      ->check(CLI::IsMember({"auto", "connectivity", "groups", "materials"}))
       ->capture_default_str();
   app.add_option("--scene", a.assembly.scene, "of an assembly: the scene in which it stands and moves by its joints")
       ->type_name("SCENE.json");
@@ -598,9 +600,9 @@ void precompute_assembly(Program& program, const Arguments& a, const BakeOptions
   assembly.scale = a.geometry.scale;
   assembly.tets = a.geometry.tets;
   assembly.tets.quadratic = a.modal.elements == "quadratic";
-  assembly.components = a.assembly.components == "groups"      ? ComponentRule::kGroups
-                        : a.assembly.components == "materials" ? ComponentRule::kMaterials
-                                                               : ComponentRule::kConnectivity;
+  if (a.assembly.components == "groups") assembly.components = ComponentRule::kGroups;
+  if (a.assembly.components == "materials") assembly.components = ComponentRule::kMaterials;
+  if (a.assembly.components == "connectivity") assembly.components = ComponentRule::kConnectivity;
   program.add_input(a.mesh);
   TbbJobs jobs;
   BakedAssembly baked = bake_assembly(program, a.mesh, assembly, options, jobs);

@@ -29,7 +29,8 @@ struct Arguments {
   std::vector<std::string> bake;
 };
 
-/// How an assembly is baked where nothing is said.
+/// How an assembly is baked where nothing is said; its material, where only that is not said.
+constexpr std::size_t kMaterialWords = 2;
 constexpr const char* kBake[] = {"--material", "nylon", "--modes", "6", "--damping-ratio", "0.03@50,500"};
 
 std::string joined(std::span<const char* const> words) {
@@ -86,10 +87,14 @@ PageContent page_of_assembly(const fs::path& input, const std::vector<std::strin
   const fs::path asset = folder.path / (input.stem().string() + ".glb");
   std::vector<std::string> arguments{input.string(), "-o", asset.string()};
   if (std::find(bake.begin(), bake.end(), "--joints") == bake.end()) arguments.emplace_back("--auto-joints");
-  if (bake.empty())
-    arguments.insert(arguments.end(), std::begin(kBake), std::end(kBake));
-  else
-    arguments.insert(arguments.end(), bake.begin(), bake.end());
+  const auto is_given = [&](const std::string& option) {
+    return std::ranges::any_of(bake, [&](const std::string& word) { return word.starts_with(option); });
+  };
+  const bool material = is_given("--material") || is_given("--youngs-modulus");
+  const std::span<const char* const> defaults(kBake);
+  for (const char* word : bake.empty() ? defaults : defaults.first(material ? 0 : kMaterialWords))
+    arguments.emplace_back(word);
+  arguments.insert(arguments.end(), bake.begin(), bake.end());
   const std::optional<int> code = exit_code_of(neighbour("limber-precompute"), std::move(arguments));
   if (!code)
     throw InputError(
@@ -157,7 +162,8 @@ int main(int argc, char** argv) {
       ->required();
   program.options().add_option(
       "BAKE", arguments.bake,
-      "after --: how limber-precompute bakes the assembly; default: " + limber::tools::joined(limber::tools::kBake));
+      "after --: how limber-precompute bakes the assembly, by default of nylon; without any: " +
+          limber::tools::joined(limber::tools::kBake));
   program.options()
       .add_option("-o,--output", arguments.page, "page to write; without it a temporary one is opened")
       ->type_name("FILE.html");

@@ -8,6 +8,7 @@
 
 #include "asked.h"
 #include "limber/core/file.h"
+#include "limber/mesh/grouped_surface.h"
 #include "limber/model/asset.h"
 #include "limber/scene/run.h"
 #include "limber/scene/scene_player.h"
@@ -214,6 +215,59 @@ TEST_F(AssemblyProgram, MaterialsAreNamedByComponentsAndScaleIsOfLengths) {
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_DOUBLE_EQ(made.joints[0].spec.frame.origin[static_cast<Index>(i)],
                      2.0 * told["joints"][0]["origin"][i].get<double>());
+}
+
+/// The lamp's groups are its five parts, drawn in more shells; rigid ones are as their surfaces bound them.
+TEST_F(AssemblyProgram, TheFirstCommandTakesTheFilesGroupsAndMeshesNoRigidPart) {
+  const ProgramResult r = testing::run_program(
+      "limber-precompute",
+      {"lamp.obj", "--auto-joints", "--material", "nylon", "--rigid", "*", "-o", "lamp.glb", "--report", "r.json"},
+      folder_);
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, ::testing::Not(HasSubstr("falls")));
+  const Asset lamp = read_asset(folder_ / "lamp.glb");
+  EXPECT_EQ(lamp.bodies.size(), 5u);
+  EXPECT_EQ(lamp.joints.size(), 5u) << "and the ground's";
+  const auto report = nlohmann::json::parse(read_file(folder_ / "r.json"));
+  EXPECT_EQ(report["tets"], 0);
+  EXPECT_EQ(report["frequencies_hz"].size(), 0u);
+  Warnings warnings;
+  const GroupedSurface drawn = read_grouped_surface(folder_ / "lamp.obj", warnings);
+  double volume = 0.0;
+  for (const SurfaceGroup& group : drawn.groups)
+    if (group.name == "base") {
+      const auto first = drawn.surface.triangles.begin() + group.first;
+      volume += enclosed_volume({drawn.surface.vertices, {first, first + group.count}});
+    }
+  EXPECT_NEAR(mass("base"), 1140.0 * volume, 1e-9 * mass("base")) << "kg, of nylon";
+}
+
+TEST_F(AssemblyProgram, TrianglesWithTwoCornersAtOnePlaceAreDroppedWithAWarning) {
+  const std::string lamp = read_file(folder_ / "lamp.obj");
+  const std::size_t first = lamp.starts_with("v ") ? 0 : lamp.find("\nv ") + 1, end = lamp.find('\n', first);
+  // A vertex at the first one's place, the last of the file, in a triangle of the last part.
+  write_file(folder_ / "lamp.obj", lamp + lamp.substr(first, end - first) + "\nf 1 -1 2\n");
+  const ProgramResult r = testing::run_program("limber-precompute",
+                                               {"lamp.obj", "--auto-joints", "--components", "connectivity",
+                                                "--material", "nylon", "--rigid", "*", "-o", "lamp.glb"},
+                                               folder_);
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, HasSubstr("1 triangles have two corners at one place"));
+}
+
+TEST_F(AssemblyProgram, LinearElementsThatAreTooStiffAreToldWithTheError) {
+  write_file(folder_ / "bar.obj",
+             "v 0 0 0\nv .3 0 0\nv .3 .04 0\nv 0 .04 0\nv 0 0 .01\nv .3 0 .01\nv .3 .04 .01\nv 0 .04 .01\n"
+             "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const auto warnings = [&](const std::string& elements) {
+    const ProgramResult r = testing::run_program(
+        "limber-precompute",
+        {"bar.obj", "--material", "steel", "--modes", "3", "--elements", elements, "-o", "bar.glb"}, folder_);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  EXPECT_THAT(warnings("linear"), HasSubstr("\"bar\" by 3"));  // 34 %, of a frequency that is 77 % too high
+  EXPECT_EQ(warnings("quadratic"), "");
 }
 
 TEST_F(AssemblyProgram, WhatIsWrongIsOneLineAndNothingIsWritten) {

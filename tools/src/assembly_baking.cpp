@@ -1,12 +1,20 @@
 #include "assembly_baking.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 
 #include "limber/articulation/contact_region.h"
 #include "limber/articulation/detect_joints.h"
 #include "limber/articulation/range_of_motion.h"
+#include "limber/collision/rigid_model.h"
 #include "limber/core/error.h"
+#include "limber/mesh/closed_shells.h"
+#include "limber/mesh/mend_surface.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/scene/scene_model.h"
 
@@ -24,8 +32,34 @@ struct Joined {
   std::vector<double> patch_radii;  // in the file's unit; 0: not known
 };
 
-Joined detect(Program& program, const GroupedSurface& surface, ComponentRule rule, Jobs& jobs) {
-  Joined joined{.assembly = find_components(surface, {.rule = rule}), .joints = {}, .patch_radii = {}};
+/// The file's groups, where it names two or more and none cuts through a shell; else what shares vertices.
+Assembly take_apart(Program& program, const GroupedSurface& surface) {
+  Assembly shells = find_components(surface);
+  std::vector<Index> group_of(surface.surface.triangles.size());
+  std::set<std::string> names;
+  for (std::size_t g = 0; g < surface.groups.size(); ++g) {
+    names.insert(surface.groups[g].name);
+    std::fill_n(group_of.begin() + surface.groups[g].first, surface.groups[g].count, static_cast<Index>(g));
+  }
+  const auto name_of = [&](Index triangle) -> const std::string& {
+    return surface.groups[static_cast<std::size_t>(group_of[static_cast<std::size_t>(triangle)])].name;
+  };
+  const auto whole = [&](const Component& shell) {
+    return std::ranges::all_of(shell.triangles,
+                               [&](Index t) { return name_of(t) == name_of(shell.triangles.front()); });
+  };
+  if (names.size() < 2 || names.contains("") || names.size() == shells.components.size() ||
+      !std::ranges::all_of(shells.components, whole))
+    return shells;
+  program.print(
+      fmt::format("components: the file's {} groups, drawn in {} shells\n", names.size(), shells.components.size()));
+  return find_components(surface, {.rule = ComponentRule::kGroups});
+}
+
+Joined detect(Program& program, const GroupedSurface& surface, std::optional<ComponentRule> rule, Jobs& jobs) {
+  Joined joined{.assembly = rule ? find_components(surface, {.rule = *rule}) : take_apart(program, surface),
+                .joints = {},
+                .patch_radii = {}};
   program.progress().stage("joints");
   std::vector<DetectedJoint> found = detect_joints(joined.assembly, {}, jobs);
   const std::vector<RangeOfMotion> ranges = ranges_of_motion(joined.assembly, found, {}, jobs);
@@ -60,6 +94,36 @@ bool is_rigid(const AssemblyOptions& options, const std::string& name) {
   return std::ranges::any_of(options.rigid, [&](const std::string& r) { return r == "*" || r == name; });
 }
 
+/// A part that does not bend, from its surface alone; nothing where that, mended, bounds no solid.
+std::optional<BakeResult> rigid_part(const std::string& name, SurfaceMesh surface, double density) {
+  if (!surface_quality(surface).closed_manifold()) mend_surface(surface, weld_tolerance(surface));
+  if (!surface_quality(surface).closed_manifold()) return std::nullopt;
+  turn_shells_outward(surface);
+  const MassProperties mass = mass_properties(TriangleMesh{surface.vertices, surface.triangles}, density);
+  ModalModelData data;
+  data.name = name;
+  data.volume = mass.mass / density;
+  data.mass = mass.mass;
+  data.inertia = mass.inertia;
+  data.origin_in_input = mass.center_of_mass;
+  for (const Vec3& p : surface.vertices) data.render.rest.push_back((p - mass.center_of_mass).cast<float>());
+  data.render.basis = ModalBasis(static_cast<Index>(surface.vertices.size()), 0);
+  data.render.triangles = std::move(surface.triangles);
+  BodyReport report;
+  report.name = name;
+  report.mass = mass.mass;
+  report.volume = data.volume;
+  report.center_of_mass = mass.center_of_mass;
+  report.inertia = mass.inertia;
+  report.zero_modes = 6;
+  report.all_modes = true;
+  BakeResult result;
+  result.asset.bodies.push_back(std::make_shared<const ModalModel>(std::move(data)));
+  result.asset.frequency_errors.emplace_back();
+  result.bodies.push_back(std::move(report));
+  return result;
+}
+
 /// @param patches where its joints sit
 BakeResult bake_part(Program& program, const Component& part, const AssemblyOptions& options, BakeOptions bake_options,
                      std::vector<AttachmentPatch> patches, Jobs& jobs) {
@@ -74,6 +138,8 @@ BakeResult bake_part(Program& program, const Component& part, const AssemblyOpti
   TetrahedralisationOptions tets = options.tets;
   if (tets.cell_size == 0.0) tets.cell_size = kCell * options.scale * part.diagonal;
   const bool rigid = is_rigid(options, part.name);
+  if (rigid && bake_options.collision_triangles == 0)
+    if (auto made = rigid_part(part.name, surface, of_part.density)) return std::move(*made);
   if (rigid)
     bake_options.analysis.modes = 1, bake_options.analysis.certify = false;
   else if (options.joint_compliance)
@@ -176,8 +242,15 @@ std::vector<AttachmentPatch> patches_on(Index part, const Joined& joined, double
 BakedAssembly bake_assembly(Program& program, const std::string& path, const AssemblyOptions& options,
                             const BakeOptions& bake_options, Jobs& jobs) {
   const GroupedSurface surface = read_any_grouped_surface(path, program.warnings());
-  Joined joined = options.joints_file.empty() ? detect(program, surface, options.components, jobs)
-                                              : take(program, surface, options.components, options.joints_file);
+  Joined joined =
+      options.joints_file.empty()
+          ? detect(program, surface, options.components, jobs)
+          : take(program, surface, options.components.value_or(ComponentRule::kConnectivity), options.joints_file);
+  std::size_t dropped = surface.surface.triangles.size();
+  for (const Component& part : joined.assembly.components) dropped -= part.triangles.size();
+  if (dropped > 0)
+    program.warnings().push_back(
+        fmt::format("\"{}\": {} triangles have two corners at one place and have been dropped", path, dropped));
   for (const std::string& name : options.rigid)
     if (name != "*") component_named(joined.assembly, name);
   for (const std::string& name : options.ground) component_named(joined.assembly, name);

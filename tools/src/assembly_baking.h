@@ -2,6 +2,7 @@
 /// limber-precompute on an assembly: every component a body, and the joints between them as a scene.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@
 namespace limber::tools {
 
 struct AssemblyOptions {
-  ComponentRule components = ComponentRule::kConnectivity;
+  /// None: the file's groups where joints are to be found and no shell has triangles of two, else shared vertices.
+  std::optional<ComponentRule> components{};
   std::string joints_file{};          ///< empty: the joints are detected
   std::vector<std::string> rigid{};   ///< components without modes; "*": all
   std::vector<std::string> ground{};  ///< components that stand still; none: the first
