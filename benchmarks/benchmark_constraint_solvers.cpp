@@ -12,8 +12,8 @@
 
 #include "contact_problems.h"
 #include "cpu_time.h"
+#include "limber/hauser/contact_qp.h"
 #include "limber/hauser/linear_program.h"
-#include "limber/solvers/contact_qp.h"
 #include "limber/solvers/least_squares.h"
 
 namespace limber {

@@ -105,7 +105,7 @@ double RowEquilibrium::solve(std::span<const double> b, std::span<double> f) {
     }
     if (best <= tuning.met || !factor()) break;
     find_direction({});
-    const double reached = product_after(std::min(1.0, longest_step())) / product();
+    const double all = product(), reached = all > 0.0 ? product_after(std::min(1.0, longest_step())) / all : 0.0;
     find_direction(
         {.centring = std::clamp(reached * reached * reached, tuning.least_centring, 1.0), .corrected = true});
     const double step = std::min(1.0, tuning.part_of_longest * longest_step());
@@ -113,6 +113,34 @@ double RowEquilibrium::solve(std::span<const double> b, std::span<double> f) {
     take_step(step);
   }
   return best;
+}
+
+void RowEquilibrium::solve(const IntervalRows& rows, std::span<double> f) {
+  const std::size_t m = rows.b.size(), n = rows.dimension;
+  A_.resize(m * m);
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t j = 0; j < m; ++j) {
+      double sum = i == j && !rows.D.empty() ? rows.D[i] : 0.0;
+      for (std::size_t k = 0; k < n; ++k) sum += rows.G[i * n + k] * rows.G[j * n + k];
+      A_[i * m + j] = sum;
+    }
+  double size = 0.0;  // of the largest gap, as a length of b in the metric of W
+  for (std::size_t i = 0; i < m; ++i)
+    if (const double moved = A_[i * (m + 1)]; moved > 0.0)
+      size = std::max(size, std::abs(rows.b[i]) / std::sqrt(moved));
+  clear();
+  for (std::size_t i = 0; i < m; ++i) {
+    const double moved = A_[i * (m + 1)], rest = std::clamp(0.0, rows.lower[i], rows.upper[i]);
+    ContactPotential set{.set = ContactPotential::Set::kInterval,
+                         .compliance = moved > 0.0 ? moved : 1.0,
+                         .lower = moved > 0.0 ? rows.lower[i] : rest,
+                         .upper = moved > 0.0 ? rows.upper[i] : rest};
+    add_unit(1, set,
+             std::max(kSolversTuning.equilibrium.digits * size * std::sqrt(set.compliance),
+                      std::numeric_limits<double>::min()));
+  }
+  set_matrix(A_);
+  solve(rows.b, f);
 }
 
 void RowEquilibrium::to_scale(std::span<const double> b) {
@@ -126,6 +154,11 @@ bool RowEquilibrium::is_fixed(const Unit& unit) const {
   using Set = ContactPotential::Set;
   return (unit.set.set == Set::kBall && unit.set.bound == 0.0) ||
          (unit.set.set == Set::kInterval && unit.set.lower == unit.set.upper);
+}
+
+bool RowEquilibrium::is_free(const Unit& unit) const {
+  return unit.set.set == ContactPotential::Set::kInterval && unit.set.lower == -kUnbounded &&
+         unit.set.upper == kUnbounded;
 }
 
 void RowEquilibrium::place_pairs() {
@@ -191,11 +224,13 @@ double RowEquilibrium::product_after(double step) const {
 
 /// W and what the pairs yield, after what they leave of u = b + W f. @return false where digits end
 bool RowEquilibrium::factor() {
-  if (bounds_.empty() && discs_.empty()) return false;
-  level_ = product() / static_cast<double>(bounds_.size() + discs_.size());
+  const std::size_t pairs = bounds_.size() + discs_.size();
+  level_ = pairs > 0 ? product() / static_cast<double>(pairs) : 0.0;
   find_gaps(f_);
   for (std::size_t i = 0; i < size_; ++i) left_[i] = -gap_[i];
   A_.assign(W_.begin(), W_.end());
+  for (const Unit& unit : units_)
+    if (is_free(unit)) A_[unit.first * (size_ + 1)] += kSolversTuning.equilibrium.yield;
   for (const Bound& bound : bounds_) {
     A_[bound.row * (size_ + 1)] += bound.z / bound.x;
     left_[bound.row] += bound.side * bound.z;

@@ -21,19 +21,13 @@ struct EquilibriumTuning {
   int most_steps = 100;          ///< of Newton's method. [path] Bounds the work
   double least_centring = 0.1;   ///< of the mean product, what a step aims at: less leaves the middle of the sets
   double part_of_longest = 0.9;  ///< of the step to the nearest bound, what is taken
+  /// Of what an impulse moves its own row by, what a row without bounds yields to a change of it in a step: far above
+  /// round-off of redundant rows.
+  double yield = 1e-8;
+  double digits = 1e-10;  ///< tolerance of rows with an interval each, of the largest gap
 };
 
-/// ContactQpSolver: active sets.
-struct QpTuning {
-  /// A row that differs from those of the free forces by a part σ has a pivot of σ², taken as zero below about 1e-14,
-  /// and is pulled by at most σ. A larger pull is no rounding. [path]
-  double nearly_dependent = 1e-6;
-  double residual = 1e-11;              ///< ContactQpResult::residual of what is solved
-  double infeasible_compliance = 1e-6;  ///< added to the diagonal, as a part of it, where there is no solution. [path]
-  double more_compliance = 10.0;        ///< times that, each time that it is not enough
-};
-
-/// LeastSquaresSolver and EqualityElimination.
+/// LeastSquaresSolver.
 struct LeastSquaresTuning {
   double rank = 1e-11;            ///< of the largest pivot: (singular value ratio)². Less is zero. [path]
   double least_mobility = 1e-13;  ///< of the largest diagonal: rows that move less are not scaled up
@@ -42,7 +36,6 @@ struct LeastSquaresTuning {
 struct SolversTuning {
   ConvexSolverTuning convex{};
   EquilibriumTuning equilibrium{};
-  QpTuning qp{};
   LeastSquaresTuning least_squares{};
   double secant_ridge = 1e-12;  ///< of SecantIteration's normal equations, of their scaled diagonal: round-off needs it
 };

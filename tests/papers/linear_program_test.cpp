@@ -14,8 +14,8 @@
 #include "contact_problems.h"
 #include "counted_new.h"
 #include "limber/core/error.h"
+#include "limber/hauser/contact_qp.h"
 #include "limber/hauser/energy_guard.h"
-#include "limber/solvers/contact_qp.h"
 
 namespace limber {
 namespace {

@@ -7,9 +7,10 @@
 
 #include "contact_problems.h"
 #include "instruction_sets.h"
-#include "limber/solvers/contact_qp.h"
+#include "limber/core/types.h"
 #include "limber/solvers/convex_contact_solver.h"
 #include "limber/solvers/least_squares.h"
+#include "limber/solvers/row_equilibrium.h"
 
 namespace limber {
 namespace {
@@ -43,14 +44,15 @@ TEST(ConstraintSolvers, SameBitsOnEveryInstructionSet) {
   const auto s = testing::make_contacts(37, 20, testing::Touching::kAround, random);
   const auto t = testing::make_friction(7, 20, random);
   const std::vector<double> metric(26, 0.5);
+  const std::vector<double> none(s.b.size(), 0.0), any(s.b.size(), kUnbounded);
   std::vector<std::vector<double>> results;
   for_each_instruction_set([&](std::int64_t target) {
     std::vector<double> all, f(s.b.size());
     const auto keep = [&](const std::vector<double>& x) { all.insert(all.end(), x.begin(), x.end()); };
-    ContactQpSolver qp;
-    qp.solve(ContactQp{.size = s.contacts, .A = s.A, .b = s.b}, f), keep(f);
-    f.assign(f.size(), 0.0);
-    qp.solve(FactoredContactQp{.size = s.contacts, .dimension = s.dimension, .G = s.G, .b = s.b}, f), keep(f);
+    internal::RowEquilibrium equilibrium;
+    equilibrium.solve(
+        {.dimension = static_cast<std::size_t>(s.dimension), .G = s.G, .b = s.b, .lower = none, .upper = any}, f);
+    keep(f);
     LeastSquaresSolver least_squares;
     least_squares.factor(s.G, metric, s.contacts);
     least_squares.solve(s.b, f), keep(f);

@@ -112,6 +112,18 @@ TEST(RowEquilibrium, ABallSlidesAtItsRadiusAgainstTheSlip) {
   EXPECT_NEAR(f[2], -1.6, 1e-12);
 }
 
+TEST(RowEquilibrium, RedundantRowsShareWhatTheyHoldBesideAStop) {
+  // Two equal rows hold what a third, a stop, presses on: u = 0 of both, and the stop's force is what closes it.
+  const std::vector<double> G{1.0, 0.0, 1.0, 0.0, 1.0, 1.0}, b{1.0, 1.0, -1.0};
+  const std::vector<double> lower{-kUnbounded, -kUnbounded, 0.0}, upper(3, kUnbounded);
+  std::vector<double> f(3, 0.0);
+  RowEquilibrium equilibrium;
+  equilibrium.solve({.dimension = 2, .G = G, .b = b, .lower = lower, .upper = upper}, f);
+  EXPECT_NEAR(f[2], 2.0, 1e-9);
+  EXPECT_NEAR(f[0] + f[1], -3.0, 1e-9);
+  EXPECT_NEAR(f[0], f[1], 1e-6);
+}
+
 /// Problems of some kinds (ConeProblems::make) that are not met to 1e-6 of the gaps in ten seconds each. The
 /// environment variable LIMBER_CONTACTS asks for three hundred of up to that many contacts.
 double part_missed(int first_kind, int kinds) {

@@ -66,14 +66,7 @@ void EndVelocities::solve_within_bounds() {
     off_[i] = -off_[i];
     for (std::size_t k = 0; k < n; ++k) J_[i * n + k] *= std::sqrt(metric_[k]);
   }
-  qp_.solve(FactoredContactQp{.size = static_cast<int>(rows_.size()),
-                              .dimension = static_cast<int>(n),
-                              .G = J_,
-                              .D = compliance_,
-                              .b = off_,
-                              .lower = lower_,
-                              .upper = upper_},
-            found_);
+  bounded_.solve({.dimension = n, .G = J_, .D = compliance_, .b = off_, .lower = lower_, .upper = upper_}, found_);
 }
 
 /// Springs that are stiff yield: with κ = Δt a/c, a what an impulse changes the rate by, c the compliance, by

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "equality_rows.h"
-#include "limber/solvers/contact_qp.h"
+#include "limber/solvers/row_equilibrium.h"
 
 namespace limber::internal {
 
@@ -33,7 +33,7 @@ class EndVelocities {
   std::vector<double> off_, compliance_, J_, metric_, row_, impulses_;
   std::vector<double> found_, lower_, upper_;  // by row that holds
   EqualityRows equalities_;
-  ContactQpSolver qp_;
+  RowEquilibrium bounded_;
 };
 
 }  // namespace limber::internal

@@ -145,14 +145,7 @@ void HeldReaction::answer(std::span<double> forces) {
     least_squares_.solve(b_, forces);
     return;
   }
-  qp_.solve(FactoredContactQp{.size = static_cast<int>(m),
-                              .dimension = static_cast<int>(n),
-                              .G = G_,
-                              .D = {},
-                              .b = b_,
-                              .lower = lower_,
-                              .upper = upper_},
-            forces);
+  bounded_.solve({.dimension = n, .G = G_, .b = b_, .lower = lower_, .upper = upper_}, forces);
 }
 
 }  // namespace limber::internal

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "island_step.h"
-#include "limber/solvers/contact_qp.h"
 #include "limber/solvers/least_squares.h"
+#include "limber/solvers/row_equilibrium.h"
 
 namespace limber::internal {
 
@@ -42,7 +42,7 @@ class HeldReaction {
   std::vector<std::size_t> columns_;              // by body, where its frame's begin
   bool equalities_ = true;                        // among the rows that answer
   LeastSquaresSolver least_squares_;
-  ContactQpSolver qp_;
+  RowEquilibrium bounded_;
 };
 
 }  // namespace limber::internal

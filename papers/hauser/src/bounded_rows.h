@@ -7,7 +7,7 @@
 
 #include "island/island_step.h"
 #include "limber/hauser/contact_rule.h"
-#include "limber/solvers/least_squares.h"
+#include "limber/hauser/equality_elimination.h"
 
 namespace limber::internal {
 

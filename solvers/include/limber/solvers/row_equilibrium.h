@@ -11,10 +11,11 @@
 //   a bound      x = ±(f − bound),         z its part of ±u
 //   a disc       x = (r + μ f_n, f_t),     z = (s, u_t)      in the second-order cone, s ≥ |u_t| free
 //
-// and all else is linear. Newton's steps go to x ∘ z = ν with ν → 0, scaled by Nesterov and Todd (1997), with
-// Mehrotra's (1992) predictor and corrector: W and a block for each unit are factored once a step. Where W is positive
-// semidefinite and friction fixed the number of steps has a polynomial bound; 15 to 30 are usual. It ends where the
-// digits, or EquilibriumTuning::most_steps, do.
+// and all else is linear. A row without bounds has no pair: it is to be met. It yields a little to the change of its
+// impulse, so that redundant rows share what they hold (the proximal point method). Newton's steps go to x ∘ z = ν with
+// ν → 0, scaled by Nesterov and Todd (1997), with Mehrotra's (1992) predictor and corrector: W and a block for each
+// unit are factored once a step. Where W is positive semidefinite and friction fixed the number of steps has a
+// polynomial bound; 15 to 30 are usual. It ends where the digits, or EquilibriumTuning::most_steps, do.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,6 +26,13 @@
 #include "limber/solvers/unsymmetric_factor.h"
 
 namespace limber::internal {
+
+/// Rows with an interval each, which may be a number, a half line or all numbers: W = G Gᵀ + diag(D).
+struct IntervalRows {
+  std::size_t dimension = 0;                               ///< of G's rows
+  std::span<const double> G = {}, D = {};                  ///< row-major; by row, D empty: all 0
+  std::span<const double> b = {}, lower = {}, upper = {};  ///< by row
+};
 
 class RowEquilibrium {
  public:
@@ -38,6 +46,8 @@ class RowEquilibrium {
   /// @param b gaps without impulses. @param f a guess, returned where it meets the law; else what was found. @return
   /// what it leaves of the law, by tolerance
   double solve(std::span<const double> b, std::span<double> f);
+  /// The problem of these rows in place of any before, to the digits. @param f as above
+  void solve(const IntervalRows& rows, std::span<double> f);
 
  private:
   using Vec4 = Eigen::Vector4d;
@@ -66,6 +76,7 @@ class RowEquilibrium {
   void to_scale(std::span<const double> b);
   bool is_fixed(const Unit& unit) const;
   void place_pairs();
+  bool is_free(const Unit& unit) const;
   void begin_pairs();
   double product() const;
   double product_after(double step) const;
@@ -80,7 +91,7 @@ class RowEquilibrium {
   std::vector<Unit> units_;
   std::size_t size_ = 0;
   std::vector<double> W_, A_, b_, f_, near_, gap_, left_, change_;  // all to scale
-  std::vector<char> fixed_;                                         // by row
+  std::vector<char> fixed_;                                         // by row: its set is one impulse
   std::vector<Bound> bounds_;
   std::vector<Disc> discs_;
   double level_ = 0.0;  // ν

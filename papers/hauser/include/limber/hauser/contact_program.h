@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "limber/hauser/contact_qp.h"
 #include "limber/hauser/energy_guard.h"
 #include "limber/hauser/linear_program.h"
-#include "limber/solvers/contact_qp.h"
 
 namespace limber {
 

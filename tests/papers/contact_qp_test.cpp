@@ -1,5 +1,5 @@
 // The complementary contact solver against enumeration of all contact sets, its own conditions, and worked examples.
-#include "limber/solvers/contact_qp.h"
+#include "limber/hauser/contact_qp.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-/// @file limber/solvers/contact_qp.h
+/// @file limber/hauser/contact_qp.h
 /// The complementary contact problem, and any problem with one bound on each force, by an active-set method.
 ///
 ///   0 ≤ f ⊥ w = A f + b ≥ 0      which for symmetric A ≥ 0 is      min ½fᵀA f + bᵀf,  f ≥ 0            (1)

@@ -1,4 +1,4 @@
-#include "limber/solvers/contact_qp.h"
+#include "limber/hauser/contact_qp.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +10,22 @@
 #include "free_set_factor.h"
 #include "limber/core/types.h"
 #include "limber/solvers/aligned_buffer.h"
-#include "tuning.h"
 
 namespace limber {
 using namespace internal;  // kernels and checks
 
 namespace {
+
+/// Active sets.
+struct QpTuning {
+  /// A row that differs from those of the free forces by a part σ has a pivot of σ², taken as zero below about 1e-14,
+  /// and is pulled by at most σ. A larger pull is no rounding.
+  double nearly_dependent = 1e-6;
+  double residual = 1e-11;              ///< ContactQpResult::residual of what is solved
+  double infeasible_compliance = 1e-6;  ///< added to the diagonal, as a part of it, where there is no solution
+  double more_compliance = 10.0;        ///< times that, each time that it is not enough
+};
+constexpr QpTuning kTuning;
 
 using Numbers = std::span<const double>;
 
@@ -241,7 +251,7 @@ struct ContactQpSolver::Impl {
 
   double compliance(std::size_t j) const { return added_compliance / (problem.scale[j] * problem.scale[j]); }
   double largest() const { return std::max(problem.largest_b, largest_f); }
-  double tolerated() const { return kSolversTuning.qp.residual * largest(); }
+  double tolerated() const { return kTuning.residual * largest(); }
 
   // By how much (2) is violated at a force that is not free, scaled; the sign is the way it wants to go.
   double pull(std::size_t j) const {
@@ -340,7 +350,7 @@ struct ContactQpSolver::Impl {
     double step = clip(j, way, kUnbounded);
     for (std::size_t i = 0; i < k; ++i) step = clip(static_cast<std::size_t>(P[i]), direction[i], step);
     if (step == kUnbounded) {
-      if (std::abs(pull(j)) > kSolversTuning.qp.nearly_dependent * largest())
+      if (std::abs(pull(j)) > kTuning.nearly_dependent * largest())
         add_compliance();
       else
         state[j] = State::kLeft;
@@ -354,8 +364,7 @@ struct ContactQpSolver::Impl {
   }
 
   void add_compliance() {
-    added_compliance =
-        std::max(kSolversTuning.qp.more_compliance * added_compliance, kSolversTuning.qp.infeasible_compliance);
+    added_compliance = std::max(kTuning.more_compliance * added_compliance, kTuning.infeasible_compliance);
     factor_free();
   }
 
