@@ -473,6 +473,30 @@ TEST_F(Precompute, DiskThatFillsLeavesNothing) {
   EXPECT_EQ(files(), 1u) << "more than the input is left";
 }
 
+TEST_F(Precompute, HalvesOfABlockAreToldAndMergeNodesMakesThemOne) {
+  TetMesh halves = testing::tet_box(2, 1.0);
+  const TetMesh other = halves;
+  const auto first = static_cast<Index>(halves.nodes.size());
+  for (const Vec3& x : other.nodes) halves.nodes.emplace_back(x + Vec3(1, 0, 0));
+  for (Tet t : other.tets) {
+    for (Index& n : t) n += first;
+    halves.tets.push_back(t);
+    halves.tet_region.push_back(0);
+  }
+  halves.node_groups.clear();
+  write_gmsh(folder / "halves.msh", halves);
+  std::vector<std::string> arguments = {"halves.msh", "--modes", "1", "--no-certify"};
+  arguments.insert(arguments.end(), kSteel.begin(), kSteel.end());
+  const Json two = report(arguments);
+  EXPECT_EQ(two["components"], 2);
+  EXPECT_THAT(two["warnings"][0].get<std::string>(), HasSubstr("9 nodes lie on nodes of another body"));
+  arguments.insert(arguments.end(), {"--merge-nodes", "1e-6"});
+  const Json one = report(arguments);
+  EXPECT_EQ(one["components"], 1);
+  EXPECT_EQ(one["merged_nodes"], 9);
+  EXPECT_NEAR(one["volume"].get<double>(), 2.0, 1e-12);
+}
+
 TEST_F(Precompute, FlatTetsAreRefusedAndNegativeOnesTurned) {
   TetMesh mesh = testing::tet_box(2, 1.0);
   std::swap(mesh.tets[3][0], mesh.tets[3][1]);
