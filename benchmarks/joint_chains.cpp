@@ -246,34 +246,51 @@ struct Figure : Chain {
   std::vector<std::tuple<BodyId, BodyId, Vec3>> tips;
 };
 
+/// What was seen of figures over all their steps.
+struct Falls {
+  Seen seen;
+  std::vector<double> passed;  // degrees
+  int failed = 0;
+  void watch(World& world, const std::vector<Figure>& figures, int steps) {
+    for (int i = 0; i < steps; ++i) {
+      const double start = thread_seconds();
+      world.step();
+      seen.seconds.push_back((thread_seconds() - start) / static_cast<double>(figures.size()));
+      double most = 0.0;
+      for (const Figure& figure : figures) {
+        most = std::max(most, figure.passed(world));
+        for (const JointId joint : figure.joints) seen.apart = std::max(seen.apart, world.joint(joint).distance_error);
+      }
+      passed.push_back(most * 180.0 / std::numbers::pi);
+      failed += world.constraint_report().solved ? 0 : 1;
+    }
+  }
+  void print(const char* name) {
+    std::ranges::sort(passed);
+    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.1e | %d of %zu |\n", name, 1e3 * seen.at(0.5),
+                1e3 * seen.at(0.99), passed[passed.size() * 99 / 100], passed.back(), seen.apart, failed,
+                passed.size());
+  }
+};
+
 void figures() {
   std::printf(
       "| figures | ms a step and figure: p50 | p99 | limits passed, degrees: p99 of steps | most | opening, m | steps "
       "not solved |\n|---|---|---|---|---|---|---|\n");
   std::mt19937 numbers(1);
   std::normal_distribution<double> normal;
-  Seen seen;
-  std::vector<double> passed;
-  int failed = 0;
-  constexpr int kFalls = 30;
-  for (int fall = 0; fall < kFalls; ++fall) {
+  const auto any = [&] { return normalized({normal(numbers), normal(numbers), normal(numbers), normal(numbers)}); };
+  Falls alone, together;
+  for (int fall = 0; fall < 100; ++fall) {
     GroundedWorld scene(kGame);
-    const Quaternion q = normalized({normal(numbers), normal(numbers), normal(numbers), normal(numbers)});
-    const Figure figure(scene.world, {q, {0.0, 0.0, 2.0}});
-    for (int i = 0; i < 180; ++i) {
-      const double start = thread_seconds();
-      scene.world.step();
-      seen.seconds.push_back(thread_seconds() - start);
-      passed.push_back(figure.passed(scene.world) * 180.0 / std::numbers::pi);
-      for (const JointId joint : figure.joints)
-        seen.apart = std::max(seen.apart, scene.world.joint(joint).distance_error);
-      failed += scene.world.constraint_report().solved ? 0 : 1;
-    }
+    alone.watch(scene.world, {Figure(scene.world, {any(), {0.0, 0.0, 2.0}})}, 180);
   }
-  std::ranges::sort(passed);
-  std::printf("| %d | %.3f | %.3f | %.2f | %.2f | %.1e | %d of %d |\n", kFalls, 1e3 * seen.at(0.5), 1e3 * seen.at(0.99),
-              passed[static_cast<std::size_t>(0.99 * static_cast<double>(passed.size()))], passed.back(), seen.apart,
-              failed, 180 * kFalls);
+  alone.print("100, one by one");
+  GroundedWorld scene(kGame);
+  std::vector<Figure> heap;
+  for (int i = 0; i < 20; ++i) heap.emplace_back(scene.world, RigidTransform{any(), {0.0, 0.0, 2.0 + 2.5 * i}});
+  together.watch(scene.world, heap, 360);
+  together.print("20, on each other");
 }
 
 /// Balls on a square grid, joined to their neighbours and hung by one edge's corners.

@@ -147,15 +147,15 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
 }
 
 /// Right-hand sides of zeros, and the gaps as they are now.
-/// @param visit (group, rows of it that hold, right) with right of `columns` numbers for each of them
+/// @param visit (group, rows of it that hold, right) with right of kColumns numbers for each of them
 template <class Visit>
-void GameConstraints::for_met_gaps(const BodyStates& states, std::size_t columns, const Visit& visit) {
+void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit) {
   const std::span<const GameGroup> groups = rows_.groups();
-  right_.assign(columns * system_.size(), 0.0);
+  right_.assign(kColumns * system_.size(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     gaps_.resize(groups[g].count);
     groups[g].constraint->gaps(states, StepTime::kStart, gaps_);
-    visit(groups[g], system_.met(g), right_.data() + columns * system_.first(g));
+    visit(groups[g], system_.met(g), right_.data() + kColumns * system_.first(g));
   }
 }
 
@@ -164,7 +164,7 @@ void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies
   const double most = GameRows::kRecoverySpeed * rows_.length();
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   if (pushed) rows_.scale_pushes(bodies, system_.frames(), pushes_);
-  for_met_gaps(states, kColumns, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
+  for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
     const std::span<const GameRow> rows = rows_.of(group);
     products_.assign(2 * rows.size(), 0.0);
     rows_.multiply(group, motion_, products_.data());
@@ -247,31 +247,46 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
 void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
   for (GameRow& row : rows_.rows()) row.closing = 0.0;
   for (int round = 0;; ++round) {
-    measure_places(states);
+    find_errors(states);
     if (residual_ <= kRounded || round == kMostClosings) return;
     rows_.linearise_again(states, bodies);
     system_.factor(rows_, true);
-    asked_.assign(right_.size(), 0.0);
-    system_.solve_fully(rows_, asked_, right_);
-    close_places(bodies);
+    close_errors(bodies);
   }
 }
 
-void GameConstraints::measure_places(const BodyStates& states) {
+/// Limits hold where they are passed.
+void GameConstraints::find_errors(const BodyStates& states) {
   residual_ = 0.0;
-  for_met_gaps(states, 1, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
-    for (const std::int32_t at : met) {
-      const auto i = static_cast<std::size_t>(at);
-      const GameRow& row = rows_.of(group)[i];
-      if (row.keeps_place) *right = row.left - gaps_[i];
-      residual_ = std::max(residual_, std::abs(*right++));
+  for (const GameGroup& group : rows_.groups()) {
+    gaps_.resize(group.count);
+    group.constraint->gaps(states, StepTime::kStart, gaps_);
+    const std::span<GameRow> rows = rows_.of(group);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      GameRow& row = rows[i];
+      if (!row.keeps_place) continue;
+      row.error = gaps_[i] - row.left;
+      if (row.is_bounded()) {
+        const bool from_below = row.lower == 0.0, passed = from_below ? row.error < 0.0 : row.error > 0.0;
+        row.hold = passed ? Hold::kMet : from_below ? Hold::kLower : Hold::kUpper;
+      }
+      if (row.hold == Hold::kMet) residual_ = std::max(residual_, std::abs(row.error));
     }
-  });
+  }
 }
 
-/// By one column of what rows yield.
-void GameConstraints::close_places(GameBodies& bodies) {
+void GameConstraints::close_errors(GameBodies& bodies) {
   const std::span<const GameGroup> groups = rows_.groups();
+  right_.assign(system_.size(), 0.0);
+  asked_.assign(system_.size(), 0.0);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    double* right = right_.data() + system_.first(g);
+    for (const std::int32_t i : system_.met(g)) {
+      const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
+      *right++ = row.keeps_place ? -row.error : 0.0;
+    }
+  }
+  system_.solve_fully(rows_, asked_, right_);
   speed_.assign(rows_.coordinates(), 0.0);
   place_.assign(rows_.coordinates(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {

@@ -33,14 +33,14 @@ class GameConstraints {
   bool let_go(bool takes_hold);
   void find_taken(const GameBodies& bodies);
   template <class Visit>
-  void for_met_gaps(const BodyStates& states, std::size_t columns, const Visit& visit);
+  void for_met_gaps(const BodyStates& states, const Visit& visit);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies);
   void move(GameBodies& bodies);
   void close_step(const BodyStates& states, GameBodies& bodies);
-  void measure_places(const BodyStates& states);
-  void close_places(GameBodies& bodies);
+  void find_errors(const BodyStates& states);
+  void close_errors(GameBodies& bodies);
 
   GameRows rows_;
   RowSystem system_;
