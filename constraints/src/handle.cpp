@@ -98,11 +98,13 @@ void Handle::add_force_derivative(const BodyStates& states, std::span<const doub
 void Handle::accept(const BodyStates& states, std::span<const double> impulses) {
   if (left_ == whole_) force_ = Vec3::Zero(), work_ = 0.0;   // the step's first part
   const Vec3 p = point_.position(states, StepTime::kStart);  // the state has been taken: the step's end
+  part_work_ = 0.0;
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     last_force_[i] = impulses[i] / step_;
     force_ += impulses[i] / whole_ * options_.directions[i];
-    work_ += last_force_[i] * options_.directions[i].dot(p - from_);
+    part_work_ += last_force_[i] * options_.directions[i].dot(p - from_);
   }
+  work_ += part_work_;
   now_ = then_;
   if (step_ == left_) next_.position += whole_ * next_.velocity;
 }

@@ -146,6 +146,25 @@ TEST(GameConstraints, AHandleOfLimitedForceDragsABoxOverTheGround) {
   EXPECT_NEAR(scene.world.position(box, kMarked).x() - start.x(), 1.2, 0.05);
 }
 
+/// A hand of limited force whirls a box about: all energy that the box has is the work that the hand tells.
+TEST(GameConstraints, AHandTellsTheEnergyThatItGives) {
+  GroundedWorld scene(kGame, {.gravity = Vec3::Zero()});
+  const BodyId box = scene.world.add_body(sample_model({.modes = 6, .decay = 0.0}), {.pose = {{}, {0.0, 0.0, 3.0}}});
+  const SurfacePoint corner{.triangle = 0, .weight = {1.0, 0.0, 0.0}};
+  const HandleId hand = scene.world.add_handle(box, corner, {.max_force = 500.0});
+  const Vec3 start = scene.world.position(box, corner);
+  double most = 0.0;
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 0.3 * i, before = scene.world.energy(box).total();
+    scene.world.set_handle_target(hand, {.position = start + 0.2 * Vec3(std::cos(angle) - 1.0, std::sin(angle), 0.0)});
+    scene.step(1);
+    const double after = scene.world.energy(box).total();
+    most = std::max(most, after);
+    ASSERT_NEAR(after - before, scene.world.handle(hand).work, 1e-3 * most) << i;
+  }
+  EXPECT_GT(most, 1.0);
+}
+
 TEST(GameConstraints, ABodyRidesOnALedOne) {
   for (const FrameMotion motion : {FrameMotion::kKinematic}) {
     GroundedWorld scene(kGame);

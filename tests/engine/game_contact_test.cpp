@@ -47,6 +47,26 @@ struct Bricks : GroundedWorld {
   std::vector<BodyId> bodies;
 };
 
+/// Contacts that do not press have rows of one attitude; the body turns on by its inertia all the same.
+TEST(GameContact, WhatTumblesCloseAboveTheGroundKeepsItsEnergy) {
+  const Vec3 half(0.25, 0.06, 0.04);
+  GroundedWorld scene(game(), {.gravity = Vec3::Zero()});
+  const BodyId bar = scene.world.add_body(sample_model({.modes = 0, .half_extent = half}),
+                                          {.pose = {{}, {0.0, 0.0, 1.01 * half.norm()}},
+                                           .velocity = Vec3::Zero(),
+                                           .angular_velocity = {20.0, 25.0, 10.0},
+                                           .shape = std::make_shared<const Shape>(Box{.half_extents = half})});
+  const double energy = scene.world.energy(bar).total();
+  int rows = 0;
+  for (int i = 0; i < 120; ++i) {
+    scene.step(1);
+    rows += scene.world.constraint_report().rows;
+    ASSERT_NEAR(scene.world.energy(bar).total(), energy, 1e-3 * energy) << i;
+  }
+  EXPECT_GT(rows, 0);
+  EXPECT_TRUE(scene.world.contact_events().empty());
+}
+
 TEST(GameContact, AStackOfTenStandsAndComesToRest) {
   Bricks scene;
   for (int i = 0; i < 10; ++i)

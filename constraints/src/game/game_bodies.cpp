@@ -87,6 +87,9 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
                                               : Vec3(c.principal.moments.cwiseSqrt());
   set_axes(body, turned(body.q, 0.5 * plan_.step * frame.angular_velocity(c)));
   if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * frame.angular_momentum(c);
+  if (c.motion != FrameMotion::kFree) return;
+  const Mat3 axes = to_matrix(c.principal.q_BP);
+  body.inverse_inertia = axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose();
 }
 
 void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
@@ -109,11 +112,34 @@ void GameBodies::turn_axes() {
   }
 }
 
+/// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
+/// the middle of the substep. @param R the attitude now
+Vec3 GameBodies::free_turn(const GameBody& body, const Mat3& R) const {
+  if (!body.keeps_axes || body.led >= 0) return body.turn;
+  const double half = 0.5 * plan_.length();
+  const Vec3 momentum = R.transpose() * body.momentum();  // body axes
+  const Vec3 now = body.inverse_inertia * momentum;
+  const Vec3 middle = body.inverse_inertia * (momentum + half * momentum.cross(now));
+  return body.roots.cwiseProduct(body.roots.cwiseProduct(body.turn_scale * (R * (middle + half * now.cross(middle)))));
+}
+
 void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
   const double h = plan_.length();
   row = {};
   if (body.root_mass > 0.0) write_vector(h / body.root_mass * linear, row.v);
   write_vector(h * (body.turn_scale * moment), row.v + 3);
+}
+
+void GameBodies::write_energy_slopes(std::int32_t at, const std::vector<Block8>& frames, double* to) const {
+  const GameBody& body = bodies_[static_cast<std::size_t>(at)];
+  std::fill_n(to, 8 * body.blocks, 0.0);
+  for (int l = 0; l < 6; ++l) to[l] = static_cast<double>(frames[static_cast<std::size_t>(body.first)].v[l]);
+  if (body.modes == nullptr) return;
+  const std::span<const double> z = body.group->amplitudes(body.slot), rates = body.group->rates(body.slot);
+  const std::vector<double>& lambda = body.group->model().data().eigenvalues;
+  for (std::size_t m = 0; m < z.size(); ++m)
+    to[8 + m] = static_cast<double>(body.modes->roots()[m]) * lambda[m] * z[m] +
+                static_cast<double>(body.modes->rates()[m]) * rates[m];
 }
 
 FrameLoad GameBodies::load_of(const GameBody& body) const {
@@ -135,7 +161,8 @@ void GameBodies::begin_substep(int number, Jobs& jobs) {
 
 void GameBodies::begin_substep_of(std::size_t at, int number) {
   GameBody& body = bodies_[at];
-  tell_shift(at);
+  const Mat3 R = to_matrix(body.q);
+  tell_shift(at, R);
   FrameExcitation excitation;
   if (body.led < 0)
     fall(body);
@@ -148,7 +175,8 @@ void GameBodies::begin_substep_of(std::size_t at, int number) {
   if (body.led >= 0) swing(body);
   Block8& frame = free_[static_cast<std::size_t>(body.first)];
   write_vector(body.root_mass * body.v, frame.v);
-  write_vector(body.turn, frame.v + 3);
+  body.free_turn = free_turn(body, R);
+  write_vector(body.free_turn, frame.v + 3);
   for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
     for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
 }
@@ -225,8 +253,9 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
   GameBody& body = bodies_[at];
   const double h = plan_.length();
   const Block8 &q = answers_[static_cast<std::size_t>(body.first)], &push = pushes_[at];
-  body.turn += read_vector(q.v + 3);
-  Vec3 turn = h * (body.turn_scale.transpose() * body.turn);
+  const Vec3 change = read_vector(q.v + 3);
+  body.turn += change;
+  Vec3 turn = h * (body.turn_scale.transpose() * (body.free_turn + change));
   if (pushed) turn += h * (body.turn_scale.transpose() * read_vector(push.v + 3));
   const Quaternion turned = quaternion_from_rotation_vector(turn);
   if (body.led < 0) {
@@ -240,10 +269,10 @@ void GameBodies::move_frame(std::size_t at, bool pushed) {
   }
 }
 
-void GameBodies::tell_shift(std::size_t at) {
+void GameBodies::tell_shift(std::size_t at, const Mat3& R) {
   const GameBody& body = bodies_[at];
   write_vector(body.shift, shifts_[at].shift);
-  write_matrix(to_matrix(body.q) - body.start.R, shifts_[at].turned);
+  write_matrix(R - body.start.R, shifts_[at].turned);
 }
 
 void GameBodies::displace(std::int32_t at, const double* speed, const double* place) {

@@ -53,7 +53,10 @@ struct GameBody {
   Vec3 shift = Vec3::Zero();  // of the origin since then
   Quaternion q{};             // attitude now
   Vec3 v = Vec3::Zero();      // of the origin
-  Vec3 turn = Vec3::Zero();   // coordinates of the turn
+  Vec3 turn = Vec3::Zero();   // coordinates of the turn, L
+  // Of bodies that keep their axes: the turn of the substep at hand if nothing acted, ω; 1/(kg·m²), body axes.
+  Vec3 free_turn = Vec3::Zero();
+  Mat3 inverse_inertia = Mat3::Zero();
 
   Vec3 momentum() const { return turn_scale.transpose() * roots.cwiseProduct(roots.cwiseProduct(turn)); }
 };
@@ -91,6 +94,10 @@ class GameBodies {
   const std::vector<Block8>& pushes() const { return pushes_; }
   const std::vector<FrameShift>& shifts() const { return shifts_; }
 
+  /// The derivative of a body's energy by its coordinates, frame and modes, J. @param frames y of the frames
+  void write_energy_slopes(std::int32_t at, const std::vector<Block8>& frames, double* to) const;
+  const std::vector<Block8>& free_motion() const { return free_; }  ///< y_free
+
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
   void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
   /// Whether all that moves has numbers.
@@ -105,11 +112,12 @@ class GameBodies {
   void place_frame(GameBody& body, const RigidFrame& frame);
   static void set_axes(GameBody& body, const Quaternion& attitude);
   void fall(GameBody& body) const;
+  Vec3 free_turn(const GameBody& body, const Mat3& R) const;
   FrameExcitation lead(GameBody& body, int number, FrameShift& shift);
   void swing(GameBody& body);
   void turn_led(GameBody& body, const Quaternion& turned);
   void tell_led(GameBody& body);
-  void tell_shift(std::size_t at);
+  void tell_shift(std::size_t at, const Mat3& R);
   FrameLoad load_of(const GameBody& body) const;
   void write_modes(const GameBody& body, std::vector<Block8>& to) const;
   void advance_modes(GameBody& body, int number, const FrameExcitation& excitation);

@@ -44,6 +44,8 @@ void GameConstraints::make_rows(const BodyStates& states, const GameBodies& bodi
 void GameConstraints::solve(GameBodies& bodies) {
   if (rows_.groups().empty()) return;
   rows_.add_what_leads(bodies);
+  slopes_.assign(rows_.coordinates(), 0.0);
+  rows_.add_energy_slopes(bodies, system_.frames(), bodies.free_motion(), {}, slopes_);
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   int round = 0;
   do {
@@ -144,6 +146,7 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   system_.solve<kColumns>(right_);
   find_shares();
   displace(bodies);
+  rows_.add_energy_slopes(bodies, system_.frames(), bodies.motion(), speed_, slopes_);
 }
 
 /// Right-hand sides of zeros, and the gaps as they are now.
@@ -233,11 +236,21 @@ void GameConstraints::move(GameBodies& bodies) {
   }
 }
 
+/// Of a group's impulses: energies are squares, so each force takes the mean of the slopes before and after.
+double GameConstraints::work_of(const GameGroup& group) {
+  products_.resize(group.count);
+  rows_.multiply(group, slopes_, products_.data());
+  double work = 0.0;
+  for (std::size_t i = 0; i < group.count; ++i) work += 0.5 * rows_.of(group)[i].force * products_[i];
+  return work;
+}
+
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
   for (const GameGroup& group : rows_.groups()) {
     forces_.clear();
     for (const GameRow& row : rows_.of(group)) forces_.push_back(rows_.length() * row.force);
     group.constraint->accept(states, forces_);
+    group.constraint->accept_work(work_of(group));
   }
   if (last && !rows_.groups().empty()) close_step(states, bodies);
 }

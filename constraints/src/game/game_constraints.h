@@ -38,6 +38,7 @@ class GameConstraints {
   void find_shares();
   void displace(GameBodies& bodies);
   void move(GameBodies& bodies);
+  double work_of(const GameGroup& group);
   void close_step(const BodyStates& states, GameBodies& bodies);
   void find_errors(const BodyStates& states);
   void close_errors(GameBodies& bodies);
@@ -45,6 +46,7 @@ class GameConstraints {
   GameRows rows_;
   RowSystem system_;
   std::vector<double> motion_, moved_;          // of the bodies, in the rows' coordinates: all of it; what the rows did
+  std::vector<double> slopes_;                  // of energies, before all impulses of the substep and after them
   std::vector<double> taken_, given_;           // energies by component
   std::vector<double> right_, asked_;           // of the system
   std::vector<double> speed_, place_, pushes_;  // in the rows' coordinates

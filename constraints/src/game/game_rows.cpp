@@ -235,6 +235,21 @@ void GameRows::scale(const GameBodies& bodies, std::span<const std::int32_t> fra
   }
 }
 
+void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const std::int32_t> frames,
+                                 const std::vector<Block8>& y, std::span<const double> more,
+                                 std::vector<double>& slopes) {
+  for (const std::int32_t frame : frames) {
+    const GameBody& body = bodies.body(frame);
+    slope_.resize(static_cast<std::size_t>(8 * body.blocks));
+    bodies.write_energy_slopes(frame, y, slope_.data());
+    for (std::size_t l = 0; l < 6 && !more.empty(); ++l)
+      slope_[l] += more[static_cast<std::size_t>(8 * body.first) + l];
+    for (std::size_t k = 0; k < 3; ++k) slope_[3 + k] /= scales_[static_cast<std::size_t>(frame)][k];
+    double* to = &slopes[static_cast<std::size_t>(8 * body.first)];
+    for (std::size_t l = 0; l < slope_.size(); ++l) to[l] += slope_[l];
+  }
+}
+
 void GameRows::scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames,
                             std::vector<double>& x) const {
   x.assign(coordinates_, 0.0);

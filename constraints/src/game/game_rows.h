@@ -78,6 +78,9 @@ class GameRows {
              std::vector<double>& x) const;
   /// The same of GameBodies::pushes().
   void scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames, std::vector<double>& x) const;
+  /// slopes += those of the bodies' energies, J for a unit of x. @param y, more whose sum the frames have
+  void add_energy_slopes(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
+                         std::span<const double> more, std::vector<double>& slopes);
   /// y of x in its place.
   void unscale(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<double> y) const;
   /// J x of a group. @param product one number for each of its rows
@@ -123,7 +126,7 @@ class GameRows {
   std::vector<Turns> scales_;    // by frame: x/y of its turn
   std::vector<Led> led_;
   ConstraintRows made_;
-  std::vector<double> yields_;  // scratch
+  std::vector<double> yields_, slope_;  // scratch
   std::size_t coordinates_ = 0;
   double length_ = 0.0;
   bool goes_on_ = false;  // the rows are those of the substep before

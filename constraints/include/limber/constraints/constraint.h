@@ -111,6 +111,8 @@ class Constraint {
   virtual void slid(std::span<const double> /*slip*/) {}
   /// @param impulses of the rows over the step that ends now, N·s, held part included
   virtual void accept(const BodyStates& states, std::span<const double> impulses) = 0;
+  /// After accept(), by small steps: what those impulses did on the bodies, J.
+  virtual void accept_work(double /*work*/) {}
 };
 
 }  // namespace limber

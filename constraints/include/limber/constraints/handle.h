@@ -43,7 +43,8 @@ class Handle final : public Constraint {
   const MaterialFrame& point() const { return point_; }
   /// Mean force on the body over the last step, world, N.
   const Vec3& force() const { return force_; }
-  /// What it did on the body over the last step, J: each substep's force along the point's way in it.
+  /// What it did on the body over the last step, J. ContactSolver::kGame: the energy that its impulses gave, to
+  /// round-off. kExact: each part's force along the point's way in it.
   double work() const { return work_; }
   /// Distance from the target along the held directions now, between steps, m.
   double error(const BodyStates& states) const;
@@ -56,6 +57,7 @@ class Handle final : public Constraint {
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
+  void accept_work(double work) override { work_ += work - part_work_; }
 
  private:
   friend struct StateFields;
@@ -70,6 +72,7 @@ class Handle final : public Constraint {
   Vec3 now_, then_;  // the target at the start and at the end of the step's part at hand
   HandleTarget next_;
   double step_ = 0.0, left_ = 0.0, whole_ = 0.0, work_ = 0.0;  // of the part; of the step
+  double part_work_ = 0.0;                                     // J, by the point's way in the last part
   Vec3 from_ = Vec3::Zero();                                   // where the point is at the start of the part
   Vec3 force_ = Vec3::Zero();
   std::array<double, 3> last_force_{};
