@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <tuple>
 #include <vector>
@@ -396,6 +397,35 @@ TEST(FieldContacts, BarsAcrossEachOtherRestOnTheirEdges) {
     }
     EXPECT_EQ(edges, 4) << depth;
   }
+}
+
+// A corner that has gone through a ridge and out of its other side: no vertex is inside, and the common perpendiculars
+// of edges that have crossed may lie in no cone of normals. The overlap is seen all the same.
+TEST(FieldContacts, CornersThroughRidgesAreSeen) {
+  constexpr double kHalf = 0.05, kCorner = 0.1;
+  const auto coarse = [](const Vec3& half) {
+    return testing::wavy_model(boundary_surface(testing::solid_box(half, {1, 1, 1})).surface, 0);
+  };
+  TwoWays ridge(coarse({0.15, kHalf, kHalf})), cube(coarse(Vec3::Constant(kCorner)));
+  ridge.place({quaternion_from_rotation_vector({0.25 * std::numbers::pi, 0.0, 0.0}), Vec3::Zero()});
+  const double top = std::sqrt(2.0) * kHalf;
+  // Takes (1, 1, 1) to y.
+  const Quaternion along =
+      quaternion_from_rotation_vector(std::acos(1.0 / std::sqrt(3.0)) * Vec3(-1.0, 0.0, 1.0).normalized());
+  int overlaps = 0;
+  for (const double beyond : {0.01, 0.02, 0.03})
+    for (const double below : {0.003, 0.006})
+      for (int roll = 0; roll < 12; ++roll) {
+        const Quaternion turn = quaternion_from_rotation_vector({0.0, 0.2 * roll, 0.0}) * along;
+        const Vec3 tip(0.01, beyond, top - below);
+        cube.place({turn, tip - turn * Vec3::Constant(kCorner)});
+        // How far the ridge's middle is inside of the cube.
+        const Vec3 middle = turn.conjugate() * (Vec3(0.01, 0.0, top) - cube.exact.pose.p);
+        if (kCorner - middle.cwiseAbs().maxCoeff() < 2e-3) continue;
+        ++overlaps;
+        EXPECT_GT(deepest(by_fields(ridge, cube, 1e-3)), 0.0) << beyond << ' ' << below << ' ' << roll;
+      }
+  EXPECT_GT(overlaps, 40);
 }
 
 // A bar pushed into another: nearest points of vertices next to its sides are there, and ways out to both of them and

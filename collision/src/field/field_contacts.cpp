@@ -182,9 +182,10 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   const double slack = collision_tuning().field.slack;
   view_[0].place(*a.shell, *b.shell, motion_.X_AB.inverse(), motion_.end.inverse(),
                  motion_.X_AB.q.conjugate() * motion_.fall, comes_near(1) + slack * b.shell->shell().cell());
+  if (view_[0].apart()) return;
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
-  if (view_[0].apart() || view_[1].apart()) return;
+  if (view_[1].apart()) return;
   edges_.begin(view_[0], view_[1]);
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {

@@ -133,28 +133,54 @@ void FieldEdges::find_loops() {
   });
 }
 
-void FieldEdges::cross_loop(std::size_t first, std::size_t end) {
+// Edges that stick out and have crossed on a loop: those that lead out, and those of which each goes through a face
+// next to the other.
+void FieldEdges::find_crossings(std::size_t first, std::size_t end) {
   crossings_.clear();
   for (std::size_t i = first; i < end; ++i) {
     const Piercing& p = piercings_[i];
     for (int c = 0; c < 3; ++c) {
       const Index other = view_[p.of].other->shell().surface().edge_of(p.face, c);
       EdgePair pair;
-      if (view_[p.of].other->shell().sticks_out(other) &&
-          nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair) &&
-          in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction))
-        crossings_.push_back(pair);
+      if (!view_[p.of].other->shell().sticks_out(other) ||
+          !nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair))
+        continue;
+      pair.leads_out = in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction);
+      if (pair.leads_out || goes_through(other, 1 - p.of, p.edge, first, end)) crossings_.push_back(pair);
     }
   }
+}
+
+// Whether an edge goes through a face next to one of the other surface, on a loop.
+bool FieldEdges::goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const {
+  const auto next_to = view_[of].other->shell().surface().edge_triangles(other);
+  return std::any_of(piercings_.begin() + static_cast<std::ptrdiff_t>(first),
+                     piercings_.begin() + static_cast<std::ptrdiff_t>(end), [&](const Piercing& p) {
+                       return p.of == of && p.edge == edge && std::ranges::find(next_to, p.face) != next_to.end();
+                     });
+}
+
+// Where a corner goes through a ridge and beyond, no vertex is inside and no crossing may lead out of both surfaces:
+// the one along which the bodies overlap least stands for all.
+void FieldEdges::cross_loop(std::size_t first, std::size_t end) {
+  find_crossings(first, end);
   find_ways_out(first, end);
+  const auto leads_out = [](const EdgePair& crossing) { return crossing.leads_out; };
+  if (ways_out_.empty() && std::ranges::none_of(crossings_, leads_out)) {
+    if (crossings_.empty()) return;
+    const EdgePair& crossing = narrowest_crossing(first, end);
+    return add(crossing, -crossing.direction);
+  }
+  std::erase_if(crossings_, [](const EdgePair& crossing) { return !crossing.leads_out; });
+  if (crossings_.empty()) return;
+  if (ways_out_.empty()) ways_out_.push_back(-narrowest_crossing(first, end).direction);
   const auto same_way = static_cast<float>(collision_tuning().narrow.same_way);
   for (const EdgePair& crossing : crossings_)
     if (std::ranges::any_of(ways_out_, [&](const Vec3f& way) { return -crossing.direction.dot(way) > same_way; }))
       add(crossing, -crossing.direction);
 }
 
-// Directions in which vertices leave that are inside next to the loop. Without any, that of the crossing along which
-// the loop, and with it what both bodies share, is least wide.
+// Directions in which vertices leave that are inside next to the loop.
 void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
   ways_out_.clear();
   for (std::size_t i = first; i < end; ++i) {
@@ -169,8 +195,11 @@ void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
         if (inside(w)) ways_out_.push_back(exit_[of][static_cast<std::size_t>(w)]);
     }
   }
-  if (!ways_out_.empty() || crossings_.empty()) return;
-  const EdgePair* best = nullptr;
+}
+
+// That along which the loop, and with it what both bodies share, is least wide. @pre some have crossed
+const FieldEdges::EdgePair& FieldEdges::narrowest_crossing(std::size_t first, std::size_t end) const {
+  const EdgePair* best = &crossings_.front();
   float least = std::numeric_limits<float>::infinity();
   for (const EdgePair& crossing : crossings_) {
     float low = std::numeric_limits<float>::infinity(), high = -low;
@@ -181,7 +210,7 @@ void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
     const float width = std::max(high - low, crossing.distance);
     if (width < least) least = width, best = &crossing;
   }
-  ways_out_.push_back(-best->direction);
+  return *best;
 }
 
 FoundSide FieldEdges::on_edge(int of, Index edge, float along, const Vec3f& point) const {

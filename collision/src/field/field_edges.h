@@ -32,6 +32,7 @@ class FieldEdges {
     float s, t;
     Vec3f on_e, on_f, direction;  ///< unit, from f to e
     float distance;
+    bool leads_out = true;  ///< of edges that have crossed: against the direction both surfaces part there
   };
   struct Crossed {
     std::uint64_t triangles;
@@ -44,7 +45,10 @@ class FieldEdges {
   void add_separated(int of, Index edge, Index face);
   void find_loops();
   void cross_loop(std::size_t first, std::size_t end);
+  void find_crossings(std::size_t first, std::size_t end);
+  bool goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const;
   void find_ways_out(std::size_t first, std::size_t end);
+  const EdgePair& narrowest_crossing(std::size_t first, std::size_t end) const;
   void add(const EdgePair& pair, const Vec3f& normal);
   FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 

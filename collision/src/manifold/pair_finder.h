@@ -29,9 +29,11 @@ struct PairQuery {
   /// Of pairs that DeformingPairs finds: where b is expected in the frame of a at the step's end, and the gaps up to
   /// which contacts are wanted beside what the expected motion of their points, and a fall, close, m.
   bool by_fields = false;
-  RigidTransform X_AB_end{};
-  double near = 0.0;
-  Vec3 fall = Vec3::Zero();  ///< ContactQuery::fall, frame of a
+  struct {
+    RigidTransform X_AB_end{};
+    double near = 0.0;
+    Vec3 fall = Vec3::Zero();  ///< ContactQuery::fall, frame of a
+  } expected{};
 };
 
 /// Finds the contacts of pairs in which a surface deforms: what may take the place of NarrowPhase there. Calls of

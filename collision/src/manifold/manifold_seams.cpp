@@ -1,0 +1,115 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "manifold/manifold_finder_impl.h"
+
+namespace limber {
+
+using internal::KeptPoint;
+using internal::ManifoldBody;
+using internal::ManifoldWorker;
+using internal::ManifoldWorkers;
+using internal::PairQuery;
+
+namespace {
+
+constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+
+}  // namespace
+
+// -- Seams between bodies ---------------------------------------------------------------------------------------------
+
+/// Where a body rests or comes down on one thing and comes to another one that reaches to the same plane and no
+/// farther, the plane is what both touch along. Manifolds made in this query are made again so, one after the other.
+void ManifoldFinder::Impl::level_seams() {
+  bool listed = false;
+  const ManifoldWorkers::Lease worker(workers);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const BodyPair& pair = pairs[p];
+    if (recycled[p] != 0 || graph.at(p).points.empty() || at(pair.a).modal || at(pair.b).modal) continue;
+    if (!listed) list_pairs_of_bodies();
+    listed = true;
+    find_planes(p, pair.a, seams.planes_a, *worker);
+    find_planes(p, pair.b, seams.planes_b, *worker);
+    if (seams.planes_a.empty() && seams.planes_b.empty()) continue;
+    PairQuery q = query_of(pair);
+    q.planes_a = seams.planes_a, q.planes_b = seams.planes_b;
+    make(graph.at(p), q, *worker);
+  }
+}
+
+void ManifoldFinder::Impl::list_pairs_of_bodies() {
+  seams.first_pair_of.assign(bodies.size() + 1, 0);
+  for (const auto& [a, b] : pairs)
+    ++seams.first_pair_of[static_cast<std::size_t>(a) + 1], ++seams.first_pair_of[static_cast<std::size_t>(b) + 1];
+  for (std::size_t i = 1; i < seams.first_pair_of.size(); ++i) seams.first_pair_of[i] += seams.first_pair_of[i - 1];
+  seams.pairs_of.resize(2 * pairs.size());
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (const Index body : {pairs[p].a, pairs[p].b})
+      seams.pairs_of[seams.first_pair_of[static_cast<std::size_t>(body)]++] = p;
+  for (std::size_t i = seams.first_pair_of.size() - 1; i > 0; --i) seams.first_pair_of[i] = seams.first_pair_of[i - 1];
+  seams.first_pair_of[0] = 0;
+}
+
+/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
+/// that one reaches, and along which not all of the pair's contacts are.
+void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes,
+                                       ManifoldWorker& worker) {
+  planes.clear();
+  const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
+  const ManifoldBody& me = at(body);
+  if (me.core() == nullptr || at(other).half_space() != nullptr) return;
+  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
+  const auto i = static_cast<std::size_t>(body);
+  seams.own_normals.clear();
+  for (const KeptPoint& point : graph.at(p).points) seams.own_normals.push_back(out_of_other(point, pairs[p], body));
+  for (std::size_t k = seams.first_pair_of[i]; k < seams.first_pair_of[i + 1]; ++k) {
+    const std::size_t beside = seams.pairs_of[k];
+    if (beside == p) continue;
+    const KeptPoint* last_point = nullptr;
+    Vec3 out = Vec3::Zero(), last = Vec3::Zero();
+    for (const KeptPoint& point : graph.at(beside).points) {
+      if (last_point == nullptr || last_point->turns_with_b != point.turns_with_b || last_point->normal != point.normal)
+        out = out_of_other(point, pairs[beside], body);
+      last_point = &point;
+      if ((out - last).squaredNorm() <= kSameNormal * kSameNormal) continue;  // contacts of a face
+      const Measured m = measure(point, pairs[beside], worker);
+      const ManifoldBody& ground = at(pairs[beside].a == body ? pairs[beside].b : pairs[beside].a);
+      if (m.gap + std::min(0.0, out.dot(me.displacement - ground.displacement)) > tolerance) continue;
+      last = out;
+      if (touches_along(out)) continue;
+      const double offset =
+          pairs[beside].a == body ? out.dot(m.p_b) : out.dot(m.p_a + at(pairs[beside].a).pose.p - me.pose.p);
+      if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
+        planes.push_back({me.turn.transpose() * out, offset, tolerance});
+    }
+  }
+}
+
+/// The normal of a contact, into a body of the pair, world.
+Vec3 ManifoldFinder::Impl::out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const {
+  const Vec3 normal = at(point.turns_with_b ? pair.b : pair.a).turn * point.normal;
+  return pair.a == body ? normal : Vec3(-normal);
+}
+
+bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {
+  return std::ranges::all_of(seams.own_normals,
+                             [&](const Vec3& own) { return (own - out).squaredNorm() <= kSameNormal * kSameNormal; });
+}
+
+/// Whether a convex body reaches to normal · x = offset, x from its origin, and no farther; of meshes each triangle is
+/// looked at by itself.
+bool ManifoldFinder::Impl::reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const {
+  const internal::ConvexCore* core = at(body).core();
+  if (core == nullptr) return at(body).half_space() == nullptr;
+  const Vec3 normal_B = at(body).turn.transpose() * normal;
+  double highest = -std::numeric_limits<double>::infinity();
+  if (core->half_extents[0] > 0.0)
+    highest = normal_B.cwiseAbs().dot(core->half_extents);
+  else
+    for (const Vec3& p : core->points) highest = std::max(highest, normal_B.dot(p));
+  return std::abs(highest + core->radius - offset) <= tolerance;
+}
+
+}  // namespace limber
