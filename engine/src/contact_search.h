@@ -11,7 +11,7 @@
 #include "limber/core/stage_times.h"
 #include "motion_forecast.h"
 #include "sleep_stage.h"
-#include "step_path.h"
+#include "substep.h"
 
 namespace limber::internal {
 

@@ -1,7 +1,7 @@
 // A World's parts: seven rooms, each of which knows the others only by what it is given.
 //
 //   BodyTable         bodies by number: ids, shapes, groups of one model
-//   ContactPipeline   from where bodies are to contacts, rows and islands: the exact path of a step (StepPath)
+//   ExactPath         from where bodies are to contacts, rows and islands: the exact path of a step (StepPath)
 //   GamePath          the path by small steps
 //   ConstraintStage   handles and joints, and the islands that they and contacts make
 //   SleepStage        who is at rest
@@ -15,9 +15,9 @@
 
 #include "body_table.h"
 #include "constraint_stage.h"
-#include "contact_pipeline.h"
 #include "contact_registry.h"
 #include "drawing.h"
+#include "exact_path.h"
 #include "game_path.h"
 #include "limber/engine/world.h"
 #include "rigid_models.h"
@@ -65,7 +65,7 @@ struct World::Impl {
   internal::ConstraintStage constraints;  // bodies by their entries' indices
   internal::SleepStage sleep;
   internal::ContactRegistry registry;
-  internal::ContactPipeline contacts;
+  internal::ExactPath contacts;
   internal::GamePath game;
   ContactSolver solver = kDefaultContactSolver;
   internal::Drawing drawing;
