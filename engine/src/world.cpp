@@ -86,6 +86,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   m.constraints.set_body(index, {.group = &bodies, .slot = slot});
   m.sleep.add(index);
   m.registry.add_body(index);
+  m.queries.tell_changed();
   return id;
 }
 
@@ -116,6 +117,7 @@ BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransfor
   m.constraints.set_body(index, {.pose = pose});
   m.sleep.add(index);
   m.registry.add_body(index);
+  m.queries.tell_changed();
   return id;
 }
 
@@ -130,6 +132,7 @@ void World::remove_body(BodyId id) {
   m.path().forget(index);
   m.drawing.forget(index);
   m.bodies.remove(id);
+  m.queries.tell_changed();
 }
 
 bool World::contains(BodyId id) const { return impl_->bodies.contains(id); }
@@ -155,6 +158,7 @@ void World::step() {
   StageClock clock(m.stage_times);
   m.last.report = {};
   m.drawing.keep_dents(m.path());
+  m.queries.tell_changed();
   if (m.registry.source() != nullptr) m.last.events.begin();
   for (int part = 0; part < m.parts.count(); ++part) {
     m.bodies.set_within_step(part > 0);

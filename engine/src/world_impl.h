@@ -13,6 +13,7 @@
 // world_state.cpp.
 #pragma once
 
+#include "body_queries.h"
 #include "body_table.h"
 #include "constraint_stage.h"
 #include "contact_registry.h"
@@ -40,6 +41,7 @@ struct World::Impl {
       : options(wanted),
         jobs(lent),
         bodies(wanted.half_precision),
+        queries(bodies),
         sleep(constraints),
         registry(bodies),
         contacts(bodies, constraints, sleep, registry),
@@ -61,6 +63,7 @@ struct World::Impl {
   WorldOptions options;
   Jobs& jobs;
   internal::BodyTable bodies;
+  internal::BodyQueries queries;
   internal::RigidModels rigid;
   internal::ConstraintStage constraints;  // bodies by their entries' indices
   internal::SleepStage sleep;

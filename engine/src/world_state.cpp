@@ -38,6 +38,7 @@ void World::set_pose(BodyId id, const RigidTransform& pose) {
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->parts.forget_frame(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_pose(e.slot, pose);
+  impl_->queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
@@ -60,6 +61,7 @@ void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::s
   require_finite(rates, "set_amplitudes", "rates");
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_amplitudes(e.slot, amplitudes, rates);
+  impl_->queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
@@ -87,6 +89,7 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
   };
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_amplitudes(e.slot, project(displacements), project(velocities));
+  impl_->queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
@@ -168,6 +171,7 @@ void World::restore_state(std::span<const std::byte> state) {
   internal::Snapshot snapshot = impl_->snapshot();
   for (const BodyId later : snapshot.check_structure(reader)) remove_body(later);
   snapshot.restore_motion(reader);
+  impl_->queries.tell_changed();
 }
 
 // Drawing -------------------------------------------------------------------------------------------------------------

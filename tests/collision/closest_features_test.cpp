@@ -188,6 +188,26 @@ TEST(ConvexDistance, HullsWithACommonPointIntersect) {
   }
 }
 
+/// On the way four corners of one face of the box are the simplex: in one plane but for round-off, which gave their
+/// tetrahedron an inside with the origin in it.
+TEST(ConvexDistance, AFlatTetrahedronHasNoInside) {
+  const std::vector<Vec3> box{{0.098865446443361038, -0.81336979128697529, 0.17942671673501664},
+                              {0.017056309148154147, -0.44066725115962552, -0.039142900442054762},
+                              {-0.03761076331995411, -1.238069353230453, -0.49368424189406679},
+                              {-0.11941990061516097, -0.86536681310310315, -0.71225385907113825},
+                              {-0.14396216058319297, -0.83120022236332924, 0.23991119879305639},
+                              {-0.22577129787839983, -0.45849768223597942, 0.021341581615984984},
+                              {-0.28043837034650809, -1.2558997843068069, -0.43319975983602704},
+                              {-0.36224750764171498, -0.88319724417945711, -0.65176937701309845}};
+  const std::vector<Vec3> triangle{{-0.28172136089416233, -0.50673229852878154, 0.084146892867336232},
+                                   {-0.11330441320340323, -0.34375870596193081, -0.020833205848556968},
+                                   {-0.095371148615059631, -0.53738404410726559, 0.069747264621189409}};
+  const ConvexDistance d = distance(ConvexSolid{box}, ConvexSolid{triangle});
+  EXPECT_FALSE(d.cores_intersect);
+  EXPECT_NEAR(proven_distance(box, triangle, d.normal), d.distance, kLength);
+  EXPECT_GT(d.distance, 0.01);
+}
+
 TEST(ConvexDistance, BoxesCornerToCornerEdgeToEdgeAndFaceToFaceHaveTheirClosedForms) {
   const auto box = [](const Vec3& center) {
     std::vector<Vec3> p;

@@ -94,7 +94,7 @@ std::vector<ContactPoint> by_fields(const TwoWays& a, const TwoWays& b, double m
   return contacts;
 }
 
-double deepest(const std::vector<ContactPoint>& contacts) {
+double deepest_gap(const std::vector<ContactPoint>& contacts) {
   double depth = 0.0;
   for (const ContactPoint& c : contacts) depth = std::max(depth, -c.gap);
   return depth;
@@ -107,7 +107,7 @@ void bring_together(TwoWays& a, TwoWays& b, const Vec3& direction, const std::ve
   for (int halving = 0; halving < 14; ++halving) {
     const double middle = 0.5 * (near + far);
     b.exact.place({turn, middle * direction}, z);
-    (deepest(contacts_of(a.exact, b.exact, 1e-3)) > depth ? near : far) = middle;
+    (deepest_gap(contacts_of(a.exact, b.exact, 1e-3)) > depth ? near : far) = middle;
   }
   b.place({turn, near * direction}, z);
 }
@@ -292,8 +292,8 @@ void look_at_pairs(TwoWays& a, TwoWays& b, Index modes, int pairs, unsigned seed
         ASSERT_LT(found[c - 1].id, found[c].id);
       }
     }
-    missed.deep_pairs += deepest(exact) > 3e-3 ? 1 : 0;
-    missed.unseen_pairs += deepest(exact) > 3e-3 && deepest(found) == 0.0 ? 1 : 0;
+    missed.deep_pairs += deepest_gap(exact) > 3e-3 ? 1 : 0;
+    missed.unseen_pairs += deepest_gap(exact) > 3e-3 && deepest_gap(found) == 0.0 ? 1 : 0;
     for (const ContactPoint& c : exact) {
       if (!(-c.gap > 1e-3)) continue;
       (is_edge_on_edge(c) ? missed.edges : missed.vertices) += 1;
@@ -361,7 +361,7 @@ TEST(FieldContacts, TellsWhatTheExpectedMotionOfItsPointsCloses) {
   EXPECT_GT(count_in_fall({0.0, 0.0, -1.1 * kApart}), 0u);
   // By its frame alone, by its modes alone, and by both.
   std::vector<double> bent = random.amplitudes(kModes, 0.01);
-  while (deepest(at_end(bent, start)) < 3e-3)
+  while (deepest_gap(at_end(bent, start)) < 3e-3)
     for (double& z : bent) z *= 1.2;
   for (const auto& [z, end] : {std::pair(still, near), std::pair(bent, start), std::pair(bent, near)}) {
     const std::vector<ContactPoint> then = at_end(z, end);
@@ -423,7 +423,7 @@ TEST(FieldContacts, CornersThroughRidgesAreSeen) {
         const Vec3 middle = turn.conjugate() * (Vec3(0.01, 0.0, top) - cube.exact.pose.p);
         if (kCorner - middle.cwiseAbs().maxCoeff() < 2e-3) continue;
         ++overlaps;
-        EXPECT_GT(deepest(by_fields(ridge, cube, 1e-3)), 0.0) << beyond << ' ' << below << ' ' << roll;
+        EXPECT_GT(deepest_gap(by_fields(ridge, cube, 1e-3)), 0.0) << beyond << ' ' << below << ' ' << roll;
       }
   EXPECT_GT(overlaps, 40);
 }
@@ -437,7 +437,7 @@ TEST(FieldContacts, PatchesHaveOneWayOut) {
   for (const double depth : {0.002, 0.006, 0.012, 0.02}) {
     b.place({quaternion_from_rotation_vector({0.0, 0.0, 1.5}), {0.01, 0.02, 0.05 - depth}});
     const std::vector<ContactPoint> found = by_fields(a, b, 1e-3);
-    EXPECT_GT(deepest(found), 0.99 * depth);
+    EXPECT_GT(deepest_gap(found), 0.99 * depth);
     for (const ContactPoint& c : found)
       for (const ContactPoint& d : found)
         if (c.gap < 0.0 && d.gap < 0.0) {
@@ -468,7 +468,7 @@ TEST(FieldContacts, RigidShapesAreMetAsByNarrowPhase) {
       bring_together(shape, body, (Vec3::UnitZ() + random.vector(0.2)).normalized(), z, 1.5e-3);
       const std::vector<ContactPoint> exact = contacts_of(shape.exact, body.exact, 1e-3),
                                       found = by_fields(shape, body, 1e-3);
-      EXPECT_NEAR(deepest(found), deepest(exact), 1e-4) << kind.index();
+      EXPECT_NEAR(deepest_gap(found), deepest_gap(exact), 1e-4) << kind.index();
       for (const ContactPoint& c : exact)
         if (c.gap < -1e-3) {
           EXPECT_TRUE(has_like(c, found)) << kind.index() << " " << c.gap;

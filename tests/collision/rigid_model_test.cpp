@@ -16,7 +16,7 @@ constexpr double kDensity = 700.0;
 
 /// A round solid about z of the given outline, cut into discs: m, and the moments about its middle.
 template <class Radius>
-MassProperties turned(double half_height, const Radius& radius) {
+MassProperties sum_of_discs(double half_height, const Radius& radius) {
   constexpr int kDiscs = 200000;
   MassProperties sum;
   const double thickness = 2.0 * half_height / kDiscs;
@@ -29,7 +29,7 @@ MassProperties turned(double half_height, const Radius& radius) {
   return sum;
 }
 
-void expect_same(const MassProperties& a, const MassProperties& b, double relative) {
+void expect_same_mass(const MassProperties& a, const MassProperties& b, double relative) {
   EXPECT_NEAR(a.mass, b.mass, relative * b.mass);
   EXPECT_LE((a.center_of_mass - b.center_of_mass).norm(), relative);
   EXPECT_LE((a.inertia - b.inertia).norm(), relative * b.inertia.norm());
@@ -38,9 +38,9 @@ void expect_same(const MassProperties& a, const MassProperties& b, double relati
 TEST(MassProperties, ThoseOfRoundSolidsAreSumsOfTheirDiscs) {
   constexpr double kCut = 1e-8;  // of discs as thick as these
   const auto ball = [](double z) { return std::sqrt(std::max(0.0, 0.09 - z * z)); };
-  expect_same(mass_properties(Sphere{0.3}, kDensity), turned(0.3, ball), kCut);
+  expect_same_mass(mass_properties(Sphere{0.3}, kDensity), sum_of_discs(0.3, ball), kCut);
   const auto capsule = [&](double z) { return ball(std::max(0.0, std::abs(z) - 0.5)); };
-  expect_same(mass_properties(Capsule{0.3, 0.5}, kDensity), turned(0.8, capsule), kCut);
+  expect_same_mass(mass_properties(Capsule{0.3, 0.5}, kDensity), sum_of_discs(0.8, capsule), kCut);
 }
 
 TEST(MassProperties, ABoxIsTheHullAndTheMeshOfItsCorners) {
@@ -51,7 +51,7 @@ TEST(MassProperties, ABoxIsTheHullAndTheMeshOfItsCorners) {
   const MassProperties box = mass_properties(Box{half}, kDensity);
   EXPECT_NEAR(box.mass, kDensity * 0.2 * 0.4 * 0.8, 1e-12);
   EXPECT_NEAR(box.inertia(0, 0), box.mass / 12.0 * (0.4 * 0.4 + 0.8 * 0.8), 1e-12);
-  expect_same(mass_properties(hull, kDensity), box, 1e-14);
+  expect_same_mass(mass_properties(hull, kDensity), box, 1e-14);
 }
 
 TEST(MassProperties, APrismOfManySidesIsNearlyTheCylinder) {
@@ -59,7 +59,7 @@ TEST(MassProperties, APrismOfManySidesIsNearlyTheCylinder) {
   const double inside =
       2.0 / 3.0 * std::pow(2.0 * std::numbers::pi / kSides, 2);  // what the sides leave out, of moments
   const MassProperties prism = mass_properties(cylinder_hull(0.3, 0.5, kSides), kDensity);
-  expect_same(prism, turned(0.5, [](double) { return 0.3; }), inside);
+  expect_same_mass(prism, sum_of_discs(0.5, [](double) { return 0.3; }), inside);
 }
 
 TEST(MassProperties, WhatBoundsNoSolidIsRefused) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "constants.h"
@@ -30,6 +31,8 @@ inline std::unique_ptr<ContactSource> make_finder(ContactSolver solver = kDefaul
   if (solver == ContactSolver::kGame) return std::make_unique<ManifoldFinder>();
   return std::make_unique<ContactFinder>();
 }
+
+inline std::shared_ptr<const Shape> share(Shape shape) { return std::make_shared<const Shape>(std::move(shape)); }
 
 /// A world with the ground, and its finder.
 struct GroundedWorld {

@@ -13,12 +13,11 @@ namespace limber {
 namespace {
 
 using testing::GroundedWorld;
-
-std::shared_ptr<const Shape> shape(Shape s) { return std::make_shared<const Shape>(std::move(s)); }
+using testing::share;
 
 TEST(RigidBodies, BodiesOfOneShapeAndMassShareAModel) {
   World world;
-  const auto box = shape(Box{});
+  const auto box = share(Box{});
   const BodyId a = world.add_rigid(box, 500.0), b = world.add_rigid(box, 500.0), heavy = world.add_rigid(box, 600.0);
   EXPECT_EQ(&world.model(a), &world.model(b));
   EXPECT_NE(&world.model(a), &world.model(heavy));
@@ -31,9 +30,9 @@ TEST(RigidBodies, BodiesOfOneShapeAndMassShareAModel) {
 TEST(RigidBodies, ArgumentsAreChecked) {
   World world;
   EXPECT_THROW(world.add_rigid(nullptr, 1.0), InvalidArgument);
-  EXPECT_THROW(world.add_rigid(shape(HalfSpace{}), 1.0), InvalidArgument);
-  EXPECT_THROW(world.add_rigid(shape(Box{}), 0.0), InvalidArgument);
-  EXPECT_THROW(world.add_rigid(shape(Box{}), 1.0, {.shape = shape(Box{})}), InvalidArgument);
+  EXPECT_THROW(world.add_rigid(share(HalfSpace{}), 1.0), InvalidArgument);
+  EXPECT_THROW(world.add_rigid(share(Box{}), 0.0), InvalidArgument);
+  EXPECT_THROW(world.add_rigid(share(Box{}), 1.0, {.shape = share(Box{})}), InvalidArgument);
   EXPECT_EQ(world.body_count(), 0u);
 }
 
@@ -42,7 +41,7 @@ TEST(RigidBodies, ABoxSlidesAsFarAsFrictionLetsIt) {
   constexpr double kFriction = 0.4, kSpeed = 3.0;
   GroundedWorld g({.friction = kFriction}, {.step = 1.0 / 240.0});
   const BodyId box =
-      g.world.add_rigid(shape(Box{{0.5, 0.5, 0.1}}), 500.0, {.pose = {.p = {0, 0, 0.1}}, .velocity = {kSpeed, 0, 0}});
+      g.world.add_rigid(share(Box{{0.5, 0.5, 0.1}}), 500.0, {.pose = {.p = {0, 0, 0.1}}, .velocity = {kSpeed, 0, 0}});
   g.step(480);
   const double way = kSpeed * kSpeed / (2.0 * kFriction * 9.80665);
   EXPECT_NEAR(g.world.body(box).pose.p.x(), way, 0.01 * way);
@@ -53,7 +52,7 @@ TEST(RigidBodies, ABoxSlidesAsFarAsFrictionLetsIt) {
 TEST(RigidBodies, ABallThatSlidesComesToRoll) {
   GroundedWorld g({.friction = 0.3}, {.step = 1.0 / 240.0});
   const BodyId ball =
-      g.world.add_rigid(shape(Sphere{0.2}), 1000.0, {.pose = {.p = {0, 0, 0.2}}, .velocity = {2, 0, 0}});
+      g.world.add_rigid(share(Sphere{0.2}), 1000.0, {.pose = {.p = {0, 0, 0.2}}, .velocity = {2, 0, 0}});
   g.step(240);
   EXPECT_NEAR(g.world.body(ball).velocity.x(), 2.0 * 5.0 / 7.0, 0.01);
   EXPECT_NEAR(g.world.body(ball).angular_velocity.y(), 2.0 * 5.0 / 7.0 / 0.2, 0.05);
@@ -67,7 +66,7 @@ TEST(RigidBodies, WhatHasCornersComesToRest) {
       {Box{}, 0.5}, {cylinder_hull(0.5, 0.5), 0.5}, {ConvexHull{corners}, 0.25}, {mesh, 0.25}};
   for (const auto& [solid, height] : heights) {
     GroundedWorld g;
-    const BodyId body = g.world.add_rigid(shape(solid), 500.0, {.pose = {.p = {0, 0, height + 0.3}}});
+    const BodyId body = g.world.add_rigid(share(solid), 500.0, {.pose = {.p = {0, 0, height + 0.3}}});
     g.step(120);
     EXPECT_NEAR(g.world.body(body).pose.p.z(), height, 2e-3) << "shape " << solid.index();
     EXPECT_LE(g.world.body(body).velocity.norm(), 1e-3) << "shape " << solid.index();
@@ -77,7 +76,7 @@ TEST(RigidBodies, WhatHasCornersComesToRest) {
 /// Free of forces a body keeps energy and momentum, about the axis of neither its least nor its largest moment too.
 TEST(RigidBodies, ABoxTumblesWithItsMomentum) {
   World world({.step = 1.0 / 60.0, .gravity = Vec3::Zero()});
-  const BodyId box = world.add_rigid(shape(Box{{0.5, 0.2, 0.1}}), 500.0, {.angular_velocity = {0.01, 3.0, 0.02}});
+  const BodyId box = world.add_rigid(share(Box{{0.5, 0.2, 0.1}}), 500.0, {.angular_velocity = {0.01, 3.0, 0.02}});
   const Vec3 momentum = world.angular_momentum(box);
   const double energy = world.energy(box).total();
   for (int i = 0; i < 600; ++i) world.step();

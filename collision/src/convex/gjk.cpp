@@ -46,13 +46,27 @@ SurfaceFoot nearest_to_origin(const Simplex& s, const std::array<std::size_t, 3>
   return closest_on_triangle(Vec3::Zero(), {s.vertices[of[0]].point, s.vertices[of[1]].point, s.vertices[of[2]].point});
 }
 
-// Whether the origin is on the same side of the face opposite `apex` as the apex; a flat tetrahedron has no inside.
-bool on_inner_side(const Simplex& s, const std::array<std::size_t, 3>& face, std::size_t apex) {
-  const Vec3& p = s.vertices[face[0]].point;
-  const Vec3 n = (s.vertices[face[1]].point - p).cross(s.vertices[face[2]].point - p);
-  const double height = n.dot(s.vertices[apex].point - p), origin = -n.dot(p);
-  return (height > 0.0 && origin >= 0.0) || (height < 0.0 && origin <= 0.0);
-}
+// Six times the volume of the tetrahedron with each vertex in turn at the origin; they sum to that of the whole, and
+// have its sign where the origin is inside. A flat one has no inside: volumes that are the round-off of these products
+// tell no sides, and the origin, off its plane, has some of either sign.
+struct SplitVolumes {
+  std::array<double, 4> part;
+  double whole;
+
+  explicit SplitVolumes(const Simplex& s) {
+    const auto p = [&](std::size_t i) -> const Vec3& { return s.vertices[i].point; };
+    part = {p(1).dot(p(2).cross(p(3))), -p(0).dot(p(2).cross(p(3))), p(0).dot(p(1).cross(p(3))),
+            -p(0).dot(p(1).cross(p(2)))};
+    whole = part[0] + part[1] + part[2] + part[3];
+    double size = 0.0;
+    for (const Vertex& v : s.vertices) size = std::max(size, v.point.cwiseAbs().maxCoeff());
+    // Four triple products of six terms each, of three roundings and the sum's.
+    constexpr double kRoundings = 4.0 * 6.0 * 8.0 * std::numeric_limits<double>::epsilon();
+    if (std::abs(whole) <= kRoundings * size * size * size) whole = 0.0;
+  }
+  // Whether the origin is on the side of a vertex as seen from the face opposite to it.
+  bool inner(std::size_t i) const { return (whole > 0.0 && part[i] >= 0.0) || (whole < 0.0 && part[i] <= 0.0); }
+};
 
 // The simplex's point nearest to the origin; leaves only the vertices it depends on. All four are left, and the origin
 // itself is returned, where the origin is inside.
@@ -62,12 +76,13 @@ Vec3 shrink_to_nearest(Simplex& s) {
     return reduce_to(s, of, nearest_to_origin(s, of));
   }
   constexpr std::array<std::array<std::size_t, 3>, 4> kFaces{{{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}};
+  const SplitVolumes volumes(s);
   bool inside = true;
   std::size_t best = 0;
   SurfaceFoot best_foot{};
   double best_distance = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) {
-    if (on_inner_side(s, kFaces[i], i)) continue;  // what is nearest on it is on another face too
+    if (volumes.inner(i)) continue;  // what is nearest on it is on another face too
     inside = false;
     const SurfaceFoot foot = nearest_to_origin(s, kFaces[i]);
     if (const double d = foot.point.norm(); d < best_distance) best = i, best_foot = foot, best_distance = d;

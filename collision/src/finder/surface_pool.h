@@ -16,13 +16,14 @@ class SurfacePool {
   void start_query() { ++query_; }
 
   /// The surface of a body in the query's state; the last four that were asked for stay.
-  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z) {
+  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
+                       BoundsChoice choice = BoundsChoice::kAutomatic) {
     Slot* oldest = slots_.data();
     for (Slot& slot : slots_) {
       if (slot.body == body && slot.query == query_) return slot.use(++clock_);
       if (slot.used < oldest->used) oldest = &slot;
     }
-    oldest->surface.bind(surface, z, BoundsChoice::kAutomatic);
+    oldest->surface.bind(surface, z, choice);
     oldest->body = body;
     oldest->query = query_;
     return oldest->use(++clock_);

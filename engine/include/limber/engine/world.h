@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "limber/collision/rigid_model.h"
+#include "limber/collision/spatial_index.h"
 #include "limber/constraints/contact_constraint.h"
 #include "limber/constraints/handle.h"
 #include "limber/constraints/island_solver.h"
@@ -137,6 +138,10 @@ struct HandleView {
   double work = 0.0;   ///< done on the body in the last step, J: each substep's force along the point's way in it
   double error = 0.0;  ///< distance from the target along the held directions, m
 };
+
+/// Which bodies may answer a query, and how one does: spatial_index.h by BodyId.
+using BodyFilter = QueryFilter<BodyId>;
+using BodyHit = QueryHit<BodyId>;
 
 /// One direction in which a point of a body is to do something: PointWish of manipulation.h by BodyId.
 struct BodyWish {
@@ -355,6 +360,21 @@ class World {
   /// the model has no residual compliance or ContactOptions::residual_compliance is off. A point of the render surface
   /// goes with the point of the collision surface that was nearest at rest.
   Vec3 dent(BodyId id, const SurfacePoint& at) const;
+
+  // Queries ----------------------------------------------------------------------------------------------------------
+  // Of bodies as they are now, moved and bent: limber/collision/spatial_index.h tells what each gives, and throws. They
+  // need no contact source. Bodies in no layer, and those without a shape whose model is not touchable, do not answer.
+  // The first query after a step brings the index up to date, O(bodies). `at` may be given to loads and handles.
+  std::optional<BodyHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const;  ///< the first place of all
+  /// The first place on each body, by fraction; replaces `hits`.
+  void cast_ray(const Ray& ray, std::vector<BodyHit>& hits, const BodyFilter& filter = {}) const;
+  /// Where a convex shape first touches that is moved without turning.
+  std::optional<BodyHit> cast_shape(const Shape& shape, const RigidTransform& pose, const Vec3& way,
+                                    const BodyFilter& filter = {}) const;
+  /// Bodies that a convex shape touches or lies in; replaces `bodies`.
+  void find_overlaps(const Shape& shape, const RigidTransform& pose, std::vector<BodyId>& bodies,
+                     const BodyFilter& filter = {}) const;
+  std::optional<BodyHit> nearest_point(const Vec3& point, double max_distance, const BodyFilter& filter = {}) const;
 
   // Drawing ----------------------------------------------------------------------------------------------------------
   /// Deformed render surfaces, residual displacement included, less `origin` (pass a point near the camera far from the

@@ -1,0 +1,54 @@
+#include "body_queries.h"
+
+namespace limber::internal {
+
+BodyQueries::Shown BodyQueries::shown_of(const BodyTable::Entry& e) const {
+  if (!e.alive || e.filter.layers == 0) return {};
+  Shown shown{.shape = e.shape.get(), .layers = e.filter.layers};
+  if (e.group >= 0 && bodies_.group(e).model().data().touchable) {
+    shown.model = &bodies_.group(e).model();
+    shown.skinned = bodies_.group(e).skinned(e.slot);
+  }
+  return shown;
+}
+
+void BodyQueries::show(Index body) {
+  const BodyTable::Entry& e = bodies_[body];
+  Shown& before = shown_[static_cast<std::size_t>(body)];
+  const Shown now = shown_of(e);
+  if (now != before) {
+    if (before.any()) index_.remove_body(body);
+    if (now.any()) {
+      const auto model = now.model != nullptr ? bodies_.group(e).shared_model() : nullptr;
+      index_.add_body(body, {.model = e.shape ? nullptr : model, .shape = e.shape, .skin = now.skinned}, now.layers,
+                      e.shape ? model : nullptr);
+    }
+    before = now;
+  }
+  if (!now.any()) return;
+  if (e.group < 0)
+    index_.set_state(body, e.pose, {});
+  else
+    index_.set_state(body, bodies_.group(e).frame(e.slot).pose(), bodies_.group(e).amplitudes(e.slot));
+}
+
+SpatialIndex& BodyQueries::index() {
+  if (changed_) {
+    shown_.resize(bodies_.size());
+    for (std::size_t i = 0; i < bodies_.size(); ++i) show(static_cast<Index>(i));
+    changed_ = false;
+  }
+  return index_;
+}
+
+SpatialIndex::Filter BodyQueries::filter(const BodyFilter& filter) const {
+  SpatialIndex::Filter asked{.mask = filter.mask};
+  if (filter.accepts) asked.accepts = [this, &filter](Index body) { return filter.accepts(id(body)); };
+  return asked;
+}
+
+BodyHit BodyQueries::told(const SpatialIndex::Hit& hit) const {
+  return {id(hit.body), hit.at, hit.position, hit.normal, hit.fraction, hit.distance};
+}
+
+}  // namespace limber::internal

@@ -1,0 +1,42 @@
+#include "world_impl.h"
+
+namespace limber {
+
+std::optional<BodyHit> World::cast_ray(const Ray& ray, const BodyFilter& filter) const {
+  internal::BodyQueries& queries = impl_->queries;
+  const auto hit = queries.index().cast_ray(ray, queries.filter(filter));
+  if (!hit) return {};
+  return queries.told(*hit);
+}
+
+void World::cast_ray(const Ray& ray, std::vector<BodyHit>& hits, const BodyFilter& filter) const {
+  internal::BodyQueries& queries = impl_->queries;
+  queries.index().cast_ray(ray, queries.hits, queries.filter(filter));
+  hits.clear();
+  for (const SpatialIndex::Hit& hit : queries.hits) hits.push_back(queries.told(hit));
+}
+
+std::optional<BodyHit> World::cast_shape(const Shape& shape, const RigidTransform& pose, const Vec3& way,
+                                         const BodyFilter& filter) const {
+  internal::BodyQueries& queries = impl_->queries;
+  const auto hit = queries.index().cast_shape(shape, pose, way, queries.filter(filter));
+  if (!hit) return {};
+  return queries.told(*hit);
+}
+
+void World::find_overlaps(const Shape& shape, const RigidTransform& pose, std::vector<BodyId>& bodies,
+                          const BodyFilter& filter) const {
+  internal::BodyQueries& queries = impl_->queries;
+  queries.index().find_overlaps(shape, pose, queries.found, queries.filter(filter));
+  bodies.clear();
+  for (const Index body : queries.found) bodies.push_back(queries.id(body));
+}
+
+std::optional<BodyHit> World::nearest_point(const Vec3& point, double max_distance, const BodyFilter& filter) const {
+  internal::BodyQueries& queries = impl_->queries;
+  const auto hit = queries.index().nearest_point(point, max_distance, queries.filter(filter));
+  if (!hit) return {};
+  return queries.told(*hit);
+}
+
+}  // namespace limber
