@@ -1,13 +1,15 @@
-// 00_hello: ground, a box that falls, a step, a line: everything that a game loop needs.
+// 00_hello: ground, a box and a soft ball that fall, a step, a ray: everything that a game loop needs.
 //   run:   00_hello
-//   see:   the height and tilt of a wooden crate, ten times a second: it falls, lands on an edge, tips over and lies still.
-//          docs/hello.md tells it line by line
+//   see:   the heights of a wooden crate and of a ball of jelly, ten times a second. The crate lands on a corner, tips over
+//          and lies still; the ball bounces, wobbles and sags, and a ray tells by how much. docs/hello.md tells it line by
+//          line
 //   next:  01_ring_a_bar
 #include <cstdio>
 #include <memory>
 
 #include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
+#include "limber/model/soft_bodies.h"
 
 int main() {
   limber::ManifoldFinder finder;              // finds where bodies touch
@@ -21,12 +23,17 @@ int main() {
   const limber::Quaternion askew = limber::quaternion_from_rotation_vector({0.3, 0.2, 0.0});
   const limber::BodyId box = world.add_rigid(crate, 700.0, {.pose = {askew, {0.0, 0.0, 3.0}}});  // kg/m³
 
-  for (int step = 0; step <= 120; ++step) {
-    if (step % 6 == 0) {
-      const limber::RigidTransform pose = world.body(box).pose;
-      const double tilt = (pose.q * limber::Vec3::UnitZ()).head<2>().norm();
-      std::printf("%.1f s: height %.3f m, tilt %.3f\n", world.time(), pose.p.z(), tilt);
-    }
+  const limber::Material jelly{.youngs_modulus = 1e5, .poisson_ratio = 0.4, .density = 1000.0};
+  const auto wobbly = limber::make_soft_ball(0.3, 6, jelly, 12);  // radius, cells across, modes
+  const limber::BodyId ball = world.add_body(wobbly, {.pose = {.p = {3.0, 0.0, 1.0}}});
+
+  for (int step = 0; step <= 180; ++step) {
+    if (step % 6 == 0)
+      std::printf("%.1f s: crate at %.3f m, ball at %.3f m\n", world.time(), world.body(box).pose.p.z(),
+                  world.body(ball).pose.p.z());
     world.step();
   }
+  const limber::Vec3 above = world.body(ball).pose.p + limber::Vec3(0.0, 0.0, 1.0);
+  if (const auto hit = world.cast_ray({.from = above, .way = {0.0, 0.0, -2.0}}))
+    std::printf("a ray from above meets the %s at %.3f m\n", hit->body == ball ? "ball" : "ground", hit->position.z());
 }
