@@ -3,7 +3,7 @@
 namespace limber::internal {
 
 BodyQueries::Shown BodyQueries::shown_of(const BodyTable::Entry& e) const {
-  if (!e.alive || e.filter.layers == 0) return {};
+  if (!e.alive || e.sensor || e.filter.layers == 0) return {};
   Shown shown{.shape = e.shape.get(), .layers = e.filter.layers};
   if (e.group >= 0 && bodies_.group(e).model().data().touchable) {
     shown.model = &bodies_.group(e).model();

@@ -58,19 +58,23 @@ void BodyTable::remove(BodyId id) {
   if (++entry.generation != 0) vacant_.push_back(id.index);
 }
 
-const BodyTable::Entry& BodyTable::entry(BodyId id, const char* function) const {
+const BodyTable::Entry& BodyTable::any_entry(BodyId id, const char* function) const {
   if (!contains(id))
     throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) + " (generation " +
                           std::to_string(id.generation) +
                           ") does not exist; it was removed or belongs to another world");
-  if (entries_[id.index].group < 0)
+  return entries_[id.index];
+}
+
+const BodyTable::Entry& BodyTable::entry(BodyId id, const char* function) const {
+  if (any_entry(id, function).group < 0)
     throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) +
                           " is a static shape; it has no motion");
   return entries_[id.index];
 }
 
 bool BodyTable::shows(const Entry& e) const {
-  const bool meets = e.filter.self || (e.filter.layers != 0 && e.filter.mask != 0);
+  const bool meets = !e.sensor && (e.filter.self || (e.filter.layers != 0 && e.filter.mask != 0));
   return meets && (e.shape || group(e).model().data().touchable);
 }
 
@@ -127,7 +131,10 @@ void BodyTable::advance_free(std::span<const Index> awake, std::uint64_t changes
 
 void BodyTable::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(entries_.size()));
-  for (const Entry& e : entries_) state(e.generation, e.placed);
+  for (const Entry& e : entries_) {
+    state(e.generation, e.placed, e.user_data);
+    if (e.alive && e.sensor) state(e.pose);
+  }
   state(vacant_);
   for (const Entry& e : entries_)
     if (e.alive && e.group >= 0) group(e).save_state(e.slot, state);
@@ -135,7 +142,10 @@ void BodyTable::save_state(StateWriter& state) const {
 
 void BodyTable::restore_state(StateReader& state) {
   entries_.resize(static_cast<std::size_t>(state.read<std::uint64_t>()));
-  for (Entry& e : entries_) state(e.generation, e.placed);
+  for (Entry& e : entries_) {
+    state(e.generation, e.placed, e.user_data);
+    if (e.alive && e.sensor) state(e.pose);
+  }
   state(vacant_);
   for (const Entry& e : entries_)
     if (e.alive && e.group >= 0) group(e).restore_state(e.slot, state);

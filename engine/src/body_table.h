@@ -31,6 +31,8 @@ class BodyTable {
     double friction = -1.0;  // negative: that of the contact options
     ShapeExtent extent{};    // of what moves
     bool placed = false;     // of a static one: the source has seen where it stands
+    bool sensor = false;     // tells what it overlaps, and meets nothing
+    std::uint64_t user_data = 0;
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {
@@ -56,6 +58,8 @@ class BodyTable {
   }
   /// @throws InvalidArgument, in the name of a function of World, for an id that names no body or one that is static
   const Entry& entry(BodyId id, const char* function) const;
+  /// The same for one that may be static.
+  const Entry& any_entry(BodyId id, const char* function) const;
   /// By BodyId::index.
   std::span<const Entry> entries() const { return entries_; }
   std::span<Entry> entries() { return entries_; }

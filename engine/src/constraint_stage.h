@@ -36,6 +36,7 @@ class ConstraintStage {
   std::uint32_t add(std::unique_ptr<JointConstraint> joint);
   void remove(std::uint32_t place);
   const std::vector<Entry>& entries() const { return constraints_.entries(); }
+  void set_user_data(std::uint32_t place, std::uint64_t data) { constraints_.set_user_data(place, data); }
   void disturb_bodies_of(std::uint32_t place);
 
   /// Constraints of the coming step alone, beside the others: they stay the caller's.

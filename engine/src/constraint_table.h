@@ -17,6 +17,7 @@ class ConstraintTable {
     std::uint32_t generation = 1;
     std::unique_ptr<Handle> handle;
     std::unique_ptr<JointConstraint> joint;
+    std::uint64_t user_data = 0;
     Constraint* constraint() const {
       return handle ? static_cast<Constraint*>(handle.get()) : static_cast<Constraint*>(joint.get());
     }
@@ -26,6 +27,7 @@ class ConstraintTable {
   std::uint32_t add(Entry&& entry);
   void remove(std::uint32_t place);
   const std::vector<Entry>& entries() const { return entries_; }
+  void set_user_data(std::uint32_t place, std::uint64_t data) { entries_[place].user_data = data; }
 
   void save_state(StateWriter& state) const;
   /// Constraints made since are removed, those removed since made again.

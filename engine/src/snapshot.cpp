@@ -12,7 +12,7 @@ namespace limber::internal {
 namespace {
 
 /// Changes with what is written.
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 constexpr std::uint64_t kMagic = 0x6574617473626d6c;  // "lmbstate"
 
 struct Header {
@@ -141,7 +141,7 @@ void Snapshot::save_motion(StateWriter& state) const {
   rooms_.bodies.save_state(state);
   rooms_.constraints.save_state(rooms_.bodies.size(), state);
   rooms_.sleep.save_state(rooms_.bodies.size(), state);
-  state(rooms_.parts, rooms_.events);
+  state(rooms_.parts, rooms_.events, rooms_.sensors);
   rooms_.registry.save_pairs(state);
   rooms_.path.save_state(state);
   rooms_.drawing.save_state(state);
@@ -158,7 +158,7 @@ void Snapshot::restore_motion(StateReader& state) {
   rooms_.bodies.restore_state(state);
   rooms_.constraints.restore_state(rooms_.bodies.size(), state);
   rooms_.sleep.restore_state(rooms_.bodies.size(), state);
-  state(rooms_.parts, rooms_.events);
+  state(rooms_.parts, rooms_.events, rooms_.sensors);
   rooms_.registry.restore_pairs(state);
   rooms_.path.restore_state(state);
   rooms_.drawing.restore_state(state);

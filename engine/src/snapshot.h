@@ -10,6 +10,7 @@
 #include "contact_registry.h"
 #include "drawing.h"
 #include "limber/core/state_archive.h"
+#include "sensor_stage.h"
 #include "sleep_stage.h"
 #include "step_events.h"
 #include "step_parts.h"
@@ -29,6 +30,7 @@ class Snapshot {
     SleepStage& sleep;
     StepParts& parts;
     StepEvents& events;
+    SensorStage& sensors;
     ContactRegistry& registry;
     StepPath& path;
     ContactSolver solver;  // that of the path

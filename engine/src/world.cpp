@@ -81,7 +81,8 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
                                   .shape = placement.shape,
                                   .filter = placement.filter,
                                   .friction = friction,
-                                  .extent = extent});
+                                  .extent = extent,
+                                  .user_data = placement.user_data});
   const auto index = static_cast<Index>(id.index);
   m.constraints.set_body(index, {.group = &bodies, .slot = slot});
   m.sleep.add(index);
@@ -102,6 +103,35 @@ BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, const MassPro
 BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement) {
   if (!shape) throw InvalidArgument("World::add_rigid: the shape is null");
   return add_rigid(shape, mass_properties(*shape, density), placement);
+}
+
+BodyId World::add_sensor(std::shared_ptr<const Shape> shape, const RigidTransform& pose,
+                         const CollisionFilter& filter) {
+  if (!shape) throw InvalidArgument("World::add_sensor: the shape is null");
+  if (!SpatialIndex::may_ask(*shape))
+    throw InvalidArgument("World::add_sensor: the shape is not convex, expected a sphere, capsule, box or hull");
+  const BodyId id = add_static(std::move(shape), pose, {.layers = 0, .mask = 0});
+  Entry& e = impl_->bodies[static_cast<Index>(id.index)];
+  e.sensor = true;
+  e.filter = filter;
+  impl_->sensors.add(static_cast<Index>(id.index));
+  return id;
+}
+
+void World::set_sensor_pose(BodyId id, const RigidTransform& pose) {
+  require_pose(pose, "set_sensor_pose");
+  impl_->bodies[require_sensor(id, "set_sensor_pose")].pose = pose;
+}
+
+Index World::require_sensor(BodyId id, const char* function) const {
+  if (!impl_->bodies.any_entry(id, function).sensor)
+    throw InvalidArgument(std::string("World::") + function + ": body " + std::to_string(id.index) + " is no sensor");
+  return static_cast<Index>(id.index);
+}
+
+std::span<const SensorEvent> World::sensor_events() const { return impl_->sensors.events(); }
+void World::list_inside(BodyId sensor, std::vector<BodyId>& bodies) const {
+  impl_->sensors.list(require_sensor(sensor, "list_inside"), bodies);
 }
 
 BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose, const CollisionFilter& filter,
@@ -126,6 +156,7 @@ void World::remove_body(BodyId id) {
   if (!m.bodies.contains(id)) m.bodies.entry(id, "remove_body");  // tells so
   const auto index = static_cast<Index>(id.index);
   m.sleep.remove(index);
+  m.sensors.remove(index);
   m.parts.forget(index);
   m.registry.remove_body(index);
   m.constraints.remove_body(index);
@@ -134,6 +165,21 @@ void World::remove_body(BodyId id) {
   m.bodies.remove(id);
   m.queries.tell_changed();
 }
+
+void World::list(std::vector<BodyId>& bodies) const {
+  bodies.clear();
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
+    if (impl_->bodies[static_cast<Index>(i)].alive) bodies.push_back(impl_->queries.id(static_cast<Index>(i)));
+}
+BodyId World::id_of(Index body) const {
+  if (body < 0 || static_cast<std::size_t>(body) >= impl_->bodies.size() || !impl_->bodies[body].alive) return {};
+  return impl_->queries.id(body);
+}
+void World::set_user_data(BodyId id, std::uint64_t data) {
+  impl_->bodies.any_entry(id, "set_user_data");
+  impl_->bodies[static_cast<Index>(id.index)].user_data = data;
+}
+std::uint64_t World::user_data(BodyId id) const { return impl_->bodies.any_entry(id, "user_data").user_data; }
 
 bool World::contains(BodyId id) const { return impl_->bodies.contains(id); }
 std::size_t World::body_count() const { return impl_->bodies.count(); }
@@ -158,7 +204,6 @@ void World::step() {
   StageClock clock(m.stage_times);
   m.last.report = {};
   m.drawing.keep_dents(m.path());
-  m.queries.tell_changed();
   if (m.registry.source() != nullptr) m.last.events.begin();
   for (int part = 0; part < m.parts.count(); ++part) {
     m.bodies.set_within_step(part > 0);
@@ -169,6 +214,8 @@ void World::step() {
     m.add_to_report(m.path().report());
   }
   m.parts.finish();
+  m.queries.tell_changed();
+  m.sensors.update();
   if (m.registry.source() != nullptr) m.last.events.end();
   if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
   m.time.count_step();

@@ -35,6 +35,15 @@ const ConstraintStage::Entry& named(const ConstraintStage& constraints, Id id, c
                         ") does not exist; it was removed, with its body or by itself, or belongs to another world");
 }
 
+template <class Id>
+void list_of(const ConstraintStage& constraints, std::vector<Id>& ids) {
+  ids.clear();
+  for (std::size_t i = 0; i < constraints.entries().size(); ++i) {
+    const Id id{static_cast<std::uint32_t>(i), constraints.entries()[i].generation};
+    if (find(constraints, id) != nullptr) ids.push_back(id);
+  }
+}
+
 /// The joint's frame on one part, as it stands.
 MaterialFrame joint_side(const BodyTable& bodies, BodyId id, const JointFrame& in_world, const JointAttachment& on) {
   if (id == BodyId{}) return MaterialFrame(in_world);
@@ -74,6 +83,19 @@ void World::remove_handle(HandleId id) {
   wake_bodies_of(*impl_->constraints.entries()[id.index].constraint(), impl_->sleep);
   impl_->constraints.remove(id.index);
 }
+
+void World::set_user_data(HandleId id, std::uint64_t data) {
+  named(impl_->constraints, id, "set_user_data");
+  impl_->constraints.set_user_data(id.index, data);
+}
+void World::set_user_data(JointId id, std::uint64_t data) {
+  named(impl_->constraints, id, "set_user_data");
+  impl_->constraints.set_user_data(id.index, data);
+}
+std::uint64_t World::user_data(HandleId id) const { return named(impl_->constraints, id, "user_data").user_data; }
+std::uint64_t World::user_data(JointId id) const { return named(impl_->constraints, id, "user_data").user_data; }
+void World::list(std::vector<HandleId>& handles) const { list_of(impl_->constraints, handles); }
+void World::list(std::vector<JointId>& joints) const { list_of(impl_->constraints, joints); }
 
 bool World::contains(HandleId id) const { return find(impl_->constraints, id) != nullptr; }
 

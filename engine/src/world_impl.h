@@ -22,6 +22,7 @@
 #include "game_path.h"
 #include "limber/engine/world.h"
 #include "rigid_models.h"
+#include "sensor_stage.h"
 #include "sleep_stage.h"
 #include "snapshot.h"
 #include "step_events.h"
@@ -42,6 +43,7 @@ struct World::Impl {
         jobs(lent),
         bodies(wanted.half_precision),
         queries(bodies),
+        sensors(bodies, queries),
         sleep(constraints),
         registry(bodies),
         contacts(bodies, constraints, sleep, registry),
@@ -56,7 +58,7 @@ struct World::Impl {
   }
   internal::Snapshot snapshot() {
     return internal::Snapshot(
-        {options, time, bodies, constraints, sleep, parts, last.events, registry, path(), solver, drawing});
+        {options, time, bodies, constraints, sleep, parts, last.events, sensors, registry, path(), solver, drawing});
   }
   void add_to_report(const IslandReport& substep);
 
@@ -64,6 +66,7 @@ struct World::Impl {
   Jobs& jobs;
   internal::BodyTable bodies;
   internal::BodyQueries queries;
+  internal::SensorStage sensors;
   internal::RigidModels rigid;
   internal::ConstraintStage constraints;  // bodies by their entries' indices
   internal::SleepStage sleep;

@@ -420,6 +420,11 @@ std::optional<SpatialIndex::Hit> SpatialIndex::Impl::touch(Index b, double limit
   return hit;
 }
 
+bool SpatialIndex::may_ask(const Shape& shape) {
+  return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
+         std::holds_alternative<Box>(shape) || std::holds_alternative<ConvexHull>(shape);
+}
+
 std::optional<SpatialIndex::Hit> SpatialIndex::cast_shape(const Shape& shape, const RigidTransform& pose,
                                                           const Vec3& way, const Filter& filter) {
   constexpr double kTouching = 1e-7;  // of the shape's size

@@ -88,6 +88,8 @@ class SpatialIndex {
   std::optional<Hit> cast_ray(const Ray& ray, const Filter& filter = {});
   /// The first place on each body that a ray meets; replaces `hits`, by fraction.
   void cast_ray(const Ray& ray, std::vector<Hit>& hits, const Filter& filter = {});
+  /// Whether a shape may ask the next two: spheres, capsules, boxes and hulls.
+  static bool may_ask(const Shape& shape);
   /// Where a shape that is moved, without turning, first touches: to a gap of less than 1e-7 of its size.
   /// @param pose of the shape at the start, world
   std::optional<Hit> cast_shape(const Shape& shape, const RigidTransform& pose, const Vec3& way,

@@ -31,6 +31,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "limber/collision/rigid_model.h"
@@ -119,6 +120,7 @@ struct BodyPlacement {
   /// What others meet in place of the model's collision surface: it moves with the frame and does not deform, and
   /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.
   std::shared_ptr<const Shape> shape{};
+  std::uint64_t user_data = 0;  ///< the caller's own: World::user_data()
   /// Whether the body bends by the modal skin of its model (docs/large-bends.md), where it has one: drawn, held, joined
   /// and pushed there. False, or no skin: by its modes alone.
   bool modal_skin = true;
@@ -142,6 +144,17 @@ struct HandleView {
 /// Which bodies may answer a query, and how one does: spatial_index.h by BodyId.
 using BodyFilter = QueryFilter<BodyId>;
 using BodyHit = QueryHit<BodyId>;
+
+/// A body that came into a sensor in the last step, or left it.
+struct SensorEvent {
+  BodyId sensor{}, body{};
+  bool began = true;  ///< false: left, or was removed
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.sensor.index, s.sensor.generation, s.body.index, s.body.generation, s.began);
+  }
+};
 
 /// One direction in which a point of a body is to do something: PointWish of manipulation.h by BodyId.
 struct BodyWish {
@@ -229,9 +242,31 @@ class World {
   /// @param friction as in BodyPlacement
   BodyId add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose = {},
                     const CollisionFilter& filter = {}, std::optional<double> friction = {});
+  /// A convex shape that tells which bodies it overlaps and pushes none: a trigger. It overlaps what queries see and
+  /// the filters of both let meet, as find_overlaps() tells, static bodies too. contains(), remove_body(), user data
+  /// and the functions below take its id.
+  BodyId add_sensor(std::shared_ptr<const Shape> shape, const RigidTransform& pose = {},
+                    const CollisionFilter& filter = {});
+  void set_sensor_pose(BodyId id, const RigidTransform& pose);  ///< from the coming step on
+  /// Who came and went in the last step, by sensor and body; at most once each, whatever happened within the step.
+  std::span<const SensorEvent> sensor_events() const;
+  /// Who is inside, as of the last step; replaces `bodies`.
+  void list_inside(BodyId sensor, std::vector<BodyId>& bodies) const;
   void remove_body(BodyId id);  ///< and with it its handles and joints
   bool contains(BodyId id) const;
   std::size_t body_count() const;
+  // All there are, by index, static bodies and sensors too; these replace what is in the vector.
+  void list(std::vector<BodyId>& bodies) const;
+  void list(std::vector<HandleId>& handles) const;
+  void list(std::vector<JointId>& joints) const;
+  BodyId id_of(Index body) const;  ///< the body of an event, by its index; BodyId{}: there is none
+  // A number of the caller's own, 0 at first; part of a saved state.
+  void set_user_data(BodyId id, std::uint64_t data);
+  void set_user_data(HandleId id, std::uint64_t data);
+  void set_user_data(JointId id, std::uint64_t data);
+  std::uint64_t user_data(BodyId id) const;
+  std::uint64_t user_data(HandleId id) const;
+  std::uint64_t user_data(JointId id) const;
   const ModalModel& model(BodyId id) const;
   /// Whether a body sleeps; see SleepOptions.
   bool is_asleep(BodyId id) const;
@@ -430,6 +465,7 @@ class World {
 
  private:
   struct Impl;
+  Index require_sensor(BodyId id, const char* function) const;
   std::unique_ptr<Impl> impl_;
 };
 
