@@ -51,8 +51,8 @@ TEST(Bake, FreeBoxHasTheMassCentreAndInertiaOfABox) {
     const double expected = mass / 12.0 * (kBoxSize.squaredNorm() - kBoxSize[a] * kBoxSize[a]);
     EXPECT_NEAR(d.inertia(a, a), expected, kRoundOff * expected);
   }
-  EXPECT_EQ(r.bodies.at(0).zero_modes, 6);
-  EXPECT_TRUE(r.bodies.at(0).certified);
+  EXPECT_EQ(r.bodies.at(0).freedom.zero_modes(), 6);
+  EXPECT_TRUE(r.bodies.at(0).accuracy.certified);
 }
 
 TEST(Bake, AllModesOfAClampedBodyCarryAllItsFreeMass) {
@@ -140,8 +140,8 @@ TEST(Bake, SeparateComponentsAreSeparateBodiesAndUnusedNodesAreDropped) {
   const BakeResult r = bake({.name = "pair", .mesh = two_boxes()}, rubber(4), warnings);
   ASSERT_EQ(r.bodies.size(), 2u);
   EXPECT_EQ(r.asset.bodies[0]->name(), "pair_1");
-  EXPECT_EQ(r.bodies[0].nodes + r.bodies[1].nodes, 12 + 8);
-  EXPECT_NEAR(r.bodies[1].center_of_mass.y(), 1.0 + kBoxSize.y() / 2, kRoundOff);
+  EXPECT_EQ(r.bodies[0].mesh.nodes + r.bodies[1].mesh.nodes, 12 + 8);
+  EXPECT_NEAR(r.bodies[1].solid.center_of_mass.y(), 1.0 + kBoxSize.y() / 2, kRoundOff);
   EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 of 21 nodes belong to no tetrahedron")));
 }
 
@@ -150,9 +150,9 @@ TEST(Bake, ARenderSurfaceOfTwoBodiesIsDealtOutTriangleByTriangle) {
   Warnings warnings;
   const BakeResult r =
       bake({.name = "pair", .mesh = mesh, .render = boundary_surface(mesh).surface}, rubber(4), warnings);
-  EXPECT_EQ(r.bodies[0].render.vertices, 12);
-  EXPECT_EQ(r.bodies[1].render.vertices, 8);
-  EXPECT_EQ(r.bodies[0].render.outside + r.bodies[1].render.outside, 0);
+  EXPECT_EQ(r.bodies[0].surfaces.render.vertices, 12);
+  EXPECT_EQ(r.bodies[1].surfaces.render.vertices, 8);
+  EXPECT_EQ(r.bodies[0].surfaces.render.outside + r.bodies[1].surfaces.render.outside, 0);
 
   SurfaceMesh half;  // covers the first box only
   half.vertices = {{0, 0, 0}, {0.3, 0, 0}, {0, 0.2, 0}};
@@ -197,12 +197,12 @@ TEST(Bake, VolumeBlockProjectsAShapeOntoItsOwnAmplitude) {
 
 TEST(Bake, LimitsLeaveOutWhatTheSceneCannotShow) {
   BakeOptions o = rubber(20);
-  const auto all = bake_box(o).bodies.at(0).frequencies_hz;
+  const auto all = bake_box(o).bodies.at(0).modes.frequencies_hz;
   o.limits.frame_rate = all[6] + all[7];  // half of it lies between the seventh and the eighth
   const BodyReport r = bake_box(o).bodies.at(0);
-  EXPECT_EQ(r.selection.kept.size(), 7u);
-  EXPECT_EQ(r.selection.dropped.size(), all.size() - 7);
-  for (const DroppedMode& m : r.selection.dropped) EXPECT_EQ(m.reason, DropReason::kTooFast);
+  EXPECT_EQ(r.modes.selection.kept.size(), 7u);
+  EXPECT_EQ(r.modes.selection.dropped.size(), all.size() - 7);
+  for (const DroppedMode& m : r.modes.selection.dropped) EXPECT_EQ(m.reason, DropReason::kTooFast);
 }
 
 /// A collision surface where the first mode has its node moves less than the ends, which a strike can reach.

@@ -44,11 +44,11 @@ Summary analyse_bodies(const TetMesh& mesh, std::span<const Material> materials,
       if (std::binary_search(fixed.begin(), fixed.end(), part.node_of[i])) held.push_back(static_cast<Index>(i));
     Warnings warnings;
     const auto found = analyse_modes(part.mesh, materials, held, {.modes = 30, .mass = mass}, warnings);
-    EXPECT_TRUE(found.certified);
-    EXPECT_LT(found.orthogonality_max, 1e-9);
-    EXPECT_LE(found.residual_max, found.residual_bound);
-    EXPECT_LT(found.backward_error_max, 1e-12);
-    all.zero_modes += found.rigid_modes + found.mechanisms;
+    EXPECT_TRUE(found.accuracy.certified);
+    EXPECT_LT(found.accuracy.orthogonality_max, 1e-9);
+    EXPECT_LE(found.accuracy.residual_max, found.accuracy.residual_bound);
+    EXPECT_LT(found.accuracy.backward_error_max, 1e-12);
+    all.zero_modes += found.freedom.rigid_modes + found.freedom.mechanisms;
     all.volume += volume_properties(part.mesh).volume;
     for (const double m : assemble_mass(part.mesh, materials, mass).value) all.mass += m;
     for (const double lambda : found.eigenvalues) all.frequencies.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));

@@ -174,7 +174,7 @@ TEST(Residual, CoarserCollisionSurfaceKeepsToTheBoundary) {
   ASSERT_TRUE(model.data().collision);
   EXPECT_LE(model.collision().triangles.size(), 100u);
   EXPECT_LT(model.collision().triangles.size(), model.render().triangles.size());
-  EXPECT_LE(r.bodies[0].collision_error, 1e-6);  // a box is flat: nothing moves
+  EXPECT_LE(r.bodies[0].surfaces.collision_error, 1e-6);  // a box is flat: nothing moves
   for (const Vec3f& x : model.collision().rest) {
     const Vec3 beyond = x.cast<double>().cwiseAbs() - 0.5 * kBoxSize;
     EXPECT_NEAR(beyond.maxCoeff(), 0.0, 1e-7);

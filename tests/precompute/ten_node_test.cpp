@@ -116,11 +116,11 @@ TEST(TenNodeModes, leave_six_rigid_motions_and_are_certified) {
   const TetMesh mesh = ten_node_box({0.3, 0.04, 0.01}, 6, 1, 1);
   for (const MassKind mass : {MassKind::kLumped, MassKind::kConsistent}) {
     const ModalAnalysis a = analyse_modes(mesh, std::array{kSteel}, {}, {.modes = 12, .mass = mass}, warnings);
-    EXPECT_TRUE(a.certified);
-    EXPECT_EQ(a.rigid_modes, 6);
-    EXPECT_EQ(a.mechanisms, 0);
-    EXPECT_LT(a.orthogonality_max, 1e-12);
-    EXPECT_LE(a.residual_max, a.residual_bound);
+    EXPECT_TRUE(a.accuracy.certified);
+    EXPECT_EQ(a.freedom.rigid_modes, 6);
+    EXPECT_EQ(a.freedom.mechanisms, 0);
+    EXPECT_LT(a.accuracy.orthogonality_max, 1e-12);
+    EXPECT_LE(a.accuracy.residual_max, a.accuracy.residual_bound);
   }
   EXPECT_TRUE(warnings.empty());
 }
@@ -202,10 +202,10 @@ TEST(TenNodeBake, holds_the_middles_of_held_edges) {
   Warnings warnings;
   const BakeResult result = bake(clamped_bar(), clamped(kSteel, Elements::kQuadratic), warnings);
   const BodyReport& report = result.bodies[0];
-  EXPECT_EQ(report.nodes_per_tet, 10);
-  EXPECT_EQ(report.motion, FrameMotion::kKinematic);
-  EXPECT_EQ(report.zero_modes, 0);
-  EXPECT_NEAR(report.frequencies_hz[0], cantilever_hz(kSteel), 0.02 * cantilever_hz(kSteel));
+  EXPECT_EQ(report.mesh.nodes_per_tet, 10);
+  EXPECT_EQ(report.freedom.motion, FrameMotion::kKinematic);
+  EXPECT_EQ(report.freedom.zero_modes(), 0);
+  EXPECT_NEAR(report.modes.frequencies_hz[0], cantilever_hz(kSteel), 0.02 * cantilever_hz(kSteel));
   const ModalSurface& drawn = result.asset.bodies[0]->data().render;
   int held = 0;
   for (Index v = 0; v < drawn.vertices(); ++v) {
@@ -227,7 +227,7 @@ TEST(TenNodeBake, answers_loads_and_stores_all_nodes_and_a_skin) {
   const BakeResult result = bake(input, options, warnings);
   const ModalModelData& data = result.asset.bodies[0]->data();
   EXPECT_EQ(data.volume_block->tets.size(), 8 * input.mesh.tets.size());
-  EXPECT_EQ(static_cast<Index>(data.volume_block->rest.size()), result.bodies[0].nodes);
+  EXPECT_EQ(static_cast<Index>(data.volume_block->rest.size()), result.bodies[0].mesh.nodes);
   EXPECT_EQ(result.bodies[0].residual.modes, 6);
   ASSERT_TRUE(data.residual_compliance && data.skin);
   EXPECT_EQ(data.skin->volume.size(), data.volume_block->rest.size());
@@ -238,10 +238,10 @@ TEST(TenNodeBake, answers_loads_and_stores_all_nodes_and_a_skin) {
 TEST(TenNodeBake, drops_middles_where_linear_elements_are_asked_for) {
   BakeInput input = clamped_bar();
   Warnings warnings;
-  const double linear = bake(input, clamped(kSteel, Elements::kLinear), warnings).bodies[0].frequencies_hz[0];
+  const double linear = bake(input, clamped(kSteel, Elements::kLinear), warnings).bodies[0].modes.frequencies_hz[0];
   add_mid_edge_nodes(input.mesh);
-  EXPECT_EQ(bake(input, clamped(kSteel, Elements::kLinear), warnings).bodies[0].frequencies_hz[0], linear);
-  EXPECT_EQ(bake(input, clamped(kSteel, Elements::kAsGiven), warnings).bodies[0].nodes_per_tet, 10);
+  EXPECT_EQ(bake(input, clamped(kSteel, Elements::kLinear), warnings).bodies[0].modes.frequencies_hz[0], linear);
+  EXPECT_EQ(bake(input, clamped(kSteel, Elements::kAsGiven), warnings).bodies[0].mesh.nodes_per_tet, 10);
 }
 
 // Bending asks for no change of volume, and E alone counts.
@@ -250,7 +250,7 @@ TEST(TenNodeBake, hardly_locks_near_one_half_where_linear_elements_do_and_say_so
   const auto hz = [&](double nu, Elements elements, Warnings& warnings) {
     BakeOptions options = clamped({.youngs_modulus = 5e6, .poisson_ratio = nu, .density = 1100.0}, elements);
     options.fixed.clear();
-    return bake(free, options, warnings).bodies[0].frequencies_hz[0];
+    return bake(free, options, warnings).bodies[0].modes.frequencies_hz[0];
   };
   Warnings quiet, told;
   const double at_049 = hz(0.49, Elements::kQuadratic, quiet), at_0499 = hz(0.499, Elements::kQuadratic, quiet);

@@ -56,14 +56,14 @@ struct Total {
 Total total_of(const std::vector<BodyReport>& bodies) {
   Total t;
   for (const BodyReport& b : bodies) {
-    t.mass += b.mass;
-    t.volume += b.volume;
-    t.center += b.mass * b.center_of_mass;
+    t.mass += b.solid.mass;
+    t.volume += b.solid.volume;
+    t.center += b.solid.mass * b.solid.center_of_mass;
   }
   t.center /= t.mass;
   for (const BodyReport& b : bodies) {
-    const Vec3 d = b.center_of_mass - t.center;
-    t.inertia += b.inertia + b.mass * (d.squaredNorm() * Mat3::Identity() - d * d.transpose());
+    const Vec3 d = b.solid.center_of_mass - t.center;
+    t.inertia += b.solid.inertia + b.solid.mass * (d.squaredNorm() * Mat3::Identity() - d * d.transpose());
   }
   return t;
 }
@@ -79,9 +79,9 @@ std::vector<BodyMode> merged_modes(const std::vector<BodyReport>& bodies) {
   std::vector<BodyMode> modes;
   double complete_to = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const auto& hz = bodies[b].frequencies_hz;
+    const auto& hz = bodies[b].modes.frequencies_hz;
     for (std::size_t m = 0; m < hz.size(); ++m) modes.push_back({hz[m], static_cast<Index>(b), static_cast<Index>(m)});
-    if (!bodies[b].all_modes) complete_to = std::min(complete_to, hz.empty() ? 0.0 : hz.back());
+    if (!bodies[b].modes.all) complete_to = std::min(complete_to, hz.empty() ? 0.0 : hz.back());
   }
   std::stable_sort(modes.begin(), modes.end(), [](const BodyMode& a, const BodyMode& b) { return a.hz < b.hz; });
   std::erase_if(modes, [&](const BodyMode& m) { return m.hz > complete_to; });
@@ -96,9 +96,9 @@ void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
   const auto modes = merged_modes(bodies);
   Json hz = Json::array(), errors = Json::array(), kept = Json::array(), dropped = Json::array(), owner = Json::array();
   for (std::size_t i = 0; i < modes.size(); ++i) {
-    const ModeSelection& s = bodies[modes[i].body].selection;
+    const ModeSelection& s = bodies[modes[i].body].modes.selection;
     hz.push_back(modes[i].hz);
-    errors.push_back(bodies[modes[i].body].frequency_errors[static_cast<std::size_t>(modes[i].mode)]);
+    errors.push_back(bodies[modes[i].body].modes.frequency_errors[static_cast<std::size_t>(modes[i].mode)]);
     owner.push_back(modes[i].body);
     if (std::binary_search(s.kept.begin(), s.kept.end(), modes[i].mode)) {
       kept.push_back(i);
@@ -116,32 +116,32 @@ void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
 
 Json json(const BodyReport& b) {
   Json dropped = Json::array();
-  for (const DroppedMode& d : b.selection.dropped) dropped.push_back(discarded(d.mode, d));
+  for (const DroppedMode& d : b.modes.selection.dropped) dropped.push_back(discarded(d.mode, d));
   return {{"name", b.name},
-          {"motion", to_string(b.motion)},
-          {"nodes", b.nodes},
-          {"tets", b.tets},
-          {"nodes_per_tet", b.nodes_per_tet},
-          {"mass", b.mass},
-          {"volume", b.volume},
-          {"center_of_mass", json(b.center_of_mass)},
-          {"inertia", json(b.inertia)},
-          {"zero_modes", b.zero_modes},
-          {"mechanisms", b.mechanisms},
-          {"frequencies_hz", b.frequencies_hz},
-          {"frequency_errors", b.frequency_errors},
-          {"kept", b.selection.kept},
+          {"motion", to_string(b.freedom.motion)},
+          {"nodes", b.mesh.nodes},
+          {"tets", b.mesh.tets},
+          {"nodes_per_tet", b.mesh.nodes_per_tet},
+          {"mass", b.solid.mass},
+          {"volume", b.solid.volume},
+          {"center_of_mass", json(b.solid.center_of_mass)},
+          {"inertia", json(b.solid.inertia)},
+          {"zero_modes", b.freedom.zero_modes()},
+          {"mechanisms", b.freedom.mechanisms},
+          {"frequencies_hz", b.modes.frequencies_hz},
+          {"frequency_errors", b.modes.frequency_errors},
+          {"kept", b.modes.selection.kept},
           {"discarded", std::move(dropped)},
-          {"certified", b.certified},
-          {"residual_max", b.residual_max},
-          {"residual_bound", b.residual_bound},
-          {"backward_error_max", b.backward_error_max},
-          {"orthogonality_max", b.orthogonality_max},
+          {"certified", b.accuracy.certified},
+          {"residual_max", b.accuracy.residual_max},
+          {"residual_bound", b.accuracy.residual_bound},
+          {"backward_error_max", b.accuracy.backward_error_max},
+          {"orthogonality_max", b.accuracy.orthogonality_max},
           {"solves", b.solves},
-          {"render_surface", json(b.render)},
-          {"collision_surface", json(b.collision)},
-          {"collision_triangles", b.collision_triangles},
-          {"collision_error", b.collision_error},
+          {"render_surface", json(b.surfaces.render)},
+          {"collision_surface", json(b.surfaces.collision)},
+          {"collision_triangles", b.surfaces.collision_triangles},
+          {"collision_error", b.surfaces.collision_error},
           {"residual_compliance", json(b.residual)},
           {"skin", json(b.skin)}};
 }
@@ -173,7 +173,7 @@ std::string skin_summary(const SkinReport& r) {
 
 /// "  lowest ten modes: within 0.4 % of the continuum's, as their stresses tell"
 std::string error_summary(const BodyReport& b) {
-  const std::size_t told = std::min<std::size_t>(b.frequency_errors.size(), kModesTold);
+  const std::size_t told = std::min<std::size_t>(b.modes.frequency_errors.size(), kModesTold);
   return fmt::format("  lowest {}: frequencies within {:.2g} % of the continuum's, as their stresses tell\n",
                      told == 1 ? std::string("elastic mode") : fmt::format("{} elastic modes", told),
                      100.0 * largest_frequency_error(b));
@@ -183,8 +183,8 @@ std::string error_summary(const BodyReport& b) {
 
 double largest_frequency_error(const BodyReport& b) {
   double largest = 0.0;
-  for (std::size_t m = 0; m < std::min<std::size_t>(b.frequency_errors.size(), kModesTold); ++m)
-    largest = std::max(largest, std::abs(b.frequency_errors[m]));
+  for (std::size_t m = 0; m < std::min<std::size_t>(b.modes.frequency_errors.size(), kModesTold); ++m)
+    largest = std::max(largest, std::abs(b.modes.frequency_errors[m]));
   return largest;
 }
 
@@ -192,7 +192,7 @@ void warn_of_stiff_elements(const std::vector<BodyReport>& bodies, Warnings& war
   constexpr double kTold = 0.05;
   std::string stiff;
   for (const BodyReport& b : bodies)
-    if (const double error = largest_frequency_error(b); b.nodes_per_tet == 4 && error > kTold)
+    if (const double error = largest_frequency_error(b); b.mesh.nodes_per_tet == 4 && error > kTold)
       stiff += fmt::format("{}\"{}\" by {:.0f} %", stiff.empty() ? "" : ", ", b.name, 100.0 * error);
   if (!stiff.empty())
     warnings.push_back(
@@ -203,50 +203,53 @@ void warn_of_stiff_elements(const std::vector<BodyReport>& bodies, Warnings& war
 
 void add_bake(Json& report, const std::vector<BodyReport>& bodies) {
   const Total total = total_of(bodies);
-  report["nodes"] = sum(bodies, [](const BodyReport& b) { return b.nodes; });
-  report["tets"] = sum(bodies, [](const BodyReport& b) { return b.tets; });
+  report["nodes"] = sum(bodies, [](const BodyReport& b) { return b.mesh.nodes; });
+  report["tets"] = sum(bodies, [](const BodyReport& b) { return b.mesh.tets; });
   report["components"] = bodies.size();
   report["mass"] = total.mass;
   report["volume"] = total.volume;
   report["center_of_mass"] = json(total.center);
   report["inertia"] = json(total.inertia);
-  report["zero_modes"] = sum(bodies, [](const BodyReport& b) { return b.zero_modes; });
-  report["mechanisms"] = sum(bodies, [](const BodyReport& b) { return b.mechanisms; });
+  report["zero_modes"] = sum(bodies, [](const BodyReport& b) { return b.freedom.zero_modes(); });
+  report["mechanisms"] = sum(bodies, [](const BodyReport& b) { return b.freedom.mechanisms; });
   add_modes(report, bodies);
-  report["certified"] = std::all_of(bodies.begin(), bodies.end(), [](const BodyReport& b) { return b.certified; });
-  report["residual_max"] = largest(bodies, [](const BodyReport& b) { return b.residual_max; });
-  report["backward_error_max"] = largest(bodies, [](const BodyReport& b) { return b.backward_error_max; });
-  report["orthogonality_max"] = largest(bodies, [](const BodyReport& b) { return b.orthogonality_max; });
+  report["certified"] =
+      std::all_of(bodies.begin(), bodies.end(), [](const BodyReport& b) { return b.accuracy.certified; });
+  report["residual_max"] = largest(bodies, [](const BodyReport& b) { return b.accuracy.residual_max; });
+  report["backward_error_max"] = largest(bodies, [](const BodyReport& b) { return b.accuracy.backward_error_max; });
+  report["orthogonality_max"] = largest(bodies, [](const BodyReport& b) { return b.accuracy.orthogonality_max; });
   report["bodies"] = Json::array();
   for (const BodyReport& b : bodies) report["bodies"].push_back(json(b));
 }
 
 void add_bake_seconds(Json& seconds, const std::vector<BodyReport>& bodies) {
-  seconds["assemble"] = sum(bodies, [](const BodyReport& b) { return b.seconds.assemble; });
-  seconds["order"] = sum(bodies, [](const BodyReport& b) { return b.seconds.order; });
-  seconds["factor"] = sum(bodies, [](const BodyReport& b) { return b.seconds.factor; });
-  seconds["iterate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.iterate; });
-  seconds["certify"] = sum(bodies, [](const BodyReport& b) { return b.seconds.certify; });
-  seconds["estimate"] = sum(bodies, [](const BodyReport& b) { return b.seconds_estimate; });
+  seconds["assemble"] = sum(bodies, [](const BodyReport& b) { return b.seconds.modes.assemble; });
+  seconds["order"] = sum(bodies, [](const BodyReport& b) { return b.seconds.modes.order; });
+  seconds["factor"] = sum(bodies, [](const BodyReport& b) { return b.seconds.modes.factor; });
+  seconds["iterate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.modes.iterate; });
+  seconds["certify"] = sum(bodies, [](const BodyReport& b) { return b.seconds.modes.certify; });
+  seconds["estimate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.estimate; });
   seconds["residual"] = sum(bodies, [](const BodyReport& b) { return b.residual.seconds; });
   seconds["skin"] = sum(bodies, [](const BodyReport& b) { return b.skin.seconds; });
-  seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds_embed; });
+  seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds.embed; });
 }
 
 std::string bake_summary(const std::vector<BodyReport>& bodies) {
   std::string text;
   for (const BodyReport& b : bodies) {
     std::map<std::string_view, int> reasons;
-    for (const DroppedMode& d : b.selection.dropped) ++reasons[to_string(d.reason)];
+    for (const DroppedMode& d : b.modes.selection.dropped) ++reasons[to_string(d.reason)];
     std::string why;
     for (const auto& [reason, count] : reasons) why += fmt::format(", {} {}", count, reason);
-    text += fmt::format("{}: {} nodes, {} tets of {}, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.nodes, b.tets,
-                        b.nodes_per_tet, b.mass, to_string(b.motion), b.zero_modes);
-    if (!b.frequencies_hz.empty())
-      text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.frequencies_hz.size(),
-                          b.frequencies_hz.front(), b.frequencies_hz.back(),
-                          b.certified ? ", none missed (certified)" : ", not certified", b.selection.kept.size(), why);
-    if (!b.frequency_errors.empty()) text += error_summary(b);
+    text += fmt::format("{}: {} nodes, {} tets of {}, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.mesh.nodes,
+                        b.mesh.tets, b.mesh.nodes_per_tet, b.solid.mass, to_string(b.freedom.motion),
+                        b.freedom.zero_modes());
+    if (!b.modes.frequencies_hz.empty())
+      text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.modes.frequencies_hz.size(),
+                          b.modes.frequencies_hz.front(), b.modes.frequencies_hz.back(),
+                          b.accuracy.certified ? ", none missed (certified)" : ", not certified",
+                          b.modes.selection.kept.size(), why);
+    if (!b.modes.frequency_errors.empty()) text += error_summary(b);
     if (b.residual.modes > 0)
       text += fmt::format(
           "  {} residual modes at chosen places, of whose static compliance the others show {:.0f} % and more\n",

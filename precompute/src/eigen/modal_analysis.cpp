@@ -166,11 +166,11 @@ Body make_body(const TetMesh& mesh, std::span<const Material> materials, std::sp
 
 void describe_freedom(const Body& body, ModalAnalysis& analysis, Warnings& warnings) {
   const NullSpace& space = body.null_space;
-  analysis.motion = space.rigid.motion;
-  analysis.pivot = space.rigid.pivot;
-  analysis.line_axis = space.rigid.line_axis;
-  analysis.rigid_modes = space.rigid.dimension();
-  analysis.mechanisms = space.mechanisms;
+  analysis.freedom.motion = space.rigid.motion;
+  analysis.freedom.pivot = space.rigid.pivot;
+  analysis.freedom.line_axis = space.rigid.line_axis;
+  analysis.freedom.rigid_modes = space.rigid.dimension();
+  analysis.freedom.mechanisms = space.mechanisms;
   if (space.mechanisms > 0)
     warnings.push_back(
         "the body has " + std::to_string(space.mechanisms) +
@@ -216,11 +216,11 @@ void measure_residuals(const ScaledProblem& problem, const EigenPairs& pairs, Mo
     const double bound = std::max(kResidual, round_off);
     if (residual / bound >= worst) {
       worst = residual / bound;
-      analysis.residual_max = residual;
-      analysis.residual_bound = bound;
+      analysis.accuracy.residual_max = residual;
+      analysis.accuracy.residual_bound = bound;
     }
-    analysis.backward_error_max =
-        std::max(analysis.backward_error_max, R.col(i).norm() / ((norm_K + pairs.lambda[i] * norm_M) * length));
+    analysis.accuracy.backward_error_max = std::max(analysis.accuracy.backward_error_max,
+                                                    R.col(i).norm() / ((norm_K + pairs.lambda[i] * norm_M) * length));
   }
 }
 
@@ -261,10 +261,10 @@ void warn_of_shortfalls(const ModalAnalysis& analysis, const ModalAnalysisOption
   if (elastic < options.modes)
     warnings.push_back(std::to_string(options.modes) + " modes were asked for, but the mesh has only " +
                        std::to_string(elastic) + " elastic ones");
-  if (analysis.residual_max > analysis.residual_bound) {
+  if (analysis.accuracy.residual_max > analysis.accuracy.residual_bound) {
     std::ostringstream text;
-    text << "a mode's residual, " << analysis.residual_max << " of its inertia force, exceeds "
-         << analysis.residual_bound;
+    text << "a mode's residual, " << analysis.accuracy.residual_max << " of its inertia force, exceeds "
+         << analysis.accuracy.residual_bound;
     warnings.push_back(text.str());
   }
   if (shift > 0.0)
@@ -339,7 +339,7 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   describe_freedom(body, analysis, warnings);
   watch.lap(analysis.seconds.assemble);
   if (body.free_nodes.empty()) {
-    analysis.certified = options.certify;  // nothing could be missed
+    analysis.accuracy.certified = options.certify;  // nothing could be missed
     return analysis;
   }
 
@@ -355,14 +355,14 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
     EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
     complete(body.problem, inverse, counter, pairs, options.modes, kept);
     confirm_zero_modes(body.problem, pairs, counter, warnings);
-    analysis.certified = true;
+    analysis.accuracy.certified = true;
   }
   watch.lap(analysis.seconds.certify);
 
   pairs.keep_first(kept);
   make_clusters_canonical(pairs);
   measure_residuals(body.problem, pairs, analysis);
-  analysis.orthogonality_max = orthogonality_error(body.problem, pairs);
+  analysis.accuracy.orthogonality_max = orthogonality_error(body.problem, pairs);
   analysis.solves = inverse.solves();
   write_modes(body, pairs, analysis);
   warn_of_shortfalls(analysis, options, kept, inverse.shift(), warnings);

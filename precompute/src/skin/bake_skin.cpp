@@ -313,7 +313,7 @@ SkinBody skin_body(const ModalAnalysis& analysis, std::span<const Index> kept, c
   SkinBody body{.mesh = mesh.has_mid_edge_nodes() ? split_into_eight(mesh) : mesh,
                 .materials = materials,
                 .fixed = fixed,
-                .motion = analysis.motion,
+                .motion = analysis.freedom.motion,
                 .origin = origin,
                 .node_mass = assemble_mass(mesh, materials, made.mass),
                 .W = Matrix(3 * k, columns(mesh.nodes)),

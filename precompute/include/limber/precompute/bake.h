@@ -148,34 +148,55 @@ struct SkinReport {
   double seconds = 0.0;
 };
 
-/// Result of one body. Masses in kg, lengths in m, input coordinates.
-struct BodyReport {
-  std::string name;
-  FrameMotion motion = FrameMotion::kFree;
+/// The tets of one body, as they were analysed.
+struct BodyMeshReport {
   Index nodes = 0, tets = 0;
   Index nodes_per_tet = 4;  ///< 4 or 10
-  double mass = 0.0, volume = 0.0;
-  Vec3 center_of_mass = Vec3::Zero();
-  Mat3 inertia = Mat3::Zero();  ///< about the centre of mass, input axes, kg·m²
-  int zero_modes = 0;           ///< rigid motions and mechanisms
-  int mechanisms = 0;
-  std::vector<double> frequencies_hz;  ///< elastic, before selection, ascending
+};
+
+/// A solid's mass and how it is spread. Input coordinates.
+struct SolidReport {
+  double mass = 0.0;                   ///< kg
+  double volume = 0.0;                 ///< m³
+  Vec3 center_of_mass = Vec3::Zero();  ///< m
+  Mat3 inertia = Mat3::Zero();         ///< about the centre of mass, input axes, kg·m²
+};
+
+/// Elastic modes of one body, before and after selection.
+struct BodyModesReport {
+  std::vector<double> frequencies_hz;  ///< before selection, ascending
   /// f_h/f − 1 of each of frequencies_hz against the continuum in the tets' own polyhedron, estimated by recovered
   /// stresses (docs/modal-analysis.md).
   std::vector<double> frequency_errors;
   std::vector<double> kept_errors;  ///< the asset's: of the modes kept, mechanisms and those of static loads too
   ModeSelection selection;          ///< indices into frequencies_hz
-  bool all_modes = false;           ///< frequencies_hz holds every mode the mesh has
-  double residual_max = 0.0, residual_bound = 0.0, backward_error_max = 0.0, orthogonality_max = 0.0;
-  bool certified = false;
-  int solves = 0;
+  bool all = false;                 ///< frequencies_hz holds every mode the mesh has
+};
+
+struct BodySurfacesReport {
   EmbeddingReport render, collision;
   Index collision_triangles = 0;
   double collision_error = 0.0;  ///< what leaving out triangles moved the collision surface by, estimated, m
+};
+
+struct BodySeconds {
+  EigenSeconds modes;
+  double embed = 0.0, estimate = 0.0;
+};
+
+/// Result of one body.
+struct BodyReport {
+  std::string name;
+  BodyMeshReport mesh;
+  SolidReport solid;
+  BodyFreedom freedom;
+  BodyModesReport modes;
+  EigenAccuracy accuracy;
+  int solves = 0;  ///< right-hand sides solved
+  BodySurfacesReport surfaces;
   ResidualReport residual;
   SkinReport skin;
-  ModalAnalysis::Seconds seconds;
-  double seconds_embed = 0.0, seconds_estimate = 0.0;
+  BodySeconds seconds;
 };
 
 struct BakeResult {

@@ -37,28 +37,38 @@ struct ModalAnalysisOptions {
   void validate() const;
 };
 
-struct ModalAnalysis {
+/// Motions of one body that store no energy.
+struct BodyFreedom {
   FrameMotion motion = FrameMotion::kFree;  ///< what the fixed nodes leave free
   Vec3 pivot = Vec3::Zero();                ///< kPoint, kLine: a fixed point, mesh coordinates
   Vec3 line_axis = Vec3::UnitX();           ///< kLine
   int rigid_modes = 0;                      ///< 6, 3, 1 or 0: dimension of the rigid motions that are free
   int mechanisms = 0;                       ///< further zero modes
+  int zero_modes() const { return rigid_modes + mechanisms; }
+};
 
+/// How well pairs λ, w solve K w = λ M w.
+struct EigenAccuracy {
+  double residual_max = 0.0;        ///< ‖Kw − λMw‖ / ‖λMw‖ of the elastic mode that is nearest to its bound
+  double residual_bound = 0.0;      ///< its bound: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖)
+  double backward_error_max = 0.0;  ///< max of ‖Kw − λMw‖ / ((‖K‖ + λ‖M‖)‖w‖)
+  double orthogonality_max = 0.0;   ///< max |WᵀMW − I|, rigid motions included
+  bool certified = false;           ///< a count of eigenvalues proves that none is missed
+};
+
+struct EigenSeconds {
+  double assemble = 0.0, order = 0.0, factor = 0.0, iterate = 0.0, certify = 0.0;
+};
+
+struct ModalAnalysis {
+  BodyFreedom freedom;
   std::vector<double> eigenvalues;        ///< mechanisms (λ = 0 exactly) first, then elastic, ascending; rad²/s²
   std::vector<double> shapes;             ///< W, column-major 3n × k, kg^−½, zero at fixed nodes
   std::vector<double> mass_times_shapes;  ///< M W, the same shape, kg^½
   Index nodes = 0;
   std::shared_ptr<ElasticCompliance> compliance;  ///< where it was asked for and a node is free, else null
-
-  double residual_max = 0.0;        ///< ‖Kw − λMw‖ / ‖λMw‖ of the elastic mode that is nearest to its bound
-  double residual_bound = 0.0;      ///< its bound: max(1e-8, 100ε‖K‖‖w‖/‖λMw‖)
-  double backward_error_max = 0.0;  ///< max of ‖Kw − λMw‖ / ((‖K‖ + λ‖M‖)‖w‖)
-  double orthogonality_max = 0.0;   ///< max |WᵀMW − I|, rigid motions included
-  bool certified = false;
-
-  struct Seconds {
-    double assemble = 0.0, order = 0.0, factor = 0.0, iterate = 0.0, certify = 0.0;
-  } seconds;
+  EigenAccuracy accuracy;
+  EigenSeconds seconds;
   int solves = 0;  ///< right-hand sides solved
 };
 

@@ -1,0 +1,83 @@
+/// @file precompute_arguments.h
+/// The arguments of limber-precompute, uninterpreted, and what they mean.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "assembly_baking.h"
+#include "limber/precompute/bake.h"
+#include "limber/precompute/tetrahedralise.h"
+
+namespace CLI {
+class App;
+}
+
+namespace limber::tools {
+
+struct MaterialArguments {
+  std::string file, name;
+  std::optional<double> youngs_modulus, poisson_ratio, density;
+};
+
+struct ModeArguments {
+  int modes = 64;
+  std::string mass, elements, frequency_error, damping_ratio;
+  std::string load = "sudden";
+  std::vector<double> rayleigh;
+  SceneLimits limits;
+  int blas_threads = 1;
+  bool no_certify = false;
+};
+
+struct GeometryArguments {
+  std::vector<std::string> fixes;
+  std::string render_surface, collision_surface;
+  int collision_triangles = 0;
+  TetrahedralisationOptions tets;
+  double scale = 1.0;
+  std::optional<double> merge_nodes;
+};
+
+/// Of the blocks that an asset may have beside its modes.
+struct ResponseArguments {
+  std::vector<std::string> residuals;
+  double residual_megabytes = 32.0;
+  std::string skin;
+  bool volume_block = false;
+};
+
+struct AssemblyArguments {
+  AssemblyOptions options;
+  bool auto_joints = false;
+  std::string components = "auto";
+  std::string scene;
+};
+
+struct PrecomputeArguments {
+  std::string mesh, output;
+  bool list_materials = false;
+  MaterialArguments material;
+  ModeArguments modal;
+  GeometryArguments geometry;
+  ResponseArguments response;
+  AssemblyArguments assembly;
+};
+
+/// Declares them all; `a` must outlive the parsing.
+void declare_options(CLI::App& app, PrecomputeArguments& a);
+
+/// @throws InvalidArgument or InputError in the user's words, as all below do
+BakeOptions bake_options_of(const PrecomputeArguments& a);
+
+/// --frequency-error as a ratio; 0 if it is not given.
+double frequency_error_of(const PrecomputeArguments& a);
+
+/// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
+void choose_elements(const PrecomputeArguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options);
+
+/// Options for assemblies alone, and for single bodies alone.
+void check_assembly(const PrecomputeArguments& a);
+
+}  // namespace limber::tools
