@@ -60,10 +60,12 @@ double peak_memory_bytes() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// Mass of the surface as given, beside that of its tets.
-void add_surface_mass(nlohmann::ordered_json& report, const MaterialTable& materials) {
-  const auto material = materials.find("*");  // of the one region that a surface's tets have
-  if (!report.contains("surface") || material == materials.end()) return;
+/// Mass of the surface as given, beside that of its tets, where it is of one material.
+void add_surface_mass(nlohmann::ordered_json& report, const BakeOptions& options) {
+  const MaterialTable& materials = options.materials;
+  const auto material = materials.find("*");
+  if (!report.contains("surface") || materials.size() != 1 || material == materials.end() || !options.regions.empty())
+    return;
   auto& surface = report["surface"];
   surface["mass_before"] = material->second.density * surface["volume_before"].get<double>();
   surface["mass_after"] = material->second.density * surface["volume_after"].get<double>();
@@ -109,8 +111,11 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   if (a.list_materials) return print_materials(program);
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
   check_assembly(a);
-  BakeOptions options = bake_options_of(a);
+  AskedBake asked = asked_bake(program, a);
+  BakeOptions& options = asked.options;
   if (a.assembly.auto_joints || !a.assembly.options.joints_file.empty()) {
+    if (!options.regions.empty())
+      throw InvalidArgument("--materials: regions by shapes are for single bodies, not for assemblies");
     choose_elements(a, false, false, options);
     return precompute_assembly(program, a, options);
   }
@@ -120,7 +125,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   for (const std::string& input : {a.mesh, a.material.file, a.geometry.render_surface, a.geometry.collision_surface})
     if (!input.empty()) program.add_input(input);
   program.progress().stage("reading");
-  BakeInput input = read_input(program, a, options, stopwatch);
+  BakeInput input = read_input(program, a, asked, stopwatch);
   input.provenance = provenance_of(program, a, program.options());
   choose_elements(a, program.report().contains("surface"), input.mesh.has_mid_edge_nodes(), options);
 
@@ -134,7 +139,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   add_bake(program.report(), result.bodies);
   warn_of_stiff_elements(result.bodies, program.warnings());
   add_bake_seconds(seconds, result.bodies);
-  add_surface_mass(program.report(), options.materials);
+  add_surface_mass(program.report(), options);
   program.report()["asset_bytes"] = bytes.size();
   program.report()["peak_memory_bytes"] = peak_memory_bytes();
   program.print(bake_summary(result.bodies));

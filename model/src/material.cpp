@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "limber/core/error.h"
+#include "limber/internal/material_json.h"
 #include "limber/internal/strict_json.h"
 #include "text.h"
 
@@ -88,25 +89,6 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-Material read_material(const nlohmann::json& value, const std::string& where) {
-  try {
-    if (value.is_string()) return material_preset(value.get<std::string>());
-    if (!value.is_object())
-      throw InputError(where + ": is " + internal::JsonObject::shown(value) +
-                       ", expected an object { … } or a preset's name");
-    const internal::JsonObject object(value, where);
-    const Material material{.youngs_modulus = object.number("youngs_modulus"),
-                            .poisson_ratio = object.number("poisson_ratio"),
-                            .density = object.number("density")};
-    object.finish();
-    material.validate(where);
-    return material;
-  } catch (const InvalidArgument& e) {
-    const std::string what = e.what();
-    throw InputError(what.starts_with(where) ? what : where + ": " + what);
-  }
-}
-
 }  // namespace
 
 void Material::validate(const std::string& where) const {
@@ -130,12 +112,31 @@ const Material& material_preset(std::string_view name) {
                         internal::nearest_word(name, preset_names()) + "\"?");
 }
 
+Material internal::read_material(const nlohmann::json& value, const std::string& where) {
+  try {
+    if (value.is_string()) return material_preset(value.get<std::string>());
+    if (!value.is_object())
+      throw InputError(where + ": is " + internal::JsonObject::shown(value) +
+                       ", expected an object { … } or a preset's name");
+    const internal::JsonObject object(value, where);
+    const Material material{.youngs_modulus = object.number("youngs_modulus"),
+                            .poisson_ratio = object.number("poisson_ratio"),
+                            .density = object.number("density")};
+    object.finish();
+    material.validate(where);
+    return material;
+  } catch (const InvalidArgument& e) {
+    const std::string what = e.what();
+    throw InputError(what.starts_with(where) ? what : where + ": " + what);
+  }
+}
+
 MaterialTable read_materials(const std::filesystem::path& path) {
   const nlohmann::json document = internal::read_json(path);
   const internal::JsonObject object(document, "\"" + path.string() + "\"");
   MaterialTable table;
   object.for_each_member([&](const std::string& region, const nlohmann::json& value) {
-    table.emplace(region, read_material(value, object.where() + " region " + internal::in_quotes(region)));
+    table.emplace(region, internal::read_material(value, object.where() + " region " + internal::in_quotes(region)));
   });
   if (table.empty()) throw InputError(object.where() + ": names no region, expected at least one, or \"*\" for all");
   return table;

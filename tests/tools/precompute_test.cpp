@@ -348,6 +348,82 @@ TEST_F(Precompute, BodiesThatTurnAboutAPointGetNoSkin) {
   EXPECT_THAT(r["warnings"][1].get<std::string>(), HasSubstr("linear elements are too stiff"));
 }
 
+// Materials inside a surface ----------------------------------------------------------------------------------------
+
+/// OBJ text of closed boxes, a group each.
+std::string grouped_boxes(const std::vector<std::tuple<std::string, Vec3, Vec3>>& boxes) {
+  std::string text;
+  Index first = 1;
+  for (const auto& [name, low, size] : boxes) {
+    const SurfaceMesh box = boundary_surface(testing::tet_box(4, 4, 4, size)).surface;
+    text += "g " + name + "\n";
+    for (const Vec3& v : box.vertices) {
+      const Vec3 p = low + v;
+      text += "v " + std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
+    }
+    for (const Triangle& t : box.triangles)
+      text += "f " + std::to_string(first + t[0]) + " " + std::to_string(first + t[1]) + " " +
+              std::to_string(first + t[2]) + "\n";
+    first += static_cast<Index>(box.vertices.size());
+  }
+  return text;
+}
+
+TEST_F(Precompute, GroupsOfASoupsFacesHaveMaterialsOfTheirOwn) {
+  write_file(folder / "soup.obj", grouped_boxes({{"left", Vec3(0, 0, 0), Vec3(0.55, 0.4, 0.4)},
+                                                 {"right", Vec3(0.45, 0, 0), Vec3(0.55, 0.4, 0.4)}}));
+  write_file(folder / "m.json", R"({"left": "rubber", "right": "steel"})");
+  const Json r = report({"soup.obj", "--materials", "m.json", "--modes", "4"});
+  const Json& regions = r["bodies"][0]["regions"];
+  ASSERT_EQ(regions.size(), 2u);
+  for (const Json& region : regions) {
+    EXPECT_NEAR(region["volume"].get<double>(), 0.08, 0.06 * 0.08) << region["name"];
+    const double density = region["name"] == "left" ? 925.0 : 7850.0;
+    EXPECT_NEAR(region["mass"].get<double>(), density * region["volume"].get<double>(), 1e-9 * density);
+  }
+}
+
+TEST_F(Precompute, AGroupOfClosedShellsIsARegionAndNoCavity) {
+  write_file(folder / "body.obj", grouped_boxes({{"skin", Vec3(0, 0, 0), Vec3(1, 1, 1)},
+                                                 {"core", Vec3(0.25, 0.25, 0.25), Vec3(0.5, 0.5, 0.5)}}));
+  write_file(
+      folder / "m.json",
+      R"([{"name": "*", "material": "rubber"}, {"name": "core", "shells": {"group": "core"}, "material": "steel"}])");
+  const Json r = report({"body.obj", "--materials", "m.json", "--modes", "2"});
+  EXPECT_NEAR(r["volume"].get<double>(), 1.0, 1e-9);
+  const Json& regions = r["bodies"][0]["regions"];
+  ASSERT_EQ(regions.size(), 2u);
+  const Json& core = regions[regions[0]["name"] == "core" ? 0 : 1];
+  EXPECT_NEAR(core["volume"].get<double>(), 0.125, 0.1 * 0.125);
+  const auto asset = read_asset(folder / "asset.glb");
+  EXPECT_EQ(asset.bodies[0]->render().vertices(), 98) << "the skin alone is drawn";
+}
+
+TEST_F(Precompute, BadRegionsAreToldInOneLine) {
+  write_file(folder / "box.obj", grouped_boxes({{"skin", Vec3(0, 0, 0), Vec3(1, 1, 1)}}));
+  write_file(folder / "a.obj", grouped_boxes({{"a", Vec3(0.2, 0.2, 0.2), Vec3(0.4, 0.4, 0.4)}}));
+  write_file(folder / "b.obj", grouped_boxes({{"b", Vec3(0.4, 0.4, 0.41), Vec3(0.4, 0.4, 0.4)}}));
+  write_file(folder / "half.vtk",
+             "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nSPACING 0.5 1 1\n"
+             "POINT_DATA 8\nSCALARS density float\nLOOKUP_TABLE default\n1 1 1 1 1 1 1 1\n");
+  const std::vector<std::pair<std::string, const char*>> wrong{
+      {R"([{"name": "*", "material": "rubber"}, {"name": "far", "ball": {"center": [9, 9, 9], "radius": 1}, "material": "steel"}])",
+       "region \"far\" is empty"},
+      {R"([{"name": "a", "shells": "a.obj", "material": "steel"}, {"name": "b", "shells": "b.obj", "material": "wood"}])",
+       "the shells of regions \"a\" and \"b\" cross"},
+      {R"([{"name": "scan", "voxels": "half.vtk", "material": "steel"}])", "do not cover it"},
+      {R"([{"name": "*", "material": "rubber"}, {"name": "x", "shells": {"group": "core"}, "material": "steel"}])",
+       "has no group \"core\""}};
+  for (const auto& [materials, expected] : wrong) {
+    write_file(folder / "m.json", materials);
+    const ProgramResult r = run({"box.obj", "--materials", "m.json", "--cell-size", "0.3", "-o", "asset.glb"});
+    EXPECT_EQ(r.exit_code, 1) << materials;
+    EXPECT_TRUE(is_one_line(r.err)) << r.err;
+    EXPECT_THAT(r.err, HasSubstr(expected));
+    EXPECT_FALSE(fs::exists(folder / "asset.glb"));
+  }
+}
+
 // Wrong input -------------------------------------------------------------------------------------------------------
 
 TEST_F(Precompute, EveryBrokenMeshGivesOneLineAndNoOutput) {

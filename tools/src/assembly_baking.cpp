@@ -111,12 +111,10 @@ std::optional<BakeResult> rigid_part(const std::string& name, SurfaceMesh surfac
   data.render.triangles = std::move(surface.triangles);
   BodyReport report;
   report.name = name;
-  report.mass = mass.mass;
-  report.volume = data.volume;
-  report.center_of_mass = mass.center_of_mass;
-  report.inertia = mass.inertia;
-  report.zero_modes = 6;
-  report.all_modes = true;
+  report.solid = {
+      .mass = mass.mass, .volume = data.volume, .center_of_mass = mass.center_of_mass, .inertia = mass.inertia};
+  report.freedom.rigid_modes = 6;
+  report.modes.all = true;
   BakeResult result;
   result.asset.bodies.push_back(std::make_shared<const ModalModel>(std::move(data)));
   result.asset.frequency_errors.emplace_back();

@@ -1,10 +1,13 @@
 #include "precompute_arguments.h"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
+
 #include <cmath>
 #include <cstdio>
 
 #include "limber/core/error.h"
+#include "limber/mesh_assimp/read_surface_mesh.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -16,8 +19,9 @@ void declare_material_options(CLI::App& app, PrecomputeArguments& a) {
   app.add_option("--density", a.material.density, "density of the whole body")->type_name("KG_M3");
   app.add_option("--material", a.material.name, "a material by name, such as steel or rubber")->type_name("NAME");
   app.add_option("--materials", a.material.file,
-                 "materials by region: {\"REGION\": {\"youngs_modulus\", \"poisson_ratio\", \"density\"} or \"NAME\"}; "
-                 "\"*\" is the rest")
+                 "materials by region of the tets, or by groups or materials of a surface's faces: {\"REGION\": "
+                 "{\"youngs_modulus\", \"poisson_ratio\", \"density\"} or \"NAME\"}; \"*\" is the rest; or a list of "
+                 "regions by shells, boxes, balls, half-spaces and voxels")
       ->type_name("FILE.json");
   app.add_flag("--list-materials", a.list_materials, "print the materials known by name and their sources, then stop");
 }
@@ -150,20 +154,65 @@ void declare_assembly_options(CLI::App& app, PrecomputeArguments& a) {
       "the joint does to it at rest");
 }
 
-MaterialTable materials_of(const PrecomputeArguments& a) {
+/// Shells of two regions, or of one, that cross bound nothing.
+void check_shells(const std::vector<MaterialRegion>& regions) {
+  for (std::size_t i = 0; i < regions.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto *a = std::get_if<InsideShells>(&regions[j].shape), *b = std::get_if<InsideShells>(&regions[i].shape);
+      if (!a || !b) continue;
+      if (const Index pairs = crossing_triangles(a->surface, b->surface); pairs > 0)
+        throw InputError(
+            fmt::format("materials: the shells of regions \"{}\" and \"{}\" cross, at {} pairs of triangles",
+                        regions[j].name, regions[i].name, pairs));
+    }
+}
+
+void read_materials_of(Program& program, const PrecomputeArguments& a, AskedBake& asked) {
+  const double scale = a.geometry.scale;
+  const auto scaled = [scale](SurfaceMesh surface) {
+    for (Vec3& v : surface.vertices) v *= scale;
+    return surface;
+  };
+  Warnings unread;  // of the input, which is read again
+  MaterialsFile file = read_materials_file(
+      a.material.file,
+      {.read_surface =
+           [&](const std::filesystem::path& path) { return scaled(read_any_surface_mesh(path, program.warnings())); },
+       .take_group =
+           [&](const std::string& group) {
+             GroupedSurface surface = read_any_grouped_surface(a.mesh, unread);
+             SurfaceMesh shells = take_group(surface, group);
+             if (shells.triangles.empty())
+               throw InputError(
+                   fmt::format("\"{}\" has no group \"{}\", which \"{}\" names", a.mesh, group, a.material.file));
+             asked.shell_groups.push_back(group);
+             return scaled(std::move(shells));
+           },
+       .scale = scale},
+      program.warnings());
+  for (const auto& path : file.files) program.add_input(path);
+  check_shells(file.regions);
+  asked.options.materials = std::move(file.table);
+  asked.options.regions = std::move(file.regions);
+}
+
+void read_materials(Program& program, const PrecomputeArguments& a, AskedBake& asked) {
   const bool by_numbers = a.material.youngs_modulus || a.material.poisson_ratio || a.material.density;
   const int ways = (by_numbers ? 1 : 0) + (a.material.name.empty() ? 0 : 1) + (a.material.file.empty() ? 0 : 1);
   if (ways != 1)
     throw InvalidArgument(
         std::string(ways == 0 ? "no material is given" : "the material is given twice") +
         "; give --material NAME, or --youngs-modulus, --poisson-ratio and --density, or --materials FILE");
-  if (!a.material.file.empty()) return read_materials(a.material.file);
-  if (!a.material.name.empty()) return {{"*", material_preset(a.material.name)}};
+  if (!a.material.file.empty()) return read_materials_of(program, a, asked);
+  if (!a.material.name.empty()) {
+    asked.options.materials = {{"*", material_preset(a.material.name)}};
+    return;
+  }
   if (!a.material.youngs_modulus || !a.material.poisson_ratio || !a.material.density)
     throw InvalidArgument("--youngs-modulus, --poisson-ratio and --density go together: one of them is missing");
   const Material material{*a.material.youngs_modulus, *a.material.poisson_ratio, *a.material.density};
   material.validate("material");
-  return {{"*", material}};
+  asked.options.materials = {{"*", material}};
 }
 
 RayleighDamping damping_of(const PrecomputeArguments& a) {
@@ -229,9 +278,10 @@ double frequency_error_of(const PrecomputeArguments& a) {
   return 0.01 * percent;
 }
 
-BakeOptions bake_options_of(const PrecomputeArguments& a) {
-  BakeOptions o;
-  o.materials = materials_of(a);
+AskedBake asked_bake(Program& program, const PrecomputeArguments& a) {
+  AskedBake asked;
+  BakeOptions& o = asked.options;
+  read_materials(program, a, asked);
   for (const std::string& text : a.geometry.fixes) o.fixed.push_back(parse_node_selector(text));
   if (!a.modal.elements.empty()) o.elements = a.modal.elements == "linear" ? Elements::kLinear : Elements::kQuadratic;
   o.damping = damping_of(a);
@@ -251,7 +301,7 @@ BakeOptions bake_options_of(const PrecomputeArguments& a) {
   o.validate();
   a.geometry.tets.validate();
   (void)frequency_error_of(a);
-  return o;
+  return asked;
 }
 
 void choose_elements(const PrecomputeArguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options) {

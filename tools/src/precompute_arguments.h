@@ -9,6 +9,7 @@
 #include "assembly_baking.h"
 #include "limber/precompute/bake.h"
 #include "limber/precompute/tetrahedralise.h"
+#include "program.h"
 
 namespace CLI {
 class App;
@@ -68,8 +69,15 @@ struct PrecomputeArguments {
 /// Declares them all; `a` must outlive the parsing.
 void declare_options(CLI::App& app, PrecomputeArguments& a);
 
-/// @throws InvalidArgument or InputError in the user's words, as all below do
-BakeOptions bake_options_of(const PrecomputeArguments& a);
+/// What the arguments say of the bake, and of the input what files of materials say of it.
+struct AskedBake {
+  BakeOptions options;
+  std::vector<std::string> shell_groups;  ///< of the input surface: shells of regions, which do not bound the body
+};
+
+/// Reads the file of materials, and shells that it names. @throws InvalidArgument or InputError in the user's words, as
+/// all below do
+AskedBake asked_bake(Program& program, const PrecomputeArguments& a);
 
 /// --frequency-error as a ratio; 0 if it is not given.
 double frequency_error_of(const PrecomputeArguments& a);

@@ -9,6 +9,7 @@
 #include "limber/core/error.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
 #include "limber/mesh/merge_nodes.h"
+#include "limber/mesh/unused_vertices.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "precompute_report.h"
 
@@ -84,7 +85,8 @@ TriedCells try_cells(Program& program, const PrecomputeArguments& a, const BakeI
   options.volume_block = false;
   Warnings unread;  // those of the whole bake follow
   TbbJobs jobs;
-  const BakeResult result = bake({.name = input.name, .mesh = tried.tets.mesh}, options, unread, jobs);
+  const BakeResult result =
+      bake({.name = input.name, .mesh = tried.tets.mesh, .named_faces = input.named_faces}, options, unread, jobs);
   for (const BodyReport& body : result.bodies) {
     tried.error = std::max(tried.error, largest_frequency_error(body));
     tried.nodes += body.mesh.nodes;
@@ -171,9 +173,31 @@ void tell_unit(Program& program, const FileUnit& unit) {
   if (unit.metres != 1.0) program.print(fmt::format("lengths: the file's unit is {:.6g} m\n", unit.metres));
 }
 
+/// Whether materials are told by names of faces.
+bool asks_for_faces(const BakeOptions& bake) {
+  return std::ranges::any_of(bake.materials, [](const auto& entry) { return entry.first != "*"; }) ||
+         std::ranges::any_of(bake.regions,
+                             [](const MaterialRegion& r) { return std::holds_alternative<NearFaces>(r.shape); });
+}
+
+/// Reads the surface once more, with its names. Shells of regions leave it.
+void read_named_faces(const PrecomputeArguments& a, const AskedBake& asked, BakeInput& input) {
+  if (!asks_for_faces(asked.options) && asked.shell_groups.empty()) return;
+  Warnings unread;  // they stand already
+  GroupedSurface faces = read_any_grouped_surface(a.mesh, unread);
+  scale(faces.surface.vertices, a.geometry.scale);
+  for (const std::string& group : asked.shell_groups) take_group(faces, group);
+  if (!asked.shell_groups.empty()) {
+    input.render = faces.surface;
+    weld(*input.render);
+    drop_unused_vertices(*input.render, "", unread);
+  }
+  input.named_faces = std::move(faces);
+}
+
 }  // namespace
 
-BakeInput read_input(Program& program, const PrecomputeArguments& a, const BakeOptions& bake, Stopwatch& stopwatch) {
+BakeInput read_input(Program& program, const PrecomputeArguments& a, const AskedBake& asked, Stopwatch& stopwatch) {
   BakeInput input;
   input.name = fs::path(a.mesh).stem().string();
   FileUnit unit;
@@ -191,7 +215,8 @@ BakeInput read_input(Program& program, const PrecomputeArguments& a, const BakeO
     if (a.geometry.merge_nodes)
       program.warnings().push_back("--merge-nodes has no effect: the input is a surface, whose vertices are welded");
     scale(input.render->vertices, a.geometry.scale);
-    fill_with_tets(program, a, bake, input, stopwatch);
+    read_named_faces(a, asked, input);
+    fill_with_tets(program, a, asked.options, input, stopwatch);
   }
   if (!a.geometry.render_surface.empty())
     input.render = read_surface(program, a.geometry.render_surface, a.geometry.scale);

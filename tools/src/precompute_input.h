@@ -27,7 +27,8 @@ class Stopwatch {
   nlohmann::ordered_json& seconds_;
 };
 
-/// @param bake what --frequency-error bakes its tries with. The report gets `surface`, `unit` and `merged_nodes`.
-BakeInput read_input(Program& program, const PrecomputeArguments& a, const BakeOptions& bake, Stopwatch& stopwatch);
+/// @param asked what --frequency-error bakes its tries with, and what materials want of the surface. The report gets
+/// `surface`, `unit` and `merged_nodes`.
+BakeInput read_input(Program& program, const PrecomputeArguments& a, const AskedBake& asked, Stopwatch& stopwatch);
 
 }  // namespace limber::tools

@@ -114,6 +114,13 @@ void add_modes(Json& report, const std::vector<BodyReport>& bodies) {
   report["discarded"] = std::move(dropped);
 }
 
+Json json(const std::vector<RegionReport>& regions) {
+  Json all = Json::array();
+  for (const RegionReport& r : regions)
+    all.push_back({{"name", r.name}, {"tets", r.tets}, {"volume", r.volume}, {"mass", r.mass}});
+  return all;
+}
+
 Json json(const BodyReport& b) {
   Json dropped = Json::array();
   for (const DroppedMode& d : b.modes.selection.dropped) dropped.push_back(discarded(d.mode, d));
@@ -126,6 +133,7 @@ Json json(const BodyReport& b) {
           {"volume", b.solid.volume},
           {"center_of_mass", json(b.solid.center_of_mass)},
           {"inertia", json(b.solid.inertia)},
+          {"regions", json(b.regions)},
           {"zero_modes", b.freedom.zero_modes()},
           {"mechanisms", b.freedom.mechanisms},
           {"frequencies_hz", b.modes.frequencies_hz},
@@ -169,6 +177,14 @@ std::string skin_summary(const SkinReport& r) {
                         &m == r.modes.data() ? "; energy over the mode's at 30, 60, 90, 120 deg," : ";", m.mode,
                         fmt::join(m.energy, ", "));
   return text + "\n";
+}
+
+std::string region_summary(const std::vector<RegionReport>& regions) {
+  std::string text;
+  for (const RegionReport& r : regions)
+    text += fmt::format("  region \"{}\": {} tets by their centroids, {:.4g} m^3, {:.4g} kg\n", r.name, r.tets,
+                        r.volume, r.mass);
+  return text;
 }
 
 /// "  lowest ten modes: within 0.4 % of the continuum's, as their stresses tell"
@@ -244,6 +260,7 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
     text += fmt::format("{}: {} nodes, {} tets of {}, {:.6g} kg, {} frame, {} zero modes\n", b.name, b.mesh.nodes,
                         b.mesh.tets, b.mesh.nodes_per_tet, b.solid.mass, to_string(b.freedom.motion),
                         b.freedom.zero_modes());
+    if (b.regions.size() > 1) text += region_summary(b.regions);
     if (!b.modes.frequencies_hz.empty())
       text += fmt::format("  {} elastic modes, {:.6g} to {:.6g} Hz{}; {} kept{}\n", b.modes.frequencies_hz.size(),
                           b.modes.frequencies_hz.front(), b.modes.frequencies_hz.back(),

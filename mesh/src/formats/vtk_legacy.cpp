@@ -7,6 +7,7 @@
 
 #include "formats/file_scanner.h"
 #include "formats/mesh_file.h"
+#include "formats/number_types.h"
 
 namespace limber::internal {
 namespace {
@@ -351,28 +352,7 @@ class VtkReader {
 
   template <class F>
   void with_type(const std::string& type, F&& use) const {
-    if (type == "float")
-      use(float{});
-    else if (type == "double")
-      use(double{});
-    else if (type == "char")
-      use(std::int8_t{});
-    else if (type == "unsigned_char")
-      use(std::uint8_t{});
-    else if (type == "short")
-      use(std::int16_t{});
-    else if (type == "unsigned_short")
-      use(std::uint16_t{});
-    else if (type == "int" || type == "vtkidtype")
-      use(std::int32_t{});  // VTK writes its ids as 32 bits
-    else if (type == "unsigned_int")
-      use(std::uint32_t{});
-    else if (type == "long" || type == "vtktypeint64")
-      use(std::int64_t{});
-    else if (type == "unsigned_long" || type == "vtktypeuint64")
-      use(std::uint64_t{});
-    else
-      in_.fail("seen data type " + shown(type) + ", expected one of numbers, such as double or int");
+    with_number_type(type, in_, std::forward<F>(use));
   }
 
   std::size_t size_of(const std::string& type) const {

@@ -1,5 +1,9 @@
 #include "limber/mesh/grouped_surface.h"
 
+#include <utility>
+
+#include "limber/mesh/unused_vertices.h"
+
 namespace limber {
 
 void validate(GroupedSurface& surface, const std::string& name, Warnings& warnings) {
@@ -23,6 +27,28 @@ void validate(GroupedSurface& surface, const std::string& name, Warnings& warnin
     if (group.count > 0) groups.push_back(std::move(group));
   }
   surface.groups = std::move(groups);
+}
+
+SurfaceMesh take_group(GroupedSurface& surface, std::string_view name) {
+  SurfaceMesh taken{.vertices = surface.surface.vertices, .triangles = {}};
+  GroupedSurface rest{
+      .surface = {.vertices = std::move(surface.surface.vertices), .triangles = {}}, .face_of = {}, .groups = {}};
+  for (SurfaceGroup& group : surface.groups) {
+    const bool is_taken = group.name == name || group.material == name;
+    const auto first = static_cast<std::size_t>(group.first), end = first + static_cast<std::size_t>(group.count);
+    for (std::size_t t = first; t < end; ++t) {
+      (is_taken ? taken : rest.surface).triangles.push_back(surface.surface.triangles[t]);
+      if (!is_taken) rest.face_of.push_back(surface.face_of[t]);
+    }
+    if (is_taken) continue;
+    group.first = static_cast<Index>(rest.surface.triangles.size()) - group.count;
+    rest.groups.push_back(std::move(group));
+  }
+  surface = std::move(rest);
+  weld(taken);
+  Warnings unread;  // of vertices that the others use
+  drop_unused_vertices(taken, "", unread);
+  return taken;
 }
 
 }  // namespace limber

@@ -5,9 +5,9 @@
 
 #include "bake/bake_body.h"
 #include "bake/body_surfaces.h"
-#include "bake/region_materials.h"
 #include "limber/core/error.h"
 #include "limber/mesh/ten_node_tet.h"
+#include "regions/assign_regions.h"
 
 namespace limber {
 namespace {
@@ -86,14 +86,14 @@ void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warn
 BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
   options.validate();
   if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
-  const auto materials = internal::materials_by_region(input.mesh, options.materials);
-  internal::warn_of_unknown_regions(input.mesh, options.materials, warnings);
+  TetMesh mesh = input.mesh;
+  const auto materials =
+      internal::assign_regions(mesh, options.materials, options.regions, input.named_faces, warnings);
   auto fixed = selected_flags(input.mesh, options.fixed);
   auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);
   warn_of_fixed_loads(loaded, fixed, warnings);
 
-  TetMesh mesh = input.mesh;
   use_elements(options.elements, mesh, fixed, loaded);
   const auto component = connected_components(mesh);
   const Index bodies = 1 + *std::max_element(component.begin(), component.end());

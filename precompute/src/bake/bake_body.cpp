@@ -106,13 +106,30 @@ void add_frame(ModalModelData& data, const ModalAnalysis& a, const MassPropertie
   data.inertia = p.inertia_about(data.center_of_mass);
 }
 
-void fill_report(BodyReport& r, const BodyInput& in, const ModalAnalysis& a, const MassProperties& p) {
+/// By names: the regions of a field are one.
+std::vector<RegionReport> region_reports(const TetMesh& mesh, std::span<const Material> materials) {
+  std::vector<RegionReport> reports;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    const std::string& name = mesh.regions[mesh.tet_region[t]].name;
+    auto found = std::find_if(reports.begin(), reports.end(), [&](const RegionReport& r) { return r.name == name; });
+    if (found == reports.end()) found = reports.insert(reports.end(), {.name = name});
+    const double volume = signed_volume(mesh, static_cast<Index>(t));
+    ++found->tets;
+    found->volume += volume;
+    found->mass += materials[mesh.tet_region[t]].density * volume;
+  }
+  return reports;
+}
+
+void fill_report(BodyReport& r, const BodyInput& in, std::span<const Material> materials, const ModalAnalysis& a,
+                 const MassProperties& p) {
   const auto free_dofs = 3 * (static_cast<std::size_t>(a.nodes) - in.fixed.size());
   r.name = in.name;
   r.mesh = {.nodes = a.nodes,
             .tets = static_cast<Index>(in.part.mesh.tets.size()),
             .nodes_per_tet = in.part.mesh.has_mid_edge_nodes() ? 10 : 4};
   r.solid = {.mass = p.mass, .volume = p.volume, .center_of_mass = p.center, .inertia = p.inertia};
+  r.regions = region_reports(in.part.mesh, materials);
   r.freedom = a.freedom;
   r.modes.all = static_cast<std::size_t>(a.freedom.rigid_modes) + a.eigenvalues.size() >= free_dofs;
   r.accuracy = a.accuracy;
@@ -207,7 +224,7 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   ModalAnalysisOptions wanted = options.analysis;
   wanted.keep_compliance = options.residual.surface || in.answers_loads();
   ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, warnings, jobs);
-  fill_report(report, in, a, mass);
+  fill_report(report, in, materials, a, mass);
   warn_of_locking(in, materials, a, warnings);
   estimate_errors(in, materials, a, wanted, report, jobs);
 

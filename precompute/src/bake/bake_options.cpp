@@ -40,7 +40,7 @@ void SkinOptions::validate() const {
 }
 
 void BakeOptions::validate() const {
-  if (materials.empty()) throw InvalidArgument("bake: no material is given");
+  if (materials.empty() && regions.empty()) throw InvalidArgument("bake: no material is given");
   damping.validate();
   analysis.validate();
   limits.validate();

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <map>
+#include <string>
 #include <tuple>
 
 #include "fem/element_rules.h"
@@ -75,18 +77,22 @@ StressRecovery::StressRecovery(const TetMesh& mesh, std::span<const Index> fixed
 
 void StressRecovery::number_values() {
   struct Known {
-    Index region, value;
+    Index part, value;
   };
+  std::map<std::string, Index> by_name;
+  std::vector<Index> smooth_part;  // per region
+  for (const Region& r : mesh_.regions)
+    smooth_part.push_back(by_name.try_emplace(r.name, static_cast<Index>(by_name.size())).first->second);
   std::vector<std::vector<Known>> of_node(mesh_.nodes.size());
   values_.resize(mesh_.tets.size());
   for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
     const TetNodes nodes(mesh_, t);
+    const Index part = smooth_part[mesh_.tet_region[t]];
     for (std::size_t a = 0; a < nodes.size(); ++a) {
       auto& known = of_node[nodes[a]];
-      auto found =
-          std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.region == mesh_.tet_region[t]; });
+      auto found = std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.part == part; });
       if (found == known.end()) {
-        found = known.insert(known.end(), {mesh_.tet_region[t], static_cast<Index>(places_.size())});
+        found = known.insert(known.end(), {part, static_cast<Index>(places_.size())});
         places_.push_back(mesh_.nodes[nodes[a]]);
         tets_of_.emplace_back();
       }

@@ -6,7 +6,7 @@
 /// at the points of the adjacent tets where they are most accurate, and to σ n = 0 on free faces at the corner. The
 /// values of these polynomials at the nodes (in the middle of an edge the mean of those of its ends) are the recovered
 /// stress, interpolated by the shape functions of the displacements. Stresses jump where materials change, so each
-/// region has fits of its own.
+/// region has fits of its own; regions of one name are one, whose material varies.
 ///
 /// Zienkiewicz, Zhu: The superconvergent patch recovery and a posteriori error estimates, International Journal for
 /// Numerical Methods in Engineering 33, 1992. Equations of the boundary: Wiberg, Abdulwahab, Ziukas, ibid. 37, 1994.
@@ -56,7 +56,7 @@ class StressRecovery {
 
   const TetMesh& mesh_;
   const std::vector<Barycentric>& points_;
-  std::vector<std::array<Index, 10>> values_;  // per tet and node: one value for each node and region
+  std::vector<std::array<Index, 10>> values_;  // per tet and node: one value for each node and name of a region
   std::vector<Vec3> places_;                   // of values
   std::vector<std::vector<Index>> tets_of_;    // of corners' values
   std::vector<std::vector<FreeFace>> faces_of_;

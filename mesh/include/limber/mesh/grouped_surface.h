@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "limber/mesh/surface_mesh.h"
@@ -28,6 +29,10 @@ struct GroupedSurface {
 /// an STL file comes as triangles that share no vertex. Formats without names give one group without a name.
 /// @throws InputError as read_surface_mesh() does
 GroupedSurface read_grouped_surface(const std::filesystem::path& path, Warnings& warnings);
+
+/// Takes the triangles of all groups of a name, or else material, out of a surface. Its vertices stay.
+/// @return them with vertices of their own, welded (see weld()); empty if no group has the name
+SurfaceMesh take_group(GroupedSurface& surface, std::string_view name);
 
 /// As validate() of a SurfaceMesh; faces and groups follow the triangles that are dropped.
 void validate(GroupedSurface& surface, const std::string& name, Warnings& warnings);

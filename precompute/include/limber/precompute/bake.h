@@ -14,11 +14,13 @@
 #include <vector>
 
 #include "limber/core/jobs.h"
+#include "limber/mesh/grouped_surface.h"
 #include "limber/mesh/surface_mesh.h"
 #include "limber/mesh/tet_mesh.h"
 #include "limber/model/asset.h"
 #include "limber/model/material.h"
 #include "limber/model/mode_selection.h"
+#include "limber/precompute/material_regions.h"
 #include "limber/precompute/modal_analysis.h"
 
 namespace limber {
@@ -58,6 +60,9 @@ struct BakeInput {
   TetMesh mesh = {};                          ///< validated
   std::optional<SurfaceMesh> render = {};     ///< what is drawn; none: the boundary of the mesh
   std::optional<SurfaceMesh> collision = {};  ///< what touches; none: the boundary of the mesh
+  /// The surface that the mesh fills, where regions are told by its faces: names of the materials' table that no region
+  /// of the mesh has, and NearFaces.
+  std::optional<GroupedSurface> named_faces = {};
   Provenance provenance = {};
 };
 
@@ -102,8 +107,9 @@ enum class Elements {
 };
 
 struct BakeOptions {
-  MaterialTable materials = {};          ///< by region; "*" is the rest
-  std::vector<NodeSelector> fixed = {};  ///< their union is held
+  MaterialTable materials = {};              ///< by region of the mesh, or by faces; "*" is the rest
+  std::vector<MaterialRegion> regions = {};  ///< count over these, later ones over earlier
+  std::vector<NodeSelector> fixed = {};      ///< their union is held
   Elements elements = Elements::kAsGiven;
   RayleighDamping damping = {};
   ModalAnalysisOptions analysis = {};
@@ -162,6 +168,13 @@ struct SolidReport {
   Mat3 inertia = Mat3::Zero();         ///< about the centre of mass, input axes, kg·m²
 };
 
+/// What one body has of a region. A tet is in it by its centroid.
+struct RegionReport {
+  std::string name;
+  Index tets = 0;
+  double volume = 0.0, mass = 0.0;  ///< m³, kg
+};
+
 /// Elastic modes of one body, before and after selection.
 struct BodyModesReport {
   std::vector<double> frequencies_hz;  ///< before selection, ascending
@@ -189,6 +202,7 @@ struct BodyReport {
   std::string name;
   BodyMeshReport mesh;
   SolidReport solid;
+  std::vector<RegionReport> regions;  ///< in the order of their first tets
   BodyFreedom freedom;
   BodyModesReport modes;
   EigenAccuracy accuracy;

@@ -58,4 +58,8 @@ struct Tetrahedralisation {
 Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const TetrahedralisationOptions& options,
                                   Warnings& warnings);
 
+/// Pairs of triangles, one of each of two closed surfaces, that cross or touch (CGAL's exact test).
+/// @pre both are closed and manifold, and neither crosses itself
+Index crossing_triangles(const SurfaceMesh& a, const SurfaceMesh& b);
+
 }  // namespace limber
