@@ -64,7 +64,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_pose(placement.pose, "add_body");
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
-  const double friction = checked(placement.friction, impl_->solver, "add_body");
+  const double friction = checked(placement.friction, impl_->paths.solver, "add_body");
   if (placement.shape) {
     validate(*placement.shape);
     if (std::holds_alternative<HalfSpace>(*placement.shape))
@@ -86,8 +86,8 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   const auto index = static_cast<Index>(id.index);
   m.constraints.set_body(index, {.group = &bodies, .slot = slot});
   m.sleep.add(index);
-  m.registry.add_body(index);
-  m.queries.tell_changed();
+  m.paths.registry.add_body(index);
+  m.probes.queries.tell_changed();
   return id;
 }
 
@@ -114,7 +114,7 @@ BodyId World::add_sensor(std::shared_ptr<const Shape> shape, const RigidTransfor
   Entry& e = impl_->bodies[static_cast<Index>(id.index)];
   e.sensor = true;
   e.filter = filter;
-  impl_->sensors.add(static_cast<Index>(id.index));
+  impl_->probes.sensors.add(static_cast<Index>(id.index));
   return id;
 }
 
@@ -129,9 +129,9 @@ Index World::require_sensor(BodyId id, const char* function) const {
   return static_cast<Index>(id.index);
 }
 
-std::span<const SensorEvent> World::sensor_events() const { return impl_->sensors.events(); }
+std::span<const SensorEvent> World::sensor_events() const { return impl_->probes.sensors.events(); }
 void World::list_inside(BodyId sensor, std::vector<BodyId>& bodies) const {
-  impl_->sensors.list(require_sensor(sensor, "list_inside"), bodies);
+  impl_->probes.sensors.list(require_sensor(sensor, "list_inside"), bodies);
 }
 
 BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransform& pose, const CollisionFilter& filter,
@@ -139,15 +139,15 @@ BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransfor
   if (!shape) throw InvalidArgument("World::add_static: the shape is null");
   validate(*shape);
   require_pose(pose, "add_static");
-  const double mu = checked(friction, impl_->solver, "add_static");
+  const double mu = checked(friction, impl_->paths.solver, "add_static");
   Impl& m = *impl_;
   const BodyId id =
       m.bodies.add({.group = -1, .shape = std::move(shape), .pose = pose, .filter = filter, .friction = mu});
   const auto index = static_cast<Index>(id.index);
   m.constraints.set_body(index, {.pose = pose});
   m.sleep.add(index);
-  m.registry.add_body(index);
-  m.queries.tell_changed();
+  m.paths.registry.add_body(index);
+  m.probes.queries.tell_changed();
   return id;
 }
 
@@ -156,24 +156,24 @@ void World::remove_body(BodyId id) {
   if (!m.bodies.contains(id)) m.bodies.entry(id, "remove_body");  // tells so
   const auto index = static_cast<Index>(id.index);
   m.sleep.remove(index);
-  m.sensors.remove(index);
+  m.probes.sensors.remove(index);
   m.parts.forget(index);
-  m.registry.remove_body(index);
+  m.paths.registry.remove_body(index);
   m.constraints.remove_body(index);
-  m.path().forget(index);
+  m.paths.in_force().forget(index);
   m.drawing.forget(index);
   m.bodies.remove(id);
-  m.queries.tell_changed();
+  m.probes.queries.tell_changed();
 }
 
 void World::list(std::vector<BodyId>& bodies) const {
   bodies.clear();
   for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
-    if (impl_->bodies[static_cast<Index>(i)].alive) bodies.push_back(impl_->queries.id(static_cast<Index>(i)));
+    if (impl_->bodies[static_cast<Index>(i)].alive) bodies.push_back(impl_->probes.queries.id(static_cast<Index>(i)));
 }
 BodyId World::id_of(Index body) const {
   if (body < 0 || static_cast<std::size_t>(body) >= impl_->bodies.size() || !impl_->bodies[body].alive) return {};
-  return impl_->queries.id(body);
+  return impl_->probes.queries.id(body);
 }
 void World::set_user_data(BodyId id, std::uint64_t data) {
   impl_->bodies.any_entry(id, "set_user_data");
@@ -201,22 +201,22 @@ int World::advance(double real_seconds) {
 
 void World::step() {
   Impl& m = *impl_;
-  StageClock clock(m.stage_times);
+  StageClock clock(m.last.times);
   m.last.report = {};
-  m.drawing.keep_dents(m.path());
-  if (m.registry.source() != nullptr) m.last.events.begin();
+  m.drawing.keep_dents(m.paths.in_force());
+  if (m.paths.registry.source() != nullptr) m.last.events.begin();
   for (int part = 0; part < m.parts.count(); ++part) {
     m.bodies.set_within_step(part > 0);
     m.parts.begin(part);
     clock.lap(Stage::kBookkeeping);
     const internal::Substep substep{.index = part, .length = m.parts.length(), .gravity = m.options.gravity};
-    m.path().advance(substep, m.last.events, m.jobs, clock);
-    m.add_to_report(m.path().report());
+    m.paths.in_force().advance(substep, m.last.events, m.jobs, clock);
+    m.add_to_report(m.paths.in_force().report());
   }
   m.parts.finish();
-  m.queries.tell_changed();
-  m.sensors.update();
-  if (m.registry.source() != nullptr) m.last.events.end();
+  m.probes.queries.tell_changed();
+  m.probes.sensors.update();
+  if (m.paths.registry.source() != nullptr) m.last.events.end();
   if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
   m.time.count_step();
   clock.lap(Stage::kBookkeeping, 1);
@@ -236,7 +236,7 @@ void World::Impl::add_to_report(const IslandReport& substep) {
   sum.attempts.add(substep.attempts);
 }
 
-void World::set_stage_times(StageTimes* times) { impl_->stage_times = times; }
+void World::set_stage_times(StageTimes* times) { impl_->last.times = times; }
 
 double World::interpolation_factor() const { return impl_->time.waiting() / impl_->options.step; }
 

@@ -163,15 +163,15 @@ JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointA
   wake_bodies_of(*impl_->constraints.entries()[index].constraint(), impl_->sleep);
   const bool two = a != BodyId{} && b != BodyId{};
   if (two && !collide_connected)
-    impl_->registry.exclude_for_joint(static_cast<Index>(std::min(a.index, b.index)),
-                                      static_cast<Index>(std::max(a.index, b.index)), index);
+    impl_->paths.registry.exclude_for_joint(static_cast<Index>(std::min(a.index, b.index)),
+                                            static_cast<Index>(std::max(a.index, b.index)), index);
   return {index, impl_->constraints.entries()[index].generation};
 }
 
 void World::remove_joint(JointId id) {
   named(impl_->constraints, id, "remove_joint");
   wake_bodies_of(*impl_->constraints.entries()[id.index].constraint(), impl_->sleep);
-  impl_->registry.include_after_joint(id.index);
+  impl_->paths.registry.include_after_joint(id.index);
   impl_->constraints.remove(id.index);
 }
 
@@ -180,7 +180,7 @@ void World::set_apart(BodyId a, BodyId b, bool apart) {
   m.bodies.entry(a, "set_apart"), m.bodies.entry(b, "set_apart");
   if (a == b) throw InvalidArgument("World::set_apart: both bodies are the same");
   const auto [first, second] = std::minmax({static_cast<Index>(a.index), static_cast<Index>(b.index)});
-  if (!m.registry.set_excluded(first, second, apart)) return;
+  if (!m.paths.registry.set_excluded(first, second, apart)) return;
   m.sleep.wake(first), m.sleep.wake(second);
 }
 
@@ -213,16 +213,14 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   const auto sticks = [](const Entry& e) { return e.alive && std::isinf(e.friction); };
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), sticks))
     throw InvalidArgument("World::set_contact_source: a body has infinite friction, expected ContactSolver::kGame");
-  m.contacts.reset(options);
-  m.game.reset(options);
-  m.solver = options.solver;
+  m.paths.reset(options);
   m.drawing.forget_all();
   m.sleep.wake_all();
-  m.registry.set_source(source);
+  m.paths.registry.set_source(source);
 }
 
 void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) {
-  impl_->registry.set_veto(std::move(acts));
+  impl_->paths.registry.set_veto(std::move(acts));
   impl_->sleep.wake_all();
 }
 

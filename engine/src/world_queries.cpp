@@ -3,14 +3,14 @@
 namespace limber {
 
 std::optional<BodyHit> World::cast_ray(const Ray& ray, const BodyFilter& filter) const {
-  internal::BodyQueries& queries = impl_->queries;
+  internal::BodyQueries& queries = impl_->probes.queries;
   const auto hit = queries.index().cast_ray(ray, queries.filter(filter));
   if (!hit) return {};
   return queries.told(*hit);
 }
 
 void World::cast_ray(const Ray& ray, std::vector<BodyHit>& hits, const BodyFilter& filter) const {
-  internal::BodyQueries& queries = impl_->queries;
+  internal::BodyQueries& queries = impl_->probes.queries;
   queries.index().cast_ray(ray, queries.hits, queries.filter(filter));
   hits.clear();
   for (const SpatialIndex::Hit& hit : queries.hits) hits.push_back(queries.told(hit));
@@ -18,7 +18,7 @@ void World::cast_ray(const Ray& ray, std::vector<BodyHit>& hits, const BodyFilte
 
 std::optional<BodyHit> World::cast_shape(const Shape& shape, const RigidTransform& pose, const Vec3& way,
                                          const BodyFilter& filter) const {
-  internal::BodyQueries& queries = impl_->queries;
+  internal::BodyQueries& queries = impl_->probes.queries;
   const auto hit = queries.index().cast_shape(shape, pose, way, queries.filter(filter));
   if (!hit) return {};
   return queries.told(*hit);
@@ -26,14 +26,14 @@ std::optional<BodyHit> World::cast_shape(const Shape& shape, const RigidTransfor
 
 void World::find_overlaps(const Shape& shape, const RigidTransform& pose, std::vector<BodyId>& bodies,
                           const BodyFilter& filter) const {
-  internal::BodyQueries& queries = impl_->queries;
+  internal::BodyQueries& queries = impl_->probes.queries;
   queries.index().find_overlaps(shape, pose, queries.found, queries.filter(filter));
   bodies.clear();
   for (const Index body : queries.found) bodies.push_back(queries.id(body));
 }
 
 std::optional<BodyHit> World::nearest_point(const Vec3& point, double max_distance, const BodyFilter& filter) const {
-  internal::BodyQueries& queries = impl_->queries;
+  internal::BodyQueries& queries = impl_->probes.queries;
   const auto hit = queries.index().nearest_point(point, max_distance, queries.filter(filter));
   if (!hit) return {};
   return queries.told(*hit);

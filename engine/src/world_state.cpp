@@ -38,7 +38,7 @@ void World::set_pose(BodyId id, const RigidTransform& pose) {
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->parts.forget_frame(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_pose(e.slot, pose);
-  impl_->queries.tell_changed();
+  impl_->probes.queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
@@ -61,7 +61,7 @@ void World::set_amplitudes(BodyId id, std::span<const double> amplitudes, std::s
   require_finite(rates, "set_amplitudes", "rates");
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_amplitudes(e.slot, amplitudes, rates);
-  impl_->queries.tell_changed();
+  impl_->probes.queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
@@ -89,14 +89,14 @@ void World::set_node_displacements(BodyId id, std::span<const double> displaceme
   };
   impl_->sleep.wake(static_cast<Index>(id.index));
   impl_->bodies.group(e).set_amplitudes(e.slot, project(displacements), project(velocities));
-  impl_->queries.tell_changed();
+  impl_->probes.queries.tell_changed();
   impl_->constraints.disturb(static_cast<Index>(id.index));
 }
 
 BodyEnergy World::energy(BodyId id) const {
   const Entry& e = impl_->bodies.entry(id, "energy");
   BodyEnergy energy = impl_->bodies.group(e).energy(e.slot, impl_->options.gravity);
-  energy.elastic += impl_->path().stored_energy(static_cast<Index>(id.index));
+  energy.elastic += impl_->paths.in_force().stored_energy(static_cast<Index>(id.index));
   return energy;
 }
 
@@ -128,7 +128,7 @@ Vec3 World::dent(BodyId id, const SurfacePoint& at) const {
   validate(group.model(), at);
   const DentedSurface* dented = impl_->bodies.model_group(e).dented.get();
   if (dented == nullptr) return Vec3::Zero();
-  Vec3 dent = dented->displacement(impl_->path().dent_loads(static_cast<Index>(id.index)), at);
+  Vec3 dent = dented->displacement(impl_->paths.in_force().dent_loads(static_cast<Index>(id.index)), at);
   if (group.skinned(e.slot)) dent = group.shape(e.slot).turn(at) * dent;
   return group.frame(e.slot).pose().q * dent;
 }
@@ -160,7 +160,7 @@ std::uint64_t World::state_hash() const {
     for (int i = 0; e.joint && i < e.joint->coordinates(); ++i)
       hash.add(e.joint->coordinate(i, m.constraints.states()));
   }
-  m.path().add_to(hash);
+  m.paths.in_force().add_to(hash);
   return hash.value();
 }
 
@@ -171,14 +171,14 @@ void World::restore_state(std::span<const std::byte> state) {
   internal::Snapshot snapshot = impl_->snapshot();
   for (const BodyId later : snapshot.check_structure(reader)) remove_body(later);
   snapshot.restore_motion(reader);
-  impl_->queries.tell_changed();
+  impl_->probes.queries.tell_changed();
 }
 
 // Drawing -------------------------------------------------------------------------------------------------------------
 
 void World::reconstruct(std::span<const DrawTarget> targets, double interpolation, const Vec3& origin) const {
   Impl& m = *impl_;
-  m.drawing.reconstruct(targets, interpolation, origin, m.path(), m.jobs, m.stage_times);
+  m.drawing.reconstruct(targets, interpolation, origin, m.paths.in_force(), m.jobs, m.last.times);
 }
 
 void World::reconstruct(BodyId id, std::span<float> positions, std::span<float> normals, double interpolation,
