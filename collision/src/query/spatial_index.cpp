@@ -358,8 +358,8 @@ bool SpatialIndex::Impl::is_inside(Index b, const Vec3& p_B) {
 
 std::optional<Touch> SpatialIndex::Impl::touch_half_space(const HalfSpace& plane, const Vec3& way, double limit) const {
   const auto height = [&](const Vec3& p) { return plane.normal.dot(p) - plane.offset; };
-  const Vec3 low =
-      *std::ranges::min_element(mover.points_B, [&](const Vec3& p, const Vec3& q) { return height(p) < height(q); });
+  const Vec3 low = *std::min_element(mover.points_B.begin(), mover.points_B.end(),
+                                     [&](const Vec3& p, const Vec3& q) { return height(p) < height(q); });
   const double gap = height(low) - mover.radius, closing = -plane.normal.dot(way);
   const double fraction = gap <= 0.0 ? 0.0 : gap / closing;
   if (gap > 0.0 && !(closing > 0.0 && fraction <= limit)) return {};
