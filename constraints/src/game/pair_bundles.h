@@ -51,7 +51,9 @@ class PairBundles {
   /// The same in the order of levels, or against it: for kernels that change coordinates.
   template <class Kernel>
   void in_order(Jobs& jobs, bool backward, const Kernel& kernel);
-  bool overlap() const { return std::ranges::any_of(bundles_, &PairBundle::overlaps); }
+  bool overlap() const {
+    return std::ranges::any_of(bundles_, [](const PairBundle& b) { return b.overlaps; });
+  }
   float residual() const;
 
  private:
