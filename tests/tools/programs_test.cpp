@@ -157,7 +157,7 @@ TEST_F(Programs, SimulateTellsWhatTouchedHungAndWasHeld) {
   EXPECT_EQ(report.at("joints").at(0).at("position").size(), 3u);
   EXPECT_TRUE(report.at("joints").at(0).at("a").is_null());
   EXPECT_LT(report.at("joints").at(0).at("largest_distance_error"), 1e-9);
-  EXPECT_LT(report.at("handles").at(0).at("largest_error"), 1e-9);
+  EXPECT_LT(report.at("handles").at(0).at("largest_error"), 1.8e-9);  // three rows, each closed to 1e-9
   const std::string contacts = bytes("c.csv");
   EXPECT_THAT(contacts, HasSubstr(",begun,falls,ground,"));
   EXPECT_THAT(contacts, HasSubstr(",lasting,falls,ground,"));
