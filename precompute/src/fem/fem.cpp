@@ -9,18 +9,12 @@
 #include "fem/element_rules.h"
 #include "limber/core/error.h"
 #include "limber/mesh/ten_node_tet.h"
+#include "limber/model/tet_element.h"
 
 namespace limber {
 namespace {
 
 constexpr std::size_t kGrain = 512;  // tets or nodes per task: tens of microseconds
-
-/// Ingredients of a tet's 3 × 3 blocks: gradients of its barycentric coordinates, which are constant.
-struct Element {
-  std::array<Vec3, 4> gradient;  // 1/m, summing to zero
-  double lambda_volume = 0.0;    // λV, N·m
-  double mu_volume = 0.0;        // μV, N·m
-};
 
 /// Gradients of a tet's shape functions at one point, where a rule of integration has this part of the volume.
 template <std::size_t n>
@@ -30,19 +24,6 @@ using Gradients = std::array<Vec3, n>;
 /// two linear functions at four points.
 template <std::size_t n>
 inline constexpr std::size_t kPoints = n == 4 ? 1 : 4;
-
-Element make_element(const std::array<Vec3, 4>& x, const Material& material) {
-  const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0], e3 = x[3] - x[0];
-  const double six_volumes = e1.cross(e2).dot(e3);
-  Element e;
-  e.gradient[1] = e2.cross(e3) / six_volumes;
-  e.gradient[2] = e3.cross(e1) / six_volumes;
-  e.gradient[3] = e1.cross(e2) / six_volumes;
-  e.gradient[0] = -(e.gradient[1] + e.gradient[2] + e.gradient[3]);
-  e.lambda_volume = material.lame_lambda() * six_volumes / 6.0;
-  e.mu_volume = material.shear_modulus() * six_volumes / 6.0;
-  return e;
-}
 
 using SlopesAtPoints = std::array<std::array<std::array<double, 4>, 10>, 4>;
 
@@ -57,7 +38,7 @@ const SlopesAtPoints& slopes_at_points() {
 
 /// At every point of the rule.
 template <std::size_t n>
-std::array<Gradients<n>, kPoints<n>> shape_gradients(const Element& e) {
+std::array<Gradients<n>, kPoints<n>> shape_gradients(const TetElement& e) {
   if constexpr (n == 4) {
     return {e.gradient};
   } else {
@@ -72,24 +53,14 @@ std::array<Gradients<n>, kPoints<n>> shape_gradients(const Element& e) {
   }
 }
 
-// K_ab = V (λ g_a g_bᵀ + μ g_b g_aᵀ + μ (g_a·g_b) I). Each product has the same factors in K_ba, so K_baᵀ = K_ab to the
-// bit; the order of the sums below keeps that.
-Mat3 stiffness_block(const Element& e, const Vec3& ga, const Vec3& gb) {
-  const double isotropic = e.mu_volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
-  Mat3 block;
-  for (int p = 0; p < 3; ++p)
-    for (int q = 0; q < 3; ++q)
-      block(p, q) = (e.lambda_volume * (ga[p] * gb[q]) + e.mu_volume * (gb[p] * ga[q])) + (p == q ? isotropic : 0.0);
-  return block;
-}
-
 std::array<Vec3, 4> corners(const TetMesh& mesh, const Tet& t) {
   return {mesh.nodes[t[0]], mesh.nodes[t[1]], mesh.nodes[t[2]], mesh.nodes[t[3]]};
 }
 
-/// K_ab summed up over the points.
+/// K_ab summed up over the points. The order of the sums keeps K_baᵀ = K_ab to the bit.
 template <std::size_t n>
-Mat3 stiffness_block(const Element& e, const std::array<Gradients<n>, kPoints<n>>& at, std::size_t a, std::size_t b) {
+Mat3 stiffness_block(const TetElement& e, const std::array<Gradients<n>, kPoints<n>>& at, std::size_t a,
+                     std::size_t b) {
   if constexpr (n == 4) return stiffness_block(e, at[0][a], at[0][b]);
   Mat3 block = Mat3::Zero();
   for (const Gradients<n>& g : at) block += stiffness_block(e, g[a], g[b]);
@@ -98,7 +69,7 @@ Mat3 stiffness_block(const Element& e, const std::array<Gradients<n>, kPoints<n>
 
 template <std::size_t n>
 std::array<double, 9 * n * n> element_stiffness(const std::array<Vec3, 4>& x, const Material& material) {
-  const Element e = make_element(x, material);
+  const TetElement e = make_tet_element(x, material);
   const auto at = shape_gradients<n>(e);
   std::array<double, 9 * n * n> K{};
   for (std::size_t a = 0; a < n; ++a)
@@ -197,7 +168,7 @@ std::size_t place_of(Index node, std::span<const Index> neighbours) {
 
 /// Adds what one node's tets give to its three columns. @param blocks one per neighbour, zero on entry
 template <std::size_t n>
-void add_stiffness(const TetMesh& mesh, std::span<const Element> elements, const NodeGraph& graph, Index node,
+void add_stiffness(const TetMesh& mesh, std::span<const TetElement> elements, const NodeGraph& graph, Index node,
                    std::vector<Mat3>& blocks) {
   for (const Index e : graph.tets_of(node)) {
     const TetNodes t(mesh, static_cast<std::size_t>(e));
@@ -274,7 +245,8 @@ SparseMatrix consistent_mass(const TetMesh& mesh, std::span<const Material> mate
 
 /// One tet's part of K u, from differences to its first node.
 template <std::size_t n>
-void add_forces(const TetNodes& t, const Element& e, std::span<const double> displacements, std::span<double> forces) {
+void add_forces(const TetNodes& t, const TetElement& e, std::span<const double> displacements,
+                std::span<double> forces) {
   const auto u = [&](Index node) { return Eigen::Map<const Vec3>(displacements.data() + 3 * node); };
   const auto f = [&](Index node) { return Eigen::Map<Vec3>(forces.data() + 3 * node); };
   for (const Gradients<n>& g : shape_gradients<n>(e)) {
@@ -305,10 +277,10 @@ std::array<double, 900> ten_node_stiffness(const std::array<Vec3, 4>& x, const M
 
 SparseMatrix assemble_stiffness(const TetMesh& mesh, std::span<const Material> materials, Jobs& jobs) {
   check(mesh, materials, "assemble_stiffness");
-  std::vector<Element> elements(mesh.tets.size());
+  std::vector<TetElement> elements(mesh.tets.size());
   jobs.parallel_for(elements.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e)
-      elements[e] = make_element(corners(mesh, mesh.tets[e]), materials[mesh.tet_region[e]]);
+      elements[e] = make_tet_element(corners(mesh, mesh.tets[e]), materials[mesh.tet_region[e]]);
   });
   const NodeGraph graph = make_node_graph(mesh, jobs);
   SparseMatrix K = stiffness_pattern(graph);
@@ -343,7 +315,7 @@ void elastic_forces(const TetMesh& mesh, std::span<const Material> materials, st
                           std::to_string(mesh.nodes.size()) + " nodes");
   std::fill(forces.begin(), forces.end(), 0.0);
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    const Element e = make_element(corners(mesh, mesh.tets[i]), materials[mesh.tet_region[i]]);
+    const TetElement e = make_tet_element(corners(mesh, mesh.tets[i]), materials[mesh.tet_region[i]]);
     if (mesh.has_mid_edge_nodes())
       add_forces<10>(TetNodes(mesh, i), e, displacements, forces);
     else
