@@ -9,8 +9,8 @@
 #include <set>
 
 #include "accessor_type.h"
-#include "glb_container.h"
 #include "limber/core/error.h"
+#include "limber/internal/glb_container.h"
 
 namespace limber {
 namespace {

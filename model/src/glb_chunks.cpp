@@ -1,28 +1,12 @@
-#include <cstring>
 #include <string>
 
-#include "glb_container.h"
 #include "limber/core/error.h"
+#include "limber/internal/glb_container.h"
 #include "limber/model/glb.h"
 
 namespace limber {
 
-using internal::kBinChunk;
-using internal::kChunkHeaderSize;
-using internal::kGlbHeaderSize;
-using internal::kGlbMagic;
-using internal::kGlbVersion;
-using internal::kJsonChunk;
-
-namespace {
-
-std::uint32_t u32_at(std::string_view bytes, std::size_t offset) {
-  std::uint32_t v;
-  std::memcpy(&v, bytes.data() + offset, 4);
-  return v;
-}
-
-}  // namespace
+using namespace internal;  // the container's numbers
 
 GlbChunks glb_chunks(std::string_view bytes, const std::string& name) {
   const auto fail = [&](const std::string& what) { throw InputError(name + ": " + what); };

@@ -6,6 +6,7 @@
 
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/internal/glb_container.h"
 
 namespace limber::internal {
 namespace {
@@ -67,12 +68,6 @@ double number_at(const char* at, Stored stored, bool normalised) {
 
 std::size_t components_of(std::string_view type) {
   return type == "SCALAR" ? 1 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
-}
-
-std::uint32_t u32_at(std::string_view bytes, std::size_t offset) {
-  std::uint32_t value;
-  std::memcpy(&value, bytes.data() + offset, sizeof value);
-  return value;
 }
 
 /// RFC 3986, 2.1; a per cent sign that begins no byte stands for itself.
@@ -139,22 +134,20 @@ void GltfFile::take_container(std::string_view bytes) {
     json_ = parse_json(bytes, name_);
     return;
   }
-  constexpr std::size_t kGlbHead = 12, kChunkHead = 8;
-  constexpr std::uint32_t kJson = 0x4E4F534A, kBinary = 0x004E4942;
-  if (bytes.size() < kGlbHead + kChunkHead) throw InputError(name_ + ": ends in the head of a GLB file");
-  if (const std::uint32_t version = u32_at(bytes, 4); version != 2)
+  if (bytes.size() < kGlbHeaderSize + kChunkHeaderSize) throw InputError(name_ + ": ends in the head of a GLB file");
+  if (const std::uint32_t version = u32_at(bytes, 4); version != kGlbVersion)
     throw InputError(name_ + ": is glTF " + std::to_string(version) + ", expected 2.0");
-  std::size_t at = kGlbHead;
-  for (int chunk = 0; chunk < 2 && at + kChunkHead <= bytes.size(); ++chunk) {
+  std::size_t at = kGlbHeaderSize;
+  for (int chunk = 0; chunk < 2 && at + kChunkHeaderSize <= bytes.size(); ++chunk) {
     const std::size_t length = u32_at(bytes, at);
     const std::uint32_t kind = u32_at(bytes, at + 4);
-    at += kChunkHead;
+    at += kChunkHeaderSize;
     if (length > bytes.size() - at)
       throw InputError(name_ + ": byte " + std::to_string(at) + " begins a chunk of " + std::to_string(length) +
                        " bytes, and " + std::to_string(bytes.size() - at) + " are left");
-    if (chunk == 0 && kind != kJson) throw InputError(name_ + ": its first chunk is not JSON");
+    if (chunk == 0 && kind != kJsonChunk) throw InputError(name_ + ": its first chunk is not JSON");
     if (chunk == 0) json_ = parse_json(bytes.substr(at, length), name_);
-    if (chunk == 1 && kind == kBinary) binary_ = bytes.substr(at, length);
+    if (chunk == 1 && kind == kBinChunk) binary_ = bytes.substr(at, length);
     at += length;
   }
 }
