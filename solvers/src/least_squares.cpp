@@ -14,12 +14,6 @@ namespace {
 
 using Numbers = std::span<const double>;
 
-double* zeros(AlignedBuffer& memory, std::size_t n) {
-  double* to = memory.need(n);
-  std::fill_n(to, padded(n), 0.0);
-  return to;
-}
-
 }  // namespace
 
 void LeastSquaresSolver::scale_rows(Numbers J, Numbers metric) {
@@ -64,8 +58,8 @@ LeastSquaresResult LeastSquaresSolver::factor(Numbers J, Numbers metric, int row
            std::ranges::all_of(metric, [](double x) { return x >= 0.0; });
   if (!valid_) return {.status = SolveStatus::kInvalidInput};
   scale_rows(J, metric);
-  zeros(motion_, d_);
-  for (AlignedBuffer* vector : {&rest_, &work_, &found_, &product_}) zeros(*vector, m_);
+  motion_.zeros(d_);
+  for (AlignedBuffer* vector : {&rest_, &work_, &found_, &product_}) vector->zeros(m_);
   const std::size_t n = std::min(m_, d_);
   const MatrixView S = S_memory_.need(n, n);
   if (m_ <= d_) {

@@ -11,41 +11,15 @@
 
 #include "counted_new.h"
 #include "limber/core/error.h"
+#include "random_rows.h"
 
 namespace limber {
 namespace {
 
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-struct Rows {
-  Matrix J;
-  Eigen::VectorXd metric;
-  Matrix S() const { return J * metric.asDiagonal() * J.transpose(); }
-};
-
-std::span<const double> span_of(const Matrix& M) { return {M.data(), static_cast<std::size_t>(M.size())}; }
-std::span<const double> span_of(const Eigen::VectorXd& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
-std::span<double> span_of(Eigen::VectorXd& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
+using namespace testing;
 
 // Singular values below this part of the largest are zero: the square root of the solver's rank cut.
 constexpr double kSingular = 3.2e-6;
-
-Eigen::VectorXd random_vector(Eigen::Index n, std::mt19937& random) {
-  std::normal_distribution<double> normal;
-  Eigen::VectorXd v(n);
-  for (double& x : v) x = normal(random);
-  return v;
-}
-
-/// m rows of rank ≤ `rank` over d degrees of freedom, with a metric that spans two decades.
-Rows make_rows(int m, int d, int rank, std::mt19937& random) {
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  Rows rows{.J = Matrix(m, d), .metric = Eigen::VectorXd(d)};
-  for (double& x : rows.J.reshaped()) x = uniform(random);
-  for (double& x : rows.metric) x = std::pow(10.0, uniform(random));
-  for (int i = rank; i < m; ++i) rows.J.row(i) = rows.J.row(i % rank) * (1.0 + 0.5 * (i / rank));
-  return rows;
-}
 
 Eigen::VectorXd solve(LeastSquaresSolver& solver, const Rows& rows, const Eigen::VectorXd& r) {
   Eigen::VectorXd f(r.size());

@@ -16,12 +16,6 @@ constexpr double kLeastMobility = 1e-13;  // of the largest diagonal: rows that 
 
 using Numbers = std::span<const double>;
 
-double* zeros(AlignedBuffer& memory, std::size_t n) {
-  double* to = memory.need(n);
-  std::fill_n(to, padded(n), 0.0);
-  return to;
-}
-
 }  // namespace
 
 // A_ee with rows and columns, A_ec and b_e with rows, scaled to a unit diagonal: joints mix metres and radians, and the
@@ -81,7 +75,7 @@ LeastSquaresResult EqualityElimination::reduce(Numbers A, Numbers b, int equalit
   for (std::size_t i = 0; i < c_; ++i)
     for (std::size_t j = 0; j < c_; ++j) A_reduced[i * c_ + j] = A[(e_ + i) * n + e_ + j] - YtY.row(i)[j];
 
-  double *x = zeros(x_, e_), *rest = zeros(rest_, c_);
+  double *x = x_.zeros(e_), *rest = rest_.zeros(c_);
   std::ranges::copy(b_e_, x);
   factor_.apply_pseudoinverse(x);
   for (std::size_t i = 0; i < e_; ++i) x[i] = -x[i];
@@ -95,7 +89,7 @@ void EqualityElimination::recover(Numbers f_c, std::span<double> f_e) {
   check_length("EqualityElimination::recover", "f_c", f_c.size(), c_);
   check_length("EqualityElimination::recover", "f_e", f_e.size(), e_);
   if (!valid_) return std::fill(f_e.begin(), f_e.end(), 0.0);
-  double *x = zeros(x_, e_), *f = zeros(rest_, c_);
+  double *x = x_.zeros(e_), *f = rest_.zeros(c_);
   std::ranges::copy(f_c, f);
   multiply_rows(x, A_ec_, nullptr, f, e_, c_);
   for (std::size_t i = 0; i < e_; ++i) x[i] += b_e_[i];

@@ -17,6 +17,12 @@ class AlignedBuffer {
     if (blocks > blocks_.size()) blocks_.assign(std::max(blocks, blocks_.size() + blocks_.size() / 2), Block{});
     return data();
   }
+  /// n numbers that are zero, and their padding.
+  double* zeros(std::size_t n) {
+    double* to = need(n);
+    std::fill_n(to, padded(n), 0.0);
+    return to;
+  }
   double* data() { return blocks_.empty() ? nullptr : blocks_.front().values; }
   const double* data() const { return blocks_.empty() ? nullptr : blocks_.front().values; }
 
