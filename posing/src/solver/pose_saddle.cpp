@@ -11,7 +11,6 @@ namespace {
 constexpr double kNegative = 1e-6;    // of the matrix: negative curvature that is more than round-off
 constexpr double kExhausted = 1e-10;  // what a direction adds to those before it, of itself
 constexpr int kMostDirections = 40;   // of Lanczos' method; a mechanism has as many as freedoms
-constexpr double kFirstTurn = 0.8;    // rad that the way first turns a body by at most
 constexpr int kHalvings = 30;
 constexpr double kLower = 1e-3;  // of the decrease that the curvature promises
 
@@ -20,12 +19,6 @@ VectorX uneven(Eigen::Index n) {
   VectorX out(n);
   for (Eigen::Index i = 0; i < n; ++i)
     out[i] = 2.0 * std::fmod(0.6180339887498949 * static_cast<double>(i + 1), 1.0) - 1.0;
-  return out;
-}
-
-double largest_turn(const VectorX& twists) {
-  double out = 0.0;
-  for (Eigen::Index d = 0; d < twists.size(); d += 6) out = std::max(out, twists.segment<3>(d).norm());
   return out;
 }
 
@@ -54,15 +47,14 @@ VectorX PoseSolver::surplus(const Curvature& curvature, const VectorX& twists) c
 PoseSolver::Descent PoseSolver::way_of_descent(const Pose& pose) {
   const std::vector<Mat3> R = rotations_of(pose.bodies);
   const BodyLoads acting = loads(*structure_, handles_, pose.bodies, R);
-  Linearised at = linearise(pose);
+  const Linearised at = linearise(pose);
   damping_ = 0.0;
   const Curvature curved = curvature(pose, acting, at);
   make_matrix(curved, R);
-  factor_.age = 0;
+  factor_.age = factor_.whole ? 0 : kAnew;
   pairs_.clear();
   last_.moved.resize(0);
   if (factor_.whole) return {};
-  factor_.age = -1;
   std::vector<Row> held;
   for (std::size_t i = 0; i < at.rows.size(); ++i)
     if (!at.pushes[i] || multipliers_[static_cast<Eigen::Index>(i)] > 0.0) held.push_back(at.rows[i]);
@@ -103,8 +95,8 @@ PoseSolver::Descent PoseSolver::way_of_descent(const Pose& pose) {
   Descent out{.way = ways.leftCols(n) * split.eigenvectors().col(n - 1), .curvature = 1.0 - surplus_most};
   const double turn = largest_turn(out.way);
   if (!(turn > 0.0)) return {};
-  out.curvature *= kFirstTurn * kFirstTurn / (turn * turn);
-  out.way *= kFirstTurn / turn;
+  out.curvature *= kLargestTurn * kLargestTurn / (turn * turn);
+  out.way *= kLargestTurn / turn;
   return out;
 }
 
@@ -126,7 +118,7 @@ bool PoseSolver::leave_saddle(Pose& pose, double& value) {
     }
     if (!found) continue;
     pose = std::move(best), value = lowest;
-    factor_.age = -1;
+    factor_.age = kAnew;
     return true;
   }
   return false;

@@ -15,14 +15,12 @@ namespace {
 // enough for round-off. A single body has nothing soft of its own; in a block of many, bending is far softer than its
 // links.
 constexpr double kProximal = 1e-7, kProximalOfLinked = 1e-8;
-constexpr double kLargestTurn = 0.8;  // rad of a body in one step: beyond, rotations are far from their linearisation
-constexpr double kFeasible = 1e-11;   // to which joints and limits are put back; of the size, rad
-constexpr double kSlack = 1e-12;      // a limit that is nearer counts as reached
-constexpr int kRestorations = 12;     // Newton steps to put a pose back onto its joints
-constexpr double kArmijo = 1e-4;      // of the decrease that the quadratic model promises
+constexpr double kFeasible = 1e-11;  // to which joints and limits are put back; of the size, rad
+constexpr double kSlack = 1e-12;     // a limit that is nearer counts as reached
+constexpr int kRestorations = 12;    // Newton steps to put a pose back onto its joints
+constexpr double kArmijo = 1e-4;     // of the decrease that the quadratic model promises
 // Levenberg–Marquardt damping, in units of the loads' own moments: what second derivatives that are left out amount to.
 constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLeastDamping = 1e-5, kLargestDamping = 1e6;
-constexpr int kAnew = -1;               // age of a matrix that is to be made
 constexpr double kNewtonSteps = 2.0;    // that a pose takes with a matrix just made
 constexpr int kShortenings = 2;         // of a step by a matrix that was made for an earlier pose
 constexpr double kLeastEnergy = 1e-12;  // of a step's decrease: what later ones are not worth
@@ -79,6 +77,12 @@ bool all_finite(const Pose& pose) {
 }
 
 }  // namespace
+
+double largest_turn(const VectorX& twists) {
+  double out = 0.0;
+  for (Eigen::Index d = 0; d < twists.size(); d += 6) out = std::max(out, twists.segment<3>(d).norm());
+  return out;
+}
 
 Feasibility feasibility(const PoseStructure& structure, const Pose& pose) {
   const JointRows rows = all_rows(structure, pose);
@@ -199,9 +203,7 @@ bool PoseSolver::make_feasible(Pose& pose, VectorX& correction) {
     solve_bounded(system_.compliance(at.rows), at.values(), at.pushes, lambda);
     VectorX step = VectorX::Zero(system_.interface_dofs());
     system_.subtract_response(at.rows, lambda, step);
-    double turn = 0.0;
-    for (Index d = 0; d < system_.interface_dofs(); d += 6) turn = std::max(turn, step.segment<3>(d).norm());
-    step *= std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn));
+    step *= kLargestTurn / std::max(largest_turn(step), kLargestTurn);
     for (std::size_t body = 0; body < pose.bodies.size(); ++body)
       if (const Index d = system_.interface_dof(static_cast<Index>(body)); d >= 0)
         pose.bodies[body] = moved(pose.bodies[body], step.segment<6>(d));
@@ -372,9 +374,7 @@ bool PoseSolver::matrix_pays(double promised, double value) const {
 PoseSolver::Step PoseSolver::step(Pose& pose, double& value) {
   const Linearised at = linearise(pose);
   const Direction way = direction(pose, at);
-  double turn = 0.0;
-  for (Index d = 0; d < system_.dofs(); d += 6) turn = std::max(turn, way.step.segment<3>(d).norm());
-  Trial trial = try_step(pose, way, std::min(1.0, kLargestTurn / std::max(turn, kLargestTurn)));
+  Trial trial = try_step(pose, way, kLargestTurn / std::max(largest_turn(way.step), kLargestTurn));
   Step out{.moved = trial.part * reach(way.step), .outcome = Step::Outcome::kRejected};
   const bool last =
       out.moved <= options_.tolerance || trial.promised <= options_.energy_tolerance * value + at.worth(multipliers_);

@@ -10,6 +10,12 @@
 
 namespace limber::internal {
 
+constexpr double kLargestTurn = 0.8;  // rad of a body in one step: beyond, rotations are far from their linearisation
+constexpr int kAnew = -1;             // age of a matrix that is to be made
+
+/// Rad, of the body that turns most. @param twists of bodies, six numbers each
+double largest_turn(const VectorX& twists);
+
 /// A pose and what of it is history: how often joints have turned round.
 struct Pose {
   BodyPoses bodies{};
@@ -102,7 +108,7 @@ class PoseSolver {
   VectorX multipliers_;  // of the last step's rows
   double damping_ = 0.0;
   struct {
-    int age = -1;           // steps that the matrix has been used for; −1: it is to be made anew
+    int age = kAnew;        // steps that the matrix has been used for
     double promised = 0.0;  // decrease by the step before
     bool whole = false;     // made of all second derivatives, and positive definite: the pose was near a minimum
   } factor_;
