@@ -71,14 +71,6 @@ void ExactMotion::at(double t, RigidTransform& pose, std::span<double> amplitude
     modes_at(t, i, std::min(kChunk, z_.size() - i), amplitudes.data() + i, unused.data());
 }
 
-void ExactMotion::rates_at(double t, Vec3& velocity, Vec3& angular_velocity, std::span<double> rates) const {
-  velocity = path_.velocity(t);
-  angular_velocity = path_.angular_velocity(t);
-  std::array<double, kChunk> unused;
-  for (std::size_t i = 0; i < z_.size(); i += kChunk)
-    modes_at(t, i, std::min(kChunk, z_.size() - i), unused.data(), rates.data() + i);
-}
-
 void ExactMotion::evaluate(double t, MotionState& state) const {
   state.time = t;
   state.pose = path_.pose(t);

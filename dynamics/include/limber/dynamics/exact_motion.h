@@ -44,8 +44,6 @@ class ExactMotion {
 
   /// @param t in [0, step]; no check, here and below. @param amplitudes modes() numbers
   void at(double t, RigidTransform& pose, std::span<double> amplitudes) const;
-  /// @param rates modes() numbers; where an impulse acts at t: after it
-  void rates_at(double t, Vec3& velocity, Vec3& angular_velocity, std::span<double> rates) const;
   double amplitude(Index mode, double t) const;
   /// Both at once.
   void evaluate(double t, MotionState& state) const;
