@@ -72,7 +72,7 @@ class BodyRegister {
     check_present(b, "exclude_pair");
     broad_phase_.exclude_pair(a, b, excluded);
   }
-  /// Their places hold no longer.
+  /// Their places count as unknown.
   void forget_places() {
     for (Body& body : bodies_) body.placed_asleep = false;
   }

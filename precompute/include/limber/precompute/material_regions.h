@@ -79,7 +79,8 @@ struct MaterialsFile {
 struct MaterialsFileOptions {
   /// A surface, in mesh coordinates; none: read_surface_mesh(), times `scale`.
   std::function<SurfaceMesh(const std::filesystem::path&)> read_surface{};
-  /// Closed shells that are a group of the body's own file, which they no longer bound; none: they are refused.
+  /// Closed shells that are a group of the body's own file and bound a region in place of the body; none: they are
+  /// refused.
   std::function<SurfaceMesh(const std::string& group)> take_group{};
   double scale = 1.0;  ///< metres per unit of a grid's file; > 0
 };
