@@ -434,9 +434,14 @@ HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[1
   }
 }
 
-/// @param bent what the modes give to the rows' numbers
+/// As PairBundle has them.
+struct Begun {
+  Vector begun, kept;
+};
+
+/// @param bent what the modes give to the rows' numbers. @param sums are added to
 HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], const Vector* bent, float share,
-                                    float most, std::size_t lane) {
+                                    float most, std::size_t lane, Begun& sums) {
   const Lanes d;
   const Vector zero = hn::Zero(d);
   Vector apart[3];
@@ -447,7 +452,12 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   const Vector part = hn::Min(hn::Mul(hn::Set(d, share), hn::Neg(hn::Add(gap, Get(c.slop, lane)))), hn::Set(d, most));
   Put(now, c.now, lane);
   Put(straight, c.gap, lane);
-  for (std::size_t t = 0; t < 2; ++t) Put(hn::Neg(bent[1 + t]), c.slip[t], lane);
+  sums.begun = hn::MulAdd(force, hn::Sub(straight, hn::Min(gap, zero)), sums.begun);
+  sums.kept = hn::MulAdd(yields, force, sums.kept);
+  for (std::size_t t = 0; t < 2; ++t) {
+    Put(hn::Neg(bent[1 + t]), c.slip[t], lane);
+    sums.begun = hn::NegMulAdd(Get(c.force[1 + t], lane), bent[1 + t], sums.begun);
+  }
   Put(hn::Sub(hn::Min(gap, zero), yields), c.target, lane);
   Put(force, c.before, lane);
   Put(zero, c.push, lane);
@@ -470,11 +480,14 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
       }
       Modes modes;
       ReadModes(all, bundle, shapes, lane, modes);
+      Begun sums{hn::Zero(d), hn::Zero(d)};
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         AddModes(bundle, RowsOf(all, bundle, k), modes, lane, bent);
-        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane)) bundle.overlaps = true;
+        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane, sums)) bundle.overlaps = true;
       }
+      Put(sums.begun, bundle.begun, lane);
+      Put(sums.kept, bundle.kept, lane);
     }
   }
 }
@@ -543,6 +556,18 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
   }
 }
 
+HWY_ATTR void ScaleBundleForces(const BundleArrays& all, const Block8* shares) {
+  for (std::size_t b = 0; b < all.count; ++b)
+    for (std::int32_t k = 0; k < all.bundles[b].count; ++k) {
+      BundleContact& c = all.contacts[all.bundles[b].first + k];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+          Put(hn::Mul(Get(shares[b], lane), Get(c.force[axis], lane)), c.force[axis], lane);
+          Put(hn::Mul(Get(shares[b], lane), Get(c.moment[axis], lane)), c.moment[axis], lane);
+        }
+    }
+}
+
 HWY_ATTR void AddUpBundles(const BundleArrays& all) {
   for (std::size_t b = 0; b < all.count; ++b)
     for (std::int32_t k = 0; k < all.bundles[b].count; ++k) {
@@ -566,6 +591,7 @@ HWY_EXPORT(SweepBundles);
 HWY_EXPORT(PushBundles);
 HWY_EXPORT(FindResiduals);
 HWY_EXPORT(ApplyBundleForces);
+HWY_EXPORT(ScaleBundleForces);
 HWY_EXPORT(AddUpBundles);
 
 void make_mode_rows(const ModePoint& point, Block8* rows) { HWY_DYNAMIC_DISPATCH(MakeModeRows)(point, rows); }
@@ -593,6 +619,10 @@ void find_residuals(const BundleArrays& bundles, const Block8* motion) {
 
 void apply_bundle_forces(const BundleArrays& bundles, Block8* motion) {
   HWY_DYNAMIC_DISPATCH(ApplyBundleForces)(bundles, motion);
+}
+
+void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares) {
+  HWY_DYNAMIC_DISPATCH(ScaleBundleForces)(bundles, shares);
 }
 
 void add_up_bundles(const BundleArrays& bundles) { HWY_DYNAMIC_DISPATCH(AddUpBundles)(bundles); }

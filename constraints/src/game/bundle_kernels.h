@@ -26,6 +26,9 @@ struct PairBundle {
   bool rolls = false;     // whether any resists rolling
   bool overlaps = false;  // whether any is to be pushed apart
   float residual = 0.0f;  // as residual_of_contacts()
+  // By lane, of the forces that the substep begins with: what they do along their gaps without J y, J, and twice what
+  // they keep in what yields.
+  Block8 begun, kept;
 };
 
 /// One contact in each lane; fields as those of ContactRow. A lane without a contact has masses and rows of 0.
@@ -80,6 +83,8 @@ void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);
 void find_residuals(const BundleArrays& bundles, const Block8* motion);
 /// As apply_forces().
 void apply_bundle_forces(const BundleArrays& bundles, Block8* motion);
+/// Leaves a share of each lane's forces. @param shares by bundle
+void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares);
 /// Adds up forces.
 void add_up_bundles(const BundleArrays& bundles);
 

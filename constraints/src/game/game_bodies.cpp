@@ -28,6 +28,8 @@ Quaternion turned(const Quaternion& q, const Vec3& cayley) {
   return normalized(Quaternion{1.0, 0.5 * cayley.x(), 0.5 * cayley.y(), 0.5 * cayley.z()} * q);
 }
 
+double sum_of(const double (&x)[8]) { return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])); }
+
 Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
 
 }  // namespace
@@ -177,8 +179,23 @@ void GameBodies::begin_substep_of(std::size_t at, int number) {
   write_vector(body.root_mass * body.v, frame.v);
   body.free_turn = free_turn(body, R);
   write_vector(body.free_turn, frame.v + 3);
+  double along[8] = {}, square[8] = {};
   for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
-    for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
+    for (int l = 0; l < 8; ++l) {
+      const auto y = static_cast<double>(free_[i].v[l]), q = static_cast<double>(answers_[i].v[l]);
+      motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
+      along[l] += q * y, square[l] += q * q;
+    }
+  body.along = sum_of(along), body.square = sum_of(square);
+}
+
+void GameBodies::scale_answer(std::size_t at, float share) {
+  const auto first = static_cast<std::size_t>(bodies_[at].first), blocks = static_cast<std::size_t>(bodies_[at].blocks);
+  for (std::size_t i = first; i < first + blocks; ++i)
+    for (int l = 0; l < 8; ++l) {
+      answers_[i].v[l] *= share;
+      motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
+    }
 }
 
 /// Held forces come at the substep's start, so that what rests has no velocity.

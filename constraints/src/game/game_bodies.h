@@ -49,11 +49,12 @@ struct GameBody {
   struct Start {
     Vec3 p = Vec3::Zero();
     Mat3 R = Mat3::Identity();
-  } start{};                  // pose at the step's start
-  Vec3 shift = Vec3::Zero();  // of the origin since then
-  Quaternion q{};             // attitude now
-  Vec3 v = Vec3::Zero();      // of the origin
-  Vec3 turn = Vec3::Zero();   // coordinates of the turn, L
+  } start{};                         // pose at the step's start
+  Vec3 shift = Vec3::Zero();         // of the origin since then
+  Quaternion q{};                    // attitude now
+  Vec3 v = Vec3::Zero();             // of the origin
+  Vec3 turn = Vec3::Zero();          // coordinates of the turn, L
+  double along = 0.0, square = 0.0;  // q·y_free and q·q as the substep begins
   // Of bodies that keep their axes: the turn of the substep at hand if nothing acted, ω; 1/(kg·m²), body axes.
   Vec3 free_turn = Vec3::Zero();
   Mat3 inverse_inertia = Mat3::Zero();
@@ -71,6 +72,8 @@ class GameBodies {
   void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
   void begin_substep(int number, Jobs& jobs);
+  /// Begins anew with a share of what a body's coordinates are answered by.
+  void scale_answer(std::size_t at, float share);
   /// Moves them by what the sweeps found, and by pushes.
   void end_substep(bool pushed, Jobs& jobs);
   /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
@@ -88,7 +91,8 @@ class GameBodies {
   // Arrays by block or by body have one at their end that stands.
   std::vector<Block8>& motion() { return motion_; }  ///< y
   const std::vector<Block8>& motion() const { return motion_; }
-  std::vector<Block8>& answers() { return answers_; }            ///< q, of what keeps its rows for the step
+  std::vector<Block8>& answers() { return answers_; }  ///< q, of what keeps its rows for the step
+  const std::vector<Block8>& answers() const { return answers_; }
   const std::vector<Block8>& shapes() const { return shapes_; }  ///< modes at the substep's start
   std::vector<Block8>& pushes() { return pushes_; }  ///< by body: displacements of frames that leave no speed
   const std::vector<Block8>& pushes() const { return pushes_; }

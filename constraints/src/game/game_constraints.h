@@ -16,6 +16,12 @@ class GameConstraints {
                  int number);
   /// Once the bodies have fallen: makes their motion meet the rows.
   void solve(GameBodies& bodies);
+  /// The same anew, where contacts begin with other forces.
+  void solve_again(GameBodies& bodies);
+  /// y by solve(), by body; none without rows.
+  std::span<const double> moved() const {
+    return rows_.groups().empty() ? std::span<const double>{} : std::span<const double>(moved_);
+  }
   /// Once the bodies have moved: closes what is open there. @param pushed whether GameBodies::pushes() moved them
   void close(const BodyStates& states, GameBodies& bodies, bool pushed);
   /// Tells the constraints what acted, and at the end of a step closes what close() has left.

@@ -100,6 +100,11 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
       put_in_bundle(states, bodies, i, options);
   bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
   sums_.assign(rows_.size(), Vec3::Zero());
+  islands_.reset(bodies.bodies().size());
+  for (const PreparedContact& contact : contacts) {
+    const std::int32_t a = bodies.of(contact.a.body), b = bodies.of(contact.b.body);
+    if (a >= 0 && b >= 0) islands_.join(a, b);
+  }
 }
 
 void GameContacts::put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t i,
@@ -264,6 +269,54 @@ bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& ste
   const bool rows_overlap = measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(),
                                              bodies.shifts().data(), kPushShare, most);
   return bundles_.overlap() || rows_overlap;
+}
+
+// With a share s of the forces f the sweeps begin at s a + ½ s² b, a = f·(gap + J y), b = f·(J Jᵀ + C) f, where no
+// force is at 0 and a sweep only goes down.
+bool GameContacts::limit_forces(GameBodies& bodies, std::span<const double> moved) {
+  begun_.assign(bodies.bodies().size() + 1, {});
+  add_begun(bodies, moved);
+  bool any = false;
+  for (Begun& begun : begun_) {
+    begun.share = begun.square > 0.0 ? std::clamp(-2.0 * begun.along / begun.square, 0.0, 1.0) : 1.0;
+    any = any || begun.share < 1.0;
+  }
+  if (any) scale_forces(bodies);
+  return any;
+}
+
+void GameContacts::add_begun(const GameBodies& bodies, std::span<const double> moved) {
+  for (std::size_t i = 0; i < bodies.bodies().size(); ++i) {
+    const GameBody& body = bodies.bodies()[i];
+    Begun& begun = begun_of(static_cast<std::int32_t>(i));
+    begun.along += body.along;
+    begun.square += body.square;
+    if (moved.empty()) continue;
+    const auto first = static_cast<std::size_t>(body.first);
+    for (std::size_t b = first; b < first + static_cast<std::size_t>(body.blocks); ++b)
+      for (std::size_t l = 0; l < 8; ++l)
+        begun.along += static_cast<double>(bodies.answers()[b].v[l]) * moved[8 * b + l];
+  }
+  bundles_.for_all_begun([&](std::int32_t frame, double along, double kept) {
+    Begun& begun = begun_of(frame);
+    begun.along += along;
+    begun.square += kept;
+  });
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    Begun& begun = begun_of(frame_of(bodies, i));
+    begun.along += static_cast<double>(rows_[i].begun);
+    begun.square += static_cast<double>(rows_[i].compliance * rows_[i].force[0] * rows_[i].force[0]);
+  }
+}
+
+void GameContacts::scale_forces(GameBodies& bodies) {
+  const auto share = [&](std::int32_t frame) { return static_cast<float>(begun_of(frame).share); };
+  bundles_.scale(share);
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    for (float& force : rows_[i].force) force *= share(frame_of(bodies, i));
+  for (RollingRow& rolling : rolling_)
+    for (float& moment : rolling.moment) moment *= share(frame_of(bodies, static_cast<std::size_t>(rolling.contact)));
+  for (std::size_t i = 0; i < bodies.bodies().size(); ++i) bodies.scale_answer(i, share(static_cast<std::int32_t>(i)));
 }
 
 void GameContacts::sweep(GameBodies& bodies, bool backward, Jobs& jobs) {

@@ -7,6 +7,7 @@
 #include "../prepared_contact.h"
 #include "game_bodies.h"
 #include "limber/constraints/small_steps.h"
+#include "limber/core/disjoint_sets.h"
 #include "pair_bundles.h"
 
 namespace limber::internal {
@@ -38,6 +39,10 @@ class GameContacts {
   void apply_last_forces(GameBodies& bodies, Jobs& jobs);
   /// Measures gaps. @return whether something is to be pushed apart
   bool begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs);
+  /// Of the forces that the substep begins with, those of the last one, leaves what adds no energy: of bodies that
+  /// contacts tie together the largest share. @param moved y by joints and handles; none: nothing. @return whether any
+  /// were too large
+  bool limit_forces(GameBodies& bodies, std::span<const double> moved);
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
   void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
   /// Adds up forces.
@@ -70,6 +75,20 @@ class GameContacts {
   void write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes);
   void join_sides(ContactRow& row);
   void find_masses(const GameBodies& bodies, ContactRow& row);
+  /// Of bodies that contacts tie together, as a substep begins: q·y and f·gap, q·q and f C f, and what of f is left.
+  struct Begun {
+    double along = 0.0, square = 0.0, share = 1.0;
+  };
+  Begun& begun_of(std::int32_t frame) {
+    return frame < 0 ? begun_.back() : begun_[static_cast<std::size_t>(islands_.root(frame))];
+  }
+  /// One that moves, of a row of `rows_`; −1: none.
+  std::int32_t frame_of(const GameBodies& bodies, std::size_t row) const {
+    const PreparedContact& contact = contacts_[numbers_[row]];
+    return std::max(bodies.of(contact.a.body), bodies.of(contact.b.body));
+  }
+  void add_begun(const GameBodies& bodies, std::span<const double> moved);
+  void scale_forces(GameBodies& bodies);
   Vec3 last_moment(const PreparedContact& contact) const;
   void add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius);
 
@@ -82,6 +101,8 @@ class GameContacts {
   std::vector<RollingRow> rolling_;
   std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;
+  DisjointSets islands_;       // of bodies that contacts tie together
+  std::vector<Begun> begun_;   // by the first body of an island, and of what does not move
   std::vector<double> modal_;  // scratch
 };
 

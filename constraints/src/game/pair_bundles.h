@@ -45,6 +45,14 @@ class PairBundles {
   double friction(std::size_t contact) const { return read(contact, &BundleContact::friction); }
   double compliance(std::size_t contact) const { return read(contact, &BundleContact::compliance); }
 
+  /// Visits all pairs as a substep begins: visit(frame, begun, kept), the frame one of the pair's that moves (−1:
+  /// none), the others as PairBundle has them.
+  template <class Visit>
+  void for_all_begun(const Visit& visit) const;
+  /// Leaves shares of the forces: share(frame) of a pair.
+  template <class Share>
+  void scale(const Share& share);
+
   /// Runs a kernel over all bundles, in parts.
   template <class Kernel>
   void for_all(Jobs& jobs, const Kernel& kernel);
@@ -87,13 +95,19 @@ class PairBundles {
   void empty(std::size_t bundle);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
   double read(std::size_t contact, Block8 BundleContact::*field) const;
+  /// −1: a lane without a pair.
+  std::int32_t frame_of(const PairBundle& bundle, std::size_t lane) const {
+    const std::int32_t a = bundle.frame[0][lane], b = bundle.frame[1][lane];
+    return a != standing_ ? a : b != standing_ ? b : -1;
+  }
 
   std::int32_t standing_ = 0, zeros_ = 0;
   std::vector<PairBundle> bundles_;
   std::vector<BundleContact> packed_;
-  std::vector<Block8> rows_;   // of modes
-  std::vector<Place> places_;  // by contact
-  std::vector<Lane> lanes_;    // by bundle
+  std::vector<Block8> rows_;    // of modes
+  std::vector<Block8> shares_;  // by bundle
+  std::vector<Place> places_;   // by contact
+  std::vector<Lane> lanes_;     // by bundle
   std::vector<Chunk> chunks_, ordered_;
   std::vector<std::int32_t> next_level_;  // by frame
   std::vector<std::int32_t> begins_;      // by level, in `ordered_`
@@ -111,6 +125,22 @@ void PairBundles::fill(Jobs& jobs, const Visit& visit) {
     }
   };
   jobs.parallel_for(bundles_.size(), kBundlesAtOnce, std::ref(part));
+}
+
+template <class Visit>
+void PairBundles::for_all_begun(const Visit& visit) const {
+  for (const PairBundle& bundle : bundles_)
+    for (std::size_t lane = 0; lane < kBundleLanes; ++lane)
+      visit(frame_of(bundle, lane), static_cast<double>(bundle.begun.v[lane]),
+            static_cast<double>(bundle.kept.v[lane]));
+}
+
+template <class Share>
+void PairBundles::scale(const Share& share) {
+  shares_.resize(bundles_.size());
+  for (std::size_t b = 0; b < bundles_.size(); ++b)
+    for (std::size_t lane = 0; lane < kBundleLanes; ++lane) shares_[b].v[lane] = share(frame_of(bundles_[b], lane));
+  scale_bundle_forces(arrays(), shares_.data());
 }
 
 template <class Kernel>

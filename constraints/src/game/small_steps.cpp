@@ -77,6 +77,7 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   bodies.begin_substep(number, jobs);
   const bool overlap = contacts.begin_substep(bodies, steps, jobs);
   constraints.solve(bodies);
+  if (contacts.limit_forces(bodies, constraints.moved())) constraints.solve_again(bodies);
   for (const bool backward : {false, true}) contacts.sweep(bodies, backward, jobs);
   if (overlap) {
     std::ranges::fill(bodies.pushes(), internal::Block8{});

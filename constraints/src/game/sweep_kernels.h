@@ -47,7 +47,8 @@ struct ContactRow {
   float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap
   float now = 0.0f;                               // the gap at the substep's start
   float force[3] = {}, before = 0.0f;             // the latter: along the normal in the last substep
-  float push = 0.0f, part = 0.0f;                 // what displaces frames; how far they are to part in the substep, m
+  float begun = 0.0f;              // what the forces that the substep begins with do along the gap without J y, J
+  float push = 0.0f, part = 0.0f;  // what displaces frames; how far they are to part in the substep, m
 };
 
 /// Resistance of a round contact to rolling and spinning: a moment up to `radius` times the contact's normal force.
