@@ -114,7 +114,7 @@ TEST(GameJoints, AHeavyEndThatDropsOnTheGroundLeavesItsLinksClosed) {
   Chain chain(10, Vec3::UnitX(), 1e4, 0, {.solver = ContactSolver::kGame, .small_steps = {8}}, 3.0);
   for (int i = 0; i < 120; ++i) {
     chain.step(1);
-    EXPECT_LT(chain.opening(), 2e-6) << i;
+    EXPECT_LT(chain.opening(), 1e-8) << i;
   }
   EXPECT_LT(chain.world.body(chain.bodies.back()).pose.p.z(), 0.2);
 }

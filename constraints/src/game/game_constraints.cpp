@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace limber::internal {
 namespace {
@@ -29,6 +31,18 @@ void add(const GameBodies& bodies, std::span<const std::int32_t> frames, std::sp
     for (auto b = static_cast<std::size_t>(body.first); b < static_cast<std::size_t>(body.first + body.blocks); ++b)
       for (std::size_t l = 0; l < 8; ++l) to[b].v[l] += static_cast<float>(factor * y[8 * b + l]);
   }
+}
+
+/// The s in [0, 1] at which (1 − s)² before + 2 (1 − s) s² both + s⁴ after is least, by bisection of its slope.
+double least_open(const GameConstraints::Closing& sums) {
+  const auto slope = [&](double s) {
+    return -2.0 * (1.0 - s) * sums.before + (4.0 - 6.0 * s) * s * sums.both + 4.0 * s * s * s * sums.after;
+  };
+  if (slope(1.0) <= 0.0) return 1.0;
+  double low = 0.0, high = 1.0;
+  for (int i = 0; i < std::numeric_limits<double>::digits; ++i)
+    (slope(0.5 * (low + high)) < 0.0 ? low : high) = 0.5 * (low + high);
+  return high;
 }
 
 }  // namespace
@@ -264,12 +278,49 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
 /// of least displacement: a chain all but straight is closed by its heavy end, not by links thrown out sideways.
 void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
   for (GameRow& row : rows_.rows()) row.closing = 0.0;
-  for (int round = 0;; ++round) {
-    find_errors(states);
-    if (residual_ <= kRounded || round == kMostClosings) return;
+  find_errors(states);
+  for (int round = 0; residual_ > kRounded && round < kMostClosings; ++round) {
     rows_.linearise_again(states, bodies);
     system_.factor(rows_, true);
     close_errors(bodies);
+    find_errors(states);
+    if (residual_ > kRounded && find_closing_shares()) {
+      shorten_closing(bodies);
+      find_errors(states);
+    }
+  }
+}
+
+/// By component, what share of the last closing leaves least open: with s of it (1 − s) before + s² after, to second
+/// order. @return whether any is less than all
+bool GameConstraints::find_closing_shares() {
+  closings_.assign(taken_.size(), {});
+  const std::span<const GameGroup> groups = rows_.groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    Closing& closing = closings_[system_.component(groups[g])];
+    for (const std::int32_t i : system_.met(g)) {
+      const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
+      if (!row.keeps_place) continue;
+      const double after = row.hold == Hold::kMet ? row.error : 0.0;
+      closing.before += row.error_before * row.error_before;
+      closing.both += row.error_before * after;
+      closing.after += after * after;
+    }
+  }
+  given_.resize(closings_.size());
+  std::ranges::transform(closings_, given_.begin(), least_open);
+  return std::ranges::any_of(given_, [](double share) { return share < 1.0; });
+}
+
+/// By the shares in `given_`.
+void GameConstraints::shorten_closing(GameBodies& bodies) {
+  for (const std::int32_t frame : system_.frames()) {
+    const GameBody& body = bodies.body(frame);
+    const double back = given_[system_.component(frame)] - 1.0;
+    double* place = place_.data() + 8 * body.first;
+    if (back == 0.0) continue;
+    for (std::int32_t l = 0; l < 8 * body.blocks; ++l) place[l] *= back;
+    bodies.displace(frame, speed_.data() + 8 * body.first, place);
   }
 }
 
@@ -283,7 +334,7 @@ void GameConstraints::find_errors(const BodyStates& states) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       GameRow& row = rows[i];
       if (!row.keeps_place) continue;
-      row.error = gaps_[i] - row.left;
+      row.error_before = std::exchange(row.error, gaps_[i] - row.left);
       if (row.is_bounded()) {
         const bool from_below = row.lower == 0.0, passed = from_below ? row.error < 0.0 : row.error > 0.0;
         row.hold = passed ? Hold::kMet : from_below ? Hold::kLower : Hold::kUpper;

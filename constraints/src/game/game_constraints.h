@@ -11,6 +11,11 @@ namespace limber::internal {
 
 class GameConstraints {
  public:
+  /// Sums over rows of what was open before a closing and is after it, squared.
+  struct Closing {
+    double before = 0.0, both = 0.0, after = 0.0;
+  };
+
   /// The rows of a substep, from where it begins. @param number of the substep, 0 …
   void make_rows(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                  int number);
@@ -48,6 +53,8 @@ class GameConstraints {
   void close_step(const BodyStates& states, GameBodies& bodies);
   void find_errors(const BodyStates& states);
   void close_errors(GameBodies& bodies);
+  bool find_closing_shares();
+  void shorten_closing(GameBodies& bodies);
 
   GameRows rows_;
   RowSystem system_;
@@ -57,6 +64,7 @@ class GameConstraints {
   std::vector<double> right_, asked_;           // of the system
   std::vector<double> speed_, place_, pushes_;  // in the rows' coordinates
   std::vector<double> gaps_, forces_, products_;  // of a group: scratch
+  std::vector<Closing> closings_;                 // by component
   double residual_ = 0.0;
 };
 

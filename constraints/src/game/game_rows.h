@@ -23,6 +23,7 @@ struct GameRow {
   double compliance = 0.0;                         // gap per force
   double rate = 0.0;                               // what the gap is to change by in the substep
   double error = 0.0;                              // of its gap at the substep's start, which displacements undo
+  double error_before = 0.0;                       // the same, before the last closing
   double left = 0.0;                               // of the step's first error, what the step does not undo
   double force = 0.0;                              // held over the substep
   double closing = 0.0;                            // displaces the bodies at the step's end: the last such force
