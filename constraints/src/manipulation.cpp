@@ -74,8 +74,8 @@ Vec3 acceleration(const ConstrainedBody& body, const BodyStates& states, const M
     point.side(at, velocity, modal);
     for (std::size_t i = 0; i < modal.size(); ++i) vibrating[axis] += modal[i] * bent[i];
   }
-  return gravity + group.held_force(body.slot) / c.mass + alpha.cross(arm) + omega.cross(omega.cross(arm)) +
-         2.0 * omega.cross(deforming) + vibrating;
+  return group.own_gravity(body.slot, gravity) + group.held_force(body.slot) / c.mass + alpha.cross(arm) +
+         omega.cross(omega.cross(arm)) + 2.0 * omega.cross(deforming) + vibrating;
 }
 
 void check(std::span<const ConstrainedBody> table, std::span<const PointWish> wishes,
@@ -153,7 +153,8 @@ class Manipulation {
   Eigen::VectorXd wanted_less_coming() {
     if (options_.level != ManipulationLevel::kAcceleration && options_.level != ManipulationLevel::kVelocity)
       for (Index b = 0; b < bodies_.count(); ++b)
-        bodies_.body(b).group->predict(bodies_.body(b).slot, options_.gravity);
+        bodies_.body(b).group->predict(bodies_.body(b).slot,
+                                       bodies_.body(b).group->own_gravity(bodies_.body(b).slot, options_.gravity));
     Eigen::VectorXd missing(static_cast<Eigen::Index>(wishes_.size()));
     for (std::size_t i = 0; i < wishes_.size(); ++i) {
       const PointWish& wish = wishes_[i];

@@ -190,7 +190,7 @@ void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
   Body& b = body(slot);
   keep_previous_state(slot);
 
-  const FrameLoad load{gravity, b.force, b.torque};
+  const FrameLoad load{own_gravity(slot, gravity), b.force, b.torque};
   const double h = step_length();
   const ModeArrays modes{now_.amplitudes.row(slot), now_.rates.row(slot), now_.forces.row(slot)};
   const FrameExcitation excitation = b.frame.begin_step(constants_, load, first_moment(slot), h);
@@ -455,7 +455,8 @@ double BodyGroup::predicted_dissipation(Index slot) const {
 BodyEnergy BodyGroup::energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
                                 std::span<const double> answer, const Vec3& gravity) const {
   const Vec3 mass_times_center = constants_.mass * frame.pose().p + frame.pose().q * first_moment_of(z);
-  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(constants_), .potential = -gravity.dot(mass_times_center)};
+  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(constants_),
+                    .potential = -frame.settings().gravity_scale * gravity.dot(mass_times_center)};
   for (std::size_t i = 0; i < z.size(); ++i) {
     const double c = answer.empty() ? 0.0 : answer[i], vibrating = z[i] - c;
     energy.kinetic_modal += 0.5 * rates[i] * rates[i];

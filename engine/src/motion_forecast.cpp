@@ -76,17 +76,19 @@ void MotionForecast::write_awake(Index body) {
   else
     expect_exact(body, state);
   state.end_amplitudes = end_amplitudes_[static_cast<std::size_t>(body)];
-  state.reach += state.doubt + fall_.norm();
+  state.reach += state.doubt + std::abs(group.frame(e.slot).settings().gravity_scale) * fall_.norm();
 }
 
-/// A free body goes on with its velocities, its modes no farther than they would swing by these: what lies on something
-/// does not fall.
+/// A free body goes on with its velocities, by which damping brings it less far; its modes no farther than they would
+/// swing by these: what lies on something does not fall.
 void MotionForecast::expect_steady(Index body, BodyState& state) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
   const RigidFrame& frame = group.frame(e.slot);
-  state.displacement = length_ * frame.velocity();
-  state.rotation = length_ * frame.angular_velocity(group.frame_constants());
+  const double goes = Decay(frame.settings().linear_damping * length_).first,
+               turns = Decay(frame.settings().angular_damping * length_).first;
+  state.displacement = length_ * goes * frame.velocity();
+  state.rotation = length_ * turns * frame.angular_velocity(group.frame_constants());
   state.end_pose = {quaternion_from_rotation_vector(state.rotation) * state.pose.q, state.pose.p + state.displacement};
   std::vector<double>& end = end_amplitudes_[static_cast<std::size_t>(body)];
   end.resize(state.amplitudes.size());
@@ -99,14 +101,15 @@ void MotionForecast::expect_steady(Index body, BodyState& state) {
     arm += shape[i] * std::abs(state.amplitudes[i]);
     bends += shape[i] * std::abs(change);
   }
-  state.reach = 2.0 * std::sin(0.5 * std::min(state.rotation.norm(), std::numbers::pi)) * arm + bends;
+  state.reach = 2.0 * std::sin(0.5 * std::min(state.rotation.norm(), std::numbers::pi)) * arm + bends +
+                (1.0 - goes) * length_ * frame.velocity().norm();
 }
 
 /// One that is led, hangs, or bends by its skin: by itself, as far as it comes.
 void MotionForecast::expect_exact(Index body, BodyState& state) {
   const BodyTable::Entry& e = (*bodies_)[body];
   const BodyGroup& group = bodies_->group(e);
-  group.predict_motion(e.slot, gravity_, length_, motion_);
+  group.predict_motion(e.slot, group.own_gravity(e.slot, gravity_), length_, motion_);
   if (e.shape) motion_.set_modes({}, {}, {}, {});
   std::vector<double>& end = end_amplitudes_[static_cast<std::size_t>(body)];
   end.resize(state.amplitudes.size());

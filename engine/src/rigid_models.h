@@ -12,14 +12,19 @@ class RigidModels {
  public:
   /// That of a body that has it still, or a new one.
   RigidModel get(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
+  /// The same of one that is led.
+  RigidModel get_kinematic(const std::shared_ptr<const Shape>& shape);
 
  private:
   struct Made {
     std::weak_ptr<const Shape> of{};
-    MassProperties mass{};
+    MassProperties mass{};  // 0 kg: led
     std::weak_ptr<const ModalModel> model{};
     std::weak_ptr<const Shape> shape{};
   };
+  template <class Make>
+  RigidModel find_or_make(const std::shared_ptr<const Shape>& shape, const MassProperties& mass, const Make& make);
+
   std::vector<Made> made_;
 };
 

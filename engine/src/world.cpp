@@ -25,6 +25,21 @@ double checked(std::optional<double> friction, ContactSolver solver, const char*
   return friction.value_or(kNotGiven);
 }
 
+const FrameSettings& settings_of(const internal::BodyTable& bodies, BodyId id, const char* function) {
+  const Entry& e = bodies.entry(id, function);
+  return bodies.group(e).frame(e.slot).settings();
+}
+
+/// @param motion of the body's model
+void check(const FrameSettings& settings, FrameMotion motion, ContactSolver solver, const char* function) {
+  settings.validate();
+  const std::string in = std::string("World::") + function + ": ";
+  if (motion != FrameMotion::kFree && (settings.linear_damping > 0.0 || settings.locks.any()))
+    throw InvalidArgument(in + "the body has fixed nodes, expected no linear damping and no locked axes");
+  if (solver == ContactSolver::kExact && settings.alter_free_motion())
+    throw InvalidArgument(in + "damping and locked axes are for ContactSolver::kGame");
+}
+
 }  // namespace
 
 void SleepOptions::validate() const {
@@ -65,6 +80,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
   const double friction = checked(placement.friction, impl_->paths.solver, "add_body");
+  check(placement.frame, model->data().motion, impl_->paths.solver, "add_body");
   if (placement.shape) {
     validate(*placement.shape);
     if (std::holds_alternative<HalfSpace>(*placement.shape))
@@ -76,6 +92,8 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   const Index group = m.bodies.group_of(std::move(model), m.parts.length());
   BodyGroup& bodies = *m.bodies.model_group(group).bodies;
   const Index slot = bodies.add(placement.pose, placement.velocity, placement.angular_velocity, skinned);
+  bodies.set_frame_settings(slot, placement.frame);
+  bodies.set_velocity(slot, placement.velocity, placement.angular_velocity);
   const BodyId id = m.bodies.add({.group = group,
                                   .slot = slot,
                                   .shape = placement.shape,
@@ -103,6 +121,20 @@ BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, const MassPro
 BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement) {
   if (!shape) throw InvalidArgument("World::add_rigid: the shape is null");
   return add_rigid(shape, mass_properties(*shape, density), placement);
+}
+
+BodyId World::add_kinematic(const std::shared_ptr<const Shape>& shape, const BodyPlacement& placement) {
+  if (placement.shape) throw InvalidArgument("World::add_kinematic: placement.shape is given, expected none");
+  BodyPlacement placed = placement;
+  placed.shape = shape;
+  return add_body(impl_->rigid.get_kinematic(shape).model, placed);
+}
+
+BodyType World::body_type(BodyId id) const {
+  const Entry& e = impl_->bodies.any_entry(id, "body_type");
+  if (e.group < 0) return BodyType::kStatic;
+  const bool led = impl_->bodies.group(e).frame_constants().motion == FrameMotion::kKinematic;
+  return led ? BodyType::kKinematic : BodyType::kDynamic;
 }
 
 BodyId World::add_sensor(std::shared_ptr<const Shape> shape, const RigidTransform& pose,
@@ -262,6 +294,37 @@ void World::set_gravity(const Vec3& gravity) {
   require_finite(gravity, "set_gravity", "gravity");
   impl_->sleep.wake_all();
   impl_->options.gravity = gravity;
+}
+
+FrameSettings World::frame_settings(BodyId id) const { return settings_of(impl_->bodies, id, "frame_settings"); }
+
+void World::set_frame_settings(BodyId id, const FrameSettings& settings, const char* function) {
+  const Entry& e = impl_->bodies.entry(id, function);
+  BodyGroup& group = impl_->bodies.group(e);
+  check(settings, group.frame_constants().motion, impl_->paths.solver, function);
+  const auto body = static_cast<Index>(id.index);
+  impl_->sleep.wake(body);
+  group.set_frame_settings(e.slot, settings);
+  impl_->constraints.disturb(body);
+}
+
+void World::set_gravity_scale(BodyId id, double scale) {
+  FrameSettings settings = settings_of(impl_->bodies, id, "set_gravity_scale");
+  settings.gravity_scale = scale;
+  set_frame_settings(id, settings, "set_gravity_scale");
+}
+
+void World::set_damping(BodyId id, double linear, double angular) {
+  FrameSettings settings = settings_of(impl_->bodies, id, "set_damping");
+  settings.linear_damping = linear;
+  settings.angular_damping = angular;
+  set_frame_settings(id, settings, "set_damping");
+}
+
+void World::set_locks(BodyId id, const AxisLocks& locks) {
+  FrameSettings settings = settings_of(impl_->bodies, id, "set_locks");
+  settings.locks = locks;
+  set_frame_settings(id, settings, "set_locks");
 }
 
 // Loads ---------------------------------------------------------------------------------------------------------------

@@ -213,6 +213,12 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   const auto sticks = [](const Entry& e) { return e.alive && std::isinf(e.friction); };
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), sticks))
     throw InvalidArgument("World::set_contact_source: a body has infinite friction, expected ContactSolver::kGame");
+  const auto is_damped = [&](const Entry& e) {
+    return e.alive && e.group >= 0 && m.bodies.group(e).frame(e.slot).settings().alter_free_motion();
+  };
+  if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), is_damped))
+    throw InvalidArgument(
+        "World::set_contact_source: a body has damping or locked axes, expected ContactSolver::kGame");
   m.paths.reset(options);
   m.drawing.forget_all();
   m.sleep.wake_all();

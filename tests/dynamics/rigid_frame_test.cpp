@@ -314,5 +314,100 @@ TEST(RigidFrame, KineticEnergyIsThatOfTheParticles) {
   }
 }
 
+TEST(RigidFrame, DecayIsWhatExponentialsSay) {
+  EXPECT_EQ(Decay(0.0).left, 1.0);
+  EXPECT_EQ(Decay(0.0).first, 1.0);
+  EXPECT_EQ(Decay(0.0).second, 0.5);
+  for (const double x : {1e-12, 1e-6, 0.01, 0.5, std::nextafter(1.0, 0.0), 1.0, 3.0, 40.0}) {
+    const Decay decay(x);
+    EXPECT_NEAR(decay.left, std::exp(-x), 4 * kEpsilon) << x;
+    EXPECT_NEAR(decay.first, -std::expm1(-x) / x, 4 * kEpsilon) << x;
+    const double second = x < 0.01 ? 0.5 - x / 6.0 : (x + std::expm1(-x)) / (x * x);
+    EXPECT_NEAR(decay.second, second, 1e-12 + x * x * (x < 0.01)) << x;
+  }
+}
+
+/// v̇ = a − c v, L̇ = −c L: the same end by one step as by many, and that of the formulas.
+TEST(RigidFrame, DampedFlightIsExactForAnyStep) {
+  const ModalModelData data = sample_model_data({});
+  const FrameConstants c(data);
+  constexpr double kLinear = 0.7, kAngular = 1.3, kTime = 2.0;
+  const Vec3 v(1, -2, 3), omega(0.5, 3.0, -0.2);
+  RigidFrame whole(c, {}, v, omega);
+  whole.set_settings(c, {.linear_damping = kLinear, .angular_damping = kAngular});
+  RigidFrame parts = whole, undamped(c, {}, v, omega);
+  const Vec3 L = whole.angular_momentum(c);
+  step(whole, c, {.gravity = kDown}, kTime);
+  for (int i = 0; i < 100; ++i) step(parts, c, {.gravity = kDown}, kTime / 100);
+  const double left = std::exp(-kLinear * kTime);
+  const Vec3 terminal = kDown / kLinear;
+  EXPECT_LT((whole.velocity() - (terminal + left * (v - terminal))).norm(), 1e-14 * terminal.norm());
+  EXPECT_LT((whole.pose().p - (kTime * terminal + (1.0 - left) / kLinear * (v - terminal))).norm(), 1e-13);
+  EXPECT_LT((whole.angular_momentum(c) - std::exp(-kAngular * kTime) * L).norm(), 1e-14 * L.norm());
+  step(undamped, c, {}, -std::expm1(-kAngular * kTime) / kAngular);
+  EXPECT_LT(angle_between(whole.pose().q, undamped.pose().q), 1e-12);
+  EXPECT_LT((whole.pose().p - parts.pose().p).norm(), 1e-13);
+  EXPECT_LT((whole.velocity() - parts.velocity()).norm(), 1e-13);
+  EXPECT_LT(angle_between(whole.pose().q, parts.pose().q), 1e-11);
+}
+
+/// The path that searches follow ends where the step does.
+TEST(RigidFrame, ThePathOfADampedOrLockedFrameEndsAtItsEnd) {
+  const FrameConstants c(sample_model_data({}));
+  const FrameSettings damped{.linear_damping = 2.0, .angular_damping = 3.0},
+      locked{.locks = {.translation = {true, false, false}, .rotation = {false, true, true}}};
+  for (const FrameSettings& settings : {damped, locked}) {
+    RigidFrame frame(c, {}, {1, -2, 3}, {0.5, 3.0, -0.2});
+    frame.set_settings(c, settings);
+    FramePath path;
+    constexpr double h = 0.1;
+    frame.begin_step(c, {.gravity = kDown}, Vec3::Zero(), h, &path);
+    frame.end_step(c, {.gravity = kDown}, Vec3::Zero(), h, &path);
+    const RigidTransform almost = path.pose(h * (1.0 - 1e-13));
+    EXPECT_LT((almost.p - frame.pose().p).norm(), 1e-12);
+    EXPECT_LT(angle_between(almost.q, frame.pose().q), 1e-12);
+    EXPECT_EQ(path.velocity(h), frame.velocity());
+  }
+}
+
+/// One axis left: e·L and so ω stay, whatever the body's axes are.
+TEST(RigidFrame, ABodyThatMayTurnAboutOneAxisTurnsSteadily) {
+  const ModalModelData data = sample_model_data({});
+  const FrameConstants c(data);
+  const Quaternion q = quaternion_from_rotation_vector({1.0, 0.3, -0.5});
+  RigidFrame frame(c, {.q = q}, {1, 2, 3}, {0.5, 3.0, -0.2});
+  const Vec3 L = frame.angular_momentum(c);
+  frame.set_settings(c, {.locks = {.translation = {false, true, false}, .rotation = {true, false, true}}});
+  const Mat3 inertia = to_matrix(q) * data.inertia * to_matrix(q).transpose();
+  const double rate = L.y() / inertia(1, 1);
+  EXPECT_EQ(frame.velocity(), Vec3(1, 0, 3));
+  for (int i = 0; i < 50; ++i) step(frame, c, {.gravity = {0, -5, 0}, .torque = {3, 0, 4}}, 0.1);
+  EXPECT_LT((frame.angular_velocity(c) - Vec3(0, rate, 0)).norm(), 1e-12 * rate);
+  EXPECT_LT(angle_between(frame.pose().q, quaternion_from_rotation_vector({0, 5.0 * rate, 0}) * q), 1e-10);
+  EXPECT_LT((frame.pose().p - Vec3(5, 0, 15)).norm(), 1e-12);
+}
+
+/// Two axes left, a rolling constraint: what holds ω_z at 0 does no work and has no moment about the others.
+TEST(RigidFrame, ABodyThatMayTurnAboutTwoAxesKeepsEnergyAndMomentumAboutThem) {
+  const FrameConstants c(sample_model_data({}));
+  RigidFrame frame(c, {}, Vec3::Zero(), Vec3::Zero());
+  frame.set_settings(c, {.locks = {.rotation = {false, false, true}}});
+  frame.set_velocity(c, Vec3::Zero(), {2.0, 3.0, 5.0});
+  EXPECT_LT((frame.angular_velocity(c) - Vec3(2.0, 3.0, 0.0)).norm(), 1e-14);
+  const Vec3 L = frame.angular_momentum(c);
+  const double energy = frame.kinetic_energy(c);
+  double drift = 0.0, turned = 0.0;
+  for (int i = 0; i < 2400; ++i) {
+    const Vec3 before = frame.angular_velocity(c);
+    step(frame, c, {}, 1.0 / 240.0);
+    EXPECT_EQ(frame.angular_velocity(c).z(), 0.0);
+    drift = std::max(drift, std::abs(frame.kinetic_energy(c) / energy - 1.0));
+    turned = std::max(turned, (frame.angular_velocity(c) - before).norm());
+  }
+  EXPECT_LT((frame.angular_momentum(c) - L).head<2>().norm(), 1e-12 * L.norm());
+  EXPECT_LT(drift, 1e-4);  // of a rule of second order
+  EXPECT_GT(turned, 0.0);
+}
+
 }  // namespace
 }  // namespace limber

@@ -77,6 +77,23 @@ TEST(SceneFile, ABodyTouchesItselfIfToldSoAndIfItDeforms) {
                InputError);
 }
 
+TEST(SceneFile, ABodyMayHaveItsShareOfGravityDampingAndLocks) {
+  const std::string with = R"({"name": "bell", "asset": "bell", )";
+  const FrameSettings s = parse(scene_with(with + R"("gravity_scale": -0.5, "damping": {"linear": 2, "angular": 3},
+                                                     "locks": {"translation": ["x", "z"], "rotation": ["y"]}})"))
+                              .bodies.at(0)
+                              .placement.frame;
+  EXPECT_EQ(s.gravity_scale, -0.5);
+  EXPECT_EQ(s.linear_damping, 2.0);
+  EXPECT_EQ(s.angular_damping, 3.0);
+  EXPECT_EQ(s.locks, (AxisLocks{.translation = {true, false, true}, .rotation = {false, true, false}}));
+  for (const char* wrong : {R"("damping": {"linear": -1}})", R"("damping": {"turning": 1}})", R"("locks": ["x"]})",
+                            R"("locks": {"translation": ["w"]}})", R"("locks": {"rotation": "x"}})"})
+    EXPECT_THROW(parse(scene_with(with + wrong)), InputError) << wrong;
+  EXPECT_THROW(parse(scene_with(with + R"("locks": {"rotation": ["x"]}})", R"("solver": "exact")")), InputError);
+  EXPECT_THROW(parse(scene_with(with + R"("damping": {"linear": 1}})", R"("solver": "exact")")), InputError);
+}
+
 /// [H03]'s rules are read where limber::hauser is built; elsewhere they are refused by name.
 TEST(SceneFile, ARuleForContactsIsReadOrRefusedAsTheBuildHasIt) {
   const std::string told = scene_with(R"({"name": "bell", "asset": "bell"})",

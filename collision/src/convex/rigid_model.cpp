@@ -80,6 +80,17 @@ struct About {
   }
 };
 
+/// @param made its shape @param solid of the given shape
+void make_model(RigidModel& made, const char* name, double volume, ModalModelData data) {
+  data.name = name;
+  data.volume = volume;
+  const TriangleMesh drawn = surface_of(*made.shape, Vec3::Zero(), 1.0);
+  for (const Vec3& p : drawn.vertices) data.render.rest.push_back(p.cast<float>());
+  data.render.triangles = drawn.triangles;
+  data.render.basis = ModalBasis(static_cast<Index>(drawn.vertices.size()), 0);
+  made.model = std::make_shared<const ModalModel>(std::move(data));
+}
+
 constexpr std::array<const char*, std::variant_size_v<Shape>> kNames{"half-space", "ball", "capsule",     "box",
                                                                      "hull",       "mesh", "height field"};
 
@@ -112,18 +123,27 @@ RigidModel make_rigid_model(const std::shared_ptr<const Shape>& shape, const Mas
   if (!mass.center_of_mass.allFinite()) throw InvalidArgument("make_rigid_model: center_of_mass is not finite");
   RigidModel made{nullptr, shape};
   ModalModelData data;
-  data.volume = solid_of(*shape).volume;
+  const double volume = solid_of(*shape).volume;
   if (!mass.center_of_mass.isZero(0.0))
     made.shape = std::make_shared<const Shape>(std::visit(About{mass.center_of_mass}, *shape));
-  data.name = kNames[shape->index()];
   data.mass = mass.mass;
   data.inertia = mass.inertia;
   data.origin_in_input = mass.center_of_mass;
-  const TriangleMesh drawn = surface_of(*made.shape, Vec3::Zero(), 1.0);
-  for (const Vec3& p : drawn.vertices) data.render.rest.push_back(p.cast<float>());
-  data.render.triangles = drawn.triangles;
-  data.render.basis = ModalBasis(static_cast<Index>(drawn.vertices.size()), 0);
-  made.model = std::make_shared<const ModalModel>(std::move(data));
+  make_model(made, kNames[shape->index()], volume, std::move(data));
+  return made;
+}
+
+RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape) {
+  if (!shape) throw InvalidArgument("make_kinematic_model: the shape is null");
+  const SolidProperties solid = solid_of(*shape);
+  constexpr double kWater = 1000.0;  // kg/m³: nothing asks how heavy it is, but for its energy
+  ModalModelData data;
+  data.motion = FrameMotion::kKinematic;
+  data.mass = kWater * solid.volume;
+  data.inertia = kWater * (solid.inertia + solid.volume * (solid.centroid.squaredNorm() * Mat3::Identity() -
+                                                           solid.centroid * solid.centroid.transpose()));
+  RigidModel made{nullptr, shape};
+  make_model(made, kNames[shape->index()], solid.volume, std::move(data));
   return made;
 }
 

@@ -32,6 +32,8 @@ double sum_of(const double (&x)[8]) { return ((x[0] + x[1]) + (x[2] + x[3])) + (
 
 Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
 
+bool turns_locked(const FrameSettings& settings) { return settings.locks.rotation != AxisLocks{}.rotation; }
+
 }  // namespace
 
 SubstepModes& GameBodies::modes_of(const ModalModel& model) {
@@ -85,6 +87,8 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
   body.v = frame.velocity();
   if (c.motion == FrameMotion::kKinematic) return;
   if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (frame.settings().locks.translation[i]) body.goes[static_cast<Eigen::Index>(i)] = 0.0;
   body.roots = c.motion == FrameMotion::kLine ? Vec3(std::sqrt(line_inertia(c)), 0.0, 0.0)
                                               : Vec3(c.principal.moments.cwiseSqrt());
   set_axes(body, turned(body.q, 0.5 * plan_.step * frame.angular_velocity(c)));
@@ -96,10 +100,17 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
 
 void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
   const FrameConstants& c = body.group->frame_constants();
-  if (c.motion == FrameMotion::kLine)
+  if (c.motion == FrameMotion::kLine) {
     body.turn_scale.row(0) = (attitude * c.line_axis).transpose() / body.roots.x();
-  else
+  } else if (turns_locked(settings(body))) {
+    const Mat3 R = to_matrix(attitude);
+    const TurnAxes turns(R * c.inertia * R.transpose(), settings(body).locks);
+    body.roots = turns.moments.cwiseSqrt();
+    for (Eigen::Index i = 0; i < 3; ++i)
+      if (body.roots[i] > 0.0) body.turn_scale.row(i) = turns.axes.col(i).transpose() / body.roots[i];
+  } else {
     body.turn_scale = body.roots.cwiseInverse().asDiagonal() * to_matrix(attitude * c.principal.q_BP).transpose();
+  }
 }
 
 void GameBodies::turn_axes() {
@@ -117,7 +128,7 @@ void GameBodies::turn_axes() {
 /// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
 /// the middle of the substep. @param R the attitude now
 Vec3 GameBodies::free_turn(const GameBody& body, const Mat3& R) const {
-  if (!body.keeps_axes || body.led >= 0) return body.turn;
+  if (!body.keeps_axes || body.led >= 0 || turns_locked(settings(body))) return body.turn;
   const double half = 0.5 * plan_.length();
   const Vec3 momentum = R.transpose() * body.momentum();  // body axes
   const Vec3 now = body.inverse_inertia * momentum;
@@ -128,7 +139,7 @@ Vec3 GameBodies::free_turn(const GameBody& body, const Mat3& R) const {
 void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
   const double h = plan_.length();
   row = {};
-  if (body.root_mass > 0.0) write_vector(h / body.root_mass * linear, row.v);
+  if (body.root_mass > 0.0) write_vector(h / body.root_mass * linear.cwiseProduct(body.goes), row.v);
   write_vector(h * (body.turn_scale * moment), row.v + 3);
 }
 
@@ -145,7 +156,8 @@ void GameBodies::write_energy_slopes(std::int32_t at, const std::vector<Block8>&
 }
 
 FrameLoad GameBodies::load_of(const GameBody& body) const {
-  return {plan_.gravity, body.group->held_force(body.slot), body.group->held_torque(body.slot)};
+  return {body.group->own_gravity(body.slot, plan_.gravity), body.group->held_force(body.slot),
+          body.group->held_torque(body.slot)};
 }
 
 template <class Visit>
@@ -198,12 +210,16 @@ void GameBodies::scale_answer(std::size_t at, float share) {
     }
 }
 
-/// Held forces come at the substep's start, so that what rests has no velocity.
+/// Held forces come at the substep's start, so that what rests has no velocity. Of the substep that begins, velocities
+/// are damped as they would be at its end.
 void GameBodies::fall(GameBody& body) const {
   const double h = plan_.length();
   const FrameLoad load = load_of(body);
-  body.v += h * (load.gravity + load.force / body.group->frame_constants().mass);
-  if (!load.torque.isZero(0.0)) body.turn += h * (body.turn_scale * load.torque);
+  const Decay moving(settings(body).linear_damping * h), turning(settings(body).angular_damping * h);
+  const Vec3 acceleration = load.gravity + load.force / body.group->frame_constants().mass;
+  body.v = moving.left * body.v + h * moving.first * acceleration.cwiseProduct(body.goes);
+  body.turn *= turning.left;
+  if (!load.torque.isZero(0.0)) body.turn += h * turning.first * (body.turn_scale * load.torque);
 }
 
 /// A body with fixed nodes: its parent goes through the substep, and it begins to swing there as it would by itself.

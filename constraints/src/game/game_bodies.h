@@ -44,6 +44,7 @@ struct GameBody {
   std::int32_t led = -1;                // its number among those that are
   bool keeps_axes = false;              // its coordinates are those of the whole step
   double root_mass = 0.0;               // √m; 0: its origin is carried
+  Vec3 goes = Vec3::Ones();             // along each axis of the world: 0 where its origin is locked, 1 else
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
   Vec3 roots = Vec3::Zero();            // of the inertia about the axes of the turn's coordinates
   struct Start {
@@ -115,6 +116,7 @@ class GameBodies {
   void end_substep_of(std::size_t at, bool pushed);
   void place_frame(GameBody& body, const RigidFrame& frame);
   static void set_axes(GameBody& body, const Quaternion& attitude);
+  static const FrameSettings& settings(const GameBody& body) { return body.group->frame(body.slot).settings(); }
   void fall(GameBody& body) const;
   Vec3 free_turn(const GameBody& body, const Mat3& R) const;
   FrameExcitation lead(GameBody& body, int number, FrameShift& shift);

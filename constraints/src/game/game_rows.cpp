@@ -82,7 +82,7 @@ void GameRows::add_side(const GameBodies& bodies, GameGroup& group, std::size_t 
 void GameRows::write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const {
   const double linear = body.root_mass > 0.0 ? length_ / body.root_mass : 0.0;
   const Vec3 turn = body.turn_scale * (length_ * from.angular);
-  for (int i = 0; i < 3; ++i) to[i] = linear * from.linear[i], to[3 + i] = turn[i];
+  for (int i = 0; i < 3; ++i) to[i] = linear * body.goes[i] * from.linear[i], to[3 + i] = turn[i];
   const std::span<const double> modal = made_.modal(from);
   for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
 }

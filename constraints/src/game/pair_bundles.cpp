@@ -11,9 +11,11 @@ std::int32_t blocks_of(const GameBodies& bodies, std::int32_t frame) {
   return frame < 0 ? 0 : bodies.body(frame).blocks - 1;
 }
 
-/// Whether it is free or stands.
+/// Whether it stands or is free, as the loops have it: alike along all axes.
 bool is_taken(const GameBodies& bodies, std::int32_t frame) {
-  return frame < 0 || (bodies.body(frame).led < 0 && 8 * blocks_of(bodies, frame) <= kMostBundledModes);
+  if (frame < 0) return true;
+  const GameBody& body = bodies.body(frame);
+  return body.led < 0 && body.goes == Vec3::Ones() && 8 * blocks_of(bodies, frame) <= kMostBundledModes;
 }
 
 bool of_one_pair(const PreparedContact& x, const PreparedContact& y) {

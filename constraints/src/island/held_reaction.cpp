@@ -47,7 +47,7 @@ void HeldReaction::find_accelerations(const IslandStep& step, StepTime when) {
   accelerations_.clear();
   for (Index local = 0; local < step.bodies.count(); ++local)
     accelerations_.push_back(held_acceleration(*step.bodies.body(local).group, step.bodies.body(local).slot, when,
-                                               step.bodies.response(local), step.part.options.gravity));
+                                               step.bodies.response(local), step.gravity_of(local)));
 }
 
 HeldReaction::Motion HeldReaction::motion_of(const IslandStep& step, StepTime when, Index row) const {

@@ -68,7 +68,7 @@ void IslandEnergy::begin(const IslandStep& step) {
     before_ += energy.total();
     recovery_ += c.mass * kConstraintsTuning.energy.recovery_speed * kConstraintsTuning.energy.recovery_speed;
     scale_ += energy.kinetic_rigid + energy.kinetic_modal + energy.elastic +
-              gravity.norm() * std::sqrt(c.mass * c.inertia.trace());
+              step.gravity_of(local).norm() * std::sqrt(c.mass * c.inertia.trace());
     driven_ = driven_ || carried(*group, slot) || group->has_delayed_impulse(slot);
   }
 }

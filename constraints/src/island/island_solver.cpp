@@ -113,7 +113,7 @@ double IslandParts::next_cut(const StepPart& part) {
   if (motions_.size() < part.members.size()) motions_.resize(part.members.size());
   for (std::size_t i = 0; i < part.members.size(); ++i) {
     const ConstrainedBody& body = part.table[static_cast<std::size_t>(part.members[i])];
-    body.group->predict_motion(body.slot, part.options.gravity, left, motions_[i]);
+    body.group->predict_motion(body.slot, body.group->own_gravity(body.slot, part.options.gravity), left, motions_[i]);
   }
   const FreeMotions free{part.members, std::span(motions_).first(part.members.size())};
   for (Constraint* constraint : part.constraints) left = wanted_cut(*constraint, BodyStates(part.table), free, left);

@@ -145,7 +145,7 @@ void IslandStep::move_under_loads() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
-    if (loads.early[static_cast<std::size_t>(local)] != 0) load_early(body, load);
+    if (loads.early[static_cast<std::size_t>(local)] != 0) load_early(local, load);
     body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
 }
@@ -188,9 +188,10 @@ void IslandStep::bend_rows() {
 
 /// The frame's part. Modes of a free body do not feel gravity; those of one that is held somewhere have it over the
 /// whole part, as they have contact forces.
-void IslandStep::load_early(const ConstrainedBody& body, ConstraintLoad& load) const {
+void IslandStep::load_early(Index local, ConstraintLoad& load) const {
+  const ConstrainedBody& body = bodies.body(local);
   const FrameConstants& c = body.group->frame_constants();
-  const Vec3 weight = c.mass * part.options.gravity, arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
+  const Vec3 weight = c.mass * gravity_of(local), arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
   load.moment += length() * arm.cross(weight);
   if (c.motion == FrameMotion::kFree)
     load.impulse += length() * (weight + body.group->held_force(body.slot));
@@ -202,7 +203,7 @@ void IslandStep::load_early(const ConstrainedBody& body, ConstraintLoad& load) c
 Vec3 IslandStep::held_gravity(Index local) const {
   const ConstrainedBody& body = bodies.body(local);
   if (loads.early[static_cast<std::size_t>(local)] == 0 || body.group->frame_constants().motion != FrameMotion::kFree)
-    return part.options.gravity;
+    return gravity_of(local);
   return -body.group->held_force(body.slot) / body.group->frame_constants().mass;
 }
 

@@ -103,6 +103,10 @@ struct IslandStep {
     return by_row.subspan(begin, end - begin);
   }
   bool any_law(bool (*holds)(const RowLaw&)) const;
+  /// What the world's gravity is to a body.
+  Vec3 gravity_of(Index local) const {
+    return bodies.body(local).group->own_gravity(bodies.body(local).slot, part.options.gravity);
+  }
 
   /// The bodies under θ f and the first half of the reaction at the start, their modes under all of both, held; and the
   /// gaps there. Modes of bodies with a skin get of the impulses what moves the rows' points on the way to where the
@@ -134,7 +138,7 @@ struct IslandStep {
   }
 
  private:
-  void load_early(const ConstrainedBody& body, ConstraintLoad& load) const;
+  void load_early(Index local, ConstraintLoad& load) const;
   Vec3 held_gravity(Index local) const;
   void set_loads();
   void move_under_loads();

@@ -12,7 +12,7 @@ double largest_recovery_work(const IslandStep& step, double distance) {
   double work = 0.0;
   for (Index local = 0; local < step.bodies.count(); ++local)
     work += step.bodies.body(local).group->frame_constants().mass *
-            (0.5 * speed * speed + step.part.options.gravity.norm() * distance);
+            (0.5 * speed * speed + step.gravity_of(local).norm() * distance);
   return work;
 }
 

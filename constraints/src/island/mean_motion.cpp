@@ -74,7 +74,7 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
               .first_mode = modes,
               .modes = step.bodies.response(local).modes};
     body.flight =
-        h * frame.velocity() + share_ * h * h * (step.part.options.gravity + at.group->held_force(at.slot) / c.mass);
+        h * frame.velocity() + share_ * h * h * (step.gravity_of(local) + at.group->held_force(at.slot) / c.mass);
     if (c.motion == FrameMotion::kPoint) body.turn = free_turn(body.inertia, body.momentum, h);
     if (c.motion != FrameMotion::kFree) begin_carried(step, local, body);
     body.shift = body.flight;  // and what is free turns as guess() tells
@@ -128,13 +128,13 @@ void MeanMotion::begin_carried(const IslandStep& step, Index local, Body& body) 
   const bool turns = c.motion != FrameMotion::kKinematic;
   Carried carried(start);
   carried.torque = body.torque;
-  carried.excitation = carried.end.begin_step(c, {.gravity = turns ? Vec3::Zero() : step.part.options.gravity},
+  carried.excitation = carried.end.begin_step(c, {.gravity = turns ? Vec3::Zero() : step.gravity_of(local)},
                                               at.group->first_moment(at.slot), length_);
   const KinematicFrame& parent = carried.end.parent();
   body.flight = carried.end.pose().p - start.pose().p;
   body.carried = static_cast<Index>(carried_.size());
   if (turns) {
-    carried.field = length_ * (step.part.options.gravity - parent.acceleration);
+    carried.field = length_ * (step.gravity_of(local) - parent.acceleration);
   } else {
     const Quaternion turn = carried.end.pose().q * start.pose().q.conjugate();
     body.turn = 2.0 / turn.w * turn.vector();
@@ -514,7 +514,7 @@ void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
       continue;
     }
     RigidFrame end = at.group->frame(at.slot);
-    const Vec3 velocity = end.velocity() + h * step.part.options.gravity +
+    const Vec3 velocity = end.velocity() + h * step.gravity_of(local) +
                           (impulse_[static_cast<std::size_t>(local)] + h * at.group->held_force(at.slot)) / b.mass;
     end.set_motion({attitude(step, local), end.pose().p + b.shift}, velocity, momentum);
     predict(step, local, end);

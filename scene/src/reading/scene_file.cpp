@@ -1,6 +1,7 @@
 #include "limber/scene/scene_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -88,6 +89,41 @@ void add_copies(const SceneBody& original, const Grid& grid, Scene& scene) {
   });
 }
 
+/// `damping` and `locks` are for the game solver.
+void require_game(const JsonObject& o, const char* key, const Scene& scene) {
+  if (o.has(key) && scene.contacts.solver == ContactSolver::kExact)
+    refuse(o.where(key), "given, and the scene's solver is \"exact\"", "\"solver\": \"game\"");
+}
+
+std::array<bool, 3> read_locked(const JsonObject& o, const char* key) {
+  std::array<bool, 3> locked{};
+  if (!o.has(key)) return locked;
+  o.for_each(key, [&](const Json& axis, const std::string& where) {
+    const std::string name = axis.is_string() ? axis.get<std::string>() : "";
+    if (name.size() != 1 || name[0] < 'x' || name[0] > 'z')
+      refuse(where, JsonObject::shown(axis), "\"x\", \"y\" or \"z\"");
+    locked[static_cast<std::size_t>(name[0] - 'x')] = true;
+  });
+  return locked;
+}
+
+FrameSettings read_frame_settings(const JsonObject& o, const Scene& scene) {
+  FrameSettings settings{.gravity_scale = o.number("gravity_scale", 1.0)};
+  for (const char* key : {"damping", "locks"}) require_game(o, key, scene);
+  if (o.has("damping")) {
+    const JsonObject damping(o.at("damping"), o.where("damping"));
+    settings.linear_damping = non_negative(damping, "linear", 0.0);
+    settings.angular_damping = non_negative(damping, "angular", 0.0);
+    damping.finish();
+  }
+  if (o.has("locks")) {
+    const JsonObject locks(o.at("locks"), o.where("locks"));
+    settings.locks = {.translation = read_locked(locks, "translation"), .rotation = read_locked(locks, "rotation")};
+    locks.finish();
+  }
+  return settings;
+}
+
 void read_body(const Json& value, const std::string& where, const std::filesystem::path& folder, Scene& scene) {
   const JsonObject o(value, where);
   SceneBody body;
@@ -98,6 +134,7 @@ void read_body(const Json& value, const std::string& where, const std::filesyste
                     .velocity = o.vec3("velocity", Vec3::Zero()),
                     .angular_velocity = o.vec3("angular_velocity", Vec3::Zero())};
   body.placement.modal_skin = o.boolean("modal_skin", true);
+  body.placement.frame = read_frame_settings(o, scene);
   read_touch(o, scene, folder, body);
   body.movement = read_movement(o, true);
   if (body.movement.index() != 0 && (o.has("velocity") || o.has("angular_velocity")))

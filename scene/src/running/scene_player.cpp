@@ -160,9 +160,13 @@ void ScenePlayer::Impl::add_bodies() {
     const SceneBody& body = scene.bodies[i];
     BodyPlacement placement = start_of(body);
     if (i < models.shape_of_body.size()) placement.shape = models.shape_of_body[i];
+    const bool is_free = models.of_body[i]->data().motion == FrameMotion::kFree;
+    if (!is_free && (placement.frame.linear_damping > 0.0 || placement.frame.locks.any()))
+      throw InputError(body.where + ": the body \"" + body.name +
+                       "\" has fixed nodes, expected no \"locks\" and no linear \"damping\"");
     bodies.push_back(world.add_body(models.of_body[i], placement));
     if (std::holds_alternative<std::monostate>(body.movement)) continue;
-    if (models.of_body[i]->data().motion == FrameMotion::kFree)
+    if (is_free)
       throw InputError(body.where + ".motion: the body \"" + body.name +
                        "\" has no fixed nodes, expected none or an asset baked with --fix");
     moved.push_back({i, start_of(body).pose});

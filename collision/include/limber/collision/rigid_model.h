@@ -48,4 +48,8 @@ struct RigidModel {
 /// whose centre of mass is not its middle, which no shape tells about another origin
 RigidModel make_rigid_model(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
 
+/// One that is led: World::add_kinematic(). Its origin is the shape's own. @throws InvalidArgument as
+/// mass_properties() does
+RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape);
+
 }  // namespace limber

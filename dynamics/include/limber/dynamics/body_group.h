@@ -76,6 +76,12 @@ class BodyGroup {
   void set_velocity(Index slot, const Vec3& velocity, const Vec3& angular_velocity);
   void set_amplitudes(Index slot, std::span<const double> amplitudes, std::span<const double> rates);
   void set_parent(Index slot, const KinematicFrame& at_step_end);
+  /// @pre locks and linear damping are for free bodies
+  void set_frame_settings(Index slot, const FrameSettings& settings) {
+    body(slot).frame.set_settings(constants_, settings);
+  }
+  /// What the world's gravity is to the body, m/s².
+  Vec3 own_gravity(Index slot, const Vec3& gravity) const { return frame(slot).settings().gravity_scale * gravity; }
 
   // State before the last step, for drawing between.
   const RigidTransform& previous_pose(Index slot) const {
@@ -106,6 +112,8 @@ class BodyGroup {
   /// places for delayed impulses.
   /// @param newton_seconds world axes. @param delay in [0, step), s
   void apply_impulse(Index slot, const SurfacePoint& at, const Vec3& newton_seconds, double delay);
+
+  // Gravity is the world's in advance(), energy() and predicted_energy(), and the body's own in all that predicts.
 
   /// One step of the occupied slots in [begin, end) that are awake. Allocates and throws nothing.
   void advance(Index begin, Index end, const Vec3& gravity);

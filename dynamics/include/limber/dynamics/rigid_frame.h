@@ -6,6 +6,14 @@
 ///   kLine       eᵀIe θ̈ = eᵀ(Rᵀτ + s × Rᵀ(g − a) − I α − ω × I ω)    θ about the line, which the parent carries
 ///   kKinematic  moves with the parent only
 ///
+/// Damping c (FrameSettings) adds −c m v and −c L. Both are taken exactly, as v(h) = e^{−ch} v + h φ₁ a, and with
+/// φ₁ = (1 − e^{−ch})/(ch), φ₂ = (1 − φ₁)/(ch): p(h) = p + h φ₁ v + h² φ₂ a; an L that decays turns the body in h as a
+/// steady one does in h φ₁. Locked axes e of the world take up all force and moment along them:
+///
+///   v·e = 0;   ω = A (Aᵀ I A)⁻¹ Aᵀ L,  Aᵀ L̇ = Aᵀ τ        the columns of A: the axes about which it may turn
+///
+/// which is a steady turn where one axis is left; where two are, it is taken by the midpoint rule.
+///
 /// with R = R_WB, a, ω, α the parent's acceleration, angular velocity and acceleration (ω, α in body axes), and
 /// s = m c + Σ z_i p_i the first mass moment of the deformed body about its origin, body axes, kg·m.
 /// Torques are applied by Strang splitting, half a kick, the exact free motion, half a kick: second order in the step,
@@ -15,6 +23,7 @@
 /// Derivation: docs/derivations/rigid-frame.md.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <tuple>
 #include <type_traits>
@@ -58,6 +67,54 @@ struct FrameConstants {
   explicit FrameConstants(const ModalModelData& body);
 };
 
+/// Axes of the world along which a free body may not move, and about which it may not turn: x, y, z.
+struct AxisLocks {
+  std::array<bool, 3> translation{}, rotation{};
+
+  bool any() const { return *this != AxisLocks{}; }
+  friend bool operator==(const AxisLocks&, const AxisLocks&) = default;
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.translation, s.rotation);
+  }
+};
+
+/// How one body's frame moves, beside its model and what acts on it.
+struct FrameSettings {
+  double gravity_scale = 1.0;   ///< the body's gravity is this times the world's; finite
+  double linear_damping = 0.0;  ///< c of translation, 1/s, ≥ 0; kFree alone
+  /// c of rotation, 1/s, ≥ 0: of L about the body origin; kPoint: about the point; kLine: of θ̇.
+  double angular_damping = 0.0;
+  AxisLocks locks{};  ///< kFree alone
+  /// Whether it has damping or locks.
+  bool alter_free_motion() const { return linear_damping > 0.0 || angular_damping > 0.0 || locks.any(); }
+  /// @throws InvalidArgument naming the field and its value
+  void validate() const;
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.gravity_scale, s.linear_damping, s.angular_damping, s.locks);
+  }
+};
+
+/// What exponential damping makes of a step: e^{−x}, φ₁(x), φ₂(x) of the head of this file. @param x = c h ≥ 0
+struct Decay {
+  explicit Decay(double x);
+  double left = 1.0, first = 1.0, second = 0.5;
+};
+
+/// How a body may turn about axes of the world: columns across each other in which its inertia is diagonal. Those that
+/// are locked are zero.
+struct TurnAxes {
+  Mat3 axes = Mat3::Zero();
+  Vec3 moments = Vec3::Zero();  ///< about them, kg·m²
+
+  /// @param inertia about the body origin, world axes, kg·m². @param locks at least one of rotation
+  TurnAxes(const Mat3& inertia, const AxisLocks& locks);
+  /// A (Aᵀ I A)⁻¹ Aᵀ, 1/(kg·m²).
+  Mat3 inverse_inertia() const;
+};
+
 /// Loads on a frame over one step, held.
 struct FrameLoad {
   Vec3 gravity = Vec3::Zero();  ///< world, m/s²
@@ -84,6 +141,9 @@ class RigidFrame {
   RigidFrame(const FrameConstants& c, const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity);
 
   const RigidTransform& pose() const { return pose_; }
+  const FrameSettings& settings() const { return settings_; }
+  /// Takes from its motion what is locked now. @pre locks are for kFree
+  void set_settings(const FrameConstants& c, const FrameSettings& settings);
   const Vec3& velocity() const { return velocity_; }     ///< of the body origin, world, m/s
   Vec3 angular_velocity(const FrameConstants& c) const;  ///< world, rad/s
   Vec3 angular_momentum(const FrameConstants& c) const;  ///< R I Rᵀω, world, about the body origin, kg·m²/s
@@ -127,7 +187,11 @@ class RigidFrame {
 
  private:
   void kick(const FrameConstants& c, const FrameLoad& load, const Vec3& first_moment, double seconds);
+  void fly(const FrameConstants& c, const FrameLoad& load, double h, FramePath* path);
   void rotate_freely(const FrameConstants& c, double h);
+  void rotate_undamped(const FrameConstants& c, double h);
+  void rotate_about_axes(const FrameConstants& c, double h);
+  void set_momentum(const Vec3& angular_momentum);
   void hold_parent_accelerations();
   void move_parent(double h);
   RigidMotion parent_path(double h) const;
@@ -139,13 +203,15 @@ class RigidFrame {
   friend struct StateFields;
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.pose_, s.velocity_, s.momentum_, s.rotation_, s.rotation_step_, s.rotation_steps_, s.disturbed_,
-                    s.parent_, s.next_parent_, s.parent_was_set_, s.angle_, s.angle_rate_);
+    return std::tie(s.pose_, s.settings_, s.velocity_, s.momentum_, s.rotation_, s.rotation_step_, s.rotation_steps_,
+                    s.disturbed_, s.parent_, s.next_parent_, s.parent_was_set_, s.angle_, s.angle_rate_);
   }
 
   RigidTransform pose_;
+  FrameSettings settings_;
   Vec3 velocity_;
-  // kFree, kPoint: the momentum is the state; attitudes come from the rotation since the last disturbance.
+  // kFree, kPoint: the momentum is the state (about what is not locked); attitudes come from the rotation since the
+  // last disturbance.
   Vec3 momentum_ = Vec3::Zero();  // world
   FreeRotation rotation_;
   double rotation_step_ = 0.0;

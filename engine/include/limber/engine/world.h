@@ -107,6 +107,14 @@ struct WorldOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
+/// How a body comes to move: World::body_type().
+enum class BodyType {
+  kStatic,     ///< not at all: World::add_static(), add_sensor()
+  kKinematic,  ///< as World::set_kinematic_frame() says, whatever it meets: add_kinematic(), or a model of that
+               ///< FrameMotion, whose modes move all the same
+  kDynamic,    ///< by what acts on it: add_rigid(), add_body(), also of a model that hangs from a point or a line
+};
+
 /// How a body starts. Velocities are of the body origin (docs/notation.md), world axes.
 struct BodyPlacement {
   RigidTransform pose{};         ///< X_WB
@@ -121,6 +129,9 @@ struct BodyPlacement {
   /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.
   std::shared_ptr<const Shape> shape{};
   std::uint64_t user_data = 0;  ///< the caller's own: World::user_data()
+  /// Gravity's share, damping and locked axes (rigid_frame.h): World::set_gravity_scale() and the next two. Velocities
+  /// along locked axes are left out.
+  FrameSettings frame{};
   /// Whether the body bends by the modal skin of its model (docs/large-bends.md), where it has one: drawn, held, joined
   /// and pushed there. False, or no skin: by its modes alone.
   bool modal_skin = true;
@@ -237,6 +248,10 @@ class World {
                    const BodyPlacement& placement = {});
   /// The same, of even density. @param density kg/m³, > 0
   BodyId add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement = {});
+  /// A rigid shape that goes where it is led, whatever it meets: a lift, a door of a machine, a hand. It stands, or
+  /// goes on at the velocities it is placed with, until set_kinematic_frame() tells of another way.
+  /// @param shape one that bounds a solid; `placement.pose` places its own origin
+  BodyId add_kinematic(const std::shared_ptr<const Shape>& shape, const BodyPlacement& placement = {});
   /// A rigid shape that never moves: the ground, a triangle mesh, a height field. Only contains() and remove_body()
   /// take its id.
   /// @param friction as in BodyPlacement
@@ -268,6 +283,7 @@ class World {
   std::uint64_t user_data(HandleId id) const;
   std::uint64_t user_data(JointId id) const;
   const ModalModel& model(BodyId id) const;
+  BodyType body_type(BodyId id) const;
   /// Whether a body sleeps; see SleepOptions.
   bool is_asleep(BodyId id) const;
   /// Wakes a body and all that sleeps with it; one that is awake counts its time at rest anew.
@@ -290,6 +306,17 @@ class World {
   const WorldOptions& options() const;
   /// From the coming step on, m/s², world. Wakes all bodies.
   void set_gravity(const Vec3& gravity);
+  // Of one body, from the coming step on: rigid_frame.h. They wake it.
+  void set_gravity_scale(BodyId id, double scale);  ///< finite
+  /// @param linear, angular c of v̇ = … − c v and L̇ = … − c L, 1/s, ≥ 0: by e^{−ct} in a time t, whatever the step.
+  /// Modes have damping of their own. @throws InvalidArgument also for a linear one of a body with fixed nodes, and by
+  /// ContactSolver::kExact
+  void set_damping(BodyId id, double linear, double angular);
+  /// Axes of the world along which the body does not move and about which it does not turn. What is locked takes up
+  /// all force, as an infinite mass would; contacts and joints reckon with it. Velocities there are lost at once.
+  /// @throws InvalidArgument also for a body with fixed nodes, and by ContactSolver::kExact
+  void set_locks(BodyId id, const AxisLocks& locks);
+  FrameSettings frame_settings(BodyId id) const;
 
   // Loads, all at the deformed point ----------------------------------------------------------------------------------
   /// Held over the next step; several add up. World axes once applied: a force in body axes does not turn with the body
@@ -466,6 +493,7 @@ class World {
  private:
   struct Impl;
   Index require_sensor(BodyId id, const char* function) const;
+  void set_frame_settings(BodyId id, const FrameSettings& settings, const char* function);
   std::unique_ptr<Impl> impl_;
 };
 
