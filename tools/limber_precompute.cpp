@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "assembly_baking.h"
+#include "bake_results.h"
 #include "limber/core/error.h"
 #include "limber/jobs_tbb/tbb_jobs.h"
 #include "limber/model/sha256.h"
@@ -109,6 +110,15 @@ void precompute_assembly(Program& program, const PrecomputeArguments& a, const B
 
 void precompute(Program& program, const PrecomputeArguments& a) {
   if (a.list_materials) return print_materials(program);
+  if (!a.farm.manifest.empty()) {
+    if (!a.mesh.empty()) throw InvalidArgument("MESH and --manifest exclude each other");
+    return bake_many(program, a.farm, a.output);
+  }
+  if (!a.farm.summaries.empty()) {
+    if (!a.mesh.empty() || a.output.empty())
+      throw InvalidArgument("--summary RESULTS.jsonl --output PAGE.html: both are needed, and no MESH");
+    return write_overview(program, a.farm.summaries, a.output);
+  }
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
   check_assembly(a);
   AskedBake asked = asked_bake(program, a);

@@ -265,6 +265,7 @@ void declare_options(CLI::App& app, PrecomputeArguments& a) {
   declare_mode_options(app, a);
   declare_geometry_options(app, a);
   declare_assembly_options(app, a);
+  declare_farm_options(app, a.farm);
 }
 
 double frequency_error_of(const PrecomputeArguments& a) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "assembly_baking.h"
+#include "bake_farm.h"
 #include "limber/precompute/bake.h"
 #include "limber/precompute/tetrahedralise.h"
 #include "program.h"
@@ -64,6 +65,7 @@ struct PrecomputeArguments {
   GeometryArguments geometry;
   ResponseArguments response;
   AssemblyArguments assembly;
+  FarmArguments farm;
 };
 
 /// Declares them all; `a` must outlive the parsing.
