@@ -13,6 +13,7 @@ static BodyPlacement to_cpp(const limber_placement& p) {
           .angular_velocity = to_cpp(p.angular_velocity),
           .filter = to_cpp(p.filter),
           .friction = friction_of(p),
+          .restitution = p.restitution,
           .shape = p.shape != nullptr ? p.shape->shape : nullptr,
           .user_data = p.user_data,
           .modal_skin = p.modal_skin};

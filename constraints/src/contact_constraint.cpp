@@ -69,6 +69,7 @@ struct ContactSet::Impl {
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
+  static double restitution_of(const PreparedContact& contact, std::span<const double> restitution);
   void reserve_regions(const BodyStates& states, std::span<const ContactPoint> points);
   void add_region(PreparedSide& side, const ContactSide& found);
   void spread_shapes(PreparedSide& side);
@@ -94,6 +95,15 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = history.find(point.id))
     contact.last_force = known->force, contact.compliance = known->compliance, contact.slip = known->slip;
+}
+
+/// Of contacts between what does not bend: other bodies rebound by their modes.
+double ContactSet::Impl::restitution_of(const PreparedContact& contact, std::span<const double> restitution) {
+  const auto of = [&](const PreparedSide& side) {
+    const auto body = static_cast<std::size_t>(side.body);
+    return body < restitution.size() ? restitution[body] : 0.0;
+  };
+  return flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(of(contact.a), of(contact.b));
 }
 
 /// So that spans of them stay where they are.
@@ -143,7 +153,7 @@ ContactSet::ContactSet(ContactSet&&) noexcept = default;
 ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 
 void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points, const Vec3& origin,
-                        std::span<const double> friction) {
+                        std::span<const double> friction, std::span<const double> restitution) {
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
@@ -154,7 +164,10 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.dents.reserve(bodies);
   s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
-    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, origin, friction);
+    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) {
+      s.add(states, point, origin, friction);
+      s.contacts.back().restitution = Impl::restitution_of(s.contacts.back(), restitution);
+    }
   s.pairs.reuse(), s.rolling.reuse();
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {

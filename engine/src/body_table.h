@@ -29,9 +29,10 @@ class BodyTable {
     RigidTransform pose{};  // of a static one
     CollisionFilter filter{};
     double friction = -1.0;  // negative: that of the contact options
-    ShapeExtent extent{};    // of what moves
-    bool placed = false;     // of a static one: the source has seen where it stands
-    bool sensor = false;     // tells what it overlaps, and meets nothing
+    double restitution = 0.0;
+    ShapeExtent extent{};  // of what moves
+    bool placed = false;   // of a static one: the source has seen where it stands
+    bool sensor = false;   // tells what it overlaps, and meets nothing
     std::uint64_t user_data = 0;
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.

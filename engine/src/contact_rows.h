@@ -12,18 +12,19 @@ namespace limber::internal {
 
 struct ContactRows {
   ContactSet set;
-  std::vector<double> friction;  // by body
+  std::vector<double> friction, restitution;  // by body
 
   const ContactOptions& options() const { return set.options(); }
   /// @param found at the start of the step, ordered as by ContactSource
   void take(const BodyStates& states, std::span<const ContactPoint> found) {
-    set.update(states, found, Vec3::Zero(), friction);
+    set.update(states, found, Vec3::Zero(), friction, restitution);
   }
-  void note_friction(const BodyTable& bodies) {
-    friction.resize(bodies.size());
+  void note_surfaces(const BodyTable& bodies) {
+    friction.resize(bodies.size()), restitution.resize(bodies.size());
     for (std::size_t i = 0; i < friction.size(); ++i) {
-      const double own = bodies[static_cast<Index>(i)].friction;
-      friction[i] = own >= 0.0 ? own : options().friction;
+      const BodyTable::Entry& e = bodies[static_cast<Index>(i)];
+      friction[i] = e.friction >= 0.0 ? e.friction : options().friction;
+      restitution[i] = e.restitution;
     }
   }
 };

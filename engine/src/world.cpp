@@ -40,6 +40,13 @@ void check(const FrameSettings& settings, FrameMotion motion, ContactSolver solv
     throw InvalidArgument(in + "damping and locked axes are for ContactSolver::kGame");
 }
 
+void check_restitution(double restitution, ContactSolver solver) {
+  const double most = solver == ContactSolver::kGame ? 1.0 : 0.0;
+  if (!(restitution >= 0.0 && restitution <= most))
+    throw InvalidArgument("World::add_body: restitution is " + std::to_string(restitution) +
+                          ", expected 0 to 1, and 0 but for ContactSolver::kGame");
+}
+
 }  // namespace
 
 void SleepOptions::validate() const {
@@ -81,6 +88,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
   const double friction = checked(placement.friction, impl_->paths.solver, "add_body");
   check(placement.frame, model->data().motion, impl_->paths.solver, "add_body");
+  check_restitution(placement.restitution, impl_->paths.solver);
   if (placement.shape) {
     validate(*placement.shape);
     if (std::holds_alternative<HalfSpace>(*placement.shape))
@@ -99,6 +107,7 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
                                   .shape = placement.shape,
                                   .filter = placement.filter,
                                   .friction = friction,
+                                  .restitution = placement.restitution,
                                   .extent = extent,
                                   .user_data = placement.user_data});
   const auto index = static_cast<Index>(id.index);

@@ -219,6 +219,9 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), is_damped))
     throw InvalidArgument(
         "World::set_contact_source: a body has damping or locked axes, expected ContactSolver::kGame");
+  const auto rebounds = [](const Entry& e) { return e.alive && e.restitution > 0.0; };
+  if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), rebounds))
+    throw InvalidArgument("World::set_contact_source: a body has restitution, expected ContactSolver::kGame");
   m.paths.reset(options);
   m.drawing.forget_all();
   m.sleep.wake_all();

@@ -103,6 +103,20 @@ TEST(GameContact, AStackOfTenStandsAndComesToRest) {
   EXPECT_TRUE(scene.world.constraint_report().solved);
 }
 
+TEST(GameContact, LightBricksCarryOneAHundredTimesAsHeavy) {
+  for (const auto& [light, substeps] : {std::pair{1, 16}, std::pair{2, 24}}) {
+    Bricks scene(game(substeps));
+    for (int i = 0; i <= light; ++i)
+      scene.add({.pose = {{}, {0.0, 0.0, kHalf.z() + i * (2.0 * kHalf.z() + 1e-4)}}}, i < light ? 1.0 : 100.0);
+    scene.step(600);
+    const Vec3 before = scene.world.body(scene.bodies.back()).pose.p;
+    scene.step(60);
+    const Vec3 after = scene.world.body(scene.bodies.back()).pose.p;
+    EXPECT_LT((after - before).norm(), 1e-6 * kSize) << light;
+    EXPECT_NEAR(after.z(), kHalf.z() * (1.0 + 2.0 * light), 2e-3 * (1.0 + light) * kSize) << light;
+  }
+}
+
 TEST(GameContact, ASlopeBelowTheAngleOfFrictionHoldsAndAboveItSlidesByCoulombsLaw) {
   for (const double share : {0.9, 1.05}) {
     const double angle = std::atan(share * 0.5);

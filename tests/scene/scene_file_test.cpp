@@ -130,7 +130,7 @@ TEST(SceneFile, TheSolverIsGameUnlessTheFileChoosesTheExactOne) {
 
 TEST(SceneFile, ContactIsReadWhereItBelongs) {
   const Scene s = parse(scene_with(
-      R"({"name": "bell", "asset": "bell", "friction": 0.3, "shape": {"capsule": {"radius": 2, "half_length": 3}},
+      R"({"name": "bell", "asset": "bell", "friction": 0.3, "restitution": 0.4, "shape": {"capsule": {"radius": 2, "half_length": 3}},
           "layers": [0, 2], "meets": [1], "copies": {"count": [2, 1, 1], "spacing": [1, 0, 0]}})",
       R"("contact": {"friction": 0.7, "guard": "none", "recovery_speed": 0.2, "rolling_friction": 0.04,
                      "residual_compliance": true, "penalty_frequency": 30, "penalty_damping": 0.5},
@@ -142,6 +142,7 @@ TEST(SceneFile, ContactIsReadWhereItBelongs) {
   EXPECT_TRUE(s.contacts.rule.is_own());
   EXPECT_EQ(s.contacts.rule.guard, SceneContactRule::Guard::kNone);
   EXPECT_EQ(s.contacts.options->friction, 0.7);
+  EXPECT_EQ(s.bodies[0].placement.restitution, 0.4);
   EXPECT_EQ(s.contacts.options->rolling_friction, 0.04);
   EXPECT_EQ(s.contacts.options->recovery_speed, 0.2);
   EXPECT_TRUE(s.contacts.options->residual_compliance);
@@ -386,6 +387,11 @@ TEST(SceneFile, EveryWrongSceneGetsOneLineThatNamesPlaceAndExpectation) {
       {scene_with(kBell, R"("statics": [{"name": "s", "layers": [32], "shape": {"half_space": {}}}])"),
        "statics[0].layers[0]", "0 to 31"},
       {scene_with(R"({"name": "x", "asset": "bell", "friction": 0.5})"), "bodies[0].friction", "\"contact\": {}"},
+      {scene_with(R"({"name": "x", "asset": "bell", "restitution": 0.5})"), "bodies[0].restitution", "\"contact\": {}"},
+      {scene_with(R"({"name": "x", "asset": "bell", "restitution": 1.5})", R"("contact": {})"), "bodies[0].restitution",
+       "0 to 1"},
+      {scene_with(R"({"name": "x", "asset": "bell", "restitution": 0.5})", R"("contact": {}, "solver": "exact")"),
+       "bodies[0].restitution", "\"exact\""},
       {scene_with(R"({"name": "x", "asset": "bell", "shape": {"half_space": {}}})", R"("contact": {})"),
        "bodies[0].shape", "a shape that ends"},
       {handle(R"("start": 1)"), "handles[0].start", "[0, 1.0) s"},

@@ -253,12 +253,25 @@ HWY_INLINE HWY_ATTR Vector ShareWithin(Vector square, Vector most) {
   return hn::IfThenElse(hn::Lt(square, hn::Mul(most, most)), hn::Set(d, 1.0f), hn::Div(most, length));
 }
 
+/// The force that meets a normal's law, `plain` the one of either sign that leaves nothing open: the larger of that and
+/// the f > 0 with f (u − fall) = 2 release, u what it opens the gap by.
+HWY_INLINE HWY_ATTR Vector NormalForce(const BundleContact& c, Vector plain, std::size_t lane) {
+  const Lanes d;
+  const Vector mass = Get(c.inverse_normal, lane), zero = hn::Zero(d);
+  const Vector lifted = hn::MulAdd(mass, Get(c.fall, lane), plain);
+  const Vector energy = hn::Mul(hn::Set(d, 8.0f), hn::Mul(Get(c.release, lane), mass));
+  const Vector root = hn::Mul(hn::Set(d, 0.5f), hn::Add(lifted, hn::Sqrt(hn::MulAdd(lifted, lifted, energy))));
+  return hn::Max(plain, hn::IfThenElse(hn::Gt(energy, zero), root, zero));
+}
+
 /// @param u the rows' numbers. @param change out: of the forces
-HWY_INLINE HWY_ATTR void SolveOne(BundleContact& c, const Vector* u, std::size_t lane, Vector* change) {
+HWY_INLINE HWY_ATTR void SolveOne(const PairBundle& bundle, BundleContact& c, const Vector* u, std::size_t lane,
+                                  Vector* change) {
   const Lanes d;
   const Vector zero = hn::Zero(d), before = Get(c.force[0], lane);
   Vector wanted[2];
-  const Vector normal = hn::Max(zero, hn::MulAdd(Approach(c, u[0], lane), Get(c.inverse_normal, lane), before));
+  const Vector plain = hn::MulAdd(Approach(c, u[0], lane), Get(c.inverse_normal, lane), before);
+  const Vector normal = bundle.rebounds ? NormalForce(c, plain, lane) : hn::Max(zero, plain);
   change[0] = hn::Sub(normal, before);
   for (std::size_t t = 0; t < 2; ++t) {
     const Vector slip = hn::Add(u[1 + t], Get(c.slip[t], lane));
@@ -413,7 +426,7 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
         const Block8* rows = RowsOf(all, bundle, k);
         Vector u[3], change[3];
         ReadRows(bundle, c, rows, y, lane, u);
-        SolveOne(c, u, lane, change);
+        SolveOne(bundle, c, u, lane, change);
         MoveCoordinates(bundle, c, rows, change, lane, y);
         if (bundle.rolls) RollOne(bundle, c, y.sides, lane);
       }
@@ -568,6 +581,40 @@ HWY_ATTR void ScaleBundleForces(const BundleArrays& all, const Block8* shares) {
     }
 }
 
+/// As NoteRebound(). @param start, end u of the free motion and of that found
+HWY_INLINE HWY_ATTR void NoteOne(BundleContact& c, Vector start, Vector end, std::size_t lane) {
+  const Lanes d;
+  const Vector zero = hn::Zero(d), stage = Get(c.stage, lane), together = hn::Set(d, kTogether),
+               parted = hn::Set(d, kParted);
+  const Vector mean = hn::NegMulAdd(hn::Set(d, 2.0f), Get(c.fall, lane), hn::Add(start, end));
+  const Vector given = hn::Mul(hn::Set(d, 0.5f), hn::Mul(Get(c.force[0], lane), mean));
+  const auto presses = hn::Gt(Get(c.force[0], lane), zero);
+  const auto is_between = hn::And(hn::Gt(stage, zero), hn::Lt(stage, parted));
+  const Vector next =
+      hn::IfThenElseZero(hn::Or(presses, is_between), hn::Min(hn::Add(stage, hn::Set(d, 1.0f)), parted));
+  const Vector left = hn::Max(zero, hn::Sub(Get(c.energy, lane), given));
+  const Vector kept = hn::IfThenElse(hn::Eq(next, together), hn::Mul(Get(c.rebound, lane), left), left);
+  const Vector energy = hn::IfThenElseZero(hn::And(hn::Gt(next, zero), hn::Lt(next, parted)), kept);
+  Put(next, c.stage, lane);
+  Put(energy, c.energy, lane);
+  Put(hn::IfThenElseZero(hn::Ge(next, together), energy), c.release, lane);
+}
+
+HWY_ATTR void NoteBundleRebounds(const BundleArrays& all, const Block8* free, const Block8* motion) {
+  for (std::size_t b = 0; b < all.count; ++b) {
+    const PairBundle& bundle = all.bundles[b];
+    for (std::size_t lane = 0; lane < kBundleLanes && bundle.rebounds; lane += kLanesAtOnce) {
+      Sides start, end;
+      ReadSides(bundle, bundle.motion, free, lane, start);
+      ReadSides(bundle, bundle.motion, motion, lane, end);
+      for (std::int32_t k = 0; k < bundle.count; ++k) {
+        BundleContact& c = all.contacts[bundle.first + k];
+        NoteOne(c, ReadAxis(c, 0, start, lane), ReadAxis(c, 0, end, lane), lane);
+      }
+    }
+  }
+}
+
 HWY_ATTR void AddUpBundles(const BundleArrays& all) {
   for (std::size_t b = 0; b < all.count; ++b)
     for (std::int32_t k = 0; k < all.bundles[b].count; ++k) {
@@ -592,6 +639,7 @@ HWY_EXPORT(PushBundles);
 HWY_EXPORT(FindResiduals);
 HWY_EXPORT(ApplyBundleForces);
 HWY_EXPORT(ScaleBundleForces);
+HWY_EXPORT(NoteBundleRebounds);
 HWY_EXPORT(AddUpBundles);
 
 void make_mode_rows(const ModePoint& point, Block8* rows) { HWY_DYNAMIC_DISPATCH(MakeModeRows)(point, rows); }
@@ -623,6 +671,10 @@ void apply_bundle_forces(const BundleArrays& bundles, Block8* motion) {
 
 void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares) {
   HWY_DYNAMIC_DISPATCH(ScaleBundleForces)(bundles, shares);
+}
+
+void note_bundle_rebounds(const BundleArrays& bundles, const Block8* free, const Block8* motion) {
+  HWY_DYNAMIC_DISPATCH(NoteBundleRebounds)(bundles, free, motion);
 }
 
 void add_up_bundles(const BundleArrays& bundles) { HWY_DYNAMIC_DISPATCH(AddUpBundles)(bundles); }

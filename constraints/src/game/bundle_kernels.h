@@ -24,6 +24,7 @@ struct PairBundle {
   std::int32_t first = 0, count = 0;
   Block8 inverse_turn;    // as RollingRow::inverse
   bool rolls = false;     // whether any resists rolling
+  bool rebounds = false;  // whether any does
   bool overlaps = false;  // whether any is to be pushed apart
   float residual = 0.0f;  // as residual_of_contacts()
   // By lane, of the forces that the substep begins with: what they do along their gaps without J y, J, and twice what
@@ -41,6 +42,7 @@ struct BundleContact {
   Block8 now, gap, slip[2], target, force[3], before, push, part;
   Block8 sum[3];             // of the substeps' forces, N
   Block8 radius, moment[3];  // as those of RollingRow
+  Block8 rebound, fall, stage, energy, release;
 };
 
 /// Kernels of different bundles may run at once, but for those that change coordinates: these where no body is shared.
@@ -85,6 +87,8 @@ void find_residuals(const BundleArrays& bundles, const Block8* motion);
 void apply_bundle_forces(const BundleArrays& bundles, Block8* motion);
 /// Leaves a share of each lane's forces. @param shares by bundle
 void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares);
+/// As note_rebounds(). @param free, motion with a block of zeros at their end
+void note_bundle_rebounds(const BundleArrays& bundles, const Block8* free, const Block8* motion);
 /// Adds up forces.
 void add_up_bundles(const BundleArrays& bundles);
 

@@ -222,6 +222,15 @@ void GameBodies::fall(GameBody& body) const {
   if (!load.torque.isZero(0.0)) body.turn += h * turning.first * (body.turn_scale * load.torque);
 }
 
+Vec3 GameBodies::fall_of(std::int32_t at) const {
+  if (at < 0 || body(at).led >= 0) return Vec3::Zero();
+  const GameBody& falls = body(at);
+  const FrameLoad load = load_of(falls);
+  const double h = plan_.length();
+  const Vec3 acceleration = load.gravity + load.force / falls.group->frame_constants().mass;
+  return h * h * Decay(settings(falls).linear_damping * h).first * acceleration.cwiseProduct(falls.goes);
+}
+
 /// A body with fixed nodes: its parent goes through the substep, and it begins to swing there as it would by itself.
 FrameExcitation GameBodies::lead(GameBody& body, int number, FrameShift& shift) {
   const FrameConstants& c = body.group->frame_constants();

@@ -103,6 +103,10 @@ class GameBodies {
   void write_energy_slopes(std::int32_t at, const std::vector<Block8>& frames, double* to) const;
   const std::vector<Block8>& free_motion() const { return free_; }  ///< y_free
 
+  /// By how much more held forces move the origin of a body that is free in a substep than in the last one, m; of
+  /// others 0.
+  Vec3 fall_of(std::int32_t at) const;
+
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
   void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
   /// Whether all that moves has numbers.

@@ -70,6 +70,14 @@ double rolling_radius(const BodyStates& states, const PreparedContact& contact, 
   return options.rolling_friction * shorter_arm(states, contact);
 }
 
+/// What a memory, ordered by id, has of a contact; null: nothing.
+template <class Memory>
+const Memory* find(const std::vector<Memory>& known, std::uint64_t id) {
+  const auto at = std::lower_bound(known.begin(), known.end(), id,
+                                   [](const Memory& memory, std::uint64_t of) { return memory.id < of; });
+  return at != known.end() && at->id == id ? &*at : nullptr;
+}
+
 /// Whether a force pushes, is in its cone, and is finite.
 bool meets_law(const Vec3& f, double friction) {
   constexpr double kRounded = 1e-5;  // of a force, in single precision
@@ -120,6 +128,7 @@ void GameContacts::put_in_bundle(const BodyStates& states, const GameBodies& bod
                     modal, rows.data());
     bundles_.put_modes(i, s, rows.data());
   }
+  if (row.rebound > 0.0f) bundles_.rebound(i, row);
   if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
     bundles_.resist_rolling(i, radius, last_moment(contact));
 }
@@ -170,7 +179,19 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
   const Vec3 last = contact.axes.transpose() * contact.last_force;
   for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
   row.force[0] = std::max(0.0f, row.force[0]);
+  if (contact.restitution > 0.0) begin_rebound(bodies, contact, row);
   return row;
+}
+
+void GameContacts::begin_rebound(const GameBodies& bodies, const PreparedContact& contact, ContactRow& row) const {
+  row.rebound = static_cast<float>(contact.restitution * contact.restitution);
+  row.fall = static_cast<float>(
+      contact.axes.col(0).dot(bodies.fall_of(row.side[0].frame) - bodies.fall_of(row.side[1].frame)));
+  row.stage = row.force[0] > 0.0f ? kParted : 0.0f;
+  const Rebound* known = find(rebound_memory_, contact.id);
+  if (known == nullptr) return;
+  row.stage = known->stage, row.energy = known->energy;
+  if (row.stage >= kTogether) row.release = row.energy;
 }
 
 void GameContacts::place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
@@ -231,9 +252,8 @@ void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row) {
 
 /// At the end of the last step, N·m; zero where it was not there.
 Vec3 GameContacts::last_moment(const PreparedContact& contact) const {
-  const auto known = std::lower_bound(rolling_memory_.begin(), rolling_memory_.end(), contact.id,
-                                      [](const Rolling& memory, std::uint64_t id) { return memory.id < id; });
-  return known != rolling_memory_.end() && known->id == contact.id ? known->moment : Vec3(Vec3::Zero());
+  const Rolling* known = find(rolling_memory_, contact.id);
+  return known != nullptr ? known->moment : Vec3(Vec3::Zero());
 }
 
 void GameContacts::add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius) {
@@ -339,8 +359,14 @@ void GameContacts::push_apart(GameBodies& bodies, bool backward, Jobs& jobs) {
   if (backward) bundles();
 }
 
-void GameContacts::end_substep(Jobs& jobs) {
-  bundles_.for_all(jobs, add_up_bundles);
+void GameContacts::end_substep(const GameBodies& bodies, Jobs& jobs) {
+  const Block8* free = bodies.free_motion().data();
+  const Block8* motion = bodies.motion().data();
+  bundles_.for_all(jobs, [&](const BundleArrays& part) {
+    note_bundle_rebounds(part, free, motion);
+    add_up_bundles(part);
+  });
+  note_rebounds(rows_.data(), rows_.size(), blocks_.data(), free, motion);
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);
 }
@@ -363,6 +389,17 @@ void GameContacts::end_step(const SubstepPlan& plan) {
     if (bundles_.holds(i) && bundles_.resists_rolling(i))
       rolling_memory_.push_back({contacts_[i].id, bundles_.moment(i)});
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
+  rebound_memory_.clear();
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    remember_rebound({contacts_[numbers_[i]].id, rows_[i].stage, rows_[i].energy});
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (contacts_[i].restitution > 0.0 && bundles_.holds(i))
+      remember_rebound({contacts_[i].id, bundles_.stage(i), bundles_.energy(i)});
+  std::ranges::sort(rebound_memory_, {}, &Rebound::id);
+}
+
+void GameContacts::remember_rebound(const Rebound& rebound) {
+  if (rebound.stage > 0.0f && rebound.stage < kParted) rebound_memory_.push_back(rebound);
 }
 
 /// Its spring stores what the row's law does, by the normal force of the last substep: ½ c F².

@@ -24,6 +24,16 @@ class GameContacts {
       return std::tie(s.id, s.moment);
     }
   };
+  /// Contacts that have begun to rebound, from step to step: as ContactRow has them.
+  struct Rebound {
+    std::uint64_t id = 0;  // of the contact
+    float stage = 0.0f, energy = 0.0f;
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.id, s.stage, s.energy);
+    }
+  };
   struct Options {
     SmallSteps steps;
     double rolling_friction = 0.0;
@@ -46,7 +56,7 @@ class GameContacts {
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
   void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
   /// Adds up forces.
-  void end_substep(Jobs& jobs);
+  void end_substep(const GameBodies& bodies, Jobs& jobs);
   /// Tells the contacts what acted on them.
   void end_step(const SubstepPlan& plan);
 
@@ -58,6 +68,8 @@ class GameContacts {
 
   std::vector<Rolling>& rolling_memory() { return rolling_memory_; }
   const std::vector<Rolling>& rolling_memory() const { return rolling_memory_; }
+  std::vector<Rebound>& rebound_memory() { return rebound_memory_; }
+  const std::vector<Rebound>& rebound_memory() const { return rebound_memory_; }
 
  private:
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
@@ -69,6 +81,8 @@ class GameContacts {
     Vec3 last, sum;
     double compliance = 0.0;
   };
+  void remember_rebound(const Rebound& rebound);
+  void begin_rebound(const GameBodies& bodies, const PreparedContact& contact, ContactRow& row) const;
   void tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const;
   static void place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
                          ContactSideRows& at);
@@ -101,6 +115,7 @@ class GameContacts {
   std::vector<RollingRow> rolling_;
   std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;
+  std::vector<Rebound> rebound_memory_;
   DisjointSets islands_;       // of bodies that contacts tie together
   std::vector<Begun> begun_;   // by the first body of an island, and of what does not move
   std::vector<double> modal_;  // scratch

@@ -181,6 +181,14 @@ void PairBundles::resist_rolling(std::size_t contact, double radius, const Vec3&
   for (int i = 0; i < 3; ++i) c.moment[i].v[lane] = static_cast<float>(moment[i]);
 }
 
+void PairBundles::rebound(std::size_t contact, const ContactRow& row) {
+  const auto lane = static_cast<std::size_t>(places_[contact].lane);
+  bundles_[static_cast<std::size_t>(places_[contact].bundle)].rebounds = true;
+  BundleContact& c = packed_[static_cast<std::size_t>(places_[contact].at)];
+  c.rebound.v[lane] = row.rebound, c.fall.v[lane] = row.fall, c.stage.v[lane] = row.stage;
+  c.energy.v[lane] = row.energy, c.release.v[lane] = row.release;
+}
+
 double PairBundles::read(std::size_t contact, Block8 BundleContact::*field) const {
   const Place& place = places_[contact];
   return static_cast<double>((packed_[static_cast<std::size_t>(place.at)].*field).v[place.lane]);

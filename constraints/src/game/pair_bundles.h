@@ -36,6 +36,12 @@ class PairBundles {
   /// Gives a contact in its place resistance to rolling. @param radius m, > 0. @param moment N·m, to begin with
   void resist_rolling(std::size_t contact, double radius, const Vec3& moment);
 
+  /// Gives a contact in its place a rebound: those fields of `row`.
+  void rebound(std::size_t contact, const ContactRow& row);
+  /// As ContactRow has them.
+  float stage(std::size_t contact) const { return static_cast<float>(read(contact, &BundleContact::stage)); }
+  float energy(std::size_t contact) const { return static_cast<float>(read(contact, &BundleContact::energy)); }
+
   /// Force along a contact's axes at the last substep, and the sum of all, N.
   Vec3 force(std::size_t contact) const { return read(contact, &BundleContact::force); }
   Vec3 sum(std::size_t contact) const { return read(contact, &BundleContact::sum); }

@@ -85,14 +85,23 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   }
   bodies.end_substep(overlap, jobs);
   constraints.close(states, bodies, overlap);
-  contacts.end_substep(jobs);
+  contacts.end_substep(bodies, jobs);
   constraints.end_substep(states, bodies, number + 1 == steps.substeps);
 }
 
-void SmallStepSolver::clear() { impl_->contacts.rolling_memory().clear(); }
+void SmallStepSolver::clear() {
+  impl_->contacts.rolling_memory().clear();
+  impl_->contacts.rebound_memory().clear();
+}
 
-void SmallStepSolver::save_state(StateWriter& state) const { state(impl_->contacts.rolling_memory()); }
+void SmallStepSolver::save_state(StateWriter& state) const {
+  state(impl_->contacts.rolling_memory());
+  state(impl_->contacts.rebound_memory());
+}
 
-void SmallStepSolver::restore_state(StateReader& state) { state(impl_->contacts.rolling_memory()); }
+void SmallStepSolver::restore_state(StateReader& state) {
+  state(impl_->contacts.rolling_memory());
+  state(impl_->contacts.rebound_memory());
+}
 
 }  // namespace limber

@@ -98,11 +98,11 @@ HWY_INLINE HWY_ATTR void AddScaledRows(const Block8* rows, const float* by, std:
 }
 
 /// The rows' numbers for the coordinates as they are. @param u four numbers
-HWY_INLINE HWY_ATTR void ReadContact(const ContactRow& contact, const SweepArrays& arrays, float* u) {
+HWY_INLINE HWY_ATTR void ReadContact(const ContactRow& contact, const Block8* rows, const Block8* motion, float* u) {
   Products p;
   Clear(p);
   for (const ContactSideRows& side : contact.side)
-    AddProducts(arrays.rows + side.rows, arrays.motion + side.body, static_cast<std::size_t>(side.blocks), p);
+    AddProducts(rows + side.rows, motion + side.body, static_cast<std::size_t>(side.blocks), p);
   SumRows(p, u);
 }
 
@@ -125,10 +125,16 @@ HWY_INLINE HWY_ATTR float ShareWithin(float square, float most) {
   return square < most * most ? 1.0f : most / std::sqrt(std::max(square, std::numeric_limits<float>::min()));
 }
 
+/// As that of a bundle.
+HWY_INLINE HWY_ATTR float NormalForce(const ContactRow& c, float plain) {
+  const float lifted = plain + c.inverse_normal * c.fall, energy = 8.0f * c.release * c.inverse_normal;
+  return std::max(plain, energy > 0.0f ? 0.5f * (lifted + std::sqrt(lifted * lifted + energy)) : 0.0f);
+}
+
 HWY_INLINE HWY_ATTR void SolveContact(ContactRow& c, const SweepArrays& arrays) {
   float u[4], change[3];
-  ReadContact(c, arrays, u);
-  const float normal = std::max(0.0f, c.force[0] + Approach(c, c.force[0], u[0]) * c.inverse_normal);
+  ReadContact(c, arrays.rows, arrays.motion, u);
+  const float normal = NormalForce(c, c.force[0] + Approach(c, c.force[0], u[0]) * c.inverse_normal);
   change[0] = normal - c.force[0];
   float wanted[2], square = 0.0f;
   for (int t = 0; t < 2; ++t) {
@@ -230,6 +236,28 @@ HWY_ATTR bool MeasureContacts(ContactRow* contacts, std::size_t count, const Blo
   return any;
 }
 
+/// @param start, end u of the free motion and of that found
+HWY_INLINE HWY_ATTR void NoteRebound(ContactRow& c, float start, float end) {
+  const float given = 0.5f * c.force[0] * (start + end - 2.0f * c.fall), left = std::max(0.0f, c.energy - given);
+  const bool is_between = c.stage > 0.0f && c.stage < kParted;
+  c.stage = c.force[0] > 0.0f || is_between ? std::min(c.stage + 1.0f, kParted) : 0.0f;
+  c.energy = c.stage > 0.0f && c.stage < kParted ? (c.stage == kTogether ? c.rebound * left : left) : 0.0f;
+  c.release = c.stage >= kTogether ? c.energy : 0.0f;
+}
+
+HWY_ATTR void NoteRebounds(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* free,
+                           const Block8* motion) {
+  for (std::size_t i = 0; i < count; ++i) {
+    ContactRow& c = contacts[i];
+    if (!(c.rebound > 0.0f)) continue;
+    const float carried = c.gap - c.now;
+    float start[4], end[4];
+    ReadContact(c, rows, free, start);
+    ReadContact(c, rows, motion, end);
+    NoteRebound(c, start[0] + carried, end[0] + carried);
+  }
+}
+
 HWY_ATTR void SweepContacts(ContactRow* contacts, std::size_t count, RollingRow* rolling, std::size_t rolling_count,
                             bool backward, const SweepArrays& arrays) {
   std::size_t rolls = backward ? rolling_count : 0;
@@ -271,7 +299,7 @@ HWY_ATTR float ResidualOfContacts(const ContactRow* contacts, std::size_t count,
   float largest = 0.0f;
   for (std::size_t i = 0; i < count; ++i) {
     float u[4];
-    ReadContact(contacts[i], arrays, u);
+    ReadContact(contacts[i], arrays.rows, arrays.motion, u);
     const float approach = Approach(contacts[i], contacts[i].force[0], u[0]);
     largest = std::max(largest, contacts[i].force[0] > 0.0f ? std::abs(approach) : approach);
   }
@@ -297,6 +325,7 @@ HWY_AFTER_NAMESPACE();
 namespace limber::internal {
 
 HWY_EXPORT(MeasureContacts);
+HWY_EXPORT(NoteRebounds);
 HWY_EXPORT(SweepContacts);
 HWY_EXPORT(PushContacts);
 HWY_EXPORT(ResidualOfContacts);
@@ -305,6 +334,11 @@ HWY_EXPORT(ApplyForces);
 bool measure_contacts(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* shapes,
                       const FrameShift* frames, float share, float most) {
   return HWY_DYNAMIC_DISPATCH(MeasureContacts)(contacts, count, rows, shapes, frames, share, most);
+}
+
+void note_rebounds(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* free,
+                   const Block8* motion) {
+  HWY_DYNAMIC_DISPATCH(NoteRebounds)(contacts, count, rows, free, motion);
 }
 
 void sweep_contacts(ContactRow* contacts, std::size_t count, RollingRow* rolling, std::size_t rolling_count,

@@ -35,6 +35,10 @@ struct ContactSideRows {
   float lever[3] = {};      // from the origin to where the body touches, world
 };
 
+/// Stages of a contact that rebounds. Each takes one substep, but for 0, in which it is open, and the last one: bodies
+/// come together up to kTogether, part up to kParted, and stay there while they press.
+inline constexpr float kTogether = 3.0f, kParted = 5.0f;
+
 /// One contact as the sweeps see it. Lengths in m, forces in N, held over the substep.
 struct ContactRow {
   ContactSideRows side[2];
@@ -47,8 +51,12 @@ struct ContactRow {
   float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap
   float now = 0.0f;                               // the gap at the substep's start
   float force[3] = {}, before = 0.0f;             // the latter: along the normal in the last substep
-  float begun = 0.0f;              // what the forces that the substep begins with do along the gap without J y, J
-  float push = 0.0f, part = 0.0f;  // what displaces frames; how far they are to part in the substep, m
+  float begun = 0.0f;                 // what the forces that the substep begins with do along the gap without J y, J
+  float push = 0.0f, part = 0.0f;     // what displaces frames; how far they are to part in the substep, m
+  float rebound = 0.0f;               // e² of a contact between rigid bodies
+  float fall = 0.0f;                  // what free motion adds to the gap in a substep, m
+  float stage = 0.0f, energy = 0.0f;  // J: what it took as they come together, then what it has still to give
+  float release = 0.0f;               // of that, what it gives in the coming substep
 };
 
 /// Resistance of a round contact to rolling and spinning: a moment up to `radius` times the contact's normal force.
@@ -69,6 +77,11 @@ struct SweepArrays {
 /// @return whether any is to be pushed apart
 bool measure_contacts(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* shapes,
                       const FrameShift* frames, float share, float most);
+
+/// At a substep's end: what contacts that rebound took and are to give. @param free the coordinates that the bodies
+/// would have come to by themselves. @param motion those at the end
+void note_rebounds(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* free,
+                   const Block8* motion);
 
 /// One sweep of Gauss–Seidel: each contact's normal, then both tangents by one step.
 void sweep_contacts(ContactRow* contacts, std::size_t count, RollingRow* rolling, std::size_t rolling_count,

@@ -48,6 +48,14 @@ std::optional<double> read_friction(const JsonObject& o) {
   return non_negative(o, "friction", 0.0);
 }
 
+double read_restitution(const JsonObject& o, const Scene& scene) {
+  const double e = non_negative(o, "restitution", 0.0);
+  if (e > (scene.contacts.solver == ContactSolver::kGame ? 1.0 : 0.0))
+    throw InputError(o.where("restitution") + ": is " + std::to_string(e) +
+                     ", expected 0 to 1, and 0 where \"solver\" is \"exact\"");
+  return e;
+}
+
 /// Numbers of layers as bits.
 std::uint32_t read_layers(const JsonObject& o, const std::string& key, std::uint32_t otherwise) {
   constexpr int kLayers = 32;
@@ -145,11 +153,12 @@ SceneStatic read_static(const Json& value, const std::string& where, const std::
 }
 
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
-  for (const char* key : {"friction", "shape", "layers", "meets", "touches_itself"})
+  for (const char* key : {"friction", "restitution", "shape", "layers", "meets", "touches_itself"})
     if (o.has(key) && !scene.contacts.options)
       throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
                        "\"statics\" beside \"bodies\"");
   body.placement.friction = read_friction(o);
+  body.placement.restitution = read_restitution(o, scene);
   body.placement.filter = read_filter(o);
   body.placement.filter.self = o.boolean("touches_itself", false);
   if (o.has("shape")) body.shape = read_shape(o, folder, true);

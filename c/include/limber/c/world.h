@@ -48,6 +48,7 @@ typedef struct limber_placement {
   limber_vec3 angular_velocity;  ///< world, rad/s; default 0
   limber_filter filter;          ///< whom it meets; default all
   double friction;            ///< μ ≥ 0, of two bodies √(μ_a μ_b); below 0, the default: limber_contact_options'
+  double restitution;         ///< e, 0 to 1, of rigid bodies, of two the larger; default 0
   const limber_shape* shape;  ///< what others meet in place of a modal body's surface; default NULL: the surface
   uint64_t user_data;         ///< the caller's own; default 0
   bool modal_skin;            ///< bends by its model's modal skin where it has one; default true

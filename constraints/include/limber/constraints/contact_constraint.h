@@ -147,9 +147,10 @@ class ContactSet {
 
   /// Takes the contacts found at the step's start, in the order of ContactSource.
   /// @param origin that of the query. @param friction by body: μ of a pair is √(μ_a μ_b); bodies beyond its end have
-  /// that of the options
+  /// that of the options. @param restitution by body: e of a pair is the larger of both; bodies beyond its end have
+  /// none
   void update(const BodyStates& states, std::span<const ContactPoint> contacts, const Vec3& origin = Vec3::Zero(),
-              std::span<const double> friction = {});
+              std::span<const double> friction = {}, std::span<const double> restitution = {});
   /// One for each pair of bodies that have contacts, ordered as they are. Valid until the next update().
   std::span<Constraint* const> constraints() const;
 

@@ -125,6 +125,9 @@ struct BodyPlacement {
   /// μ, ≥ 0; that of two bodies is √(μ_a μ_b). Infinite, with ContactSolver::kGame: what touches it sticks. Not given:
   /// ContactOptions::friction.
   std::optional<double> friction{};
+  /// e, 0 to 1; that of two bodies is the larger. They part with e² of the energy that their contact takes as they meet
+  /// (docs/contact.md). Of rigid bodies, with ContactSolver::kGame: bodies that bend rebound by their modes.
+  double restitution = 0.0;
   /// What others meet in place of the model's collision surface: it moves with the frame and does not deform, and
   /// contacts with it do not excite the modes. Any shape but a half-space; null: the surface.
   std::shared_ptr<const Shape> shape{};
