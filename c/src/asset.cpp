@@ -18,6 +18,10 @@ static limber_surface_data to_c(const ModalSurface& surface) {
           surface.triangles.empty() ? nullptr : surface.triangles.front().data()};
 }
 
+static std::filesystem::path path_of(const char* utf8) {
+  return std::filesystem::path(reinterpret_cast<const char8_t*>(&required(utf8, "path")));
+}
+
 /// Makes the caller an object of its own.
 template <class Object, class... Arguments>
 void give(Object** out, const char* name, Arguments&&... arguments) {
@@ -59,9 +63,12 @@ limber_transform limber_identity(void) { return to_c(RigidTransform{}); }
 limber_result limber_asset_read_file(const char* path, limber_asset** asset) {
   return guarded([&] {
     required(asset, "asset");
-    const auto* utf8 = reinterpret_cast<const char8_t*>(&required(path, "path"));
-    give(asset, "asset", read_asset(std::filesystem::path(utf8)));
+    give(asset, "asset", read_asset(path_of(path)));
   });
+}
+
+limber_result limber_asset_write_file(const limber_asset* asset, const char* path) {
+  return guarded([&] { write_asset(path_of(path), required(asset, "asset").asset); });
 }
 
 limber_result limber_asset_read_memory(const void* bytes, size_t size, const char* name, limber_asset** asset) {

@@ -7,6 +7,27 @@ static std::optional<double> friction_of(const limber_placement& p) {
   return p.friction < 0.0 ? std::nullopt : std::optional(p.friction);
 }
 
+static AxisLocks locks_of(const bool* translation, const bool* rotation) {
+  AxisLocks out;
+  std::copy_n(translation, 3, out.translation.begin());
+  std::copy_n(rotation, 3, out.rotation.begin());
+  return out;
+}
+
+static FrameSettings to_cpp(const limber_frame_settings& s) {
+  return {.gravity_scale = s.gravity_scale,
+          .linear_damping = s.linear_damping,
+          .angular_damping = s.angular_damping,
+          .locks = locks_of(s.lock_translation, s.lock_rotation)};
+}
+
+static limber_frame_settings to_c(const FrameSettings& s) {
+  limber_frame_settings out{s.gravity_scale, s.linear_damping, s.angular_damping, {}, {}};
+  std::ranges::copy(s.locks.translation, out.lock_translation);
+  std::ranges::copy(s.locks.rotation, out.lock_rotation);
+  return out;
+}
+
 static BodyPlacement to_cpp(const limber_placement& p) {
   return {.pose = to_cpp(p.pose),
           .velocity = to_cpp(p.velocity),
@@ -16,6 +37,7 @@ static BodyPlacement to_cpp(const limber_placement& p) {
           .restitution = p.restitution,
           .shape = p.shape != nullptr ? p.shape->shape : nullptr,
           .user_data = p.user_data,
+          .frame = to_cpp(p.frame),
           .modal_skin = p.modal_skin};
 }
 
@@ -43,12 +65,15 @@ limber_filter limber_default_filter(void) {
   return {all.layers, all.mask, all.self};
 }
 
+limber_frame_settings limber_default_frame_settings(void) { return to_c(FrameSettings{}); }
+
 limber_placement limber_default_placement(void) {
   const BodyPlacement start{};
   limber_placement out{};
   out.pose = to_c(start.pose);
   out.filter = limber_default_filter();
   out.friction = -1.0;
+  out.frame = to_c(start.frame);
   out.modal_skin = start.modal_skin;
   return out;
 }
@@ -77,6 +102,14 @@ limber_result limber_world_add_rigid_with_mass(limber_world* world, const limber
     const limber_mass_properties& m = required(mass, "mass");
     const MassProperties properties{m.mass, to_cpp(m.center_of_mass), Eigen::Map<const Mat3>(m.inertia)};
     out = to_c(world_of(world).add_rigid(shape_of(shape), properties, to_cpp(given(placement))));
+  });
+}
+
+limber_result limber_world_add_kinematic(limber_world* world, const limber_shape* shape,
+                                         const limber_placement* placement, limber_body_id* id) {
+  return guarded([&] {
+    limber_body_id& out = required(id, "id");
+    out = to_c(world_of(world).add_kinematic(shape_of(shape), to_cpp(given(placement))));
   });
 }
 
@@ -121,6 +154,32 @@ limber_result limber_world_body_user_data(const limber_world* world, limber_body
 
 limber_result limber_world_body_model(const limber_world* world, limber_body_id id, const limber_model** model) {
   return guarded([&] { required(model, "model") = to_c(world_of(world).model(to_cpp(id))); });
+}
+
+limber_result limber_world_body_type(const limber_world* world, limber_body_id id, limber_body_type* type) {
+  return guarded(
+      [&] { required(type, "type") = static_cast<limber_body_type>(world_of(world).body_type(to_cpp(id))); });
+}
+
+limber_result limber_world_set_gravity_scale(limber_world* world, limber_body_id id, double scale) {
+  return guarded([&] { world_of(world).set_gravity_scale(to_cpp(id), scale); });
+}
+
+limber_result limber_world_set_damping(limber_world* world, limber_body_id id, double linear, double angular) {
+  return guarded([&] { world_of(world).set_damping(to_cpp(id), linear, angular); });
+}
+
+limber_result limber_world_set_locks(limber_world* world, limber_body_id id, const bool translation[3],
+                                     const bool rotation[3]) {
+  return guarded([&] {
+    world_of(world).set_locks(to_cpp(id),
+                              locks_of(&required(translation, "translation"), &required(rotation, "rotation")));
+  });
+}
+
+limber_result limber_world_frame_settings(const limber_world* world, limber_body_id id,
+                                          limber_frame_settings* settings) {
+  return guarded([&] { required(settings, "settings") = to_c(world_of(world).frame_settings(to_cpp(id))); });
 }
 
 limber_result limber_world_is_asleep(const limber_world* world, limber_body_id id, bool* asleep) {

@@ -174,6 +174,35 @@ TEST(CWorld, MotorTurnsAtItsSpeedAndALimitHoldsIt) {
   EXPECT_EQ(limber_world_set_joint_actuation(world.get(), joint, 1, &motor), LIMBER_INVALID_ARGUMENT);
 }
 
+TEST(CWorld, FramesTakeTheirShareOfGravityDampingAndLocks) {
+  const World world = make_world();
+  limber_placement start = limber_default_placement();
+  start.frame.gravity_scale = 0.5;
+  start.velocity = {1, 0, 0};
+  limber_body_id light{}, lift{};
+  ASSERT_EQ(limber_world_add_rigid(world.get(), make_sphere(0.1).get(), 1000.0, &start, &light), LIMBER_OK);
+  start = limber_default_placement();
+  start.velocity = {0, 0, 2};
+  ASSERT_EQ(limber_world_add_kinematic(world.get(), make_sphere(0.1).get(), &start, &lift), LIMBER_OK)
+      << limber_last_error();
+  limber_body_type type{};
+  ASSERT_EQ(limber_world_body_type(world.get(), lift, &type), LIMBER_OK);
+  EXPECT_EQ(type, LIMBER_BODY_KINEMATIC);
+  ASSERT_EQ(limber_world_set_damping(world.get(), light, 3.0, 0.0), LIMBER_OK) << limber_last_error();
+  const bool along_z[3] = {false, false, true}, none[3] = {};
+  ASSERT_EQ(limber_world_set_locks(world.get(), light, along_z, none), LIMBER_OK) << limber_last_error();
+  limber_world_step(world.get(), 60);
+  limber_body_state state{};
+  limber_world_body_state(world.get(), light, &state);
+  EXPECT_NEAR(state.velocity.x, std::exp(-3.0), 1e-9);
+  EXPECT_EQ(state.pose.p.z, 0.0);
+  EXPECT_NEAR(height(world.get(), lift), 2.0, 1e-9);
+  limber_frame_settings settings{};
+  ASSERT_EQ(limber_world_frame_settings(world.get(), light, &settings), LIMBER_OK);
+  EXPECT_EQ(settings.gravity_scale, 0.5);
+  EXPECT_TRUE(settings.lock_translation[2] && !settings.lock_translation[0]);
+}
+
 TEST(CWorld, HandleHoldsItsPoint) {
   const World world = make_world();
   limber_body_id ball{};

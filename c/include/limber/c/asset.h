@@ -21,6 +21,8 @@ LIMBER_API limber_result limber_asset_read_file(const char* path, limber_asset**
 /// The same from memory, which is not needed afterwards. @param name shown in messages; NULL: "memory"
 LIMBER_API limber_result limber_asset_read_memory(const void* bytes, size_t size, const char* name,
                                                   limber_asset** asset);
+/// Writes the GLB, whole or not at all.
+LIMBER_API limber_result limber_asset_write_file(const limber_asset* asset, const char* path);
 LIMBER_API void limber_asset_destroy(limber_asset* asset);
 LIMBER_API size_t limber_asset_body_count(const limber_asset* asset);
 /// @param body below limber_asset_body_count() @param model out: lives as long as the asset

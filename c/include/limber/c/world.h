@@ -41,6 +41,17 @@ LIMBER_API limber_result limber_world_get_options(const limber_world* world, lim
 
 // Bodies ---------------------------------------------------------------------------------------------------------
 
+/// How a body's frame moves, beside what acts on it. All but gravity's share is for bodies without fixed nodes, and
+/// for game contact alone.
+typedef struct limber_frame_settings {
+  double gravity_scale;      ///< the body's gravity is this times the world's; default 1
+  double linear_damping;     ///< c of v̇ = … − c v, 1/s, ≥ 0; default 0
+  double angular_damping;    ///< the same of rotation; default 0
+  bool lock_translation[3];  ///< axes of the world along which the body does not move; default none
+  bool lock_rotation[3];     ///< and about which it does not turn
+} limber_frame_settings;
+LIMBER_API limber_frame_settings limber_default_frame_settings(void);
+
 /// How a body starts.
 typedef struct limber_placement {
   limber_transform pose;         ///< X_WB; default the world's origin
@@ -51,7 +62,8 @@ typedef struct limber_placement {
   double restitution;         ///< e, 0 to 1, of rigid bodies, of two the larger; default 0
   const limber_shape* shape;  ///< what others meet in place of a modal body's surface; default NULL: the surface
   uint64_t user_data;         ///< the caller's own; default 0
-  bool modal_skin;            ///< bends by its model's modal skin where it has one; default true
+  limber_frame_settings frame;  ///< gravity's share, damping, locked axes; default none
+  bool modal_skin;              ///< bends by its model's modal skin where it has one; default true
 } limber_placement;
 LIMBER_API limber_placement limber_default_placement(void);
 
@@ -65,6 +77,10 @@ LIMBER_API limber_result limber_world_add_rigid(limber_world* world, const limbe
 LIMBER_API limber_result limber_world_add_rigid_with_mass(limber_world* world, const limber_shape* shape,
                                                           const limber_mass_properties* mass,
                                                           const limber_placement* placement, limber_body_id* id);
+/// A rigid shape that goes where limber_world_set_kinematic_frame() leads it, whatever it meets: a lift, a hand. Until
+/// then it goes on at the velocities it is placed with. The pose places the shape's own origin.
+LIMBER_API limber_result limber_world_add_kinematic(limber_world* world, const limber_shape* shape,
+                                                    const limber_placement* placement, limber_body_id* id);
 /// A shape that never moves: the ground. Of the placement its pose, filter and friction are read. Only
 /// limber_world_contains_body(), _remove_body() and user data take its id.
 LIMBER_API limber_result limber_world_add_static(limber_world* world, const limber_shape* shape,
@@ -83,6 +99,14 @@ LIMBER_API limber_result limber_world_body_user_data(const limber_world* world, 
 /// @param model out: lives until the body is removed
 LIMBER_API limber_result limber_world_body_model(const limber_world* world, limber_body_id id,
                                                  const limber_model** model);
+
+/// How a body comes to move.
+typedef enum limber_body_type {
+  LIMBER_BODY_STATIC = 0,     ///< not at all: static bodies and sensors
+  LIMBER_BODY_KINEMATIC = 1,  ///< as limber_world_set_kinematic_frame() says
+  LIMBER_BODY_DYNAMIC = 2,    ///< by what acts on it
+} limber_body_type;
+LIMBER_API limber_result limber_world_body_type(const limber_world* world, limber_body_id id, limber_body_type* type);
 LIMBER_API limber_result limber_world_is_asleep(const limber_world* world, limber_body_id id, bool* asleep);
 /// Wakes a body and all that sleeps with it.
 LIMBER_API limber_result limber_world_wake(limber_world* world, limber_body_id id);
@@ -98,6 +122,15 @@ LIMBER_API limber_result limber_world_advance(limber_world* world, double second
 LIMBER_API limber_result limber_world_set_step(limber_world* world, double seconds);
 /// From the coming step on, m/s², world. Wakes all bodies.
 LIMBER_API limber_result limber_world_set_gravity(limber_world* world, limber_vec3 gravity);
+// Of one body, from the coming step on: limber_frame_settings. They wake it.
+LIMBER_API limber_result limber_world_set_gravity_scale(limber_world* world, limber_body_id id, double scale);
+LIMBER_API limber_result limber_world_set_damping(limber_world* world, limber_body_id id, double linear,
+                                                  double angular);
+/// Velocities along axes that are locked are lost at once.
+LIMBER_API limber_result limber_world_set_locks(limber_world* world, limber_body_id id, const bool translation[3],
+                                                const bool rotation[3]);
+LIMBER_API limber_result limber_world_frame_settings(const limber_world* world, limber_body_id id,
+                                                     limber_frame_settings* settings);
 // Of a world that is NULL these are 0.
 /// Fraction of a step left in the accumulator, in [0, 1): how far to draw between the last two states.
 LIMBER_API double limber_world_interpolation_factor(const limber_world* world);
