@@ -161,7 +161,9 @@ struct FieldTuning {
   /// Displacements up to this part of a cell are not undone before the field is asked [0.25 to 1]; up to that of the
   /// longest side in one step, above in two [0.01 to 0.05].
   double carried_from = 0.5, carried_once = 0.02;
-  double slack = 0.2;  ///< part of a cell that the field may be off by, next to edges [0.1 to 0.5]
+  /// Part of a cell that the field may be off by [0.5 to 0.9]: so much it is at the corner of a box that lies in the
+  /// middle of a cell, 0.3 at its edges.
+  double slack = 0.5;
   /// Sine, 64°, by which a vertex's surface may lean back from the plane that it is to leave a body by [0.7 to 0.95].
   double leaning = 0.9;
   double least_patch = 0.1;   ///< part of its area below which a patch's area vector is no direction [0.01 to 0.3]

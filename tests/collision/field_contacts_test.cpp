@@ -9,6 +9,7 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "counted_new.h"
 #include "finder_scenes.h"
 #include "instruction_sets.h"
+#include "limber/collision/contact_finder.h"
 #include "limber/collision/manifold_finder.h"
 #include "limber/mesh/winding_number.h"
 #include "random_states.h"
@@ -518,11 +520,53 @@ TEST(FieldContacts, NothingIsAllocatedOnceWarm) {
   EXPECT_GT(found, 100u);
 }
 
+// -- Next to rims ----------------------------------------------------------------------------------------------------
+
+/// A bar on another one, sides flush but for what is to be told apart from nothing.
+TEST(FieldContacts, BarsWhoseSidesAreFlushPressStraightDown) {
+  const auto model = testing::wavy_model(bar(), 2);
+  for (const double gap : {1e-4, 1e-7, 0.0, -1e-7, -1e-5})
+    for (const double aside : {0.0, 1e-7, -1e-7, 2e-5, -2e-5}) {
+      TwoWays below(model), above(model);
+      const std::vector<double> still(2, 0.0);
+      below.place({}, still), above.place({{}, {aside, 0.5 * aside, 0.05 + gap}}, still);
+      std::set<std::pair<bool, bool>> corners;
+      for (const ContactPoint& c : by_fields(below, above, 1e-3)) {
+        EXPECT_LT(c.normal.z(), -0.999) << gap << ' ' << aside << ' ' << c.position.transpose();
+        if (std::abs(c.position.x()) > 0.149 && std::abs(c.position.y()) > 0.024)
+          corners.insert({c.position.x() > 0.0, c.position.y() > 0.0});
+      }
+      EXPECT_EQ(corners.size(), 4u) << gap << ' ' << aside;
+    }
+}
+
+/// A bar's end slides over the rim between two flush boxes, a little lower than they are.
+TEST(FieldContacts, TheSideOfAFlushBoxDoesNotStopWhatSlidesOverIt) {
+  const double low = 1e-5, way = 0.01;  // m
+  TwoWays slider(testing::wavy_model(bar(), 2)), box(Box{{0.1, 0.1, 0.1}});
+  FieldContacts finder;
+  for (const double ahead : {0.008, 0.001, 1e-6, -1e-6, -0.001}) {  // of the end, from the box's side
+    slider.place({}, std::vector<double>(2, 0.0));
+    box.place({{}, {0.15 + ahead + 0.1, 0.0, -0.025 - 0.1 + low}});
+    RigidTransform end = between(slider, box);
+    end.p.x() -= way;
+    for (const internal::FoundContact& c :
+         finder.find(slider.field(), box.field(), {between(slider, box), end, Vec3::Zero(), 1e-4}, 1e-3))
+      EXPECT_GT(std::abs(c.normal.z()), 0.999) << ahead << ' ' << c.normal.transpose();
+  }
+  // A step is met.
+  box.place({{}, {0.15 + 0.008 + 0.1, 0.0, -0.1}});
+  RigidTransform end = between(slider, box);
+  end.p.x() -= way;
+  EXPECT_FALSE(finder.find(slider.field(), box.field(), {between(slider, box), end, Vec3::Zero(), 1e-4}, 1e-3).empty());
+}
+
 // -- In ManifoldFinder -----------------------------------------------------------------------------------------------
 
 TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
   const testing::ContactScene heap = testing::heap(40);
-  ManifoldFinder by_fields({.distance_fields = true}), by_triangles;
+  ManifoldFinder by_fields;
+  ContactFinder by_triangles({.clusters = {.max_points = 0}});
   heap.add_all_to(by_fields), heap.add_all_to(by_triangles);
   const auto found = contacts_of(by_fields, heap, 1e-2), exact = contacts_of(by_triangles, heap, 1e-2);
   // Bodies of 1 m, three hundredths deep in each other: no pair that triangles have deep is missing.
@@ -548,7 +592,7 @@ TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
 TEST(FieldPairs, AnyNumberOfThreadsFindsTheSameBits) {
   const testing::ContactScene heap = testing::heap(40);
   const auto found_by = [&](int threads) {
-    ManifoldFinder finder({.distance_fields = true});
+    ManifoldFinder finder;
     heap.add_all_to(finder);
     testing::ThreadJobs jobs(threads);
     return contacts_of(finder, heap, 1e-2, Vec3::Zero(), jobs);
@@ -569,7 +613,7 @@ TEST(FieldPairs, AnyNumberOfThreadsFindsTheSameBits) {
 
 TEST(FieldPairs, AWarmQueryAllocatesNothing) {
   testing::ContactScene heap = testing::heap(24);
-  ManifoldFinder finder({.distance_fields = true});
+  ManifoldFinder finder;
   heap.add_all_to(finder);
   std::vector<ContactPoint> contacts;
   const auto query = [&](double sign) {

@@ -148,8 +148,6 @@ std::unique_ptr<ContactSource> ContactChoice::make_finder() const {
       return std::make_unique<ContactFinder>();
     case Finder::kManifolds:
       return std::make_unique<ManifoldFinder>();
-    case Finder::kFields:
-      return std::make_unique<ManifoldFinder>(ManifoldFinderOptions{.distance_fields = true});
   }
   return nullptr;
 }

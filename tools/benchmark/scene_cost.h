@@ -27,12 +27,12 @@ struct TimedScene {
 
 /// Who answers contacts in place of what the scene says.
 struct ContactChoice {
-  enum class Finder { kOfTheScene, kContactFinder, kManifolds, kFields };
+  enum class Finder { kOfTheScene, kContactFinder, kManifolds };
   std::optional<ContactSolver> solver{};
   Finder finder = Finder::kOfTheScene;
   int substeps = 0;  ///< of ContactSolver::kGame; 0: the scene's
 
-  /// Null: the scene's own. kFields: ManifoldFinder with distance fields.
+  /// Null: the scene's own.
   std::unique_ptr<ContactSource> make_finder() const;
 };
 

@@ -284,12 +284,10 @@ void declare_step(CLI::App& app, StepArguments& a) {
       ->transform(CLI::Transformer(
           std::map<std::string, ContactSolver>{{"game", ContactSolver::kGame}, {"exact", ContactSolver::kExact}}))
       ->option_text("NAME");
-  app.add_option(
-         "--finder", a.contact.finder,
-         "who finds contacts: exact (ContactFinder), manifolds (ManifoldFinder), fields (with distance fields); "
-         "default: the scene's")
-      ->transform(CLI::Transformer(std::map<std::string, Finder>{
-          {"exact", Finder::kContactFinder}, {"manifolds", Finder::kManifolds}, {"fields", Finder::kFields}}))
+  app.add_option("--finder", a.contact.finder,
+                 "who finds contacts: exact (ContactFinder), manifolds (ManifoldFinder); default: the scene's")
+      ->transform(CLI::Transformer(
+          std::map<std::string, Finder>{{"exact", Finder::kContactFinder}, {"manifolds", Finder::kManifolds}}))
       ->option_text("NAME");
   app.add_option("--substeps", a.contact.substeps, "of the game solver; default: the scene's")
       ->type_name("N")

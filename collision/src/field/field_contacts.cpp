@@ -186,7 +186,7 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
   if (view_[1].apart()) return;
-  edges_.begin(view_[0], view_[1]);
+  edges_.begin(view_[0], view_[1], static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {
     const ClusterView samples = view_[of].mine->view().samples;
@@ -212,10 +212,17 @@ void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters
     SampleFoot sample{.vertex = view.mine->shell().sample_vertex(hit.feature)};
     if (std::exchange(last, sample.vertex) == sample.vertex) continue;  // repeated to fill the last cluster
     settle_foot(view, hit, sample);
+    rest_on_face(view, sample);
     samples_.push_back(sample);
   }
   leave_by_patches(view);
-  for (const SampleFoot& sample : samples_) add_sample(of, sample);
+  for (SampleFoot& sample : samples_) {
+    edges_.find_at_end(of, sample);
+    const bool inside = sample.gap < 0.0f, meets = unhindered(view, sample, static_cast<float>(motion_.passed));
+    const Vec3f n = of == 0 ? view.turned_back(sample.normal) : Vec3f(-sample.normal);
+    if (inside) edges_.set_exit(of, sample.vertex, n);
+    if (meets) add_sample(of, sample, n);
+  }
 }
 
 void FieldContacts::settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample) {
@@ -234,9 +241,9 @@ void FieldContacts::settle_foot(const FieldView& view, const FieldHit& hit, Samp
   const bool inside = std::abs(hit.distance) < near ? out.dot(outward) < 0.0f : hit.distance < 0.0f;
   const float distance = std::sqrt(sample.foot.squared_distance);
   sample.gap = inside ? -distance : distance;
-  // Directions between points as near as this are noise in single precision.
-  const float directionless = 1e-5f * static_cast<float>(view.other->shell().longest_side());
-  sample.normal = distance > directionless ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
+  const float directionless = kNoise * static_cast<float>(view.other->shell().longest_side());
+  const bool on_face = sample.foot.corners == kFootOnFace;
+  sample.normal = !on_face && distance > directionless ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
 }
 
 // Vertices inside whose own surface does not lie on the side that their nearest point would push them to.
@@ -265,15 +272,14 @@ void FieldContacts::leave_by_patches(const FieldView& view) {
   }
 }
 
-void FieldContacts::add_sample(int of, const SampleFoot& sample) {
+// @param n out of b, frame of a
+void FieldContacts::add_sample(int of, const SampleFoot& sample, const Vec3f& n) {
   const FieldView& view = view_[of];
   FoundContact contact;
   contact.of[of] = at_vertex(*view.mine, sample.vertex);
   contact.of[1 - of] = on_foot(sample.foot);
-  const Vec3f n = of == 0 ? view.turned_back(sample.normal) : Vec3f(-sample.normal);
   contact.normal = n.cast<double>();
   found_.push_back(contact);
-  if (sample.gap < 0.0f) edges_.set_exit(of, sample.vertex, n);
 }
 
 // -- Half-spaces, balls and capsules ----------------------------------------------------------------------------------

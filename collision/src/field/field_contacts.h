@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "field/contact_planes.h"
 #include "field/field_edges.h"
 #include "limber/collision/narrow_phase.h"
 
@@ -35,6 +36,7 @@ struct FieldBody {
 struct FieldMotion {
   RigidTransform X_AB{}, end{};  ///< now, and as expected at the step's end
   Vec3 fall = Vec3::Zero();      ///< frame of a, m: one of the two may do that beside it (ContactQuery::fall)
+  double passed = 0.0;           ///< m: planes that were passed by so much still keep a and b apart
 };
 
 /// Holds the scratch of one thread, and allocates nothing once warm. The same contacts in the same order whatever was
@@ -62,7 +64,7 @@ class FieldContacts {
   void find_samples(int of, std::span<const std::uint32_t> clusters, const SampleBounds& bounds);
   static void settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample);
   void leave_by_patches(const FieldView& view);
-  void add_sample(int of, const SampleFoot& sample);
+  void add_sample(int of, const SampleFoot& sample, const Vec3f& n);
   double comes_near(int of) const;
   void settle();
 

@@ -14,8 +14,8 @@ int corner_of(const CollisionSurface& surface, Index t, Index e) {
 
 }  // namespace
 
-void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a) {
-  view_[0] = a_in_b, view_[1] = b_in_a;
+void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a, float passed) {
+  view_[0] = a_in_b, view_[1] = b_in_a, passed_ = passed;
   piercings_.clear(), contacts_.clear();
   ++generation_;
   for (int of = 0; of < 2; ++of) {
@@ -43,14 +43,36 @@ void FieldEdges::find(int of, const SampleBounds& ends, std::span<const std::uin
     const auto& between = mine.surface().edge(e).vertices;
     const Vec3f from = view.placed(view.mine->vertex(between[0])), to = view.placed(view.mine->vertex(between[1]));
     const Index near = view.other->shell().triangle_near(hit);
-    const Pierced through = walk_to_face(*view.other, near, from, to);
-    if (through.triangle >= 0 && through.along > 0.0f && through.along < 1.0f) {
-      const Vec3f point = from + through.along * (to - from);
-      piercings_.push_back({of, e, through.triangle, of == 0 ? view.turned_back(point - view.shift) : point, 0});
-    } else {
-      add_separated(of, e, walk_to_foot(*view.other, near, from + hit.along * (to - from)).triangle);
-    }
+    if (!goes_through_face(of, e, near, from, to))
+      add_separated_of_face(of, e, walk_to_foot(*view.other, near, from + hit.along * (to - from)).triangle);
   }
+}
+
+// Along an edge the foot goes from one feature to the next: next to the vertex it stays on the one that it is on there.
+// The field sees no change of its distance within a part of a cell.
+void FieldEdges::find_at_end(int of, const SampleFoot& sample) {
+  if (sample.foot.corners == kFootOnFace) return;
+  const FieldView& view = view_[of];
+  const CollisionSurface &mine = view.mine->shell().surface(), &other = view.other->shell().surface();
+  const Vec3f out = sample.at - sample.foot.point;
+  for (const Index t : mine.vertex_triangles(sample.vertex)) {
+    const auto corner =
+        static_cast<std::size_t>(std::ranges::find(mine.triangle(t), sample.vertex) - mine.triangle(t).begin());
+    const Index e = mine.edge_of(t, static_cast<int>(corner));
+    const Vec3f to = view.placed(view.mine->vertex(mine.triangle(t)[(corner + 1) % 3]));
+    if (!view.mine->shell().sticks_out(e) || out.dot(to - sample.at) >= 0.0f) continue;  // the distance rises
+    if (goes_through_face(of, e, sample.foot.triangle, sample.at, to)) continue;
+    for_edges_at(other, sample.foot, [&](Index f) { add_separated(of, e, f); });
+  }
+}
+
+bool FieldEdges::goes_through_face(int of, Index edge, Index near, const Vec3f& from, const Vec3f& to) {
+  const FieldView& view = view_[of];
+  const Pierced through = walk_to_face(*view.other, near, from, to);
+  if (through.triangle < 0 || !(through.along > 0.0f && through.along < 1.0f)) return false;
+  const Vec3f point = from + through.along * (to - from);
+  piercings_.push_back({of, edge, through.triangle, of == 0 ? view.turned_back(point - view.shift) : point, 0});
+  return true;
 }
 
 Vec3f FieldEdges::vertex(int of, Index v) const {
@@ -76,6 +98,19 @@ bool FieldEdges::nearest_of_edges(Index e, Index f, EdgePair& pair) const {
   return true;
 }
 
+// So near that the sign of the direction is noise.
+bool FieldEdges::touches(const EdgePair& pair) const {
+  return pair.distance <= kNoise * static_cast<float>(view_[0].mine->shell().longest_side());
+}
+
+// Gives the direction the sign with which it leads out of b, or into it.
+void FieldEdges::turn(EdgePair& pair, float out_of_b) const {
+  Vec3f outward = Vec3f::Zero();
+  for (const Index t : view_[1].mine->shell().surface().edge_triangles(pair.f))
+    outward += face_normal(*view_[1].mine, t);
+  if (out_of_b * pair.direction.dot(view_[1].turn * outward) < 0.0f) pair.direction = -pair.direction;
+}
+
 // See PairSurface::in_normal_cone().
 bool FieldEdges::in_normal_cone(int of, Index edge, const Vec3f& direction) const {
   const DeformedPointshell& body = *view_[of].mine;
@@ -98,15 +133,53 @@ bool FieldEdges::in_normal_cone(int of, Index edge, const Vec3f& direction) cons
 }
 
 // Edges that have not crossed, of a face next to the point at which the field is least.
-void FieldEdges::add_separated(int of, Index edge, Index face) {
-  for (int c = 0; c < 3; ++c) {
-    const Index other = view_[of].other->shell().surface().edge_of(face, c);
-    EdgePair pair;
-    if (!view_[of].other->shell().sticks_out(other)) continue;
-    if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) continue;
-    if (in_normal_cone(1, pair.f, pair.direction) && in_normal_cone(0, pair.e, -pair.direction))
-      add(pair, pair.direction);
-  }
+void FieldEdges::add_separated_of_face(int of, Index edge, Index face) {
+  for (int c = 0; c < 3; ++c) add_separated(of, edge, view_[of].other->shell().surface().edge_of(face, c));
+}
+
+void FieldEdges::add_separated(int of, Index edge, Index other) {
+  EdgePair pair;
+  if (!view_[of].other->shell().sticks_out(other)) return;
+  if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) return;
+  if (touches(pair)) turn(pair, 1.0f);
+  if (!in_normal_cone(1, pair.f, pair.direction) || !in_normal_cone(0, pair.e, -pair.direction)) return;
+  if (unhindered(pair)) add(pair, pair.direction);
+}
+
+// See unhindered() of a sample.
+bool FieldEdges::unhindered(EdgePair& pair) const {
+  const auto swing = [&](int of, Index edge, float along) {
+    const auto& ends = view_[of].mine->shell().surface().edge(edge).vertices;
+    const Vec3f from = view_[of].mine->swing(ends[0]);
+    return Vec3f(from + along * (view_[of].mine->swing(ends[1]) - from));
+  };
+  const FieldView& view = view_[1];
+  const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&view.query.turn[0][0]);
+  const Vec3f of_b = turning * view.turned_back(pair.on_f - view.shift) +
+                     Vec3f(view.query.shift[0], view.query.shift[1], view.query.shift[2]) +
+                     view.turn * swing(1, pair.f, pair.t);
+  const Vec3f motion = swing(0, pair.e, pair.s) - of_b, apart = pair.on_e - pair.on_f;
+  const Vec3f direction = pair.direction;
+  const float noise = kNoise * (apart.norm() + motion.norm());
+  float end = direction.dot(apart + motion);
+  if (!(end < 0.0f)) return true;
+  // Next to an end the vertex there tells of it.
+  const auto room = [&](int of, Index edge, float along) {
+    const auto& ends = view_[of].mine->shell().surface().edge(edge).vertices;
+    return std::min(along, 1.0f - along) * (vertex(of, ends[1]) - vertex(of, ends[0])).norm();
+  };
+  if (std::min(room(0, pair.e, pair.s), room(1, pair.f, pair.t)) <= passed_) return false;
+  const auto try_normal = [&](const Vec3f& n) {
+    const float gap = n.dot(apart);
+    if (!(gap >= -passed_) || !(gap + n.dot(motion) > end + noise)) return;
+    if (!in_normal_cone(1, pair.f, n) || !in_normal_cone(0, pair.e, -n)) return;
+    pair.direction = n, end = gap + n.dot(motion);
+  };
+  for (const Index t : view_[0].mine->shell().surface().edge_triangles(pair.e))
+    try_normal(-face_normal(*view_[0].mine, t));
+  for (const Index t : view.mine->shell().surface().edge_triangles(pair.f))
+    try_normal(view.turn * face_normal(*view.mine, t));
+  return pair.direction == direction || end < -passed_;
 }
 
 // Where two triangles intersect, an edge of one goes through the other at each end: piercings with a triangle pair in
@@ -131,6 +204,10 @@ void FieldEdges::find_loops() {
   std::ranges::sort(piercings_, [](const Piercing& x, const Piercing& y) {
     return std::tie(x.loop, x.of, x.edge, x.face) < std::tie(y.loop, y.of, y.edge, y.face);
   });
+  const auto repeated = std::unique(piercings_.begin(), piercings_.end(), [](const Piercing& x, const Piercing& y) {
+    return x.of == y.of && x.edge == y.edge && x.face == y.face;
+  });
+  piercings_.erase(repeated, piercings_.end());
 }
 
 // Edges that stick out and have crossed on a loop: those that lead out, and those of which each goes through a face
@@ -145,6 +222,7 @@ void FieldEdges::find_crossings(std::size_t first, std::size_t end) {
       if (!view_[p.of].other->shell().sticks_out(other) ||
           !nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair))
         continue;
+      if (touches(pair)) turn(pair, -1.0f);
       pair.leads_out = in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction);
       if (pair.leads_out || goes_through(other, 1 - p.of, p.edge, first, end)) crossings_.push_back(pair);
     }

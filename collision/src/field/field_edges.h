@@ -11,7 +11,10 @@ namespace limber::internal {
 /// See field_contacts.h. Everything in the frame of a.
 class FieldEdges {
  public:
-  void begin(const FieldView& a_in_b, const FieldView& b_in_a);
+  /// @param passed see unhindered()
+  void begin(const FieldView& a_in_b, const FieldView& b_in_a, float passed);
+  /// Edges of a vertex on those that its foot lies on: where they cross, or come nearest, is next to the vertex.
+  void find_at_end(int of, const SampleFoot& sample);
   /// An inside vertex leaves along a direction, out of b into a.
   void set_exit(int of, Index vertex, const Vec3f& direction);
   /// Edges of one side, in clusters that the other's field has near. @param ends bounds of all samples
@@ -40,9 +43,14 @@ class FieldEdges {
   };
 
   Vec3f vertex(int of, Index v) const;
+  bool touches(const EdgePair& pair) const;
+  void turn(EdgePair& pair, float out_of_b) const;
   bool nearest_of_edges(Index e, Index f, EdgePair& pair) const;
   bool in_normal_cone(int of, Index edge, const Vec3f& direction) const;
-  void add_separated(int of, Index edge, Index face);
+  void add_separated(int of, Index edge, Index other);
+  void add_separated_of_face(int of, Index edge, Index face);
+  bool goes_through_face(int of, Index edge, Index near, const Vec3f& from, const Vec3f& to);
+  bool unhindered(EdgePair& pair) const;
   void find_loops();
   void cross_loop(std::size_t first, std::size_t end);
   void find_crossings(std::size_t first, std::size_t end);
@@ -53,6 +61,7 @@ class FieldEdges {
   FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 
   FieldView view_[2];
+  float passed_ = 0.0f;
   std::vector<FieldHit> hits_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;

@@ -11,6 +11,9 @@
 
 namespace limber::internal {
 
+/// Part of lengths that is noise in single precision, after some sums: directions between points nearer than that.
+inline constexpr float kNoise = 1e-5f;
+
 /// One body's surface as the other's field sees it.
 struct FieldView {
   const DeformedPointshell* mine = nullptr;

@@ -102,9 +102,9 @@ void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found
     if (free_.empty()) throw ComputationError("FieldPairs: Jobs runs more loop bodies at once than concurrency()");
     scratch = free_.back(), free_.pop_back();
   }
-  for (const FoundContact& c :
-       scratch->find(field_body(query.index_a), field_body(query.index_b),
-                     {query.X_AB, query.expected.X_AB_end, query.expected.fall}, query.expected.near)) {
+  for (const FoundContact& c : scratch->find(
+           field_body(query.index_a), field_body(query.index_b),
+           {query.X_AB, query.expected.X_AB_end, query.expected.fall, query.passing.touching}, query.expected.near)) {
     FeatureContact contact{feature_side(c.of[0]), feature_side(c.of[1]), c.normal, c.gap};
     contact.b.point = query.X_AB * contact.b.point;
     found.push_back(contact);

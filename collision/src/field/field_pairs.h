@@ -8,30 +8,37 @@
 #include <vector>
 
 #include "field/field_contacts.h"
-#include "manifold/pair_finder.h"
+#include "manifold/pair_query.h"
 
 namespace limber::internal {
 
-/// Holds the shells of all bodies, each made once for all that share a model or shape; those of rigid shapes once a
-/// body that deforms is there.
-class FieldPairs final : public DeformingPairs {
+/// Finds the contacts of pairs in which a surface deforms. Holds the shells of all bodies, each made once for all that
+/// share a model or shape; those of rigid shapes once a body that deforms is there.
+class FieldPairs {
  public:
-  void add_body(Index index, const ManifoldBody& body) override;
-  void remove_body(Index index) override;
+  void add_body(Index index, const ManifoldBody& body);
+  void remove_body(Index index);
+  /// Once a query, before anything else: all states are checked. @param changed bodies whose state may be another than
+  /// in the last query, ascending
   void start_query(std::span<const ManifoldBody> bodies, std::span<const BodyState> states,
-                   std::span<const Index> changed, Jobs& jobs) override;
-  bool takes(Index a, Index b) const override;
-  void find(const PairQuery& query, std::vector<FeatureContact>& found) override;
-  bool has(Index body) const override { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
-  Aabb bounds(Index body) const override {
+                   std::span<const Index> changed, Jobs& jobs);
+  /// Whether it finds the contacts of two bodies, of which one deforms at least.
+  bool takes(Index a, Index b) const;
+  /// Appends; many threads may call it at once. @pre query.by_fields
+  void find(const PairQuery& query, std::vector<FeatureContact>& found);
+  /// Whether it has a body's coordinates, and then: what holds its surface, how far modes are expected to move any
+  /// point of it, m, and where a point of it is; body frame.
+  bool has(Index body) const { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
+  Aabb bounds(Index body) const {
     const DeformedPointshell& shell = *entries_[static_cast<std::size_t>(body)].shell;
     return {shell.low().cast<double>(), shell.high().cast<double>()};
   }
-  double largest_swing(Index body) const override {
+  double largest_swing(Index body) const {
     return static_cast<double>(entries_[static_cast<std::size_t>(body)].shell->largest_swing());
   }
-  Vec3 place(Index body, const FeatureSide& side) const override;
-  double closing(const PairQuery& query, const FeatureContact& contact) const override;
+  Vec3 place(Index body, const FeatureSide& side) const;
+  /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a
+  double closing(const PairQuery& query, const FeatureContact& contact) const;
 
  private:
   struct Entry {

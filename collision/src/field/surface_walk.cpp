@@ -10,7 +10,6 @@ namespace {
 // Steps of a walk at most: a cell of the field is seldom wider than so many triangles.
 constexpr int kMostSteps = 12;
 
-constexpr unsigned kFace = 7u;
 constexpr unsigned edge_bits(unsigned corner) { return 1u << corner | 1u << (corner + 1) % 3; }
 
 int corner_of_edge(unsigned corners) { return corners == edge_bits(0) ? 0 : corners == edge_bits(1) ? 1 : 2; }
@@ -48,7 +47,7 @@ SurfaceFoothold foot_on(const DeformedPointshell& body, Index t, const Vec3f& p)
     foot.corners = edge_bits(1), w = (d4 - d3) / ((d4 - d3) + (d5 - d6)), v = 1.0f - w;
   } else {
     const float sum = va + vb + vc;
-    foot.corners = kFace, v = vb / sum, w = vc / sum;
+    foot.corners = kFootOnFace, v = vb / sum, w = vc / sum;
   }
   foot.weight = {1.0f - v - w, v, w};
   foot.point = x[0] + v * ab + w * ac;
@@ -59,7 +58,7 @@ SurfaceFoothold foot_on(const DeformedPointshell& body, Index t, const Vec3f& p)
 SurfaceFoothold walk_to_foot(const DeformedPointshell& body, Index start, const Vec3f& p) {
   const CollisionSurface& surface = body.shell().surface();
   SurfaceFoothold best = foot_on(body, start, p);
-  for (int step = 0; step < kMostSteps && best.corners != kFace; ++step) {
+  for (int step = 0; step < kMostSteps && best.corners != kFootOnFace; ++step) {
     SurfaceFoothold next = best;
     const auto look_at = [&](Index t) {
       if (t < 0 || t == best.triangle) return;
@@ -82,7 +81,7 @@ SurfaceFoothold walk_to_foot(const DeformedPointshell& body, Index start, const 
 Vec3f normal_at(const DeformedPointshell& body, const SurfaceFoothold& foot) {
   const CollisionSurface& surface = body.shell().surface();
   const Vec3f n = face_normal(body, foot.triangle);
-  if (foot.corners == kFace) return n;
+  if (foot.corners == kFootOnFace) return n;
   if (!std::has_single_bit(foot.corners)) {
     const Index other = surface.neighbour(foot.triangle, corner_of_edge(foot.corners));
     return other < 0 ? n : Vec3f(n + face_normal(body, other));
@@ -143,7 +142,7 @@ Vec3f area_vector(const DeformedPointshell& body, Index v) {
 }
 
 FeatureKey key_of(const CollisionSurface& surface, const SurfaceFoothold& foot) {
-  if (foot.corners == kFace) return feature_key(Feature::Kind::kFace, foot.triangle);
+  if (foot.corners == kFootOnFace) return feature_key(Feature::Kind::kFace, foot.triangle);
   if (std::has_single_bit(foot.corners))
     return feature_key(Feature::Kind::kVertex,
                        surface.triangle(foot.triangle)[static_cast<std::size_t>(std::countr_zero(foot.corners))]);

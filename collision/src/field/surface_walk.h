@@ -2,12 +2,16 @@
 // body frame.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 
 #include "field/pointshell.h"
 #include "narrow/pair_surface.h"
 
 namespace limber::internal {
+
+inline constexpr unsigned kFootOnFace = 7u;  ///< SurfaceFoothold::corners
 
 /// The point of a surface that is nearest to another one, among those around it.
 struct SurfaceFoothold {
@@ -52,6 +56,20 @@ bool lies_in_front(const DeformedPointshell& body, Index v, const Vec3f& n, floa
 
 /// Sum of a third of the area vectors of the triangles at a vertex, outwards, m².
 Vec3f area_vector(const DeformedPointshell& body, Index v);
+
+/// Visits the edge that a foot lies on, or those of the vertex that it is; none of a face.
+template <class Visit>
+void for_edges_at(const CollisionSurface& surface, const SurfaceFoothold& foot, const Visit& visit) {
+  if (foot.corners == kFootOnFace) return;
+  if (!std::has_single_bit(foot.corners)) {
+    visit(surface.edge_of(foot.triangle, foot.corners == 3u ? 0 : foot.corners == 6u ? 1 : 2));
+    return;
+  }
+  const Index v = surface.triangle(foot.triangle)[static_cast<std::size_t>(std::countr_zero(foot.corners))];
+  for (const Index t : surface.vertex_triangles(v))
+    visit(
+        surface.edge_of(t, static_cast<int>(std::ranges::find(surface.triangle(t), v) - surface.triangle(t).begin())));
+}
 
 /// What a foot lies on, as NarrowPhase calls it.
 FeatureKey key_of(const CollisionSurface& surface, const SurfaceFoothold& foot);

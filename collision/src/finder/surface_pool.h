@@ -15,18 +15,23 @@ class SurfacePool {
   /// Forgets all states.
   void start_query() { ++query_; }
 
-  /// The surface of a body in the query's state; the last four that were asked for stay.
+  /// The surface of a body in the query's state; the last four that were asked for stay. A body finds the room that it
+  /// had in earlier queries, so that nothing grows once all bodies were asked for.
   DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
                        BoundsChoice choice = BoundsChoice::kAutomatic) {
-    Slot* oldest = slots_.data();
+    Slot* place = slots_.data();
     for (Slot& slot : slots_) {
-      if (slot.body == body && slot.query == query_) return slot.use(++clock_);
-      if (slot.used < oldest->used) oldest = &slot;
+      if (slot.body == body) {
+        place = &slot;
+        break;
+      }
+      if (slot.used < place->used) place = &slot;
     }
-    oldest->surface.bind(surface, z, choice);
-    oldest->body = body;
-    oldest->query = query_;
-    return oldest->use(++clock_);
+    if (place->body == body && place->query == query_) return place->use(++clock_);
+    place->surface.bind(surface, z, choice);
+    place->body = body;
+    place->query = query_;
+    return place->use(++clock_);
   }
 
  private:

@@ -35,9 +35,9 @@ void ManifoldFinderOptions::validate() const {
 /// About all that a deforming body is expected to pass through until the next query, straight on.
 Aabb ManifoldFinder::Impl::swept_box(Index body) const {
   const BodyState& s = state(body);
-  const Aabb bounds = deforming->bounds(body);
+  const Aabb bounds = fields.bounds(body);
   Aabb box = internal::world_box(bounds, s.pose);
-  box.include(internal::world_box(bounds.grown(deforming->largest_swing(body)), s.end_pose));
+  box.include(internal::world_box(bounds.grown(fields.largest_swing(body)), s.end_pose));
   return box.grown(s.doubt + query.fall.norm());
 }
 
@@ -55,7 +55,7 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                           internal::bind_state("ManifoldFinder", placing.bodies[i], (*worker).root, body.modal->surface,
                                                s.amplitudes);
                         Aabb& box = placing.boxes[i];
-                        if (body.modal && deforming && deforming->has(placing.bodies[i]) && std::isfinite(s.doubt)) {
+                        if (body.modal && fields.has(placing.bodies[i]) && std::isfinite(s.doubt)) {
                           box = swept_box(placing.bodies[i]);
                           continue;
                         }
@@ -91,8 +91,8 @@ void ManifoldFinder::Impl::find_near_pairs(Jobs& jobs) {
   bodies.list_to_place(query, placing.bodies);
   workers.start_query(
       jobs.concurrency(), [this] { return std::make_unique<ManifoldWorker>(options.narrow_phase); },
-      [this](ManifoldWorker& worker) { worker.pairs.start_query(deforming.get()); });
-  if (deforming) deforming->start_query(bodies.all(), query.states, placing.bodies, jobs);
+      [this](ManifoldWorker& worker) { worker.pairs.start_query(&fields); });
+  fields.start_query(bodies.all(), query.states, placing.bodies, jobs);
   make_boxes(jobs);
   place();
   bodies.find_pairs(query, pairs, jobs);
@@ -106,7 +106,7 @@ namespace {
 Vec3 place_of(const FeatureSide& side, Index index, const ManifoldBody& body, const BodyState& state,
               PairFinder& finder) {
   if (!body.modal || side.triangle < 0) return side.point;
-  if (finder.deforming() != nullptr && finder.deforming()->has(index)) return finder.deforming()->place(index, side);
+  if (finder.fields().has(index)) return finder.fields().place(index, side);
   DeformedSurface& surface = finder.surface(index, body, state);
   const Triangle& t = body.modal->surface->triangle(side.triangle);
   Vec3 p = Vec3::Zero();
@@ -163,7 +163,7 @@ std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pa
   for (const KeptPoint& point : live.points) {
     const Measured m = measure(point, pair, worker);
     const auto closing = [&] {
-      return by_fields ? deforming->closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way);
+      return by_fields ? fields.closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way);
     };
     if (point.ahead == 0.0 && m.gap > near_enough && m.gap > near_enough + closing()) continue;
     to[count++] = {side_of(point.a, pair.a, a, point.round_a, a.turn.transpose() * m.p_a),
@@ -227,13 +227,13 @@ void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const Co
   fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
   m.graph.reserve(fresh.modes());
   m.bodies.add(body, std::move(fresh), filter);
-  if (m.deforming) m.deforming->add_body(body, m.at(body));
+  m.fields.add_body(body, m.at(body));
 }
 
 void ManifoldFinder::remove_body(Index body) {
   impl_->bodies.remove(body);
   impl_->graph.forget(body);
-  if (impl_->deforming) impl_->deforming->remove_body(body);
+  impl_->fields.remove_body(body);
 }
 
 void ManifoldFinder::set_filter(Index body, const CollisionFilter& filter) { impl_->bodies.set_filter(body, filter); }

@@ -35,10 +35,7 @@ using ManifoldWorkers = WorkerPool<ManifoldWorker>;
 }  // namespace internal
 
 struct ManifoldFinder::Impl {
-  explicit Impl(const ManifoldFinderOptions& o) : options(o) {
-    options.validate();
-    if (options.distance_fields) deforming = std::make_unique<internal::FieldPairs>();
-  }
+  explicit Impl(const ManifoldFinderOptions& o) : options(o) { options.validate(); }
 
   ManifoldFinderOptions options;
   struct {
@@ -47,7 +44,7 @@ struct ManifoldFinder::Impl {
   } geometry;
   internal::BodyRegister<internal::ManifoldBody> bodies{"ManifoldFinder"};
   internal::ContactGraph graph;
-  std::unique_ptr<internal::DeformingPairs> deforming;  ///< null: NarrowPhase finds all contacts of what deforms
+  internal::FieldPairs fields;
   internal::ManifoldWorkers workers;
 
   // Of the query under way.
@@ -77,7 +74,7 @@ struct ManifoldFinder::Impl {
   void place();
   void find_near_pairs(Jobs& jobs);
   bool by_fields(const BodyPair& pair) const {
-    return deforming && (at(pair.a).modal || at(pair.b).modal) && deforming->takes(pair.a, pair.b);
+    return (at(pair.a).modal || at(pair.b).modal) && fields.takes(pair.a, pair.b);
   }
   internal::PairQuery query_of(const BodyPair& pair) const;
   void find_manifolds(Jobs& jobs);

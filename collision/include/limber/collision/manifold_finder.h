@@ -28,7 +28,12 @@
 /// and no farther, that plane's normal is the contacts'; of meshes and height fields only edges and vertices where the
 /// surface is convex or ends are touched otherwise than along a face's normal. Where bodies overlap, convex shapes
 /// leave each other along the direction of least depth, and what has its middle in a mesh goes out to the nearest
-/// point. Pairs in which a surface deforms have all their contacts, by distance fields or NarrowPhase.
+/// point.
+///
+/// Pairs in which a surface deforms are looked up in distance fields, in bounded time and single precision, and have
+/// all their contacts. Fields are made by add_body(), in up to some tenths of a second for each model. NarrowPhase
+/// finds the contacts of pairs that fields do not resolve: open surfaces, thin walls, modal skins, a body beside a much
+/// larger one (docs/collision.md).
 #pragma once
 
 #include <cstdint>
@@ -48,11 +53,7 @@ struct ManifoldFinderOptions {
   /// Share of a pair's size up to which overlapping faces keep two bodies apart, and by which the faces of neighbours
   /// may differ in height and still are one. In [0, 0.1].
   double flush = 5e-3;
-  /// Whether pairs in which a surface deforms are looked up in distance fields, in bounded time and single precision,
-  /// where these resolve both bodies (docs/collision.md). Fields are made by add_body(), in up to some tenths of a
-  /// second for each model. Otherwise, and for all other such pairs, NarrowPhase finds the contacts.
-  bool distance_fields = false;
-  /// Of pairs in which a surface deforms and that NarrowPhase looks at.
+  /// Of pairs in which a surface deforms and that distance fields do not resolve.
   NarrowPhaseOptions narrow_phase{};
   void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
