@@ -19,7 +19,7 @@ def declarations():
     text = "".join((HEADERS / f"{name}.h").read_text() for name in ("base", "asset", "world", "constraints", "contact"))
     text = re.sub(r"#ifdef __cplusplus.*?#endif", "", text, flags=re.S)
     text = re.sub(r"//.*", "", text)
-    return re.sub(r"^#.*$", "", text, flags=re.M).replace("LIMBER_API ", "")
+    return re.sub(r"^#.*$", "", text, flags=re.M).replace("LIMBER_API ", "").replace("LIMBER_ENUM ", "")
 
 
 def assemble(library, folder):

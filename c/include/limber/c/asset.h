@@ -49,7 +49,7 @@ LIMBER_API limber_result limber_asset_create_soft_box(limber_vec3 half_extents, 
                                                       double damping_ratio, limber_asset** asset);
 
 /// How a body's frame moves, decided by the nodes that were fixed when it was baked.
-typedef enum limber_frame_motion {
+typedef enum limber_frame_motion LIMBER_ENUM {
   LIMBER_FRAME_FREE = 0,       ///< six degrees of freedom; origin at the centre of mass
   LIMBER_FRAME_POINT = 1,      ///< turns about one fixed point, its origin
   LIMBER_FRAME_LINE = 2,       ///< turns about one fixed line

@@ -12,12 +12,19 @@
 #define LIMBER_API
 #endif
 
+// In C an enumeration takes any int, which limber checks. In C++ it does so only where its type is told.
+#ifdef __cplusplus
+#define LIMBER_ENUM : int
+#else
+#define LIMBER_ENUM
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 /// How a call ended.
-typedef enum limber_result {
+typedef enum limber_result LIMBER_ENUM {
   LIMBER_OK = 0,
   LIMBER_INVALID_ARGUMENT = 1,   ///< an argument is NULL, out of its range, not finite, or names nothing
   LIMBER_INPUT_ERROR = 2,        ///< a file cannot be read, or holds something wrong
@@ -68,7 +75,7 @@ typedef struct limber_joint_id {
   uint32_t index, generation;
 } limber_joint_id;
 
-typedef enum limber_surface {
+typedef enum limber_surface LIMBER_ENUM {
   LIMBER_SURFACE_RENDER = 0,     ///< what is drawn
   LIMBER_SURFACE_COLLISION = 1,  ///< what touches
 } limber_surface;

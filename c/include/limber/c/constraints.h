@@ -44,7 +44,7 @@ LIMBER_API limber_result limber_world_handle_user_data(const limber_world* world
 // Joints ---------------------------------------------------------------------------------------------------------
 
 /// What b may do relative to a, along and about the axes of the joint's frame.
-typedef enum limber_joint_type {
+typedef enum limber_joint_type LIMBER_ENUM {
   LIMBER_JOINT_BALL = 0,         ///< three rotations about the origin; coordinates: intrinsic x-y-z Euler angles
   LIMBER_JOINT_REVOLUTE = 1,     ///< rotation about x
   LIMBER_JOINT_CYLINDRICAL = 2,  ///< rotation about x, translation along x; with a pitch the two go together
@@ -129,7 +129,7 @@ LIMBER_API limber_result limber_world_constraint_report(const limber_world* worl
 
 // Manipulation: points get an acceleration, a velocity or a place by forces of least norm -------------------------
 
-typedef enum limber_manipulation_level {
+typedef enum limber_manipulation_level LIMBER_ENUM {
   LIMBER_MANIPULATE_ACCELERATION = 0,      ///< m/s², by a force held over the coming step
   LIMBER_MANIPULATE_VELOCITY = 1,          ///< m/s now, by an impulse
   LIMBER_MANIPULATE_POSITION = 2,          ///< m at the coming step's end, by a force held over it

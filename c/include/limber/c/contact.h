@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-typedef enum limber_contact_solver {
+typedef enum limber_contact_solver LIMBER_ENUM {
   LIMBER_CONTACT_GAME = 0,   ///< small steps: bounded work
   LIMBER_CONTACT_EXACT = 1,  ///< to Coulomb's law, in the time that it takes
 } limber_contact_solver;
@@ -47,7 +47,7 @@ LIMBER_API limber_result limber_world_set_contact_veto(limber_world* world,
                                                        bool (*veto)(void* context, const limber_contact* contact),
                                                        void* context);
 
-typedef enum limber_contact_phase {
+typedef enum limber_contact_phase LIMBER_ENUM {
   LIMBER_CONTACT_BEGUN = 0,    ///< pressed now, and not before
   LIMBER_CONTACT_LASTING = 1,  ///< pressed now and before
   LIMBER_CONTACT_ENDED = 2,    ///< pressed before, and not now

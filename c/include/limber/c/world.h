@@ -101,7 +101,7 @@ LIMBER_API limber_result limber_world_body_model(const limber_world* world, limb
                                                  const limber_model** model);
 
 /// How a body comes to move.
-typedef enum limber_body_type {
+typedef enum limber_body_type LIMBER_ENUM {
   LIMBER_BODY_STATIC = 0,     ///< not at all: static bodies and sensors
   LIMBER_BODY_KINEMATIC = 1,  ///< as limber_world_set_kinematic_frame() says
   LIMBER_BODY_DYNAMIC = 2,    ///< by what acts on it
@@ -140,7 +140,7 @@ LIMBER_API double limber_world_dropped_seconds(const limber_world* world);  ///<
 
 // Loads ----------------------------------------------------------------------------------------------------------
 
-typedef enum limber_axes {
+typedef enum limber_axes LIMBER_ENUM {
   LIMBER_AXES_WORLD = 0,
   LIMBER_AXES_BODY = 1,
 } limber_axes;
