@@ -18,7 +18,7 @@ static ContactOptions to_cpp(const limber_contact_options& o) {
 static std::unique_ptr<ContactSource> make_source(const limber_contact_options& o) {
   if (!o.find_contacts) return nullptr;
   if (o.solver == LIMBER_CONTACT_EXACT) return std::make_unique<ContactFinder>();
-  return std::make_unique<ManifoldFinder>(ManifoldFinderOptions{.distance_fields = o.distance_fields});
+  return std::make_unique<ManifoldFinder>();
 }
 
 static limber_contact_event to_c(const World& world, const ContactEvent& e) {
@@ -76,8 +76,7 @@ limber_contact_options limber_default_contact_options(void) {
           o.rolling_friction,
           o.recovery_speed,
           o.residual_compliance,
-          o.compliance,
-          ManifoldFinderOptions{}.distance_fields};
+          o.compliance};
 }
 
 limber_result limber_world_set_contacts(limber_world* world, const limber_contact_options* options) {

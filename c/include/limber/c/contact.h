@@ -25,7 +25,6 @@ typedef struct limber_contact_options {
   double recovery_speed;     ///< of the exact solver, m/s, ≥ 0: the same as push_speed; default 0.05
   bool residual_compliance;  ///< dents, where models have it; default true
   double compliance;         ///< ≥ 0: ContactOptions::compliance; default 0
-  bool distance_fields;      ///< of the game solver: deforming surfaces meet by distance fields; default false
 } limber_contact_options;
 LIMBER_API limber_contact_options limber_default_contact_options(void);
 
