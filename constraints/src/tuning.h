@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace limber::internal {
 
@@ -114,6 +115,28 @@ struct EnergyTuning {
   double least_accepted = 4e-4;  ///< of the impulses; less is none. [path] Ends the refusals
 };
 
+/// Small steps of game contact (docs/derivations/small-steps.md).
+struct SmallStepTuning {
+  float push_share = 0.2f;  ///< of an overlap beyond the slop that a substep undoes. By judgement
+  /// m/s and rad/s: what joints are open by as a step begins comes together at this speed. By judgement.
+  double recovery_speed = 1.0;
+  /// Modes of a body up to which its pairs are swept eight at a time. [path] The loops have room for so many.
+  std::int32_t most_bundled_modes = 32;
+  /// Substeps in which bodies that rebound come together, and in which they part. The gap closes in the first; sweeps
+  /// leave 6 % of the speed of a box that lands flat after the second, and a tenth of what is to be given after the
+  /// first that parts.
+  float together = 3.0f, parting = 2.0f;
+  /// Rounds in which rows with bounds may take hold as well as let go; after that they let go alone. [path] Ends the
+  /// rounds.
+  int most_rounds = 4;
+  /// Newton's steps that close joints at a step's end. [path] Bounds the work: one is enough but where links buckle.
+  int most_closings = 8;
+  /// Neighbours of a node of joints up to which its elimination may join them. [path] Trees need none beside those that
+  /// share a body; machines of a few loops are below it.
+  std::size_t most_joined = 8;
+  int most_gradients = 8;  ///< steps of conjugate gradients where joints of many loops are not joined. [path]
+};
+
 struct ConstraintsTuning {
   RowTuning rows{};
   TouchTuning touches{};
@@ -121,6 +144,7 @@ struct ConstraintsTuning {
   RoundsTuning rounds{};
   MidpointTuning midpoint{};
   EnergyTuning energy{};
+  SmallStepTuning small_steps{};
 };
 inline constexpr ConstraintsTuning kConstraintsTuning{};
 

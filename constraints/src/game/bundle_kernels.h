@@ -10,7 +10,7 @@
 namespace limber::internal {
 
 inline constexpr std::size_t kBundleLanes = 8;
-inline constexpr std::int32_t kMostBundledModes = 32;  // of a body
+inline constexpr std::int32_t kMostBundledModes = kConstraintsTuning.small_steps.most_bundled_modes;
 
 /// Up to eight pairs. Contact k of all is contacts[first + k].
 struct PairBundle {

@@ -5,15 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include "../tuning.h"
+
 namespace limber::internal {
 namespace {
 
-// Rounds in which rows may take hold as well as let go; after that they let go alone, so that rounds end.
-constexpr int kMostRounds = 4;
+constexpr SmallStepTuning kTuning = kConstraintsTuning.small_steps;
 // What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
 constexpr double kRounded = 1e-9;
-// Newton's steps that close what is open at a step's end. One is enough but where links buckle.
-constexpr int kMostClosings = 8;
 
 using Hold = GameRow::Hold;
 
@@ -70,7 +69,7 @@ void GameConstraints::solve_again(GameBodies& bodies) {
   do {
     system_.factor(rows_, false);
     solve_once();
-  } while (let_go(++round < kMostRounds));
+  } while (let_go(++round < kTuning.most_rounds));
   find_taken(bodies);
   rows_.unscale(bodies, system_.frames(), moved_);
   add(bodies, system_.frames(), moved_, 1.0, bodies.motion());
@@ -183,7 +182,7 @@ void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit)
 
 /// What the rows that hold are short of: in their rates, by the way they turned, and in places.
 void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
-  const double most = GameRows::kRecoverySpeed * rows_.length();
+  const double most = kTuning.recovery_speed * rows_.length();
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   if (pushed) rows_.scale_pushes(bodies, system_.frames(), pushes_);
   for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
@@ -279,7 +278,7 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
 void GameConstraints::close_step(const BodyStates& states, GameBodies& bodies) {
   for (GameRow& row : rows_.rows()) row.closing = 0.0;
   find_errors(states);
-  for (int round = 0; residual_ > kRounded && round < kMostClosings; ++round) {
+  for (int round = 0; residual_ > kRounded && round < kTuning.most_closings; ++round) {
     rows_.linearise_again(states, bodies);
     system_.factor(rows_, true);
     close_errors(bodies);

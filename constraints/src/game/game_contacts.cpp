@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include "../tuning.h"
 #include "limber/model/vertex_rows.h"
 
 namespace limber::internal {
 namespace {
 
-// What of an overlap beyond the slop is undone in a substep.
-constexpr float kPushShare = 0.2f;
+constexpr float kPushShare = kConstraintsTuning.small_steps.push_share;
 
 float dot(const Block8& a, const Block8& b) {
   float sum = 0.0f;

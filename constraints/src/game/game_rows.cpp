@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
+
 namespace limber::internal {
 namespace {
 
 using Hold = GameRow::Hold;
+constexpr double kRecoverySpeed = kConstraintsTuning.small_steps.recovery_speed;
 
 /// to += J x of rows of eight coordinates. @param count of rows; 0: `rows`
 template <std::size_t count>

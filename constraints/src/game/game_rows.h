@@ -50,9 +50,6 @@ struct GameGroup {
 
 class GameRows {
  public:
-  // Out of place, parts come together this fast, m/s and rad/s.
-  static constexpr double kRecoverySpeed = 1.0;
-
   /// From where the substep begins. @param number of the substep, 0 …
   void make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints, int number);
   /// J where the bodies are at the step's end, for displacements: turns resist what GameRow::closing would do to them

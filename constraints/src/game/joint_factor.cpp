@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
+
 namespace limber::internal {
 namespace {
 
 // Far above what is lost to round-off in a pivot, far below what the lightest of bodies on the heaviest chain leaves.
 constexpr double kRegular = 1e-9;
-// Neighbours of a node up to which its elimination may join them. Trees need none beside those that share a body;
-// machines of a few loops are below it.
-constexpr std::size_t kMostJoined = 8;
 
 /// Three, the rows of a ball joint, or as many as are given: kernels below come for both.
 template <int fixed>
@@ -148,7 +147,7 @@ void JointFactor::order() {
     pattern_.position[at] = static_cast<std::int32_t>(pattern_.node_at.size());
     columns[pattern_.node_at.size()] = neighbours[at];
     pattern_.node_at.push_back(node);
-    const bool joins = neighbours[at].size() <= kMostJoined;
+    const bool joins = neighbours[at].size() <= kConstraintsTuning.small_steps.most_joined;
     for (const std::int32_t other : neighbours[at]) {
       std::vector<std::int32_t>& theirs = neighbours[static_cast<std::size_t>(other)];
       merged.clear();

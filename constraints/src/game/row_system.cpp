@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "../tuning.h"
+
 namespace limber::internal {
 namespace {
-
-// Steps of conjugate gradients where the factor has left something out.
-constexpr int kMostGradients = 8;
 
 using Hold = GameRow::Hold;
 
@@ -129,7 +128,7 @@ void RowSystem::solve_fully(const GameRows& rows, std::span<const double> guess,
   g.direction = g.residual;
   factor_.solve<1>(g.direction);
   double square = dot(g.residual, g.direction);
-  for (int i = 0; i < kMostGradients && square > 0.0; ++i) {
+  for (int i = 0; i < kConstraintsTuning.small_steps.most_gradients && square > 0.0; ++i) {
     multiply(rows, g.direction, g.product);
     const double along = dot(g.direction, g.product);
     if (!(along > 0.0)) break;

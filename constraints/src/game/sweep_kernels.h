@@ -11,6 +11,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../tuning.h"
+
 namespace limber::internal {
 
 struct alignas(32) Block8 {
@@ -37,7 +39,8 @@ struct ContactSideRows {
 
 /// Stages of a contact that rebounds. Each takes one substep, but for 0, in which it is open, and the last one: bodies
 /// come together up to kTogether, part up to kParted, and stay there while they press.
-inline constexpr float kTogether = 3.0f, kParted = 5.0f;
+inline constexpr float kTogether = kConstraintsTuning.small_steps.together,
+                       kParted = kTogether + kConstraintsTuning.small_steps.parting;
 
 /// One contact as the sweeps see it. Lengths in m, forces in N, held over the substep.
 struct ContactRow {
