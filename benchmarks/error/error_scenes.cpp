@@ -77,6 +77,13 @@ ErrorScene spin() {
           .tip = kBar};
 }
 
+ErrorScene whirl() {
+  ErrorScene scene = spin();
+  scene.name = "whirl", scene.what = "spin, with inertial coupling";
+  scene.bodies[0].coupled = true;
+  return scene;
+}
+
 ErrorScene lamp() {
   const Vec3 size{0.2, 0.03, 0.03};
   const Vec3 low_end(0.0, 0.015, 0.015), high_end(0.2, 0.015, 0.015);
@@ -136,6 +143,7 @@ Json body_json(const ErrorBody& body) {
   if (body.clamped) return out;
   out["velocity"] = vector(body.velocity);
   out["angular_velocity"] = vector(body.angular_velocity);
+  if (body.coupled) out["inertial_coupling"] = true;
   return out;
 }
 
@@ -167,7 +175,8 @@ void add_loads(const ErrorScene& scene, Json& out) {
 }  // namespace
 
 const std::vector<ErrorScene>& error_scenes() {
-  static const std::vector<ErrorScene> scenes{poke(), drag(), drop(), collide(), spin(), lamp(), squeeze(), strip()};
+  static const std::vector<ErrorScene> scenes{poke(),  drag(), drop(),    collide(), spin(),
+                                              whirl(), lamp(), squeeze(), strip()};
   return scenes;
 }
 

@@ -27,6 +27,7 @@ struct ErrorBody {
   Vec3 size = Vec3::Ones();                ///< m
   std::array<int, 3> cells{1, 1, 1};       ///< of the coarsest mesh
   bool clamped = false, mirrored = false;  ///< mirrored: its mesh is, at the middle of x
+  bool coupled = false;                    ///< limber plays it with inertial coupling
   Material material{};
   RigidTransform pose{};  ///< of the centre of mass
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
@@ -75,7 +76,7 @@ inline constexpr double kSlowestStep = 1.0 / 60.0;      ///< s
 /// The scene with everything that drives it so many times as strong: forces, ways, velocities and gravity.
 ErrorScene driven(ErrorScene scene, double times);
 
-/// poke, drag, drop, collide, spin, lamp, squeeze, strip.
+/// poke, drag, drop, collide, spin, whirl, lamp, squeeze, strip.
 const std::vector<ErrorScene>& error_scenes();
 /// @throws InvalidArgument naming the known ones
 const ErrorScene& error_scene(const std::string& name);

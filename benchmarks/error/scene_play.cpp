@@ -65,6 +65,7 @@ Asset baked_body(const ErrorScene& scene, std::size_t i, const ErrorSetting& set
   options.materials = {{"*", body.material}};
   options.analysis.modes = options.limits.max_modes = setting.modes;
   options.analysis.mass = MassKind::kConsistent;  // as the references have
+  options.volume_block = body.coupled;
   if (body.clamped) options.fixed = {NodesByIndex{clamped_nodes(body, input.mesh)}};
   if (setting.residual) {
     const std::vector<Index> loaded = loaded_nodes(scene, i, input.mesh);

@@ -53,6 +53,7 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
 void BodyGroup::set_step_length(double step) {
   were_static_.assign(whole_.velocity_response().begin(), whole_.velocity_response().end());
   whole_.set(model_->data().eigenvalues, model_->data().decays, positive(step), std::numbers::pi / step);
+  if (coupling_) coupling_->set_step(step);
   for (Index slot = 0; slot < slots(); ++slot)
     if (occupied(slot)) split_static_answer(slot);
 }
@@ -78,9 +79,11 @@ Index BodyGroup::add(const RigidTransform& X_WB, const Vec3& velocity, const Vec
     vacant_.pop_back();
     bodies_[static_cast<std::size_t>(slot)] = body;
     skins_[static_cast<std::size_t>(slot)] = std::move(skin);
+    coupled_[static_cast<std::size_t>(slot)] = nullptr;
     return slot;
   }
   bodies_.push_back(body);
+  coupled_.emplace_back();
   skins_.push_back(std::move(skin));
   predictions_.push_back({.frame = body.frame});
   for (ModeRows* rows : mode_rows()) rows->resize(bodies_.size());
@@ -102,15 +105,20 @@ void BodyGroup::clear_modes(Index slot) {
 void BodyGroup::set_pose(Index slot, const RigidTransform& X_WB) {
   body(slot).frame.set_pose(X_WB);
   body(slot).previous_pose = body(slot).frame.pose();
+  find_coupled_velocities(slot);
 }
 
 void BodyGroup::set_velocity(Index slot, const Vec3& velocity, const Vec3& angular_velocity) {
   body(slot).frame.set_velocity(constants_, velocity, angular_velocity);
+  if (coupled(slot)) set_coupled_velocities(slot, angular_velocity, rates(slot));
 }
 
 void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, std::span<const double> rates) {
   std::copy(amplitudes.begin(), amplitudes.end(), now_.amplitudes.modes(slot).begin());
-  std::copy(rates.begin(), rates.end(), now_.rates.modes(slot).begin());
+  if (coupled(slot))
+    set_coupled_velocities(slot, angular_velocity(slot), rates);
+  else
+    std::copy(rates.begin(), rates.end(), now_.rates.modes(slot).begin());
   previous_amplitudes_.copy_from(now_.amplitudes, slot);
   forget_static_answer(slot);
 }
@@ -124,13 +132,17 @@ Vec3 BodyGroup::position(Index slot, const SurfacePoint& at) const {
 Vec3 BodyGroup::velocity(Index slot, const SurfacePoint& at) const {
   const RigidFrame& f = frame(slot);
   const Vec3 arm = f.pose().q * shape(slot).position(at);
-  return f.velocity() + f.angular_velocity(constants_).cross(arm) + f.pose().q * shape(slot).velocity(at, rates(slot));
+  return f.velocity() + angular_velocity(slot).cross(arm) + f.pose().q * shape(slot).velocity(at, rates(slot));
 }
 
 void BodyGroup::apply_force(Index slot, const SurfacePoint& at, const Vec3& newtons) {
   Body& b = body(slot);
   const Quaternion& q_WB = b.frame.pose().q;
   b.force += newtons;
+  if (coupled(slot)) {
+    b.point_forces.push_back({at, newtons});
+    return;
+  }
   b.torque += (q_WB * shape(slot).position(at)).cross(newtons);
   shape(slot).add_force(at, q_WB.conjugate() * newtons, now_.forces.modes(slot));
   b.modes_loaded = true;
@@ -141,7 +153,9 @@ void BodyGroup::apply_impulse(Index slot, const SurfacePoint& at, const Vec3& ne
   const Quaternion q_WB = b.frame.pose().q;
   b.frame.apply_impulse(constants_, newton_seconds, (q_WB * shape(slot).position(at)).cross(newton_seconds));
   const Vec3 impulse_B = q_WB.conjugate() * newton_seconds;
-  if (delay == 0.0) return shape(slot).add_force(at, impulse_B, now_.rates.modes(slot));
+  if (delay == 0.0) shape(slot).add_force(at, impulse_B, now_.rates.modes(slot));
+  find_coupled_velocities(slot);
+  if (delay == 0.0) return;
   if (whole_.table().modes() == 0) return;
   b.delayed.push_back({at, impulse_B, delay});
   if (!skinned(slot)) return;
@@ -180,6 +194,7 @@ void BodyGroup::put_to_sleep(Index slot) {
   Body& b = body(slot);
   b.frame.set_velocity(constants_, Vec3::Zero(), Vec3::Zero());
   now_.rates.clear(slot);
+  find_coupled_velocities(slot);
   b.previous_pose = b.frame.pose();
   previous_amplitudes_.copy_from(now_.amplitudes, slot);
   clear_loads(slot);
@@ -189,6 +204,7 @@ void BodyGroup::put_to_sleep(Index slot) {
 void BodyGroup::advance_body(Index slot, const Vec3& gravity) {
   Body& b = body(slot);
   keep_previous_state(slot);
+  if (coupled(slot)) return advance_coupled(slot, gravity);
 
   const FrameLoad load{own_gravity(slot, gravity), b.force, b.torque};
   const double h = step_length();
@@ -280,6 +296,7 @@ void BodyGroup::apply_generalized_impulse(Index slot, const Vec3& impulse, const
   body(slot).frame.apply_impulse(constants_, impulse, moment);
   const std::span<double> rates = now_.rates.modes(slot);
   for (std::size_t i = 0; i < modal.size(); ++i) rates[i] += modal[i];
+  find_coupled_velocities(slot);
 }
 
 void BodyGroup::apply_generalized_force(Index slot, const Vec3& force, const Vec3& torque,
@@ -423,46 +440,7 @@ void BodyGroup::clear_loads(Index slot) {
   if (b.modes_loaded || !couplings_.empty()) now_.forces.clear(slot);
   b.modes_loaded = false;
   b.delayed.clear();
-}
-
-BodyEnergy BodyGroup::energy(Index slot, const Vec3& gravity) const {
-  const bool answers = bodies_[static_cast<std::size_t>(slot)].modes_static;
-  return energy_of(frame(slot), amplitudes(slot), rates(slot),
-                   answers ? static_amplitudes(slot) : std::span<const double>(), gravity);
-}
-
-BodyEnergy BodyGroup::predicted_energy(Index slot, const Vec3& gravity) const {
-  const Prediction& p = predictions_[static_cast<std::size_t>(slot)];
-  return energy_of(p.frame, predicted_amplitudes(slot), predicted_rates(slot),
-                   p.modes_static ? predicted_.answers.modes(slot) : std::span<const double>(), gravity);
-}
-
-double BodyGroup::predicted_dissipation(Index slot) const {
-  const std::span<const double> z0 = amplitudes(slot), z1 = predicted_amplitudes(slot), v0 = rates(slot),
-                                v1 = predicted_rates(slot), g = predicted_.forces.modes(slot);
-  const bool had = bodies_[static_cast<std::size_t>(slot)].modes_static;
-  const bool has = predictions_[static_cast<std::size_t>(slot)].modes_static;
-  double taken = 0.0;
-  for (std::size_t i = 0; i < z0.size(); ++i) {
-    const double before = z0[i] - (had ? static_amplitudes(slot)[i] : 0.0);
-    const double after = z1[i] - (has ? predicted_.answers.modes(slot)[i] : 0.0);
-    taken += g[i] * (after - before) + 0.5 * (v0[i] * v0[i] - v1[i] * v1[i]) +
-             0.5 * model_->data().eigenvalues[i] * (before * before - after * after);
-  }
-  return taken;
-}
-
-BodyEnergy BodyGroup::energy_of(const RigidFrame& frame, std::span<const double> z, std::span<const double> rates,
-                                std::span<const double> answer, const Vec3& gravity) const {
-  const Vec3 mass_times_center = constants_.mass * frame.pose().p + frame.pose().q * first_moment_of(z);
-  BodyEnergy energy{.kinetic_rigid = frame.kinetic_energy(constants_),
-                    .potential = -frame.settings().gravity_scale * gravity.dot(mass_times_center)};
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const double c = answer.empty() ? 0.0 : answer[i], vibrating = z[i] - c;
-    energy.kinetic_modal += 0.5 * rates[i] * rates[i];
-    energy.elastic += 0.5 * model_->data().eigenvalues[i] * (vibrating * vibrating + c * c);
-  }
-  return energy;
+  b.point_forces.clear();
 }
 
 void BodyGroup::save_state(Index slot, StateWriter& state) const {
@@ -482,6 +460,7 @@ void BodyGroup::restore_state(Index slot, StateReader& state) {
   if (b.modes_loaded) state.numbers(now_.forces.modes(slot));
   if (b.modes_static) state.numbers(now_.answers.modes(slot));
   if (b.held) state.numbers(predicted_.forces.modes(slot));
+  find_coupled_velocities(slot);
 }
 
 Vec3 BodyGroup::first_moment(Index slot) const { return first_moment_of(amplitudes(slot)); }

@@ -75,6 +75,9 @@ class BodyTable {
   /// Whether a contact source knows a body: it has something to meet others with, and others to meet.
   bool shows(const Entry& e) const;
 
+  /// Whether its turning and its modes feel each other's inertia.
+  bool coupled(const Entry& e) const { return e.group >= 0 && group(e).coupled(e.slot); }
+
   /// Whether contacts may press dents into any of them.
   bool any_dented() const;
 

@@ -95,7 +95,7 @@ bool SleepStage::at_rest(Index body, const SleepOptions& options) const {
   const RigidFrame& frame = group.frame(at.slot);
   const ModalModelData& data = group.model().data();
   const double radius = group.model().collision_extent().radius;
-  const double speed = frame.velocity().norm() + radius * frame.angular_velocity(group.frame_constants()).norm();
+  const double speed = frame.velocity().norm() + radius * group.angular_velocity(at.slot).norm();
   if (!(speed <= options.speed)) return false;
   double modal = 0.0;  // twice the kinetic energy
   for (const double rate : group.rates(at.slot)) modal += rate * rate;

@@ -47,6 +47,20 @@ void check_restitution(double restitution, ContactSolver solver) {
                           ", expected 0 to 1, and 0 but for ContactSolver::kGame");
 }
 
+/// @param contacts whether the world has them
+void require_flight(const ModalModel& model, const BodyPlacement& placement, bool skinned, bool contacts) {
+  const auto refuse = [&](const std::string& why) {
+    throw InvalidArgument("World::add_body: \"" + model.name() + "\" cannot have inertial coupling: " + why);
+  };
+  if (model.data().motion != FrameMotion::kFree) refuse("it has fixed nodes, expected a free body");
+  if (model.modes() > 0 && !model.data().volume_block) refuse("it has no volume block; bake it with --volume");
+  if (placement.frame.alter_free_motion()) refuse("it has damping or locked axes, expected none");
+  if (skinned) refuse("it bends by its modal skin; set modal_skin = false");
+  const CollisionFilter& filter = placement.filter;
+  if (contacts && (filter.self || (filter.layers != 0 && filter.mask != 0)))
+    refuse("it may meet others, expected a filter whose mask is 0");
+}
+
 }  // namespace
 
 void SleepOptions::validate() const {
@@ -97,11 +111,13 @@ BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacem
   const internal::ShapeExtent extent = placement.shape ? extent_of(*placement.shape) : extent_of(*model);
   const bool skinned = placement.modal_skin && model->data().skin.has_value();
   Impl& m = *impl_;
+  if (placement.inertial_coupling) require_flight(*model, placement, skinned, m.paths.registry.source() != nullptr);
   const Index group = m.bodies.group_of(std::move(model), m.parts.length());
   BodyGroup& bodies = *m.bodies.model_group(group).bodies;
   const Index slot = bodies.add(placement.pose, placement.velocity, placement.angular_velocity, skinned);
   bodies.set_frame_settings(slot, placement.frame);
   bodies.set_velocity(slot, placement.velocity, placement.angular_velocity);
+  if (placement.inertial_coupling) bodies.couple(slot);
   const BodyId id = m.bodies.add({.group = group,
                                   .slot = slot,
                                   .shape = placement.shape,
@@ -311,6 +327,8 @@ void World::set_frame_settings(BodyId id, const FrameSettings& settings, const c
   const Entry& e = impl_->bodies.entry(id, function);
   BodyGroup& group = impl_->bodies.group(e);
   check(settings, group.frame_constants().motion, impl_->paths.solver, function);
+  if (group.coupled(e.slot) && settings.alter_free_motion())
+    throw InvalidArgument(std::string("World::") + function + ": the body has inertial coupling, expected one without");
   const auto body = static_cast<Index>(id.index);
   impl_->sleep.wake(body);
   group.set_frame_settings(e.slot, settings);

@@ -59,6 +59,12 @@ MaterialFrame joint_side(const BodyTable& bodies, BodyId id, const JointFrame& i
   return {body, model, patch_around(model, on.surface, in_body.origin, on.radius), in_body, skinned};
 }
 
+void require_uncoupled(const internal::BodyTable& bodies, const Entry& e, const char* function) {
+  if (bodies.coupled(e))
+    throw InvalidArgument(std::string("World::") + function + ": a body of \"" + bodies.group(e).model().name() +
+                          "\" has inertial coupling, expected one without: such bodies fly freely");
+}
+
 void wake_bodies_of(const Constraint& constraint, SleepStage& sleep) {
   for (const Index body : constraint.bodies())
     if (body >= 0) sleep.wake(body);
@@ -70,6 +76,7 @@ HandleId World::add_handle(BodyId id, const SurfacePoint& at, const HandleOption
   const Entry& e = impl_->bodies.entry(id, "add_handle");
   const ModalModel& model = impl_->bodies.group(e).model();
   validate(model, at);
+  require_uncoupled(impl_->bodies, e, "add_handle");
   auto made = std::make_unique<Handle>(
       MaterialFrame(static_cast<Index>(id.index), model, at, impl_->bodies.group(e).skinned(e.slot)),
       impl_->bodies.group(e).position(e.slot, at), options);
@@ -126,6 +133,7 @@ ManipulationResult World::manipulate(std::span<const BodyWish> wishes, std::span
     const Entry& e = impl_->bodies.entry(id, "manipulate");
     const ModalModel& model = impl_->bodies.group(e).model();
     validate(model, at);
+    require_uncoupled(impl_->bodies, e, "manipulate");
     return {static_cast<Index>(id.index), model, at, impl_->bodies.group(e).skinned(e.slot)};
   };
   std::vector<PointWish> wanted;
@@ -157,6 +165,8 @@ JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointA
     if (!(on->radius >= 0.0 && std::isfinite(on->radius)))
       throw InvalidArgument("World::add_joint: the attachment's radius is " + std::to_string(on->radius) +
                             " m, expected a finite number of at least 0");
+  for (const BodyId id : {a, b})
+    if (id != BodyId{}) require_uncoupled(impl_->bodies, impl_->bodies.any_entry(id, "add_joint"), "add_joint");
   auto made = std::make_unique<JointConstraint>(joint_side(impl_->bodies, a, spec.frame, on_a),
                                                 joint_side(impl_->bodies, b, spec.frame, on_b), spec);
   const std::uint32_t index = impl_->constraints.add(std::move(made));
@@ -222,6 +232,8 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   const auto rebounds = [](const Entry& e) { return e.alive && e.restitution > 0.0; };
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), rebounds))
     throw InvalidArgument("World::set_contact_source: a body has restitution, expected ContactSolver::kGame");
+  for (const Entry& e : std::as_const(m.bodies).entries())
+    if (source != nullptr && e.alive && m.bodies.shows(e)) require_uncoupled(m.bodies, e, "set_contact_source");
   m.paths.reset(options);
   m.drawing.forget_all();
   m.sleep.wake_all();

@@ -28,7 +28,7 @@ BodyView World::body(BodyId id) const {
   const Entry& e = impl_->bodies.entry(id, "body");
   const BodyGroup& group = impl_->bodies.group(e);
   const RigidFrame& frame = group.frame(e.slot);
-  return {frame.pose(), frame.velocity(), frame.angular_velocity(group.frame_constants()), group.amplitudes(e.slot),
+  return {frame.pose(), frame.velocity(), group.angular_velocity(e.slot), group.amplitudes(e.slot),
           group.rates(e.slot)};
 }
 

@@ -210,6 +210,37 @@ TEST(World, HungBodySwingsAndKeepsItsTotalEnergy) {
   }
 }
 
+TEST(World, BodyWithInertialCouplingTellsItsVelocitiesAndFliesAlone) {
+  const BodyPlacement spins{.angular_velocity = {3, -2, 4}, .inertial_coupling = true};
+  World world({.gravity = kNoGravity});
+  const BodyId body = world.add_body(sample_model(), spins), plain = world.add_body(sample_model());
+  const std::vector<double> z{0.02, 0.01, -0.03, 0.02}, rates{0.3, 0.1, 0.2, -0.4};
+  world.set_amplitudes(body, z, rates);
+  EXPECT_LT((world.body(body).angular_velocity - Vec3(3, -2, 4)).norm(), 1e-13);
+  EXPECT_NEAR(world.body(body).rates[3], -0.4, 1e-14);
+  const Vec3 L = world.angular_momentum(body);
+  const double energy = world.energy(body).total();
+  for (int i = 0; i < 240; ++i) world.step();
+  EXPECT_LT((world.angular_momentum(body) - L).norm(), 1e-12 * L.norm());
+  EXPECT_NEAR(world.energy(body).total(), energy, 1e-3 * energy);
+  EXPECT_THROW(world.add_handle(body, kMarked), InvalidArgument);
+  EXPECT_THROW(world.add_joint(plain, body, {}), InvalidArgument);
+  EXPECT_THROW(world.set_damping(body, 0.0, 1.0), InvalidArgument);
+}
+
+TEST(World, RefusesInertialCouplingWhereItIsNotOffered) {
+  World world;
+  EXPECT_THROW(world.add_body(sample_model({.motion = FrameMotion::kPoint}), {.inertial_coupling = true}),
+               InvalidArgument);
+  ModalModelData data = testing::sample_model_data({});
+  data.volume_block.reset();
+  EXPECT_THROW(world.add_body(std::make_shared<const ModalModel>(std::move(data)), {.inertial_coupling = true}),
+               InvalidArgument);
+  EXPECT_THROW(world.add_body(sample_model(), {.frame = {.angular_damping = 1.0}, .inertial_coupling = true}),
+               InvalidArgument);
+  EXPECT_EQ(world.body_count(), 0u);
+}
+
 // Instances, identity, order
 // --------------------------------------------------------------------------------------------
 

@@ -183,5 +183,20 @@ TEST(ErrorOrders, ASpinningBarIsOffByTheStretchThatTheFrameLeavesOut) {
               0.1 * error.mean * error.peak);
 }
 
+/// The same bar struck off its axis, with inertial coupling: Coriolis forces keep its shape, and its inertia grows.
+TEST(ErrorOrders, InertialCouplingFollowsABarThatSpinsAndIsStruck) {
+  const ErrorScene &whirl = error_scene("whirl"), &spin = error_scene("spin");
+  const PlayedScene exact = play_reference(whirl, ElasticLaw::kLinear, 1);
+  SceneBakery bakery;
+  const PlayedScene seen = play(whirl, {}, bakery);
+  const MotionError error = scene_error(whirl, seen, exact).motion;
+  EXPECT_LT(error.mean, 0.02);
+  EXPECT_LT(error.shape_mean, 0.1);
+  EXPECT_LT(std::max(seen.energy_rise, seen.energy_loss), 1e-4);
+  const MotionError alone = scene_error(spin, play(spin, {}, bakery), exact).motion;
+  EXPECT_GT(alone.mean, 10.0 * error.mean);
+  EXPECT_GT(alone.shape_mean, 5.0 * error.shape_mean);
+}
+
 }  // namespace
 }  // namespace limber

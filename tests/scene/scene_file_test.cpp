@@ -32,12 +32,14 @@ TEST(SceneFile, EveryFieldIsReadWhereItBelongs) {
     "assets": {"bell": "sub/bell.glb"},
     "limits": {"max_modes": 7, "max_force": 10, "min_displacement": 1e-4, "frame_rate": 120, "load": "static"},
     "bodies": [{"name": "left", "asset": "bell", "part": "clapper", "position": [1, 2, 3],
-                "orientation": [2, 0, 0, 0], "velocity": [4, 5, 6], "angular_velocity": [7, 8, 9]}],
+                "orientation": [2, 0, 0, 0], "velocity": [4, 5, 6], "angular_velocity": [7, 8, 9],
+                "inertial_coupling": true}],
     "strikes": [{"body": "left", "time": 0.5, "at": {"triangle": 4, "weights": [0.5, 0.25, 0.25]},
                  "impulse": [0, 0, -1], "axes": "body"}],
     "forces": [{"body": "left", "start": 0.1, "duration": 0.2, "at": {"nearest": [0, 0, 1], "frame": "input"},
                 "force": [1, 0, 0]}]})");
   EXPECT_EQ(s.step, 0.002);
+  EXPECT_TRUE(s.bodies[0].placement.inertial_coupling);
   EXPECT_EQ(s.steps, 500);
   EXPECT_EQ(s.gravity, Vec3(0, -1, 0));
   EXPECT_EQ(s.substeps, 3);

@@ -135,6 +135,7 @@ void read_body(const Json& value, const std::string& where, const std::filesyste
                     .angular_velocity = o.vec3("angular_velocity", Vec3::Zero())};
   body.placement.modal_skin = o.boolean("modal_skin", true);
   body.placement.frame = read_frame_settings(o, scene);
+  body.placement.inertial_coupling = o.boolean("inertial_coupling", false);
   read_touch(o, scene, folder, body);
   body.movement = read_movement(o, true);
   if (body.movement.index() != 0 && (o.has("velocity") || o.has("angular_velocity")))

@@ -71,6 +71,10 @@ ModalSurface pick(const ModalSurface& surface, std::span<const Index> kept) {
   return {surface.rest, surface.triangles, pick(surface.basis, kept)};
 }
 
+ModalVolume pick(const ModalVolume& volume, std::span<const Index> kept) {
+  return {volume.rest, volume.tets, pick(volume.basis, kept), pick(volume.mass_times_basis, kept)};
+}
+
 template <class T>
 std::vector<T> pick(const std::vector<T>& all, std::span<const Index> kept) {
   std::vector<T> out;
@@ -189,16 +193,19 @@ std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<
     lean.skin = pick(*all.skin, kept);
     if (!parts.drawn && all.collision) lean.skin->render = lean.skin->collision;
     if (!two_surfaces) lean.skin->collision.clear();
+    if (all.volume_block && parts.volume) lean.skin->volume = all.skin->volume;
   }
+  if (all.volume_block && parts.volume) lean.volume_block = pick(*all.volume_block, kept);
   if (all.residual_compliance && parts.residual) lean.residual_compliance = with_statics_of_dropped(model, kept);
   return std::make_shared<const ModalModel>(std::move(lean));
 }
 
 /// A scene's use of the bodies of one model.
 struct ModelNeeds {
-  bool meets = false;   // others, by its own surface
-  bool yields = false;  // so that its residual compliance acts
-  bool bends = false;   // by its modal skin
+  bool meets = false;    // others, by its own surface
+  bool yields = false;   // so that its residual compliance acts
+  bool bends = false;    // by its modal skin
+  bool couples = false;  // its turning with its modes, by the volume block
   bool meets_itself = false;
   bool is_tied = false;    // by joints, whose patches lie on the collision surface
   bool is_loaded = false;  // by strikes, forces and handles, whose places are on the render surface
@@ -213,6 +220,7 @@ ModelNeeds needs_of(const Scene& scene, const std::set<std::string>& bodies, con
     const bool in_reach = filter.self || (filter.layers != 0 && filter.mask != 0);
     needs.meets = needs.meets || (scene.contacts.options && in_reach && !wears);
     needs.bends = needs.bends || body->placement.modal_skin;
+    needs.couples = needs.couples || body->placement.inertial_coupling;
     needs.meets_itself = needs.meets_itself || filter.self;
   }
   needs.yields = needs.meets && scene.contacts.options->residual_compliance;
@@ -282,8 +290,8 @@ class Leaving {
 
 void leave_out_parts(Leaving& leaving, const ModalModelData& data, const ModelNeeds& needs, const SceneUse& use) {
   const bool is_private = !use.reached_into;
-  leaving.leave(&Parts::volume, LeftOut::kVolume, data.volume_block && !needs.meets_itself,
-                "no body of it touches itself");
+  leaving.leave(&Parts::volume, LeftOut::kVolume, data.volume_block && !needs.meets_itself && !needs.couples,
+                "no body of it touches itself or has inertial coupling");
   leaving.leave(&Parts::rows, LeftOut::kVertexRows, data.touchable && !data.eigenvalues.empty() && !needs.meets,
                 "no body of it meets another by its surface");
   leaving.leave(&Parts::residual, LeftOut::kResidual, data.residual_compliance && !needs.yields,

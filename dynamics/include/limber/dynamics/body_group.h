@@ -6,7 +6,8 @@
 /// (a, ω, α of the parent; the mean of the values at the step's two ends is held over the step). These are the inertial
 /// forces on the rest shape; those on the deformation itself (Coriolis, Euler and centrifugal of u, of relative size
 /// |ω|/√λ and |ω|²/λ) are left out as in [H03], and so is all coupling of a *dynamic* rotation to the modes: taken
-/// without its reaction on the rotation it would not conserve energy. Free bodies feel none of it: p_i = 0.
+/// without its reaction on the rotation it would not conserve energy. Free bodies feel none of it, p_i = 0, unless they
+/// are told to feel all of it (couple(); inertial_coupling.h).
 #pragma once
 
 #include <array>
@@ -17,6 +18,7 @@
 #include "limber/core/state_archive.h"
 #include "limber/dynamics/body_energy.h"
 #include "limber/dynamics/body_shape.h"
+#include "limber/dynamics/inertial_coupling.h"
 #include "limber/dynamics/modal_step.h"
 #include "limber/dynamics/rigid_frame.h"
 #include "limber/dynamics/surface_point.h"
@@ -64,6 +66,12 @@ class BodyGroup {
   /// @param skinned whether it bends by its modal skin. @pre not so for a model that has none
   Index add(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_velocity, bool skinned = false);
   void remove(Index slot);
+  /// From now on the body's turning and its modes feel each other's inertia, as in inertial_coupling.h: it flies
+  /// freely, under loads. Neither predict() nor parts of steps are for it. Allocates; the first time for a model, the
+  /// integrals.
+  /// @throws InvalidArgument as InertialCoupling, and for a body that bends by its skin
+  void couple(Index slot);
+  bool coupled(Index slot) const { return coupled_[static_cast<std::size_t>(slot)] != nullptr; }
   Index slots() const { return static_cast<Index>(bodies_.size()); }
   Index count() const { return slots() - static_cast<Index>(vacant_.size()); }
   bool occupied(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].occupied; }
@@ -71,12 +79,15 @@ class BodyGroup {
   // State of one body. Setting it sets its previous state too: nothing is drawn between.
   const RigidFrame& frame(Index slot) const { return bodies_[static_cast<std::size_t>(slot)].frame; }
   std::span<const double> amplitudes(Index slot) const { return now_.amplitudes.modes(slot); }  ///< z
-  std::span<const double> rates(Index slot) const { return now_.rates.modes(slot); }            ///< ż
+  std::span<const double> rates(Index slot) const {                                             ///< ż
+    return coupled(slot) ? coupled_[static_cast<std::size_t>(slot)]->rates() : now_.rates.modes(slot);
+  }
+  Vec3 angular_velocity(Index slot) const;  ///< world, rad/s; of coupled bodies it is not frame()'s
   void set_pose(Index slot, const RigidTransform& X_WB);
   void set_velocity(Index slot, const Vec3& velocity, const Vec3& angular_velocity);
   void set_amplitudes(Index slot, std::span<const double> amplitudes, std::span<const double> rates);
   void set_parent(Index slot, const KinematicFrame& at_step_end);
-  /// @pre locks and linear damping are for free bodies
+  /// @pre locks and linear damping are for free bodies; coupled ones have neither locks nor damping
   void set_frame_settings(Index slot, const FrameSettings& settings) {
     body(slot).frame.set_settings(constants_, settings);
   }
@@ -105,7 +116,8 @@ class BodyGroup {
   Vec3 velocity(Index slot, const SurfacePoint& at) const;  ///< world, m/s, deformation included
 
   // Loads, at the deformed point.
-  /// Held over the next step. @param newtons world axes
+  /// Held over the next step, with the arm and the axes at its start; on coupled bodies with the mean of both ends'.
+  /// @param newtons world axes
   void apply_force(Index slot, const SurfacePoint& at, const Vec3& newtons);
   /// Changes the velocities of frame and modes at once; the modes' only `delay` seconds into the next step if that is
   /// positive (exactly: the response to an impulse at that time is added). Allocates nothing but the body's first
@@ -249,7 +261,8 @@ class BodyGroup {
   /// The modes of all bodies at one time.
   struct ModalState {
     explicit ModalState(Index modes) : amplitudes(modes), rates(modes), forces(modes), answers(modes) {}
-    ModeRows amplitudes, rates;
+    ModeRows amplitudes;
+    ModeRows rates;    // of coupled bodies: the modes' momenta π
     ModeRows forces;   // g, held over the step that begins then
     ModeRows answers;  // c, of the amplitudes: the static answer to the last step's constraints
   };
@@ -266,6 +279,17 @@ class BodyGroup {
     }
   };
 
+  /// Held on a point of a coupled body: its arm and axes are those of both ends of the step.
+  struct PointForce {
+    SurfacePoint at;
+    Vec3 force;  // world, N
+
+    template <class Self>
+    static auto state_fields(Self& s) {
+      return std::tie(s.at, s.force);
+    }
+  };
+
   struct Body {
     RigidFrame frame;
     RigidTransform previous_pose;
@@ -273,16 +297,17 @@ class BodyGroup {
     bool occupied = true;
     bool constrained = false;
     bool asleep = false;
-    bool modes_loaded = false;              // forces of modes are not zero
-    bool modes_static = false;              // their static answers are not zero
-    bool held = false;                      // a constraint acted on the modes in the last step
-    std::vector<DelayedImpulse> delayed{};  // on the modes, within the next step
+    bool modes_loaded = false;               // forces of modes are not zero
+    bool modes_static = false;               // their static answers are not zero
+    bool held = false;                       // a constraint acted on the modes in the last step
+    std::vector<DelayedImpulse> delayed{};   // on the modes, within the next step
+    std::vector<PointForce> point_forces{};  // part of `force`; of coupled bodies alone
 
     /// `occupied` and `constrained` are others' business.
     template <class Self>
     static auto state_fields(Self& s) {
       return std::tie(s.frame, s.previous_pose, s.force, s.torque, s.asleep, s.modes_loaded, s.modes_static, s.held,
-                      s.delayed);
+                      s.delayed, s.point_forces);
     }
   };
 
@@ -302,6 +327,10 @@ class BodyGroup {
   Body& body(Index slot) { return bodies_[static_cast<std::size_t>(slot)]; }
   const Body& body(Index slot) const { return bodies_[static_cast<std::size_t>(slot)]; }
   void advance_body(Index slot, const Vec3& gravity);
+  void advance_coupled(Index slot, const Vec3& gravity);
+  void set_coupled_velocities(Index slot, const Vec3& angular_velocity, std::span<const double> rates);
+  void find_coupled_velocities(Index slot);
+  Vec3 add_point_forces(Index slot, const Quaternion& q_WB, std::span<double> modal) const;
   void predict_motion(Index slot, const Vec3& gravity, double length, const ConstraintLoad& load,
                       std::span<const double> answers, ExactMotion& motion) const;
   void advance_modes(Index slot, const ModeArrays& modes, bool loaded, const ModalStep& step) const;
@@ -336,7 +365,9 @@ class BodyGroup {
   std::vector<Coupling> couplings_;  // empty for free bodies
 
   std::vector<Body> bodies_;
-  std::vector<std::unique_ptr<Skin>> skins_;  // by slot
+  std::vector<std::unique_ptr<Skin>> skins_;             // by slot
+  std::unique_ptr<InertialCoupling> coupling_;           // made for the first body that needs it
+  std::vector<std::unique_ptr<CoupledMotion>> coupled_;  // by slot; null: not coupled
   std::vector<Index> vacant_;
   bool within_step_ = false;
   ModeRows previous_amplitudes_;

@@ -138,6 +138,13 @@ struct BodyPlacement {
   /// Whether the body bends by the modal skin of its model (docs/large-bends.md), where it has one: drawn, held, joined
   /// and pushed there. False, or no skin: by its modes alone.
   bool modal_skin = true;
+  /// Whether a free body's turning and its modes feel each other's inertia: Coriolis, Euler and centrifugal forces on
+  /// the deformation, and the change of inertia by it (limber/dynamics/inertial_coupling.h). False, as [H03] has it:
+  /// modes ring as in a body that does not turn, and a body turns as one that is not bent.
+  /// True needs a model with a volume block, no modal skin in use, and is for flight under forces, impulses and
+  /// gravity: World refuses joints, handles and manipulate() on such a body, damping and locks of its frame, and a
+  /// contact source unless its filter meets nothing.
+  bool inertial_coupling = false;
 };
 
 /// How a joint sits on a deforming body: on a patch of its surface, whose mean displacement and rotation it follows.
