@@ -38,7 +38,8 @@ static BodyPlacement to_cpp(const limber_placement& p) {
           .shape = p.shape != nullptr ? p.shape->shape : nullptr,
           .user_data = p.user_data,
           .frame = to_cpp(p.frame),
-          .modal_skin = p.modal_skin};
+          .modal_skin = p.modal_skin,
+          .inertial_coupling = p.inertial_coupling};
 }
 
 static limber_placement given(const limber_placement* placement) {
@@ -75,6 +76,7 @@ limber_placement limber_default_placement(void) {
   out.friction = -1.0;
   out.frame = to_c(start.frame);
   out.modal_skin = start.modal_skin;
+  out.inertial_coupling = start.inertial_coupling;
   return out;
 }
 

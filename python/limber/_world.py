@@ -352,7 +352,8 @@ class World:
 
         Placement, here and below: position (3,), m; rotation, a quaternion (w, x, y, z) or a rotation vector, rad; velocity,
         m/s; angular_velocity, rad/s; friction, μ ≥ 0; layers and mask, bits: whom it meets; shape, which others meet in place
-        of the surface; modal_skin, False to bend by modes alone; gravity_scale; linear_damping and angular_damping, 1/s;
+        of the surface; modal_skin, False to bend by modes alone; inertial_coupling, True
+        for flight in which turning and modes feel each other; gravity_scale; linear_damping and angular_damping, 1/s;
         lock_translation and lock_rotation, three bools for axes of the world; user_data.
         """
         return self._add(lib.limber_world_add_body, (asset._pointer, body), placement)

@@ -203,6 +203,28 @@ TEST(CWorld, FramesTakeTheirShareOfGravityDampingAndLocks) {
   EXPECT_TRUE(settings.lock_translation[2] && !settings.lock_translation[0]);
 }
 
+// A turning ball stretches where its modes feel the turning, and only there.
+TEST(CWorld, CouplesTurningAndModesWhereItIsTold) {
+  limber_world_options options = limber_default_world_options();
+  options.gravity = {0, 0, 0};
+  double elastic[2]{};
+  for (int coupled = 0; coupled < 2; ++coupled) {
+    const World world = make_world(&options);
+    limber_placement start = limber_default_placement();
+    start.angular_velocity = {0, 0, 5};
+    start.inertial_coupling = coupled == 1;
+    limber_body_id ball{};
+    ASSERT_EQ(limber_world_add_body(world.get(), soft_ball().get(), 0, &start, &ball), LIMBER_OK)
+        << limber_last_error();
+    limber_world_step(world.get(), 30);
+    limber_energy energy{};
+    ASSERT_EQ(limber_world_energy(world.get(), ball, &energy), LIMBER_OK);
+    elastic[coupled] = energy.elastic;
+  }
+  EXPECT_EQ(elastic[0], 0.0);
+  EXPECT_GT(elastic[1], 0.0);
+}
+
 TEST(CWorld, HandleHoldsItsPoint) {
   const World world = make_world();
   limber_body_id ball{};

@@ -64,6 +64,9 @@ typedef struct limber_placement {
   uint64_t user_data;         ///< the caller's own; default 0
   limber_frame_settings frame;  ///< gravity's share, damping, locked axes; default none
   bool modal_skin;              ///< bends by its model's modal skin where it has one; default true
+  /// Whether a free body's turning and its modes feel each other's inertia; for flight alone, of a model with a volume
+  /// block and no modal skin in use: limber/dynamics/inertial_coupling.h. Default false
+  bool inertial_coupling;
 } limber_placement;
 LIMBER_API limber_placement limber_default_placement(void);
 
