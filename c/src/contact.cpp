@@ -28,7 +28,13 @@ static limber_contact_event to_c(const World& world, const ContactEvent& e) {
           static_cast<limber_contact_phase>(e.phase),
           to_c(e.position),
           to_c(e.normal),
-          to_c(e.impulse)};
+          to_c(e.impulse),
+          e.approach};
+}
+
+static limber_hit_event to_c(const HitEvent& e) {
+  return {to_c(e.a),        to_c(e.b),      e.user_data_a, e.user_data_b,
+          to_c(e.position), to_c(e.normal), e.speed,       to_c(e.impulse)};
 }
 
 static BodyFilter to_cpp(const limber_query_filter* filter) {
@@ -109,6 +115,26 @@ limber_result limber_world_contact_events(const limber_world* world, limber_cont
     const World& w = world_of(world);
     answer(w.contact_events(), events, capacity, count, [&w](const ContactEvent& e) { return to_c(w, e); });
   });
+}
+
+limber_result limber_world_hit_events(const limber_world* world, limber_hit_event* events, size_t capacity,
+                                      size_t* count) {
+  return guarded([&] {
+    answer(world_of(world).hit_events(), events, capacity, count, [](const HitEvent& e) { return to_c(e); });
+  });
+}
+
+limber_result limber_world_contact_impulse(const limber_world* world, limber_body_id a, limber_body_id b,
+                                           limber_vec3* impulse) {
+  return guarded([&] { required(impulse, "impulse") = to_c(world_of(world).contact_impulse(to_cpp(a), to_cpp(b))); });
+}
+
+limber_result limber_world_set_surface_velocity(limber_world* world, limber_body_id id, limber_vec3 velocity) {
+  return guarded([&] { world_of(world).set_surface_velocity(to_cpp(id), to_cpp(velocity)); });
+}
+
+limber_result limber_world_surface_velocity(const limber_world* world, limber_body_id id, limber_vec3* velocity) {
+  return guarded([&] { required(velocity, "velocity") = to_c(world_of(world).surface_velocity(to_cpp(id))); });
 }
 
 limber_result limber_world_add_sensor(limber_world* world, const limber_shape* shape, limber_transform pose,

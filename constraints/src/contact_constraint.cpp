@@ -23,6 +23,29 @@ Mat3 frame_along(const Vec3& n) {
   return axes;
 }
 
+/// Of a side's body, if nothing touches it, along n.
+double acceleration(const BodyStates& states, const PreparedSide& side, const Vec3& n, const Vec3& gravity) {
+  if (states.is_static(side.body)) return 0.0;
+  const auto& [group, slot, pose] = states.body(side.body);
+  const FrameConstants& c = group->frame_constants();
+  if (c.motion != FrameMotion::kFree) return 0.0;
+  return n.dot(group->own_gravity(slot, gravity) + group->held_force(slot) / c.mass);
+}
+
+/// How fast a contact's points will come together as they meet; 0: they will not.
+double approach(const BodyStates& states, const PreparedContact& contact, const Vec3& gravity) {
+  const Vec3 n = contact.axes.col(0);
+  double speed = 0.0, gain = 0.0;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const PreparedSide& side = contact.side(s);
+    if (states.is_static(side.body)) continue;
+    speed -= PreparedContact::sign(s) * n.dot(side.motion(states).velocity);
+    gain -= PreparedContact::sign(s) * acceleration(states, side, n, gravity);
+  }
+  if (speed < 0.0 && gain <= 0.0) return 0.0;
+  return std::sqrt(std::max(0.0, speed * speed + 2.0 * gain * std::max(0.0, n.dot(contact.offset))));
+}
+
 /// Constraints that are used anew in every step.
 template <class T>
 class Pool {
@@ -68,42 +91,38 @@ struct ContactSet::Impl {
   std::vector<Index> touched;  // scratch of finish()
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
-  void add(const BodyStates& states, const ContactPoint& point, const Vec3& origin, std::span<const double> friction);
-  static double restitution_of(const PreparedContact& contact, std::span<const double> restitution);
+  void add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around);
   void reserve_regions(const BodyStates& states, std::span<const ContactPoint> points);
   void add_region(PreparedSide& side, const ContactSide& found);
   void spread_shapes(PreparedSide& side);
 };
 
-void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const Vec3& origin,
-                           std::span<const double> friction) {
-  const auto of = [&](Index body) {
-    return static_cast<std::size_t>(body) < friction.size() ? friction[static_cast<std::size_t>(body)]
-                                                            : options.friction;
+void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around) {
+  const auto surface = [&](Index body) {
+    const auto i = static_cast<std::size_t>(body);
+    return i < around.surfaces.size() ? around.surfaces[i] : BodySurface{.friction = options.friction};
   };
+  const BodySurface of_a = surface(point.a.body), of_b = surface(point.b.body);
   PreparedContact& contact = contacts.emplace_back();
   contact.id = point.id;
   contact.a = make_side(states, point.a, point.normal), contact.b = make_side(states, point.b, -point.normal);
   add_region(contact.a, point.a);
   add_region(contact.b, point.b);
   contact.axes = frame_along(point.normal);
-  const double smaller = std::min(of(point.a.body), of(point.b.body));
-  contact.friction = smaller > 0.0 ? std::sqrt(of(point.a.body) * of(point.b.body)) : 0.0;
+  const double smaller = std::min(of_a.friction, of_b.friction);
+  contact.friction = smaller > 0.0 ? std::sqrt(of_a.friction * of_b.friction) : 0.0;
+  // Bodies that bend rebound by their modes.
+  contact.restitution = flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(of_a.restitution, of_b.restitution);
+  contact.running = states.pose(point.a.body, StepTime::kStart).q * of_a.velocity -
+                    states.pose(point.b.body, StepTime::kStart).q * of_b.velocity;
   contact.offset = contact.apart(states, StepTime::kStart);
-  contact.start_position = point.position + origin;
+  contact.start_position = point.position + around.origin;
   contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
   if (const ContactMemory* known = history.find(point.id))
     contact.last_force = known->force, contact.compliance = known->compliance, contact.slip = known->slip;
-}
-
-/// Of contacts between what does not bend: other bodies rebound by their modes.
-double ContactSet::Impl::restitution_of(const PreparedContact& contact, std::span<const double> restitution) {
-  const auto of = [&](const PreparedSide& side) {
-    const auto body = static_cast<std::size_t>(side.body);
-    return body < restitution.size() ? restitution[body] : 0.0;
-  };
-  return flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(of(contact.a), of(contact.b));
+  else
+    contact.approach = approach(states, contact, around.gravity);
 }
 
 /// So that spans of them stay where they are.
@@ -152,8 +171,8 @@ ContactSet::~ContactSet() = default;
 ContactSet::ContactSet(ContactSet&&) noexcept = default;
 ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 
-void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points, const Vec3& origin,
-                        std::span<const double> friction, std::span<const double> restitution) {
+void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points,
+                        const ContactSurroundings& surroundings) {
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
@@ -164,10 +183,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.dents.reserve(bodies);
   s.reserve_regions(states, points);
   for (const ContactPoint& point : points)
-    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) {
-      s.add(states, point, origin, friction);
-      s.contacts.back().restitution = Impl::restitution_of(s.contacts.back(), restitution);
-    }
+    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, surroundings);
   s.pairs.reuse(), s.rolling.reuse();
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {

@@ -78,11 +78,17 @@ void ContactHistory::take(const PreparedContact& contact, bool lasts) {
                      .phase = lasts ? ContactPhase::kLasting : ContactPhase::kBegun,
                      .position = contact.start_position,
                      .normal = contact.axes.col(0),
-                     .impulse = contact.impulse});
+                     .impulse = contact.impulse,
+                     .approach = lasts ? 0.0 : contact.approach});
 }
 
 void ContactHistory::end(const ContactMemory& last) {
-  events_.push_back({last.id, last.a, last.b, ContactPhase::kEnded, last.position, last.normal, Vec3::Zero()});
+  events_.push_back({.id = last.id,
+                     .a = last.a,
+                     .b = last.b,
+                     .phase = ContactPhase::kEnded,
+                     .position = last.position,
+                     .normal = last.normal});
 }
 
 void ContactHistory::list_ids() {

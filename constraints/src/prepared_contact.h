@@ -80,8 +80,10 @@ struct PreparedContact {
   Index yielding = -1;           // the body that the energy of its spring is counted with
   Mat3 axes = Mat3::Identity();  // columns: normal, two tangents; world
   double friction = 0.0;
-  double restitution = 0.0;    // of small steps alone
-  Vec3 offset = Vec3::Zero();  // p_a − p_b at the step's start, world
+  double restitution = 0.0;     // of small steps alone
+  Vec3 running = Vec3::Zero();  // of a's surface over a less that of b's over b, world, m/s
+  double approach = 0.0;        // m/s, as ContactEvent::approach
+  Vec3 offset = Vec3::Zero();   // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
   Vec3 last_force = Vec3::Zero();  // world, on a, N
   Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone

@@ -132,7 +132,7 @@ void BodyTable::advance_free(std::span<const Index> awake, std::uint64_t changes
 void BodyTable::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(entries_.size()));
   for (const Entry& e : entries_) {
-    state(e.generation, e.placed, e.user_data);
+    state(e.generation, e.placed, e.user_data, e.surface_velocity);
     if (e.alive && e.sensor) state(e.pose);
   }
   state(vacant_);
@@ -143,7 +143,7 @@ void BodyTable::save_state(StateWriter& state) const {
 void BodyTable::restore_state(StateReader& state) {
   entries_.resize(static_cast<std::size_t>(state.read<std::uint64_t>()));
   for (Entry& e : entries_) {
-    state(e.generation, e.placed, e.user_data);
+    state(e.generation, e.placed, e.user_data, e.surface_velocity);
     if (e.alive && e.sensor) state(e.pose);
   }
   state(vacant_);

@@ -34,6 +34,7 @@ class BodyTable {
     bool placed = false;   // of a static one: the source has seen where it stands
     bool sensor = false;   // tells what it overlaps, and meets nothing
     std::uint64_t user_data = 0;
+    Vec3 surface_velocity = Vec3::Zero();  // m/s, body axes
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {

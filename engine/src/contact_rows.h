@@ -12,19 +12,22 @@ namespace limber::internal {
 
 struct ContactRows {
   ContactSet set;
-  std::vector<double> friction, restitution;  // by body
+  std::vector<BodySurface> surfaces;  // by body
+  bool stale = false;                 // these
 
   const ContactOptions& options() const { return set.options(); }
   /// @param found at the start of the step, ordered as by ContactSource
-  void take(const BodyStates& states, std::span<const ContactPoint> found) {
-    set.update(states, found, Vec3::Zero(), friction, restitution);
+  void take(const BodyStates& states, std::span<const ContactPoint> found, const Vec3& gravity) {
+    set.update(states, found, {.surfaces = surfaces, .gravity = gravity});
   }
   void note_surfaces(const BodyTable& bodies) {
-    friction.resize(bodies.size()), restitution.resize(bodies.size());
-    for (std::size_t i = 0; i < friction.size(); ++i) {
+    stale = false;
+    surfaces.resize(bodies.size());
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
       const BodyTable::Entry& e = bodies[static_cast<Index>(i)];
-      friction[i] = e.friction >= 0.0 ? e.friction : options().friction;
-      restitution[i] = e.restitution;
+      surfaces[i] = {.friction = e.friction >= 0.0 ? e.friction : options().friction,
+                     .restitution = e.restitution,
+                     .velocity = e.surface_velocity};
     }
   }
 };

@@ -6,7 +6,7 @@ namespace limber::internal {
 void ContactSearch::find(const Substep& substep, int parts, ContactRows& rows, Jobs& jobs, StageClock& clock) {
   do {
     const bool told_all = forecast_.write_states(substep.length, parts, substep.gravity);
-    if (told_all) rows.note_surfaces(*bodies_);
+    if (told_all || rows.stale) rows.note_surfaces(*bodies_);
     clock.lap(Stage::kLookAhead, std::ssize(sleep_->awake()));
     StageTimes theirs;
     registry_->source()->find_contacts({.states = forecast_.states(),

@@ -21,7 +21,7 @@ class ContactSearch {
       : bodies_(&bodies), sleep_(&sleep), registry_(&registry), forecast_(bodies, sleep) {}
 
   /// Finds what touches, or may within the step. Bodies that are touched wake. @pre there is a source
-  /// @param parts the step is taken in, of one length  @param rows are told the bodies' friction and restitution
+  /// @param parts the step is taken in, of one length  @param rows are told of the bodies' surfaces
   void find(const Substep& substep, int parts, ContactRows& rows, Jobs& jobs, StageClock& clock);
   /// Contacts of all bodies, ordered as by ContactSource.
   std::span<const ContactPoint> found() const { return found_; }

@@ -59,6 +59,7 @@ void StepEvents::add_to(Merged& merged, const ContactEvent& event) {
   merged.event = event;
   merged.event.impulse += before.impulse;
   merged.event.phase = merged.pressed ? before.phase : ContactPhase::kLasting;
+  merged.event.approach = std::max(merged.event.approach, before.approach);
   merged.pressed = true;
 }
 

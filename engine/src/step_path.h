@@ -56,10 +56,16 @@ class StepPath {
   /// Energy that a body's contacts store, beside that of its modes, J.
   double stored_energy(Index body) const { return rows_.set.dent_energy(constraints_->states(), body); }
 
+  /// Bodies' surfaces run otherwise from now on.
+  void tell_surfaces() { rows_.stale = true; }
+
   // The contacts' memory from step to step. Between steps.
   void add_to(StateHash& hash) const { add_memory_to(hash, rows_.set, bodies_->size()); }
   virtual void save_state(StateWriter& state) const { rows_.set.save_state(state); }
-  virtual void restore_state(StateReader& state) { rows_.set.restore_state(state); }
+  virtual void restore_state(StateReader& state) {
+    rows_.set.restore_state(state);
+    tell_surfaces();
+  }
 
  protected:
   /// In how many parts velocities change over a substep.

@@ -82,6 +82,8 @@ void WorldOptions::validate() const {
                           ", expected at least 1");
   if (substeps < 1)
     throw InvalidArgument("WorldOptions: substeps is " + std::to_string(substeps) + ", expected at least 1");
+  if (!(hit_speed >= 0.0))
+    throw InvalidArgument("WorldOptions: hit_speed is " + std::to_string(hit_speed) + " m/s, expected at least 0");
   sleep.validate();
 }
 
@@ -274,6 +276,7 @@ void World::step() {
   m.probes.queries.tell_changed();
   m.probes.sensors.update();
   if (m.paths.registry.source() != nullptr) m.last.events.end();
+  m.last.hits.update(contact_events(), m.options.hit_speed, m.bodies);
   if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
   m.time.count_step();
   clock.lap(Stage::kBookkeeping, 1);

@@ -223,12 +223,15 @@ void World::set_contact_source(ContactSource* source, const ContactOptions& opti
   const auto sticks = [](const Entry& e) { return e.alive && std::isinf(e.friction); };
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), sticks))
     throw InvalidArgument("World::set_contact_source: a body has infinite friction, expected ContactSolver::kGame");
-  const auto is_damped = [&](const Entry& e) {
-    return e.alive && e.group >= 0 && m.bodies.group(e).frame(e.slot).settings().alter_free_motion();
+  const auto is_for_games = [&](const Entry& e) {
+    const bool moves = e.alive && e.group >= 0;
+    return (moves && m.bodies.group(e).frame(e.slot).settings().alter_free_motion()) ||
+           (e.alive && !e.surface_velocity.isZero(0.0));
   };
-  if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), is_damped))
+  if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), is_for_games))
     throw InvalidArgument(
-        "World::set_contact_source: a body has damping or locked axes, expected ContactSolver::kGame");
+        "World::set_contact_source: a body has damping, locked axes or a surface velocity, expected "
+        "ContactSolver::kGame");
   const auto rebounds = [](const Entry& e) { return e.alive && e.restitution > 0.0; };
   if (options.solver == ContactSolver::kExact && std::ranges::any_of(std::as_const(m.bodies).entries(), rebounds))
     throw InvalidArgument("World::set_contact_source: a body has restitution, expected ContactSolver::kGame");
@@ -246,5 +249,31 @@ void World::set_contact_veto(std::function<bool(const ContactPoint&)> acts) {
 }
 
 std::span<const ContactEvent> World::contact_events() const { return impl_->last.events.events(); }
+std::span<const HitEvent> World::hit_events() const { return impl_->last.hits.events(); }
+
+Vec3 World::contact_impulse(BodyId a, BodyId b) const {
+  for (const BodyId id : {a, b}) impl_->bodies.any_entry(id, "contact_impulse");
+  if (a == b) throw InvalidArgument("World::contact_impulse: a and b are the same body, expected two");
+  const auto [first, second] = std::minmax(a.index, b.index);
+  Vec3 sum = Vec3::Zero();
+  for (const ContactEvent& contact : contact_events())
+    if (contact.a == static_cast<Index>(first) && contact.b == static_cast<Index>(second)) sum += contact.impulse;
+  return a.index == first ? sum : Vec3(-sum);
+}
+
+void World::set_surface_velocity(BodyId id, const Vec3& velocity) {
+  Impl& m = *impl_;
+  m.bodies.any_entry(id, "set_surface_velocity");
+  require_finite(velocity, "set_surface_velocity", "velocity");
+  if (m.paths.solver == ContactSolver::kExact)
+    throw InvalidArgument("World::set_surface_velocity: the contact solver is kExact, expected ContactSolver::kGame");
+  m.bodies[static_cast<Index>(id.index)].surface_velocity = velocity;
+  m.paths.in_force().tell_surfaces();
+  m.sleep.wake_all();
+}
+
+Vec3 World::surface_velocity(BodyId id) const {
+  return impl_->bodies.any_entry(id, "surface_velocity").surface_velocity;
+}
 
 }  // namespace limber

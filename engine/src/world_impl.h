@@ -18,6 +18,7 @@
 #include "constraint_stage.h"
 #include "contact_paths.h"
 #include "drawing.h"
+#include "hit_events.h"
 #include "limber/engine/world.h"
 #include "rigid_models.h"
 #include "sleep_stage.h"
@@ -33,6 +34,7 @@ struct World::Impl {
   struct LastStep {
     ConstraintReport report;
     internal::StepEvents events;
+    internal::HitEvents hits;
     StageTimes* times = nullptr;  // written if not null
   };
   Impl(const WorldOptions& wanted, Jobs& lent)

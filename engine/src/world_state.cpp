@@ -171,6 +171,7 @@ void World::restore_state(std::span<const std::byte> state) {
   internal::Snapshot snapshot = impl_->snapshot();
   for (const BodyId later : snapshot.check_structure(reader)) remove_body(later);
   snapshot.restore_motion(reader);
+  impl_->last.hits.update(contact_events(), impl_->options.hit_speed, impl_->bodies);
   impl_->probes.queries.tell_changed();
 }
 

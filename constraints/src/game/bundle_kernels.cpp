@@ -468,8 +468,9 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   sums.begun = hn::MulAdd(force, hn::Sub(straight, hn::Min(gap, zero)), sums.begun);
   sums.kept = hn::MulAdd(yields, force, sums.kept);
   for (std::size_t t = 0; t < 2; ++t) {
-    Put(hn::Neg(bent[1 + t]), c.slip[t], lane);
-    sums.begun = hn::NegMulAdd(Get(c.force[1 + t], lane), bent[1 + t], sums.begun);
+    const Vector slip = hn::Sub(Get(c.running[t], lane), bent[1 + t]);
+    Put(slip, c.slip[t], lane);
+    sums.begun = hn::MulAdd(Get(c.force[1 + t], lane), slip, sums.begun);
   }
   Put(hn::Sub(hn::Min(gap, zero), yields), c.target, lane);
   Put(force, c.before, lane);

@@ -38,7 +38,7 @@ struct BundleContact {
   Block8 turn[2][3][3];  // rows of the sides' turns: [side][axis][component]
   Block8 arm[2][3];      // body axes
   Block8 lever[2][3];    // world
-  Block8 rest, friction, slop, compliance, inverse_normal, inverse_tangent, inverse_push, coupling[2];
+  Block8 rest, friction, slop, compliance, inverse_normal, inverse_tangent, inverse_push, coupling[2], running[2];
   Block8 now, gap, slip[2], target, force[3], before, push, part;
   Block8 sum[3];             // of the substeps' forces, N
   Block8 radius, moment[3];  // as those of RollingRow

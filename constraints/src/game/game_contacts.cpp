@@ -176,6 +176,8 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
   row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
   row.compliance = static_cast<float>(yields);
   row.rest = static_cast<float>(contact.axes.col(0).dot(contact.offset));
+  for (int t = 0; t < 2; ++t)
+    row.running[t] = static_cast<float>(bodies.plan().length() * contact.axes.col(1 + t).dot(contact.running));
   const Vec3 last = contact.axes.transpose() * contact.last_force;
   for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
   row.force[0] = std::max(0.0f, row.force[0]);

@@ -147,6 +147,7 @@ void PairBundles::put(std::size_t contact, const ContactRow& row) {
       c.arm[s][i].v[lane] = row.side[s].arm[i], c.lever[s][i].v[lane] = row.side[s].lever[i];
   c.rest.v[lane] = row.rest, c.friction.v[lane] = row.friction, c.slop.v[lane] = row.slop;
   c.compliance.v[lane] = row.compliance;
+  for (std::size_t t = 0; t < 2; ++t) c.running[t].v[lane] = row.running[t];
   for (std::size_t axis = 0; axis < 3; ++axis) c.force[axis].v[lane] = row.force[axis];
 }
 

@@ -48,7 +48,8 @@ struct ContactRow {
   float axes[3][3] = {};  // normal, tangents; world
   float rest = 0.0f;      // the gap at the step's start less what the modes give it
   float friction = 0.0f, slop = 0.0f;
-  float compliance = 0.0f;                                                   // m/N
+  float running[2] = {};    // of the surfaces along the tangents, m a substep
+  float compliance = 0.0f;  // m/N
   float inverse_normal = 0.0f, inverse_tangent = 0.0f, inverse_push = 0.0f;  // effective masses, N/m
   float coupling[2] = {};                                                    // of the normal with the tangents
   float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap

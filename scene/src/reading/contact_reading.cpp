@@ -140,25 +140,35 @@ void read_contact(const JsonObject& o, Scene& scene) {
   read_solver(o, scene);
 }
 
-SceneStatic read_static(const Json& value, const std::string& where, const std::filesystem::path& folder) {
+Vec3 read_surface_velocity(const JsonObject& o, const Scene& scene) {
+  const char* key = "surface_velocity";
+  if (o.has(key) && scene.contacts.solver == ContactSolver::kExact)
+    refuse(o.where(key), "given, and the scene's solver is \"exact\"", "\"solver\": \"game\"");
+  return o.vec3(key, Vec3::Zero());
+}
+
+SceneStatic read_static(const Json& value, const std::string& where, const Scene& scene,
+                        const std::filesystem::path& folder) {
   const JsonObject o(value, where);
   SceneStatic s{.name = o.text("name"),
                 .shape = read_shape(o, folder, false),
                 .pose = read_pose(o),
                 .filter = read_filter(o),
                 .friction = read_friction(o),
+                .surface_velocity = read_surface_velocity(o, scene),
                 .where = where};
   o.finish();
   return s;
 }
 
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
-  for (const char* key : {"friction", "restitution", "shape", "layers", "meets", "touches_itself"})
+  for (const char* key : {"friction", "restitution", "surface_velocity", "shape", "layers", "meets", "touches_itself"})
     if (o.has(key) && !scene.contacts.options)
       throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
                        "\"statics\" beside \"bodies\"");
   body.placement.friction = read_friction(o);
   body.placement.restitution = read_restitution(o, scene);
+  body.surface_velocity = read_surface_velocity(o, scene);
   body.placement.filter = read_filter(o);
   body.placement.filter.self = o.boolean("touches_itself", false);
   if (o.has("shape")) body.shape = read_shape(o, folder, true);

@@ -14,7 +14,8 @@ namespace limber::internal {
 /// The member `contact`; without one, the defaults where there are statics, else none.
 void read_contact(const JsonObject& o, Scene& scene);
 
-SceneStatic read_static(const nlohmann::json& value, const std::string& where, const std::filesystem::path& folder);
+SceneStatic read_static(const nlohmann::json& value, const std::string& where, const Scene& scene,
+                        const std::filesystem::path& folder);
 
 /// `friction`, `shape`, `layers` and `meets` of a body, which only a scene with contact may have.
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body);

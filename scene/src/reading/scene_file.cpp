@@ -287,7 +287,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   read_contact(o, scene);
   if (o.has("statics"))
     o.for_each("statics",
-               [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, folder)); });
+               [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, scene, folder)); });
   if (o.has("bodies") || !o.has("machines"))
     o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
   read_machines(o, folder, scene);

@@ -114,6 +114,7 @@ struct ScenePlayer::Impl {
     for (std::size_t i = 0; i < scene.statics.size(); ++i) {
       const SceneStatic& standing = scene.statics[i];
       statics.push_back(world.add_static(models.shape_of_static[i], standing.pose, standing.filter, standing.friction));
+      if (!standing.surface_velocity.isZero(0.0)) world.set_surface_velocity(statics.back(), standing.surface_velocity);
     }
     add_joints();
     plan_loads();
@@ -165,6 +166,7 @@ void ScenePlayer::Impl::add_bodies() {
       throw InputError(body.where + ": the body \"" + body.name +
                        "\" has fixed nodes, expected no \"locks\" and no linear \"damping\"");
     bodies.push_back(world.add_body(models.of_body[i], placement));
+    if (!body.surface_velocity.isZero(0.0)) world.set_surface_velocity(bodies.back(), body.surface_velocity);
     if (std::holds_alternative<std::monostate>(body.movement)) continue;
     if (is_free)
       throw InputError(body.where + ".motion: the body \"" + body.name +

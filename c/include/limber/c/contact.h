@@ -59,9 +59,29 @@ typedef struct limber_contact_event {
   limber_vec3 position;  ///< world, m
   limber_vec3 normal;    ///< unit, world, out of b into a
   limber_vec3 impulse;   ///< on a over the step, world, N·s
+  double approach;       ///< of one that began: how fast its points came together, m/s
 } limber_contact_event;
 LIMBER_API limber_result limber_world_contact_events(const limber_world* world, limber_contact_event* events,
                                                      size_t capacity, size_t* count);
+
+/// A pair of bodies that came together at 1 m/s or faster in the last step.
+typedef struct limber_hit_event {
+  limber_body_id a, b;
+  uint64_t user_data_a, user_data_b;
+  limber_vec3 position, normal;  ///< of the fastest contact: world, m; unit, out of b into a
+  double speed;                  ///< at which they came together there, m/s
+  limber_vec3 impulse;           ///< of all their contacts on a, over the step, world, N·s
+} limber_hit_event;
+LIMBER_API limber_result limber_world_hit_events(const limber_world* world, limber_hit_event* events, size_t capacity,
+                                                 size_t* count);
+/// Of all contacts of two bodies in the last step, on a: world, N·s.
+LIMBER_API limber_result limber_world_contact_impulse(const limber_world* world, limber_body_id a, limber_body_id b,
+                                                      limber_vec3* impulse);
+/// Lets a body's surface run over it, as a conveyor's belt does. @param velocity m/s, body axes
+LIMBER_API limber_result limber_world_set_surface_velocity(limber_world* world, limber_body_id id,
+                                                           limber_vec3 velocity);
+LIMBER_API limber_result limber_world_surface_velocity(const limber_world* world, limber_body_id id,
+                                                       limber_vec3* velocity);
 
 // Sensors: convex shapes that tell which bodies they overlap, and push none ---------------------------------------
 

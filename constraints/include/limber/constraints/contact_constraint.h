@@ -88,11 +88,28 @@ struct ContactEvent {
   Vec3 position = Vec3::Zero();  ///< world, at the start of the step in which it was last pressed
   Vec3 normal = Vec3::Zero();    ///< world, out of b into a
   Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s; zero for kEnded
+  /// kBegun: how fast the points came together as they met, m/s, ≥ 0. By √(u² + 2 a gap) of their speed u and
+  /// acceleration a at the step's start, under gravity and held forces: of bodies that fall without turning, exactly.
+  double approach = 0.0;
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.id, s.a, s.b, s.phase, s.position, s.normal, s.impulse);
+    return std::tie(s.id, s.a, s.b, s.phase, s.position, s.normal, s.impulse, s.approach);
   }
+};
+
+/// What contacts are told of a body's surface.
+struct BodySurface {
+  double friction = 0.5;         ///< μ ≥ 0; that of a pair is √(μ_a μ_b)
+  double restitution = 0.0;      ///< e, 0 to 1; that of a pair is the larger
+  Vec3 velocity = Vec3::Zero();  ///< how it runs over the body, as that of a conveyor: m/s, body axes
+};
+
+/// A step, as contacts are told of it beside where bodies are.
+struct ContactSurroundings {
+  Vec3 origin = Vec3::Zero();               ///< that of the query
+  std::span<const BodySurface> surfaces{};  ///< by body; those beyond its end have the options' friction
+  Vec3 gravity = Vec3::Zero();              ///< m/s², world
 };
 
 /// What a scene's contacts remember of a step: with the bodies' states it is all that the next step depends on.
@@ -146,11 +163,8 @@ class ContactSet {
   ContactSet& operator=(ContactSet&&) noexcept;
 
   /// Takes the contacts found at the step's start, in the order of ContactSource.
-  /// @param origin that of the query. @param friction by body: μ of a pair is √(μ_a μ_b); bodies beyond its end have
-  /// that of the options. @param restitution by body: e of a pair is the larger of both; bodies beyond its end have
-  /// none
-  void update(const BodyStates& states, std::span<const ContactPoint> contacts, const Vec3& origin = Vec3::Zero(),
-              std::span<const double> friction = {}, std::span<const double> restitution = {});
+  void update(const BodyStates& states, std::span<const ContactPoint> contacts,
+              const ContactSurroundings& surroundings = {});
   /// One for each pair of bodies that have contacts, ordered as they are. Valid until the next update().
   std::span<Constraint* const> constraints() const;
 

@@ -104,7 +104,8 @@ struct WorldOptions {
   /// drawn with a tolerance is drawn from these where what they are off by is within it. Half the time to read where
   /// bodies are drawn that share no shapes. Not for bodies with a modal skin.
   bool half_precision = false;
-  void validate() const;  ///< @throws InvalidArgument naming the field and its value
+  double hit_speed = 1.0;  ///< m/s, ≥ 0: hit_events() tells of pairs that come together at least this fast
+  void validate() const;   ///< @throws InvalidArgument naming the field and its value
 };
 
 /// How a body comes to move: World::body_type().
@@ -175,6 +176,15 @@ struct SensorEvent {
   static auto state_fields(Self& s) {
     return std::tie(s.sensor.index, s.sensor.generation, s.body.index, s.body.generation, s.began);
   }
+};
+
+/// A pair of bodies that came together fast in the last step: for sounds and damage.
+struct HitEvent {
+  BodyId a{}, b{};
+  std::uint64_t user_data_a = 0, user_data_b = 0;       ///< theirs
+  Vec3 position = Vec3::Zero(), normal = Vec3::Zero();  ///< of the fastest contact, as in ContactEvent: out of b into a
+  double speed = 0.0;           ///< at which they came together there: ContactEvent::approach, m/s
+  Vec3 impulse = Vec3::Zero();  ///< of all their contacts on a, over the step, world, N·s
 };
 
 /// One direction in which a point of a body is to do something: PointWish of manipulation.h by BodyId.
@@ -406,6 +416,17 @@ class World {
   /// What pressed, or ceased to, in the last step; bodies by BodyId::index. Impulses of substeps are summed. Contacts
   /// of bodies that sleep are not told; those that press when they wake go on as kLasting.
   std::span<const ContactEvent> contact_events() const;
+  /// Pairs that came together in the last step, at WorldOptions::hit_speed or faster; at most one each, by a and b.
+  std::span<const HitEvent> hit_events() const;
+  /// What two bodies pressed each other with in the last step, all contacts together: on a, N·s, world.
+  /// @throws InvalidArgument if a and b are the same
+  Vec3 contact_impulse(BodyId a, BodyId b) const;
+  /// Lets a body's surface run over it, as a conveyor's belt does: contacts rub against it as if they slid at so much
+  /// more. Static, kinematic and dynamic bodies alike. Wakes all that sleeps.
+  /// @param velocity m/s, body axes; of it, a contact feels what lies along the surface
+  /// @throws InvalidArgument also by ContactSolver::kExact
+  void set_surface_velocity(BodyId id, const Vec3& velocity);
+  Vec3 surface_velocity(BodyId id) const;
 
   // State ------------------------------------------------------------------------------------------------------------
   BodyView body(BodyId id) const;

@@ -109,7 +109,8 @@ struct SceneStatic {
   SceneShape shape{};
   RigidTransform pose{};
   CollisionFilter filter{};
-  std::optional<double> friction{};  ///< as in World::add_static
+  std::optional<double> friction{};      ///< as in World::add_static
+  Vec3 surface_velocity = Vec3::Zero();  ///< as in World::set_surface_velocity
   std::string where{};
 };
 
@@ -120,6 +121,7 @@ struct SceneBody {
   std::variant<Index, std::string> part = Index{0};  ///< which body of the asset: index or name
   BodyPlacement placement{};                         ///< its shape is null: see below
   SceneShape shape{};                                ///< what others meet in place of the body's surface
+  Vec3 surface_velocity = Vec3::Zero();              ///< as in World::set_surface_velocity
   FrameMovement movement{};
   std::string where{};
 };
