@@ -12,7 +12,6 @@
 #include "limber/core/stage_times.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_player.h"
-#include "limber/scene/surface_ray.h"
 #include "page_history.h"
 #include "page_model.h"
 #include "page_tracks.h"
@@ -41,7 +40,8 @@ void check(const PageSettings& s) {
 }  // namespace
 
 struct PageWorld::Impl {
-  explicit Impl(const std::filesystem::path& path) : told(read_scene(path)), baked(load_models(told)) {
+  explicit Impl(const std::filesystem::path& path)
+      : told(read_scene(path)), baked(load_models(told, {.keep = {LeftOut::kVertexRows}})) {
     settings.gravity = told.gravity;
     settings.step = told.step;
     settings.substeps = told.substeps;
@@ -216,15 +216,14 @@ void PageWorld::reconstruct(int body, float* positions) const {
 // Hands ---------------------------------------------------------------------------------------------------------------
 
 PageHit PageWorld::cast_ray(const Vec3& from, const Vec3& direction) const {
-  const Impl& m = *impl_;
-  PageHit best{.distance = std::numeric_limits<double>::infinity()};
-  const Vec3 along = direction.normalized();
-  for (std::size_t i = 0; i < m.bodies.size(); ++i) {
-    const std::optional<SurfaceHit> hit = first_hit(m.world(), m.bodies[i].id, from, along);
-    if (!hit || hit->parameter >= best.distance) continue;
-    best = {static_cast<int>(i), hit->at, from + hit->parameter * along, hit->parameter};
-  }
-  return best;
+  constexpr double kFar = 1e4;  // m
+  const World& world = impl_->world();
+  const BodyFilter moving{.accepts = [&](BodyId id) { return world.body_type(id) != BodyType::kStatic; }};
+  const std::optional<BodyHit> hit = world.cast_ray({.from = from, .way = kFar * direction.normalized()}, moving);
+  const auto& bodies = impl_->bodies;
+  const auto body = std::ranges::find_if(bodies, [&](const auto& b) { return hit && b.id == hit->body; });
+  if (body == bodies.end() || !hit->at) return {};
+  return {static_cast<int>(body - bodies.begin()), *hit->at, hit->position, hit->distance};
 }
 
 bool PageWorld::grab(const PageHit& hit) {

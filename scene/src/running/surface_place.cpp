@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include "limber/core/error.h"
 #include "limber/mesh/closest_point.h"
-#include "limber/scene/surface_ray.h"
 
 namespace limber::internal {
 namespace {
@@ -85,20 +83,18 @@ Hit meet(const TrianglePoints& x, const Vec3& from, const Vec3& direction) {
   return {e2.dot(m) / det, {1.0 - scale * (vi + wi), scale * vi, scale * wi}};
 }
 
-std::optional<SurfaceHit> first_of(const PlacedSurface& s, const Vec3& start, const Vec3& direction) {
-  const Vec3 from = start - s.origin;
-  std::optional<SurfaceHit> best;
-  for (std::size_t t = 0; t < s.triangles->size(); ++t) {
-    const Hit hit = meet(s.corners((*s.triangles)[t]), from, direction);
-    if (hit.parameter < 0.0 || (best && hit.parameter >= best->parameter)) continue;
-    best = {render_point(t, hit.weights), hit.parameter};
-  }
-  return best;
-}
-
 SurfacePoint find(const AlongRay& place, const World& world, BodyId body, const std::string& where) {
   const PlacedSurface s = place_surface(world, body, place.frame);
-  if (const std::optional<SurfaceHit> hit = first_of(s, place.from, place.direction)) return hit->at;
+  const Vec3 from = place.from - s.origin;
+  Hit first;
+  SurfacePoint at;
+  for (std::size_t t = 0; t < s.triangles->size(); ++t) {
+    const Hit hit = meet(s.corners((*s.triangles)[t]), from, place.direction);
+    if (hit.parameter < 0.0 || (first.parameter >= 0.0 && hit.parameter >= first.parameter)) continue;
+    first = hit;
+    at = render_point(t, hit.weights);
+  }
+  if (first.parameter >= 0.0) return at;
   throw InputError(where + ".at.ray: misses the body \"" + world.model(body).name() + "\" as it is at " +
                    std::to_string(world.time()) + " s, expected a ray that meets its surface");
 }
@@ -132,11 +128,3 @@ SurfacePoint find_place(const SurfacePlace& place, const World& world, BodyId bo
 }
 
 }  // namespace limber::internal
-
-namespace limber {
-
-std::optional<SurfaceHit> first_hit(const World& world, BodyId body, const Vec3& from, const Vec3& direction) {
-  return internal::first_of(internal::place_surface(world, body, PlaceFrame::kWorld), from, direction);
-}
-
-}  // namespace limber

@@ -44,7 +44,7 @@ struct PageModel {
   std::vector<double> visible_amplitudes{};
 };
 
-/// The first point of any body that a ray meets.
+/// The first point of any body that moves, as contact has it, which a ray meets within 10 km: World::cast_ray().
 struct PageHit {
   int body = -1;  ///< −1: none
   SurfacePoint at{};
