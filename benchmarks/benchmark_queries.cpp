@@ -1,4 +1,5 @@
-// Queries in a world of a thousand bodies: rigid boxes, or boxes that bend.
+// Queries in a world of a thousand bodies: rigid boxes, or balls that bend. Where Bullet is found, its ray test among
+// the same boxes.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -9,6 +10,10 @@
 #include "random_states.h"
 #include "shapes.h"
 #include "wavy_model.h"
+
+#ifdef LIMBER_HAS_BULLET
+#include <btBulletCollisionCommon.h>
+#endif
 
 namespace {
 
@@ -76,5 +81,57 @@ BENCHMARK(ray)->ArgName("bends")->Arg(0)->Arg(1);
 BENCHMARK(ball_cast)->ArgName("bends")->Arg(0)->Arg(1);
 BENCHMARK(nearest)->ArgName("bends")->Arg(0)->Arg(1);
 BENCHMARK(ray_after_a_step)->ArgName("bends")->Arg(0)->Arg(1);
+
+#ifdef LIMBER_HAS_BULLET
+btScalar to_bullet(double x) { return static_cast<btScalar>(x); }
+btVector3 to_bullet(const Vec3& v) { return {to_bullet(v.x()), to_bullet(v.y()), to_bullet(v.z())}; }
+btQuaternion to_bullet(const Quaternion& q) { return {to_bullet(q.x), to_bullet(q.y), to_bullet(q.z), to_bullet(q.w)}; }
+
+/// The boxes of a room, in a broad phase of trees as its worlds have it.
+struct BulletRoom {
+  explicit BulletRoom(const Room& room) : dispatcher(&configuration), world(&dispatcher, &trees, &configuration) {
+    std::vector<BodyId> bodies;
+    room.world.list(bodies);
+    for (const BodyId id : bodies) {
+      const RigidTransform X = room.world.body(id).pose;
+      auto& object = objects.emplace_back(std::make_unique<btCollisionObject>());
+      object->setCollisionShape(&box);
+      object->setWorldTransform(btTransform(to_bullet(X.q), to_bullet(X.p)));
+      world.addCollisionObject(object.get());
+    }
+    world.updateAabbs();
+  }
+  ~BulletRoom() {
+    for (const auto& object : objects) world.removeCollisionObject(object.get());
+  }
+  bool cast(const Ray& ray) const {
+    const btVector3 from = to_bullet(ray.from), to = to_bullet(ray.from + ray.way);
+    btCollisionWorld::ClosestRayResultCallback first(from, to);
+    world.rayTest(from, to, first);
+    return first.hasHit();
+  }
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher;
+  btDbvtBroadphase trees;
+  btBoxShape box{to_bullet(Vec3(0.4, 0.3, 0.2))};
+  std::vector<std::unique_ptr<btCollisionObject>> objects;
+  btCollisionWorld world;
+};
+
+void bullet_ray(benchmark::State& state) {
+  const Room room(false);
+  const BulletRoom bullet(room);
+  LeastTime least;
+  long met = 0;
+  for (auto _ : state)
+    least.measure([&] {
+      met = 0;
+      for (const Ray& ray : room.rays) met += bullet.cast(ray);
+    });
+  state.counters["ns"] = 1e9 * least.seconds() / static_cast<double>(room.rays.size());
+  state.counters["met"] = static_cast<double>(met) / static_cast<double>(room.rays.size());
+}
+BENCHMARK(bullet_ray);
+#endif
 
 }  // namespace
