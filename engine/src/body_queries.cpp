@@ -1,5 +1,7 @@
 #include "body_queries.h"
 
+#include <algorithm>
+
 namespace limber::internal {
 
 BodyQueries::Shown BodyQueries::shown_of(const BodyTable::Entry& e) const {
@@ -27,7 +29,7 @@ void BodyQueries::show(Index body) {
   }
   if (!now.any()) return;
   if (e.group < 0)
-    index_.set_state(body, e.pose, {});
+    index_.set_state(body, bodies_.standing_pose(e), {});
   else
     index_.set_state(body, bodies_.group(e).frame(e.slot).pose(), bodies_.group(e).amplitudes(e.slot));
 }
@@ -39,6 +41,14 @@ SpatialIndex& BodyQueries::index() {
     changed_ = false;
   }
   return index_;
+}
+
+void BodyQueries::find_overlaps(const Shape& shape, const RigidTransform& pose, const SpatialIndex::Filter& filter) {
+  index().find_overlaps(shape, pose, found, filter);
+  if (!bodies_.has_parts()) return;
+  for (Index& body : found) body = bodies_.whole_of(body);
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
 }
 
 SpatialIndex::Filter BodyQueries::filter(const BodyFilter& filter) const {

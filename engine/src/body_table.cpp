@@ -40,7 +40,7 @@ BodyId BodyTable::add(Entry&& made) {
   made.generation = entries_[index].generation;
   made.alive = true;
   entries_[index] = std::move(made);
-  ++alive_;
+  ++(entries_[index].whole < 0 ? alive_ : parts_);
   awake_.ranges.reserve(entries_.capacity());
   awake_.slots.reserve(entries_.capacity());
   return {index, entries_[index].generation};
@@ -53,7 +53,7 @@ void BodyTable::remove(BodyId id) {
     if (group(entry).count() == 0) groups_[static_cast<std::size_t>(entry.group)] = {};  // lets go of the model
   }
   entry.alive = false;
-  --alive_;
+  --(entry.whole < 0 ? alive_ : parts_);
   // An index whose generations are used up is never given again.
   if (++entry.generation != 0) vacant_.push_back(id.index);
 }

@@ -35,6 +35,8 @@ class BodyTable {
     bool sensor = false;   // tells what it overlaps, and meets nothing
     std::uint64_t user_data = 0;
     Vec3 surface_velocity = Vec3::Zero();  // m/s, body axes
+    std::vector<Index> parts{};            // of a compound: what others meet of it
+    Index whole = -1;                      // of such a part: the body, in which it is at `pose`
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {
@@ -56,7 +58,8 @@ class BodyTable {
 
   std::size_t count() const { return alive_; }
   bool contains(BodyId id) const {
-    return id.index < entries_.size() && entries_[id.index].alive && entries_[id.index].generation == id.generation;
+    return id.index < entries_.size() && entries_[id.index].alive && entries_[id.index].whole < 0 &&
+           entries_[id.index].generation == id.generation;
   }
   /// @throws InvalidArgument, in the name of a function of World, for an id that names no body or one that is static
   const Entry& entry(BodyId id, const char* function) const;
@@ -68,6 +71,25 @@ class BodyTable {
   std::size_t size() const { return entries_.size(); }
   const Entry& operator[](Index body) const { return entries_[static_cast<std::size_t>(body)]; }
   Entry& operator[](Index body) { return entries_[static_cast<std::size_t>(body)]; }
+
+  // Parts of compounds are entries of their own, which contact sources and queries know; ids name wholes alone.
+  bool has_parts() const { return parts_ > 0; }
+  /// The body that an entry is of.
+  Index whole_of(Index body) const { return (*this)[body].whole < 0 ? body : (*this)[body].whole; }
+  /// Where an entry that is no body of its own is.
+  RigidTransform standing_pose(const Entry& e) const {
+    if (e.whole < 0) return e.pose;
+    const Entry& whole = (*this)[e.whole];
+    return group(whole).frame(whole.slot).pose() * e.pose;
+  }
+  /// visit(entry's number) for all that others meet of a body.
+  template <class Visit>
+  void for_shown(Index body, const Visit& visit) const {
+    if (const Entry& e = (*this)[body]; e.parts.empty())
+      visit(body);
+    else
+      for (const Index part : e.parts) visit(part);
+  }
 
   /// @pre the body moves
   BodyGroup& group(const Entry& e) const { return *model_group(e).bodies; }
@@ -113,7 +135,7 @@ class BodyTable {
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> vacant_;
   std::vector<ModelGroup> groups_;
-  std::size_t alive_ = 0;
+  std::size_t alive_ = 0, parts_ = 0;  // bodies, and parts of such
   bool half_precision_;
   AwakeRanges awake_;
 };

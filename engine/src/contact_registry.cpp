@@ -7,7 +7,16 @@ namespace limber::internal {
 void ContactRegistry::set_source(ContactSource* source) {
   source_ = source;
   for (std::size_t i = 0; i < bodies_->size(); ++i) add_body(static_cast<Index>(i));
+  for (std::size_t i = 0; i < bodies_->size(); ++i) keep_parts_apart(static_cast<Index>(i));
   for (const Pair& pair : pairs_) tell(pair, true);
+}
+
+void ContactRegistry::keep_parts_apart(Index body) {
+  const BodyTable::Entry& e = (*bodies_)[body];
+  if (source_ == nullptr || !e.alive) return;
+  for (std::size_t i = 0; i < e.parts.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (bodies_->shows((*bodies_)[e.parts[i]])) source_->exclude_pair(e.parts[j], e.parts[i], true);
 }
 
 void ContactRegistry::add_body(Index body) {
@@ -62,7 +71,12 @@ void ContactRegistry::include(std::vector<Pair>::iterator found) {
 
 void ContactRegistry::tell(const Pair& pair, bool excluded) {
   const auto shown = [&](Index body) { return bodies_->shows((*bodies_)[body]); };
-  if (source_ != nullptr && shown(pair.a) && shown(pair.b)) source_->exclude_pair(pair.a, pair.b, excluded);
+  if (source_ == nullptr) return;
+  bodies_->for_shown(pair.a, [&](Index a) {
+    bodies_->for_shown(pair.b, [&](Index b) {
+      if (shown(a) && shown(b)) source_->exclude_pair(std::min(a, b), std::max(a, b), excluded);
+    });
+  });
 }
 
 void ContactRegistry::restore_pairs(StateReader& state) {

@@ -25,6 +25,8 @@ class ContactRegistry {
   bool acts(const ContactPoint& contact) const { return !acts_ || acts_(contact); }
 
   void add_body(Index body);
+  /// Parts of a compound, all of which were added, do not meet each other.
+  void keep_parts_apart(Index body);
   void remove_body(Index body);
 
   // Pairs, a < b, that do not meet as long as a joint between them stands, or until someone lets them.

@@ -32,6 +32,7 @@ class ContactSearch {
 
  private:
   bool wake_touched();
+  void give_to_wholes();
 
   BodyTable* bodies_;
   SleepStage* sleep_;

@@ -31,8 +31,15 @@ bool MotionForecast::write_states(double length, int substeps, const Vec3& gravi
     write_all();
     return true;
   }
-  for (const Index body : sleep_->awake())
-    if (bodies_->shows((*bodies_)[body])) write_awake(body);
+  awake_.clear();
+  for (const Index body : sleep_->awake()) {
+    const BodyTable::Entry& e = (*bodies_)[body];
+    if (bodies_->shows(e) || !e.parts.empty()) write_awake(body);
+    if (!bodies_->has_parts()) continue;
+    awake_.push_back(body);
+    awake_.insert(awake_.end(), e.parts.begin(), e.parts.end());
+  }
+  std::ranges::sort(awake_);
   return false;
 }
 
@@ -43,6 +50,7 @@ void MotionForecast::write_all() {
   for (std::size_t i = 0; i < bodies_->size(); ++i) {
     const auto body = static_cast<Index>(i);
     BodyTable::Entry& e = (*bodies_)[body];
+    if (e.alive && e.whole >= 0) continue;  // with its whole
     states_[i] = {};
     if (!e.alive) continue;
     if (e.group < 0) {
@@ -51,7 +59,7 @@ void MotionForecast::write_all() {
       continue;
     }
     thickness_[i] = e.extent.thickness;
-    if (!bodies_->shows(e)) continue;
+    if (!bodies_->shows(e) && e.parts.empty()) continue;
     if (!sleep_->asleep(body)) {
       write_awake(body);
       continue;
@@ -60,6 +68,20 @@ void MotionForecast::write_all() {
     states_[i] = {.pose = group.frame(e.slot).pose(), .asleep = true};
     if (!e.shape) states_[i].amplitudes = group.amplitudes(e.slot);
     expect_to_stay(states_[i]);
+    write_parts(body);
+  }
+}
+
+/// They go as their whole goes, no point of which comes farther than its reach.
+void MotionForecast::write_parts(Index body) {
+  const BodyState& whole = states_[static_cast<std::size_t>(body)];
+  for (const Index part : (*bodies_)[body].parts) {
+    const RigidTransform& in_whole = (*bodies_)[part].pose;
+    BodyState& state = states_[static_cast<std::size_t>(part)];
+    state = whole;
+    state.amplitudes = state.end_amplitudes = {};
+    state.pose = whole.pose * in_whole;
+    state.end_pose = whole.end_pose * in_whole;
   }
 }
 
@@ -77,6 +99,7 @@ void MotionForecast::write_awake(Index body) {
     expect_exact(body, state);
   state.end_amplitudes = end_amplitudes_[static_cast<std::size_t>(body)];
   state.reach += state.doubt + std::abs(group.frame(e.slot).settings().gravity_scale) * fall_.norm();
+  write_parts(body);
 }
 
 /// A free body goes on with its velocities, by which damping brings it less far; its modes no farther than they would

@@ -27,6 +27,8 @@ class MotionForecast {
   /// By body.
   std::span<const BodyState> states() const { return states_; }
   std::span<const double> thickness() const { return thickness_; }
+  /// Those that are awake, parts of compounds too, ascending. @pre write_states() has not written all
+  std::span<const Index> awake() const { return bodies_->has_parts() ? awake_ : sleep_->awake(); }
   /// See ContactQuery::fall.
   const Vec3& fall() const { return fall_; }
 
@@ -37,6 +39,7 @@ class MotionForecast {
   };
   void write_all();
   void write_awake(Index body);
+  void write_parts(Index body);
   void expect_steady(Index body, BodyState& state);
   void expect_exact(Index body, BodyState& state);
 
@@ -49,6 +52,7 @@ class MotionForecast {
   std::vector<BodyState> states_;
   std::vector<std::vector<double>> end_amplitudes_;
   std::vector<double> thickness_;  // m; infinite for what stands
+  std::vector<Index> awake_;       // with parts
   ExactMotion motion_;             // scratch
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "limber/collision/rigid_model.h"
@@ -12,18 +13,24 @@ class RigidModels {
  public:
   /// That of a body that has it still, or a new one.
   RigidModel get(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
+  /// The same of a compound.
+  RigidModel get(std::span<const ShapePart> parts, const MassProperties& mass);
   /// The same of one that is led.
   RigidModel get_kinematic(const std::shared_ptr<const Shape>& shape);
 
  private:
-  struct Made {
+  struct Part {
     std::weak_ptr<const Shape> of{};
-    MassProperties mass{};  // 0 kg: led
+    RigidTransform pose{};
+  };
+  struct Made {
+    std::vector<Part> parts{};  // as they were given
+    MassProperties mass{};      // 0 kg: led
     std::weak_ptr<const ModalModel> model{};
     std::weak_ptr<const Shape> shape{};
   };
   template <class Make>
-  RigidModel find_or_make(const std::shared_ptr<const Shape>& shape, const MassProperties& mass, const Make& make);
+  RigidModel find_or_make(std::span<const ShapePart> parts, const MassProperties& mass, const Make& make);
 
   std::vector<Made> made_;
 };

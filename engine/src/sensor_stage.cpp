@@ -13,7 +13,7 @@ void SensorStage::remove(Index sensor) {
 
 void SensorStage::find(Index sensor, std::vector<Overlap>& found) {
   const BodyTable::Entry& e = bodies_[sensor];
-  queries_.index().find_overlaps(*e.shape, e.pose, queries_.found, {.mask = e.filter.mask});
+  queries_.find_overlaps(*e.shape, e.pose, {.mask = e.filter.mask});
   for (const Index body : queries_.found)
     if ((bodies_[body].filter.mask & e.filter.layers) != 0) found.push_back({queries_.id(sensor), queries_.id(body)});
 }

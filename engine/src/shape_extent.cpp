@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace limber::internal {
 namespace {
@@ -38,6 +39,15 @@ struct ExtentOf {
 }  // namespace
 
 ShapeExtent extent_of(const Shape& shape) { return std::visit(ExtentOf{}, shape); }
+
+ShapeExtent extent_of(std::span<const ShapePart> parts) {
+  ShapeExtent sum = {0.0, std::numeric_limits<double>::infinity()};
+  for (const ShapePart& part : parts) {
+    const ShapeExtent own = extent_of(*part.shape);
+    sum = {std::max(sum.radius, part.pose.p.norm() + own.radius), std::min(sum.thickness, own.thickness)};
+  }
+  return sum;
+}
 
 ShapeExtent extent_of(const ModalModel& model) { return extent_of_points(model.collision().rest); }
 

@@ -1,6 +1,9 @@
 // How large what a body shows to others is, m.
 #pragma once
 
+#include <span>
+
+#include "limber/collision/rigid_model.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
 
@@ -13,6 +16,8 @@ struct ShapeExtent {
 
 /// @pre valid, and no half-space
 ShapeExtent extent_of(const Shape& shape);
+/// Of a compound: it is as thin as its thinnest part.
+ShapeExtent extent_of(std::span<const ShapePart> parts);
 /// Of the collision surface at rest.
 ShapeExtent extent_of(const ModalModel& model);
 

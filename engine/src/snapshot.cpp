@@ -123,10 +123,11 @@ std::vector<BodyId> Snapshot::check_structure(StateReader& state) const {
 BodyId Snapshot::check_body(std::size_t i, bool saved, StateReader& state) const {
   const std::span<const BodyTable::Entry> entries = std::as_const(rooms_.bodies).entries();
   const bool known = i < entries.size() && entries[i].alive;
+  const bool is_part = known && entries[i].whole >= 0;  // comes and goes with its body
   std::uint32_t generation = 0;
   bool alive = false;
   if (saved) state(generation, alive);
-  if (!alive) return known ? BodyId{static_cast<std::uint32_t>(i), entries[i].generation} : BodyId{};
+  if (!alive) return known && !is_part ? BodyId{static_cast<std::uint32_t>(i), entries[i].generation} : BodyId{};
   const auto print = state.read<std::uint64_t>();
   if (!known || entries[i].generation != generation)
     refuse("body " + std::to_string(i) + " (generation " + std::to_string(generation) +

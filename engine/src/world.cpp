@@ -150,6 +150,33 @@ BodyId World::add_rigid(const std::shared_ptr<const Shape>& shape, double densit
   return add_rigid(shape, mass_properties(*shape, density), placement);
 }
 
+BodyId World::add_rigid(const std::vector<ShapePart>& parts, const MassProperties& mass,
+                        const BodyPlacement& placement) {
+  if (placement.shape) throw InvalidArgument("World::add_rigid: placement.shape is given, expected none");
+  const RigidModel rigid = impl_->rigid.get(parts, mass);
+  const BodyId id = add_body(rigid.model, placement);
+  const auto body = static_cast<Index>(id.index);
+  impl_->bodies[body].extent = internal::extent_of(std::span<const ShapePart>(rigid.parts));
+  for (const ShapePart& part : rigid.parts) impl_->add_part(body, part);
+  impl_->paths.registry.keep_parts_apart(body);
+  return id;
+}
+
+BodyId World::add_rigid(const std::vector<ShapePart>& parts, double density, const BodyPlacement& placement) {
+  return add_rigid(parts, mass_properties(parts, density), placement);
+}
+
+void World::Impl::add_part(Index body, const ShapePart& part) {
+  const BodyId id =
+      bodies.add({.group = -1, .shape = part.shape, .pose = part.pose, .filter = bodies[body].filter, .whole = body});
+  const auto entry = static_cast<Index>(id.index);
+  bodies[body].parts.push_back(entry);
+  constraints.set_body(entry, {.pose = bodies.standing_pose(bodies[entry])});
+  sleep.add(entry);
+  paths.registry.add_body(entry);
+  probes.queries.tell_changed();
+}
+
 BodyId World::add_kinematic(const std::shared_ptr<const Shape>& shape, const BodyPlacement& placement) {
   if (placement.shape) throw InvalidArgument("World::add_kinematic: placement.shape is given, expected none");
   BodyPlacement placed = placement;
@@ -213,22 +240,28 @@ BodyId World::add_static(std::shared_ptr<const Shape> shape, const RigidTransfor
 void World::remove_body(BodyId id) {
   Impl& m = *impl_;
   if (!m.bodies.contains(id)) m.bodies.entry(id, "remove_body");  // tells so
-  const auto index = static_cast<Index>(id.index);
-  m.sleep.remove(index);
-  m.probes.sensors.remove(index);
-  m.parts.forget(index);
-  m.paths.registry.remove_body(index);
-  m.constraints.remove_body(index);
-  m.paths.in_force().forget(index);
-  m.drawing.forget(index);
-  m.bodies.remove(id);
-  m.probes.queries.tell_changed();
+  const std::vector<Index> parts = m.bodies[static_cast<Index>(id.index)].parts;
+  for (const Index part : parts) m.remove(part);
+  m.remove(static_cast<Index>(id.index));
+}
+
+void World::Impl::remove(Index entry) {
+  sleep.remove(entry);
+  probes.sensors.remove(entry);
+  parts.forget(entry);
+  paths.registry.remove_body(entry);
+  constraints.remove_body(entry);
+  paths.in_force().forget(entry);
+  drawing.forget(entry);
+  bodies.remove({static_cast<std::uint32_t>(entry), bodies[entry].generation});
+  probes.queries.tell_changed();
 }
 
 void World::list(std::vector<BodyId>& bodies) const {
   bodies.clear();
   for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
-    if (impl_->bodies[static_cast<Index>(i)].alive) bodies.push_back(impl_->probes.queries.id(static_cast<Index>(i)));
+    if (const Entry& e = impl_->bodies[static_cast<Index>(i)]; e.alive && e.whole < 0)
+      bodies.push_back(impl_->probes.queries.id(static_cast<Index>(i)));
 }
 BodyId World::id_of(Index body) const {
   if (body < 0 || static_cast<std::size_t>(body) >= impl_->bodies.size() || !impl_->bodies[body].alive) return {};

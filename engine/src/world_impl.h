@@ -52,6 +52,9 @@ struct World::Impl {
                                paths.registry, paths.in_force(), paths.solver, drawing});
   }
   void add_to_report(const IslandReport& substep);
+  /// Of a compound. @param part in the frame of the body
+  void add_part(Index body, const ShapePart& part);
+  void remove(Index entry);
 
   WorldOptions options;
   Jobs& jobs;

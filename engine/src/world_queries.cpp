@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "world_impl.h"
 
 namespace limber {
@@ -13,7 +15,11 @@ void World::cast_ray(const Ray& ray, std::vector<BodyHit>& hits, const BodyFilte
   internal::BodyQueries& queries = impl_->probes.queries;
   queries.index().cast_ray(ray, queries.hits, queries.filter(filter));
   hits.clear();
-  for (const SpatialIndex::Hit& hit : queries.hits) hits.push_back(queries.told(hit));
+  for (const SpatialIndex::Hit& hit : queries.hits) {
+    const BodyHit told = queries.told(hit);  // of a compound's parts, the first counts
+    const auto same = [&](const BodyHit& known) { return known.body == told.body; };
+    if (!impl_->bodies.has_parts() || std::ranges::none_of(hits, same)) hits.push_back(told);
+  }
 }
 
 std::optional<BodyHit> World::cast_shape(const Shape& shape, const RigidTransform& pose, const Vec3& way,
@@ -27,7 +33,7 @@ std::optional<BodyHit> World::cast_shape(const Shape& shape, const RigidTransfor
 void World::find_overlaps(const Shape& shape, const RigidTransform& pose, std::vector<BodyId>& bodies,
                           const BodyFilter& filter) const {
   internal::BodyQueries& queries = impl_->probes.queries;
-  queries.index().find_overlaps(shape, pose, queries.found, queries.filter(filter));
+  queries.find_overlaps(shape, pose, queries.filter(filter));
   bodies.clear();
   for (const Index body : queries.found) bodies.push_back(queries.id(body));
 }

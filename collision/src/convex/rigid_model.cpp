@@ -80,15 +80,35 @@ struct About {
   }
 };
 
-/// @param made its shape @param solid of the given shape
+/// Of a shape, or of parts, as they are drawn.
 void make_model(RigidModel& made, const char* name, double volume, ModalModelData data) {
   data.name = name;
   data.volume = volume;
-  const TriangleMesh drawn = surface_of(*made.shape, Vec3::Zero(), 1.0);
-  for (const Vec3& p : drawn.vertices) data.render.rest.push_back(p.cast<float>());
-  data.render.triangles = drawn.triangles;
-  data.render.basis = ModalBasis(static_cast<Index>(drawn.vertices.size()), 0);
+  const auto draw = [&](const Shape& shape, const RigidTransform& pose) {
+    const TriangleMesh drawn = surface_of(shape, Vec3::Zero(), 1.0);
+    const auto first = static_cast<Index>(data.render.rest.size());
+    for (const Vec3& p : drawn.vertices) data.render.rest.push_back((pose * p).cast<float>());
+    for (const Triangle& t : drawn.triangles)
+      data.render.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  };
+  if (made.shape) draw(*made.shape, {});
+  for (const ShapePart& part : made.parts) draw(*part.shape, part.pose);
+  data.render.basis = ModalBasis(static_cast<Index>(data.render.rest.size()), 0);
   made.model = std::make_shared<const ModalModel>(std::move(data));
+}
+
+/// About another point than the centre of mass, by the parallel axes: m (d² 1 − d dᵀ).
+Mat3 moved_inertia(double mass, const Vec3& by) {
+  return mass * (by.squaredNorm() * Mat3::Identity() - by * by.transpose());
+}
+
+void require_parts(std::span<const ShapePart> parts, const char* function) {
+  if (parts.empty()) throw InvalidArgument(std::string(function) + ": there are no parts, expected one or more");
+  for (const ShapePart& part : parts) {
+    if (!part.shape) throw InvalidArgument(std::string(function) + ": the shape of a part is null");
+    if (!part.pose.p.allFinite() || !(std::abs(part.pose.q.norm() - 1.0) <= 1e-6))
+      throw InvalidArgument(std::string(function) + ": a part's pose is not finite or its quaternion not of length 1");
+  }
 }
 
 constexpr std::array<const char*, std::variant_size_v<Shape>> kNames{"half-space", "ball", "capsule",     "box",
@@ -102,6 +122,24 @@ MassProperties mass_properties(const Shape& shape, double density) {
                           " kg/m^3, expected a finite number above 0");
   const SolidProperties solid = solid_of(shape);
   return {density * solid.volume, solid.centroid, density * solid.inertia};
+}
+
+MassProperties mass_properties(std::span<const ShapePart> parts, double density) {
+  require_parts(parts, "mass_properties");
+  MassProperties sum;
+  for (const ShapePart& part : parts) {
+    const MassProperties own = mass_properties(*part.shape, density);
+    sum.mass += own.mass;
+    sum.center_of_mass += own.mass * (part.pose * own.center_of_mass);
+  }
+  sum.center_of_mass /= sum.mass;
+  for (const ShapePart& part : parts) {
+    const MassProperties own = mass_properties(*part.shape, density);
+    const Mat3 R = to_matrix(part.pose.q);
+    sum.inertia +=
+        R * own.inertia * R.transpose() + moved_inertia(own.mass, part.pose * own.center_of_mass - sum.center_of_mass);
+  }
+  return sum;
 }
 
 ConvexHull cylinder_hull(double radius, double half_length, int sides) {
@@ -133,6 +171,24 @@ RigidModel make_rigid_model(const std::shared_ptr<const Shape>& shape, const Mas
   return made;
 }
 
+RigidModel make_rigid_model(std::span<const ShapePart> parts, const MassProperties& mass) {
+  require_parts(parts, "make_rigid_model");
+  if (!mass.center_of_mass.allFinite()) throw InvalidArgument("make_rigid_model: center_of_mass is not finite");
+  RigidModel made;
+  double volume = 0.0;
+  for (const ShapePart& part : parts) {
+    volume += solid_of(*part.shape).volume;
+    made.parts.push_back({part.shape, {part.pose.q, part.pose.p - mass.center_of_mass}});
+  }
+  ModalModelData data;
+  data.mass = mass.mass;
+  data.inertia = mass.inertia;
+  data.origin_in_input = mass.center_of_mass;
+  data.touchable = false;
+  make_model(made, "compound", volume, std::move(data));
+  return made;
+}
+
 RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape) {
   if (!shape) throw InvalidArgument("make_kinematic_model: the shape is null");
   const SolidProperties solid = solid_of(*shape);
@@ -140,8 +196,7 @@ RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape) {
   ModalModelData data;
   data.motion = FrameMotion::kKinematic;
   data.mass = kWater * solid.volume;
-  data.inertia = kWater * (solid.inertia + solid.volume * (solid.centroid.squaredNorm() * Mat3::Identity() -
-                                                           solid.centroid * solid.centroid.transpose()));
+  data.inertia = kWater * (solid.inertia + moved_inertia(solid.volume, solid.centroid));
   RigidModel made{nullptr, shape};
   make_model(made, kNames[shape->index()], solid.volume, std::move(data));
   return made;

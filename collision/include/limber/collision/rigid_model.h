@@ -9,7 +9,10 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <vector>
 
+#include "limber/core/rigid_transform.h"
 #include "limber/core/types.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
@@ -30,6 +33,16 @@ struct MassProperties {
 /// from inside
 MassProperties mass_properties(const Shape& shape, double density);
 
+/// A part of a compound: a shape that bounds a solid, and where it is.
+struct ShapePart {
+  std::shared_ptr<const Shape> shape{};
+  RigidTransform pose{};  ///< of the shape, in the frame of the compound
+};
+
+/// Of all parts together, in the frame of the compound: masses add up, and moments by the parallel axes. What parts
+/// share counts for each of them. @throws InvalidArgument also for no parts
+MassProperties mass_properties(std::span<const ShapePart> parts, double density);
+
 /// A cylinder about the z axis as the prism of so many sides whose corners lie on it. limber has no round one. The
 /// middles of its sides are radius · (1 − cos(π/sides)) inside: 0.5 % at 32.
 /// @param radius, half_length m, > 0 @param sides 3 or more @throws InvalidArgument
@@ -40,13 +53,17 @@ struct RigidModel {
   /// Free, of no modes, drawn as surface_of() has the shape. Its origin is the centre of mass, which origin_in_input
   /// tells in the frame of the shape; its axes are those of the shape.
   std::shared_ptr<const ModalModel> model{};
-  /// The shape about that origin: the given one, where its own origin is the centre of mass.
+  /// The shape about that origin: the given one, where its own origin is the centre of mass; null for a compound.
   std::shared_ptr<const Shape> shape{};
+  std::vector<ShapePart> parts{};  ///< of a compound, about that origin
 };
 
 /// @throws InvalidArgument as mass_properties() does; for properties that no solid has; and for a sphere or capsule
 /// whose centre of mass is not its middle, which no shape tells about another origin
 RigidModel make_rigid_model(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
+
+/// A compound, which others meet by its parts. Its model is not touchable: it has no collision surface of its own.
+RigidModel make_rigid_model(std::span<const ShapePart> parts, const MassProperties& mass);
 
 /// One that is led: World::add_kinematic(). Its origin is the shape's own. @throws InvalidArgument as
 /// mass_properties() does

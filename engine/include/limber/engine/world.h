@@ -268,6 +268,13 @@ class World {
                    const BodyPlacement& placement = {});
   /// The same, of even density. @param density kg/m³, > 0
   BodyId add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement = {});
+  /// A compound of shapes that bound solids: a table, a hammer, a chair. Others meet its parts; events, queries and
+  /// filters know the whole. Queries tell no place for loads on it (BodyHit::at). `placement.pose` places its centre of
+  /// mass (RigidModel).
+  BodyId add_rigid(const std::vector<ShapePart>& parts, const MassProperties& mass,
+                   const BodyPlacement& placement = {});
+  /// The same, of even density: what parts share counts for each. @param density kg/m³, > 0
+  BodyId add_rigid(const std::vector<ShapePart>& parts, double density, const BodyPlacement& placement = {});
   /// A rigid shape that goes where it is led, whatever it meets: a lift, a door of a machine, a hand. It stands, or
   /// goes on at the velocities it is placed with, until set_kinematic_frame() tells of another way.
   /// @param shape one that bounds a solid; `placement.pose` places its own origin
