@@ -9,12 +9,22 @@ import numpy as np
 from ._asset import Asset, Model, Shape
 from ._library import InvalidArgument, answer, array3, check, chosen, create, ffi, lib, transform, vector, word
 
-_VEC3 = (np.float64, 3)
-_ID = [("index", np.uint32), ("generation", np.uint32)]
-CONTACT_EVENT = np.dtype([("id", np.uint64), ("a", _ID), ("b", _ID), ("phase", np.int32), ("position", *_VEC3),
-                          ("normal", *_VEC3), ("impulse", *_VEC3)], align=True)
-"""A contact that pressed, or ceased to, in the last step. phase: 0 begun, 1 lasting, 2 ended. position: world, m; normal: out of b
-into a; impulse: on a over the step, world, N·s. World.body_at(event["a"]["index"]) is the body."""
+
+def _record(ctype: Any) -> Any:
+    """The numpy type of a C one, as the header has it: structs by member, vectors as three numbers."""
+    if ctype.cname == "limber_vec3":
+        return np.dtype((np.float64, 3))
+    if ctype.kind == "struct":
+        members = ctype.fields
+        return np.dtype({"names": [name for name, _ in members], "formats": [_record(m.type) for _, m in members],
+                         "offsets": [m.offset for _, m in members], "itemsize": ffi.sizeof(ctype)})
+    scalars = {"double": np.float64, "uint64_t": np.uint64, "uint32_t": np.uint32}
+    return np.dtype(np.int32 if ctype.kind == "enum" else scalars[ctype.cname])
+
+
+CONTACT_EVENT = _record(ffi.typeof("limber_contact_event"))
+"""A contact that pressed, or ceased to, in the last step, as limber_contact_event has it. phase: 0 begun, 1 lasting, 2 ended.
+position: world, m; normal: out of b into a; impulse: on a over the step, world, N·s. World.body_at(event["a"]["index"]) is the body."""
 
 
 class Point(NamedTuple):

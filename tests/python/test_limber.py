@@ -35,6 +35,7 @@ def test_a_ball_falls_along_its_parabola_and_presses_with_its_weight(world):
     world.step(120)
     (event,) = world.contact_events
     assert event["phase"] == 1
+    assert event["approach"] == 0.0
     assert abs(event["impulse"][2]) * 60 == pytest.approx(sphere_mass(0.5, 1000.0) * G, rel=1e-2)
     assert ball in (world.body_at(event["a"]["index"]), world.body_at(event["b"]["index"]))
 
