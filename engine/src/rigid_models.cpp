@@ -15,7 +15,7 @@ RigidModel RigidModels::find_or_make(std::span<const ShapePart> parts, const Mas
     return known.of.lock() == part.shape && known.pose.p == part.pose.p && q.w == r.w && q.vector() == r.vector();
   };
   for (const Made& m : made_)
-    if (std::ranges::equal(m.parts, parts, same) && m.mass.mass == mass.mass &&
+    if (std::equal(m.parts.begin(), m.parts.end(), parts.begin(), parts.end(), same) && m.mass.mass == mass.mass &&
         m.mass.center_of_mass == mass.center_of_mass && m.mass.inertia == mass.inertia)
       return {m.model.lock(), m.shape.lock()};
   RigidModel fresh = make();

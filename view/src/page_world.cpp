@@ -221,7 +221,7 @@ PageHit PageWorld::cast_ray(const Vec3& from, const Vec3& direction) const {
   const BodyFilter moving{.accepts = [&](BodyId id) { return world.body_type(id) != BodyType::kStatic; }};
   const std::optional<BodyHit> hit = world.cast_ray({.from = from, .way = kFar * direction.normalized()}, moving);
   const auto& bodies = impl_->bodies;
-  const auto body = std::ranges::find_if(bodies, [&](const auto& b) { return hit && b.id == hit->body; });
+  const auto body = std::find_if(bodies.begin(), bodies.end(), [&](const auto& b) { return hit && b.id == hit->body; });
   if (body == bodies.end() || !hit->at) return {};
   return {static_cast<int>(body - bodies.begin()), *hit->at, hit->position, hit->distance};
 }
