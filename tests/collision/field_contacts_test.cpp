@@ -589,35 +589,6 @@ TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
   EXPECT_GT(deep, 10);
 }
 
-/// Pairs that were too far apart to touch are not looked at until they may have come near: none comes unseen.
-TEST(FieldPairs, PairsThatWereFarApartAreSeenWhenTheyComeNear) {
-  testing::ContactScene heap = testing::heap(24);
-  ManifoldFinder finder;
-  heap.add_all_to(finder);
-  const std::vector<RigidTransform> start = heap.poses;
-  Random random(23);
-  std::vector<Vec3> ways;
-  for (std::size_t i = 0; i < start.size(); ++i) ways.push_back(random.vector(0.15));
-  std::int64_t kept = 0;
-  std::set<std::pair<Index, Index>> touching;
-  for (int step = 0; step <= 60; ++step) {
-    const double part = std::sin(0.1 * step);  // there and back, slower at the turn
-    for (std::size_t i = 1; i < start.size(); ++i) heap.poses[i].p = start[i].p + part * ways[i];
-    ManifoldFinder fresh;
-    heap.add_all_to(fresh);
-    std::set<std::pair<Index, Index>> expected, seen;
-    for (const ContactPoint& c : contacts_of(fresh, heap, 1e-3))
-      if (c.gap < -2e-3 && (c.a.triangle >= 0 || c.b.triangle >= 0))  // gaps of kept manifolds are off by a thousandth
-        expected.insert({c.a.body, c.b.body});
-    for (const ContactPoint& c : contacts_of(finder, heap, 1e-3)) seen.insert({c.a.body, c.b.body});
-    for (const auto& [a, b] : expected) EXPECT_TRUE(seen.contains({a, b})) << step << ": " << a << " on " << b;
-    touching.insert(expected.begin(), expected.end());
-    kept += finder.counts().recycled;
-  }
-  EXPECT_GT(touching.size(), 30u);
-  EXPECT_GT(kept, 300);
-}
-
 TEST(FieldPairs, AnyNumberOfThreadsFindsTheSameBits) {
   const testing::ContactScene heap = testing::heap(40);
   const auto found_by = [&](int threads) {

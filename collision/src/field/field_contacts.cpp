@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <variant>
 
 #include "limber/core/quaternion.h"
@@ -59,10 +58,10 @@ const std::vector<std::uint32_t>& find_near(const FieldQuery& query, const Clust
   return found;
 }
 
-SampleBounds bounds_of(const ClusterView& samples, std::vector<float>& room, float& clearance) {
+SampleBounds bounds_of(const ClusterView& samples, std::vector<float>& room) {
   const std::size_t most = kFieldLanes * kFieldLanes * samples.groups;
   grow(room, 5 * most);
-  return {room.data(), room.data() + most, room.data() + 2 * most, &clearance};
+  return {room.data(), room.data() + most, room.data() + 2 * most};
 }
 
 }  // namespace
@@ -83,7 +82,7 @@ void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& fi
   set_fall(query, fall);
 }
 
-bool FieldView::apart(float& clearance) const {
+bool FieldView::apart() const {
   const Vec3f centre = placed(0.5f * (mine->low() + mine->high())) - 0.5f * (other->low() + other->high());
   const Vec3f half = turn.cwiseAbs() * (0.5f * (mine->high() - mine->low())) + 0.5f * (other->high() - other->low());
   const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&query.turn[0][0]);
@@ -91,7 +90,6 @@ bool FieldView::apart(float& clearance) const {
   const Vec3f moved = (turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2])).cwiseAbs();
   const float fall = std::hypot(query.fall[0], query.fall[1], query.fall[2]);
   const float spread = query.turning * 0.5f * (mine->high() - mine->low()).norm() + query.swing + fall;
-  clearance = (centre.cwiseAbs() - half).maxCoeff();
   return (centre.cwiseAbs() - half - moved).maxCoeff() > query.reach + spread;
 }
 
@@ -166,7 +164,7 @@ bool FieldContacts::serves(const FieldBody& a, const FieldBody& b) {
 
 std::span<const FoundContact> FieldContacts::find(const FieldBody& a, const FieldBody& b, const FieldMotion& motion,
                                                   double reach) {
-  reach_ = reach, clearance_ = 0.0;
+  reach_ = reach;
   found_.clear();
   bodies_[0] = &a, bodies_[1] = &b;
   motion_ = motion;
@@ -184,29 +182,20 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   const double slack = collision_tuning().field.slack;
   view_[0].place(*a.shell, *b.shell, motion_.X_AB.inverse(), motion_.end.inverse(),
                  motion_.X_AB.q.conjugate() * motion_.fall, comes_near(1) + slack * b.shell->shell().cell());
-  float clearance = 0.0f;
-  const auto stay_apart = [&] { clearance_ = static_cast<double>(clearance); };
-  if (view_[0].apart(clearance)) return stay_apart();
+  if (view_[0].apart()) return;
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
-  if (view_[1].apart(clearance)) return stay_apart();
-  clearance = std::numeric_limits<float>::infinity();
+  if (view_[1].apart()) return;
   edges_.begin(view_[0], view_[1], static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
-  bool any = false;
   for (int of = 0; of < 2; ++of) {
     const ClusterView samples = view_[of].mine->view().samples;
-    bounds[of] = bounds_of(samples, bounds_[of], clearance);
-    const auto& near = find_near(view_[of].query, samples, near_, bounds[of]);
-    any = any || !near.empty();
-    find_samples(of, near, bounds[of]);
+    bounds[of] = bounds_of(samples, bounds_[of]);
+    find_samples(of, find_near(view_[of].query, samples, near_, bounds[of]), bounds[of]);
   }
-  const SampleBounds of_edges{.clearance = &clearance};
-  if (find_near(view_[0].query, view_[0].mine->view().edges, near_, of_edges).empty() ||
-      find_near(view_[1].query, view_[1].mine->view().edges, other_near_).empty()) {
-    clearance -= static_cast<float>(slack * std::max(a.shell->shell().cell(), b.shell->shell().cell()));
-    return any ? void() : stay_apart();  // an edge that meets another one is met
-  }
+  if (find_near(view_[0].query, view_[0].mine->view().edges, near_).empty() ||
+      find_near(view_[1].query, view_[1].mine->view().edges, other_near_).empty())
+    return;  // an edge that meets another one is met
   edges_.find(0, bounds[0], near_);
   edges_.find(1, bounds[1], other_near_);
   edges_.finish(found_);
@@ -324,9 +313,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     set_fall(query, fall_S);
   }
   const ShellView shell = body.shell->view();
-  float clearance = std::numeric_limits<float>::infinity();
-  const std::vector<std::uint32_t>& clusters = find_near(query, shell.samples, near_, {.clearance = &clearance});
-  if (half_space != nullptr && clusters.empty()) clearance_ = static_cast<double>(clearance);
+  const std::vector<std::uint32_t>& clusters = find_near(query, shell.samples, near_);
   grow(hits_, kHitsOfCluster * clusters.size());
   const std::size_t count = near_samples(query, shell, clusters.data(), clusters.size(), hits_.data());
   const Mat3 R_AB = to_matrix(motion_.X_AB.q);

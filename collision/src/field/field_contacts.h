@@ -54,8 +54,6 @@ class FieldContacts {
   std::span<const FoundContact> find(const FieldBody& a, const FieldBody& b, const RigidTransform& X_AB, double reach) {
     return find(a, b, FieldMotion{X_AB, X_AB}, reach);
   }
-  /// No points of the two were nearer to each other in the last find(), m; 0: not known, as something was near.
-  double clearance() const { return clearance_; }
   /// What the expected motion of the two points of a contact, and a fall, close of its gap, m; negative: it opens.
   static double closing(const FieldBody& a, const FieldBody& b, const FieldMotion& motion, const FoundContact& contact);
 
@@ -70,7 +68,7 @@ class FieldContacts {
   double comes_near(int of) const;
   void settle();
 
-  double reach_ = 0.0, clearance_ = 0.0;
+  double reach_ = 0.0;
   FieldView view_[2];  ///< of a in b's field, and of b in a's
   const FieldBody* bodies_[2] = {};
   FieldMotion motion_{};

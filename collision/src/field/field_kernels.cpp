@@ -25,7 +25,6 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
   std::size_t count = 0;
   const F unknown = All(std::numeric_limits<float>::quiet_NaN());
   HWY_ALIGN float distance[kLanes], motion[kLanes];
-  F nearest = All(std::numeric_limits<float>::infinity());
   for (std::size_t g = 0; g < clusters.groups; ++g)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const Points centre = LoadCluster(clusters.centres + g * kClusterFloats, lane), q = Placed(query, centre),
@@ -33,9 +32,7 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
       const F radius = hn::LoadU(d, clusters.radii + g * kFieldLanes + lane);
       const F beyond = hn::Sub(DistanceOf(query.field, q).value, radius);
       const F comes = hn::MulAdd(All(query.turning), radius, hn::Add(hn::Sqrt(Dot(moved, moved)), others));
-      const auto used = hn::Ge(radius, hn::Zero(d));
-      nearest = hn::Min(nearest, hn::IfThenElse(used, beyond, nearest));
-      unsigned near = Bits(hn::And(used, hn::Le(beyond, hn::Add(comes, All(query.reach)))));
+      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, hn::Add(comes, All(query.reach)))));
       for (unsigned left = near; left != 0; left &= left - 1) {
         const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
         found[count++] = static_cast<std::uint32_t>(g * kFieldLanes + lane + at);
@@ -51,8 +48,6 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
           StoreCluster({unknown, unknown, unknown}, bounds.slope + kClusterFloats / kFieldLanes * (first - s), s);
         }
     }
-  if (bounds.clearance != nullptr)
-    *bounds.clearance = std::min(*bounds.clearance, hn::GetLane(hn::MinOfLanes(d, nearest)) - query.flex);
   return count;
 }
 

@@ -84,10 +84,9 @@ struct ShellView {
 /// Per sample of one surface, with room for whole groups of clusters. Where its cluster is far off, bounds take the
 /// place of its own numbers, and the slope is not a number.
 struct SampleBounds {
-  float* distance = nullptr;   ///< m: from the other surface, negative inside; or less than that, outside
-  float* motion = nullptr;     ///< m: it is expected to move at most so far
-  float* slope = nullptr;      ///< of the distance, by cluster: x[8] y[8] z[8], in the field's frame
-  float* clearance = nullptr;  ///< m: no cluster is nearer to the other surface; one number, lowered to that
+  float* distance = nullptr;  ///< m: from the other surface, negative inside; or less than that, outside
+  float* motion = nullptr;    ///< m: it is expected to move at most so far
+  float* slope = nullptr;     ///< of the distance, by cluster: x[8] y[8] z[8], in the field's frame
 };
 
 /// A sample or a point of an edge near a field's surface.

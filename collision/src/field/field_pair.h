@@ -26,9 +26,8 @@ struct FieldView {
   /// @param fall one of us may do that beside it, field's frame, m
   void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
              const RigidTransform& end, const Vec3& fall, double reach);
-  /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame, and then by
-  /// how much they are apart, m.
-  bool apart(float& clearance) const;
+  /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
+  bool apart() const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }
   Vec3f turned_back(const Vec3f& direction) const { return turn.transpose() * direction; }
 };

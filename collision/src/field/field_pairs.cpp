@@ -95,7 +95,7 @@ double FieldPairs::closing(const PairQuery& query, const FeatureContact& contact
                                 {{found_side(contact.a), found_side(contact.b)}, contact.normal, contact.gap});
 }
 
-double FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found) {
+void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found) {
   FieldContacts* scratch = nullptr;
   {
     const std::lock_guard lock(mutex_);
@@ -109,10 +109,8 @@ double FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& fou
     contact.b.point = query.X_AB * contact.b.point;
     found.push_back(contact);
   }
-  const double clearance = scratch->clearance();
   const std::lock_guard lock(mutex_);
   free_.push_back(scratch);
-  return clearance;
 }
 
 }  // namespace limber::internal

@@ -1,7 +1,6 @@
 // Contacts by distance fields for ManifoldFinder.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,8 +24,8 @@ class FieldPairs {
                    std::span<const Index> changed, Jobs& jobs);
   /// Whether it finds the contacts of two bodies, of which one deforms at least.
   bool takes(Index a, Index b) const;
-  /// Appends; many threads may call it at once. @return FieldContacts::clearance() @pre query.by_fields
-  double find(const PairQuery& query, std::vector<FeatureContact>& found);
+  /// Appends; many threads may call it at once. @pre query.by_fields
+  void find(const PairQuery& query, std::vector<FeatureContact>& found);
   /// Whether it has a body's coordinates, and then: what holds its surface, how far modes are expected to move any
   /// point of it, m, and where a point of it is; body frame.
   bool has(Index body) const { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
@@ -36,11 +35,6 @@ class FieldPairs {
   }
   double largest_swing(Index body) const {
     return static_cast<double>(entries_[static_cast<std::size_t>(body)].shell->largest_swing());
-  }
-  /// No amplitudes z of it displace a point of its surface farther than this times |z|, kg^−½; infinite: not known.
-  double largest_norm(Index body) const {
-    const auto& shell = entries_[static_cast<std::size_t>(body)].shell;
-    return shell ? shell->shell().largest_norm() : std::numeric_limits<double>::infinity();
   }
   Vec3 place(Index body, const FeatureSide& side) const;
   /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a

@@ -210,16 +210,12 @@ void Pointshell::make_ball(const Clusters& of, std::size_t cluster, std::span<co
 void Pointshell::make_rows() {
   const auto k = static_cast<std::size_t>(modes());
   std::vector<double> u(k);
-  for (std::size_t s = 0; s < sample_vertex_.size(); ++s) {
-    double squared = 0.0;
+  for (std::size_t s = 0; s < sample_vertex_.size(); ++s)
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t m = 0; m < k; ++m) u[m] = static_cast<double>(surface_->row(sample_vertex_[s], axis)[m]);
-      for (const double v : u) squared += v * v;
       set_row(s / kLanes * kClusterFloats + static_cast<std::size_t>(axis) * kLanes + s % kLanes,
               surface_->rest(sample_vertex_[s])[axis], u);
     }
-    largest_norm_ = std::max(largest_norm_, std::sqrt(squared));
-  }
   for (std::size_t c = 0; c < sample_clusters_.count; ++c)
     make_ball(sample_clusters_, c, std::span(sample_vertex_).subspan(c * kLanes, kLanes));
   std::vector<Index> ends;

@@ -50,9 +50,6 @@ class Pointshell {
   /// Triangles that are nearest to points next to it: of more than one side where these are about as near.
   std::array<Index, 8> triangles_about(const FieldHit& hit) const;
 
-  /// The largest Frobenius norm of U at a vertex: |u| ≤ that |z|, as Cauchy and Schwarz have it, kg^−½.
-  double largest_norm() const { return largest_norm_; }
-
   Index sample_vertex(std::int32_t sample) const { return sample_vertex_[static_cast<std::size_t>(sample)]; }
   Index edge(std::int32_t entry) const { return edges_[static_cast<std::size_t>(entry)]; }
   /// Whether the surface turns outwards at an edge at rest: others touch no edge.
@@ -98,7 +95,6 @@ class Pointshell {
   /// Per cluster of samples and then of edges: r + Σ |z_i| s_i, how far from its centre it gets.
   AlignedArray<float> radius_, spread_;
   std::vector<float> largest_shape_;  ///< per mode, of any vertex
-  double largest_norm_ = 0.0;
 };
 
 /// Where the samples of one body are. Keeps its numbers from deform() to deform().

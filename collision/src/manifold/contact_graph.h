@@ -33,17 +33,15 @@ struct KeptPoint {
 
 struct LivePair {
   bool known = false;                ///< a manifold was made
-  bool lasts = false;                ///< for more than what was near then
   RigidTransform X_LS{};             ///< then: the smaller body in the frame of the larger one
   RigidTransform X_LS_end{};         ///< the same where it was expected to be at the step's end
   double reach = 0.0;                ///< gaps up to here were asked for, m
-  double clearance = 0.0;            ///< no points of both were nearer, m; 0: not known
   std::vector<double> amplitudes{};  ///< of a, then of b, then how those of either were expected to change
   std::vector<KeptPoint> points{};   ///< ascending in id
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.known, s.lasts, s.X_LS, s.X_LS_end, s.reach, s.clearance, s.amplitudes, s.points);
+    return std::tie(s.known, s.X_LS, s.X_LS_end, s.reach, s.amplitudes, s.points);
   }
 };
 

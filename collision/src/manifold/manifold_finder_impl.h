@@ -82,12 +82,6 @@ struct ManifoldFinder::Impl {
   bool keeps_motion(const internal::LivePair& pair, const internal::PairQuery& query) const;
   bool hardly_moved(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to) const;
   bool lasts(const internal::PairQuery& query) const;
-  bool stays_apart(const internal::LivePair& pair, const internal::PairQuery& query) const;
-  double moved(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to) const;
-  double expected_swing(Index body) const;
-  template <class Change>
-  double most_bent(Index index, std::size_t modes, const Change& change) const;
-  double bent(const internal::LivePair& pair, const internal::PairQuery& query) const;
   void expect(internal::PairQuery& query) const;
   void make(internal::LivePair& pair, const internal::PairQuery& query, internal::ManifoldWorker& worker);
   void follow(internal::ManifoldWorker& worker) const;

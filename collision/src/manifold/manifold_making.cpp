@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "finder/contact_id.h"
@@ -74,59 +73,17 @@ double expected_change(const BodyState& state, std::size_t mode) {
 
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
   const double farthest = this->farthest(q);
-  if (!pair.known) return false;
-  if (pair.clearance > 0.0 && stays_apart(pair, q)) return true;
-  if (!pair.lasts || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
+  if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
   if (!hardly_moved(q, pair.X_LS, smaller_in_larger(q, q.X_AB))) return false;
-  return bent(pair, q) <= farthest && (!q.by_fields || keeps_motion(pair, q));
-}
-
-/// How far a change of amplitudes moves points of a body's surface, m, at most.
-template <class Change>
-double ManifoldFinder::Impl::most_bent(Index index, std::size_t modes, const Change& change) const {
-  if (modes == 0) return 0.0;
-  const CollisionSurface& surface = *at(index).modal->surface;
-  double sum = 0.0, squared = 0.0;
-  for (std::size_t i = 0; i < modes; ++i) {
-    const double c = std::abs(change(i));
-    sum += c * surface.largest_shape(static_cast<Index>(i)), squared += c * c;
-  }
-  if (surface.skin() != nullptr) return squared > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
-  return std::min(sum, std::sqrt(squared) * fields.largest_norm(index));
-}
-
-/// How far points of both have moved by bending since a manifold was made.
-double ManifoldFinder::Impl::bent(const LivePair& pair, const PairQuery& q) const {
-  double sum = 0.0;
+  double bent = 0.0;
   const double* z = pair.amplitudes.data();
-  for (const auto& [index, state] : {std::pair(q.index_a, &q.state_a), std::pair(q.index_b, &q.state_b)}) {
-    const std::span<const double> now = state->amplitudes;
-    sum += most_bent(index, now.size(), [&](std::size_t i) { return now[i] - z[i]; });
-    z += now.size();
-  }
-  return sum;
-}
-
-/// Points of the smaller body move by no more in the frame of the larger one.
-double ManifoldFinder::Impl::moved(const PairQuery& q, const RigidTransform& from, const RigidTransform& to) const {
-  const bool a_is_smaller = q.a.radius <= q.b.radius;
-  const ManifoldBody& smaller = a_is_smaller ? q.a : q.b;
-  const double radius =
-      smaller.modal ? internal::farthest_of(fields.bounds(a_is_smaller ? q.index_a : q.index_b)) : smaller.radius;
-  return (to.p - from.p).norm() + 2.0 * (to.q * from.q.conjugate()).vector().norm() * radius;
-}
-
-double ManifoldFinder::Impl::expected_swing(Index body) const {
-  return at(body).modal ? fields.largest_swing(body) : 0.0;
-}
-
-/// Whether the surfaces were too far apart for all that has moved since then and is expected to until the step's end.
-bool ManifoldFinder::Impl::stays_apart(const LivePair& pair, const PairQuery& q) const {
-  const RigidTransform X_LS = smaller_in_larger(q, q.X_AB), end = smaller_in_larger(q, q.expected.X_AB_end);
-  const double to_come = moved(q, X_LS, end) + expected_swing(q.index_a) + expected_swing(q.index_b) +
-                         q.expected.fall.norm() + q.expected.near;
-  const double room = pair.clearance - moved(q, pair.X_LS, X_LS) - to_come;
-  return room > 0.0 && bent(pair, q) < room;
+  for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
+    for (std::size_t i = 0; i < amplitudes.size(); ++i) {
+      const double change = std::abs(amplitudes[i] - *z++);
+      if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
+      bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
+    }
+  return bent <= farthest && (!q.by_fields || keeps_motion(pair, q));
 }
 
 bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform& from,
@@ -138,8 +95,12 @@ bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform
 /// Whether a manifold that is made now can be kept in the next query, as far as the expected motion tells.
 bool ManifoldFinder::Impl::lasts(const PairQuery& q) const {
   if (!q.by_fields) return true;
-  return hardly_moved(q, smaller_in_larger(q, q.X_AB), smaller_in_larger(q, q.expected.X_AB_end)) &&
-         expected_swing(q.index_a) + expected_swing(q.index_b) <= farthest(q);
+  if (!hardly_moved(q, smaller_in_larger(q, q.X_AB), smaller_in_larger(q, q.expected.X_AB_end))) return false;
+  double bends = 0.0;
+  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
+    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
+      bends += std::abs(expected_change(*state, i)) * body->modal->surface->largest_shape(static_cast<Index>(i));
+  return bends <= farthest(q);
 }
 
 /// Whether the expected motion closes at most so much more as manifolds are made for.
@@ -150,11 +111,10 @@ bool ManifoldFinder::Impl::keeps_motion(const LivePair& pair, const PairQuery& q
   double more = (way - way_before).norm() +
                 2.0 * (turn * turn_before.conjugate()).vector().norm() * std::min(q.a.radius, q.b.radius);
   const double* change = pair.amplitudes.data() + pair.amplitudes.size() / 2;
-  for (const auto& [index, state] : {std::pair(q.index_a, &q.state_a), std::pair(q.index_b, &q.state_b)}) {
-    const std::size_t modes = state->amplitudes.size();
-    more += most_bent(index, modes, [&](std::size_t i) { return expected_change(*state, i) - change[i]; });
-    change += modes;
-  }
+  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
+    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
+      more +=
+          std::abs(expected_change(*state, i) - *change++) * body->modal->surface->largest_shape(static_cast<Index>(i));
   return more <= farthest(q);
 }
 
@@ -187,13 +147,12 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   graph.make_room(pair, worker.made.size());
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
-  pair.lasts = kept, pair.clearance = worker.pairs.clearance();
-  pair.known = kept || pair.clearance > 0.0;
+  pair.known = kept;
   pair.X_LS = smaller_in_larger(q, q.X_AB);
   pair.X_LS_end = smaller_in_larger(q, q.expected.X_AB_end);
   pair.reach = q.by_fields ? q.expected.near : q.reach;
   pair.amplitudes.clear();
-  if (!pair.known) return;  // nothing asks for them
+  if (!kept) return;  // nothing asks for them
   pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
   pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
   if (!q.by_fields) return;

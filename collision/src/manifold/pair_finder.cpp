@@ -20,7 +20,6 @@ FeatureContact exchanged(const FeatureContact& c, const RigidTransform& X_AB) {
 
 std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<const std::uint64_t> last) {
   found_.clear();
-  clearance_ = 0.0;
   const ConvexCore *core_a = q.a.core(), *core_b = q.b.core();
   if (core_a != nullptr && core_b != nullptr) {
     between_convex(q, *core_a, *core_b);
@@ -30,7 +29,7 @@ std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<c
     against_ground(q, q.b, q.a, q.X_AB.inverse(), q.X_AB.q.conjugate() * -q.passing.way);
     for (FeatureContact& c : found_) c = exchanged(c, q.X_AB);
   } else if (q.by_fields) {
-    clearance_ = fields_->find(q, found_);
+    fields_->find(q, found_);
   } else {
     by_narrow_phase(q);
   }

@@ -23,7 +23,6 @@ class PairFinder {
   /// Until the next call. Of rigid pairs at most kManifoldPoints to a patch.
   /// @param last feature_pair() of those of the last manifold
   std::span<const FeatureContact> find(const PairQuery& query, std::span<const std::uint64_t> last);
-  double clearance() const { return clearance_; }  ///< of the last pair, if by fields: see FieldContacts
 
   /// A body that deforms, in its state of this query.
   DeformedSurface& surface(Index index, const ManifoldBody& body, const BodyState& state) {
@@ -48,7 +47,6 @@ class PairFinder {
   SurfacePool pool_;
   std::array<DeformedSurface, 2> ahead_;  // of a pair that is on its way
   FieldPairs* fields_ = nullptr;
-  double clearance_ = 0.0;
   std::vector<ContactPoint> contacts_;
   std::vector<FeatureContact> found_;
 };
