@@ -458,7 +458,7 @@ TEST(World, RefusesWhatIsNotANumberAndLeavesTheStateAlone) {
   EXPECT_THAT(message_of([&] { world.apply_force(body, {.weight = {1, 1, 1}}, {0, 0, 1}); }), HasSubstr("sum to 3"));
   EXPECT_THAT(message_of([&] { world.apply_force(body, {.weight = {nan, 1, 1}}, {0, 0, 1}); }), HasSubstr("weights"));
   EXPECT_THAT(message_of([&] { world.set_pose(body, {{}, {nan, 0, 0}}); }), HasSubstr("position"));
-  EXPECT_THAT(message_of([&] { world.set_pose(body, {{2, 0, 0, 0}, {}}); }), HasSubstr("norm 2"));
+  EXPECT_THAT(message_of([&] { world.set_pose(body, {{2, 0, 0, 0}, {0, 0, 0}}); }), HasSubstr("norm 2"));
   EXPECT_THAT(message_of([&] { world.set_velocity(body, {0, 0, 0}, {nan, 0, 0}); }), HasSubstr("angular velocity"));
   EXPECT_THAT(message_of([&] { world.set_amplitudes(body, bad, good); }), HasSubstr("amplitudes[1] is nan"));
   EXPECT_THAT(message_of([&] { world.set_amplitudes(body, good, {}); }), HasSubstr("rates has 0 elements, expected 4"));
