@@ -109,8 +109,11 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
   bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
   sums_.assign(rows_.size(), Vec3::Zero());
   islands_.reset(bodies.bodies().size());
+  touched_.assign(bodies.bodies().size(), false);
   for (const PreparedContact& contact : contacts) {
     const std::int32_t a = bodies.of(contact.a.body), b = bodies.of(contact.b.body);
+    for (const std::int32_t frame : {a, b})
+      if (frame >= 0) touched_[static_cast<std::size_t>(frame)] = true;
     if (a >= 0 && b >= 0) islands_.join(a, b);
   }
 }
@@ -309,6 +312,7 @@ bool GameContacts::limit_forces(GameBodies& bodies, std::span<const double> move
 
 void GameContacts::add_begun(const GameBodies& bodies, std::span<const double> moved) {
   for (std::size_t i = 0; i < bodies.bodies().size(); ++i) {
+    if (!touched_[i]) continue;  // its answers are the round-off of what joints gave and took back
     const GameBody& body = bodies.bodies()[i];
     Begun& begun = begun_of(static_cast<std::int32_t>(i));
     begun.along += body.along;

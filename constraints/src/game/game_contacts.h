@@ -116,6 +116,7 @@ class GameContacts {
   std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;
   std::vector<Rebound> rebound_memory_;
+  std::vector<bool> touched_;  // by frame
   DisjointSets islands_;       // of bodies that contacts tie together
   std::vector<Begun> begun_;   // by the first body of an island, and of what does not move
   std::vector<double> modal_;  // scratch
