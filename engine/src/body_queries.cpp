@@ -53,12 +53,12 @@ void BodyQueries::find_overlaps(const Shape& shape, const RigidTransform& pose, 
 
 SpatialIndex::Filter BodyQueries::filter(const BodyFilter& filter) const {
   SpatialIndex::Filter asked{.mask = filter.mask};
-  if (filter.accepts) asked.accepts = [this, &filter](Index body) { return filter.accepts(id(body)); };
+  if (filter.accepts) asked.accepts = [this, &filter](Index body) { return filter.accepts(bodies_.id(body)); };
   return asked;
 }
 
 BodyHit BodyQueries::told(const SpatialIndex::Hit& hit) const {
-  return {id(hit.body), hit.at, hit.position, hit.normal, hit.fraction, hit.distance};
+  return {bodies_.id(hit.body), hit.at, hit.position, hit.normal, hit.fraction, hit.distance};
 }
 
 }  // namespace limber::internal

@@ -19,11 +19,6 @@ class BodyQueries {
   SpatialIndex& index();
   SpatialIndex::Filter filter(const BodyFilter& filter) const;
   BodyHit told(const SpatialIndex::Hit& hit) const;
-  /// Of a body, or of the whole that a part is of.
-  BodyId id(Index entry) const {
-    const Index body = bodies_.whole_of(entry);
-    return {static_cast<std::uint32_t>(body), bodies_[body].generation};
-  }
   /// Bodies that a shape touches, to `found`, ascending.
   void find_overlaps(const Shape& shape, const RigidTransform& pose, const SpatialIndex::Filter& filter);
 

@@ -76,6 +76,11 @@ class BodyTable {
   bool has_parts() const { return parts_ > 0; }
   /// The body that an entry is of.
   Index whole_of(Index body) const { return (*this)[body].whole < 0 ? body : (*this)[body].whole; }
+  /// Of a body, or of the whole that a part is of.
+  BodyId id(Index entry) const {
+    const Index body = whole_of(entry);
+    return {static_cast<std::uint32_t>(body), (*this)[body].generation};
+  }
   /// Where an entry that is no body of its own is.
   RigidTransform standing_pose(const Entry& e) const {
     if (e.whole < 0) return e.pose;

@@ -13,8 +13,8 @@ Pair pair_of(const HitEvent& hit) { return {hit.a.index, hit.b.index}; }
 
 HitEvent make_hit(const ContactEvent& contact, const BodyTable& bodies) {
   const BodyTable::Entry &a = bodies[contact.a], &b = bodies[contact.b];
-  return {.a = {static_cast<std::uint32_t>(contact.a), a.generation},
-          .b = {static_cast<std::uint32_t>(contact.b), b.generation},
+  return {.a = bodies.id(contact.a),
+          .b = bodies.id(contact.b),
           .user_data_a = a.user_data,
           .user_data_b = b.user_data,
           .position = contact.position,

@@ -15,7 +15,7 @@ void SensorStage::find(Index sensor, std::vector<Overlap>& found) {
   const BodyTable::Entry& e = bodies_[sensor];
   queries_.find_overlaps(*e.shape, e.pose, {.mask = e.filter.mask});
   for (const Index body : queries_.found)
-    if ((bodies_[body].filter.mask & e.filter.layers) != 0) found.push_back({queries_.id(sensor), queries_.id(body)});
+    if ((bodies_[body].filter.mask & e.filter.layers) != 0) found.push_back({bodies_.id(sensor), bodies_.id(body)});
 }
 
 void SensorStage::update() {

@@ -261,11 +261,11 @@ void World::list(std::vector<BodyId>& bodies) const {
   bodies.clear();
   for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
     if (const Entry& e = impl_->bodies[static_cast<Index>(i)]; e.alive && e.whole < 0)
-      bodies.push_back(impl_->probes.queries.id(static_cast<Index>(i)));
+      bodies.push_back(impl_->bodies.id(static_cast<Index>(i)));
 }
 BodyId World::id_of(Index body) const {
   if (body < 0 || static_cast<std::size_t>(body) >= impl_->bodies.size() || !impl_->bodies[body].alive) return {};
-  return impl_->probes.queries.id(body);
+  return impl_->bodies.id(body);
 }
 void World::set_user_data(BodyId id, std::uint64_t data) {
   impl_->bodies.any_entry(id, "set_user_data");

@@ -35,7 +35,7 @@ void World::find_overlaps(const Shape& shape, const RigidTransform& pose, std::v
   internal::BodyQueries& queries = impl_->probes.queries;
   queries.find_overlaps(shape, pose, queries.filter(filter));
   bodies.clear();
-  for (const Index body : queries.found) bodies.push_back(queries.id(body));
+  for (const Index body : queries.found) bodies.push_back(impl_->bodies.id(body));
 }
 
 std::optional<BodyHit> World::nearest_point(const Vec3& point, double max_distance, const BodyFilter& filter) const {
