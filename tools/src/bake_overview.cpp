@@ -6,6 +6,7 @@
 #include "bake_results.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
+#include "limber/internal/base64.h"
 #include "limber/model/asset.h"
 #include "program.h"
 #include "thumbnail.h"
@@ -33,23 +34,11 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-std::string base64(const std::string& bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      three = three << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += k > bytes.size() - i ? '=' : kDigits[three >> (18 - 6 * k) & 63];
-  }
-  return text;
-}
-
 /// Empty where the asset is no longer there.
 std::string picture_of(const std::string& asset) {
   try {
     return fmt::format("<img alt=\"\" width={} height={} src=\"data:image/png;base64,{}\">", kWidth, kHeight,
-                       base64(thumbnail(read_asset(asset), kWidth, kHeight)));
+                       internal::base64(thumbnail(read_asset(asset), kWidth, kHeight)));
   } catch (const InputError&) {
     return "";
   }
