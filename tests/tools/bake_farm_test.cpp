@@ -152,6 +152,14 @@ TEST_F(BakeFarm, AJobThatTakesTooLongOrTooMuchIsStoppedAndLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder / "out"));
 }
 
+TEST_F(BakeFarm, AnAssetThatCannotTakeItsPlaceFailsItsJobAlone) {
+  fs::create_directories(folder / "out/bar2.glb/kept");
+  const std::vector<Json> results = bake_all({});
+  EXPECT_THAT(statuses(results), ElementsAre("baked", "failed", "baked", "failed"));
+  EXPECT_THAT(results[1]["message"].get<std::string>(), HasSubstr("bar2.glb"));
+  EXPECT_TRUE(fs::exists(folder / "out/bar2.glb/kept"));
+}
+
 TEST_F(BakeFarm, ThePageShowsEachAssetAndGroupsWhatFailed) {
   write_file(folder / "broken2.msh", "no mesh either\n");
   bake_all({"--results", "r.jsonl"});

@@ -17,6 +17,7 @@
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/model/sha256.h"
+#include "precompute_report.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -29,9 +30,13 @@ using Json = nlohmann::ordered_json;
 constexpr std::chrono::milliseconds kBetweenLooks{5};
 constexpr const char* kReport = "report.json";
 
-bool holds(const fs::path& file, const std::string& hash) {
+/// The bytes of a file with this hash; none: it is not there, or has others.
+std::optional<std::string> bytes_with(const fs::path& file, const std::string& hash) {
   std::error_code failed;
-  return fs::file_size(file, failed) > 0 && !failed && sha256_hex(read_file(file)) == hash;
+  if (fs::file_size(file, failed) == 0 || failed) return std::nullopt;
+  std::string bytes = read_file(file);
+  if (sha256_hex(bytes) != hash) return std::nullopt;
+  return bytes;
 }
 
 /// Assets by what decides their bytes. An asset is there once the line that tells its hash is.
@@ -48,14 +53,14 @@ class Cache {
     if (!fs::exists(told)) return std::nullopt;
     Json result = Json::parse(read_file(told), nullptr, false);
     if (result.is_discarded() || !result.contains("output_hash")) return std::nullopt;
-    const fs::path asset = path(key, ".glb");
-    if (!holds(asset, result["output_hash"].get<std::string>())) return std::nullopt;
-    write_file(output, read_file(asset));
+    const auto asset = bytes_with(path(key, ".glb"), result["output_hash"].get<std::string>());
+    if (!asset) return std::nullopt;
+    write_file(output, *asset);
     return result;
   }
-  void put(const std::string& key, const Json& result) const {
+  void put(const std::string& key, const std::string& asset, const Json& result) const {
     fs::create_directories(path(key, "").parent_path());
-    write_file(path(key, ".glb"), read_file(result["output"].get<std::string>()));
+    write_file(path(key, ".glb"), asset);
     write_file(path(key, ".json"), result.dump());
   }
 
@@ -76,7 +81,7 @@ void add_report(Json& result, const Json& report) {
     result["lowest_hz"] = report["frequencies_hz"][0];
   if (report.contains("frequency_errors")) {
     double largest = 0.0;
-    for (std::size_t i = 0; i < std::min<std::size_t>(10, report["frequency_errors"].size()); ++i)
+    for (std::size_t i = 0; i < std::min<std::size_t>(kModesTold, report["frequency_errors"].size()); ++i)
       if (const Json& error = report["frequency_errors"][i]; error.is_number())
         largest = std::max(largest, std::abs(error.get<double>()));
     result["frequency_error"] = largest;
@@ -123,7 +128,7 @@ class Farm {
   /// Takes it as done, or starts it.
   void begin(const BakeJob& job) {
     std::string key;
-    try {
+    or_fail(job, key, [&] {
       key = key_of(job, program_hash_);
       if (is_done(job, key)) {
         ++counts_.skipped;
@@ -132,7 +137,15 @@ class Farm {
       fs::create_directories(job.output.parent_path());
       if (cache_.is_used() && writes_asset_alone(job))
         if (std::optional<Json> found = cache_.take(key, job.output)) return end_cached(job, std::move(*found));
-      start(job, std::move(key));
+      start(job, key);
+    });
+  }
+
+  /// What goes wrong with one job, such as a folder that cannot be written to, fails that one alone.
+  template <class Work>
+  void or_fail(const BakeJob& job, const std::string& key, const Work& work) {
+    try {
+      work();
     } catch (const fs::filesystem_error& e) {
       end_failed(job, key, "failed", e.what());
     } catch (const Error& e) {
@@ -140,7 +153,7 @@ class Farm {
     }
   }
 
-  void start(const BakeJob& job, std::string key) {
+  void start(const BakeJob& job, const std::string& key) {
     const fs::path folder = job.output.parent_path() / fmt::format(".limber-{}-{}", getpid(), job.number);
     fs::create_directories(folder);
     // A scene names the asset by where it is.
@@ -149,13 +162,13 @@ class Farm {
     arguments.insert(arguments.end(), {"--report", (folder / kReport).string()});
     JobProcess process("/proc/self/exe", arguments, folder / "stderr",
                        {.seconds = arguments_.seconds, .bytes = 1e6 * arguments_.megabytes});
-    running_.push_back({&job, std::move(key), folder, asset, std::move(process)});
+    running_.push_back({&job, key, folder, asset, std::move(process)});
   }
 
   bool is_done(const BakeJob& job, const std::string& key) const {
     const auto found = done_.find(job.output.string());
     return found != done_.end() && is_good(found->second) && found->second.value("key", "") == key &&
-           holds(job.output, found->second.value("output_hash", ""));
+           bytes_with(job.output, found->second.value("output_hash", "")).has_value();
   }
 
   void look() {
@@ -165,7 +178,7 @@ class Farm {
         ++running;
         continue;
       }
-      end_job(*running, *end);
+      or_fail(*running->job, running->key, [&] { end_job(*running, *end); });
       std::error_code ignored;
       fs::remove_all(running->folder, ignored);
       running = running_.erase(running);
@@ -180,17 +193,18 @@ class Farm {
       return end_failed(job, running.key, "broke down", fmt::format("ended by signal {}", end.signal), &end);
     if (end.exit_code != 0) return end_failed(job, running.key, "failed", end.message, &end);
     if (running.asset != job.output) fs::rename(running.asset, job.output);
+    const std::string asset = read_file(job.output);
     Json result = begun_result(job, "baked");
     const Json report = Json::parse(read_file(running.folder / kReport));
     add_report(result, report);
     result["key"] = running.key;
-    result["output_hash"] = sha256_hex(read_file(job.output));
+    result["output_hash"] = sha256_hex(asset);
     result["peak_memory_bytes"] = end.peak_memory;
     result["seconds"] = report.value("seconds", Json::object());
     result["seconds"]["total"] = end.seconds;
-    if (cache_.is_used() && writes_asset_alone(job)) cache_.put(running.key, result);
-    ++counts_.baked;
+    if (cache_.is_used() && writes_asset_alone(job)) cache_.put(running.key, asset, result);
     results_.add(result);
+    ++counts_.baked;
     tell_progress();
   }
 
@@ -265,13 +279,15 @@ std::vector<BakeJob> jobs_of(Program& program, const FarmArguments& a, const std
 }  // namespace
 
 void declare_farm_options(CLI::App& app, FarmArguments& a) {
-  app.add_option(
-         "--manifest", a.manifest,
+  const auto option = [&](const char* name, auto& value, const char* what) {
+    return app.add_option(name, value, what)->group(kFarmOptions);
+  };
+  option("--manifest", a.manifest,
          "many bakes, each in a process of its own: a file with one {\"mesh\", \"output\", \"options\"} a line, "
          "or a pattern such as 'meshes/*.obj' with a folder as --output; other options given here hold for all")
       ->type_name("FILE.jsonl|PATTERN");
   const auto farm_option = [&](const char* name, auto& value, const char* what) {
-    return app.add_option(name, value, std::string("with --manifest: ") + what)->needs("--manifest");
+    return option(name, value, what)->needs("--manifest");
   };
   farm_option("--shard", a.shard, "the I-th of N parts of the jobs")->type_name("I/N");
   farm_option("--job", a.job, "this job alone, from 1")
@@ -280,9 +296,10 @@ void declare_farm_options(CLI::App& app, FarmArguments& a) {
       ->excludes("--shard");
   farm_option("--results", a.results, "a line of JSON for each job is added here; default: printed")
       ->type_name("FILE.jsonl");
-  app.add_flag("--resume", a.resume,
-               "with --results: leave out jobs whose output that file tells of, made by this "
-               "program from the same contents and options")
+  app.add_flag(
+         "--resume", a.resume,
+         "leave out jobs whose output --results tells of, made by this program from the same contents and options")
+      ->group(kFarmOptions)
       ->needs("--results");
   farm_option("--cache", a.cache, "take and keep assets here, by what decides their bytes; many processes may share it")
       ->type_name("FOLDER");
@@ -290,11 +307,11 @@ void declare_farm_options(CLI::App& app, FarmArguments& a) {
   farm_option("--megabytes-a-job", a.megabytes, "memory that a job may ask for")
       ->type_name("MB")
       ->check(positive_number());
-  app.add_option("--summary", a.summaries, "write one page about these results to --output; repeatable")
+  farm_option("--at-once", a.at_once, "processes")->type_name("N")->check(CLI::Range(1, 1024))->capture_default_str();
+  option("--summary", a.summaries, "without --manifest: write one page about these results to --output; repeatable")
       ->type_name("RESULTS.jsonl")
       ->allow_extra_args(false)
       ->excludes("--manifest");
-  farm_option("--at-once", a.at_once, "processes")->type_name("N")->check(CLI::Range(1, 1024))->capture_default_str();
 }
 
 void bake_many(Program& program, const FarmArguments& a, const std::string& outputs) {

@@ -26,12 +26,14 @@ using Json = nlohmann::ordered_json;
 constexpr std::array kFiles = {"--materials", "--render-surface", "--collision-surface", "--joints"};
 constexpr const char* kScene = "--scene";
 constexpr std::array kBeside = {".node", ".ele", ".face", ".mtl", ".bin"};
-/// Options that belong to a whole run, or that a line gives by a key of its own.
-constexpr std::array kNotOfAJob = {
-    "--help",    "--version", "--report", "--output",        "--list-materials",  "--manifest", "--shard",  "--job",
-    "--results", "--resume",  "--cache",  "--seconds-a-job", "--megabytes-a-job", "--at-once",  "--summary"};
+/// Options that a job does not have, or that a line gives by a key of its own.
+constexpr std::array kNotOfAJob = {"--help", "--version", "--report", "--output", "--list-materials"};
 
 bool is_one_of(const auto& names, const std::string& name) { return std::ranges::find(names, name) != names.end(); }
+bool is_of_jobs(const CLI::Option& option) {
+  const std::string name = option.get_name();
+  return name.starts_with("--") && option.get_group() != kFarmOptions && !is_one_of(kNotOfAJob, name);
+}
 bool names_file(const std::string& option) { return is_one_of(kFiles, option) || option == kScene; }
 
 /// A line of the manifest, for messages and for relative names.
@@ -58,8 +60,7 @@ struct Line {
 std::vector<std::string> names_of_options(const CLI::App& known) {
   std::vector<std::string> names;
   for (const CLI::Option* option : known.get_options())
-    for (const std::string& name : option->get_lnames())
-      if (!is_one_of(kNotOfAJob, "--" + name)) names.push_back(name);
+    if (is_of_jobs(*option)) names.push_back(option->get_name().substr(2));
   return names;
 }
 
@@ -215,7 +216,7 @@ std::vector<GivenOption> options_of_jobs(const CLI::App& given) {
   std::vector<GivenOption> options;
   for (const CLI::Option* option : given.get_options()) {
     const std::string name = option->get_name();
-    if (option->count() == 0 || !name.starts_with("--") || is_one_of(kNotOfAJob, name)) continue;
+    if (option->count() == 0 || !is_of_jobs(*option)) continue;
     const bool is_flag = option->get_items_expected_max() == 0;
     if (option->get_items_expected_min() > 1) {  // one value of several numbers
       options.push_back({name, CLI::detail::join(option->results(), ",")});

@@ -14,6 +14,9 @@ class App;
 
 namespace limber::tools {
 
+/// The group of options of a whole run in --help; jobs have the others.
+inline constexpr const char* kFarmOptions = "Many bakes";
+
 /// An option as on a command line.
 struct GivenOption {
   std::string name;   ///< with its dashes
