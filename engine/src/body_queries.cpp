@@ -5,33 +5,35 @@
 namespace limber::internal {
 
 BodyQueries::Shown BodyQueries::shown_of(const BodyTable::Entry& e) const {
-  if (!e.alive || e.sensor || e.filter.layers == 0) return {};
+  if (!e.alive || e.sensor || !e.parts.empty() || e.filter.layers == 0) return {};
   Shown shown{.shape = e.shape.get(), .layers = e.filter.layers};
-  if (e.group >= 0 && bodies_.group(e).model().data().touchable) {
-    shown.model = &bodies_.group(e).model();
-    shown.skinned = bodies_.group(e).skinned(e.slot);
+  const BodyTable::Entry& loaded = e.whole < 0 ? e : bodies_[e.whole];
+  if (loaded.group >= 0 && bodies_.group(loaded).model().data().touchable) {
+    shown.model = &bodies_.group(loaded).model();
+    shown.skinned = bodies_.group(loaded).skinned(loaded.slot);
   }
   return shown;
 }
 
-void BodyQueries::show(Index body) {
-  const BodyTable::Entry& e = bodies_[body];
-  Shown& before = shown_[static_cast<std::size_t>(body)];
+void BodyQueries::show(Index entry) {
+  const BodyTable::Entry& e = bodies_[entry];
+  Shown& before = shown_[static_cast<std::size_t>(entry)];
   const Shown now = shown_of(e);
   if (now != before) {
-    if (before.any()) index_.remove_body(body);
+    if (before.any()) index_.remove_body(entry);
     if (now.any()) {
-      const auto model = now.model != nullptr ? bodies_.group(e).shared_model() : nullptr;
-      index_.add_body(body, {.model = e.shape ? nullptr : model, .shape = e.shape, .skin = now.skinned}, now.layers,
-                      e.shape ? model : nullptr);
+      const auto model =
+          now.model != nullptr ? bodies_.group(bodies_[bodies_.whole_of(entry)]).shared_model() : nullptr;
+      index_.add_body(entry, {.model = e.shape ? nullptr : model, .shape = e.shape, .skin = now.skinned}, now.layers,
+                      e.shape ? model : nullptr, e.whole < 0 ? RigidTransform{} : e.pose);
     }
     before = now;
   }
   if (!now.any()) return;
   if (e.group < 0)
-    index_.set_state(body, bodies_.standing_pose(e), {});
+    index_.set_state(entry, bodies_.standing_pose(e), {});
   else
-    index_.set_state(body, bodies_.group(e).frame(e.slot).pose(), bodies_.group(e).amplitudes(e.slot));
+    index_.set_state(entry, bodies_.group(e).frame(e.slot).pose(), bodies_.group(e).amplitudes(e.slot));
 }
 
 SpatialIndex& BodyQueries::index() {

@@ -36,7 +36,7 @@ class BodyQueries {
     bool any() const { return shape != nullptr || model != nullptr; }
   };
   Shown shown_of(const BodyTable::Entry& e) const;
-  void show(Index body);
+  void show(Index entry);
 
   const BodyTable& bodies_;
   SpatialIndex index_;

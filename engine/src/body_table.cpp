@@ -75,7 +75,7 @@ const BodyTable::Entry& BodyTable::entry(BodyId id, const char* function) const 
 
 bool BodyTable::shows(const Entry& e) const {
   const bool meets = !e.sensor && (e.filter.self || (e.filter.layers != 0 && e.filter.mask != 0));
-  return meets && (e.shape || group(e).model().data().touchable);
+  return meets && e.parts.empty() && (e.shape || group(e).model().data().touchable);
 }
 
 bool BodyTable::any_dented() const {

@@ -42,4 +42,10 @@ RigidModel RigidModels::get_kinematic(const std::shared_ptr<const Shape>& shape)
   return find_or_make({&part, 1}, {}, [&] { return make_kinematic_model(shape); });
 }
 
+RigidModel RigidModels::get_kinematic(std::span<const ShapePart> parts) {
+  RigidModel led = find_or_make(parts, {}, [&] { return make_kinematic_model(parts); });
+  led.parts.assign(parts.begin(), parts.end());
+  return led;
+}
+
 }  // namespace limber::internal

@@ -15,8 +15,9 @@ class RigidModels {
   RigidModel get(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
   /// The same of a compound.
   RigidModel get(std::span<const ShapePart> parts, const MassProperties& mass);
-  /// The same of one that is led.
+  // The same of one that is led.
   RigidModel get_kinematic(const std::shared_ptr<const Shape>& shape);
+  RigidModel get_kinematic(std::span<const ShapePart> parts);
 
  private:
   struct Part {

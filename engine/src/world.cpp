@@ -98,41 +98,49 @@ World& World::operator=(World&&) noexcept = default;
 // Bodies --------------------------------------------------------------------------------------------------------------
 
 BodyId World::add_body(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement) {
+  return impl_->add_moving(std::move(model), placement, {});
+}
+
+BodyId World::Impl::add_moving(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement,
+                               std::span<const ShapePart> shown_parts) {
   if (!model) throw InvalidArgument("World::add_body: the model is null");
   require_pose(placement.pose, "add_body");
   require_finite(placement.velocity, "add_body", "velocity");
   require_finite(placement.angular_velocity, "add_body", "angular velocity");
-  const double friction = checked(placement.friction, impl_->paths.solver, "add_body");
-  check(placement.frame, model->data().motion, impl_->paths.solver, "add_body");
-  check_restitution(placement.restitution, impl_->paths.solver);
+  const double friction = checked(placement.friction, paths.solver, "add_body");
+  check(placement.frame, model->data().motion, paths.solver, "add_body");
+  check_restitution(placement.restitution, paths.solver);
   if (placement.shape) {
     validate(*placement.shape);
     if (std::holds_alternative<HalfSpace>(*placement.shape))
       throw InvalidArgument("World::add_body: the shape is a half-space, expected one that ends");
   }
-  const internal::ShapeExtent extent = placement.shape ? extent_of(*placement.shape) : extent_of(*model);
+  const internal::ShapeExtent extent = !shown_parts.empty() ? extent_of(shown_parts)
+                                       : placement.shape    ? extent_of(*placement.shape)
+                                                            : extent_of(*model);
   const bool skinned = placement.modal_skin && model->data().skin.has_value();
-  Impl& m = *impl_;
-  if (placement.inertial_coupling) require_flight(*model, placement, skinned, m.paths.registry.source() != nullptr);
-  const Index group = m.bodies.group_of(std::move(model), m.parts.length());
-  BodyGroup& bodies = *m.bodies.model_group(group).bodies;
-  const Index slot = bodies.add(placement.pose, placement.velocity, placement.angular_velocity, skinned);
-  bodies.set_frame_settings(slot, placement.frame);
-  bodies.set_velocity(slot, placement.velocity, placement.angular_velocity);
-  if (placement.inertial_coupling) bodies.couple(slot);
-  const BodyId id = m.bodies.add({.group = group,
-                                  .slot = slot,
-                                  .shape = placement.shape,
-                                  .filter = placement.filter,
-                                  .friction = friction,
-                                  .restitution = placement.restitution,
-                                  .extent = extent,
-                                  .user_data = placement.user_data});
+  if (placement.inertial_coupling) require_flight(*model, placement, skinned, paths.registry.source() != nullptr);
+  const Index group = bodies.group_of(std::move(model), parts.length());
+  BodyGroup& alike = *bodies.model_group(group).bodies;
+  const Index slot = alike.add(placement.pose, placement.velocity, placement.angular_velocity, skinned);
+  alike.set_frame_settings(slot, placement.frame);
+  alike.set_velocity(slot, placement.velocity, placement.angular_velocity);
+  if (placement.inertial_coupling) alike.couple(slot);
+  const BodyId id = bodies.add({.group = group,
+                                .slot = slot,
+                                .shape = placement.shape,
+                                .filter = placement.filter,
+                                .friction = friction,
+                                .restitution = placement.restitution,
+                                .extent = extent,
+                                .user_data = placement.user_data});
   const auto index = static_cast<Index>(id.index);
-  m.constraints.set_body(index, {.group = &bodies, .slot = slot});
-  m.sleep.add(index);
-  m.paths.registry.add_body(index);
-  m.probes.queries.tell_changed();
+  constraints.set_body(index, {.group = &alike, .slot = slot});
+  sleep.add(index);
+  for (const ShapePart& part : shown_parts) add_part(index, part);
+  paths.registry.add_body(index);
+  paths.registry.keep_parts_apart(index);
+  probes.queries.tell_changed();
   return id;
 }
 
@@ -154,12 +162,7 @@ BodyId World::add_rigid(const std::vector<ShapePart>& parts, const MassPropertie
                         const BodyPlacement& placement) {
   if (placement.shape) throw InvalidArgument("World::add_rigid: placement.shape is given, expected none");
   const RigidModel rigid = impl_->rigid.get(parts, mass);
-  const BodyId id = add_body(rigid.model, placement);
-  const auto body = static_cast<Index>(id.index);
-  impl_->bodies[body].extent = internal::extent_of(std::span<const ShapePart>(rigid.parts));
-  for (const ShapePart& part : rigid.parts) impl_->add_part(body, part);
-  impl_->paths.registry.keep_parts_apart(body);
-  return id;
+  return impl_->add_moving(rigid.model, placement, rigid.parts);
 }
 
 BodyId World::add_rigid(const std::vector<ShapePart>& parts, double density, const BodyPlacement& placement) {
@@ -182,6 +185,12 @@ BodyId World::add_kinematic(const std::shared_ptr<const Shape>& shape, const Bod
   BodyPlacement placed = placement;
   placed.shape = shape;
   return add_body(impl_->rigid.get_kinematic(shape).model, placed);
+}
+
+BodyId World::add_kinematic(const std::vector<ShapePart>& parts, const BodyPlacement& placement) {
+  if (placement.shape) throw InvalidArgument("World::add_kinematic: placement.shape is given, expected none");
+  const RigidModel led = impl_->rigid.get_kinematic(parts);
+  return impl_->add_moving(led.model, placement, led.parts);
 }
 
 BodyType World::body_type(BodyId id) const {

@@ -52,7 +52,9 @@ struct World::Impl {
                                paths.registry, paths.in_force(), paths.solver, drawing});
   }
   void add_to_report(const IslandReport& substep);
-  /// Of a compound. @param part in the frame of the body
+  /// World::add_body(). @param parts of a compound, in the frame of the body: what others meet of it; empty: of others
+  BodyId add_moving(std::shared_ptr<const ModalModel> model, const BodyPlacement& placement,
+                    std::span<const ShapePart> parts);
   void add_part(Index body, const ShapePart& part);
   void remove(Index entry);
 

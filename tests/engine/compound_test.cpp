@@ -121,6 +121,48 @@ TEST(Compound, QueriesAndSensorsKnowTheWhole) {
   EXPECT_FALSE(world.cast_ray({.from = {8, 0.45, 0.2}, .way = {4, 0, 0}}));
 }
 
+/// A blow where a ray meets a leg gives the table the momentum, and the spin about its centre of mass, of a blow there.
+TEST(Compound, APlaceThatAQueryTellsTakesLoads) {
+  World world({.gravity = Vec3::Zero()});
+  const BodyPlacement askew{.pose = {quaternion_from_rotation_vector({0.3, -0.5, 0.8}), {}}};
+  const BodyId desk = add_table(world, {1, 2, 3}, askew);
+  const RigidTransform X = world.body(desk).pose;
+  const Vec3 to_leg(0.45, -0.45, 0.2 - mass_properties(table(), 500.0).center_of_mass.z());
+  const auto hit = world.cast_ray({.from = X * (to_leg + Vec3(0, -2, 0)), .way = X.q * Vec3(0, 4, 0)});
+  ASSERT_TRUE(hit && hit->at);
+  EXPECT_EQ(hit->body, desk);
+  EXPECT_LT((hit->position - X * (to_leg - Vec3(0, 0.05, 0))).norm(), 1e-9);
+  EXPECT_LT((world.position(desk, *hit->at) - hit->position).norm(), 1e-6);  // drawn surfaces are single precision
+  const Vec3 blow(10, -20, 30);
+  world.apply_impulse(desk, *hit->at, blow);
+  world.step();
+  EXPECT_LT((world.linear_momentum(desk) - blow).norm(), 1e-9);
+  EXPECT_LT((world.angular_momentum(desk) - (hit->position - X.p).cross(blow)).norm(), 1e-5);
+  const HandleId hand = world.add_handle(desk, *hit->at);
+  world.set_velocity(desk, {1, 1, 1}, {2, -1, 0.5});
+  const Vec3 held = world.handle(hand).target.position;
+  for (int i = 0; i < 30; ++i) world.step();
+  EXPECT_LT((world.position(desk, *hit->at) - held).norm(), 1e-6);
+}
+
+/// A lift of a floor and two walls carries a ball up, and the walls take it along sideways.
+TEST(Compound, OneThatIsLedCarriesOthers) {
+  GroundedWorld g({}, {.step = 1.0 / 120.0});
+  const auto floor = share(Box{{0.5, 0.5, 0.05}}), wall = share(Box{{0.05, 0.5, 0.3}});
+  const BodyId lift = g.world.add_kinematic({{floor, {}}, {wall, {.p = {-0.5, 0, 0.3}}}, {wall, {.p = {0.5, 0, 0.3}}}},
+                                            {.pose = {.p = {0, 0, 1}}, .velocity = {0.5, 0, 0.25}});
+  EXPECT_EQ(g.world.body_type(lift), BodyType::kKinematic);
+  const BodyId ball = g.world.add_rigid(share(Sphere{0.1}), 500.0, {.pose = {.p = {0, 0, 1.15}}});
+  g.step(480);
+  EXPECT_LT((g.world.body(lift).pose.p - Vec3(2, 0, 2)).norm(), 1e-9);
+  EXPECT_NEAR(g.world.body(ball).pose.p.z(), 2.15, 5e-3);
+  EXPECT_LT(std::abs(g.world.body(ball).pose.p.x() - 2.0), 0.45 - 0.1 + 5e-3);  // between the walls
+  const auto hit = g.world.cast_ray({.from = {0, 0, 1.9}, .way = {4, 0, 0}});
+  EXPECT_FALSE(hit);  // below the cabin
+  EXPECT_EQ(g.world.cast_ray({.from = {0, 0.3, 2.3}, .way = {4, 0, 0}})->body, lift);
+  EXPECT_THROW(g.world.add_kinematic(std::vector<ShapePart>{}), InvalidArgument);
+}
+
 /// An arm from one joint keeps apart what overlaps.
 TEST(Compound, JointsKeepAllPartsApart) {
   GroundedWorld g;

@@ -102,6 +102,16 @@ Mat3 moved_inertia(double mass, const Vec3& by) {
   return mass * (by.squaredNorm() * Mat3::Identity() - by * by.transpose());
 }
 
+constexpr double kWater = 1000.0;  // kg/m³, of what is led: nothing asks how heavy it is, but for its energy
+
+void make_led_model(RigidModel& made, const char* name, const MassProperties& mass) {
+  ModalModelData data;
+  data.motion = FrameMotion::kKinematic;
+  data.mass = mass.mass;
+  data.inertia = mass.inertia + moved_inertia(mass.mass, mass.center_of_mass);
+  make_model(made, name, mass.mass / kWater, std::move(data));
+}
+
 void require_parts(std::span<const ShapePart> parts, const char* function) {
   if (parts.empty()) throw InvalidArgument(std::string(function) + ": there are no parts, expected one or more");
   for (const ShapePart& part : parts) {
@@ -184,21 +194,22 @@ RigidModel make_rigid_model(std::span<const ShapePart> parts, const MassProperti
   data.mass = mass.mass;
   data.inertia = mass.inertia;
   data.origin_in_input = mass.center_of_mass;
-  data.touchable = false;
   make_model(made, "compound", volume, std::move(data));
   return made;
 }
 
 RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape) {
   if (!shape) throw InvalidArgument("make_kinematic_model: the shape is null");
-  const SolidProperties solid = solid_of(*shape);
-  constexpr double kWater = 1000.0;  // kg/m³: nothing asks how heavy it is, but for its energy
-  ModalModelData data;
-  data.motion = FrameMotion::kKinematic;
-  data.mass = kWater * solid.volume;
-  data.inertia = kWater * (solid.inertia + moved_inertia(solid.volume, solid.centroid));
   RigidModel made{nullptr, shape};
-  make_model(made, kNames[shape->index()], solid.volume, std::move(data));
+  make_led_model(made, kNames[shape->index()], mass_properties(*shape, kWater));
+  return made;
+}
+
+RigidModel make_kinematic_model(std::span<const ShapePart> parts) {
+  RigidModel made;
+  const MassProperties mass = mass_properties(parts, kWater);
+  made.parts.assign(parts.begin(), parts.end());
+  make_led_model(made, "compound", mass);
   return made;
 }
 

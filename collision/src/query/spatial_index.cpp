@@ -34,6 +34,7 @@ struct IndexedBody {
   std::shared_ptr<const CollisionSurface> surface{};  // what is met; null: a round shape or a half-space
   std::shared_ptr<const RigidGeometry> rigid{};       // null: the surface bends
   std::shared_ptr<const CollisionSurface> loaded{};   // what `at` is of; null: none
+  RigidTransform in_loaded{};                         // where the body is in the frame of that
   RigidTransform pose{};
   std::vector<double> z{};
   Index leaf = -1;
@@ -176,7 +177,7 @@ IndexedBody& SpatialIndex::Impl::body(Index b, const char* function) {
 }
 
 void SpatialIndex::add_body(Index body, const BodyGeometry& geometry, std::uint32_t layers,
-                            const std::shared_ptr<const ModalModel>& loaded) {
+                            const std::shared_ptr<const ModalModel>& loaded, const RigidTransform& in_loaded) {
   Impl& m = *impl_;
   const auto i = static_cast<std::size_t>(body);
   if (body < 0 || (i < m.bodies.size() && m.bodies[i].present))
@@ -185,7 +186,7 @@ void SpatialIndex::add_body(Index body, const BodyGeometry& geometry, std::uint3
   if ((geometry.model == nullptr) == (geometry.shape == nullptr))
     throw InvalidArgument("SpatialIndex::add_body: body " + std::to_string(body) +
                           " has a model and a shape or none, expected one of them");
-  IndexedBody made{.present = true, .layers = layers};
+  IndexedBody made{.present = true, .layers = layers, .in_loaded = in_loaded};
   if (geometry.model) {
     made.surface = made.loaded = m.cache.get(geometry.model, geometry.skin)->surface;
   } else {
@@ -275,7 +276,7 @@ void SpatialIndex::Impl::tell_place(Hit& hit) {
   if (body.bends() || !body.loaded) return;
   const Index key = -2 - hit.body;  // beside the surface that is met
   DeformedSurface& loaded = pool.get(key, body.loaded, body.z, BoundsChoice::kAmplitudes);
-  const auto near = limber::nearest_point(loaded, body.pose.inverse() * hit.position);
+  const auto near = limber::nearest_point(loaded, body.in_loaded * (body.pose.inverse() * hit.position));
   if (near) hit.at = SurfacePoint{.triangle = near->triangle, .weight = near->weight};
 }
 

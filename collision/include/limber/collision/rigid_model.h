@@ -62,11 +62,13 @@ struct RigidModel {
 /// whose centre of mass is not its middle, which no shape tells about another origin
 RigidModel make_rigid_model(const std::shared_ptr<const Shape>& shape, const MassProperties& mass);
 
-/// A compound, which others meet by its parts. Its model is not touchable: it has no collision surface of its own.
+/// A compound. Loads and handles take the surface of all its parts; with World::add_rigid(), others meet the parts.
 RigidModel make_rigid_model(std::span<const ShapePart> parts, const MassProperties& mass);
 
 /// One that is led: World::add_kinematic(). Its origin is the shape's own. @throws InvalidArgument as
 /// mass_properties() does
 RigidModel make_kinematic_model(const std::shared_ptr<const Shape>& shape);
+/// The same of a compound.
+RigidModel make_kinematic_model(std::span<const ShapePart> parts);
 
 }  // namespace limber

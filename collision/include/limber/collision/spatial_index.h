@@ -72,9 +72,10 @@ class SpatialIndex {
 
   /// @param body any index ≥ 0 that holds none @param geometry as a ContactSource takes it
   /// @param loaded of a body that wears a shape: the model that QueryHit::at is of; null: none
+  /// @param in_loaded where the shape is in that model's frame, as a part of a compound is
   /// @throws InvalidArgument for an index that holds a body, or a bad geometry
   void add_body(Index body, const BodyGeometry& geometry, std::uint32_t layers = 1,
-                const std::shared_ptr<const ModalModel>& loaded = nullptr);
+                const std::shared_ptr<const ModalModel>& loaded = nullptr, const RigidTransform& in_loaded = {});
   // These throw InvalidArgument for an index that holds no body.
   void remove_body(Index body);
   /// Where a body is; it answers from then on. @param z its amplitudes, k numbers; of one that wears a shape, those of

@@ -269,7 +269,7 @@ class World {
   /// The same, of even density. @param density kg/m³, > 0
   BodyId add_rigid(const std::shared_ptr<const Shape>& shape, double density, const BodyPlacement& placement = {});
   /// A compound of shapes that bound solids: a table, a hammer, a chair. Others meet its parts; events, queries and
-  /// filters know the whole. Queries tell no place for loads on it (BodyHit::at). `placement.pose` places its centre of
+  /// filters know the whole, and loads take hold of the surface of all parts. `placement.pose` places its centre of
   /// mass (RigidModel).
   BodyId add_rigid(const std::vector<ShapePart>& parts, const MassProperties& mass,
                    const BodyPlacement& placement = {});
@@ -279,6 +279,8 @@ class World {
   /// goes on at the velocities it is placed with, until set_kinematic_frame() tells of another way.
   /// @param shape one that bounds a solid; `placement.pose` places its own origin
   BodyId add_kinematic(const std::shared_ptr<const Shape>& shape, const BodyPlacement& placement = {});
+  /// The same of a compound: a basket, a lift's cabin. `placement.pose` places the frame that its parts are told in.
+  BodyId add_kinematic(const std::vector<ShapePart>& parts, const BodyPlacement& placement = {});
   /// A rigid shape that never moves: the ground, a triangle mesh, a height field. Only contains() and remove_body()
   /// take its id.
   /// @param friction as in BodyPlacement
