@@ -47,6 +47,12 @@ static std::vector<Vec3> points_of(const double* numbers, std::size_t count, con
   return points;
 }
 
+static limber_mass_properties to_c(const MassProperties& m) {
+  limber_mass_properties out{m.mass, to_c(m.center_of_mass), {}};
+  std::copy_n(m.inertia.data(), 9, out.inertia);
+  return out;
+}
+
 }  // namespace limber::c
 
 using namespace limber;
@@ -199,12 +205,12 @@ limber_result limber_shape_create_height_field(int32_t columns, int32_t rows, do
 void limber_shape_destroy(limber_shape* shape) { delete shape; }
 
 limber_result limber_shape_mass_properties(const limber_shape* shape, double density, limber_mass_properties* mass) {
-  return guarded([&] {
-    const MassProperties solid = mass_properties(*shape_of(shape), density);
-    limber_mass_properties out{solid.mass, to_c(solid.center_of_mass), {}};
-    std::copy_n(solid.inertia.data(), 9, out.inertia);
-    required(mass, "mass") = out;
-  });
+  return guarded([&] { required(mass, "mass") = to_c(mass_properties(*shape_of(shape), density)); });
+}
+
+limber_result limber_parts_mass_properties(const limber_shape_part* parts, size_t count, double density,
+                                           limber_mass_properties* mass) {
+  return guarded([&] { required(mass, "mass") = to_c(mass_properties(parts_of(parts, count), density)); });
 }
 
 }  // extern "C"

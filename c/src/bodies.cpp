@@ -42,6 +42,10 @@ static BodyPlacement to_cpp(const limber_placement& p) {
           .inertial_coupling = p.inertial_coupling};
 }
 
+static MassProperties to_cpp(const limber_mass_properties& m) {
+  return {m.mass, to_cpp(m.center_of_mass), Eigen::Map<const Mat3>(m.inertia)};
+}
+
 static limber_placement given(const limber_placement* placement) {
   return placement != nullptr ? *placement : limber_default_placement();
 }
@@ -101,9 +105,26 @@ limber_result limber_world_add_rigid_with_mass(limber_world* world, const limber
                                                limber_body_id* id) {
   return guarded([&] {
     limber_body_id& out = required(id, "id");
-    const limber_mass_properties& m = required(mass, "mass");
-    const MassProperties properties{m.mass, to_cpp(m.center_of_mass), Eigen::Map<const Mat3>(m.inertia)};
+    const MassProperties properties = to_cpp(required(mass, "mass"));
     out = to_c(world_of(world).add_rigid(shape_of(shape), properties, to_cpp(given(placement))));
+  });
+}
+
+limber_result limber_world_add_compound(limber_world* world, const limber_shape_part* parts, size_t count,
+                                        double density, const limber_placement* placement, limber_body_id* id) {
+  return guarded([&] {
+    limber_body_id& out = required(id, "id");
+    out = to_c(world_of(world).add_rigid(parts_of(parts, count), density, to_cpp(given(placement))));
+  });
+}
+
+limber_result limber_world_add_compound_with_mass(limber_world* world, const limber_shape_part* parts, size_t count,
+                                                  const limber_mass_properties* mass, const limber_placement* placement,
+                                                  limber_body_id* id) {
+  return guarded([&] {
+    limber_body_id& out = required(id, "id");
+    const MassProperties properties = to_cpp(required(mass, "mass"));
+    out = to_c(world_of(world).add_rigid(parts_of(parts, count), properties, to_cpp(given(placement))));
   });
 }
 
@@ -112,6 +133,14 @@ limber_result limber_world_add_kinematic(limber_world* world, const limber_shape
   return guarded([&] {
     limber_body_id& out = required(id, "id");
     out = to_c(world_of(world).add_kinematic(shape_of(shape), to_cpp(given(placement))));
+  });
+}
+
+limber_result limber_world_add_kinematic_compound(limber_world* world, const limber_shape_part* parts, size_t count,
+                                                  const limber_placement* placement, limber_body_id* id) {
+  return guarded([&] {
+    limber_body_id& out = required(id, "id");
+    out = to_c(world_of(world).add_kinematic(parts_of(parts, count), to_cpp(given(placement))));
   });
 }
 

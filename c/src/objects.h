@@ -67,5 +67,11 @@ inline const World& world_of(const limber_world* world) { return required(world,
 inline const std::shared_ptr<const Shape>& shape_of(const limber_shape* shape) {
   return required(shape, "shape").shape;
 }
+inline std::vector<ShapePart> parts_of(const limber_shape_part* parts, std::size_t count) {
+  std::vector<ShapePart> out;
+  for (const limber_shape_part& part : array(parts, count, "parts"))
+    out.push_back({.shape = shape_of(part.shape), .pose = to_cpp(part.pose)});
+  return out;
+}
 
 }  // namespace limber::c

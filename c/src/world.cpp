@@ -8,19 +8,14 @@ static WorldOptions to_cpp(const limber_world_options& o) {
           .gravity = to_cpp(o.gravity),
           .max_steps_per_advance = o.max_steps_per_advance,
           .sleep = {.enabled = o.sleep, .time = o.sleep_time, .speed = o.sleep_speed},
-          .half_precision = o.half_precision};
+          .half_precision = o.half_precision,
+          .hit_speed = o.hit_speed};
 }
 
 static limber_world_options to_c(const WorldOptions& o, const limber_jobs& jobs) {
-  return {o.step,
-          o.substeps,
-          to_c(o.gravity),
-          o.max_steps_per_advance,
-          o.sleep.enabled,
-          o.sleep.time,
-          o.sleep.speed,
-          o.half_precision,
-          jobs};
+  return {o.step,          o.substeps,   to_c(o.gravity), o.max_steps_per_advance,
+          o.sleep.enabled, o.sleep.time, o.sleep.speed,   o.half_precision,
+          o.hit_speed,     jobs};
 }
 
 static limber_stage_times to_c(const StageTimes& times) {

@@ -440,4 +440,109 @@ TEST(CShape, TellsTheMassOfASolid) {
   EXPECT_EQ(limber_shape_mass_properties(Shape(shape).get(), 1.0, &mass), LIMBER_INVALID_ARGUMENT);
 }
 
+/// A ball that falls from 1 m hits the ground at v = √(2 g h), less a step's worth, and stops: its momentum is the
+/// impulse.
+TEST(CContacts, TellHitsAboveASpeed) {
+  constexpr double kStep = 1.0 / 240.0, kGravity = 9.80665, kRadius = 0.1, kHeight = 1.0;
+  for (const double asked : {4.0, 5.0}) {
+    limber_world_options options = limber_default_world_options();
+    EXPECT_EQ(options.hit_speed, 1.0);
+    options.step = kStep, options.hit_speed = asked;
+    const World world = make_world(&options);
+    EXPECT_EQ(limber_world_set_contacts(world.get(), nullptr), LIMBER_OK);
+    const limber_body_id ground = add_ground(world.get());
+    const limber_body_id ball = add_sphere(world.get(), kRadius, {0, 0, kHeight + kRadius});
+    EXPECT_EQ(limber_world_set_body_user_data(world.get(), ball, 7), LIMBER_OK);
+    const double speed = std::sqrt(2.0 * kGravity * kHeight);  // 4.43 m/s
+    std::vector<limber_hit_event> hits;
+    for (int i = 0; i < 240; ++i) {
+      EXPECT_EQ(limber_world_step(world.get(), 1), LIMBER_OK);
+      limber_hit_event event{};
+      std::size_t count = 0;
+      EXPECT_EQ(limber_world_hit_events(world.get(), &event, 1, &count), LIMBER_OK);
+      if (count > 0) hits.push_back(event);
+    }
+    ASSERT_EQ(hits.size(), asked < speed ? 1u : 0u) << asked;
+    if (hits.empty()) continue;
+    const limber_hit_event& hit = hits[0];
+    const bool ball_first = hit.a.index == ball.index;
+    EXPECT_EQ(ball_first ? hit.b.index : hit.a.index, ground.index);
+    EXPECT_EQ(ball_first ? hit.user_data_a : hit.user_data_b, 7u);
+    EXPECT_NEAR(hit.speed, speed, 2.0 * kGravity * kStep);
+    EXPECT_NEAR(hit.normal.z, ball_first ? 1.0 : -1.0, 1e-9);
+    const double mass = 1000.0 * 4.0 / 3.0 * 3.14159265358979 * kRadius * kRadius * kRadius;
+    EXPECT_NEAR(std::abs(hit.impulse.z), mass * speed, 0.02 * mass * speed);
+    EXPECT_NEAR(height(world.get(), ball), kRadius, 1e-3);
+  }
+}
+
+/// A belt under a box carries it along at its own speed.
+TEST(CContacts, BeltsCarry) {
+  const World world = make_world();
+  EXPECT_EQ(limber_world_set_contacts(world.get(), nullptr), LIMBER_OK);
+  const limber_body_id ground = add_ground(world.get());
+  EXPECT_EQ(limber_world_set_surface_velocity(world.get(), ground, {0.5, 0, 0}), LIMBER_OK);
+  limber_vec3 told{};
+  EXPECT_EQ(limber_world_surface_velocity(world.get(), ground, &told), LIMBER_OK);
+  EXPECT_EQ(told.x, 0.5);
+  limber_shape* shape = nullptr;
+  EXPECT_EQ(limber_shape_create_box({0.2, 0.2, 0.1}, &shape), LIMBER_OK);
+  const Shape box(shape);
+  limber_placement start = limber_default_placement();
+  start.pose.p.z = 0.1;
+  limber_body_id id{};
+  EXPECT_EQ(limber_world_add_rigid(world.get(), box.get(), 500.0, &start, &id), LIMBER_OK);
+  EXPECT_EQ(limber_world_step(world.get(), 120), LIMBER_OK);
+  limber_body_state state{};
+  EXPECT_EQ(limber_world_body_state(world.get(), id, &state), LIMBER_OK);
+  EXPECT_NEAR(state.velocity.x, 0.5, 1e-3);
+}
+
+/// A dumb-bell of two balls: its mass, its rest on both, and queries that know the whole and tell a place for loads.
+TEST(CWorld, CompoundsStandOnTheirParts) {
+  constexpr double kRadius = 0.1;
+  const Shape ball = make_sphere(kRadius);
+  limber_transform left = limber_default_placement().pose, right = left;
+  left.p.x = -0.3, right.p.x = 0.3;
+  const limber_shape_part parts[] = {{ball.get(), left}, {ball.get(), right}};
+  limber_mass_properties one{}, both{};
+  EXPECT_EQ(limber_shape_mass_properties(ball.get(), 500.0, &one), LIMBER_OK);
+  EXPECT_EQ(limber_parts_mass_properties(parts, 2, 500.0, &both), LIMBER_OK);
+  EXPECT_NEAR(both.mass, 2.0 * one.mass, 1e-12);
+  EXPECT_NEAR(both.inertia[8], 2.0 * (one.inertia[8] + one.mass * 0.09), 1e-12);
+
+  const World world = make_world();
+  EXPECT_EQ(limber_world_set_contacts(world.get(), nullptr), LIMBER_OK);
+  add_ground(world.get());
+  limber_placement start = limber_default_placement();
+  start.pose.p.z = 0.2;
+  limber_body_id bell{}, heavy{}, led{};
+  EXPECT_EQ(limber_world_add_compound(world.get(), parts, 2, 500.0, &start, &bell), LIMBER_OK) << limber_last_error();
+  both.mass *= 3.0;
+  start.pose.p.y = 1.0;
+  EXPECT_EQ(limber_world_add_compound_with_mass(world.get(), parts, 2, &both, &start, &heavy), LIMBER_OK);
+  start.pose.p.y = 2.0;
+  EXPECT_EQ(limber_world_add_kinematic_compound(world.get(), parts, 2, &start, &led), LIMBER_OK) << limber_last_error();
+  EXPECT_EQ(limber_world_step(world.get(), 120), LIMBER_OK);
+  EXPECT_NEAR(height(world.get(), bell), kRadius, 1e-3);
+  EXPECT_NEAR(height(world.get(), heavy), kRadius, 1e-3);
+  EXPECT_EQ(height(world.get(), led), 0.2);
+  EXPECT_EQ(limber_world_body_count(world.get()), 4u);
+
+  bool found = false;
+  limber_hit hit{};
+  EXPECT_EQ(limber_world_cast_ray(world.get(), {0.3, 0, 2}, {0, 0, -3}, nullptr, &found, &hit), LIMBER_OK);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(hit.body.index, bell.index);
+  EXPECT_TRUE(hit.has_point);
+  EXPECT_EQ(limber_world_apply_impulse(world.get(), bell, hit.at, {0, 0, 1}, LIMBER_AXES_WORLD, 0.0), LIMBER_OK);
+
+  limber_body_id none{9, 9};
+  EXPECT_EQ(limber_world_add_compound(world.get(), nullptr, 0, 500.0, nullptr, &none), LIMBER_INVALID_ARGUMENT);
+  EXPECT_EQ(limber_world_add_compound(world.get(), nullptr, 2, 500.0, nullptr, &none), LIMBER_INVALID_ARGUMENT);
+  const limber_shape_part empty[] = {{nullptr, left}};
+  EXPECT_EQ(limber_world_add_compound(world.get(), empty, 1, 500.0, nullptr, &none), LIMBER_INVALID_ARGUMENT);
+  EXPECT_EQ(none.index, 9u);
+}
+
 }  // namespace

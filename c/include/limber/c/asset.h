@@ -123,6 +123,15 @@ typedef struct limber_mass_properties {
 LIMBER_API limber_result limber_shape_mass_properties(const limber_shape* shape, double density,
                                                       limber_mass_properties* mass);
 
+/// A part of a compound: a shape that bounds a solid, and where it is in the frame of the compound.
+typedef struct limber_shape_part {
+  const limber_shape* shape;
+  limber_transform pose;
+} limber_shape_part;
+/// Of parts together, in the frame of the compound; what parts share counts for each of them.
+LIMBER_API limber_result limber_parts_mass_properties(const limber_shape_part* parts, size_t count, double density,
+                                                      limber_mass_properties* mass);
+
 #ifdef __cplusplus
 }
 #endif

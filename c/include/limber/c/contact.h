@@ -64,7 +64,7 @@ typedef struct limber_contact_event {
 LIMBER_API limber_result limber_world_contact_events(const limber_world* world, limber_contact_event* events,
                                                      size_t capacity, size_t* count);
 
-/// A pair of bodies that came together at 1 m/s or faster in the last step.
+/// A pair of bodies that came together in the last step at limber_world_options.hit_speed or faster.
 typedef struct limber_hit_event {
   limber_body_id a, b;
   uint64_t user_data_a, user_data_b;

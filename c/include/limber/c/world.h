@@ -29,6 +29,7 @@ typedef struct limber_world_options {
   double sleep_time;          ///< s, ≥ 0, at rest until an island sleeps; default 0.5
   double sleep_speed;         ///< m/s, ≥ 0: at rest is slower than this; default 1e-3
   bool half_precision;        ///< keeps drawn surfaces' shapes in half precision too; default false
+  double hit_speed;           ///< m/s, ≥ 0: limber_world_hit_events() tells of pairs at least as fast; default 1
   limber_jobs jobs;           ///< default none
 } limber_world_options;
 LIMBER_API limber_world_options limber_default_world_options(void);
@@ -80,10 +81,22 @@ LIMBER_API limber_result limber_world_add_rigid(limber_world* world, const limbe
 LIMBER_API limber_result limber_world_add_rigid_with_mass(limber_world* world, const limber_shape* shape,
                                                           const limber_mass_properties* mass,
                                                           const limber_placement* placement, limber_body_id* id);
+/// A compound of shapes that bound solids, of even density: a table, a hammer. Others meet its parts; events and
+/// queries know the whole. The pose places its centre of mass (limber_parts_mass_properties()).
+LIMBER_API limber_result limber_world_add_compound(limber_world* world, const limber_shape_part* parts, size_t count,
+                                                   double density, const limber_placement* placement,
+                                                   limber_body_id* id);
+LIMBER_API limber_result limber_world_add_compound_with_mass(limber_world* world, const limber_shape_part* parts,
+                                                             size_t count, const limber_mass_properties* mass,
+                                                             const limber_placement* placement, limber_body_id* id);
 /// A rigid shape that goes where limber_world_set_kinematic_frame() leads it, whatever it meets: a lift, a hand. Until
 /// then it goes on at the velocities it is placed with. The pose places the shape's own origin.
 LIMBER_API limber_result limber_world_add_kinematic(limber_world* world, const limber_shape* shape,
                                                     const limber_placement* placement, limber_body_id* id);
+/// The same of a compound. The pose places the frame that its parts are told in.
+LIMBER_API limber_result limber_world_add_kinematic_compound(limber_world* world, const limber_shape_part* parts,
+                                                             size_t count, const limber_placement* placement,
+                                                             limber_body_id* id);
 /// A shape that never moves: the ground. Of the placement its pose, filter and friction are read. Only
 /// limber_world_contains_body(), _remove_body() and user data take its id.
 LIMBER_API limber_result limber_world_add_static(limber_world* world, const limber_shape* shape,
