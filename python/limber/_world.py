@@ -12,7 +12,7 @@ from ._library import InvalidArgument, answer, array3, check, chosen, create, ff
 
 def _record(ctype: Any) -> Any:
     """The numpy type of a C one, as the header has it: structs by member, vectors as three numbers."""
-    if ctype.cname == "limber_vec3":
+    if ctype is ffi.typeof("limber_vec3"):
         return np.dtype((np.float64, 3))
     if ctype.kind == "struct":
         members = ctype.fields
@@ -25,6 +25,11 @@ def _record(ctype: Any) -> Any:
 CONTACT_EVENT = _record(ffi.typeof("limber_contact_event"))
 """A contact that pressed, or ceased to, in the last step, as limber_contact_event has it. phase: 0 begun, 1 lasting, 2 ended.
 position: world, m; normal: out of b into a; impulse: on a over the step, world, N·s. World.body_at(event["a"]["index"]) is the body."""
+
+
+HIT_EVENT = _record(ffi.typeof("limber_hit_event"))
+"""A pair of bodies that came together fast in the last step, as limber_hit_event has it: a, b, user_data_a, user_data_b; position and
+normal of the fastest contact; speed, m/s; impulse of all their contacts on a, N·s."""
 
 
 class Point(NamedTuple):
@@ -72,7 +77,8 @@ class _Named:
     _kind = ""
 
     def __init__(self, world: World, id: Any) -> None:
-        self._world, self._id = world, id
+        self._world = world
+        self._id = ffi.new(ffi.getctype(ffi.typeof(id), "*"), id)[0]  # of its own: `id` may be in a list's memory
 
     def __eq__(self, other: object) -> bool:
         return (type(other) is type(self) and other._world is self._world
@@ -186,6 +192,15 @@ class Body(_Named):
                   rotation: Sequence[bool] = (False, False, False)) -> None:
         """Axes of the world along which the body does not move and about which it does not turn."""
         check(lib.limber_world_set_locks(self._world._pointer, self._id, list(translation), list(rotation)))
+
+    @property
+    def surface_velocity(self) -> np.ndarray:
+        """(3,): how the surface runs over the body, as a conveyor's belt does, body axes, m/s"""
+        return array3(answer("limber_vec3", lib.limber_world_surface_velocity, self._world._pointer, self._id))
+
+    @surface_velocity.setter
+    def surface_velocity(self, velocity: Sequence[float]) -> None:
+        check(lib.limber_world_set_surface_velocity(self._world._pointer, self._id, vector(velocity)))
 
     @property
     def energy(self) -> Energy:
@@ -326,7 +341,7 @@ class World:
 
     `step`: s. `gravity`: (3,), m/s². `contacts`: whether bodies meet; "exact" for contact to Coulomb's law in place of game
     contact, or a dict of options of limber_contact_options, such as {"substeps": 16, "friction": 0.3}. Other options are those
-    of limber_world_options: substeps, max_steps_per_advance, sleep, sleep_time, sleep_speed, half_precision.
+    of limber_world_options: substeps, max_steps_per_advance, sleep, sleep_time, sleep_speed, half_precision, hit_speed.
 
     A world is used by one thread at a time. The same calls give the same state to the bit, from C++ and C too.
     """
@@ -361,7 +376,7 @@ class World:
         """A body of an asset, which bends by its modes.
 
         Placement, here and below: position (3,), m; rotation, a quaternion (w, x, y, z) or a rotation vector, rad; velocity,
-        m/s; angular_velocity, rad/s; friction, μ ≥ 0; layers and mask, bits: whom it meets; shape, which others meet in place
+        m/s; angular_velocity, rad/s; friction, μ ≥ 0; restitution, e from 0 to 1; layers and mask, bits: whom it meets; shape, which others meet in place
         of the surface; modal_skin, False to bend by modes alone; inertial_coupling, True
         for flight in which turning and modes feel each other; gravity_scale; linear_damping and angular_damping, 1/s;
         lock_translation and lock_rotation, three bools for axes of the world; user_data.
@@ -371,6 +386,13 @@ class World:
     def add_rigid(self, shape: Shape, density: float = 1000.0, **placement: Any) -> Body:
         """A rigid body of even density, kg/m³, placed by its centre of mass."""
         return self._add(lib.limber_world_add_rigid, (shape._pointer, density), placement)
+
+    def add_compound(self, parts: Sequence[tuple[Any, ...]], density: float = 1000.0, **placement: Any) -> Body:
+        """A rigid body of several shapes, of even density, kg/m³, placed by its centre of mass. `parts`: (shape, position) or (shape,
+        position, rotation), in a frame of the compound's own."""
+        array = ffi.new("limber_shape_part[]", [(shape._pointer, transform(position, turned[0] if turned else (1, 0, 0, 0)))
+                                                for shape, position, *turned in parts])
+        return self._add(lib.limber_world_add_compound, (array, len(parts), density), placement)
 
     def add_kinematic(self, shape: Shape, **placement: Any) -> Body:
         """A rigid shape that goes where `Body.lead` leads it, whatever it meets: a lift, a hand."""
@@ -511,10 +533,20 @@ class World:
     @property
     def contact_events(self) -> np.ndarray:
         """Contacts that pressed, or ceased to, in the last step: an array of CONTACT_EVENT."""
-        events = self._list("limber_contact_event", lib.limber_world_contact_events)
-        if len(events) == 0:
-            return np.empty(0, CONTACT_EVENT)
-        return np.frombuffer(ffi.buffer(events), CONTACT_EVENT)
+        return self._events("limber_contact_event", lib.limber_world_contact_events, CONTACT_EVENT)
+
+    def _events(self, kind: str, function: Any, record: np.dtype) -> np.ndarray:
+        events = self._list(kind, function)
+        return np.frombuffer(ffi.buffer(events), record) if len(events) else np.empty(0, record)
+
+    @property
+    def hit_events(self) -> np.ndarray:
+        """Pairs that came together in the last step at `hit_speed` (m/s, an option of the world) or faster: an array of HIT_EVENT."""
+        return self._events("limber_hit_event", lib.limber_world_hit_events, HIT_EVENT)
+
+    def contact_impulse(self, a: Body, b: Body) -> np.ndarray:
+        """(3,): of all contacts of two bodies in the last step, on a, world, N·s"""
+        return array3(answer("limber_vec3", lib.limber_world_contact_impulse, self._pointer, a._id, b._id))
 
     def set_contact_veto(self, veto: Optional[Callable[[Optional[Body], Optional[Body]], bool]]) -> None:
         """Asked of every contact found between two bodies, before it acts: True leaves it out. It must not change the world,

@@ -180,6 +180,37 @@ def test_a_sensor_tells_who_is_inside(world):
     assert world.inside(gate) == []
 
 
+def test_a_fall_is_told_as_a_hit():
+    world = limber.World(hit_speed=4.0)
+    ground = world.add_static(limber.Shape.half_space())
+    ball = world.add_rigid(limber.Shape.sphere(0.1), 1000.0, position=(0, 0, 1.1))
+    hits = []
+    for _ in range(60):
+        world.step()
+        hits += [event.copy() for event in world.hit_events]
+        if len(world.hit_events):
+            assert np.linalg.norm(world.contact_impulse(ball, ground)) == pytest.approx(
+                np.linalg.norm(world.hit_events[0]["impulse"]), rel=1e-9)
+    (hit,) = hits
+    assert hit["speed"] == pytest.approx(math.sqrt(2 * G), abs=2 * G / 60)
+    assert {world.body_at(hit[side]["index"]) for side in ("a", "b")} == {ball, ground}
+
+
+def test_a_belt_carries_a_table_of_five_parts(world):
+    top, leg = limber.Shape.box((0.5, 0.5, 0.05)), limber.Shape.box((0.05, 0.05, 0.25))
+    legs = [(leg, (x, y, 0.25)) for x in (-0.45, 0.45) for y in (-0.45, 0.45)]
+    table = world.add_compound([(top, (0, 0, 0.55), (1, 0, 0, 0)), *legs], 500.0, position=(0, 0, 0.5))
+    (ground,) = [body for body in world.bodies if body != table]
+    ground.surface_velocity = (0, 0.5, 0)
+    assert ground.surface_velocity.tolist() == [0, 0.5, 0]
+    world.step(120)
+    assert table.velocity == pytest.approx((0, 0.5, 0), abs=2e-3)
+    hit = world.cast_ray((0, 0, 3), (0, 0, -4), ignore=[ground])
+    assert hit is None or hit.body == table  # it is carried away
+    hit = world.cast_ray(table.position + (0, 0, 3), (0, 0, -4))
+    assert hit.body == table and hit.point is not None and hit.position[2] == pytest.approx(0.6, abs=2e-3)
+
+
 def test_an_asset_is_written_and_read(tmp_path):
     asset = limber.soft_box((0.1, 0.1, 0.3), (2, 2, 4), "rubber", modes=5)
     asset.write(tmp_path / "bar.glb")
