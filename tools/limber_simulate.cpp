@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 struct Arguments {
   std::string scene;
   std::int64_t steps = -1;
-  std::string record, energies, mode_energies, contacts, manifest;
+  std::string record, energies, mode_energies, contacts, sensors, manifest;
   double record_frame_rate = 60.0;
   RecordingOptions recording;
   bool reconstruct = false;
@@ -53,6 +53,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--mode-energies", a.mode_energies, "write each mode's energy over time")->type_name("FILE.csv");
   app.add_option("--contacts", a.contacts,
                  "write what touched in each step: time, bodies, place, normal, impulse; for scenes with contact")
+      ->type_name("FILE.csv");
+  app.add_option("--sensors", a.sensors,
+                 "write who came into the scene's sensors and left them: time, event, sensor, body")
       ->type_name("FILE.csv");
   app.add_option(
          "--manifest", a.manifest,
@@ -350,6 +353,7 @@ void simulate(Program& program, const Arguments& a) {
   if (!a.energies.empty()) program.write_file(a.energies, energies_csv(result.trajectory));
   if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
   if (!a.contacts.empty()) program.write_file(a.contacts, contacts_csv(result.trajectory));
+  if (!a.sensors.empty()) program.write_file(a.sensors, sensors_csv(result.trajectory));
   write_manifest(program, a, scene, use);
   warn_of_limits(program, result);
   program.report()["seconds"] = {

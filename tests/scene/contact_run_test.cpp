@@ -248,6 +248,27 @@ TEST(ContactRun, TheCsvHasARowForEachContact) {
   EXPECT_THAT(csv, ::testing::HasSubstr(",begun,\"a, \"\"b\"\"\",ground,"));
 }
 
+/// A block, 1 m high, falls through a gate of 1 m without contact: its lower face comes in after 2 m, its upper one
+/// leaves after 4 m.
+TEST(ContactRun, SensorsTellWhoComesAndGoes) {
+  constexpr double kStep = 0.002;
+  const std::string sensors = R"("sensors": [
+    {"name": "gate, low", "shape": {"box": {"half_extents": [2, 2, 0.5]}}, "position": [0, 0, -3], "meets": [1]},
+    {"name": "aside", "shape": {"sphere": {"radius": 1}}, "position": [9, 0, -3]}],)";
+  const RunResult r =
+      play(R"({"step": 0.002, "steps": 500, "assets": {"block": "block.glb"}, )" + sensors +
+           bodies(block_at("seen", "[0, 0, 0]", R"(, "layers": [1])") + "," + block_at("unseen", "[0, 0, 0]")) + "}");
+  const auto& events = r.trajectory.sensor_events;
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_TRUE(events[0].began);
+  EXPECT_FALSE(events[1].began);
+  const auto fall_time = [](double height) { return std::sqrt(2.0 * height / kGravity); };
+  EXPECT_NEAR(events[0].time, fall_time(2.0), kStep);
+  EXPECT_NEAR(events[1].time, fall_time(4.0), kStep);
+  EXPECT_THAT(sensors_csv(r.trajectory), ::testing::StartsWith("time_s,event,sensor,body\n"));
+  EXPECT_THAT(sensors_csv(r.trajectory), ::testing::HasSubstr(",left,\"gate, low\",seen\n"));
+}
+
 TEST(ContactRun, FilesOfShapesAreReadOnceAndToldWhereTheyAreWrong) {
   const auto folder = std::filesystem::path(::testing::TempDir()) / "limber_ContactRunFiles";
   std::filesystem::create_directories(folder);

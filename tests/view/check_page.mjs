@@ -97,7 +97,7 @@ async function goesBack(page) {
 /** Outlines of what the GPU bends and of what World::reconstruct() gives. @return pixels drawn, and farther off than one */
 const outlines = (page, body) => page.evaluate((body) => {
   const app = globalThis.limber, { stage } = app, seen = stage.bodies[body].mesh, gl = stage.renderer.getContext();
-  const hidden = [stage.still, stage.joints, stage.hand, ...stage.bodies.map((b) => b.mesh)].filter((x) => x !== seen);
+  const hidden = [stage.still, stage.sensors, stage.joints, stage.hand, stage.rays, ...stage.bodies.map((b) => b.mesh)].filter((x) => x !== seen);
   for (const x of hidden) x.visible = false;
   const background = stage.scene.background, shown = seen.material;
   stage.scene.background = background.clone().set(0xff00ff);
@@ -149,6 +149,45 @@ async function showsWhatTheEngineHas(page) {
     check(seen.off === 0, `mode ${mode}: the picture is the engine's surface within a pixel, ${seen.off} are off`);
     check(seen.bent !== atRest.bent, `mode ${mode}: it is seen to bend`);
   }
+}
+
+/** Sensors stand as outlines whose colour tells whether somebody is inside. */
+async function drawsSensors(page) {
+  const look = () => page.evaluate(() => {
+    const { stage, engine } = globalThis.limber;
+    return { names: engine.scene.sensors.map((s) => s.name), counts: engine.sensorCounts(),
+      drawn: stage.sensors.children.map((c) => ({ line: c.isLineSegments, ends: c.geometry.attributes.position.count, color: c.material.color.getHex() })) };
+  });
+  await fromTheStart(page);
+  const { names, drawn } = await look();
+  check(drawn.length === names.length && drawn.every((d) => d.line), 'each sensor has its outline');
+  if (names.length === 0) return;
+  check(drawn[0].ends === 24, `a box has twelve edges, ${drawn[0].ends / 2} are drawn`);
+  await steps(page, 90);
+  const later = await look();
+  check(later.counts[0] > later.counts[1] && later.counts[1] === 0, `bodies fall into the first alone: ${later.counts}`);
+  check(later.drawn[0].color !== later.drawn[1].color && later.drawn[1].color === drawn[1].color, 'it is seen');
+}
+
+/** The tool Ray draws what a ray through the pointer meets, and tells it. */
+async function drawsARay(page) {
+  await fromTheStart(page);
+  const at = await onScreen(page, 0);
+  await page.locator('#panel button:has-text("Ray")').click();
+  await page.mouse.click(...at);
+  const seen = () => page.evaluate(() => {
+    const { stage, ray } = globalThis.limber;
+    return { places: ray?.places ?? [], ends: [...stage.rays.geometry.attributes.position.array], visible: stage.rays.visible };
+  });
+  const { places, ends, visible } = await seen();
+  check(places.length > 0 && places[0].body === 0, 'a ray through the pointer meets the body there');
+  check(visible && ends.length === 6 * (1 + places.length), 'it is drawn, with a normal at each place');
+  check(distance(ends.slice(3, 6), places.at(-1).point) < 1e-3, 'as far as the last of them');
+  check(!(await page.evaluate(() => globalThis.limber.engine.hand().holds)), 'and nothing is held');
+  check((await page.evaluate(() => document.getElementById('panel').textContent)).includes('the ray meets'), 'places are told');
+  await page.locator('#panel button:has-text("Drag")').click();
+  await page.evaluate(() => globalThis.limber.show());
+  check(!(await seen()).visible, 'another tool takes it away');
 }
 
 async function tellsOfDamage() {
@@ -214,6 +253,8 @@ await run('check_page', file, async () => {
       await steps(page, 60);
       await page.screenshot({ path: picture });
     }
+    await drawsSensors(page);
+    await drawsARay(page);
     await showsWhatTheEngineHas(page);
     check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed').length)) === 0, 'no text has become markup');
   }

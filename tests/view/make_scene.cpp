@@ -45,6 +45,8 @@ int main(int argc, char** argv) {
     "assets": {"</script>": "block.glb"},
     "statics": [{"name": "<b>ground</b>", "shape": {"half_space": {}}},
                 {"name": "ball", "shape": {"sphere": {"radius": 0.6}}, "position": [0, 1.5, 0.6]}],
+    "sensors": [{"name": "<b>gate</b>", "shape": {"box": {"half_extents": [1.5, 1.5, 0.3]}}, "position": [0, 0, 0.31]},
+                {"name": "high", "shape": {"sphere": {"radius": 0.5}}, "position": [-3, 0, 3]}],
     "bodies": [{"name": "</script><script>alert(2)</script>", "asset": "</script>", "position": [0, 0, 1.2]},
                {"name": "b", "asset": "</script>", "position": [0, 0.4, 2.6], "angular_velocity": [0.5, 0, 0.3]},
                {"name": "swings", "asset": "</script>", "position": [3.2, 0, 2.2]}],

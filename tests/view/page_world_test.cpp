@@ -20,6 +20,8 @@ namespace {
 constexpr Index kModes = 3;
 constexpr const char* kScene = R"({"step": 0.01, "duration": 10, "assets": {"block": "block.glb"}, "contact": {},
   "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+  "sensors": [{"name": "low", "shape": {"box": {"half_extents": [2, 2, 0.2]}}, "position": [0, 0, 0], "meets": [0]},
+              {"name": "aside", "shape": {"sphere": {"radius": 0.5}}, "position": [0, 9, 5]}],
   "bodies": [{"name": "a", "asset": "block", "position": [0, 0, 0.8]},
              {"name": "b", "asset": "block", "position": [5, 0, 0.8]}],
   "joints": [{"b": "b", "type": "ball", "origin": [5, 0, 2]}],
@@ -214,6 +216,31 @@ TEST_F(PageWorldTest, StagesOfAStepAreTimed) {
   EXPECT_EQ(stages[static_cast<std::size_t>(Stage::kReconstruct)], 0.0) << "is no part of a step";
 }
 
+TEST_F(PageWorldTest, SensorsCountWhoIsInside) {
+  PageWorld page(scene());
+  step(page, 1);
+  const auto counts = [&] { return std::vector<double>(page.sensor_counts().begin(), page.sensor_counts().end()); };
+  EXPECT_EQ(counts(), (std::vector<double>{1, 0}));  // the ground is in a layer too
+  step(page, 60);
+  EXPECT_EQ(counts(), (std::vector<double>{2, 0}));
+  page.go_to(1);
+  EXPECT_EQ(counts(), (std::vector<double>{1, 0}));
+}
+
+TEST_F(PageWorldTest, ARayMeetsTheBodiesInItsWayAndTheGround) {
+  PageWorld page(scene());
+  step(page, 1);
+  const std::span<const double> places = page.ray_places({0, 0, 5}, {0, 0, -2});
+  ASSERT_EQ(places.size(), 14u);
+  const PageHit first = page.cast_ray({0, 0, 5}, {0, 0, -2});
+  EXPECT_EQ(places[0], 0.0);
+  EXPECT_EQ(places[3], first.point.z());
+  EXPECT_EQ(places[7], -1.0);
+  EXPECT_NEAR(places[10], 0.0, 1e-12);
+  EXPECT_NEAR(places[13], 1.0, 1e-12);
+  EXPECT_TRUE(page.ray_places({0, 0, 5}, {0, 0, 1}).empty());
+}
+
 TEST_F(PageWorldTest, TheDescriptionNamesWhatIsThere) {
   const PageWorld page(scene());
   const auto json = nlohmann::json::parse(page.description());
@@ -222,6 +249,11 @@ TEST_F(PageWorldTest, TheDescriptionNamesWhatIsThere) {
   EXPECT_EQ(json["models"][0]["vertices"], 68);
   EXPECT_EQ(json["joints"][0]["type"], "ball");
   EXPECT_EQ(json["statics"][0]["ground"], true);
+  ASSERT_EQ(json["sensors"].size(), 2u);
+  EXPECT_EQ(json["sensors"][1]["name"], "aside");
+  const auto& points = json["sensors"][0]["points"];
+  ASSERT_GE(points.size(), 24u);  // a box
+  for (std::size_t i = 0; i < points.size(); i += 3) EXPECT_NEAR(std::abs(points[i + 2].get<double>()), 0.2, 1e-12);
 }
 
 }  // namespace

@@ -24,6 +24,7 @@ using limber::Vec3;
 std::unique_ptr<PageWorld> page;
 std::string error, text;
 PageHit hit;
+std::span<const double> ray;
 double answer[16];
 
 template <class F>
@@ -99,6 +100,14 @@ EMSCRIPTEN_KEEPALIVE const float* page_frame() { return page->frame().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_numbers() { return page->numbers().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_stage_seconds() { return page->stage_seconds().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_joint_frames() { return page->joint_frames().data(); }
+EMSCRIPTEN_KEEPALIVE const double* page_sensor_counts() { return page->sensor_counts().data(); }
+
+// Places that a ray meets, seven numbers each (PageWorld::ray_places()): how many, and where they are until the next.
+EMSCRIPTEN_KEEPALIVE int page_ray(double x, double y, double z, double dx, double dy, double dz) {
+  ray = page->ray_places({x, y, z}, {dx, dy, dz});
+  return static_cast<int>(ray.size() / 7);
+}
+EMSCRIPTEN_KEEPALIVE const double* page_ray_places() { return ray.data(); }
 
 // The hit stays until the next cast. @return body (−1: none), point, distance
 EMSCRIPTEN_KEEPALIVE const double* page_cast(double x, double y, double z, double dx, double dy, double dz) {

@@ -37,7 +37,9 @@ Json limits(const JointSpec& spec) {
   return Json::array();
 }
 
-Json static_shape(const SceneStatic& standing, const Shape& shape) {
+/// @param standing a static or a sensor
+template <class Standing>
+Json standing_shape(const Standing& standing, const Shape& shape) {
   constexpr double kHalfSide = 3.0;  // m, of what is shown of a half-space
   const TriangleMesh mesh = surface_of(shape, Vec3::Zero(), kHalfSide);
   Json points = Json::array(), corners = Json::array();
@@ -91,7 +93,10 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
   for (const PageBody& body : bodies) out["bodies"].push_back({{"name", body.name}, {"model", body.model}});
   out["statics"] = Json::array();
   for (std::size_t i = 0; i < scene.statics.size(); ++i)
-    out["statics"].push_back(static_shape(scene.statics[i], *models.shape_of_static[i]));
+    out["statics"].push_back(standing_shape(scene.statics[i], *models.shape_of_static[i]));
+  out["sensors"] = Json::array();
+  for (std::size_t i = 0; i < scene.sensors.size(); ++i)
+    out["sensors"].push_back(standing_shape(scene.sensors[i], *models.shape_of_sensor[i]));
   out["joints"] = Json::array();
   for (const SceneJoint& joint : scene.joints)
     out["joints"].push_back(

@@ -123,7 +123,7 @@ PageContent page_of_scene(const std::filesystem::path& path) {
   Json scene = Json::parse(read_file(path));
   Renamed renamed(path.parent_path());
   for (auto& [name, file] : scene["assets"].items()) renamed.rename(file);
-  for (const char* list : {"bodies", "statics"})
+  for (const char* list : {"bodies", "statics", "sensors"})
     if (scene.contains(list))
       for (Json& entry : scene[list])
         if (entry.contains("shape"))

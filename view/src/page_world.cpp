@@ -19,6 +19,7 @@
 namespace limber {
 namespace {
 
+constexpr double kFar = 1e4;                              // m, how long rays are
 constexpr std::int64_t kForever = std::int64_t{1} << 40;  // steps: what the scene does ends by its own times
 
 void check(const PageSettings& s) {
@@ -53,6 +54,11 @@ struct PageWorld::Impl {
   World& world() { return player->world(); }
   const World& world() const { return player->world(); }
   BodyId id(int body) const { return bodies[static_cast<std::size_t>(body)].id; }
+  /// −1: a static body.
+  int number(BodyId id) const {
+    const auto body = std::find_if(bodies.begin(), bodies.end(), [&](const auto& b) { return b.id == id; });
+    return body == bodies.end() ? -1 : static_cast<int>(body - bodies.begin());
+  }
   std::size_t dropped() const {
     return static_cast<std::size_t>(
         std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
@@ -76,7 +82,8 @@ struct PageWorld::Impl {
   std::vector<internal::JointPlace> joint_places;
   struct {
     std::vector<float> frame;
-    std::vector<double> numbers, joint_frames, amplitudes, stage_seconds = std::vector<double>(kStages, 0.0);
+    std::vector<double> numbers, joint_frames, sensor_counts, ray_places, amplitudes,
+        stage_seconds = std::vector<double>(kStages, 0.0);
   } told_to_page;  // what spans of the page point into
 };
 
@@ -207,6 +214,18 @@ std::span<const double> PageWorld::joint_frames() {
   return m.told_to_page.joint_frames;
 }
 
+std::span<const double> PageWorld::sensor_counts() {
+  Impl& m = *impl_;
+  std::vector<double>& counts = m.told_to_page.sensor_counts;
+  counts.clear();
+  std::vector<BodyId> inside;
+  for (const BodyId sensor : m.player->sensors()) {
+    m.world().list_inside(sensor, inside);
+    counts.push_back(static_cast<double>(inside.size()));
+  }
+  return counts;
+}
+
 void PageWorld::reconstruct(int body, float* positions) const {
   const World& w = impl_->world();
   const auto vertices = static_cast<std::size_t>(w.model(impl_->id(body)).render().vertices());
@@ -216,14 +235,24 @@ void PageWorld::reconstruct(int body, float* positions) const {
 // Hands ---------------------------------------------------------------------------------------------------------------
 
 PageHit PageWorld::cast_ray(const Vec3& from, const Vec3& direction) const {
-  constexpr double kFar = 1e4;  // m
   const World& world = impl_->world();
   const BodyFilter moving{.accepts = [&](BodyId id) { return world.body_type(id) != BodyType::kStatic; }};
   const std::optional<BodyHit> hit = world.cast_ray({.from = from, .way = kFar * direction.normalized()}, moving);
-  const auto& bodies = impl_->bodies;
-  const auto body = std::find_if(bodies.begin(), bodies.end(), [&](const auto& b) { return hit && b.id == hit->body; });
-  if (body == bodies.end() || !hit->at) return {};
-  return {static_cast<int>(body - bodies.begin()), *hit->at, hit->position, hit->distance};
+  if (!hit || !hit->at) return {};
+  const int body = impl_->number(hit->body);
+  return body < 0 ? PageHit{} : PageHit{body, *hit->at, hit->position, hit->distance};
+}
+
+std::span<const double> PageWorld::ray_places(const Vec3& from, const Vec3& direction) {
+  std::vector<double>& places = impl_->told_to_page.ray_places;
+  places.clear();
+  std::vector<BodyHit> hits;
+  impl_->world().cast_ray({.from = from, .way = kFar * direction.normalized()}, hits);
+  for (const BodyHit& hit : hits) {
+    places.push_back(impl_->number(hit.body));
+    for (const Vec3& v : {hit.position, hit.normal}) places.insert(places.end(), v.begin(), v.end());
+  }
+  return places;
 }
 
 bool PageWorld::grab(const PageHit& hit) {

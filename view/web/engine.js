@@ -82,6 +82,15 @@ export class Engine {
   /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
   stages() { return [...this.doubles(this.module._page_stage_seconds(), 8)]; }
   jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
+  /** How many bodies are in each sensor. */
+  sensorCounts() { return this.doubles(this.module._page_sensor_counts(), this.scene.sensors.length); }
+
+  /** @return [{body, point, normal}] of all that a ray meets, by distance; body −1: one that does not move */
+  rayPlaces(from, along) {
+    const count = this.module._page_ray(...from, ...along), all = this.doubles(this.module._page_ray_places(), 7 * count);
+    return Array.from({ length: count }, (_, i) => all.slice(7 * i, 7 * i + 7))
+      .map(([body, x, y, z, nx, ny, nz]) => ({ body, point: [x, y, z], normal: [nx, ny, nz] }));
+  }
 
   cast(from, along) {
     const [body, x, y, z, distance] = this.doubles(this.module._page_cast(...from, ...along), 5);

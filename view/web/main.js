@@ -20,6 +20,7 @@ class App {
     this.key = null;    // of the history, where one has scrubbed to it
     this.dragged = null;
     this.mode = null;   // that is played
+    this.ray = null;    // that is drawn: {from, along, places}
     stage.load(engine);
     stage.frameAll(engine);
     this.panel = new Panel(document.getElementById('panel'), this);
@@ -48,7 +49,14 @@ class App {
 
   press(event) {
     if (event.button !== 0 || !event.isPrimary) return;
-    const { from, along } = this.stage.ray(event), hit = this.engine.cast(from, along);
+    const { from, along } = this.stage.ray(event);
+    if (this.tool === 'ray') {
+      if (this.engine.rayPlaces(from, along).length === 0) return;
+      event.stopImmediatePropagation();
+      this.ray = { from, along, places: [] };
+      return this.show();
+    }
+    const hit = this.engine.cast(from, along);
     if (!hit) return;
     event.stopImmediatePropagation();
     this.resume();
@@ -176,6 +184,8 @@ class App {
 
   show() {
     const hand = this.stage.place(this.engine);
+    if (this.ray) this.ray.places = this.engine.rayPlaces(this.ray.from, this.ray.along);
+    this.stage.drawRay(this.ray?.from, this.ray?.places ?? []);
     this.panel.show(this.engine.numbers(), hand);
     this.stage.draw();
   }

@@ -2,7 +2,7 @@
 import { button, choice, element, section, slider } from './dom.js';
 import { Chart } from './charts.js';
 
-const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin']];
+const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin'], ['ray', 'Ray']];
 const SOLVERS = [['game', 'game'], ['exact', 'exact']];
 
 export class Panel {
@@ -103,6 +103,7 @@ export class Panel {
 
   choose(tool) {
     this.app.tool = tool;
+    this.app.ray = null;
     TOOLS.forEach(([name], i) => this.tools[i].setAttribute('aria-pressed', String(name === tool)));
   }
 
@@ -119,6 +120,15 @@ export class Panel {
       `${app.engine.scene.bodies.length} bodies, ${numbers.asleep} asleep, ${hand.pins} pins, state ${app.engine.hash()}` +
       (numbers.solved ? '' : '; some islands ended at a limit');
     this.showJoints();
+    this.showRay();
+  }
+
+  showRay() {
+    const { ray, engine } = this.app;
+    if (ray === null) return;
+    const name = (body) => (body < 0 ? 'what stands still' : engine.scene.bodies[body].name);
+    this.state.textContent += `; the ray meets ${ray.places.map(({ body, point }) =>
+      `${name(body)} at ${Math.hypot(...point.map((x, i) => x - ray.from[i])).toPrecision(4)} m`).join(', ') || 'nothing'}`;
   }
 
   /** @param stages seconds: the browser's clock is coarse, so that only means over many steps tell something */

@@ -1,4 +1,4 @@
-// What is seen: camera, light, bodies, shapes that stand still, axes of joints, the hand.
+// What is seen: camera, light, bodies, shapes that stand still, outlines of sensors, axes of joints, the hand, a ray.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { SurfaceBody, SurfaceModel } from './surface.js';
@@ -23,9 +23,11 @@ export class Stage {
     this.scene.add(this.sun, this.sun.target);
     this.still = new THREE.Group();
     this.moving = new THREE.Group();
-    this.scene.add(this.still, this.moving);
+    this.sensors = new THREE.Group();
+    this.scene.add(this.still, this.moving, this.sensors);
     this.joints = this.lines(0x1b1f27);
     this.hand = this.lines(0xc4302b);
+    this.rays = this.lines(0x7a3db8);
     this.models = [];
     this.bodies = [];
     this.caster = new THREE.Raycaster();
@@ -46,12 +48,14 @@ export class Stage {
     for (const model of this.models) model.dispose();
     this.bodies = [];
     this.models = engine.scene.models.map((_, i) => new SurfaceModel(engine.model(i)));
-    for (const child of [...this.still.children]) {
-      this.still.remove(child);
-      child.geometry.dispose();
-      child.material.dispose();
-    }
+    for (const group of [this.still, this.sensors])
+      for (const child of [...group.children]) {
+        group.remove(child);
+        child.geometry.dispose();
+        child.material.dispose();
+      }
     for (const shape of engine.scene.statics) this.still.add(standing(shape));
+    for (const shape of engine.scene.sensors) this.sensors.add(outline(shape));
     this.syncBodies(engine);
   }
 
@@ -76,9 +80,18 @@ export class Stage {
       at += engine.sizes[i];
     });
     this.drawJoints(engine);
+    engine.sensorCounts().forEach((count, i) => this.sensors.children[i].material.color.set(count > 0 ? 0xd9822b : 0x2f7d5b));
     const hand = engine.hand();
     setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
     return hand;
+  }
+
+  /** A ray as far as the last place that it meets, and the normals there. */
+  drawRay(from, places) {
+    const ends = [], half = 0.06 * this.size;
+    if (places.length > 0) ends.push(...from, ...places.at(-1).point);
+    for (const { point, normal } of places) ends.push(...point, ...point.map((x, i) => x + half * normal[i]));
+    setLines(this.rays, ends);
   }
 
   drawJoints(engine) {
@@ -171,10 +184,22 @@ export function setLines(lines, ends) {
   lines.visible = ends.length > 0;
 }
 
-function standing({ points, triangles, ground }) {
+function surface({ points, triangles }) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
   geometry.setIndex(triangles);
+  return geometry;
+}
+
+/** Edges between faces that are not flush: of a round shape, those of the facets that stand for it. */
+function outline(shape) {
+  const geometry = surface(shape), edges = new THREE.EdgesGeometry(geometry);
+  geometry.dispose();
+  return new THREE.LineSegments(edges, new THREE.LineBasicMaterial());
+}
+
+function standing({ points, triangles, ground }) {
+  const geometry = surface({ points, triangles });
   const flat = geometry.toNonIndexed();
   geometry.dispose();
   flat.computeVertexNormals();

@@ -151,7 +151,7 @@ SceneStatic read_static(const Json& value, const std::string& where, const Scene
                         const std::filesystem::path& folder) {
   const JsonObject o(value, where);
   SceneStatic s{.name = o.text("name"),
-                .shape = read_shape(o, folder, false),
+                .shape = read_shape(o, folder, Wearer::kStatic),
                 .pose = read_pose(o),
                 .filter = read_filter(o),
                 .friction = read_friction(o),
@@ -161,9 +161,21 @@ SceneStatic read_static(const Json& value, const std::string& where, const Scene
   return s;
 }
 
+SceneSensor read_sensor(const Json& value, const std::string& where, const std::filesystem::path& folder) {
+  const JsonObject o(value, where);
+  SceneSensor s{.name = o.text("name"),
+                .shape = read_shape(o, folder, Wearer::kSensor),
+                .pose = read_pose(o),
+                .filter = read_filter(o),
+                .where = where};
+  o.finish();
+  return s;
+}
+
 void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::path& folder, SceneBody& body) {
-  for (const char* key : {"friction", "restitution", "surface_velocity", "shape", "layers", "meets", "touches_itself"})
-    if (o.has(key) && !scene.contacts.options)
+  for (const std::string key :
+       {"friction", "restitution", "surface_velocity", "shape", "layers", "meets", "touches_itself"})
+    if (o.has(key) && !scene.contacts.options && (scene.sensors.empty() || (key != "layers" && key != "meets")))
       throw InputError(o.where(key) + ": is given, but nothing touches in this scene, expected \"contact\": {} or " +
                        "\"statics\" beside \"bodies\"");
   body.placement.friction = read_friction(o);
@@ -171,7 +183,7 @@ void read_touch(const JsonObject& o, const Scene& scene, const std::filesystem::
   body.surface_velocity = read_surface_velocity(o, scene);
   body.placement.filter = read_filter(o);
   body.placement.filter.self = o.boolean("touches_itself", false);
-  if (o.has("shape")) body.shape = read_shape(o, folder, true);
+  if (o.has("shape")) body.shape = read_shape(o, folder, Wearer::kBody);
   if (o.has("shape") && body.placement.filter.self)
     throw InputError(o.where("touches_itself") + ": is true, but the body has a \"shape\", which does not deform, " +
                      "expected one of the two");

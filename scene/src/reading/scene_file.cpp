@@ -34,6 +34,7 @@ using internal::read_machines;
 using internal::read_movement;
 using internal::read_place;
 using internal::read_pose;
+using internal::read_sensor;
 using internal::read_static;
 using internal::read_touch;
 using internal::refuse;
@@ -150,10 +151,12 @@ void require_unique_names(const Scene& scene) {
   std::set<std::string> seen;
   const auto require_new = [&](const std::string& name, const std::string& where) {
     if (!seen.insert(name).second)
-      throw InputError(where + ".name: \"" + name + "\" is the name of another body or static, expected one name each");
+      throw InputError(where + ".name: \"" + name +
+                       "\" is the name of another body, static or sensor, expected one name each");
   };
   for (const SceneBody& body : scene.bodies) require_new(body.name, body.where);
   for (const SceneStatic& s : scene.statics) require_new(s.name, s.where);
+  for (const SceneSensor& s : scene.sensors) require_new(s.name, s.where);
 }
 
 /// @return how many bodies have the name
@@ -288,6 +291,9 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   if (o.has("statics"))
     o.for_each("statics",
                [&](const Json& v, const std::string& w) { scene.statics.push_back(read_static(v, w, scene, folder)); });
+  if (o.has("sensors"))
+    o.for_each("sensors",
+               [&](const Json& v, const std::string& w) { scene.sensors.push_back(read_sensor(v, w, folder)); });
   if (o.has("bodies") || !o.has("machines"))
     o.for_each("bodies", [&](const Json& v, const std::string& w) { read_body(v, w, folder, scene); });
   read_machines(o, folder, scene);
@@ -306,6 +312,7 @@ std::vector<std::filesystem::path> files_of(const Scene& scene) {
   for (const auto& [name, file] : scene.assets) files.insert(file);
   for (const SceneBody& body : scene.bodies) add(body.shape);
   for (const SceneStatic& s : scene.statics) add(s.shape);
+  for (const SceneSensor& s : scene.sensors) add(s.shape);
   return {files.begin(), files.end()};
 }
 

@@ -411,6 +411,8 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
     models.shape_of_static.push_back(shapes.load(s.shape, s.where, models.warnings));
     internal::warn_of_facing(*models.shape_of_static.back(), s.pose, scene.gravity, s.where, models.warnings);
   }
+  for (const SceneSensor& s : scene.sensors)
+    models.shape_of_sensor.push_back(shapes.load(s.shape, s.where, models.warnings));
   return models;
 }
 

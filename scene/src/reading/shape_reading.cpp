@@ -94,7 +94,7 @@ Shape shape_of(const ShapeFile& file, Warnings& warnings) {
 
 }  // namespace
 
-SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& folder, bool ends) {
+SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& folder, Wearer wearer) {
   const std::vector<std::string> kinds = {"half_space", "sphere", "capsule", "box", "hull", "mesh", "height_field"};
   const JsonObject o(parent.at("shape"), parent.where("shape"));
   std::vector<std::string> seen;
@@ -104,8 +104,10 @@ SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& fol
   if (seen.size() != 1)
     refuse(o.where(), JsonObject::shown(parent.at("shape")),
            "exactly one of \"half_space\", \"sphere\", \"capsule\", \"box\", \"hull\", \"mesh\" and \"height_field\"");
-  if (ends && seen[0] == "half_space")
+  if (wearer == Wearer::kBody && seen[0] == "half_space")
     refuse(o.where(), "a half-space", "a shape that ends: only what never moves (\"statics\") may have none");
+  if (wearer == Wearer::kSensor && (seen[0] == "half_space" || seen[0] == "mesh" || seen[0] == "height_field"))
+    refuse(o.where(), in_quotes(seen[0]), "a convex shape: \"sphere\", \"capsule\", \"box\" or \"hull\"");
   const JsonObject inside(o.at(seen[0]), o.where(seen[0]));
   SceneShape shape = read_kind(seen[0], inside, folder);
   inside.finish();

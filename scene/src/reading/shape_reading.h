@@ -12,9 +12,11 @@
 
 namespace limber::internal {
 
-/// The member `shape` of a body or static. @param folder that files are relative to @param ends whether a half-space,
-/// which has no end, is refused @throws InputError
-SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& folder, bool ends);
+/// What wears a shape, which not every kind suits: a half-space is for statics, sensors are convex.
+enum class Wearer { kStatic, kBody, kSensor };
+
+/// The member `shape` of a body, static or sensor. @param folder that files are relative to @throws InputError
+SceneShape read_shape(const JsonObject& parent, const std::filesystem::path& folder, Wearer wearer);
 
 /// Makes shapes, each file once.
 class ShapeLoader {

@@ -62,6 +62,7 @@ class Run {
       player_.end_step();
       note_joints();
       note_contacts(n);
+      note_sensors(n);
       note_sleepers();
       if (options_.reconstruct_every_step) reconstruct_all();
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
@@ -70,7 +71,7 @@ class Run {
   }
 
  private:
-  /// Contacts tell bodies by the indices of their ids.
+  /// Contacts tell bodies by the indices of their ids; sensors have numbers of their own.
   void number_bodies() {
     const auto number = [&](BodyId id, std::size_t in_trajectory) {
       number_of_.resize(std::max<std::size_t>(number_of_.size(), id.index + 1));
@@ -81,6 +82,10 @@ class Run {
       number(player_.statics()[i], scene_.bodies.size() + i);
       result_.trajectory.statics.push_back(
           {scene_.statics[i].name, models_.shape_of_static[i], scene_.statics[i].pose});
+    }
+    for (std::size_t i = 0; i < scene_.sensors.size(); ++i) {
+      number(player_.sensors()[i], i);
+      result_.trajectory.sensors.push_back(scene_.sensors[i].name);
     }
   }
 
@@ -143,6 +148,14 @@ class Run {
                                                .normal = e.normal,
                                                .impulse = e.impulse});
     }
+  }
+
+  void note_sensors(std::int64_t n) {
+    for (const SensorEvent& e : world_.sensor_events())
+      result_.trajectory.sensor_events.push_back({.time = static_cast<double>(n + 1) * scene_.step,
+                                                  .sensor = number_of_[e.sensor.index],
+                                                  .body = number_of_[e.body.index],
+                                                  .began = e.began});
   }
 
   void note_sleepers() {

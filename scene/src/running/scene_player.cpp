@@ -116,6 +116,8 @@ struct ScenePlayer::Impl {
       statics.push_back(world.add_static(models.shape_of_static[i], standing.pose, standing.filter, standing.friction));
       if (!standing.surface_velocity.isZero(0.0)) world.set_surface_velocity(statics.back(), standing.surface_velocity);
     }
+    for (std::size_t i = 0; i < scene.sensors.size(); ++i)
+      sensors.push_back(world.add_sensor(models.shape_of_sensor[i], scene.sensors[i].pose, scene.sensors[i].filter));
     add_joints();
     plan_loads();
     for (const SceneHandle& h : scene.handles)
@@ -145,7 +147,7 @@ struct ScenePlayer::Impl {
   std::int64_t steps = 0, taken = 0;
   std::unique_ptr<ContactSource> finder;  // outlives the world
   World world;
-  std::vector<BodyId> bodies, statics;
+  std::vector<BodyId> bodies, statics, sensors;
   std::vector<JointId> joints;
   HeldPoints held;
   PlannedLoads loads;
@@ -247,6 +249,7 @@ World& ScenePlayer::world() { return impl_->world; }
 const World& ScenePlayer::world() const { return impl_->world; }
 std::span<const BodyId> ScenePlayer::bodies() const { return impl_->bodies; }
 std::span<const BodyId> ScenePlayer::statics() const { return impl_->statics; }
+std::span<const BodyId> ScenePlayer::sensors() const { return impl_->sensors; }
 std::span<const JointId> ScenePlayer::joints() const { return impl_->joints; }
 std::int64_t ScenePlayer::steps_taken() const { return impl_->taken; }
 std::span<const LoadReport> ScenePlayer::strikes() const { return impl_->loads.strike_reports; }

@@ -63,6 +63,14 @@ std::string contacts_csv(const Trajectory& trajectory) {
   return csv;
 }
 
+std::string sensors_csv(const Trajectory& trajectory) {
+  std::string csv = "time_s,event,sensor,body\n";
+  for (const SensorRecord& e : trajectory.sensor_events)
+    csv += number(e.time) + "," + (e.began ? "entered" : "left") + "," + field(trajectory.sensors.at(e.sensor)) + "," +
+           field(trajectory.name(e.body)) + "\n";
+  return csv;
+}
+
 std::string mode_energies_csv(const Trajectory& trajectory) {
   std::string csv = "time_s";
   for (const BodyTrack& body : trajectory.bodies) {

@@ -63,6 +63,14 @@ struct ContactRecord {
   Vec3 impulse = Vec3::Zero();   ///< on a over the step, world, N·s
 };
 
+/// A body that came into a sensor in a step, or left it.
+struct SensorRecord {
+  double time = 0.0;       ///< s, of the step's end
+  std::size_t sensor = 0;  ///< in Trajectory::sensors
+  std::size_t body = 0;    ///< as those of ContactRecord
+  bool began = true;       ///< false: left
+};
+
 struct Trajectory {
   std::string scene;          ///< name
   double step = 0.0;          ///< s, of the simulation
@@ -70,7 +78,9 @@ struct Trajectory {
   std::vector<double> times;  ///< s, of the keys: ascending from 0, each a whole number of steps
   std::vector<BodyTrack> bodies;
   std::vector<StaticShape> statics;
-  std::vector<ContactRecord> contacts;  ///< of every step, with RunOptions::keep_contacts
+  std::vector<std::string> sensors;         ///< names
+  std::vector<ContactRecord> contacts;      ///< of every step, with RunOptions::keep_contacts
+  std::vector<SensorRecord> sensor_events;  ///< of every step
 
   const std::string& name(std::size_t body) const;  ///< of a body or, from bodies.size() on, of a static shape
 };
@@ -122,6 +132,10 @@ std::string energies_csv(const Trajectory& trajectory);
 /// Contacts as CSV: a row per step and contact that pressed in it or ceased to, with time_s, phase (begun, lasting or
 /// ended), a, b, x_m, y_m, z_m, normal_x, normal_y, normal_z, impulse_x_Ns, impulse_y_Ns, impulse_z_Ns (on a).
 std::string contacts_csv(const Trajectory& trajectory);
+
+/// Who came into a scene's sensors and left them, as CSV: a row per event with time_s, event (entered or left), sensor,
+/// body.
+std::string sensors_csv(const Trajectory& trajectory);
 
 /// Energy of every mode, ½(ż² + λz²), as CSV: a row per key; a column time_s, one "BODY elastic+kinetic_J" with the sum
 /// over the body's modes, and one "BODY modeNN FREQUENCYHz_J" per mode.

@@ -114,6 +114,15 @@ struct SceneStatic {
   std::string where{};
 };
 
+/// A convex shape that tells who is inside it and pushes nobody, as World::add_sensor().
+struct SceneSensor {
+  std::string name{};  ///< unique among the bodies, statics and these
+  SceneShape shape{};
+  RigidTransform pose{};
+  CollisionFilter filter{};
+  std::string where{};
+};
+
 struct SceneBody {
   std::string name{};   ///< unique; copy i of a grid is called "name[i]"
   std::string group{};  ///< the name in the file: shared by all copies, equal to `name` without them
@@ -197,7 +206,8 @@ struct Scene {
   std::optional<SceneLimits> limits{};                    ///< leaves out the modes that this scene cannot show
   SceneContacts contacts{};
   std::vector<SceneStatic> statics{};  ///< none without contact
-  std::vector<SceneBody> bodies{};     ///< those of machines last
+  std::vector<SceneSensor> sensors{};
+  std::vector<SceneBody> bodies{};  ///< those of machines last
   std::vector<Strike> strikes{};
   std::vector<HeldForce> forces{};
   std::vector<SceneHandle> handles{};
@@ -206,7 +216,7 @@ struct Scene {
   double duration() const { return step * static_cast<double>(steps); }
 };
 
-/// All files that a scene names: assets, and shapes of bodies and statics; each once.
+/// All files that a scene names: assets, and shapes of bodies, statics and sensors; each once.
 std::vector<std::filesystem::path> files_of(const Scene& scene);
 
 /// Reads and checks everything that can be checked without the assets and the files of shapes. Assets of machines are

@@ -58,6 +58,7 @@ class ScenePlayer {
   const World& world() const;
   std::span<const BodyId> bodies() const;   ///< per Scene::bodies
   std::span<const BodyId> statics() const;  ///< per Scene::statics
+  std::span<const BodyId> sensors() const;  ///< per Scene::sensors
   std::span<const JointId> joints() const;  ///< per Scene::joints
   std::int64_t steps_taken() const;
 

@@ -58,8 +58,8 @@ class PageWorld {
   explicit PageWorld(const std::filesystem::path& scene);
   ~PageWorld();
 
-  /// Contents of the scene as JSON: settings, models, bodies (model, name), statics with their triangles, joints. Names
-  /// are text of the scene and its assets: nothing that may become markup.
+  /// Contents of the scene as JSON: settings, models, bodies (model, name), statics and sensors with their triangles,
+  /// joints. Names are text of the scene and its assets: nothing that may become markup.
   std::string description() const;
   const std::vector<PageModel>& models() const;
   const World& world() const;
@@ -86,7 +86,13 @@ class PageWorld {
   /// Per joint: origin and x axis in the world, coordinates (3).
   std::span<const double> joint_frames();
 
+  /// Per sensor how many bodies are in it.
+  std::span<const double> sensor_counts();
+
   // Hands.
+  /// All that a ray meets, static bodies too, the first place on each, by distance: World::cast_ray(). Per place the
+  /// body (−1: one that does not move), position and normal (3 each, world).
+  std::span<const double> ray_places(const Vec3& from, const Vec3& direction);
   PageHit cast_ray(const Vec3& from, const Vec3& direction) const;
   /// Takes hold of a point softly; one at a time. @return whether there was one to take
   bool grab(const PageHit& hit);
