@@ -23,8 +23,8 @@ void require(bool holds, const char* field, double value, const char* expected) 
 }
 
 /// A blow that waits or touches.
-struct Blow {
-  Strike strike{};
+struct PendingBlow {
+  Blow blow{};
   std::int64_t first = 0, last = 0;  // the samples from which on it acts, and no longer acts
   double begun = 0.0, ended = 0.0;   // s, how long before these samples it began and ended
   internal::ForcedPart forced{};
@@ -78,8 +78,8 @@ struct Synthesizer::Impl {
   void turn_blows(Part& p, std::int64_t sample) {
     for (Index* link = &p.blows; *link >= 0;) {
       const Index i = *link;
-      Blow& b = blows[i];
-      const Strike& s = b.strike;
+      PendingBlow& b = blows[i];
+      const Blow& s = b.blow;
       if (b.first == sample) b.forced = p.body.begin(s.at, s.impulse, s.contact_time, b.begun);
       if (b.last != sample) {
         link = &b.next;
@@ -103,9 +103,9 @@ struct Synthesizer::Impl {
   /// sum[n] += what the forces of this body's blows give.
   void add_forced(const Part& p, std::int64_t sample, std::int64_t end, double* sum) const {
     for (Index i = p.blows; i >= 0; i = blows[i].next) {
-      const Blow& b = blows[i];
+      const PendingBlow& b = blows[i];
       if (b.first > sample) continue;
-      const double omega = 2.0 * std::numbers::pi / b.strike.contact_time;
+      const double omega = 2.0 * std::numbers::pi / b.blow.contact_time;
       for (std::int64_t n = sample; n < end; ++n) {
         const double turn = omega * (static_cast<double>(n - b.first) / options.sample_rate + b.begun);
         sum[n - sample] += b.forced.along * std::cos(turn) + b.forced.across * std::sin(turn);
@@ -168,7 +168,7 @@ struct Synthesizer::Impl {
   SynthesizerOptions options;
   double fade_per_sample, glide_per_sample;
   AlignedArray<double> lanes;
-  std::vector<Blow> blows;
+  std::vector<PendingBlow> blows;
   Index free = -1;
   std::vector<Part> parts;
   std::int64_t now = 0;
@@ -205,26 +205,26 @@ void Synthesizer::set_gains(Index body, std::span<const double> gains) {
   std::ranges::copy(gains, p.targets.begin());
 }
 
-bool Synthesizer::strike(const Strike& strike) {
+bool Synthesizer::strike(const Blow& blow) {
   Impl& impl = *impl_;
-  Part& p = impl.part(strike.body, "strike");
+  Part& p = impl.part(blow.body, "strike");
   for (int corner = 0; corner < 3; ++corner) {
-    const Index v = strike.at.vertices[corner];
+    const Index v = blow.at.vertices[corner];
     require(v >= 0 && v < p.body.sound().vertices(), "strike: vertex", v, "one of the body's");
-    require(std::isfinite(strike.at.weights[corner]), "strike: weight", strike.at.weights[corner], "a finite number");
+    require(std::isfinite(blow.at.weights[corner]), "strike: weight", blow.at.weights[corner], "a finite number");
   }
   for (int axis = 0; axis < 3; ++axis)
-    require(std::isfinite(strike.impulse[axis]), "strike: impulse", strike.impulse[axis], "finite numbers");
-  const double tau = strike.contact_time, rate = impl.options.sample_rate;
+    require(std::isfinite(blow.impulse[axis]), "strike: impulse", blow.impulse[axis], "finite numbers");
+  const double tau = blow.contact_time, rate = impl.options.sample_rate;
   require(tau >= 1e-6 && tau <= 10.0, "strike: contact_time", tau, "1e-6 to 10 s");
-  require(strike.delay >= 0.0 && strike.delay <= 3600.0, "strike: delay", strike.delay, "0 to 3600 s");
+  require(blow.delay >= 0.0 && blow.delay <= 3600.0, "strike: delay", blow.delay, "0 to 3600 s");
   if (impl.free < 0) return false;
 
   const Index i = impl.free;
-  Blow& b = impl.blows[i];
+  PendingBlow& b = impl.blows[i];
   impl.free = b.next;
-  const double begin = strike.delay * rate, end = begin + tau * rate;  // in samples from now
-  b = {.strike = strike,
+  const double begin = blow.delay * rate, end = begin + tau * rate;  // in samples from now
+  b = {.blow = blow,
        .first = impl.now + static_cast<std::int64_t>(std::ceil(begin)),
        .last = impl.now + static_cast<std::int64_t>(std::ceil(end)),
        .begun = (std::ceil(begin) - begin) / rate,

@@ -92,9 +92,9 @@ TEST(Synthesizer, AStruckModeFollowsDuhamelsIntegralWhileItIsTouchedAndLater) {
 TEST(Synthesizer, BlowsAddUp) {
   const SoundModes modes = many_modes(40);
   std::vector<float> sum(4800, 0.0f);
-  const Strike first{.impulse = {1, 0, 0}, .contact_time = 1e-3, .delay = 0.001},
+  const Blow first{.impulse = {1, 0, 0}, .contact_time = 1e-3, .delay = 0.001},
       second{.impulse = {-0.3, 0, 0}, .contact_time = 3e-3, .delay = 0.0015};
-  for (const Strike& s : {first, second}) {
+  for (const Blow& s : {first, second}) {
     Synthesizer alone(mono());
     alone.add_body(sound_of(modes));
     alone.strike(s);
@@ -226,7 +226,7 @@ TEST(Synthesizer, TellsThatABlowFoundNoRoom) {
   options.max_strikes = 2;
   Synthesizer synthesizer(options);
   synthesizer.add_body(sound_of(many_modes(8)));
-  const Strike blow{.impulse = {1, 0, 0}, .contact_time = 1e-3};
+  const Blow blow{.impulse = {1, 0, 0}, .contact_time = 1e-3};
   EXPECT_TRUE(synthesizer.strike(blow));
   EXPECT_TRUE(synthesizer.strike(blow));
   EXPECT_FALSE(synthesizer.strike(blow));

@@ -50,7 +50,7 @@ struct SynthesizerOptions {
 };
 
 /// One blow.
-struct Strike {
+struct Blow {
   Index body = 0;
   StruckPoint at{};
   Vec3 impulse = Vec3::Zero();  ///< on the body, body frame, N·s
@@ -78,7 +78,7 @@ class Synthesizer {
 
   /// Takes a blow. @return false where max_strikes wait or touch: it is not heard
   /// @throws InvalidArgument for a body or vertex that is none and numbers out of range
-  bool strike(const Strike& strike);
+  bool strike(const Blow& blow);
 
   /// Replaces `interleaved`, [sample][channel], by the coming samples.
   /// @throws InvalidArgument for a length that is no multiple of the channels
