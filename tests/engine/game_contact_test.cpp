@@ -67,7 +67,7 @@ TEST(GameContact, WhatTumblesCloseAboveTheGroundKeepsItsEnergy) {
   EXPECT_TRUE(scene.world.contact_events().empty());
 }
 
-/// Forces that a substep begins with add no energy, whatever blows they come of.
+/// Forces of a blow that the next substep begins with add no energy at its end.
 TEST(GameContact, AHighPileThatFallsGainsNoEnergyInAnyStep) {
   Pile pile(kSanitized ? 50 : 300, -1, false, game());
   double scale = 0.0;

@@ -414,10 +414,27 @@ HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
   }
 }
 
+/// As PairBundle has them.
+struct Works {
+  Vector open, yielded, given;
+};
+
+HWY_INLINE HWY_ATTR void AddWorks(const BundleContact& c, std::size_t lane, Works& works) {
+  const Vector force = Get(c.force[0], lane), compliance = Get(c.compliance, lane);
+  const Vector gap = hn::Sub(Get(c.gap, lane), Get(c.target, lane));
+  works.open = hn::MulAdd(force, hn::NegMulAdd(compliance, Get(c.before, lane), gap), works.open);
+  for (std::size_t t = 0; t < 2; ++t)
+    works.open = hn::MulAdd(Get(c.force[1 + t], lane), Get(c.slip[t], lane), works.open);
+  works.yielded = hn::MulAdd(hn::Mul(compliance, force), force, works.yielded);
+  works.given = hn::Add(works.given, Get(c.release, lane));
+}
+
 HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {
+  const Lanes d;
   for (std::size_t i = 0; i < all.count; ++i) {
-    const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
+    PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
+      Works works{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
       Coordinates y;
       ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t j = 0; j < bundle.count; ++j) {
@@ -429,8 +446,13 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
         SolveOne(bundle, c, u, lane, change);
         MoveCoordinates(bundle, c, rows, change, lane, y);
         if (bundle.rolls) RollOne(bundle, c, y.sides, lane);
+        if (!backward) AddWorks(c, lane, works);
       }
       WriteCoordinates(all, bundle, motion, lane, y);
+      if (backward) continue;
+      Put(works.open, bundle.open, lane);
+      Put(works.yielded, bundle.yielded, lane);
+      Put(works.given, bundle.given, lane);
     }
   }
 }
@@ -447,14 +469,9 @@ HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[1
   }
 }
 
-/// As PairBundle has them.
-struct Begun {
-  Vector begun, kept;
-};
-
-/// @param bent what the modes give to the rows' numbers. @param sums are added to
+/// @param bent what the modes give to the rows' numbers
 HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], const Vector* bent, float share,
-                                    float most, std::size_t lane, Begun& sums) {
+                                    float most, std::size_t lane) {
   const Lanes d;
   const Vector zero = hn::Zero(d);
   Vector apart[3];
@@ -465,13 +482,7 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   const Vector part = hn::Min(hn::Mul(hn::Set(d, share), hn::Neg(hn::Add(gap, Get(c.slop, lane)))), hn::Set(d, most));
   Put(now, c.now, lane);
   Put(straight, c.gap, lane);
-  sums.begun = hn::MulAdd(force, hn::Sub(straight, hn::Min(gap, zero)), sums.begun);
-  sums.kept = hn::MulAdd(yields, force, sums.kept);
-  for (std::size_t t = 0; t < 2; ++t) {
-    const Vector slip = hn::Sub(Get(c.running[t], lane), bent[1 + t]);
-    Put(slip, c.slip[t], lane);
-    sums.begun = hn::MulAdd(Get(c.force[1 + t], lane), slip, sums.begun);
-  }
+  for (std::size_t t = 0; t < 2; ++t) Put(hn::Sub(Get(c.running[t], lane), bent[1 + t]), c.slip[t], lane);
   Put(hn::Sub(hn::Min(gap, zero), yields), c.target, lane);
   Put(force, c.before, lane);
   Put(zero, c.push, lane);
@@ -494,14 +505,11 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
       }
       Modes modes;
       ReadModes(all, bundle, shapes, lane, modes);
-      Begun sums{hn::Zero(d), hn::Zero(d)};
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         AddModes(bundle, RowsOf(all, bundle, k), modes, lane, bent);
-        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane, sums)) bundle.overlaps = true;
+        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane)) bundle.overlaps = true;
       }
-      Put(sums.begun, bundle.begun, lane);
-      Put(sums.kept, bundle.kept, lane);
     }
   }
 }

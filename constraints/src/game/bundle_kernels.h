@@ -27,9 +27,9 @@ struct PairBundle {
   bool rebounds = false;  // whether any does
   bool overlaps = false;  // whether any is to be pushed apart
   float residual = 0.0f;  // as residual_of_contacts()
-  // By lane, of the forces that the substep begins with: what they do along their gaps without J y, J, and twice what
-  // they keep in what yields.
-  Block8 begun, kept;
+  // By lane, of the forces after the forward sweep: f·c and f C f, as GameContacts::limit_forces() has them, and what
+  // contacts that rebound are to give.
+  Block8 open, yielded, given;
 };
 
 /// One contact in each lane; fields as those of ContactRow. A lane without a contact has masses and rows of 0.
@@ -77,7 +77,8 @@ void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
 /// stands at their end. @param shapes with a block of zeros at theirs
 void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
                      float most);
-/// As sweep_contacts(). @param motion with a block of zeros at its end
+/// As sweep_contacts(); a forward one tells bundles what their forces do. @param motion with a block of zeros at its
+/// end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
 /// As push_contacts(). @param pushes with a block of zeros at their end
 void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);

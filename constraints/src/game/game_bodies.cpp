@@ -32,8 +32,6 @@ double sum_of(const double (&x)[8]) { return ((x[0] + x[1]) + (x[2] + x[3])) + (
 
 Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
 
-bool turns_locked(const FrameSettings& settings) { return settings.locks.rotation != AxisLocks{}.rotation; }
-
 }  // namespace
 
 SubstepModes& GameBodies::modes_of(const ModalModel& model) {
@@ -85,6 +83,7 @@ void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
   body.q = frame.pose().q;
   body.start.R = to_matrix(body.q);
   body.v = frame.velocity();
+  body.turns_locked = frame.settings().locks.rotation != AxisLocks{}.rotation;
   if (c.motion == FrameMotion::kKinematic) return;
   if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
   for (std::size_t i = 0; i < 3; ++i)
@@ -102,7 +101,7 @@ void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
   const FrameConstants& c = body.group->frame_constants();
   if (c.motion == FrameMotion::kLine) {
     body.turn_scale.row(0) = (attitude * c.line_axis).transpose() / body.roots.x();
-  } else if (turns_locked(settings(body))) {
+  } else if (body.turns_locked) {
     const Mat3 R = to_matrix(attitude);
     const TurnAxes turns(R * c.inertia * R.transpose(), settings(body).locks);
     body.roots = turns.moments.cwiseSqrt();
@@ -128,7 +127,7 @@ void GameBodies::turn_axes() {
 /// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
 /// the middle of the substep. @param R the attitude now
 Vec3 GameBodies::free_turn(const GameBody& body, const Mat3& R) const {
-  if (!body.keeps_axes || body.led >= 0 || turns_locked(settings(body))) return body.turn;
+  if (!body.keeps_axes || body.led >= 0 || body.turns_locked) return body.turn;
   const double half = 0.5 * plan_.length();
   const Vec3 momentum = R.transpose() * body.momentum();  // body axes
   const Vec3 now = body.inverse_inertia * momentum;
@@ -191,22 +190,30 @@ void GameBodies::begin_substep_of(std::size_t at, int number) {
   write_vector(body.root_mass * body.v, frame.v);
   body.free_turn = free_turn(body, R);
   write_vector(body.free_turn, frame.v + 3);
-  double along[8] = {}, square[8] = {};
   for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
-    for (int l = 0; l < 8; ++l) {
-      const auto y = static_cast<double>(free_[i].v[l]), q = static_cast<double>(answers_[i].v[l]);
-      motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
-      along[l] += q * y, square[l] += q * q;
-    }
-  body.along = sum_of(along), body.square = sum_of(square);
+    for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
 }
 
-void GameBodies::scale_answer(std::size_t at, float share) {
+void GameBodies::find_answers(std::span<const double> moved, Jobs& jobs) {
+  for_all(jobs, [&](std::size_t at) {
+    GameBody& body = bodies_[at];
+    double along[8] = {}, square[8] = {};
+    for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
+      for (std::size_t l = 0; l < 8; ++l) {
+        const double start = static_cast<double>(free_[i].v[l]) + (moved.empty() ? 0.0 : moved[8 * i + l]);
+        const double q = static_cast<double>(motion_[i].v[l]) - start;
+        along[l] += q * start, square[l] += q * q;
+      }
+    body.along = sum_of(along), body.square = sum_of(square);
+  });
+}
+
+void GameBodies::scale_answer(std::size_t at, float share, std::span<const double> moved) {
   const auto first = static_cast<std::size_t>(bodies_[at].first), blocks = static_cast<std::size_t>(bodies_[at].blocks);
   for (std::size_t i = first; i < first + blocks; ++i)
-    for (int l = 0; l < 8; ++l) {
-      answers_[i].v[l] *= share;
-      motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
+    for (std::size_t l = 0; l < 8; ++l) {
+      const float start = free_[i].v[l] + (moved.empty() ? 0.0f : static_cast<float>(moved[8 * i + l]));
+      motion_[i].v[l] = start + share * (motion_[i].v[l] - start);
     }
 }
 

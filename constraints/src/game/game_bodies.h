@@ -43,6 +43,7 @@ struct GameBody {
   std::int32_t first = 0, blocks = 1;   // of its coordinates
   std::int32_t led = -1;                // its number among those that are
   bool keeps_axes = false;              // its coordinates are those of the whole step
+  bool turns_locked = false;            // about any axis of the world
   double root_mass = 0.0;               // √m; 0: its origin is carried
   Vec3 goes = Vec3::Ones();             // along each axis of the world: 0 where its origin is locked, 1 else
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
@@ -55,7 +56,7 @@ struct GameBody {
   Quaternion q{};                    // attitude now
   Vec3 v = Vec3::Zero();             // of the origin
   Vec3 turn = Vec3::Zero();          // coordinates of the turn, L
-  double along = 0.0, square = 0.0;  // q·y_free and q·q as the substep begins
+  double along = 0.0, square = 0.0;  // q·y₀ and q·q, by find_answers()
   // Of bodies that keep their axes: the turn of the substep at hand if nothing acted, ω; 1/(kg·m²), body axes.
   Vec3 free_turn = Vec3::Zero();
   Mat3 inverse_inertia = Mat3::Zero();
@@ -73,8 +74,10 @@ class GameBodies {
   void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
   void begin_substep(int number, Jobs& jobs);
-  /// Begins anew with a share of what a body's coordinates are answered by.
-  void scale_answer(std::size_t at, float share);
+  /// By body, sums over q = y − y₀, what contacts move, y₀ = y_free + moved. @param moved y by joints; none: nothing
+  void find_answers(std::span<const double> moved, Jobs& jobs);
+  /// Leaves a share of q.
+  void scale_answer(std::size_t at, float share, std::span<const double> moved);
   /// Moves them by what the sweeps found, and by pushes.
   void end_substep(bool pushed, Jobs& jobs);
   /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
@@ -92,8 +95,7 @@ class GameBodies {
   // Arrays by block or by body have one at their end that stands.
   std::vector<Block8>& motion() { return motion_; }  ///< y
   const std::vector<Block8>& motion() const { return motion_; }
-  std::vector<Block8>& answers() { return answers_; }  ///< q, of what keeps its rows for the step
-  const std::vector<Block8>& answers() const { return answers_; }
+  std::vector<Block8>& answers() { return answers_; }            ///< q, of what keeps its rows for the step
   const std::vector<Block8>& shapes() const { return shapes_; }  ///< modes at the substep's start
   std::vector<Block8>& pushes() { return pushes_; }  ///< by body: displacements of frames that leave no speed
   const std::vector<Block8>& pushes() const { return pushes_; }

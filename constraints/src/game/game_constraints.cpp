@@ -59,11 +59,6 @@ void GameConstraints::solve(GameBodies& bodies) {
   rows_.add_what_leads(bodies);
   slopes_.assign(rows_.coordinates(), 0.0);
   rows_.add_energy_slopes(bodies, system_.frames(), bodies.free_motion(), {}, slopes_);
-  solve_again(bodies);
-}
-
-void GameConstraints::solve_again(GameBodies& bodies) {
-  if (rows_.groups().empty()) return;
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   int round = 0;
   do {

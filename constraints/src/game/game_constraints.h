@@ -21,8 +21,6 @@ class GameConstraints {
                  int number);
   /// Once the bodies have fallen: makes their motion meet the rows.
   void solve(GameBodies& bodies);
-  /// The same anew, where contacts begin with other forces.
-  void solve_again(GameBodies& bodies);
   /// y by solve(), by body; none without rows.
   std::span<const double> moved() const {
     return rows_.groups().empty() ? std::span<const double>{} : std::span<const double>(moved_);

@@ -78,6 +78,13 @@ const Memory* find(const std::vector<Memory>& known, std::uint64_t id) {
   return at != known.end() && at->id == id ? &*at : nullptr;
 }
 
+/// The largest s in [0, 1] with s linear + ½ s² square ≤ given. @param square, given at least 0
+float share_that_gives(double linear, double square, double given) {
+  if (linear + 0.5 * square <= given) return 1.0f;
+  const double root = std::sqrt(linear * linear + 2.0 * square * given);
+  return static_cast<float>(linear > 0.0 ? 2.0 * given / (linear + root) : (root - linear) / square);
+}
+
 /// Whether a force pushes, is in its cone, and is finite.
 bool meets_law(const Vec3& f, double friction) {
   constexpr double kRounded = 1e-5;  // of a force, in single precision
@@ -108,14 +115,16 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
       put_in_bundle(states, bodies, i, options);
   bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
   sums_.assign(rows_.size(), Vec3::Zero());
-  islands_.reset(bodies.bodies().size());
+  ties_.reset(bodies.bodies().size());
   touched_.assign(bodies.bodies().size(), false);
   for (const PreparedContact& contact : contacts) {
     const std::int32_t a = bodies.of(contact.a.body), b = bodies.of(contact.b.body);
     for (const std::int32_t frame : {a, b})
       if (frame >= 0) touched_[static_cast<std::size_t>(frame)] = true;
-    if (a >= 0 && b >= 0) islands_.join(a, b);
+    if (a >= 0 && b >= 0) ties_.join(a, b);
   }
+  islands_.resize(bodies.bodies().size());
+  for (std::size_t i = 0; i < islands_.size(); ++i) islands_[i] = ties_.root(static_cast<Index>(i));
 }
 
 void GameContacts::put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t i,
@@ -296,53 +305,52 @@ bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& ste
   return bundles_.overlap() || rows_overlap;
 }
 
-// With a share s of the forces f the sweeps begin at s a + ½ s² b, a = f·(gap + J y), b = f·(J Jᵀ + C) f, where no
-// force is at 0 and a sweep only goes down.
-bool GameContacts::limit_forces(GameBodies& bodies, std::span<const double> moved) {
-  begun_.assign(bodies.bodies().size() + 1, {});
-  add_begun(bodies, moved);
+// With a share s of the forces f contacts change D by s a + ½ s² b, a = f·(c + J y₀), b = f·(J Jᵀ + C) f.
+void GameContacts::limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs) {
+  bodies.find_answers(moved, jobs);
+  works_.assign(bodies.bodies().size() + 1, {});
+  add_works(bodies);
   bool any = false;
-  for (Begun& begun : begun_) {
-    begun.share = begun.square > 0.0 ? std::clamp(-2.0 * begun.along / begun.square, 0.0, 1.0) : 1.0;
-    any = any || begun.share < 1.0;
+  for (Works& works : works_) {
+    works.share = share_that_gives(works.linear, works.square, works.given);
+    any = any || works.share < 1.0f;
   }
-  if (any) scale_forces(bodies);
-  return any;
+  if (any) scale_forces(bodies, moved);
 }
 
-void GameContacts::add_begun(const GameBodies& bodies, std::span<const double> moved) {
+void GameContacts::add_works(const GameBodies& bodies) {
   for (std::size_t i = 0; i < bodies.bodies().size(); ++i) {
-    if (!touched_[i]) continue;  // its answers are the round-off of what joints gave and took back
+    if (!touched_[i]) continue;
     const GameBody& body = bodies.bodies()[i];
-    Begun& begun = begun_of(static_cast<std::int32_t>(i));
-    begun.along += body.along;
-    begun.square += body.square;
-    if (moved.empty()) continue;
-    const auto first = static_cast<std::size_t>(body.first);
-    for (std::size_t b = first; b < first + static_cast<std::size_t>(body.blocks); ++b)
-      for (std::size_t l = 0; l < 8; ++l)
-        begun.along += static_cast<double>(bodies.answers()[b].v[l]) * moved[8 * b + l];
+    Works& works = works_of(static_cast<std::int32_t>(i));
+    works.linear += body.along;
+    works.square += body.square;
   }
-  bundles_.for_all_begun([&](std::int32_t frame, double along, double kept) {
-    Begun& begun = begun_of(frame);
-    begun.along += along;
-    begun.square += kept;
+  bundles_.for_all_works([&](std::int32_t frame, double open, double yielded, double given) {
+    Works& works = works_of(frame);
+    works.linear += open;
+    works.square += yielded;
+    works.given += given;
   });
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    Begun& begun = begun_of(frame_of(bodies, i));
-    begun.along += static_cast<double>(rows_[i].begun);
-    begun.square += static_cast<double>(rows_[i].compliance * rows_[i].force[0] * rows_[i].force[0]);
+    const ContactRow& c = rows_[i];
+    Works& works = works_of(frame_of(bodies, i));
+    works.linear += static_cast<double>(c.force[0] * (c.gap - c.target - c.compliance * c.before) +
+                                        c.force[1] * c.slip[0] + c.force[2] * c.slip[1]);
+    works.square += static_cast<double>(c.compliance * c.force[0] * c.force[0]);
+    works.given += static_cast<double>(c.release);
   }
 }
 
-void GameContacts::scale_forces(GameBodies& bodies) {
-  const auto share = [&](std::int32_t frame) { return static_cast<float>(begun_of(frame).share); };
+void GameContacts::scale_forces(GameBodies& bodies, std::span<const double> moved) {
+  const auto share = [&](std::int32_t frame) { return works_of(frame).share; };
   bundles_.scale(share);
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (float& force : rows_[i].force) force *= share(frame_of(bodies, i));
   for (RollingRow& rolling : rolling_)
     for (float& moment : rolling.moment) moment *= share(frame_of(bodies, static_cast<std::size_t>(rolling.contact)));
-  for (std::size_t i = 0; i < bodies.bodies().size(); ++i) bodies.scale_answer(i, share(static_cast<std::int32_t>(i)));
+  for (std::size_t i = 0; i < bodies.bodies().size(); ++i)
+    if (const float s = share(static_cast<std::int32_t>(i)); s < 1.0f) bodies.scale_answer(i, s, moved);
 }
 
 void GameContacts::sweep(GameBodies& bodies, bool backward, Jobs& jobs) {

@@ -49,10 +49,9 @@ class GameContacts {
   void apply_last_forces(GameBodies& bodies, Jobs& jobs);
   /// Measures gaps. @return whether something is to be pushed apart
   bool begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs);
-  /// Of the forces that the substep begins with, those of the last one, leaves what adds no energy: of bodies that
-  /// contacts tie together the largest share. @param moved y by joints and handles; none: nothing. @return whether any
-  /// were too large
-  bool limit_forces(GameBodies& bodies, std::span<const double> moved);
+  /// After the forward sweep: leaves as much of the forces as adds no energy, of bodies that contacts tie together the
+  /// largest share. @param moved y by joints and handles; none: nothing
+  void limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs);
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
   void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
   /// Adds up forces.
@@ -89,20 +88,22 @@ class GameContacts {
   void write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes);
   void join_sides(ContactRow& row);
   void find_masses(const GameBodies& bodies, ContactRow& row);
-  /// Of bodies that contacts tie together, as a substep begins: q·y and f·gap, q·q and f C f, and what of f is left.
-  struct Begun {
-    double along = 0.0, square = 0.0, share = 1.0;
+  /// Of bodies that contacts tie together: what their forces change the energy by, what they may, and what of them is
+  /// left.
+  struct Works {
+    double linear = 0.0, square = 0.0, given = 0.0;
+    float share = 1.0f;
   };
-  Begun& begun_of(std::int32_t frame) {
-    return frame < 0 ? begun_.back() : begun_[static_cast<std::size_t>(islands_.root(frame))];
+  Works& works_of(std::int32_t frame) {
+    return frame < 0 ? works_.back() : works_[static_cast<std::size_t>(islands_[static_cast<std::size_t>(frame)])];
   }
   /// One that moves, of a row of `rows_`; −1: none.
   std::int32_t frame_of(const GameBodies& bodies, std::size_t row) const {
     const PreparedContact& contact = contacts_[numbers_[row]];
     return std::max(bodies.of(contact.a.body), bodies.of(contact.b.body));
   }
-  void add_begun(const GameBodies& bodies, std::span<const double> moved);
-  void scale_forces(GameBodies& bodies);
+  void add_works(const GameBodies& bodies);
+  void scale_forces(GameBodies& bodies, std::span<const double> moved);
   Vec3 last_moment(const PreparedContact& contact) const;
   void add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius);
 
@@ -117,9 +118,10 @@ class GameContacts {
   std::vector<Rolling> rolling_memory_;
   std::vector<Rebound> rebound_memory_;
   std::vector<bool> touched_;  // by frame
-  DisjointSets islands_;       // of bodies that contacts tie together
-  std::vector<Begun> begun_;   // by the first body of an island, and of what does not move
-  std::vector<double> modal_;  // scratch
+  DisjointSets ties_;
+  std::vector<Index> islands_;  // by frame: the first body of those that contacts tie to it
+  std::vector<Works> works_;    // by the first body of an island, and of what does not move
+  std::vector<double> modal_;   // scratch
 };
 
 }  // namespace limber::internal

@@ -51,10 +51,10 @@ class PairBundles {
   double friction(std::size_t contact) const { return read(contact, &BundleContact::friction); }
   double compliance(std::size_t contact) const { return read(contact, &BundleContact::compliance); }
 
-  /// Visits all pairs as a substep begins: visit(frame, begun, kept), the frame one of the pair's that moves (−1:
-  /// none), the others as PairBundle has them.
+  /// Visits all pairs after the forward sweep: visit(frame, open, yielded, given), the frame one of the pair's that
+  /// moves (−1: none), the others as PairBundle has them.
   template <class Visit>
-  void for_all_begun(const Visit& visit) const;
+  void for_all_works(const Visit& visit) const;
   /// Leaves shares of the forces: share(frame) of a pair.
   template <class Share>
   void scale(const Share& share);
@@ -134,11 +134,11 @@ void PairBundles::fill(Jobs& jobs, const Visit& visit) {
 }
 
 template <class Visit>
-void PairBundles::for_all_begun(const Visit& visit) const {
+void PairBundles::for_all_works(const Visit& visit) const {
   for (const PairBundle& bundle : bundles_)
     for (std::size_t lane = 0; lane < kBundleLanes; ++lane)
-      visit(frame_of(bundle, lane), static_cast<double>(bundle.begun.v[lane]),
-            static_cast<double>(bundle.kept.v[lane]));
+      visit(frame_of(bundle, lane), static_cast<double>(bundle.open.v[lane]),
+            static_cast<double>(bundle.yielded.v[lane]), static_cast<double>(bundle.given.v[lane]));
 }
 
 template <class Share>

@@ -77,8 +77,9 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   bodies.begin_substep(number, jobs);
   const bool overlap = contacts.begin_substep(bodies, steps, jobs);
   constraints.solve(bodies);
-  if (contacts.limit_forces(bodies, constraints.moved())) constraints.solve_again(bodies);
-  for (const bool backward : {false, true}) contacts.sweep(bodies, backward, jobs);
+  contacts.sweep(bodies, false, jobs);
+  contacts.limit_forces(bodies, constraints.moved(), jobs);
+  contacts.sweep(bodies, true, jobs);
   if (overlap) {
     std::ranges::fill(bodies.pushes(), internal::Block8{});
     for (const bool backward : {false, true}) contacts.push_apart(bodies, backward, jobs);

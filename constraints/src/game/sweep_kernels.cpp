@@ -218,7 +218,6 @@ HWY_INLINE HWY_ATTR void MeasureContact(ContactRow& c, const Block8* rows, const
   c.target = std::min(c.now + yields, 0.0f) - yields;
   c.gap = gap + carried[0];
   for (int t = 0; t < 2; ++t) c.slip[t] = c.running[t] + carried[1 + t] - bent[1 + t];
-  c.begun = c.force[0] * (c.gap - c.target - yields) + c.force[1] * c.slip[0] + c.force[2] * c.slip[1];
 }
 
 HWY_ATTR bool MeasureContacts(ContactRow* contacts, std::size_t count, const Block8* rows, const Block8* shapes,

@@ -55,10 +55,9 @@ struct ContactRow {
   float gap = 0.0f, target = 0.0f, slip[2] = {};  // what the rows' own numbers are added to; wanted gap
   float now = 0.0f;                               // the gap at the substep's start
   float force[3] = {}, before = 0.0f;             // the latter: along the normal in the last substep
-  float begun = 0.0f;                 // what the forces that the substep begins with do along the gap without J y, J
-  float push = 0.0f, part = 0.0f;     // what displaces frames; how far they are to part in the substep, m
-  float rebound = 0.0f;               // e² of a contact between rigid bodies
-  float fall = 0.0f;                  // what free motion adds to the gap in a substep, m
+  float push = 0.0f, part = 0.0f;                 // what displaces frames; how far they are to part in the substep, m
+  float rebound = 0.0f;                           // e² of a contact between rigid bodies
+  float fall = 0.0f;                              // what free motion adds to the gap in a substep, m
   float stage = 0.0f, energy = 0.0f;  // J: what it took as they come together, then what it has still to give
   float release = 0.0f;               // of that, what it gives in the coming substep
 };
