@@ -360,6 +360,22 @@ TEST(SpatialIndex, ArgumentsAreChecked) {
   EXPECT_THROW(index.nearest_point({0, 0, 0}, 0.0), InvalidArgument);
 }
 
+/// What is made of a model is made once: further bodies of it cost next to nothing.
+TEST(SpatialIndex, BodiesOfOneModelShareItsSurface) {
+  const auto model = wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 2), kWaves);
+  SpatialIndex index;
+  const auto add = [&](Index body) {
+    const auto before = testing::allocations();
+    index.add_body(body, {.model = model});
+    index.set_state(body, {}, std::vector<double>(kWaves, 0.0));
+    return testing::allocations() - before;
+  };
+  const long first = add(0);
+  long others = 0;
+  for (Index body = 1; body <= 4; ++body) others += add(body);
+  EXPECT_LT(others, first);
+}
+
 TEST(SpatialIndex, WarmQueriesAllocateNothing) {
   Random random(6);
   Strewn scene;

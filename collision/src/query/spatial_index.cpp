@@ -136,6 +136,11 @@ struct SpatialIndex::Impl {
   ConvexCast cast;
   SurfaceMesh shell;  // of a body that a shape may lie in
 
+  /// It keeps what is made of the model, so that the next body of that model finds it.
+  std::shared_ptr<const CollisionSurface> surface_of(const std::shared_ptr<const ModalModel>& model, bool skin) {
+    const auto made = cache.get(model, skin);
+    return {made, made->surface.get()};
+  }
   IndexedBody& body(Index b, const char* function);
   void place(Index b);
   DeformedSurface& surface(Index b) {
@@ -188,11 +193,11 @@ void SpatialIndex::add_body(Index body, const BodyGeometry& geometry, std::uint3
                           " has a model and a shape or none, expected one of them");
   IndexedBody made{.present = true, .layers = layers, .in_loaded = in_loaded};
   if (geometry.model) {
-    made.surface = made.loaded = m.cache.get(geometry.model, geometry.skin)->surface;
+    made.surface = made.loaded = m.surface_of(geometry.model, geometry.skin);
   } else {
     made.rigid = m.cache.get(geometry.shape);
     made.surface = made.rigid->surface();
-    if (loaded && loaded->data().touchable) made.loaded = m.cache.get(loaded, geometry.skin)->surface;
+    if (loaded && loaded->data().touchable) made.loaded = m.surface_of(loaded, geometry.skin);
   }
   if (i >= m.bodies.size()) m.bodies.resize(i + 1);
   m.bodies[i] = std::move(made);
