@@ -189,6 +189,23 @@ limber_result limber_world_joint_state(const limber_world* world, limber_joint_i
   return guarded([&] { required(state, "state") = to_c(world_of(world).joint(to_cpp(id))); });
 }
 
+limber_result limber_world_set_joint_strength(limber_world* world, limber_joint_id id, double newtons) {
+  return guarded([&] { world_of(world).set_joint_strength(to_cpp(id), newtons); });
+}
+
+limber_result limber_world_joint_strength(const limber_world* world, limber_joint_id id, double* newtons) {
+  return guarded([&] { required(newtons, "newtons") = world_of(world).joint_strength(to_cpp(id)); });
+}
+
+limber_result limber_world_joint_breaks(const limber_world* world, limber_joint_break* breaks, size_t capacity,
+                                        size_t* count) {
+  return guarded([&] {
+    answer(world_of(world).joint_breaks(), breaks, capacity, count, [](const JointBreak& b) {
+      return limber_joint_break{to_c(b.joint), to_c(b.a), to_c(b.b), b.user_data, to_c(b.force)};
+    });
+  });
+}
+
 limber_result limber_world_set_joint_user_data(limber_world* world, limber_joint_id id, uint64_t data) {
   return guarded([&] { world_of(world).set_user_data(to_cpp(id), data); });
 }

@@ -49,8 +49,9 @@ static BodyFilter to_cpp(const limber_query_filter* filter) {
 static Ray ray(const limber_vec3& from, const limber_vec3& way) { return {.from = to_cpp(from), .way = to_cpp(way)}; }
 
 static limber_hit to_c(const BodyHit& h) {
-  return {to_c(h.body), h.at.has_value(), h.at ? to_c(*h.at) : limber_surface_point{}, to_c(h.position), to_c(h.normal),
-          h.fraction,   h.distance};
+  return {to_c(h.body),     h.at.has_value(), h.at ? to_c(*h.at) : limber_surface_point{},
+          to_c(h.position), to_c(h.normal),   h.fraction,
+          h.distance,       h.user_data};
 }
 
 static void answer(const std::optional<BodyHit>& found_hit, bool* found, limber_hit* hit) {
@@ -153,7 +154,7 @@ limber_result limber_world_sensor_events(const limber_world* world, limber_senso
                                          size_t* count) {
   return guarded([&] {
     answer(world_of(world).sensor_events(), events, capacity, count, [](const SensorEvent& e) {
-      return limber_sensor_event{to_c(e.sensor), to_c(e.body), e.began};
+      return limber_sensor_event{to_c(e.sensor), to_c(e.body), e.began, e.user_data_sensor, e.user_data_body};
     });
   });
 }

@@ -60,7 +60,9 @@ SpatialIndex::Filter BodyQueries::filter(const BodyFilter& filter) const {
 }
 
 BodyHit BodyQueries::told(const SpatialIndex::Hit& hit) const {
-  return {bodies_.id(hit.body), hit.at, hit.position, hit.normal, hit.fraction, hit.distance};
+  const BodyId body = bodies_.id(hit.body);
+  return {{body, hit.at, hit.position, hit.normal, hit.fraction, hit.distance},
+          bodies_[static_cast<Index>(body.index)].user_data};
 }
 
 }  // namespace limber::internal

@@ -37,6 +37,7 @@ class ConstraintStage {
   void remove(std::uint32_t place);
   const std::vector<Entry>& entries() const { return constraints_.entries(); }
   void set_user_data(std::uint32_t place, std::uint64_t data) { constraints_.set_user_data(place, data); }
+  void set_strength(std::uint32_t place, double newtons) { constraints_.set_strength(place, newtons); }
   void disturb_bodies_of(std::uint32_t place);
 
   /// Constraints of the coming step alone, beside the others: they stay the caller's.

@@ -22,6 +22,7 @@ void ConstraintTable::remove(std::uint32_t place) {
   entry.handle.reset();
   entry.joint.reset();
   entry.user_data = 0;
+  entry.strength = std::numeric_limits<double>::infinity();
   // A place whose generations are used up is never given again.
   if (++entry.generation != 0) vacant_.push_back(place);
 }
@@ -33,7 +34,7 @@ ConstraintTable::Kind ConstraintTable::kind_of(const Entry& entry) {
 void ConstraintTable::save_state(StateWriter& state) const {
   state(vacant_, static_cast<std::uint64_t>(entries_.size()));
   for (const Entry& entry : entries_) {
-    state(entry.generation, kind_of(entry), entry.user_data);
+    state(entry.generation, kind_of(entry), entry.user_data, entry.strength);
     if (entry.handle) state(*entry.handle);
     if (entry.joint) state(*entry.joint);
   }
@@ -46,7 +47,7 @@ void ConstraintTable::restore_state(StateReader& state) {
     const Kind known = kind_of(entry);
     entry.generation = state.read<std::uint32_t>();
     const Kind kind = state.read<Kind>();
-    entry.user_data = state.read<std::uint64_t>();
+    state(entry.user_data, entry.strength);
     if (kind != known) entry.handle.reset(), entry.joint.reset();
     if (kind == Kind::kHandle) {
       if (!entry.handle) entry.handle = std::make_unique<Handle>(MaterialFrame(JointFrame{}), Vec3::Zero());

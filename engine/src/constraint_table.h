@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -18,6 +19,7 @@ class ConstraintTable {
     std::unique_ptr<Handle> handle;
     std::unique_ptr<JointConstraint> joint;
     std::uint64_t user_data = 0;
+    double strength = std::numeric_limits<double>::infinity();  // N, of a joint
     Constraint* constraint() const {
       return handle ? static_cast<Constraint*>(handle.get()) : static_cast<Constraint*>(joint.get());
     }
@@ -28,6 +30,8 @@ class ConstraintTable {
   void remove(std::uint32_t place);
   const std::vector<Entry>& entries() const { return entries_; }
   void set_user_data(std::uint32_t place, std::uint64_t data) { entries_[place].user_data = data; }
+
+  void set_strength(std::uint32_t place, double newtons) { entries_[place].strength = newtons; }
 
   void save_state(StateWriter& state) const;
   /// Constraints made since are removed, those removed since made again.

@@ -18,6 +18,13 @@ void SensorStage::find(Index sensor, std::vector<Overlap>& found) {
     if ((bodies_[body].filter.mask & e.filter.layers) != 0) found.push_back({bodies_.id(sensor), bodies_.id(body)});
 }
 
+void SensorStage::tell(const Overlap& overlap, bool began) {
+  const auto data = [&](BodyId id) {
+    return bodies_.contains(id) ? bodies_[static_cast<Index>(id.index)].user_data : std::uint64_t{0};
+  };
+  events_.push_back({overlap.sensor, overlap.body, began, data(overlap.sensor), data(overlap.body)});
+}
+
 void SensorStage::update() {
   events_.clear();
   if (sensors_.empty()) return;
@@ -28,11 +35,9 @@ void SensorStage::update() {
   auto now = now_.begin();
   while (before != inside_.end() || now != now_.end()) {
     if (now == now_.end() || (before != inside_.end() && *before < *now)) {
-      events_.push_back({before->sensor, before->body, false});
-      ++before;
+      tell(*before++, false);
     } else if (before == inside_.end() || *now < *before) {
-      events_.push_back({now->sensor, now->body, true});
-      ++now;
+      tell(*now++, true);
     } else {
       ++before, ++now;
     }

@@ -40,6 +40,7 @@ class SensorStage {
     return std::tie(s.inside_, s.events_);
   }
   void find(Index sensor, std::vector<Overlap>& found);
+  void tell(const Overlap& overlap, bool began);
 
   const BodyTable& bodies_;
   BodyQueries& queries_;

@@ -12,7 +12,7 @@ namespace limber::internal {
 namespace {
 
 /// Changes with what is written.
-constexpr std::uint32_t kFormat = 5;
+constexpr std::uint32_t kFormat = 6;
 constexpr std::uint64_t kMagic = 0x6574617473626d6c;  // "lmbstate"
 
 struct Header {
@@ -142,7 +142,7 @@ void Snapshot::save_motion(StateWriter& state) const {
   rooms_.bodies.save_state(state);
   rooms_.constraints.save_state(rooms_.bodies.size(), state);
   rooms_.sleep.save_state(rooms_.bodies.size(), state);
-  state(rooms_.parts, rooms_.events, rooms_.sensors);
+  state(rooms_.parts, rooms_.events, rooms_.breaks, rooms_.sensors);
   rooms_.registry.save_pairs(state);
   rooms_.path.save_state(state);
   rooms_.drawing.save_state(state);
@@ -159,7 +159,7 @@ void Snapshot::restore_motion(StateReader& state) {
   rooms_.bodies.restore_state(state);
   rooms_.constraints.restore_state(rooms_.bodies.size(), state);
   rooms_.sleep.restore_state(rooms_.bodies.size(), state);
-  state(rooms_.parts, rooms_.events, rooms_.sensors);
+  state(rooms_.parts, rooms_.events, rooms_.breaks, rooms_.sensors);
   rooms_.registry.restore_pairs(state);
   rooms_.path.restore_state(state);
   rooms_.drawing.restore_state(state);

@@ -9,6 +9,7 @@
 #include "constraint_stage.h"
 #include "contact_registry.h"
 #include "drawing.h"
+#include "joint_breaks.h"
 #include "limber/core/state_archive.h"
 #include "sensor_stage.h"
 #include "sleep_stage.h"
@@ -30,6 +31,7 @@ class Snapshot {
     SleepStage& sleep;
     StepParts& parts;
     StepEvents& events;
+    JointBreaks& breaks;
     SensorStage& sensors;
     ContactRegistry& registry;
     StepPath& path;

@@ -315,6 +315,8 @@ void World::step() {
     m.add_to_report(m.paths.in_force().report());
   }
   m.parts.finish();
+  m.last.breaks.find(m.constraints, m.bodies);
+  for (const JointBreak& broken : m.last.breaks.events()) m.remove_joint(broken.joint.index);
   m.probes.queries.tell_changed();
   m.probes.sensors.update();
   if (m.paths.registry.source() != nullptr) m.last.events.end();

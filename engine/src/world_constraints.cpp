@@ -180,10 +180,24 @@ JointId World::add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointA
 
 void World::remove_joint(JointId id) {
   named(impl_->constraints, id, "remove_joint");
-  wake_bodies_of(*impl_->constraints.entries()[id.index].constraint(), impl_->sleep);
-  impl_->paths.registry.include_after_joint(id.index);
-  impl_->constraints.remove(id.index);
+  impl_->remove_joint(id.index);
 }
+
+void World::Impl::remove_joint(std::uint32_t place) {
+  wake_bodies_of(*constraints.entries()[place].constraint(), sleep);
+  paths.registry.include_after_joint(place);
+  constraints.remove(place);
+}
+
+void World::set_joint_strength(JointId id, double newtons) {
+  named(impl_->constraints, id, "set_joint_strength");
+  if (!(newtons > 0.0))
+    throw InvalidArgument("World::set_joint_strength: the strength is " + std::to_string(newtons) +
+                          " N, expected more than 0");
+  impl_->constraints.set_strength(id.index, newtons);
+}
+double World::joint_strength(JointId id) const { return named(impl_->constraints, id, "joint_strength").strength; }
+std::span<const JointBreak> World::joint_breaks() const { return impl_->last.breaks.events(); }
 
 void World::set_apart(BodyId a, BodyId b, bool apart) {
   Impl& m = *impl_;

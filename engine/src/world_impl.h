@@ -19,6 +19,7 @@
 #include "contact_paths.h"
 #include "drawing.h"
 #include "hit_events.h"
+#include "joint_breaks.h"
 #include "limber/engine/world.h"
 #include "rigid_models.h"
 #include "sleep_stage.h"
@@ -35,6 +36,7 @@ struct World::Impl {
     ConstraintReport report;
     internal::StepEvents events;
     internal::HitEvents hits;
+    internal::JointBreaks breaks;
     StageTimes* times = nullptr;  // written if not null
   };
   Impl(const WorldOptions& wanted, Jobs& lent)
@@ -48,8 +50,8 @@ struct World::Impl {
         parts(constraints, wanted.substeps, wanted.step) {}
 
   internal::Snapshot snapshot() {
-    return internal::Snapshot({options, time, bodies, constraints, sleep, parts, last.events, probes.sensors,
-                               paths.registry, paths.in_force(), paths.solver, drawing});
+    return internal::Snapshot({options, time, bodies, constraints, sleep, parts, last.events, last.breaks,
+                               probes.sensors, paths.registry, paths.in_force(), paths.solver, drawing});
   }
   void add_to_report(const IslandReport& substep);
   /// World::add_body(). @param parts of a compound, in the frame of the body: what others meet of it; empty: of others
@@ -57,6 +59,7 @@ struct World::Impl {
                     std::span<const ShapePart> parts);
   void add_part(Index body, const ShapePart& part);
   void remove(Index entry);
+  void remove_joint(std::uint32_t place);
 
   WorldOptions options;
   Jobs& jobs;

@@ -328,6 +328,15 @@ class Joint(_Named):
         """(3,): of the locked translations on b, world, N"""
         return array3(self._state().lock_force)
 
+    @property
+    def strength(self) -> float:
+        """N: at the end of a step in which `lock_force` is larger the joint is removed; infinite at first. `World.broken_joints`"""
+        return answer("double", lib.limber_world_joint_strength, self._world._pointer, self._id)[0]
+
+    @strength.setter
+    def strength(self, newtons: float) -> None:
+        check(lib.limber_world_set_joint_strength(self._world._pointer, self._id, newtons))
+
     def actuate(self, coordinate: int = 0, **actuation: float) -> None:
         """What acts along a coordinate from now on, in place of what did: motor_velocity, motor_max_force, drive_target,
         drive_stiffness, drive_damping, friction; those not given are 0."""
@@ -489,6 +498,11 @@ class World:
         world = ffi.new("limber_body_id*")[0]
         return Joint(self, answer("limber_joint_id", lib.limber_world_add_joint, self._pointer,
                                   world if a is None else a._id, world if b is None else b._id, o)[0])
+
+    @property
+    def broken_joints(self) -> list[Joint]:
+        """Joints that broke in the last step; they exist no more."""
+        return [Joint(self, event.joint) for event in self._list("limber_joint_break", lib.limber_world_joint_breaks)]
 
     def set_apart(self, a: Body, b: Body, apart: bool = True) -> None:
         """Whether two bodies have no contacts with each other."""

@@ -498,6 +498,33 @@ TEST(CContacts, BeltsCarry) {
   EXPECT_NEAR(state.velocity.x, 0.5, 1e-3);
 }
 
+/// A ball that hangs by a joint of less strength than its weight is let go in the first step.
+TEST(CWorld, JointsBreakAboveTheirStrength) {
+  const World world = make_world();
+  const limber_body_id ball = add_sphere(world.get(), 0.1, {0, 0, -1});
+  limber_joint_options options = limber_default_joint_options();
+  options.type = LIMBER_JOINT_BALL;
+  limber_joint_id joint{};
+  EXPECT_EQ(limber_world_add_joint(world.get(), {0, 0}, ball, &options, &joint), LIMBER_OK) << limber_last_error();
+  double strength = 0.0;
+  EXPECT_EQ(limber_world_joint_strength(world.get(), joint, &strength), LIMBER_OK);
+  EXPECT_TRUE(std::isinf(strength));
+  EXPECT_EQ(limber_world_step(world.get(), 10), LIMBER_OK);
+  limber_joint_state state{};
+  EXPECT_EQ(limber_world_joint_state(world.get(), joint, &state), LIMBER_OK);
+  EXPECT_EQ(limber_world_set_joint_strength(world.get(), joint, 0.9 * state.lock_force.z), LIMBER_OK);
+  EXPECT_EQ(limber_world_set_joint_strength(world.get(), joint, -1.0), LIMBER_INVALID_ARGUMENT);
+  EXPECT_EQ(limber_world_step(world.get(), 1), LIMBER_OK);
+  limber_joint_break broken{};
+  std::size_t count = 0;
+  EXPECT_EQ(limber_world_joint_breaks(world.get(), &broken, 1, &count), LIMBER_OK);
+  ASSERT_EQ(count, 1u);
+  EXPECT_EQ(broken.joint.index, joint.index);
+  EXPECT_EQ(broken.a.generation, 0u);
+  EXPECT_EQ(broken.b.index, ball.index);
+  EXPECT_FALSE(limber_world_contains_joint(world.get(), joint));
+}
+
 /// A dumb-bell of two balls: its mass, its rest on both, and queries that know the whole and tell a place for loads.
 TEST(CWorld, CompoundsStandOnTheirParts) {
   constexpr double kRadius = 0.1;

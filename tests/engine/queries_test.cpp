@@ -37,9 +37,10 @@ TEST(Queries, ARayMeetsABodyWhereAStepLeftIt) {
 TEST(Queries, APlaceTakesImpulsesAndHandles) {
   World world({.gravity = Vec3::Zero()});
   const auto ball = share(Sphere{0.5});
-  const BodyId body = world.add_rigid(ball, 1000.0, {.pose = {.p = {0, 0, 2}}});
+  const BodyId body = world.add_rigid(ball, 1000.0, {.pose = {.p = {0, 0, 2}}, .user_data = 3});
   const auto hit = world.cast_ray({{-3, 0, 2.3}, {6, 0, 0}});
   ASSERT_TRUE(hit && hit->at);
+  EXPECT_EQ(hit->user_data, 3u);
   EXPECT_NEAR(hit->position.x(), -0.4, 1e-12);  // √(0.5² − 0.3²)
   const Vec3 blow(100.0, 0, 0), about = world.body(body).pose.p;
   world.apply_impulse(body, *hit->at, blow);

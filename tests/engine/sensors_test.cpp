@@ -21,13 +21,16 @@ TEST(Sensors, ABallFallsThroughAGate) {
   constexpr double kStep = 1.0 / 240.0, kGravity = 9.80665, kRadius = 0.1;
   World world({.step = kStep});
   const BodyId gate = world.add_sensor(share(Box{{1, 1, 0.5}}), {.p = {0, 0, -2}});
-  const BodyId ball = world.add_rigid(share(Sphere{kRadius}), 1000.0);
+  const BodyId ball = world.add_rigid(share(Sphere{kRadius}), 1000.0, {.user_data = 4});
+  world.set_user_data(gate, 6);
   double in = -1.0, out = -1.0;
   for (int i = 0; i < 240; ++i) {
     world.step();
     for (const SensorEvent& e : world.sensor_events()) {
       EXPECT_EQ(e.sensor, gate);
       EXPECT_EQ(e.body, ball);
+      EXPECT_EQ(e.user_data_body, 4u);
+      EXPECT_EQ(e.user_data_sensor, 6u);
       (e.began ? in : out) = world.time();
     }
   }

@@ -149,6 +149,18 @@ def test_a_lift_carries_a_crate_that_cannot_turn(world):
     assert np.array_equal(crate.rotation, (1, 0, 0, 0))
 
 
+def test_a_joint_that_is_too_weak_breaks():
+    world = limber.World()
+    ball = world.add_rigid(limber.Shape.sphere(0.1), 1000.0, position=(0, 0, -1))
+    joint = world.add_joint(None, ball, "ball", (0, 0, 0))
+    assert joint.strength == math.inf
+    world.step(10)
+    assert world.broken_joints == []
+    joint.strength = 0.9 * sphere_mass(0.1, 1000.0) * G
+    world.step()
+    assert world.broken_joints == [joint] and not joint.exists
+
+
 def test_a_handle_drags_its_point(world):
     ball = world.add_body(limber.soft_ball(0.3, cells=4, modes=6), position=(0, 0, 2))
     start = ball.point_position(3)

@@ -113,6 +113,19 @@ typedef struct limber_joint_state {
 } limber_joint_state;
 LIMBER_API limber_result limber_world_joint_state(const limber_world* world, limber_joint_id id,
                                                   limber_joint_state* state);
+/// Lets a joint break: at the end of a step in which the force of its locked translations is larger it is removed.
+/// @param newtons > 0; infinite, as it is at first: nothing breaks it
+LIMBER_API limber_result limber_world_set_joint_strength(limber_world* world, limber_joint_id id, double newtons);
+LIMBER_API limber_result limber_world_joint_strength(const limber_world* world, limber_joint_id id, double* newtons);
+/// A joint that broke in the last step.
+typedef struct limber_joint_break {
+  limber_joint_id joint;  ///< is gone
+  limber_body_id a, b;    ///< that it joined; {0, 0}: the world
+  uint64_t user_data;     ///< the joint's
+  limber_vec3 force;      ///< that broke it: limber_joint_state.lock_force
+} limber_joint_break;
+LIMBER_API limber_result limber_world_joint_breaks(const limber_world* world, limber_joint_break* breaks,
+                                                   size_t capacity, size_t* count);
 LIMBER_API limber_result limber_world_set_joint_user_data(limber_world* world, limber_joint_id id, uint64_t data);
 LIMBER_API limber_result limber_world_joint_user_data(const limber_world* world, limber_joint_id id, uint64_t* data);
 

@@ -92,7 +92,8 @@ LIMBER_API limber_result limber_world_set_sensor_pose(limber_world* world, limbe
 /// A body that came into a sensor in the last step, or left it.
 typedef struct limber_sensor_event {
   limber_body_id sensor, body;
-  bool began;  ///< false: left, or was removed
+  bool began;                                 ///< false: left, or was removed
+  uint64_t user_data_sensor, user_data_body;  ///< theirs; 0 of a body that was removed
 } limber_sensor_event;
 LIMBER_API limber_result limber_world_sensor_events(const limber_world* world, limber_sensor_event* events,
                                                     size_t capacity, size_t* count);
@@ -119,6 +120,7 @@ typedef struct limber_hit {
   limber_vec3 normal;       ///< unit, world, towards where the query came from; 0 where it begins within the body
   double fraction;          ///< of the way, in [0, 1]
   double distance;          ///< m
+  uint64_t user_data;       ///< of the body
 } limber_hit;
 /// The first place that a ray from + f·way, 0 ≤ f ≤ 1, meets. @param way m, not zero @param filter NULL: all, here and
 /// below @param found out: false where there is none; `hit` is not written then

@@ -165,16 +165,34 @@ struct HandleView {
 
 /// Which bodies may answer a query, and how one does: spatial_index.h by BodyId.
 using BodyFilter = QueryFilter<BodyId>;
-using BodyHit = QueryHit<BodyId>;
+struct BodyHit : QueryHit<BodyId> {
+  std::uint64_t user_data = 0;  ///< of the body
+};
 
 /// A body that came into a sensor in the last step, or left it.
 struct SensorEvent {
   BodyId sensor{}, body{};
-  bool began = true;  ///< false: left, or was removed
+  bool began = true;                                       ///< false: left, or was removed
+  std::uint64_t user_data_sensor = 0, user_data_body = 0;  ///< theirs; 0 of a body that was removed
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.sensor.index, s.sensor.generation, s.body.index, s.body.generation, s.began);
+    return std::tie(s.sensor.index, s.sensor.generation, s.body.index, s.body.generation, s.began, s.user_data_sensor,
+                    s.user_data_body);
+  }
+};
+
+/// A joint that broke in the last step: World::set_joint_strength().
+struct JointBreak {
+  JointId joint{};              ///< is gone
+  BodyId a{}, b{};              ///< as add_joint() took them
+  std::uint64_t user_data = 0;  ///< the joint's
+  Vec3 force = Vec3::Zero();    ///< that broke it: JointView::lock_force
+
+  template <class Self>
+  static auto state_fields(Self& s) {
+    return std::tie(s.joint.index, s.joint.generation, s.a.index, s.a.generation, s.b.index, s.b.generation,
+                    s.user_data, s.force);
   }
 };
 
@@ -400,6 +418,11 @@ class World {
   /// Motor, drive and friction of one coordinate.
   void set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation);
   JointView joint(JointId id) const;
+  /// Lets a joint break: at the end of a step in which |JointView::lock_force| is larger it is removed.
+  /// @param newtons > 0; infinite, as it is at first: nothing breaks it
+  void set_joint_strength(JointId id, double newtons);
+  double joint_strength(JointId id) const;
+  std::span<const JointBreak> joint_breaks() const;  ///< of the last step
 
   ConstraintReport constraint_report() const;
 
@@ -422,8 +445,8 @@ class World {
   /// Asked of every contact found, before it acts: false leaves it out of the step. From the thread that calls step();
   /// empty: all act.
   void set_contact_veto(std::function<bool(const ContactPoint&)> acts);
-  /// What pressed, or ceased to, in the last step; bodies by BodyId::index. Impulses of substeps are summed. Contacts
-  /// of bodies that sleep are not told; those that press when they wake go on as kLasting.
+  /// What pressed, or ceased to, in the last step; bodies by BodyId::index: id_of(). Impulses of substeps are summed.
+  /// Contacts of bodies that sleep are not told; those that press when they wake go on as kLasting.
   std::span<const ContactEvent> contact_events() const;
   /// Pairs that came together in the last step, at WorldOptions::hit_speed or faster; at most one each, by a and b.
   std::span<const HitEvent> hit_events() const;
