@@ -37,7 +37,7 @@ def run(program: str, *arguments: Path, **options: Any) -> str:
     path = shutil.which(program, path=os.environ.get("LIMBER_BIN")) or shutil.which(program)
     if path is None:
         raise InputError(f"{program} is not in LIMBER_BIN or on PATH: install limber's programs")
-    done = subprocess.run([path, *map(os.fspath, arguments), *_arguments(options)], capture_output=True, text=True)
+    done = subprocess.run([path, *(os.fspath(a) for a in arguments), *_arguments(options)], capture_output=True, text=True)
     if done.returncode != 0:
         raise (InvalidArgument if done.returncode == 2 else InputError)(done.stderr.strip())
     return done.stdout

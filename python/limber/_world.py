@@ -81,7 +81,7 @@ class _Named:
         self._id = ffi.new(ffi.getctype(ffi.typeof(id), "*"), id)[0]  # of its own: `id` may be in a list's memory
 
     def __eq__(self, other: object) -> bool:
-        return (type(other) is type(self) and other._world is self._world
+        return (isinstance(other, _Named) and type(other) is type(self) and other._world is self._world
                 and (other._id.index, other._id.generation) == (self._id.index, self._id.generation))
 
     def __hash__(self) -> int:
@@ -570,8 +570,10 @@ class World:
             self._veto = None
             return
 
+        leaves_out = veto
+
         def acts(_: Any, contact: Any) -> bool:
-            return not veto(self.body_at(contact.a.index), self.body_at(contact.b.index))
+            return not leaves_out(self.body_at(contact.a.index), self.body_at(contact.b.index))
 
         callback = ffi.callback("bool(void*, const limber_contact*)", acts, error=True)
         check(lib.limber_world_set_contact_veto(self._pointer, callback, ffi.NULL))
