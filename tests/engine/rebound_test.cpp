@@ -80,6 +80,22 @@ TEST(Rebound, LeavesWhatRestsAlone) {
   EXPECT_LT(with.back(), 2.0 * without.back());
 }
 
+/// A box that rests without restitution beside a ball that has some: it lies as it does beside one that has none, to
+/// the bit.
+TEST(Rebound, LeavesContactsOfOthersAlone) {
+  const auto box_beside = [](double e) {
+    GroundedWorld g(kGameContact, kFine);
+    g.world.add_rigid(ball(), kDensity, {.pose = {.p = {0, 0, kRadius}}, .restitution = e});
+    const BodyId box = g.world.add_rigid(share(Box{{0.5, 0.5, 0.5}}), 700.0, {.pose = {.p = {3, 0, 0.5}}});
+    g.step(60);
+    return g.world.body(box);
+  };
+  const BodyView with = box_beside(0.7), without = box_beside(0.0);
+  EXPECT_LT(with.velocity.norm() + with.angular_velocity.norm(), 1e-7);
+  EXPECT_EQ(with.velocity, without.velocity);
+  EXPECT_EQ(with.pose.p, without.pose.p);
+}
+
 TEST(Rebound, EndsInRest) {
   GroundedWorld scene(kGameContact, kFine);
   const BodyId id = scene.world.add_rigid(ball(), kDensity, {.pose = {{}, {0.0, 0.0, 0.5}}, .restitution = 0.5});

@@ -597,7 +597,8 @@ HWY_INLINE HWY_ATTR void NoteOne(BundleContact& c, Vector start, Vector end, std
                parted = hn::Set(d, kParted);
   const Vector mean = hn::NegMulAdd(hn::Set(d, 2.0f), Get(c.fall, lane), hn::Add(start, end));
   const Vector given = hn::Mul(hn::Set(d, 0.5f), hn::Mul(Get(c.force[0], lane), mean));
-  const auto presses = hn::Gt(Get(c.force[0], lane), zero);
+  // Contacts without a rebound, beside one that has it, stay open.
+  const auto presses = hn::And(hn::Gt(Get(c.rebound, lane), zero), hn::Gt(Get(c.force[0], lane), zero));
   const auto is_between = hn::And(hn::Gt(stage, zero), hn::Lt(stage, parted));
   const Vector next =
       hn::IfThenElseZero(hn::Or(presses, is_between), hn::Min(hn::Add(stage, hn::Set(d, 1.0f)), parted));
