@@ -24,8 +24,11 @@ namespace fs = std::filesystem;
 
 void print_materials(Program& program) {
   for (const MaterialPreset& m : material_presets())
-    program.print(fmt::format("{:<12} E {:>8.3g} Pa  nu {:>5.3g}  rho {:>6.5g} kg/m^3  {}\n", m.name,
-                              m.material.youngs_modulus, m.material.poisson_ratio, m.material.density, m.source));
+    program.print(fmt::format("{:<12} E {:>8.3g} Pa  nu {:>5.3g}  rho {:>6.5g} kg/m^3  {}{}\n", m.name,
+                              m.material.youngs_modulus, m.material.poisson_ratio, m.material.density, m.source,
+                              m.material.loss_factor > 0.0 ? fmt::format("; loss factor of sound {:.2g}, {}",
+                                                                         m.material.loss_factor, m.loss_source)
+                                                           : std::string()));
 }
 
 /// The options that shape the result, in the order of --help; names of files without their folders, so that equal bakes

@@ -22,6 +22,7 @@ inline constexpr char kExtension[] = "LIMBER_modal";
 inline constexpr int kFormatVersion = 1;
 inline constexpr int kSkinVersion = 1;
 inline constexpr int kMachineVersion = 1;
+inline constexpr int kSoundVersion = 1;
 inline constexpr std::string_view kHashPrefix = "sha256:";
 
 /// The content hash: provenance, then the numbers of every body, then the whole BIN chunk. It does not depend on how
@@ -35,8 +36,8 @@ class ContentHash {
     add(std::uint64_t{bodies});
   }
 
-  /// @param frequency_errors per mode, or empty
-  void add_body(const ModalModelData& body, const std::vector<double>& frequency_errors) {
+  /// @param frequency_errors per mode, or empty. @param sound null: none
+  void add_body(const ModalModelData& body, const std::vector<double>& frequency_errors, const SoundModes* sound) {
     add(body.name);
     add(to_string(body.motion));
     if (body.motion == FrameMotion::kLine) add(body.line_axis);
@@ -77,6 +78,7 @@ class ContentHash {
       add(static_cast<std::uint64_t>(kSkinVersion));
       add(static_cast<std::uint64_t>(body.skin->handles));
     }
+    if (sound) add_sound(*sound);
   }
 
   /// After all bodies; nothing where there are neither joints nor pairs.
@@ -133,6 +135,15 @@ class ContentHash {
       for (const double x :
            {a.motor_velocity, a.motor_max_force, a.drive_target, a.drive_stiffness, a.drive_damping, a.friction})
         add(x);
+  }
+  void add_sound(const SoundModes& sound) {
+    add(std::string_view("sound"));
+    add(static_cast<std::uint64_t>(kSoundVersion));
+    add(static_cast<std::uint64_t>(sound.modes()));
+    add(static_cast<std::uint64_t>(sound.vertices));
+    add(sound.contact_modulus);
+    for (const double x : sound.eigenvalues) add(x);
+    for (const double x : sound.decays) add(x);
   }
   void add_counts(const ModalSurface& surface) {
     add(std::uint64_t{surface.rest.size()});

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -164,6 +165,7 @@ class BodyReader {
       : mesh_(value, where), block_(extension_of(mesh_)), pieces_(pieces) {}
 
   const std::vector<double>& frequency_errors() const { return frequency_errors_; }
+  const std::shared_ptr<const SoundModes>& sound() const { return sound_; }
 
   ModalModelData read() {
     data_.name = mesh_.text("name");
@@ -176,6 +178,7 @@ class BodyReader {
     if (block_.has("frequency_errors")) read_frequency_errors();
     if (block_.has("captured")) read_captured();
     if (block_.has("skin")) read_skin();
+    if (block_.has("sound")) read_sound();
     block_.finish();
     for (const char* unread : {"weights", "extras"}) (void)mesh_.has(unread);
     mesh_.finish();
@@ -318,12 +321,39 @@ class BodyReader {
     block.finish();
   }
 
+  void read_sound() {
+    const JsonObject block(block_.at("sound"), block_.where("sound"));
+    require_version(block, asset_format::kSoundVersion);
+    auto sound = std::make_shared<SoundModes>();
+    const auto modes = static_cast<std::size_t>(block.integer("modes", 0, kMaxCount));
+    sound->vertices = static_cast<Index>(count_of(block, "vertices"));
+    sound->eigenvalues = block.numbers("eigenvalues", modes);
+    sound->decays = block.numbers("decays", modes);
+    if (block.has("contact_modulus")) sound->contact_modulus = block.number("contact_modulus");
+    const std::size_t touched = (data_.collision ? *data_.collision : data_.render).rest.size();
+    if (static_cast<std::size_t>(sound->vertices) != touched)
+      throw InputError(block.where("vertices") + ": is " + std::to_string(sound->vertices) + ", expected " +
+                       std::to_string(touched) + ", those of the surface that touches");
+    if (modes > 0) sound->shapes = items_of<float>(pieces_.raw(block, "shapes", sizeof(Vec3f) * modes * touched));
+    block.finish();
+    try {
+      sound->validate();
+    } catch (const InvalidArgument& e) {
+      throw InputError(block_.where("sound") + ": " + e.what());
+    }
+    sound_ = std::move(sound);
+  }
+
+  static void require_version(const JsonObject& block, int known) {
+    const std::int64_t version = block.integer("version", 1, kMaxCount);
+    if (version != known)
+      throw InputError(block.where("version") + ": is " + std::to_string(version) + ", this limber reads version " +
+                       std::to_string(known));
+  }
+
   void read_skin() {
     const JsonObject block(block_.at("skin"), block_.where("skin"));
-    const std::int64_t version = block.integer("version", 1, kMaxCount);
-    if (version != asset_format::kSkinVersion)
-      throw InputError(block.where("version") + ": is " + std::to_string(version) + ", this limber reads version " +
-                       std::to_string(asset_format::kSkinVersion));
+    require_version(block, asset_format::kSkinVersion);
     ModalSkin skin;
     skin.handles = static_cast<Index>(block.integer("handles", 1, ModalSkin::kMaxHandles));
     skin.modes = static_cast<Index>(modes_);
@@ -373,6 +403,7 @@ class BodyReader {
   BinaryPieces& pieces_;
   ModalModelData data_;
   std::vector<double> frequency_errors_;
+  std::shared_ptr<const SoundModes> sound_;
   std::size_t modes_ = 0;
 };
 
@@ -426,7 +457,8 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   for (const char* unread : {"asset", "scene", "scenes", "nodes", "materials", "extensionsUsed"})
     (void)root.has(unread);
 
-  Asset asset{.bodies = {}, .provenance = block.provenance, .joints = {}, .apart = {}, .frequency_errors = {}};
+  Asset asset{
+      .bodies = {}, .provenance = block.provenance, .joints = {}, .apart = {}, .frequency_errors = {}, .sounds = {}};
   std::vector<ModalModelData> bodies;
   std::set<std::string> names;
   BinaryPieces pieces(root, binary);
@@ -434,6 +466,7 @@ Asset read_document(const json& document, std::string_view binary, const std::st
     BodyReader reader(value, where, pieces);
     bodies.push_back(reader.read());
     asset.frequency_errors.push_back(reader.frequency_errors());
+    asset.sounds.push_back(reader.sound());
     if (!names.insert(bodies.back().name).second) throw InputError(where + ".name: is that of another body too");
   });
   root.finish();
@@ -441,7 +474,7 @@ Asset read_document(const json& document, std::string_view binary, const std::st
   if (bodies.empty()) throw InputError(name + ": holds no body");
 
   ContentHash hash(block.provenance, bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) hash.add_body(bodies[i], asset.frequency_errors[i]);
+  for (std::size_t i = 0; i < bodies.size(); ++i) hash.add_body(bodies[i], asset.frequency_errors[i], asset.sound(i));
   if (block.machine != nullptr)
     internal::read_machine(*block.machine, block.machine_place, static_cast<Index>(bodies.size()), asset);
   hash.add_machine(asset.joints, asset.apart);

@@ -118,6 +118,17 @@ json skin_block(GlbBuilder& glb, const ModalSkin& skin) {
   return block;
 }
 
+json sound_block(GlbBuilder& glb, const SoundModes& sound) {
+  json block = {{"version", asset_format::kSoundVersion},
+                {"modes", sound.modes()},
+                {"vertices", sound.vertices},
+                {"eigenvalues", sound.eigenvalues},
+                {"decays", sound.decays}};
+  if (std::isfinite(sound.contact_modulus)) block["contact_modulus"] = sound.contact_modulus;
+  if (!sound.shapes.empty()) block["shapes"] = add_raw(glb, sound.shapes);
+  return block;
+}
+
 /// The LIMBER_modal block of a mesh, but for the parts that lie in the binary chunk.
 json body_block(const ModalModelData& body) {
   json block = {{"motion", to_string(body.motion)},
@@ -166,8 +177,8 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material) {
   return mesh;
 }
 
-void add_body(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& frequency_errors, int material,
-              ContentHash& hash) {
+void add_body(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& frequency_errors,
+              const SoundModes* sound, int material, ContentHash& hash) {
   const ModalModelData& body = model.data();
   GlbMesh mesh = surface_mesh(glb, model, material);
   json block = body_block(body);
@@ -177,11 +188,12 @@ void add_body(GlbBuilder& glb, const ModalModel& model, const std::vector<double
   if (!frequency_errors.empty()) block["frequency_errors"] = frequency_errors;  // NaN becomes null
   if (!body.captured.empty()) block["captured"] = captured_block(body.captured);
   if (body.skin) block["skin"] = skin_block(glb, *body.skin);
+  if (sound) block["sound"] = sound_block(glb, *sound);
   mesh.extras = extras_for_people(model);
   mesh.extensions = json{{asset_format::kExtension, std::move(block)}}.dump();
   // The body keeps the input's axes; the node puts its origin where it was, so that the bodies stand as they did there.
   glb.add_node({.name = body.name, .mesh = glb.add_mesh(mesh), .translation = body.origin_in_input});
-  hash.add_body(body, frequency_errors);
+  hash.add_body(body, frequency_errors, sound);
 }
 
 void check_frequency_errors(const Asset& asset) {
@@ -200,6 +212,21 @@ void check_frequency_errors(const Asset& asset) {
   }
 }
 
+void check_sounds(const Asset& asset) {
+  if (!asset.sounds.empty() && asset.sounds.size() != asset.bodies.size())
+    throw InvalidArgument("asset_bytes: there are sounds of " + std::to_string(asset.sounds.size()) +
+                          " bodies, expected " + std::to_string(asset.bodies.size()) + " or none");
+  for (std::size_t i = 0; i < asset.bodies.size(); ++i) {
+    const SoundModes* sound = asset.sound(i);
+    if (!sound) continue;
+    sound->validate();
+    if (const Index vertices = asset.bodies[i]->collision().vertices(); sound->vertices != vertices)
+      throw InvalidArgument("asset_bytes: the sound of body \"" + asset.bodies[i]->name() + "\" has " +
+                            std::to_string(sound->vertices) + " vertices, expected " + std::to_string(vertices) +
+                            ", those of the surface that touches");
+  }
+}
+
 void check(const Asset& asset) {
   if (asset.bodies.empty()) throw InvalidArgument("asset_bytes: there is no body, expected at least one");
   std::set<std::string> names;
@@ -213,6 +240,7 @@ void check(const Asset& asset) {
                             ", as viewers take no more morph targets; keep fewer (--modes)");
   }
   check_frequency_errors(asset);
+  check_sounds(asset);
   const auto bodies = static_cast<Index>(asset.bodies.size());
   const auto require_two = [&](Index a, Index b, Index least, const char* what) {
     if (a < least || a >= bodies || b < 0 || b >= bodies || a == b)
@@ -255,7 +283,7 @@ std::string asset_bytes(const Asset& asset) {
       {.name = "limber", .base_color = {0.62f, 0.70f, 0.78f, 1.0f}, .roughness = 0.55f, .double_sided = true});
   for (std::size_t i = 0; i < asset.bodies.size(); ++i)
     add_body(glb, *asset.bodies[i], asset.frequency_errors.empty() ? std::vector<double>() : asset.frequency_errors[i],
-             material, hash);
+             asset.sound(i), material, hash);
   json block = {{"version", asset_format::kFormatVersion},
                 {"provenance",
                  {{"tool", provenance.tool},

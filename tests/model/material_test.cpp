@@ -58,6 +58,7 @@ TEST(Material, ValidatingNamesPlaceFieldAndValue) {
 TEST(Material, EveryPresetIsValidNamedOnceAndHasASource) {
   const auto presets = material_presets();
   for (const MaterialPreset& p : presets) {
+    EXPECT_EQ(p.material.loss_factor > 0.0, !p.loss_source.empty()) << p.name;
     EXPECT_EQ(message_of<InvalidArgument>([&] { p.material.validate(std::string(p.name)); }), "accepted");
     EXPECT_GT(p.source.size(), 20u) << p.name;
     EXPECT_EQ(material_preset(p.name).youngs_modulus, p.material.youngs_modulus);
@@ -96,9 +97,16 @@ TEST(Material, TheManualHasThePresetsAsTheyAre) {
     EXPECT_EQ(e, p.material.youngs_modulus) << p.name;
     EXPECT_EQ(nu, p.material.poisson_ratio) << p.name;
     EXPECT_EQ(rho, p.material.density) << p.name;
+    if (p.material.loss_factor == 0.0) continue;
+    const std::string loss_of = "`" + std::string(p.name) + "` ";
+    const std::size_t loss_at = manual.find(loss_of, manual.find("Loss factors of sound:"));
+    double loss = 0.0;
+    ASSERT_NE(loss_at, std::string::npos) << p.name;
+    ASSERT_EQ(std::sscanf(manual.c_str() + loss_at + loss_of.size(), "%lf", &loss), 1) << p.name;
+    EXPECT_EQ(loss, p.material.loss_factor) << p.name;
   }
   for (std::size_t at = 0; (at = manual.find("\n| `", at)) != std::string::npos; ++at) ++rows;
-  EXPECT_EQ(rows, material_presets().size() + 3) << "three more rows describe the keys of the file";
+  EXPECT_EQ(rows, material_presets().size() + 4) << "four more rows describe the keys of the file";
 }
 
 TEST(Material, UnknownPresetSuggestsTheNearest) {

@@ -32,10 +32,23 @@ nlohmann::json expected_in_viewers(const ModalModel& model) {
   return out;
 }
 
+/// The first body sounds with two modes; the others are silent.
+Asset sounding(Asset asset) {
+  const ModalSurface& surface = asset.bodies[0]->collision();
+  SoundModes modes{.eigenvalues = {4e6, 9e7}, .decays = {2.5, 40.0}, .shapes = {}, .vertices = surface.vertices()};
+  for (int k = 0; k < 2; ++k)
+    for (const Vec3f& r : surface.rest) modes.shapes.insert(modes.shapes.end(), {r.x(), k == 0 ? r.y() : -r.y(), 0.5f});
+  modes.contact_modulus = 7.6e10;
+  asset.sounds.resize(asset.bodies.size());
+  asset.sounds[0] = std::make_shared<SoundModes>(modes);
+  return asset;
+}
+
 void write_examples(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   write_asset(folder / "two_bodies.glb", example::asset());
   write_asset(folder / "rigid.glb", {.bodies = {example::model(example::full_box("stone", 0))}, .provenance = {}});
+  write_asset(folder / "sounds.glb", sounding(example::asset()));
   for (const Index modes : {7, 64, 256}) {
     const auto model = example::model(example::box("bar", modes, 8));
     const std::string name = "bar_" + std::to_string(modes);

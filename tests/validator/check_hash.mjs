@@ -31,6 +31,10 @@ function contentHash(document, binary) {
     }
     if (body.frequency_errors) text('frequency_errors'), f64(body.frequency_errors.map((e) => e ?? NaN));
     if (body.skin) text('skin'), [body.skin.version, body.skin.handles].forEach(u64);
+    if (body.sound) {
+      const { version, modes, vertices, contact_modulus = Infinity, eigenvalues, decays } = body.sound;
+      text('sound'), [version, modes, vertices].forEach(u64), f64(contact_modulus), f64(eigenvalues), f64(decays);
+    }
   }
   return `sha256:${hash.update(binary).digest('hex')}`;
 }

@@ -261,6 +261,7 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
                                   patches_on(static_cast<Index>(i), joined, options.scale), jobs);
     baked.asset.bodies.push_back(std::move(result.asset.bodies[0]));
     baked.asset.frequency_errors.push_back(std::move(result.asset.frequency_errors[0]));
+    baked.asset.sounds.push_back(result.asset.sounds.empty() ? nullptr : std::move(result.asset.sounds[0]));
     baked.bodies.push_back(std::move(result.bodies[0]));
   }
   add_joints(joined, options, baked.asset);

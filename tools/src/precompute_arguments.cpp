@@ -17,6 +17,10 @@ void declare_material_options(CLI::App& app, PrecomputeArguments& a) {
   app.add_option("--youngs-modulus", a.material.youngs_modulus, "Young's modulus E of the whole body")->type_name("PA");
   app.add_option("--poisson-ratio", a.material.poisson_ratio, "Poisson's ratio, in (-1, 0.5)")->type_name("NU");
   app.add_option("--density", a.material.density, "density of the whole body")->type_name("KG_M3");
+  app.add_option("--loss-factor", a.material.loss_factor,
+                 "for --sound: a vibration loses 2 pi ETA of its energy a period; in place of the materials' own")
+      ->type_name("ETA")
+      ->check(positive_number());
   app.add_option("--material", a.material.name, "a material by name, such as steel or rubber")->type_name("NAME");
   app.add_option("--materials", a.material.file,
                  "materials by region of the tets, or by groups or materials of a surface's faces: {\"REGION\": "
@@ -123,6 +127,9 @@ void declare_geometry_options(CLI::App& app, PrecomputeArguments& a) {
   app.add_flag("--skin{auto}", a.response.skin,
                "also bake a modal skin, which bends far without swelling; --skin=HANDLES with so many handles, else "
                "as many as it needs, 8 to 24");
+  app.add_flag("--sound{all}", a.response.sound,
+               "also bake what one hears: all modes from 20 Hz to 20 kHz, at most 1000, at the vertices of the surface "
+               "that touches; --sound=MODES: at most so many");
   app.add_flag("--volume", a.response.volume_block,
                "also bake all nodes, so that any initial deformation can be given to the runtime");
 }
@@ -210,7 +217,9 @@ void read_materials(Program& program, const PrecomputeArguments& a, AskedBake& a
   }
   if (!a.material.youngs_modulus || !a.material.poisson_ratio || !a.material.density)
     throw InvalidArgument("--youngs-modulus, --poisson-ratio and --density go together: one of them is missing");
-  const Material material{*a.material.youngs_modulus, *a.material.poisson_ratio, *a.material.density};
+  const Material material{.youngs_modulus = *a.material.youngs_modulus,
+                          .poisson_ratio = *a.material.poisson_ratio,
+                          .density = *a.material.density};
   material.validate("material");
   asked.options.materials = {{"*", material}};
 }
@@ -248,6 +257,20 @@ SkinOptions skin_of(const std::string& text) {
   if (std::sscanf(text.c_str(), "%d%c", &skin.handles, &rest) != 1 || skin.handles < 1)
     throw InvalidArgument("--skin=" + text + ": expected a number of handles, such as --skin=12, or --skin alone");
   return skin;
+}
+
+SoundOptions sound_of(const PrecomputeArguments& a) {
+  const std::string& text = a.response.sound;
+  if (text.empty()) {
+    if (a.material.loss_factor) throw InvalidArgument("--loss-factor is for --sound, which is not given");
+    return {};
+  }
+  SoundOptions sound{.make = true, .loss_factor = a.material.loss_factor};
+  if (text == "all") return sound;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%d%c", &sound.modes, &rest) != 1 || sound.modes < 1)
+    throw InvalidArgument("--sound=" + text + ": expected a number of modes, such as --sound=200, or --sound alone");
+  return sound;
 }
 
 LoadKind load_of(const std::string& text) {
@@ -297,6 +320,7 @@ AskedBake asked_bake(Program& program, const PrecomputeArguments& a) {
     throw InvalidArgument("--max-force and --min-displacement go together: one of them is missing");
   o.residual = residual_of(a);
   o.skin = skin_of(a.response.skin);
+  o.sound = sound_of(a);
   o.collision_triangles = a.geometry.collision_triangles;
   o.volume_block = a.response.volume_block;
   o.validate();

@@ -20,7 +20,7 @@ namespace limber::tools {
 
 struct MaterialArguments {
   std::string file, name;
-  std::optional<double> youngs_modulus, poisson_ratio, density;
+  std::optional<double> youngs_modulus, poisson_ratio, density, loss_factor;
 };
 
 struct ModeArguments {
@@ -46,7 +46,7 @@ struct GeometryArguments {
 struct ResponseArguments {
   std::vector<std::string> residuals;
   double residual_megabytes = 32.0;
-  std::string skin;
+  std::string skin, sound;
   bool volume_block = false;
 };
 

@@ -40,6 +40,16 @@ Json json(const SkinReport& r) {
   return {{"handles", r.handles}, {"ground", r.ground}, {"spread", r.spread}, {"bytes", r.bytes}, {"modes", modes}};
 }
 
+Json json(const SoundReport& r) {
+  if (r.audible == 0) return nullptr;
+  return {{"modes", r.modes},
+          {"audible", r.audible},
+          {"overdamped", r.overdamped},
+          {"frequencies_hz", {r.lowest_hz, r.highest_hz}},
+          {"loss_factors", {r.lowest_loss, r.highest_loss}},
+          {"bytes", r.bytes}};
+}
+
 double least_share(const std::vector<CapturedLoad>& captured) {
   double least = 1.0;
   for (const CapturedLoad& load : captured) least = std::min(least, load.share);
@@ -151,7 +161,8 @@ Json json(const BodyReport& b) {
           {"collision_triangles", b.surfaces.collision_triangles},
           {"collision_error", b.surfaces.collision_error},
           {"residual_compliance", json(b.residual)},
-          {"skin", json(b.skin)}};
+          {"skin", json(b.skin)},
+          {"sound", json(b.sound)}};
 }
 
 template <class F>
@@ -247,6 +258,7 @@ void add_bake_seconds(Json& seconds, const std::vector<BodyReport>& bodies) {
   seconds["estimate"] = sum(bodies, [](const BodyReport& b) { return b.seconds.estimate; });
   seconds["residual"] = sum(bodies, [](const BodyReport& b) { return b.residual.seconds; });
   seconds["skin"] = sum(bodies, [](const BodyReport& b) { return b.skin.seconds; });
+  seconds["sound"] = sum(bodies, [](const BodyReport& b) { return b.sound.seconds; });
   seconds["embed"] = sum(bodies, [](const BodyReport& b) { return b.seconds.embed; });
 }
 
@@ -276,6 +288,11 @@ std::string bake_summary(const std::vector<BodyReport>& bodies) {
                           *b.residual.form == ResidualCompliance::Form::kFull ? "all pairs" : "single vertices",
                           1e-6 * static_cast<double>(b.residual.bytes), b.residual.seconds);
     if (b.skin.handles > 0) text += skin_summary(b.skin);
+    if (b.sound.audible > 0)
+      text +=
+          fmt::format("  sound of {} modes, {:.6g} to {:.6g} Hz, loss factors {:.2g} to {:.2g}: {:.2f} MB, {:.2g} s\n",
+                      b.sound.modes, b.sound.lowest_hz, b.sound.highest_hz, b.sound.lowest_loss, b.sound.highest_loss,
+                      1e-6 * static_cast<double>(b.sound.bytes), b.sound.seconds);
   }
   return text;
 }

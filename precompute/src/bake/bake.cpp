@@ -116,8 +116,10 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
       if (body_of(patch, mesh, component) == b) body.patches.push_back(patch);
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
-    result.asset.bodies.push_back(
-        internal::bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs));
+    internal::BakedBody baked =
+        internal::bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs);
+    result.asset.bodies.push_back(std::move(baked.model));
+    result.asset.sounds.push_back(std::move(baked.sound));
     result.asset.frequency_errors.push_back(result.bodies.back().modes.kept_errors);
   }
   return result;

@@ -9,6 +9,7 @@
 #include "bake/body_surfaces.h"
 #include "bake/modal_blocks.h"
 #include "bake/residual.h"
+#include "bake/sound.h"
 #include "fem/frequency_error.h"
 #include "fem/locking.h"
 #include "fem/mass_properties.h"
@@ -216,10 +217,10 @@ std::optional<ModalSkin> modal_skin(const ModalAnalysis& a, std::span<const Inde
 
 }  // namespace
 
-std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const Material> materials,
-                                            const BakeOptions& options, BodyReport& report, Warnings& warnings,
-                                            Jobs& jobs) {
+BakedBody bake_body(const BodyInput& in, std::span<const Material> materials, const BakeOptions& options,
+                    BodyReport& report, Warnings& warnings, Jobs& jobs) {
   const TetMesh& mesh = in.part.mesh;
+  if (options.sound.make) require_losses(in, materials, options);
   const MassProperties mass = mass_properties(mesh, materials);
   ModalAnalysisOptions wanted = options.analysis;
   wanted.keep_compliance = options.residual.surface || in.answers_loads();
@@ -262,7 +263,9 @@ std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const
   report.surfaces.render = surfaces.render.report();
   report.surfaces.collision = surfaces.touching().report();
   report.seconds.embed += seconds_since(store_start) - report.skin.seconds;
-  return model;
+  std::shared_ptr<const SoundModes> sound;
+  if (options.sound.make) sound = bake_sound(in, materials, surfaces.touching(), options, report.sound, warnings, jobs);
+  return {model, sound};
 }
 
 }  // namespace limber::internal

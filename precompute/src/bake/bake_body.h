@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "limber/model/sound_modes.h"
 #include "limber/precompute/bake.h"
 
 namespace limber::internal {
@@ -23,9 +24,13 @@ struct BodyInput {
   std::optional<SurfaceMesh> render, collision;
 };
 
+struct BakedBody {
+  std::shared_ptr<const ModalModel> model;
+  std::shared_ptr<const SoundModes> sound;  // null: not asked for
+};
+
 /// @param materials one per region of the whole mesh
-std::shared_ptr<const ModalModel> bake_body(const BodyInput& in, std::span<const Material> materials,
-                                            const BakeOptions& options, BodyReport& report, Warnings& warnings,
-                                            Jobs& jobs);
+BakedBody bake_body(const BodyInput& in, std::span<const Material> materials, const BakeOptions& options,
+                    BodyReport& report, Warnings& warnings, Jobs& jobs);
 
 }  // namespace limber::internal

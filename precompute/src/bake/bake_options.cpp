@@ -39,6 +39,16 @@ void SkinOptions::validate() const {
                           std::to_string(ModalSkin::kMaxHandles - 1));
 }
 
+void SoundOptions::validate() const {
+  if (modes < 1) throw InvalidArgument("SoundOptions::modes is " + std::to_string(modes) + ", expected 1 or more");
+  if (!(lowest_hz > 0.0 && lowest_hz < highest_hz && std::isfinite(highest_hz)))
+    throw InvalidArgument("SoundOptions: from " + std::to_string(lowest_hz) + " to " + std::to_string(highest_hz) +
+                          " Hz, expected two frequencies above 0, the lower one first");
+  if (loss_factor && !(*loss_factor > 0.0 && *loss_factor <= 1.0))
+    throw InvalidArgument("SoundOptions::loss_factor is " + std::to_string(*loss_factor) +
+                          ", expected above 0 and at most 1");
+}
+
 void BakeOptions::validate() const {
   if (materials.empty() && regions.empty()) throw InvalidArgument("bake: no material is given");
   damping.validate();
@@ -46,6 +56,7 @@ void BakeOptions::validate() const {
   limits.validate();
   residual.validate();
   skin.validate();
+  sound.validate();
   if (collision_triangles < 0)
     throw InvalidArgument("BakeOptions::collision_triangles is " + std::to_string(collision_triangles) +
                           ", expected 0 or more");

@@ -319,6 +319,8 @@ class FactoredBody final : public ElasticCompliance {
 void ModalAnalysisOptions::validate() const {
   if (modes < 0)
     throw InvalidArgument("ModalAnalysisOptions::modes is " + std::to_string(modes) + ", expected 0 or more");
+  if (!(below > 0.0))
+    throw InvalidArgument("ModalAnalysisOptions::below is " + std::to_string(below) + ", expected above 0");
   if (blas_threads < 0)
     throw InvalidArgument("ModalAnalysisOptions::blas_threads is " + std::to_string(blas_threads) +
                           ", expected 0 or more");
@@ -348,12 +350,21 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   ElasticInverse& inverse = factored->factor(order);
   watch.lap(analysis.seconds.factor);
 
+  ModalAnalysisOptions wanted = options;
+  if (std::isfinite(options.below)) {
+    EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
+    const int zeros = static_cast<int>(body.problem.N.cols());
+    analysis.elastic_below = counter.below(options.below * (body.mass_unit / body.stiffness_unit)) - zeros;
+    wanted.modes = std::min(options.modes, analysis.elastic_below);
+    watch.lap(analysis.seconds.certify);
+  }
+
   Eigen::Index kept = 0;
-  EigenPairs pairs = lowest_modes(body.problem, inverse, options.modes, lanczos_options(options), kept);
+  EigenPairs pairs = lowest_modes(body.problem, inverse, wanted.modes, lanczos_options(options), kept);
   watch.lap(analysis.seconds.iterate);
   if (options.certify) {
     EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
-    complete(body.problem, inverse, counter, pairs, options.modes, kept);
+    complete(body.problem, inverse, counter, pairs, wanted.modes, kept);
     confirm_zero_modes(body.problem, pairs, counter, warnings);
     analysis.accuracy.certified = true;
   }
@@ -365,7 +376,7 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   analysis.accuracy.orthogonality_max = orthogonality_error(body.problem, pairs);
   analysis.solves = inverse.solves();
   write_modes(body, pairs, analysis);
-  warn_of_shortfalls(analysis, options, kept, inverse.shift(), warnings);
+  warn_of_shortfalls(analysis, wanted, kept, inverse.shift(), warnings);
   if (options.keep_compliance) analysis.compliance = factored;
   watch.lap(analysis.seconds.iterate);
   return analysis;

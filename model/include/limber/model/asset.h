@@ -12,6 +12,7 @@
 
 #include "limber/model/joint_spec.h"
 #include "limber/model/modal_model.h"
+#include "limber/model/sound_modes.h"
 
 namespace limber {
 
@@ -38,13 +39,18 @@ struct Asset {
   /// polyhedron (docs/modal-analysis.md): above −1, or NaN where none is known, as of modes that join a basis for
   /// static loads. Empty, as a whole or for a body: not told.
   std::vector<std::vector<double>> frequency_errors{};
+  /// Per body the modes that one hears, at the vertices of its ModalModel::collision(). Empty, as a whole, or null for
+  /// a body: none.
+  std::vector<std::shared_ptr<const SoundModes>> sounds{};
+
+  const SoundModes* sound(std::size_t body) const { return body < sounds.size() ? sounds[body].get() : nullptr; }
 };
 
 /// The file's bytes. Equal assets give equal bytes, and asset_bytes(asset_from_bytes(b, …)) = b for bytes b of this
 /// version.
 /// @throws InvalidArgument if there is no body, a name repeats or is not UTF-8, a body has more modes than viewers take
 /// (kMaxMorphTargets), a joint or a pair names bodies that are not there or the same one twice, or a joint's numbers
-/// are not valid, or the file would have more than 4 GiB
+/// are not valid, sounds do not fit, or the file would have more than 4 GiB
 std::string asset_bytes(const Asset& asset);
 
 /// Writes whole or not at all. @throws InputError (disk), InvalidArgument

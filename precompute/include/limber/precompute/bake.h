@@ -98,6 +98,20 @@ struct SkinOptions {
   void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
+/// Modes that one hears (limber/model/sound_modes.h), at the vertices of the surface that touches. Each decays by the
+/// loss factors of its body's materials, weighted by its elastic energy in them:
+///
+///   ξ = ½ η √λ,   η = Σ_r η_r U_r / Σ_r U_r
+///
+/// or, where a material has none, by BakeOptions::damping.
+struct SoundOptions {
+  bool make = false;
+  Index modes = 1000;                                ///< most, lowest first; ≥ 1
+  double lowest_hz = 20.0, highest_hz = 20e3;        ///< what one hears; 0 < lowest < highest
+  std::optional<double> loss_factor = std::nullopt;  ///< η of the whole body in place of its materials'; above 0, to 1
+  void validate() const;                             ///< @throws InvalidArgument naming the field
+};
+
 /// Nodes per tet (limber/precompute/fem.h). Ten bend where four are far too stiff, at three to four times the work per
 /// tet.
 enum class Elements {
@@ -116,6 +130,7 @@ struct BakeOptions {
   SceneLimits limits = {};
   ResidualOptions residual = {};
   SkinOptions skin = {};
+  SoundOptions sound = {};
   /// Most triangles of the collision surface, by edge collapse; 0: as it is.
   Index collision_triangles = 0;
   bool volume_block = false;  ///< bake all nodes, so that any initial deformation can be given to the runtime
@@ -150,6 +165,17 @@ struct SkinReport {
   bool ground = false;      ///< the last handle holds the fixed nodes
   double spread = 0.0;      ///< rad, the largest: what SkinOptions::handles bounds
   std::vector<Mode> modes;  ///< the lowest three that turn anything
+  std::size_t bytes = 0;
+  double seconds = 0.0;
+};
+
+/// Result of SoundOptions.
+struct SoundReport {
+  Index modes = 0;                               ///< kept; 0 where none was asked for
+  Index audible = 0;                             ///< that the mesh has from lowest_hz to highest_hz
+  Index overdamped = 0;                          ///< of these, left out as they do not swing
+  double lowest_hz = 0.0, highest_hz = 0.0;      ///< of those kept
+  double lowest_loss = 0.0, highest_loss = 0.0;  ///< 2ξ/√λ of those kept
   std::size_t bytes = 0;
   double seconds = 0.0;
 };
@@ -210,6 +236,7 @@ struct BodyReport {
   BodySurfacesReport surfaces;
   ResidualReport residual;
   SkinReport skin;
+  SoundReport sound;
   BodySeconds seconds;
 };
 

@@ -25,7 +25,8 @@
 namespace limber {
 
 struct ModalAnalysisOptions {
-  int modes = 64;  ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
+  int modes = 64;             ///< elastic modes wanted; ≥ 0. A cluster of equal ones at the end is completed.
+  double below = kUnbounded;  ///< rad²/s², > 0: of these only as many as have λ < below, counted by inertia
   MassKind mass = MassKind::kLumped;
   bool certify = true;           ///< prove by inertia that no mode is missed
   bool keep_compliance = false;  ///< also return K⁺, at the memory of its factor
@@ -62,6 +63,7 @@ struct EigenSeconds {
 
 struct ModalAnalysis {
   BodyFreedom freedom;
+  int elastic_below = -1;                 ///< how many elastic modes have λ < options.below; −1: not asked for
   std::vector<double> eigenvalues;        ///< mechanisms (λ = 0 exactly) first, then elastic, ascending; rad²/s²
   std::vector<double> shapes;             ///< W, column-major 3n × k, kg^−½, zero at fixed nodes
   std::vector<double> mass_times_shapes;  ///< M W, the same shape, kg^½
