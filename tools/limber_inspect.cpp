@@ -15,6 +15,9 @@
 #include "limber/model/morph_targets.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_model.h"
+#include "limber/sound/radiation.h"
+#include "limber/sound/synthesizer.h"
+#include "limber/sound/wav.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -22,8 +25,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// A blow that is to be heard.
+struct RingArguments {
+  std::string output;
+  int body = 0, vertex = 0;
+  double impulse = 0.01, contact_time = 1e-4, seconds = 10.0;
+};
+
 struct Arguments {
   std::string asset, frequencies, clips;
+  RingArguments ring;
 };
 
 /// One mode as people and tables want it.
@@ -103,7 +114,30 @@ Json captured_report(const ModalModelData& d) {
 
 Json surface_report(const ModalSurface& s) { return {{"vertices", s.vertices()}, {"triangles", s.triangles.size()}}; }
 
-Json body_report(const ModalModel& model, const std::vector<double>& told) {
+Json sound_report(const SoundModes* sound) {
+  if (!sound) return {};
+  const auto hz = [](double lambda) { return std::sqrt(lambda) / (2.0 * std::numbers::pi); };
+  Json frequencies = Json::array(), losses = Json::array();
+  for (std::size_t k = 0; k < sound->eigenvalues.size(); ++k) {
+    frequencies.push_back(hz(sound->eigenvalues[k]));
+    losses.push_back(2.0 * sound->decays[k] / std::sqrt(sound->eigenvalues[k]));
+  }
+  return {{"modes", sound->modes()},
+          {"vertices", sound->vertices},
+          {"contact_modulus", sound->contact_modulus},
+          {"frequencies_hz", frequencies},
+          {"loss_factors", losses}};
+}
+
+std::string sound_text(const SoundModes* sound) {
+  if (!sound || sound->modes() == 0) return "";
+  const auto hz = [](double lambda) { return std::sqrt(lambda) / (2.0 * std::numbers::pi); };
+  return fmt::format("  sound           {} modes, {:.6g} to {:.6g} Hz, {:.2f} MB\n", sound->modes(),
+                     hz(sound->eigenvalues.front()), hz(sound->eigenvalues.back()),
+                     1e-6 * static_cast<double>(sizeof(float) * sound->shapes.size()));
+}
+
+Json body_report(const ModalModel& model, const std::vector<double>& told, const SoundModes* sound) {
   const ModalModelData& d = model.data();
   const Box box = box_of(d.render);
   Json inertia = Json::array();
@@ -134,6 +168,7 @@ Json body_report(const ModalModel& model, const std::vector<double>& told) {
       {"residual_compliance", residual_report(model)},
       {"captured", captured_report(d)},
       {"skin", d.skin ? Json{{"handles", d.skin->handles}} : Json()},
+      {"sound", sound_report(sound)},
       {"memory_bytes", shape_bytes(d)},
       {"modes", modes}};
 }
@@ -203,7 +238,8 @@ std::string errors_text(const std::vector<ModeLine>& lines) {
       100.0 * largest);
 }
 
-std::string body_text(const ModalModel& model, const std::vector<double>& told, std::size_t number) {
+std::string body_text(const ModalModel& model, const std::vector<double>& told, const SoundModes* sound,
+                      std::size_t number) {
   const ModalModelData& d = model.data();
   const Box box = box_of(d.render);
   const Vec3 size = box.high - box.low, center = d.center_of_mass + d.origin_in_input;
@@ -214,6 +250,7 @@ std::string body_text(const ModalModel& model, const std::vector<double>& told, 
   text += fmt::format("  centre of mass  ({:.6g}, {:.6g}, {:.6g}) m in the input mesh\n", center.x(), center.y(),
                       center.z());
   text += surfaces_text(model);
+  text += sound_text(sound);
   const std::vector<ModeLine> lines = mode_lines(model, told);
   text += errors_text(lines);
   text += fmt::format("  {:>5} {:>14} {:>14} {:>14} {:>14} {:>14}\n", "mode", "frequency Hz", "damped Hz",
@@ -286,6 +323,60 @@ void report_machine(const Asset& asset, Json& report) {
         {asset.bodies[static_cast<std::size_t>(a)]->name(), asset.bodies[static_cast<std::size_t>(b)]->name()});
 }
 
+/// The area vectors of a vertex's triangles, unit: outwards.
+Vec3 normal_at(const ModalSurface& surface, Index vertex) {
+  Vec3 sum = Vec3::Zero();
+  for (const Triangle& t : surface.triangles) {
+    if (std::find(t.begin(), t.end(), vertex) == t.end()) continue;
+    const auto corner = [&](int c) -> Vec3 {
+      return surface.rest[static_cast<std::size_t>(t[static_cast<std::size_t>(c)])].cast<double>();
+    };
+    sum += (corner(1) - corner(0)).cross(corner(2) - corner(0));
+  }
+  return sum.normalized();
+}
+
+/// A note at one metre, struck inwards at a vertex of the surface that touches.
+void ring(Program& program, const RingArguments& a, const Asset& asset) {
+  if (a.output.empty()) return;
+  constexpr double kRate = 48e3, kLoudest = 0.9;  // of full scale
+  const auto body = static_cast<std::size_t>(a.body);
+  if (body >= asset.bodies.size())
+    throw InvalidArgument(
+        fmt::format("--ring-body is {}, the asset has {} bodies, counted from 0", a.body, asset.bodies.size()));
+  const SoundModes* modes = asset.sound(body);
+  if (!modes)
+    throw InvalidArgument(
+        fmt::format("--ring: body \"{}\" has no sound; bake it with --sound", asset.bodies[body]->name()));
+  const ModalSurface& surface = asset.bodies[body]->collision();
+  if (a.vertex >= surface.vertices())
+    throw InvalidArgument(fmt::format("--ring-vertex is {}, the surface that touches has {} vertices, counted from 0",
+                                      a.vertex, surface.vertices()));
+  const auto gains = monopole_gains(*modes, surface.rest, surface.triangles);
+  Synthesizer synthesizer({.sample_rate = kRate, .channels = 1});
+  synthesizer.add_body(std::make_shared<ModalSound>(*modes, gains, kRate));
+  synthesizer.strike({.at = {.vertices = {a.vertex, a.vertex, a.vertex}},
+                      .impulse = -a.impulse * normal_at(surface, a.vertex),
+                      .contact_time = a.contact_time});
+  std::vector<float> samples;
+  constexpr std::size_t kPiece = 4800;
+  const auto most = static_cast<std::size_t>(std::lround(a.seconds * kRate));
+  while (!synthesizer.silent() && samples.size() < most) {
+    samples.resize(std::min(most, samples.size() + kPiece));
+    const auto begin = static_cast<std::size_t>(synthesizer.samples());
+    synthesizer.render(std::span(samples).subspan(begin));
+  }
+  double loudest = 0.0;
+  for (const float p : samples) loudest = std::max(loudest, std::abs(static_cast<double>(p)));
+  const double full = loudest > 0.0 ? loudest / kLoudest : 1.0;
+  for (float& p : samples) p = static_cast<float>(p / full);
+  program.write_file(a.output, wav_bytes(samples, 1, static_cast<int>(kRate)));
+  program.print(fmt::format("{}: {:.3g} s, loudest {:.3g} Pa at one metre, full scale {:.3g} Pa\n", a.output,
+                            static_cast<double>(samples.size()) / kRate, loudest, full));
+  program.report()["ring"] = {
+      {"seconds", static_cast<double>(samples.size()) / kRate}, {"loudest", loudest}, {"full_scale", full}};
+}
+
 std::string provenance_text(const Provenance& p) {
   if (p.input.empty() && p.tool.empty()) return "";
   return fmt::format("baked from {} by {}{}\n", p.input.empty() ? "?" : p.input, p.tool.empty() ? "?" : p.tool,
@@ -327,13 +418,14 @@ void inspect(Program& program, const Arguments& a) {
   report["bodies"] = Json::array();
   for (std::size_t i = 0; i < asset.bodies.size(); ++i) {
     const std::vector<double>& told = asset.frequency_errors[i];
-    program.print(body_text(*asset.bodies[i], told, i));
-    report["bodies"].push_back(body_report(*asset.bodies[i], told));
+    program.print(body_text(*asset.bodies[i], told, asset.sound(i), i));
+    report["bodies"].push_back(body_report(*asset.bodies[i], told, asset.sound(i)));
     warn(*asset.bodies[i], told, program.warnings());
   }
   program.print(joints_text(asset));
   report_machine(asset, report);
   if (!a.frequencies.empty()) program.write_file(a.frequencies, frequencies_csv(asset));
+  ring(program, a.ring, asset);
   if (!a.clips.empty()) program.write_file(a.clips, make_mode_clips(asset.bodies));
 }
 
@@ -353,5 +445,34 @@ int main(int argc, char** argv) {
       .add_option("--clips", arguments.clips,
                   "write one short clip a mode for any glTF viewer: bodies with a modal skin bend by it")
       ->type_name("FILE.glb");
+  RingArguments& note = arguments.ring;
+  program.options()
+      .add_option("--ring", note.output, "write the note of a blow, of a body baked with --sound, one metre away")
+      ->type_name("OUT.wav");
+  program.options()
+      .add_option("--ring-vertex", note.vertex, "vertex of the surface that touches, struck inwards")
+      ->type_name("V")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  program.options()
+      .add_option("--ring-body", note.body, "which body of the asset, from 0")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  program.options()
+      .add_option("--ring-impulse", note.impulse, "impulse of the blow")
+      ->type_name("N_S")
+      ->check(positive_number())
+      ->capture_default_str();
+  program.options()
+      .add_option("--ring-contact-time", note.contact_time, "how long it touches")
+      ->type_name("S")
+      ->check(CLI::Range(1e-6, 10.0))
+      ->capture_default_str();
+  program.options()
+      .add_option("--ring-seconds", note.seconds, "the most that is written")
+      ->type_name("S")
+      ->check(CLI::Range(0.01, 3600.0))
+      ->capture_default_str();
   return program.run(argc, argv, [&] { inspect(program, arguments); });
 }

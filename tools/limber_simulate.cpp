@@ -14,6 +14,8 @@
 #include "limber/scene/run.h"
 #include "limber/scene/scene_file.h"
 #include "limber/scene/scene_model.h"
+#include "limber/scene/soundtrack.h"
+#include "limber/sound/wav.h"
 #include "program.h"
 
 namespace limber::tools {
@@ -25,7 +27,9 @@ using Json = nlohmann::ordered_json;
 struct Arguments {
   std::string scene;
   std::int64_t steps = -1;
-  std::string record, energies, mode_energies, contacts, sensors, manifest;
+  std::string record, energies, mode_energies, contacts, sensors, manifest, sound;
+  double full_scale = 0.0;
+  SoundtrackOptions soundtrack;
   double record_frame_rate = 60.0;
   RecordingOptions recording;
   bool reconstruct = false;
@@ -62,6 +66,16 @@ void declare(CLI::App& app, Arguments& a) {
          "write what the scene is played without, why, and what each of it saves in bytes and time: it is played "
          "again with each put back")
       ->type_name("FILE.json");
+  app.add_option("--sound", a.sound, "write what one hears at the scene's microphones, of bodies baked with --sound")
+      ->type_name("OUT.wav");
+  app.add_option("--sound-rate", a.soundtrack.sample_rate, "samples per second")
+      ->type_name("HZ")
+      ->check(CLI::Range(8000, 384000))
+      ->capture_default_str();
+  app.add_option("--sound-full-scale", a.full_scale,
+                 "pressure that is full scale; default: 1/0.9 of the loudest sample")
+      ->type_name("PA")
+      ->check(positive_number());
   app.add_flag("--reconstruct", a.reconstruct, "also make positions and normals at every key, to time it");
 }
 
@@ -282,6 +296,35 @@ void record(Program& program, const Arguments& a, const Trajectory& trajectory) 
                             trajectory.key_interval, 1e-6 * static_cast<double>(recording.glb.size())));
 }
 
+void write_sound(Program& program, const Arguments& a, const Scene& scene, const std::map<std::string, Asset>& assets,
+                 const RunResult& result) {
+  if (a.sound.empty()) return;
+  program.progress().stage("sounding");
+  Soundtrack track = make_soundtrack(scene, assets, result, a.soundtrack);
+  constexpr double kLoudest = 0.9;  // of full scale
+  const double full = a.full_scale > 0.0 ? a.full_scale : track.loudest > 0.0 ? track.loudest / kLoudest : 1.0;
+  for (float& p : track.samples) p = static_cast<float>(p / full);
+  program.write_file(a.sound, wav_bytes(track.samples, track.channels, static_cast<int>(track.sample_rate)));
+  const double seconds = static_cast<double>(track.samples.size()) / track.channels / track.sample_rate;
+  program.report()["sound"] = {{"file", std::filesystem::path(a.sound).filename().string()},
+                               {"seconds", seconds},
+                               {"channels", track.channels},
+                               {"sample_rate", track.sample_rate},
+                               {"blows", track.blows},
+                               {"loudest", track.loudest},
+                               {"full_scale", full}};
+  program.print(fmt::format("  {}: {:.3g} s of {} blows, loudest {:.3g} Pa, full scale {:.3g} Pa\n", a.sound, seconds,
+                            track.blows, track.loudest, full));
+  if (track.loudest > full)
+    program.warnings().push_back(
+        fmt::format("the sound's loudest sample is {:.3g} of full scale: players cut it off; "
+                    "give a larger --sound-full-scale, or none",
+                    track.loudest / full));
+  if (track.silent_bodies > 0)
+    program.warnings().push_back(fmt::format(
+        "{} of the scene's bodies are silent: their assets were baked without --sound", track.silent_bodies));
+}
+
 void warn_of_limits(Program& program, const RunResult& r) {
   const ConstraintSummary& sum = r.constraints;
   if (sum.limit_steps + sum.failed_steps == 0) return;
@@ -338,7 +381,10 @@ void simulate(Program& program, const Arguments& a) {
   for (const auto& file : files_of(scene)) program.add_input(file);
   const bool sampled = !a.record.empty() || !a.energies.empty() || !a.mode_energies.empty() || a.reconstruct;
   const SceneUse use{.drawn = !a.record.empty() || a.reconstruct, .reached_into = false};
-  const SceneModels models = load_models(scene, use);
+  std::map<std::string, Asset> assets;
+  if (!a.sound.empty())
+    for (const auto& [name, file] : scene.assets) assets.emplace(name, read_asset(file));
+  const SceneModels models = a.sound.empty() ? load_models(scene, use) : make_models(scene, assets, use);
   program.warnings() = models.warnings;
   program.progress().stage("simulating");
   const RunResult result = run_scene(scene, models,
@@ -346,6 +392,7 @@ void simulate(Program& program, const Arguments& a) {
                                       .key_rate = sampled ? a.record_frame_rate * a.recording.slow_motion : 0.0,
                                       .reconstruct = a.reconstruct,
                                       .keep_contacts = !a.contacts.empty(),
+                                      .keep_blows = !a.sound.empty(),
                                       .progress = [&](double done) { program.progress().fraction(done); }});
   program.print(summary(scene, models, result));
   report_run(program.report(), scene, models, result);
@@ -354,6 +401,7 @@ void simulate(Program& program, const Arguments& a) {
   if (!a.mode_energies.empty()) program.write_file(a.mode_energies, mode_energies_csv(result.trajectory));
   if (!a.contacts.empty()) program.write_file(a.contacts, contacts_csv(result.trajectory));
   if (!a.sensors.empty()) program.write_file(a.sensors, sensors_csv(result.trajectory));
+  write_sound(program, a, scene, assets, result);
   write_manifest(program, a, scene, use);
   warn_of_limits(program, result);
   program.report()["seconds"] = {

@@ -56,6 +56,11 @@ Strike read_strike(const Json& value, const std::string& where, const Scene& sce
            .impulse = o.vec3("impulse"),
            .axes = read_axes(o),
            .where = where};
+  if (o.has("contact_time")) {
+    s.contact_time = o.number("contact_time");
+    if (!(s.contact_time >= 1e-6 && s.contact_time <= 10.0))
+      refuse(o.where("contact_time"), JsonObject::shown(o.at("contact_time")), "seconds from 1e-6 to 10");
+  }
   o.finish();
   return s;
 }
@@ -191,6 +196,19 @@ void require_joined_bodies(const Scene& scene, const SceneJoint& joint) {
   if (joint.a == joint.b) refuse(joint.where + ".b", internal::in_quotes(joint.b), "another body than \"a\"");
 }
 
+void read_microphones(const JsonObject& o, Scene& scene) {
+  constexpr std::size_t kMostMicrophones = 16;
+  if (!o.has("microphones")) return;
+  scene.microphones.clear();
+  o.for_each("microphones", [&](const Json& v, const std::string& w) {
+    const JsonObject microphone(v, w);
+    scene.microphones.push_back(microphone.vec3("position"));
+    microphone.finish();
+  });
+  if (scene.microphones.empty() || scene.microphones.size() > kMostMicrophones)
+    refuse(o.where("microphones"), std::to_string(scene.microphones.size()) + " of them", "1 to 16");
+}
+
 /// Whatever names a body is read when all are known.
 void read_actions(const JsonObject& o, Scene& scene) {
   const auto each = [&](const char* key, auto&& read) {
@@ -300,6 +318,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   if (scene.bodies.empty()) refuse(o.where("bodies"), "[]", "at least one body");
   require_unique_names(scene);
   read_actions(o, scene);
+  read_microphones(o, scene);
   o.finish();
   return scene;
 }

@@ -223,7 +223,12 @@ void ScenePlayer::Impl::strike() {
     const BodyId id = bodies[p.body];
     const SurfacePoint at = find_place(p.strike->at, world, id, p.strike->where);
     world.apply_impulse(id, at, p.strike->impulse, p.strike->axes, p.when.delay);
-    loads.strike_reports[p.order] = {scene.bodies[p.body].name, taken, p.when.delay, world.position(id, at)};
+    loads.strike_reports[p.order] = {scene.bodies[p.body].name,
+                                     taken,
+                                     p.when.delay,
+                                     world.position(id, at),
+                                     static_cast<std::size_t>(p.strike - scene.strikes.data()),
+                                     p.body};
   }
 }
 
@@ -233,7 +238,12 @@ void ScenePlayer::Impl::push() {
     const BodyId id = bodies[f.body];
     if (taken == f.first) {
       f.at = find_place(f.force->at, world, id, f.force->where);
-      loads.force_reports[f.order] = {scene.bodies[f.body].name, taken, 0.0, world.position(id, f.at)};
+      loads.force_reports[f.order] = {scene.bodies[f.body].name,
+                                      taken,
+                                      0.0,
+                                      world.position(id, f.at),
+                                      static_cast<std::size_t>(f.force - scene.forces.data()),
+                                      f.body};
     }
     world.apply_force(id, f.at, f.force->force, f.force->axes);
   }

@@ -25,6 +25,7 @@ struct RunOptions {
   bool reconstruct = false;                         ///< also reconstruct every body at every key, to time it
   bool reconstruct_every_step = false;              ///< the same after every step
   bool keep_contacts = false;                       ///< fill Trajectory::contacts
+  bool keep_blows = false;                          ///< fill Trajectory::blows
   std::function<void(double fraction)> progress{};  ///< called now and then; may be empty
   Jobs* jobs = nullptr;                             ///< null: serial
   void validate() const;                            ///< @throws InvalidArgument naming the field and its value
@@ -71,6 +72,20 @@ struct SensorRecord {
   bool began = true;       ///< false: left
 };
 
+/// Something that struck a body: a strike of the scene, or a contact that began with an approach.
+struct BlowRecord {
+  static constexpr std::size_t kNobody = ~std::size_t{0};
+  double time = 0.0;             ///< s: of the strike, or of the start of the step in which the contact began
+  std::size_t body = 0;          ///< which was struck, of Trajectory::bodies
+  std::size_t other = kNobody;   ///< which struck it, as ContactRecord numbers them; kNobody: a strike of the scene
+  Vec3 position = Vec3::Zero();  ///< world, m
+  Vec3 point = Vec3::Zero(), impulse = Vec3::Zero();  ///< the place and the impulse on the body, body frame, m and N·s
+  double contact_time = 0.0;                          ///< of a strike of the scene, s
+  /// Of a contact, of both bodies together as contact_time.h has them: m, kg, R, m, and v, m/s. A body without a radius
+  /// of its own (ContactSide) counts as a ball of its volume, a static as flat.
+  double mass = kUnbounded, radius = kUnbounded, approach = 0.0;
+};
+
 struct Trajectory {
   std::string scene;          ///< name
   double step = 0.0;          ///< s, of the simulation
@@ -81,6 +96,7 @@ struct Trajectory {
   std::vector<std::string> sensors;         ///< names
   std::vector<ContactRecord> contacts;      ///< of every step, with RunOptions::keep_contacts
   std::vector<SensorRecord> sensor_events;  ///< of every step
+  std::vector<BlowRecord> blows;            ///< by step, with RunOptions::keep_blows
 
   const std::string& name(std::size_t body) const;  ///< of a body or, from bodies.size() on, of a static shape
 };

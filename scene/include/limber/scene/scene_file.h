@@ -62,7 +62,8 @@ struct Strike {
   SurfacePlace at{};
   Vec3 impulse = Vec3::Zero();  ///< N·s
   Axes axes = Axes::kWorld;
-  std::string where{};  ///< place in the file, for messages
+  double contact_time = 1e-3;  ///< s, 1e-6 to 10: how long what strikes touches, for its sound (synthesizer.h)
+  std::string where{};         ///< place in the file, for messages
 };
 
 /// A force held over whole steps: every step whose start lies in [start, start + duration).
@@ -212,6 +213,8 @@ struct Scene {
   std::vector<HeldForce> forces{};
   std::vector<SceneHandle> handles{};
   std::vector<SceneJoint> joints{};
+  /// Where the scene is heard, world, m, one per channel: at most 16. Two ears by default.
+  std::vector<Vec3> microphones{{-0.1, -1.0, 1.0}, {0.1, -1.0, 1.0}};
 
   double duration() const { return step * static_cast<double>(steps); }
 };

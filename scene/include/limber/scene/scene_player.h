@@ -30,6 +30,8 @@ struct LoadReport {
   std::int64_t step = 0;      ///< 0-based step in which it began
   double delay = 0.0;         ///< s after that step's start (strikes)
   Vec3 point = Vec3::Zero();  ///< where it acted, world, m
+  std::size_t load = 0;       ///< which of Scene::strikes, or of Scene::forces
+  std::size_t number = 0;     ///< of the body in Scene::bodies
 };
 
 /// Record of a handle.

@@ -1,0 +1,138 @@
+#include "limber/scene/soundtrack.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "block_model.h"
+#include "limber/core/error.h"
+#include "limber/sound/contact_time.h"
+#include "limber/sound/radiation.h"
+#include "limber/sound/synthesizer.h"
+
+namespace limber {
+namespace {
+
+constexpr double kRate = 48e3;
+
+/// A block whose bending modes one hears at 300 (i+1)² Hz; without modes that move it.
+std::map<std::string, Asset> sounding_block() {
+  Asset asset = testing::block_asset(0);
+  const ModalSurface& surface = asset.bodies[0]->collision();
+  SoundModes modes{
+      .eigenvalues = {}, .decays = {}, .shapes = {}, .vertices = surface.vertices(), .contact_modulus = 1e7};
+  for (Index m = 0; m < 3; ++m) {
+    modes.eigenvalues.push_back(std::pow(2.0 * std::numbers::pi * 300.0 * (m + 1) * (m + 1), 2));
+    modes.decays.push_back(6.0 * (m + 1));
+    for (const Vec3f& r : surface.rest) {
+      const Vec3f w = testing::block_shape(r.cast<double>(), m).cast<float>();
+      modes.shapes.insert(modes.shapes.end(), {w.x(), w.y(), w.z()});
+    }
+  }
+  asset.sounds = {std::make_shared<SoundModes>(modes)};
+  return {{"block", asset}};
+}
+
+Scene heard_scene(const std::string& inside) {
+  return parse_scene(R"({"assets": {"block": "block.glb"}, )" + inside + "}", "\"test.json\"", "");
+}
+
+RunResult play_heard(const Scene& scene, const std::map<std::string, Asset>& assets) {
+  return run_scene(scene, make_models(scene, assets), {.key_rate = 0.0, .keep_blows = true});
+}
+
+// The block is turned by a right angle about x, so that body y is world z; (0, ½, ½) of it is a vertex.
+TEST(Soundtrack, AStrikeIsHeardFromItsTimeOnAsLoudAsMicrophonesAreNear) {
+  const auto assets = sounding_block();
+  const Scene scene = heard_scene(R"("step": 0.01, "steps": 30, "gravity": [0, 0, 0],
+    "bodies": [{"name": "b", "asset": "block", "orientation": {"axis": [1, 0, 0], "degrees": 90}}],
+    "strikes": [{"body": "b", "time": 0.0342, "at": {"nearest": [0, -0.5, 0.5]}, "impulse": [0, 0, -0.3],
+                 "contact_time": 0.002}],
+    "microphones": [{"position": [0, -0.5, 4.5]}, {"position": [0, -0.5, 8.5]}])");
+  const Soundtrack track = make_soundtrack(scene, assets, play_heard(scene, assets));
+  EXPECT_EQ(track.channels, 2);
+  EXPECT_EQ(track.blows, 1);
+  EXPECT_EQ(track.silent_bodies, 0);
+
+  const SoundModes& modes = *assets.at("block").sound(0);
+  const ModalSurface& surface = assets.at("block").bodies[0]->collision();
+  Synthesizer alone({.sample_rate = kRate, .channels = 1});
+  alone.add_body(std::make_shared<ModalSound>(modes, monopole_gains(modes, surface.rest, surface.triangles), kRate));
+  Index vertex = 0;
+  for (Index v = 0; v < surface.vertices(); ++v)
+    if ((surface.rest[v] - Vec3f(0.0f, 0.5f, 0.5f)).norm() < 1e-6f) vertex = v;
+  alone.strike(
+      {.at = {.vertices = {vertex, vertex, vertex}}, .impulse = {0, -0.3, 0}, .contact_time = 0.002, .delay = 0.0342});
+  std::vector<float> expected(track.samples.size() / 2);
+  alone.render(expected);
+  const double loudest = *std::ranges::max_element(expected);
+  constexpr double kSingle = 1e-6;
+  for (std::size_t n = 0; n < expected.size(); ++n) {
+    ASSERT_NEAR(track.samples[2 * n], expected[n] / 4.0, kSingle * loudest) << n;
+    ASSERT_NEAR(track.samples[2 * n + 1], expected[n] / 8.0, kSingle * loudest) << n;
+  }
+  EXPECT_GT(track.loudest, 0.1 * loudest);
+}
+
+TEST(Soundtrack, AFallIsSilentUntilTheBlockTouchesAndLastsAsHertzSays) {
+  const auto assets = sounding_block();
+  const Scene scene =
+      heard_scene(R"("step": 0.005, "steps": 120, "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 1.3]}])");
+  const RunResult run = play_heard(scene, assets);
+  const double fall = std::sqrt(2.0 * 0.8 / 9.80665), speed = 9.80665 * fall;
+  ASSERT_FALSE(run.trajectory.blows.empty());
+  for (const BlowRecord& blow : run.trajectory.blows) {
+    if (blow.time > fall) continue;  // it may rock
+    EXPECT_NEAR(blow.time, fall, scene.step);
+    EXPECT_NEAR(blow.approach, speed, 1e-3 * speed);
+    EXPECT_NEAR(blow.position.z(), 0.0, 0.05);
+    EXPECT_GT(blow.impulse.z(), 0.0);
+    // A contact at the corner of a block feels less than its mass.
+    EXPECT_GT(blow.mass, 0.1 * testing::kBlockMass);
+    EXPECT_LT(blow.mass, testing::kBlockMass);
+    EXPECT_NEAR(blow.radius, std::cbrt(3.0 * 2.0 / (4.0 * std::numbers::pi)), 1e-12);
+  }
+  const Soundtrack track = make_soundtrack(scene, assets, run);
+  const auto first = std::ranges::find_if(track.samples, [](float p) { return p != 0.0f; }) - track.samples.begin();
+  EXPECT_NEAR(static_cast<double>(first) / track.channels / kRate, fall, scene.step);
+  // It rings on after the scene's end, until it is silent.
+  EXPECT_GT(track.samples.size(), static_cast<std::size_t>(2 * scene.duration() * kRate));
+  EXPECT_LT(std::abs(track.samples.back()), 20e-6);
+}
+
+TEST(Soundtrack, TheSameSceneHasTheSameBits) {
+  const auto assets = sounding_block();
+  const Scene scene =
+      heard_scene(R"("step": 0.005, "steps": 100, "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 0.9], "copies": {"count": [2, 1, 1], "spacing": [3, 1, 1]}}])");
+  const RunResult run = play_heard(scene, assets);
+  EXPECT_TRUE(make_soundtrack(scene, assets, run).samples ==
+              make_soundtrack(scene, assets, play_heard(scene, assets)).samples);
+}
+
+TEST(Soundtrack, BodiesWithoutASoundAreToldAndSilent) {
+  const std::map<std::string, Asset> assets{{"block", testing::block_asset(0)}};
+  const Scene scene =
+      heard_scene(R"("step": 0.005, "steps": 100, "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 0.9]}])");
+  const Soundtrack track = make_soundtrack(scene, assets, play_heard(scene, assets));
+  EXPECT_EQ(track.silent_bodies, 1);
+  EXPECT_EQ(track.blows, 0);
+  EXPECT_EQ(track.loudest, 0.0);
+}
+
+TEST(Soundtrack, MicrophonesAndContactTimesOutOfRangeAreToldWithTheirPlace) {
+  const std::string body = R"("step": 0.01, "steps": 10, "bodies": [{"name": "b", "asset": "block"}])";
+  EXPECT_EQ(heard_scene(body).microphones.size(), 2u);
+  EXPECT_THROW(heard_scene(body + R"(, "microphones": [])"), InputError);
+  EXPECT_THROW(heard_scene(body + R"(, "microphones": [[0, 0, 1]])"), InputError);
+  EXPECT_THROW(heard_scene(body + R"(, "strikes": [{"body": "b", "time": 0, "at": {"vertex": 0}, "impulse": [0, 0, 1],
+                                "contact_time": 0}])"),
+               InputError);
+}
+
+}  // namespace
+}  // namespace limber
