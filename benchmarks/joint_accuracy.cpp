@@ -1,7 +1,7 @@
 // joint_accuracy: how often joints are read right, and how well.
 //   run:  build/benchmark/bin/joint_accuracy --large          (time for 50 parts of together 500,000 triangles)
 //         build/benchmark/bin/joint_accuracy [--method fixed-ratio] [--contacts hulls] [--only ASSEMBLY] [--class TEXT] [--verbose]
-//         build/benchmark/bin/joint_accuracy --limits [--samples N] [--only ASSEMBLY] [--class TEXT] [--verbose]
+//         build/benchmark/bin/joint_accuracy --limits [--only ASSEMBLY] [--class TEXT] [--verbose]
 //         build/benchmark/bin/joint_accuracy --change [--only ASSEMBLY]
 //   see:  type accuracy and axis and origin errors per class of variants, for the assemblies that thresholds were chosen
 //         on and for the held-out ones; the confusion matrix; every failure with --verbose. With --limits instead: the
@@ -227,8 +227,6 @@ int main(int argc, char** argv) {
       limits = true;
     else if (arg == "--change")
       change = true;
-    else if (arg == "--samples" && i + 1 < argc)
-      ranges.motion.samples = std::atoi(argv[++i]);
     else if (arg == "--method" && i + 1 < argc && std::string_view(argv[i + 1]) == "fixed-ratio")
       options.slippage.method = limber::SlippageMethod::kFixedRatio, ++i;
     else if (arg == "--contacts" && i + 1 < argc && std::string_view(argv[i + 1]) == "hulls")
@@ -238,12 +236,11 @@ int main(int argc, char** argv) {
     else if (arg == "--class" && i + 1 < argc)
       group_text = argv[++i];
     else
-      return std::fprintf(
-                 stderr,
-                 "joint_accuracy: seen \"%s\", expected --limits, --change, --samples N, --verbose, --only ASSEMBLY, "
-                 "--class TEXT, "
-                 "--contacts NAME or --method NAME\n",
-                 argv[i]),
+      return std::fprintf(stderr,
+                          "joint_accuracy: seen \"%s\", expected --limits, --change, --verbose, --only ASSEMBLY, "
+                          "--class TEXT, "
+                          "--contacts NAME or --method NAME\n",
+                          argv[i]),
              2;
   }
   if (change) return limber::assemblies::run_change(options, only);

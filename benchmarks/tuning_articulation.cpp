@@ -167,26 +167,10 @@ std::vector<Number> sheet_of(Tuning& tuning) {
           {"ranges.limits.pairs_growth", kPlain, kRanges, &r.limits.pairs_growth},
           {"ranges.limits.contact_margin", kPlain, kRanges, &r.limits.contact_margin},
           {"ranges.limits.cone_refinements", kPlain, kRanges, &r.limits.cone_refinements},
-          {"ranges.limits.cone_samples", kPlain, kRanges, &r.limits.cone_samples},
-          {"ranges.limits.cone_fewest", kPlain, kRanges, &r.limits.cone_fewest},
           {"ranges.against.slope", kPlain, kRanges, &r.against.slope},
           {"ranges.against.one_sided", kPlain, kRanges, &r.against.one_sided},
-          {"ranges.against.near_axis", kPlain, kRanges, &r.against.near_axis},
-          {"ranges.against.slope_margin", kFactor, kRanges, &r.against.slope_margin},
-          {"ranges.against.overlap_growth", kFactor, kRanges, &r.against.overlap_growth},
-          {"ranges.points.sharp_edge", kCosine, kRanges, &r.points.sharp_edge},
-          {"ranges.points.edge_points", kPlain, kRanges, &r.points.edge_points},
-          {"ranges.points.corner_points", kPlain, kRanges, &r.points.corner_points},
-          {"ranges.points.walked_faces", kPlain, kRanges, &r.points.walked_faces},
-          {"ranges.points.directions", kPlain, kRanges, &r.points.directions},
-          {"ranges.points.most_steps", kPlain, kRanges, &r.points.most_steps},
-          {"ranges.points.pattern_turn", kPlain, kRanges, &r.points.pattern_turn},
-          {"ranges.points.finest_blocked", kPlain, kRanges, &r.points.finest_blocked},
-          {"ranges.points.finest_touching", kPlain, kRanges, &r.points.finest_touching},
-          {"ranges.points.seeds", kPlain, kRanges, &r.points.seeds},
-          {"ranges.points.seeds_behind", kPlain, kRanges, &r.points.seeds_behind},
-          {"ranges.points.most_followed", kPlain, kRanges, &r.points.most_followed},
-          {"ranges.points.helix_steps", kPlain, kRanges, &r.points.helix_steps}};
+          {"ranges.against.curve_turn", kPlain, kRanges, &r.against.curve_turn},
+          {"ranges.against.overlap_growth", kFactor, kRanges, &r.against.overlap_growth}};
 }
 
 /// Public options of detection and ranges.
@@ -204,7 +188,6 @@ std::vector<Number> options_of(Numbers& n) {
           {"SlippageOptions::threshold", kPlain, kJoints, &n.detection.slippage.threshold},
           {"SlippageOptions::ratio", kPlain, kRatio, &n.detection.slippage.ratio},
           {"FreeMotionOptions::crease_angle", kPlain, kRanges, &n.ranges.motion.crease_angle},
-          {"FreeMotionOptions::samples", kPlain, kRanges, &n.ranges.motion.samples},
           {"RangeOptions::min_rotation", kPlain, kRanges, &n.ranges.min_rotation},
           {"RangeOptions::min_translation", kPlain, kRanges, &n.ranges.min_translation},
           {"RangeOptions::cone_directions", kPlain, kRanges, &n.ranges.cone_directions}};

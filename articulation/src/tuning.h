@@ -257,7 +257,7 @@ struct LimitsTuning {
   /// Part of the smaller body's diagonal, 5e-3 … 0.05: δ at most, where the caller gives none. `limber-joints
   /// --overlap`.
   double largest_overlap = 2e-2;
-  /// Part of δ, 1e-4 … 0.1: how far beside a crack an orbit is asked in its place.
+  /// Part of `tolerance`, 1e-4 … 0.1: δ of surfaces that do not touch as drawn, for round-off.
   double nudge = 1e-2;
   /// Pairs of bodies in either sense that are looked at first, and how many times as many next; 2 … 16. A matter of
   /// time: 900 pins on a plate take 46 s, and 134 s with all at once (docs/range-of-motion.md, "Many parts").
@@ -266,59 +266,26 @@ struct LimitsTuning {
   double contact_margin = 0.02;
   /// Halvings of the step, 2 … 10, in which the narrowest swing of a cone is sought: 30° / 2⁵ = 1° with 12 directions.
   std::size_t cone_refinements = 4;
-  /// A divisor, 1 … 10: many directions of a cone share the work of finding obstacles. A matter of time.
-  std::size_t cone_samples = 3;
-  /// Samples, 50 … 1,000: a swing of the cone has no fewer; the least that FreeMotionOptions::samples allows.
-  std::size_t cone_fewest = 100;
 };
 
-/// Surfaces that stand against the motion.
+/// Surfaces that slide, and those that stand against the motion.
 struct AgainstTuning {
   /// Tangent, 1 … 5: the steepest slope at which any surface is a stop. Beyond, what the motion runs against all over
   /// is one. Case: the collar of a screw.
   double slope = 2.0;
   /// Sine, 0.005 … 0.05: a face that the motion runs against by less than 1° may be noise.
   double one_sided = 0.0175;
-  /// Part of a radian, 0.2 … 1: so near to the axis that δ is a larger part of a turn, nothing is told.
-  double near_axis = 0.5;
-  /// 1 … 1.5: by what surfaces that curve may exceed what their slope explains. Not measured.
-  double slope_margin = 1.1;
+  /// rad, 0.02 … 0.3: pieces of curves in the orbit plane turn by no more; they leave their chord by less than 1/16 of
+  /// the sagitta of a facet of 32.
+  double curve_turn = 0.1;
   /// 1.05 … 2: steps in which δ grows to the overlap as read. δ is too generous by one step at most.
   double overlap_growth = 1.25;
-};
-
-/// Points of the orbit, and the way downhill.
-struct OrbitPointsTuning {
-  /// Cosine, 0.8 … 0.99: edges that bend by more (20°) get points of their own.
-  double sharp_edge = 0.94;
-  /// A divisor, 1 … 10: half as many points on sharp edges as on faces; at most `corner_points` times as many as these
-  /// at their ends, 1 … 10. Half as many points of all kinds changed no verdict of 16 segments
-  /// (docs/range-of-motion.md).
-  std::size_t edge_points = 2, corner_points = 2;
-  /// Faces, 4 … 100, that one step over the surface may cross.
-  std::size_t walked_faces = 16;
-  /// Directions of the pattern, 4 … 12, and steps in all, 100 … 2,000.
-  std::size_t directions = 6, most_steps = 400;
-  /// rad, not a divisor of a turn: from pattern to pattern, so that the directions do not stay the same.
-  double pattern_turn = 0.4;
-  /// Part of δ, 0.01 … 0.5: the finest step to where an orbit is blocked first.
-  double finest_blocked = 0.1;
-  /// Part of the δ to start with, 0.01 … 0.5: the finest step to where surfaces first meet.
-  double finest_touching = 0.05;
-  /// Points from which the ends of the reachable interval are followed, 2 … 20, and those of free intervals behind an
-  /// obstacle, 1 … 10, which matter less.
-  std::size_t seeds = 6, seeds_behind = 2;
-  /// Blocked intervals, 3 … 50: of more, rows of parts or noise, only the nearest ends are followed. A matter of time.
-  std::size_t most_followed = 8;
-  /// Steps, 20 … 200, of regula falsi to where a helix meets a plane; it ends sooner at 1e-14.
-  std::size_t helix_steps = 60;
 };
 
 /// Ranges of motion: where a path is blocked.
 struct RangesTuning {
   LimitsTuning limits{};
   AgainstTuning against{};
-  OrbitPointsTuning points{};
 };
 
 struct Tuning {

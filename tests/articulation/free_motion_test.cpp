@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <algorithm>
+#include <limits>
 #include <numbers>
+#include <random>
 
 #include "constants.h"
 #include "limber/core/error.h"
@@ -19,7 +21,7 @@ using Kind = MotionPath::Kind;
 using testing::kDegree;
 using testing::kPi;
 
-constexpr double kRightAngle = kPi / 2.0;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Ends are followed down to a tenth of the tolerance across, which is 2e-4 of the smaller body's diagonal.
 constexpr double kEnd = 1e-4;
 
@@ -127,8 +129,7 @@ TEST(FreeMotion, ScrewStopsWhereItsHeadArrives) {
   SurfaceMesh screw = parts::cylinder({1, 0, 0}, Vec3::UnitX(), 1.0, 8.0, 32);
   shapes::append(parts::cylinder({5.5, 0, 0}, Vec3::UnitX(), 2.0, 1.0, 32), screw);
   const MotionPath path{.kind = Kind::kScrew, .axis = Vec3::UnitX(), .pitch = 0.5};
-  const FreeMotion m =
-      turn(screw, block, path, facet_sagitta(block, Vec3::Constant(-10), Vec3::Constant(10)), {.samples = 400});
+  const FreeMotion m = turn(screw, block, path, facet_sagitta(block, Vec3::Constant(-10), Vec3::Constant(10)));
   EXPECT_NEAR(m.reachable.low, (2.0 - 5.0) / 0.5, 10 * kEnd);
   EXPECT_EQ(m.reachable.high, std::numeric_limits<double>::infinity());
 }
@@ -142,7 +143,7 @@ TEST(FreeMotion, CollarThatLiesAlongAScrewsMotionStopsItAllTheSame) {
   shapes::append(plain(assemblies::lathe({{0, 3}, {2, 3}, {2, 4.5}, {0, 4.5}}, 32)), bolt);
   const SurfaceMesh nut = plain(assemblies::thread(1.0, 0.3, pitch, -1, 1, 32, 0.5, true, 1.9));
   const MotionPath path{.kind = Kind::kScrew, .axis = Vec3::UnitZ(), .pitch = pitch};
-  const FreeMotion m = turn(nut, bolt, path, 0.1, {.largest_overlap = 0.1, .samples = 100});
+  const FreeMotion m = turn(nut, bolt, path, 0.1, {.largest_overlap = 0.1});
   EXPECT_NEAR(m.tolerance, 0.1, 2e-3);
   EXPECT_NEAR(m.reachable.high, (3.0 - 1.0) / pitch, 10 * kEnd);
   EXPECT_EQ(m.reachable.low, -std::numeric_limits<double>::infinity());
@@ -206,6 +207,67 @@ TEST(FreeMotion, ThinWiresThatCrossAreNotMissed) {
   EXPECT_NEAR(m.reachable.high, 1.0 - (0.05 + 0.05 * (std::cos(1.0) + std::sin(1.0))) / 14.0, 1e-3);
 }
 
+/// A prism over a regular polygon, anywhere.
+SurfaceMesh random_prism(std::mt19937& generator) {
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const auto number = [&] { return unit(generator); };
+  const int sides = 3 + static_cast<int>(3.0 * (number() + 1.0));
+  const double radius = 0.1 + 0.1 * (number() + 1.0), half = 0.4 + 0.3 * (number() + 1.0);
+  const double x = 0.7 * number(), y = 0.7 * number(), z = 0.4 * number();
+  const Vec3 turned(2.0 * number(), 2.0 * number(), 2.0 * number());
+  return parts::placed({x, y, z}, turned, 1.0)(parts::cylinder(Vec3::Zero(), Vec3::UnitZ(), radius, 2.0 * half, sides));
+}
+
+/// True if two convex bodies overlap: no normal, and no product of two edges, parts them.
+bool convex_overlap(const SurfaceMesh& a, const SurfaceMesh& b) {
+  std::vector<Vec3> edges[2], axes;
+  for (const SurfaceMesh* body : {&a, &b})
+    for (const Triangle& t : body->triangles) {
+      const Vec3 &p = body->vertices[t[0]], &q = body->vertices[t[1]], &r = body->vertices[t[2]];
+      axes.push_back((q - p).cross(r - p));
+      for (const Vec3& e : {Vec3(q - p), Vec3(r - q), Vec3(p - r)}) edges[body == &b].push_back(e);
+    }
+  for (const Vec3& e : edges[0])
+    for (const Vec3& f : edges[1]) axes.push_back(e.cross(f));
+  return std::none_of(axes.begin(), axes.end(), [&](const Vec3& axis) {
+    if (axis.norm() < 1e-9) return false;
+    Interval of[2] = {{kInfinite, -kInfinite}, {kInfinite, -kInfinite}};
+    for (const SurfaceMesh* body : {&a, &b})
+      for (const Vec3& p : body->vertices) {
+        Interval& i = of[body == &b];
+        i = {std::min(i.low, axis.dot(p)), std::max(i.high, axis.dot(p))};
+      }
+    return of[0].high <= of[1].low || of[1].high <= of[0].low;
+  });
+}
+
+TEST(FreeMotion, RandomPrismsStopWhereSeparatingAxesSayTheyOverlap) {
+  std::mt19937 generator(7);
+  int ends = 0;
+  for (int pair = 0; pair < 60; ++pair) {
+    const SurfaceMesh a = random_prism(generator), b = random_prism(generator);
+    const auto overlap_at = [&](double t) { return convex_overlap(parts::placed(Vec3::Zero(), {0, 0, t}, 1.0)(a), b); };
+    if (overlap_at(0.0)) continue;
+    // Facets that other parts slide on do not matter to these, which do not touch.
+    for (const double sagitta : {0.0, 0.01}) {
+      const Interval free = turn(a, b, kAboutZ, sagitta).reachable;
+      const bool open = free.open();
+      const double low = open ? -kPi : free.low, high = open ? kPi : free.high;
+      for (int i = 1; i < 50; ++i) EXPECT_FALSE(overlap_at(low + (high - low) * i / 50)) << pair;
+      if (open) continue;
+      const auto stops_within = [&](double end, double sense) {
+        for (const double beyond : {1e-6, 1e-5, 1e-4, 1e-3})
+          if (overlap_at(end + sense * beyond)) return true;
+        return false;
+      };
+      EXPECT_TRUE(stops_within(high, 1.0)) << pair << ": " << high;
+      EXPECT_TRUE(stops_within(low, -1.0)) << pair << ": " << low;
+      ends += 2;
+    }
+  }
+  EXPECT_GT(ends, 80);
+}
+
 TEST(FreeMotion, ScaleAndPlaceDoNotMatter) {
   const SurfaceMesh block = shapes::box({5, 5, -1}, {8, 9, 1});
   const double expected = std::atan2(5.0, 8.0) - std::asin(1.0 / std::sqrt(89.0));
@@ -225,7 +287,7 @@ TEST(FreeMotion, WrongArgumentsAreToldInOneLine) {
   EXPECT_THROW(free_motion({}, {&body, 1}, kAboutZ), InvalidArgument);
   EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, {.axis = {0, 0, 2}}), InvalidArgument);
   EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, {.kind = Kind::kScrew}), InvalidArgument);
-  EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, kAboutZ, {.samples = 3}), InvalidArgument);
+  EXPECT_THROW(free_motion({&body, 1}, {&body, 1}, kAboutZ, {.tolerance = -1.0}), InvalidArgument);
 }
 
 }  // namespace

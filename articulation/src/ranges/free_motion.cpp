@@ -52,8 +52,6 @@ void FreeMotionOptions::validate() const {
                           std::to_string(largest_overlap) + ", expected numbers >= 0");
   if (!(crease_angle >= 0.0 && crease_angle <= kPi))
     throw InvalidArgument("FreeMotionOptions: crease_angle is " + std::to_string(crease_angle) + ", expected 0 to pi");
-  if (samples < 100 || samples > 1'000'000)
-    throw InvalidArgument("FreeMotionOptions: samples is " + std::to_string(samples) + ", expected 100 to 1000000");
 }
 
 namespace {
@@ -93,13 +91,11 @@ FreeMotion free_motion(std::span<const OrbitBody> moving, std::span<const OrbitB
   const double size = std::min(diagonal(moving), diagonal(fixed));
   const auto given = [](double value, double otherwise) { return value > 0.0 ? value : otherwise; };
   const double least = given(options.tolerance, tuning().ranges.limits.tolerance * size);
-  Tolerances t{.least = least,
-               .facets = sagitta,
-               .across = least,
-               .largest_overlap = given(options.largest_overlap, tuning().ranges.limits.largest_overlap * size)};
-  t.largest_overlap = std::max(t.largest_overlap, least + sagitta);
-  t.nudge = tuning().ranges.limits.nudge * least;
-
+  const double overlap = given(options.largest_overlap, tuning().ranges.limits.largest_overlap * size);
+  const Tolerances t{.across = least,
+                     .facets = sagitta,
+                     .largest_overlap = std::max(overlap, least + sagitta),
+                     .nudge = tuning().ranges.limits.nudge * least};
   return motion_among_nearest(PathFrame(path), moving, fixed, t, options);
 }
 

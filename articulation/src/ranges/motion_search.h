@@ -11,15 +11,13 @@
 namespace limber::internal {
 
 struct Tolerances {
-  double least = 0.0;            ///< δ to start with, length
-  double facets = 0.0;           ///< what δ is more because of facets, length
-  double across = 0.0;           ///< δ, length
-  double largest_overlap = 0.0;  ///< length
-  double nudge = 0.0;            ///< length, far below both
+  double across = 0.0;           ///< δ to start with, without what facets add, length
+  double facets = 0.0;           ///< what facets that slide on each other add, length
+  double largest_overlap = 0.0;  ///< as drawn, length
+  double nudge = 0.0;            ///< of round-off, length, far below both
 };
 
 /// The free intervals of (1) in free_motion.h. MotionStop::body is a number in `fixed`.
-/// @param t across: to start with, without what facets add; it grows to the overlap found as read
 FreeMotion search_motion(const PathFrame& frame, std::span<const OrbitBody> moving, std::span<const OrbitBody> fixed,
                          const Tolerances& t, const FreeMotionOptions& options);
 

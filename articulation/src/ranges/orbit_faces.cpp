@@ -6,10 +6,8 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
-#include <tuple>
 
 #include "constants.h"
-#include "limber/core/disjoint_sets.h"
 #include "tuning.h"
 
 namespace limber::internal {
@@ -269,95 +267,7 @@ void set_one_sided(const PathFrame& frame, double crease, std::vector<OrbitFace>
     }
 }
 
-/// Cosine between the normal and the motion, at the corner where it is the most.
-double most_along(const PathFrame& frame, const OrbitFace& face) {
-  double most = 0.0;
-  for (const Vec3& corner : face.corners)
-    if (const double along = face.normal.dot(frame.direction(corner)); std::abs(along) > std::abs(most)) most = along;
-  return most;
-}
-
-/// Faces that continue one another and face the motion the same way. @param along per face; 0: it counts for nothing
-DisjointSets patches_of(const std::vector<OrbitFace>& faces, const std::vector<double>& along, double crease) {
-  const double continues = std::cos(crease);
-  const FacesAround around(faces);
-  DisjointSets patches(faces.size());
-  for (std::size_t f = 0; f < faces.size(); ++f)
-    for (const Index vertex : faces[f].vertices)
-      for (const Index other : around.of(vertex)) {
-        const auto o = static_cast<std::size_t>(other);
-        if (o < f && along[o] * along[f] > 0.0 && faces[o].normal.dot(faces[f].normal) > continues)
-          patches.join(other, static_cast<Index>(f));
-      }
-  return patches;
-}
-
-/// How much of the orbits a patch covers.
-struct PatchExtent {
-  Eigen::AlignedBox3d box{};
-  double across = 0.0;  ///< area as the motion sees it
-  bool aslant = false;  ///< some of it lies along the motion, such as a screw's collar: it covers more than it shows
-  bool narrower_than(double width) const { return !aslant && across < width * box.diagonal().norm(); }
-};
-
-std::vector<SharpEdge> sharp_edges(const SurfaceMesh& surface) {
-  const double flat = tuning().ranges.points.sharp_edge;
-  std::vector<SharpEdge> all;
-  all.reserve(3 * surface.triangles.size());
-  std::vector<Vec3> normals;
-  normals.reserve(surface.triangles.size());
-  for (const Triangle& t : surface.triangles) {
-    const auto number = static_cast<Index>(normals.size());
-    const Vec3 &p = surface.vertices[t[0]], &q = surface.vertices[t[1]], &r = surface.vertices[t[2]];
-    normals.push_back((q - p).cross(r - p).stableNormalized());
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto [a, b] = std::minmax(t[i], t[(i + 1) % 3]);
-      all.push_back({a, b, number});
-    }
-  }
-  std::sort(all.begin(), all.end(), [](const SharpEdge& x, const SharpEdge& y) {
-    return std::tie(x.a, x.b, x.triangle) < std::tie(y.a, y.b, y.triangle);
-  });
-  std::vector<SharpEdge> sharp;
-  for (std::size_t i = 0; i < all.size();) {
-    std::size_t end = i;
-    while (end < all.size() && all[end].a == all[i].a && all[end].b == all[i].b) ++end;
-    if (end - i != 2 || normals[static_cast<std::size_t>(all[i].triangle)].dot(
-                            normals[static_cast<std::size_t>(all[i + 1].triangle)]) < flat)
-      sharp.insert(sharp.end(), all.begin() + static_cast<std::ptrdiff_t>(i),
-                   all.begin() + static_cast<std::ptrdiff_t>(end));
-    i = end;
-  }
-  std::stable_sort(sharp.begin(), sharp.end(),
-                   [](const SharpEdge& x, const SharpEdge& y) { return x.triangle < y.triangle; });
-  return sharp;
-}
-
 }  // namespace
-
-void mark_narrow(const PathFrame& frame, double slope, double width, double crease, std::vector<OrbitFace>& faces) {
-  const double stands = 1.0 / std::hypot(1.0, slope);
-  std::vector<double> along;
-  for (const OrbitFace& face : faces) {
-    along.push_back(most_along(frame, face));
-    if (!face.one_sided && std::abs(along.back()) < stands) along.back() = 0.0;
-  }
-  if (std::all_of(along.begin(), along.end(), [](double a) { return a == 0.0; })) return;
-  DisjointSets patches = patches_of(faces, along, crease);
-  std::vector<PatchExtent> extents(faces.size());
-  const auto extent_of = [&](std::size_t face) -> PatchExtent& {
-    return extents[static_cast<std::size_t>(patches.root(static_cast<Index>(face)))];
-  };
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    if (along[f] == 0.0) continue;
-    PatchExtent& extent = extent_of(f);
-    const auto& c = faces[f].corners;
-    for (const Vec3& corner : c) extent.box.extend(corner);
-    extent.across += 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm() * std::abs(along[f]);
-    extent.aslant = extent.aslant || std::abs(along[f]) < stands;
-  }
-  for (std::size_t f = 0; f < faces.size(); ++f) faces[f].narrow = along[f] != 0.0 && extent_of(f).narrower_than(width);
-}
 
 FacesAround::FacesAround(const std::vector<OrbitFace>& faces) {
   Index vertices = 0;
@@ -400,7 +310,6 @@ OrbitBody orbit_body(const MotionBody& body) {
   }
   for (const Vec3& p : body.surface->vertices) out.box.extend(p);
   out.tree = tree_of(*body.surface, body.caps);
-  out.sharp = std::make_shared<const std::vector<SharpEdge>>(sharp_edges(*body.surface));
   return out;
 }
 

@@ -13,21 +13,14 @@
 
 namespace limber::internal {
 
-/// An edge whose two triangles bend by more than 20 degrees, or that has not two of them.
-struct SharpEdge {
-  Index a = 0, b = 0;  ///< vertices of the surface
-  Index triangle = 0;  ///< one that has it
-};
-
 /// A surface made ready for any path.
 struct OrbitBody {
   const SurfaceMesh* surface = nullptr;
   bool closed = true;
   bool inside_out = false;  ///< closed, and its triangles are clockwise seen from outside
   Eigen::AlignedBox3d box{};
-  std::span<const Triangle> caps{};                       ///< over small holes
-  std::shared_ptr<const std::vector<SharpEdge>> sharp{};  ///< ascending in the triangle; copies share them
-  std::shared_ptr<const CornerTree<3>> tree{};            ///< of all triangles, with caps; copies share it
+  std::span<const Triangle> caps{};             ///< over small holes
+  std::shared_ptr<const CornerTree<3>> tree{};  ///< of all triangles, with caps; copies share it
 
   std::size_t triangles() const { return surface->triangles.size() + caps.size(); }
   const Triangle& triangle(std::size_t i) const {
@@ -55,9 +48,6 @@ struct OrbitFace {
   /// the motion carries along itself the normal velocity changes its sign; so a face that lies along the motion is told
   /// from one that slides.
   bool one_sided = false;
-  /// It stands against the motion, but with all that continues it is narrower than what counts as an obstacle: a sliver
-  /// between faces that slide, and no stop.
-  bool narrow = false;
   OrbitSector sector{};  ///< about the axis
   OrbitBox box{};        ///< of the orbits that meet it
 };
@@ -78,13 +68,9 @@ class FacesAround {
   std::vector<Index> first_{0}, faces_;
 };
 
-/// Sets OrbitFace::narrow. @param slope at which a face stands, see OrbitPiece. @param width across the motion, length
-/// @param crease angle below which a face continues another, rad
-void mark_narrow(const PathFrame& frame, double slope, double width, double crease, std::vector<OrbitFace>& faces);
-
 /// The triangles of either side that orbits within `margin` of the other's triangles meet. All others are of no use:
 /// nothing of the other side passes them. A screw's come twice where their helices reach beyond a turn.
-/// @param crease see mark_narrow()
+/// @param crease angle below which a face continues another, rad
 std::pair<std::vector<OrbitFace>, std::vector<OrbitFace>> faces_that_meet(const PathFrame& frame,
                                                                           std::span<const OrbitBody> moving,
                                                                           std::span<const OrbitBody> fixed,

@@ -47,6 +47,12 @@ PathFrame::PathFrame(const MotionPath& path) : kind_(path.kind), pitch_(path.pit
   axes_.col(2) = path.axis.cross(y);
 }
 
+Vec3 PathFrame::moved(const Vec3& p, double t) const {
+  if (kind_ == Kind::kTranslation) return {p.x() + t, p.y(), p.z()};
+  const double c = std::cos(t), s = std::sin(t);
+  return {kind_ == Kind::kScrew ? p.x() + pitch_ * t : p.x(), c * p.y() - s * p.z(), s * p.y() + c * p.z()};
+}
+
 Orbit PathFrame::orbit_of(const Vec3& p) const {
   if (kind_ == Kind::kTranslation) return {{p.y(), p.z()}, p.x()};
   return {{p.tail<2>().norm(), p.x()}, std::atan2(p.z(), p.y())};
@@ -92,9 +98,15 @@ double PathFrame::speed(const Orbit& orbit) const {
   return 1.0;
 }
 
-Vec3 PathFrame::direction(const Vec3& p) const {
+Vec3 PathFrame::velocity(const Vec3& p) const {
   if (kind_ == Kind::kTranslation) return Vec3::UnitX();
-  return Vec3(kind_ == Kind::kScrew ? pitch_ : 0.0, -p.z(), p.y()).stableNormalized();
+  return {kind_ == Kind::kScrew ? pitch_ : 0.0, -p.z(), p.y()};
+}
+
+Vec3 PathFrame::direction(const Vec3& p) const {
+  const Vec3 v = velocity(p);
+  const double speed = v.norm();
+  return speed > 0.0 ? Vec3(v / speed) : v;
 }
 
 std::pair<Vec3, Vec3> PathFrame::box_of(const Eigen::AlignedBox3d& box) const {

@@ -32,6 +32,7 @@ class PathFrame {
   explicit PathFrame(const MotionPath& path);
   Vec3 to_path(const Vec3& p) const { return axes_.transpose() * (p - origin_); }
   Vec3 from_path(const Vec3& p) const { return axes_ * p + origin_; }
+  Vec3 moved(const Vec3& p, double t) const;  ///< φ_t(p), path coordinates
   Orbit orbit_of(const Vec3& p) const;        ///< p in path coordinates
   OrbitBox plane_point(const Vec3& p) const;  ///< p in path coordinates: its place in the orbit plane, no screw's
   OrbitBox box_of(const Orbit& orbit) const;  ///< a point
@@ -41,6 +42,7 @@ class PathFrame {
   /// Holds the orbits that meet a box, given in the input's coordinates; a screw's along x from −1e300 to 1e300.
   OrbitBox box_around(const Eigen::AlignedBox3d& box) const;
   double speed(const Orbit& orbit) const;  ///< length per unit of t
+  Vec3 velocity(const Vec3& p) const;      ///< of p per unit of t, path coordinates
   Vec3 direction(const Vec3& p) const;     ///< of motion at p, path coordinates, unit; 0 on the axis of a rotation
   MotionPath::Kind kind() const { return kind_; }
   double pitch() const { return pitch_; }

@@ -166,9 +166,7 @@ class Trial {
     // Tolerances belong to the two parts that are joined, not to all that hangs on them.
     if (options.tolerance == 0.0) options.tolerance = tuning().ranges.limits.tolerance * size_;
     if (options.largest_overlap == 0.0) options.largest_overlap = tuning().ranges.limits.largest_overlap * size_;
-    // A tolerance that was found before has the facets in it.
-    const double sagitta = options.tolerance == options.largest_overlap ? 0.0 : sagitta_;
-    FreeMotion m = internal::free_motion(moving_, fixed_, path, options, sagitta);
+    FreeMotion m = internal::free_motion(moving_, fixed_, path, options, sagitta_);
     for (MotionStop* stop : {&m.low, &m.high})
       if (stop->body >= 0) stop->body = sides_.fixed[static_cast<std::size_t>(stop->body)];
     return m;
@@ -200,15 +198,10 @@ std::size_t path_count(JointSpec joint, const RangeOptions& options) {
 }
 
 /// The least swing of the x axis over all directions. Swings by an angle about cos ψ y + sin ψ z.
-/// @param tolerance as it came out for the rotations: overlap as read is the same for all paths
-double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, const RangeOptions& options,
+double cone_of(const Trial& trial, const JointSpec& joint, const RangeOptions& options,
                const std::function<void()>& path_done) {
   FreeMotionOptions motion = options.motion;
-  motion.tolerance = motion.largest_overlap = tolerance;
   motion.reachable_only = true;
-  const internal::RangesTuning& t = tuning().ranges;
-  motion.samples = static_cast<int>(
-      std::max(t.limits.cone_fewest, static_cast<std::size_t>(motion.samples) / t.limits.cone_samples));
   const auto swing = [&](double psi) {
     const Vec3 axis = std::cos(psi) * axis_of(joint, 1) + std::sin(psi) * axis_of(joint, 2);
     const double high = trial.along(rotation(joint, axis), motion).reachable.high;
@@ -221,7 +214,7 @@ double cone_of(const Trial& trial, const JointSpec& joint, double tolerance, con
     if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
   if (least == kInfinity) return least;
   double d = 0.5 * step;
-  for (std::size_t i = 0; i < t.limits.cone_refinements; ++i, d *= 0.5)
+  for (std::size_t i = 0; i < tuning().ranges.limits.cone_refinements; ++i, d *= 0.5)
     for (const double psi : {at - d, at + d})
       if (const double angle = swing(psi); angle < least) least = angle, at = psi;
   return std::min(least, std::numbers::pi);
@@ -365,9 +358,7 @@ RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodi
     out.reasons.push_back(range_sentence(assembly, out.freedoms.back()));
   }
   if (out.joint.type == JointType::kBall) {
-    double tolerance = 0.0;
-    for (const FreedomRange& f : out.freedoms) tolerance = std::max(tolerance, f.motion.tolerance);
-    out.joint.limits.cone = cone_of(trial, out.joint, tolerance, options, path_done);
+    out.joint.limits.cone = cone_of(trial, out.joint, options, path_done);
     out.reasons.push_back("swing of x: " +
                           (out.joint.limits.cone < kInfinity
                                ? "at least " + degrees_text(out.joint.limits.cone) + " in every direction."

@@ -1,22 +1,21 @@
 /// @file limber/articulation/free_motion.h
 /// How far a rigid body can go along one path before it meets another: exact first contacts, all free intervals.
 ///
-/// A path is a rotation about a line, a translation, or a screw. Each point p of the moving body M follows its orbit
-/// φ_t(p), a circle, a line or a helix; t = 0 as drawn. The position t is blocked where φ_t(M) overlaps the fixed body
-/// F:
+/// A path is a rotation about a line, a translation, or a screw φ_t; t = 0 as drawn. The position t is blocked where
+/// φ_t(M), the moving bodies, overlaps F, the fixed ones:
 ///
-///   B = ⋃_{p ∈ ∂M} {t : φ_t(p) ∈ F}  ∪  ⋃_{q ∈ ∂F} {t : φ_{−t}(q) ∈ M}                         (1)
+///   B = ⋃ {t : φ_t(a) crosses b} over the triangles a of M and b of F, and where one holds the other       (1)
 ///
-/// An orbit meets a triangle in closed form (circle, line) or at bracketed roots (helix), so each set in (1) is a list
-/// of intervals without a step size, and nothing thin is stepped over. p and q run over samples of both surfaces; the
-/// ends of B are then followed over the surface to where it is met first.
+/// Two triangles begin to cross where a corner meets a face or an edge an edge: roots in closed form (rotation,
+/// translation) or bracketed (screw). So B is a list of intervals without samples and without a step size.
 ///
-/// Parts that fit touch everywhere. So an overlap counts only if it is wider than δ across the motion: `tolerance`,
-/// grown to the overlap as drawn and by the sagitta of the facets, up to `largest_overlap`. Along the motion the stop
-/// is where the surfaces first meet. Not seen: what is thinner than 2 δ across the motion, or within 4 δ of the axis.
+/// Parts that fit touch everywhere. So surfaces that touch as drawn and slide do not stop each other to within δ:
+/// `tolerance`, with the sagitta of the facets, grown to the overlap as drawn up to `largest_overlap`. All else stops
+/// where it first meets. Not seen: what sticks out by less than δ from surfaces that slide on each other.
 ///
 /// Closed surfaces bound solids; open ones are sheets that block where they are crossed, and hide what lies behind.
-/// Derivation: docs/derivations/orbits.md. Source: [X09] 3.3 bisects by collision tests; orbits are not in the paper.
+/// Derivation: docs/derivations/orbits.md. Source: [X09] 3.3 bisects by collision tests; exact crossings are not in the
+/// paper.
 #pragma once
 
 #include <span>
@@ -48,10 +47,9 @@ struct MotionBody {
 struct FreeMotionOptions {
   double tolerance = 0.0;        ///< δ to start with, length; ≥ 0; 0: 2e-4 of the smaller body's diagonal
   double largest_overlap = 0.0;  ///< δ at most, length; ≥ 0; 0: 2e-2 of the smaller body's diagonal
-  int samples = 1000;            ///< wanted on each body's surface; 100 … 1,000,000. Time grows linearly
   /// rad (50°), 0 … π: a face that bends by less from the next one continues it. As in ContactRegionOptions.
   double crease_angle = kDefaultCreaseAngle;
-  bool reachable_only = false;  ///< saves the work of following the ends of `others`
+  bool reachable_only = false;  ///< saves the work of finding `others`
   void validate() const;        ///< @throws InvalidArgument naming the field
 };
 
@@ -73,7 +71,7 @@ struct FreeMotion {
 
 /// @param moving, fixed in one frame
 /// @param sagitta of the facets where the two slide on each other, length, ≥ 0: see facet_sagitta()
-/// Time: sorting of the triangles in reach, and `samples` · log(triangles).
+/// Time: sorting of the triangles in reach, and pairs of them whose orbits meet.
 /// @throws InvalidArgument if an option is out of range, the axis is not a unit vector, or a screw has no pitch
 FreeMotion free_motion(std::span<const MotionBody> moving, std::span<const MotionBody> fixed, const MotionPath& path,
                        const FreeMotionOptions& options = {}, double sagitta = 0.0);
