@@ -138,11 +138,8 @@ int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointT
 JointConstraint::Placement::Placement(const Vec3& from, const Vec3& to, const Mat3& axes_a, const Mat3& axes_b)
     : o_a(from), o_b(to), d(axes_a.transpose() * (to - from)), R_a(axes_a), R_b(axes_b) {}
 
-JointConstraint::Instant::Instant(const FrameInstant& of_a, const FrameInstant& of_b)
-    : a(of_a), b(of_b), place(a.position, b.position, a.axes, b.axes) {}
-
 JointConstraint::Instant JointConstraint::instant(const BodyStates& states, StepTime when) const {
-  return {a_.at(states, when), b_.at(states, when)};
+  return {.a = a_.at(states, when), .b = b_.at(states, when)};
 }
 
 JointConstraint::Placement JointConstraint::place(const BodyStates& states, StepTime when) const {
@@ -346,7 +343,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
 /// What the rows are to be met by is told at the step's start.
 void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& rows) {
   const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
-                at{a_.between(start.a, end.a), b_.between(start.b, end.b)};
+                at{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
   for (const RowPlan& plan : rows_) {
     FrameMeasure of_a, of_b;
     if (!measure_straight(at, plan, of_a, of_b))
@@ -417,9 +414,10 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
   force_.coordinate = {};
   force_.actuation = {};
   force_.plan.resize(plan_.size());
+  const double by = 1.0 / step_;
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
-    const double force = impulses[i] / step_;
+    const double force = by * impulses[i];
     if (i < force_.plan.size()) force_.plan[i] = force;
     if (plan.law >= Law::kMotor) force_.actuation[actuator(plan)] = force;
     if (plan.coordinate >= 0)

@@ -163,7 +163,7 @@ JointFrame MaterialFrame::place(const BodyStates& states, StepTime when) const {
   const RigidTransform& pose = states.pose(body_, when);
   const Mat3 R = to_matrix(pose.q);
   JointFrame at{.axes = R * rest_.axes};
-  if (displacement_.empty() && anchors_.empty()) {
+  if (displacement_.empty()) {
     at.origin = pose.p + R * rest_.origin;
     return at;
   }
@@ -200,9 +200,14 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   if (body_ < 0) return at;
   const RigidTransform& pose = states.pose(body_, when);
   const Mat3 R = to_matrix(pose.q);
-  const std::span<const double> z = states.amplitudes(body_, when);
-  at.bends = !displacement_.empty() || !anchors_.empty();
   at.origin = pose.p;
+  at.bends = !displacement_.empty();
+  if (!at.bends) {
+    at.position = pose.p + R * rest_.origin;
+    at.axes = R * rest_.axes;
+    return at;
+  }
+  const std::span<const double> z = states.amplitudes(body_, when);
   at.R_BW = R.transpose();
   at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
   at.axes_B = rest_.axes;
@@ -222,8 +227,8 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
                   .position = 0.5 * (start.position + end.position),
                   .axes = 0.5 * (start.axes + end.axes),
                   .origin = 0.5 * (start.origin + end.origin)};
-  if (body_ < 0) return at;
   at.bends = start.bends;
+  if (!at.bends) return at;
   at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
   at.axes_B = 0.5 * (start.axes_B + end.axes_B);
   if (rotation_.empty()) return at;
@@ -240,18 +245,13 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
   return at;
 }
 
-void FrameInstant::add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
-  to.linear += n;
-  to.angular += (p - origin).cross(n);
-  if (!bends) return;
+void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
   to.shift_B += R_BW * n;
   to.turn_B += R_BW * (p - position).cross(n);
 }
 
 /// J_l Θ Δz is ε to third order; what is missing is made up for along Δz.
-void FrameInstant::add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
-  to.angular += axes.col(axis).cross(u);
-  if (!bends) return;
+void FrameInstant::bend_axis(int axis, const Vec3& u, FrameMeasure& to) const {
   const Vec3 a_B = axes_B.col(axis).cross(R_BW * u), about = turning.transpose() * a_B;
   to.turn_B += about;
   to.along_bend += inverse_square * (cayley.dot(a_B) - turned.dot(about));
@@ -263,10 +263,8 @@ void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
   to.turn_B += turning.transpose() * (R_BW * a);
 }
 
-RowSide MaterialFrame::side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
-  modal.clear();
-  if (body_ < 0) return {};
-  modal.resize(displacement_.size());
+void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
+  modal.assign(displacement_.size(), 0.0);
   if (anchors_.empty())
     for (std::size_t i = 0; i < modal.size(); ++i) modal[i] = displacement_[i].dot(measure.shift_B);
   else if (!measure.shift_B.isZero(0.0))
@@ -277,7 +275,6 @@ RowSide MaterialFrame::side(const FrameInstant& at, const FrameMeasure& measure,
                                   z1 = at.states.amplitudes(body_, StepTime::kEnd);
     for (std::size_t i = 0; i < modal.size(); ++i) modal[i] += measure.along_bend * (z1[i] - z0[i]);
   }
-  return {body_, measure.linear, measure.angular, modal};
 }
 
 std::vector<SurfacePoint> patch_around(const ModalModel& model, SurfacePoint::Surface surface, const Vec3& center,

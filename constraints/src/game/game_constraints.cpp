@@ -57,8 +57,12 @@ void GameConstraints::make_rows(const BodyStates& states, const GameBodies& bodi
 void GameConstraints::solve(GameBodies& bodies) {
   if (rows_.groups().empty()) return;
   rows_.add_what_leads(bodies);
-  slopes_.assign(rows_.coordinates(), 0.0);
-  rows_.add_energy_slopes(bodies, system_.frames(), bodies.free_motion(), {}, slopes_);
+  if (std::ranges::any_of(rows_.groups(), [](const GameGroup& group) { return group.constraint->counts_work(); })) {
+    slopes_.assign(rows_.coordinates(), 0.0);
+    rows_.add_energy_slopes(bodies, system_.frames(), bodies.free_motion(), {}, slopes_);
+  } else {
+    slopes_.clear();
+  }
   rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
   int round = 0;
   do {
@@ -159,7 +163,7 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   system_.solve<kColumns>(right_);
   find_shares();
   displace(bodies);
-  rows_.add_energy_slopes(bodies, system_.frames(), bodies.motion(), speed_, slopes_);
+  if (!slopes_.empty()) rows_.add_energy_slopes(bodies, system_.frames(), bodies.motion(), speed_, slopes_);
 }
 
 /// Right-hand sides of zeros, and the gaps as they are now.
@@ -263,7 +267,7 @@ void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, 
     forces_.clear();
     for (const GameRow& row : rows_.of(group)) forces_.push_back(rows_.length() * row.force);
     group.constraint->accept(states, forces_);
-    group.constraint->accept_work(work_of(group));
+    if (group.constraint->counts_work()) group.constraint->accept_work(work_of(group));
   }
   if (last && !rows_.groups().empty()) close_step(states, bodies);
 }

@@ -56,11 +56,11 @@ class GameConstraints {
 
   GameRows rows_;
   RowSystem system_;
-  std::vector<double> motion_, moved_;          // of the bodies, in the rows' coordinates: all of it; what the rows did
-  std::vector<double> slopes_;                  // of energies, before all impulses of the substep and after them
-  std::vector<double> taken_, given_;           // energies by component
-  std::vector<double> right_, asked_;           // of the system
-  std::vector<double> speed_, place_, pushes_;  // in the rows' coordinates
+  std::vector<double> motion_, moved_;  // of the bodies, in the rows' coordinates: all of it; what the rows did
+  std::vector<double> slopes_;  // of energies, before all impulses of the substep and after them; none: nobody asks
+  std::vector<double> taken_, given_;             // energies by component
+  std::vector<double> right_, asked_;             // of the system
+  std::vector<double> speed_, place_, pushes_;    // in the rows' coordinates
   std::vector<double> gaps_, forces_, products_;  // of a group: scratch
   std::vector<Closing> closings_;                 // by component
   double residual_ = 0.0;

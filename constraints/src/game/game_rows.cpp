@@ -11,26 +11,6 @@ namespace {
 using Hold = GameRow::Hold;
 constexpr double kRecoverySpeed = kConstraintsTuning.small_steps.recovery_speed;
 
-/// to += J x of rows of eight coordinates. @param count of rows; 0: `rows`
-template <std::size_t count>
-void add_products(const double* numbers, std::size_t rows, std::size_t stride, const double* x, double* to) {
-  for (std::size_t i = 0; i < (count == 0 ? rows : count); ++i, numbers += stride) {
-    double sum[2] = {};
-    for (std::size_t l = 0; l < 8; l += 2)
-      for (std::size_t m = 0; m < 2; ++m) sum[m] += numbers[l + m] * x[l + m];
-    to[i] += sum[0] + sum[1];
-  }
-}
-
-/// x += Jᵀ f of such rows.
-template <std::size_t count>
-void add_sums(const double* numbers, std::size_t rows, std::size_t stride, const double* forces, double* x) {
-  double sum[8] = {};
-  for (std::size_t i = 0; i < (count == 0 ? rows : count); ++i, numbers += stride)
-    for (std::size_t l = 0; l < 8; ++l) sum[l] += forces[i] * numbers[l];
-  for (std::size_t l = 0; l < 8; ++l) x[l] += sum[l];
-}
-
 }  // namespace
 
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
@@ -272,28 +252,27 @@ void GameRows::unscale(const GameBodies& bodies, std::span<const std::int32_t> f
 }
 
 void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
-  std::fill_n(product, group.count, 0.0);
-  for (const GameSide& side : group.sides)
-    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
-      const double *numbers = numbers_.data() + side.at + k, *from = x.data() + 8 * side.body + k;
-      const auto stride = static_cast<std::size_t>(side.coordinates);
-      if (group.count == 3)
-        add_products<3>(numbers, 3, stride, from, product);
-      else
-        add_products<0>(numbers, group.count, stride, from, product);
+  for (std::size_t i = 0; i < group.count; ++i) {
+    double sum[2] = {};
+    for (const GameSide& side : group.sides) {
+      const double *row = numbers(side, static_cast<std::int32_t>(i)), *from = x.data() + 8 * side.body;
+      for (std::int32_t k = 0; k < side.coordinates; k += 8)
+        for (int l = 0; l < 8; l += 2)
+          for (int m = 0; m < 2; ++m) sum[m] += row[k + l + m] * from[k + l + m];
     }
+    product[i] = sum[0] + sum[1];
+  }
 }
 
 void GameRows::add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const {
   for (const GameSide& side : group.sides)
     for (std::int32_t k = 0; k < side.coordinates; k += 8) {
-      const double* numbers = numbers_.data() + side.at + k;
-      double* to = x.data() + 8 * side.body + k;
-      const auto stride = static_cast<std::size_t>(side.coordinates);
-      if (group.count == 3)
-        add_sums<3>(numbers, 3, stride, forces, to);
-      else
-        add_sums<0>(numbers, group.count, stride, forces, to);
+      double *to = x.data() + 8 * side.body + k, sum[8];
+      std::copy_n(to, 8, sum);
+      const double* row = numbers(side, 0) + k;
+      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
+        for (int l = 0; l < 8; ++l) sum[l] += forces[i] * row[l];
+      std::copy_n(sum, 8, to);
     }
 }
 

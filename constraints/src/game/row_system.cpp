@@ -17,19 +17,16 @@ double dot(const double* a, const double* b, std::int32_t count) {
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/// to += a bᵀ of `count` rows each of a group whose rows all hold, one after the other.
-template <std::size_t count>
-void add_all_products(const double* a, const double* b, std::int32_t coordinates, double* to) {
-  for (std::int32_t k = 0; k < coordinates; k += 8)
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t j = 0; j < count; ++j) {
-        const double *row = a + static_cast<std::size_t>(coordinates) * i + k,
-                     *column = b + static_cast<std::size_t>(coordinates) * j + k;
-        double sum[2] = {};
-        for (std::size_t l = 0; l < 8; l += 2)
-          for (std::size_t m = 0; m < 2; ++m) sum[m] += row[l + m] * column[l + m];
-        to[count * i + j] += sum[0] + sum[1];
-      }
+/// to += a bᵀ of three rows each, one after the other: of the lower part alone, if a is b.
+template <bool lower>
+void add_ball_products(const double* a, const double* b, std::int32_t coordinates, double* to) {
+  double sum[3][3][2] = {};
+  for (std::int32_t k = 0; k < coordinates; k += 2)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < (lower ? i + 1 : 3); ++j)
+        for (int m = 0; m < 2; ++m) sum[i][j][m] += a[coordinates * i + k + m] * b[coordinates * j + k + m];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < (lower ? i + 1 : 3); ++j) to[3 * i + j] += sum[i][j][0] + sum[i][j][1];
 }
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
@@ -110,7 +107,9 @@ void RowSystem::add_products(const GameRows& rows, std::size_t of_rows, std::siz
   const std::span<const std::int32_t> r = met(of_rows), c = met(of_columns);
   const auto is_ball = [&](std::size_t group) { return sizes_[group] == 3 && rows.groups()[group].count == 3; };
   if (is_ball(of_rows) && is_ball(of_columns))
-    return add_all_products<3>(rows.numbers(a, 0), rows.numbers(b, 0), a.coordinates, to);
+    return (of_rows == of_columns ? add_ball_products<true> : add_ball_products<false>)(rows.numbers(a, 0),
+                                                                                        rows.numbers(b, 0),
+                                                                                        a.coordinates, to);
   for (const std::int32_t i : r)
     for (const std::int32_t j : c) *to++ += dot(rows.numbers(a, i), rows.numbers(b, j), a.coordinates);
 }

@@ -111,7 +111,9 @@ class Constraint {
   virtual void slid(std::span<const double> /*slip*/) {}
   /// @param impulses of the rows over the step that ends now, N·s, held part included
   virtual void accept(const BodyStates& states, std::span<const double> impulses) = 0;
-  /// After accept(), by small steps: what those impulses did on the bodies, J.
+  /// Whether accept_work() wants to know.
+  virtual bool counts_work() const { return false; }
+  /// After accept(), by small steps: what those impulses did on the bodies, J. Where counts_work().
   virtual void accept_work(double /*work*/) {}
 };
 

@@ -57,6 +57,7 @@ class Handle final : public Constraint {
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
   void accept(const BodyStates& states, std::span<const double> impulses) override;
+  bool counts_work() const override { return true; }
   void accept_work(double work) override { work_ += work - part_work_; }
 
  private:

@@ -76,9 +76,8 @@ class JointConstraint final : public Constraint {
     Mat3 R_a, R_b;
   };
   struct Instant {
-    Instant(const FrameInstant& of_a, const FrameInstant& of_b);
     FrameInstant a, b;
-    Placement place;
+    Placement place{a.position, b.position, a.axes, b.axes};
   };
   /// What a row measures: d_i; one axis of b across one of a; q_i of the vector part of Q's quaternion, twice; the
   /// screw's d_x − pitch q; an angle q; how far x_b is from x_a.

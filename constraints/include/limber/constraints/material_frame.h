@@ -39,7 +39,7 @@ struct FrameInstant {
   Vec3 position = Vec3::Zero();  ///< of the frame's origin, world, m
   Mat3 axes = Mat3::Identity();  ///< world
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
-  Mat3 R_BW = Mat3::Identity();  ///< in the middle R'ᵀ (BodyStates)
+  Mat3 R_BW = Mat3::Identity();  ///< in the middle R'ᵀ (BodyStates); this and what follows where modes show
   Mat3 axes_B = Mat3::Identity();
   Mat3 turning = Mat3::Identity();  ///< what the axes turn by in the body per unit of Θ dz
   Vec3 turned = Vec3::Zero();       ///< Θ z; in the middle Θ Δz,
@@ -49,11 +49,22 @@ struct FrameInstant {
 
   /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
-  void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const;
+  void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
+    to.linear += n;
+    to.angular += (p - origin).cross(n);
+    if (bends) bend_point(p, n, to);
+  }
   /// Adds what u · (an axis of the frame) changes by, u held: axis × u · its turn. @param axis 0 to 2. @param u world
-  void add_axis(int axis, const Vec3& u, FrameMeasure& to) const;
+  void add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
+    to.angular += axes.col(axis).cross(u);
+    if (bends) bend_axis(axis, u, to);
+  }
   /// Adds the angular velocity along a. @param a world
   void add_turn(const Vec3& a, FrameMeasure& to) const;
+
+ private:
+  void bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const;
+  void bend_axis(int axis, const Vec3& u, FrameMeasure& to) const;
 };
 
 class MaterialFrame {
@@ -88,7 +99,12 @@ class MaterialFrame {
   /// The middle, from both ends.
   FrameInstant between(const FrameInstant& start, const FrameInstant& end) const;
   /// One side of a row. @param modal room for k numbers; the result refers to it
-  RowSide side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const;
+  RowSide side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
+    if (body_ < 0) return {};
+    if (displacement_.empty()) return {body_, measure.linear, measure.angular, {}};
+    write_modal(at, measure, modal);
+    return {body_, measure.linear, measure.angular, modal};
+  }
 
  private:
   friend struct StateFields;
@@ -113,6 +129,7 @@ class MaterialFrame {
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
   Vec3 place(const BodyShape& shape) const;
+  void write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const;
   void add_rows(const BodyShape& shape, const Vec3& f_B, std::span<double> g) const;
   void add_rows(const BodyStates& states, StepTime when, const Vec3& f_B, std::span<double> g) const;
 
