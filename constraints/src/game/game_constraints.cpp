@@ -22,16 +22,6 @@ double cut_off(GameRow& row, double force) {
   return row.cut ? std::clamp(force, row.lower, row.upper) : force;
 }
 
-/// to += factor y
-void add(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<const double> y, double factor,
-         std::vector<Block8>& to) {
-  for (const std::int32_t frame : frames) {
-    const GameBody& body = bodies.body(frame);
-    for (auto b = static_cast<std::size_t>(body.first); b < static_cast<std::size_t>(body.first + body.blocks); ++b)
-      for (std::size_t l = 0; l < 8; ++l) to[b].v[l] += static_cast<float>(factor * y[8 * b + l]);
-  }
-}
-
 /// The s in [0, 1] at which (1 − s)² before + 2 (1 − s) s² both + s⁴ after is least, by bisection of its slope.
 double least_open(const GameConstraints::Closing& sums) {
   const auto slope = [&](double s) {
@@ -59,26 +49,25 @@ void GameConstraints::solve(GameBodies& bodies) {
   rows_.add_what_leads(bodies);
   if (std::ranges::any_of(rows_.groups(), [](const GameGroup& group) { return group.constraint->counts_work(); })) {
     slopes_.assign(rows_.coordinates(), 0.0);
-    rows_.add_energy_slopes(bodies, system_.frames(), bodies.free_motion(), {}, slopes_);
+    rows_.add_energy_slopes(bodies, system_.bodies(), bodies.free_motion(), {}, slopes_);
   } else {
     slopes_.clear();
   }
-  rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
+  rows_.scale(system_.bodies(), bodies.motion(), motion_);
   int round = 0;
   do {
     system_.factor(rows_, false);
     solve_once();
   } while (let_go(++round < kTuning.most_rounds));
-  find_taken(bodies);
-  rows_.unscale(bodies, system_.frames(), moved_);
-  add(bodies, system_.frames(), moved_, 1.0, bodies.motion());
+  take(bodies.motion());
 }
 
 /// The forces with which the rows that hold are met, within their bounds. Only what is found last acts on the motion,
 /// whose single precision would lose what rounds find whose rows contradict.
 void GameConstraints::solve_once() {
   const std::span<const GameGroup> groups = rows_.groups();
-  const bool bound = std::ranges::any_of(rows_.rows(), [](const GameRow& r) { return r.hold != Hold::kMet; });
+  const bool bound =
+      rows_.any_bounded() && std::ranges::any_of(rows_.rows(), [](const GameRow& r) { return r.hold != Hold::kMet; });
   moved_.assign(rows_.coordinates(), 0.0);
   for (std::size_t g = 0; bound && g < groups.size(); ++g) {
     forces_.clear();
@@ -89,9 +78,12 @@ void GameConstraints::solve_once() {
   asked_.resize(system_.size());
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::span<const GameRow> rows = rows_.of(groups[g]);
-    products_.assign(2 * rows.size(), 0.0);
+    products_.resize(2 * rows.size());
     rows_.multiply(groups[g], motion_, products_.data());
-    if (bound) rows_.multiply(groups[g], moved_, products_.data() + rows.size());
+    if (bound)
+      rows_.multiply(groups[g], moved_, products_.data() + rows.size());
+    else
+      std::fill_n(products_.data() + rows.size(), rows.size(), 0.0);
     double *right = right_.data() + system_.first(g), *guess = asked_.data() + system_.first(g);
     for (const std::int32_t at : system_.met(g)) {
       const auto i = static_cast<std::size_t>(at);
@@ -106,7 +98,8 @@ void GameConstraints::solve_once() {
     forces_.assign(rows.size(), 0.0);
     for (const std::int32_t at : system_.met(g)) {
       const auto i = static_cast<std::size_t>(at);
-      forces_[i] = rows[i].force = cut_off(rows[i], *right++);
+      forces_[i] = rows[i].force = rows[i].is_bounded() ? cut_off(rows[i], *right) : *right;
+      ++right;
     }
     rows_.add_transposed(groups[g], forces_.data(), moved_);
   }
@@ -115,11 +108,12 @@ void GameConstraints::solve_once() {
 /// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps may take
 /// hold. @return whether any did: the others are to be solved for again, as their forces stand against those
 bool GameConstraints::let_go(bool takes_hold) {
+  if (!rows_.any_bounded()) return false;
   bool changed = false;
   for (const GameGroup& group : rows_.groups()) {
     const std::span<GameRow> rows = rows_.of(group);
     if (std::ranges::none_of(rows, [](const GameRow& row) { return row.is_bounded(); })) continue;
-    products_.assign(2 * rows.size(), 0.0);
+    products_.resize(2 * rows.size());
     rows_.multiply(group, motion_, products_.data());
     rows_.multiply(group, moved_, products_.data() + rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -140,14 +134,16 @@ bool GameConstraints::let_go(bool takes_hold) {
   return changed;
 }
 
-/// Twice the energy of what the rows took from the motion, by component.
-void GameConstraints::find_taken(const GameBodies& bodies) {
-  taken_.assign(bodies.bodies().size(), 0.0);
-  for (const std::int32_t frame : system_.frames()) {
-    const GameBody& body = bodies.body(frame);
-    const double* at = moved_.data() + 8 * body.first;
-    double& sum = taken_[system_.component(frame)];
+/// Makes moved_ a motion, and adds it. Twice the energy of what the rows took so, by component.
+void GameConstraints::take(std::vector<Block8>& motion) {
+  taken_.assign(system_.components(), 0.0);
+  for (const RowBody& body : system_.bodies()) {
+    double* at = moved_.data() + 8 * body.first;
+    double& sum = taken_[static_cast<std::size_t>(body.component)];
     for (std::int32_t l = 0; l < 8 * body.blocks; ++l) sum += at[l] * at[l];
+    rows_.unscale(body, at);
+    for (std::int32_t l = 0; l < 8 * body.blocks; ++l)
+      motion[static_cast<std::size_t>(body.first + l / 8)].v[l % 8] += static_cast<float>(at[l]);
   }
 }
 
@@ -155,15 +151,18 @@ void GameConstraints::find_taken(const GameBodies& bodies) {
 
 void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool pushed) {
   if (rows_.groups().empty()) return;
-  add(bodies, system_.frames(), moved_, -1.0, bodies.answers());
-  if (std::ranges::any_of(rows_.rows(), [](const GameRow& row) { return row.gives_way && row.hold == Hold::kMet; }))
+  for (const RowBody& body : system_.bodies())
+    for (auto b = static_cast<std::size_t>(body.first); b < static_cast<std::size_t>(body.first + body.blocks); ++b)
+      for (std::size_t l = 0; l < 8; ++l) bodies.answers()[b].v[l] -= static_cast<float>(moved_[8 * b + l]);
+  if (rows_.any_bounded() &&
+      std::ranges::any_of(rows_.rows(), [](const GameRow& row) { return row.gives_way && row.hold == Hold::kMet; }))
     system_.factor(rows_, true);
   measure(states, bodies, pushed);
   asked_ = right_;
   system_.solve<kColumns>(right_);
   find_shares();
   displace(bodies);
-  if (!slopes_.empty()) rows_.add_energy_slopes(bodies, system_.frames(), bodies.motion(), speed_, slopes_);
+  if (!slopes_.empty()) rows_.add_energy_slopes(bodies, system_.bodies(), bodies.motion(), speed_, slopes_);
 }
 
 /// Right-hand sides of zeros, and the gaps as they are now.
@@ -182,8 +181,8 @@ void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit)
 /// What the rows that hold are short of: in their rates, by the way they turned, and in places.
 void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
   const double most = kTuning.recovery_speed * rows_.length();
-  rows_.scale(bodies, system_.frames(), bodies.motion(), motion_);
-  if (pushed) rows_.scale_pushes(bodies, system_.frames(), pushes_);
+  rows_.scale(system_.bodies(), bodies.motion(), motion_);
+  if (pushed) rows_.scale_pushes(system_.bodies(), bodies.pushes(), pushes_);
   for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
     const std::span<const GameRow> rows = rows_.of(group);
     products_.assign(2 * rows.size(), 0.0);
@@ -209,7 +208,7 @@ void GameConstraints::find_shares() {
   const std::span<const GameGroup> groups = rows_.groups();
   given_.assign(taken_.size(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    double& given = given_[system_.component(groups[g])];
+    double& given = given_[system_.component(g)];
     const std::size_t first = system_.first(g);
     for (std::size_t k = first; k < first + system_.met(g).size(); ++k)
       given += asked_[kColumns * k + kCurve] * right_[kColumns * k + kCurve];
@@ -225,7 +224,7 @@ void GameConstraints::displace(GameBodies& bodies) {
   place_.assign(rows_.coordinates(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::span<GameRow> rows = rows_.of(groups[g]);
-    const double share = given_[system_.component(groups[g])];
+    const double share = given_[system_.component(g)];
     const double* found = right_.data() + kColumns * system_.first(g);
     forces_.assign(2 * rows.size(), 0.0);
     double *forces = forces_.data(), *yields = forces + rows.size();
@@ -245,11 +244,11 @@ void GameConstraints::displace(GameBodies& bodies) {
 
 /// By speed_ and place_.
 void GameConstraints::move(GameBodies& bodies) {
-  rows_.unscale(bodies, system_.frames(), speed_);
-  rows_.unscale(bodies, system_.frames(), place_);
-  for (const std::int32_t frame : system_.frames()) {
-    const auto from = static_cast<std::size_t>(8 * bodies.body(frame).first);
-    bodies.displace(frame, speed_.data() + from, place_.data() + from);
+  for (const RowBody& body : system_.bodies()) {
+    double *speed = speed_.data() + 8 * body.first, *place = place_.data() + 8 * body.first;
+    rows_.unscale(body, speed);
+    rows_.unscale(body, place);
+    bodies.displace(body.frame, speed, place);
   }
 }
 
@@ -264,8 +263,9 @@ double GameConstraints::work_of(const GameGroup& group) {
 
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
   for (const GameGroup& group : rows_.groups()) {
-    forces_.clear();
-    for (const GameRow& row : rows_.of(group)) forces_.push_back(rows_.length() * row.force);
+    const std::span<const GameRow> rows = rows_.of(group);
+    forces_.resize(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) forces_[i] = rows_.length() * rows[i].force;
     group.constraint->accept(states, forces_);
     if (group.constraint->counts_work()) group.constraint->accept_work(work_of(group));
   }
@@ -295,7 +295,7 @@ bool GameConstraints::find_closing_shares() {
   closings_.assign(taken_.size(), {});
   const std::span<const GameGroup> groups = rows_.groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    Closing& closing = closings_[system_.component(groups[g])];
+    Closing& closing = closings_[system_.component(g)];
     for (const std::int32_t i : system_.met(g)) {
       const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
       if (!row.keeps_place) continue;
@@ -312,13 +312,12 @@ bool GameConstraints::find_closing_shares() {
 
 /// By the shares in `given_`.
 void GameConstraints::shorten_closing(GameBodies& bodies) {
-  for (const std::int32_t frame : system_.frames()) {
-    const GameBody& body = bodies.body(frame);
-    const double back = given_[system_.component(frame)] - 1.0;
+  for (const RowBody& body : system_.bodies()) {
+    const double back = given_[static_cast<std::size_t>(body.component)] - 1.0;
     double* place = place_.data() + 8 * body.first;
     if (back == 0.0) continue;
     for (std::int32_t l = 0; l < 8 * body.blocks; ++l) place[l] *= back;
-    bodies.displace(frame, speed_.data() + 8 * body.first, place);
+    bodies.displace(body.frame, speed_.data() + 8 * body.first, place);
   }
 }
 

@@ -40,7 +40,7 @@ class GameConstraints {
 
   void solve_once();
   bool let_go(bool takes_hold);
-  void find_taken(const GameBodies& bodies);
+  void take(std::vector<Block8>& motion);
   template <class Visit>
   void for_met_gaps(const BodyStates& states, const Visit& visit);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);

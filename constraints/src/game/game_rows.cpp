@@ -23,6 +23,7 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
   coordinates_ = 8 * bodies.motion().size();
   scales_.assign(bodies.bodies().size(), {});
   goes_on_ = number > 0;
+  any_bounded_ = false;
   for (Constraint* constraint : constraints) {
     constraint->begin_part({.length = length_, .left = length_ * (plan.count - number), .whole = plan.step});
     add_group(states, bodies, constraint);
@@ -146,6 +147,7 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
   }
   const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = row.is_bounded() && !from_below && !from_above;
+  any_bounded_ = any_bounded_ || row.is_bounded();
   row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
   row.gives_way = !law.goes_on && gives_way && row.compliance == 0.0;
   if (row.compliance > 0.0) {
@@ -206,48 +208,37 @@ void GameRows::add_what_leads(const GameBodies& bodies) {
 
 // Products ------------------------------------------------------------------------------------------------------------
 
-void GameRows::scale(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
-                     std::vector<double>& x) const {
+void GameRows::scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<double>& x) const {
   x.resize(coordinates_);
-  for (const std::int32_t frame : frames) {
-    const GameBody& body = bodies.body(frame);
+  for (const RowBody& body : at) {
     double* to = &x[static_cast<std::size_t>(8 * body.first)];
     for (std::int32_t b = 0; b < body.blocks; ++b)
       for (int l = 0; l < 8; ++l) to[8 * b + l] = static_cast<double>(y[static_cast<std::size_t>(body.first + b)].v[l]);
-    for (std::size_t k = 0; k < 3; ++k) to[3 + k] *= scales_[static_cast<std::size_t>(frame)][k];
+    for (std::size_t k = 0; k < 3; ++k) to[3 + k] *= scales_[static_cast<std::size_t>(body.frame)][k];
   }
 }
 
-void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const std::int32_t> frames,
-                                 const std::vector<Block8>& y, std::span<const double> more,
-                                 std::vector<double>& slopes) {
-  for (const std::int32_t frame : frames) {
-    const GameBody& body = bodies.body(frame);
+void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
+                                 std::span<const double> more, std::vector<double>& slopes) {
+  for (const RowBody& body : at) {
     slope_.resize(static_cast<std::size_t>(8 * body.blocks));
-    bodies.write_energy_slopes(frame, y, slope_.data());
+    bodies.write_energy_slopes(body.frame, y, slope_.data());
     for (std::size_t l = 0; l < 6 && !more.empty(); ++l)
       slope_[l] += more[static_cast<std::size_t>(8 * body.first) + l];
-    for (std::size_t k = 0; k < 3; ++k) slope_[3 + k] /= scales_[static_cast<std::size_t>(frame)][k];
+    unscale(body, slope_.data());
     double* to = &slopes[static_cast<std::size_t>(8 * body.first)];
     for (std::size_t l = 0; l < slope_.size(); ++l) to[l] += slope_[l];
   }
 }
 
-void GameRows::scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames,
+void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes,
                             std::vector<double>& x) const {
   x.assign(coordinates_, 0.0);
-  for (const std::int32_t frame : frames) {
-    const auto at = static_cast<std::size_t>(frame);
-    double* to = &x[static_cast<std::size_t>(8 * bodies.body(frame).first)];
+  for (const RowBody& body : at) {
+    const auto frame = static_cast<std::size_t>(body.frame);
+    double* to = &x[static_cast<std::size_t>(8 * body.first)];
     for (std::size_t l = 0; l < 6; ++l)
-      to[l] = static_cast<double>(bodies.pushes()[at].v[l]) * (l < 3 ? 1.0 : scales_[at][l - 3]);
-  }
-}
-
-void GameRows::unscale(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<double> y) const {
-  for (const std::int32_t frame : frames) {
-    double* turn = &y[static_cast<std::size_t>(8 * bodies.body(frame).first + 3)];
-    for (std::size_t k = 0; k < 3; ++k) turn[k] /= scales_[static_cast<std::size_t>(frame)][k];
+      to[l] = static_cast<double>(pushes[frame].v[l]) * (l < 3 ? 1.0 : scales_[frame][l - 3]);
   }
 }
 

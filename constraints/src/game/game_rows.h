@@ -48,6 +48,11 @@ struct GameGroup {
   std::array<GameSide, 2> sides;
 };
 
+/// A body that rows act on, and the number of those that rows join it to.
+struct RowBody {
+  std::int32_t frame = 0, first = 0, blocks = 0, component = 0;
+};
+
 class GameRows {
  public:
   /// From where the substep begins. @param number of the substep, 0 …
@@ -63,6 +68,7 @@ class GameRows {
   std::span<const GameGroup> groups() const { return groups_; }
   std::span<GameRow> of(const GameGroup& group) { return std::span(rows_).subspan(group.first, group.count); }
   std::size_t coordinates() const { return coordinates_; }  ///< of all bodies
+  bool any_bounded() const { return any_bounded_; }         ///< whether any row is
   /// s, the substep
   double length() const { return length_; }
   /// Of one row. @param side of its group
@@ -71,16 +77,17 @@ class GameRows {
   }
 
   // Vectors have eight numbers for each block of the bodies' coordinates.
-  /// x of y. @param frames where, others are left as they are
-  void scale(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
-             std::vector<double>& x) const;
+  /// x of y. @param at where, others are left as they are
+  void scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<double>& x) const;
   /// The same of GameBodies::pushes().
-  void scale_pushes(const GameBodies& bodies, std::span<const std::int32_t> frames, std::vector<double>& x) const;
+  void scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes, std::vector<double>& x) const;
   /// slopes += those of the bodies' energies, J for a unit of x. @param y, more whose sum the frames have
-  void add_energy_slopes(const GameBodies& bodies, std::span<const std::int32_t> frames, const std::vector<Block8>& y,
+  void add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
                          std::span<const double> more, std::vector<double>& slopes);
-  /// y of x in its place.
-  void unscale(const GameBodies& bodies, std::span<const std::int32_t> frames, std::span<double> y) const;
+  /// y of x in its place, of one body's numbers.
+  void unscale(const RowBody& body, double* y) const {
+    for (std::size_t k = 0; k < 3; ++k) y[3 + k] /= scales_[static_cast<std::size_t>(body.frame)][k];
+  }
   /// J x of a group. @param product one number for each of its rows
   void multiply(const GameGroup& group, std::span<const double> x, double* product) const;
   /// x += Jᵀ f of a group. @param forces one number for each of its rows
@@ -128,6 +135,7 @@ class GameRows {
   std::size_t coordinates_ = 0;
   double length_ = 0.0;
   bool goes_on_ = false;  // the rows are those of the substep before
+  bool any_bounded_ = false;
 };
 
 }  // namespace limber::internal

@@ -119,6 +119,7 @@ void JointFactor::set_graph(std::size_t nodes, std::span<const Pair> couplings) 
 
 /// Least degree, the lower number first. What the graph of the others becomes is kept as it is.
 void JointFactor::order() {
+  sizes_.clear();
   std::vector<std::vector<std::int32_t>> neighbours(nodes_), columns(nodes_);
   for (const auto& [a, b] : graph_) {
     neighbours[static_cast<std::size_t>(a)].push_back(b);
@@ -200,6 +201,18 @@ std::int32_t JointFactor::rows_of(std::size_t coupling) const {
 }
 
 void JointFactor::begin(std::span<const std::int32_t> sizes) {
+  if (!has_sizes(sizes)) lay_out(sizes);
+  std::ranges::fill(values_, 0.0);
+}
+
+bool JointFactor::has_sizes(std::span<const std::int32_t> sizes) const {
+  if (sizes_.size() != nodes_) return false;
+  for (std::size_t p = 0; p < nodes_; ++p)
+    if (sizes_[p] != sizes[static_cast<std::size_t>(pattern_.node_at[p])]) return false;
+  return true;
+}
+
+void JointFactor::lay_out(std::span<const std::int32_t> sizes) {
   sizes_.resize(nodes_), firsts_.resize(nodes_), starts_.resize(nodes_ + pattern_.rows.size());
   std::size_t numbers = 0;
   size_ = 0;
@@ -216,7 +229,7 @@ void JointFactor::begin(std::span<const std::int32_t> sizes) {
       starts_[nodes_ + e] = numbers;
       numbers += static_cast<std::size_t>(sizes_[p] * sizes_[static_cast<std::size_t>(pattern_.rows[e])]);
     }
-  values_.assign(numbers, 0.0);
+  values_.resize(numbers);
 }
 
 void JointFactor::factor() {

@@ -45,6 +45,8 @@ class JointFactor {
 
  private:
   void order();
+  bool has_sizes(std::span<const std::int32_t> sizes) const;
+  void lay_out(std::span<const std::int32_t> sizes);
   void eliminate(std::size_t column);
   void leave_out(std::size_t column, std::size_t a, std::size_t b);
   std::int32_t find(std::int32_t row, std::int32_t column) const;

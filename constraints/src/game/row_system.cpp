@@ -39,33 +39,48 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 
 void RowSystem::find_graph(const GameBodies& bodies, const GameRows& rows) {
   const std::span<const GameGroup> groups = rows.groups();
-  incident_.clear(), graph_.clear(), frames_.clear();
-  for (std::size_t g = 0; g < groups.size(); ++g)
+  incident_.clear(), graph_.clear(), bodies_.clear(), of_group_.clear();
+  joined_.reset(bodies.bodies().size());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
     for (const GameSide& side : groups[g].sides)
       if (side.frame >= 0) incident_.push_back({side.frame, static_cast<std::int32_t>(g)});
+    if (groups[g].sides[0].frame >= 0 && groups[g].sides[1].frame >= 0)
+      joined_.join(groups[g].sides[0].frame, groups[g].sides[1].frame);
+  }
   std::ranges::sort(incident_);
-  for (const auto& [frame, group] : incident_)
-    if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
   for (std::size_t i = 0; i < incident_.size(); ++i)
     for (std::size_t j = i + 1; j < incident_.size() && incident_[j][0] == incident_[i][0]; ++j)
       if (incident_[i][1] != incident_[j][1]) graph_.push_back({incident_[i][1], incident_[j][1]});
   std::ranges::sort(graph_);
   graph_.erase(std::unique(graph_.begin(), graph_.end()), graph_.end());
   factor_.set_graph(groups.size(), graph_);
-  components_.reset(bodies.bodies().size());
-  for (const GameGroup& group : groups)
-    if (group.sides[0].frame >= 0 && group.sides[1].frame >= 0)
-      components_.join(group.sides[0].frame, group.sides[1].frame);
+  number_components(bodies, groups);
+  all_met_ = false;
 }
 
-std::size_t RowSystem::component(const GameGroup& group) {
-  const std::int32_t frame = std::max(group.sides[0].frame, group.sides[1].frame);
-  return frame < 0 ? 0 : component(frame);
+/// By their first bodies.
+void RowSystem::number_components(const GameBodies& bodies, std::span<const GameGroup> groups) {
+  of_frame_.resize(bodies.bodies().size());
+  components_ = 0;
+  for (const auto& [frame, group] : incident_) {
+    if (!bodies_.empty() && bodies_.back().frame == frame) continue;
+    const std::int32_t root = joined_.root(frame);
+    if (root == frame) of_frame_[static_cast<std::size_t>(frame)] = static_cast<std::int32_t>(components_++);
+    const GameBody& body = bodies.body(frame);
+    bodies_.push_back({frame, body.first, body.blocks, of_frame_[static_cast<std::size_t>(root)]});
+  }
+  for (const GameGroup& group : groups) {
+    const std::int32_t frame = std::max(group.sides[0].frame, group.sides[1].frame);
+    of_group_.push_back(frame < 0 ? 0 : of_frame_[static_cast<std::size_t>(joined_.root(frame))]);
+  }
+  components_ = std::max<std::size_t>(components_, 1);
 }
 
 // Matrix --------------------------------------------------------------------------------------------------------------
 
 void RowSystem::list_met(const GameRows& rows, bool closing) {
+  if (all_met_ && !rows.any_bounded()) return;
+  all_met_ = !rows.any_bounded();
   met_.clear(), sizes_.clear(), first_met_.clear();
   for (const GameGroup& group : rows.groups()) {
     const std::size_t begin = met_.size();

@@ -27,11 +27,11 @@ class RowSystem {
   std::span<const std::int32_t> met(std::size_t group) const {
     return {met_.data() + first_met_[group], static_cast<std::size_t>(sizes_[group])};
   }
-  /// Bodies that rows join have one number, that of one of them.
-  std::size_t component(std::int32_t frame) { return static_cast<std::size_t>(components_.root(frame)); }
-  std::size_t component(const GameGroup& group);
   /// What rows act on, ascending.
-  std::span<const std::int32_t> frames() const { return frames_; }
+  std::span<const RowBody> bodies() const { return bodies_; }
+  std::size_t components() const { return components_; }
+  /// The number of the bodies that rows join a group's to.
+  std::size_t component(std::size_t group) const { return static_cast<std::size_t>(of_group_[group]); }
 
   /// Overwrites right-hand sides. @param x size() rows of `columns` numbers
   template <std::size_t columns>
@@ -42,6 +42,7 @@ class RowSystem {
   void solve_fully(const GameRows& rows, std::span<const double> guess, std::vector<double>& x);
 
  private:
+  void number_components(const GameBodies& bodies, std::span<const GameGroup> groups);
   void list_met(const GameRows& rows, bool closing);
   void add_products(const GameRows& rows, std::size_t of_rows, std::size_t of_columns, const GameSide& a,
                     const GameSide& b, double* to) const;
@@ -50,10 +51,13 @@ class RowSystem {
   JointFactor factor_;
   std::vector<JointFactor::Pair> graph_;
   std::vector<std::array<std::int32_t, 2>> incident_;  // (frame, group)
-  std::vector<std::int32_t> frames_;
-  DisjointSets components_;                      // of frames
+  std::vector<RowBody> bodies_;
+  std::vector<std::int32_t> of_group_, of_frame_;  // components; of_frame_ of the first frame of each
+  std::size_t components_ = 0;
+  DisjointSets joined_;                          // frames
   std::vector<std::int32_t> met_;                // rows that hold, by group
   std::vector<std::int32_t> first_met_, sizes_;  // by group: in met_
+  bool all_met_ = false;                         // of the graph at hand
   struct Gradients {
     std::vector<double> residual, direction, product, conditioned, moved, forces;
   } gradients_;
