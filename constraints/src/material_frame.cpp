@@ -44,14 +44,29 @@ Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
   return u;
 }
 
-/// J_l of rotations: exp(r + dr) = exp(J_l dr) exp(r), with c = (1 − cos θ)/θ² and s = (θ − sin θ)/θ³.
-Mat3 turn_of_rotation_vector(const Vec3& r) {
+/// A rotation by its vector r, θ = |r|:
+///   exp(r) = 1 + s₁ [r] + s₂ [r]²,   exp(r + dr) = exp(J_l dr) exp(r),   J_l = 1 + s₂ [r] + s₃ [r]²
+struct VectorRotation {
+  explicit VectorRotation(const Vec3& r);
+  Mat3 exp() const { return Mat3::Identity() + s1 * K + s2 * square; }
+  Mat3 turning() const { return Mat3::Identity() + s2 * K + s3 * square; }
+
+  Mat3 K, square;
+  double s1 = 1.0, s2 = 0.5, s3 = 1.0 / 6.0;  // sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³
+};
+
+VectorRotation::VectorRotation(const Vec3& r) : K(cross_matrix(r)), square(K * K) {
   constexpr double kSmall = 1e-2;  // where what is left out of the series is 1e-18
-  const double angle = r.norm(), y = angle * angle;
-  const double c = angle < kSmall ? 0.5 - y / 24.0 + y * y / 720.0 : (1.0 - std::cos(angle)) / y;
-  const double s = angle < kSmall ? 1.0 / 6.0 - y / 120.0 + y * y / 5040.0 : (angle - std::sin(angle)) / (angle * y);
-  const Mat3 K = cross_matrix(r);
-  return Mat3::Identity() + c * K + s * K * K;
+  const double y = r.squaredNorm(), angle = std::sqrt(y);
+  if (angle < kSmall) {
+    s1 -= y / 6.0 - y * y / 120.0 + y * y * y / 5040.0;
+    s2 -= y / 24.0 - y * y / 720.0;
+    s3 -= y / 120.0 - y * y / 5040.0;
+  } else {
+    s1 = std::sin(angle) / angle;
+    s2 = (1.0 - std::cos(angle)) / y;
+    s3 = (1.0 - s1) / y;
+  }
 }
 
 }  // namespace
@@ -169,7 +184,7 @@ JointFrame MaterialFrame::place(const BodyStates& states, StepTime when) const {
   }
   const std::span<const double> z = states.amplitudes(body_, when);
   at.origin = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-  if (!rotation_.empty()) at.axes = R * (to_matrix(quaternion_from_rotation_vector(turn(z))) * rest_.axes);
+  if (!rotation_.empty()) at.axes = R * (VectorRotation(turn(z)).exp() * rest_.axes);
   return at;
 }
 
@@ -213,8 +228,9 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   at.axes_B = rest_.axes;
   if (!rotation_.empty()) {
     at.turned = turn(z);
-    at.turning = turn_of_rotation_vector(at.turned);
-    at.axes_B = to_matrix(quaternion_from_rotation_vector(at.turned)) * rest_.axes;
+    const VectorRotation rotation(at.turned);
+    at.turning = rotation.turning();
+    at.axes_B = rotation.exp() * rest_.axes;
   }
   at.axes = R * at.axes_B;
   return at;
@@ -232,7 +248,7 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
   at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
   at.axes_B = 0.5 * (start.axes_B + end.axes_B);
   if (rotation_.empty()) return at;
-  at.turning = turn_of_rotation_vector(0.5 * (start.turned + end.turned));
+  at.turning = VectorRotation(0.5 * (start.turned + end.turned)).turning();
   at.turned = end.turned - start.turned;
   const Quaternion turn =
       quaternion_from_rotation_vector(end.turned) * quaternion_from_rotation_vector(start.turned).conjugate();

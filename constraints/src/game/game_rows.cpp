@@ -140,10 +140,13 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
                                             .rate = h * law.end_rate,
                                             .force = law.last_force});
   for (const GameSide& side : group.sides) {
-    const double* numbers = numbers_.data() + side.at + i * static_cast<std::size_t>(side.coordinates);
-    for (std::int32_t k = 8; k < side.coordinates; ++k)
-      row.target +=
-          numbers[k] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)].v[k % 8]);
+    const double* numbers = this->numbers(side, static_cast<std::int32_t>(i));
+    double sum[8] = {};
+    for (std::int32_t b = 1; b < side.coordinates / 8; ++b)
+      for (int l = 0; l < 8; ++l)
+        sum[l] +=
+            numbers[8 * b + l] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + b)].v[l]);
+    for (const double part : sum) row.target += part;
   }
   const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = row.is_bounded() && !from_below && !from_above;
