@@ -11,6 +11,10 @@ namespace {
 using Hold = GameRow::Hold;
 constexpr double kRecoverySpeed = kConstraintsTuning.small_steps.recovery_speed;
 
+/// A block of a row or of coordinates.
+using Block = Eigen::Matrix<double, 8, 1>;
+Eigen::Map<const Block> block(const double* at) { return Eigen::Map<const Block>(at); }
+
 }  // namespace
 
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
@@ -141,12 +145,10 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
                                             .force = law.last_force});
   for (const GameSide& side : group.sides) {
     const double* numbers = this->numbers(side, static_cast<std::int32_t>(i));
-    double sum[8] = {};
     for (std::int32_t b = 1; b < side.coordinates / 8; ++b)
       for (int l = 0; l < 8; ++l)
-        sum[l] +=
+        row.target +=
             numbers[8 * b + l] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + b)].v[l]);
-    for (const double part : sum) row.target += part;
   }
   const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = row.is_bounded() && !from_below && !from_above;
@@ -247,26 +249,25 @@ void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block
 
 void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
   for (std::size_t i = 0; i < group.count; ++i) {
-    double sum[2] = {};
+    double sum = 0.0;
     for (const GameSide& side : group.sides) {
       const double *row = numbers(side, static_cast<std::int32_t>(i)), *from = x.data() + 8 * side.body;
-      for (std::int32_t k = 0; k < side.coordinates; k += 8)
-        for (int l = 0; l < 8; l += 2)
-          for (int m = 0; m < 2; ++m) sum[m] += row[k + l + m] * from[k + l + m];
+      for (std::int32_t k = 0; k < side.coordinates; k += 8) sum += block(row + k).dot(block(from + k));
     }
-    product[i] = sum[0] + sum[1];
+    product[i] = sum;
   }
 }
 
 void GameRows::add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const {
   for (const GameSide& side : group.sides)
     for (std::int32_t k = 0; k < side.coordinates; k += 8) {
-      double *to = x.data() + 8 * side.body + k, sum[8];
-      std::copy_n(to, 8, sum);
+      Eigen::Map<Block> to(x.data() + 8 * side.body + k);
       const double* row = numbers(side, 0) + k;
-      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
-        for (int l = 0; l < 8; ++l) sum[l] += forces[i] * row[l];
-      std::copy_n(sum, 8, to);
+      const std::int32_t next = side.coordinates;
+      std::size_t i = 0;
+      for (; i + 3 <= group.count; i += 3, row += 3 * next)  // those of a ball joint in one pass
+        to += forces[i] * block(row) + forces[i + 1] * block(row + next) + forces[i + 2] * block(row + 2 * next);
+      for (; i < group.count; ++i, row += next) to += forces[i] * block(row);
     }
 }
 
