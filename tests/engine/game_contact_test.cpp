@@ -285,6 +285,29 @@ TEST(GameContact, ResidualComplianceYieldsByItsForce) {
   EXPECT_LT(scene.world.body(box).velocity.norm(), 1e-3);
 }
 
+/// What a blow presses into springs and modes comes back once.
+TEST(GameContact, WhatLandsOnASpringyBoxIsNotThrownOff) {
+  const auto model = sample_model({.modes = 4, .dropped = 8, .lowest_hz = 30.0, .decay = 2.0});
+  for (int i = 0; i < 12; ++i) {
+    Bricks scene;
+    scene.bodies.push_back(scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, depth_below_origin(*model)}}}));
+    scene.step(30);
+    scene.add({.pose = {quaternion_from_rotation_vector({0.02 * i, 0.02 * i, 0.0}), {0.01 * i, 0.0, 0.6}},
+               .velocity = {0.0, 0.0, -3.0 - 0.5 * i}},
+              8.0);
+    const auto energy = [&] {
+      return scene.world.energy(scene.bodies[0]).total() + scene.world.energy(scene.bodies[1]).total();
+    };
+    double before = energy();
+    for (int k = 0; k < 40; ++k) {
+      scene.step(1);
+      const double after = energy();
+      ASSERT_LT(after - before, 2e-2 * scene.scale()) << i << ", step " << k;
+      before = after;
+    }
+  }
+}
+
 TEST(GameContact, ManifoldsOfFourCarryAPile) {
   const ContactOptions options = game();
   ManifoldFinder manifolds;

@@ -421,12 +421,13 @@ struct Works {
 
 HWY_INLINE HWY_ATTR void AddWorks(const BundleContact& c, std::size_t lane, Works& works) {
   const Vector force = Get(c.force[0], lane), compliance = Get(c.compliance, lane);
-  const Vector gap = hn::Sub(Get(c.gap, lane), Get(c.target, lane));
-  works.open = hn::MulAdd(force, hn::NegMulAdd(compliance, Get(c.before, lane), gap), works.open);
+  const Vector before = Get(c.before, lane), kept = hn::Mul(hn::Set(Lanes(), 0.5f), hn::Mul(compliance, before));
+  const Vector came = hn::Sub(Get(c.gap, lane), hn::Min(Get(c.now, lane), hn::Zero(Lanes())));
+  works.open = hn::MulAdd(force, came, works.open);
   for (std::size_t t = 0; t < 2; ++t)
     works.open = hn::MulAdd(Get(c.force[1 + t], lane), Get(c.slip[t], lane), works.open);
   works.yielded = hn::MulAdd(hn::Mul(compliance, force), force, works.yielded);
-  works.given = hn::Add(works.given, Get(c.release, lane));
+  works.given = hn::MulAdd(kept, before, hn::Add(works.given, Get(c.release, lane)));
 }
 
 HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {

@@ -27,8 +27,8 @@ struct PairBundle {
   bool rebounds = false;  // whether any does
   bool overlaps = false;  // whether any is to be pushed apart
   float residual = 0.0f;  // as residual_of_contacts()
-  // By lane, of the forces after the forward sweep: f·c and f C f, as GameContacts::limit_forces() has them, and what
-  // contacts that rebound are to give.
+  // By lane, of the forces f after the forward sweep: f·c₀ and f C f, and what rebounds and springs may give, as
+  // GameContacts::limit_forces() has them.
   Block8 open, yielded, given;
 };
 

@@ -28,6 +28,9 @@ Quaternion turned(const Quaternion& q, const Vec3& cayley) {
   return normalized(Quaternion{1.0, 0.5 * cayley.x(), 0.5 * cayley.y(), 0.5 * cayley.z()} * q);
 }
 
+// Twice the energy of a frame's coordinates per square.
+constexpr Block8 kOfFrames{{1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f}};
+
 double sum_of(const double (&x)[8]) { return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])); }
 
 Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
@@ -198,12 +201,15 @@ void GameBodies::find_answers(std::span<const double> moved, Jobs& jobs) {
   for_all(jobs, [&](std::size_t at) {
     GameBody& body = bodies_[at];
     double along[8] = {}, square[8] = {};
-    for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
+    const auto first = static_cast<std::size_t>(body.first), end = first + static_cast<std::size_t>(body.blocks);
+    for (std::size_t i = first; i < end; ++i) {
+      const float* energy = i == first ? kOfFrames.v : body.modes->energies().data() + 8 * (i - first - 1);
       for (std::size_t l = 0; l < 8; ++l) {
         const double start = static_cast<double>(free_[i].v[l]) + (moved.empty() ? 0.0 : moved[8 * i + l]);
         const double q = static_cast<double>(motion_[i].v[l]) - start;
-        along[l] += q * start, square[l] += q * q;
+        along[l] += q * start, square[l] += static_cast<double>(energy[l]) * q * q;
       }
+    }
     body.along = sum_of(along), body.square = sum_of(square);
   });
 }

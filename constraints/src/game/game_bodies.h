@@ -56,7 +56,7 @@ struct GameBody {
   Quaternion q{};                    // attitude now
   Vec3 v = Vec3::Zero();             // of the origin
   Vec3 turn = Vec3::Zero();          // coordinates of the turn, L
-  double along = 0.0, square = 0.0;  // q·y₀ and q·q, by find_answers()
+  double along = 0.0, square = 0.0;  // q·y₀, and twice the energy of q, by find_answers()
   // Of bodies that keep their axes: the turn of the substep at hand if nothing acted, ω; 1/(kg·m²), body axes.
   Vec3 free_turn = Vec3::Zero();
   Mat3 inverse_inertia = Mat3::Zero();

@@ -305,7 +305,8 @@ bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& ste
   return bundles_.overlap() || rows_overlap;
 }
 
-// With a share s of the forces f contacts change D by s a + ½ s² b, a = f·(c + J y₀), b = f·(J Jᵀ + C) f.
+// A share s of the forces f changes the energy of bodies and springs by s a + ½ s² b less what springs held,
+// a = f·(c₀ + J y₀), b = f·(J E Jᵀ + C) f.
 void GameContacts::limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs) {
   bodies.find_answers(moved, jobs);
   works_.assign(bodies.bodies().size() + 1, {});
@@ -335,10 +336,10 @@ void GameContacts::add_works(const GameBodies& bodies) {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const ContactRow& c = rows_[i];
     Works& works = works_of(frame_of(bodies, i));
-    works.linear += static_cast<double>(c.force[0] * (c.gap - c.target - c.compliance * c.before) +
-                                        c.force[1] * c.slip[0] + c.force[2] * c.slip[1]);
+    works.linear += static_cast<double>(c.force[0] * (c.gap - std::min(c.now, 0.0f)) + c.force[1] * c.slip[0] +
+                                        c.force[2] * c.slip[1]);
     works.square += static_cast<double>(c.compliance * c.force[0] * c.force[0]);
-    works.given += static_cast<double>(c.release);
+    works.given += static_cast<double>(c.release + 0.5f * c.compliance * c.before * c.before);
   }
 }
 

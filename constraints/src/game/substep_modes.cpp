@@ -32,13 +32,15 @@ void SubstepModes::set(const ModalModel& model, double h) {
   const ModalModelData& data = model.data();
   flow_.set(data.eigenvalues, data.decays, h, ModalStep::kNone);
   const std::size_t modes = data.eigenvalues.size(), padded = (modes + 7) / 8 * 8;
-  for (std::vector<float>* numbers : {&roots_, &inverse_roots_, &rates_}) numbers->assign(padded, 0.0f);
+  for (std::vector<float>* numbers : {&roots_, &inverse_roots_, &rates_, &energies_}) numbers->assign(padded, 0.0f);
   for (std::size_t i = 0; i < modes; ++i) {
     const ModeAnswer answer = answer_of({data.eigenvalues[i], data.decays[i]}, h);
     const double root = std::sqrt(answer.displacement);
     roots_[i] = static_cast<float>(root);
     inverse_roots_[i] = static_cast<float>(1.0 / root);
     rates_[i] = static_cast<float>(answer.rate / root);
+    energies_[i] =
+        static_cast<float>(data.eigenvalues[i] * answer.displacement + answer.rate * answer.rate / answer.displacement);
   }
 }
 

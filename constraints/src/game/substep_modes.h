@@ -30,11 +30,13 @@ class SubstepModes {
   const std::vector<float>& inverse_roots() const { return inverse_roots_; }
   /// What a mode's rate changes by per unit of its scaled coordinate: σ/√ρ.
   const std::vector<float>& rates() const { return rates_; }
+  /// Twice the energy of a mode per square of its scaled coordinate, λρ + σ²/ρ: 1 where it is slow, 2 where it is held.
+  const std::vector<float>& energies() const { return energies_; }
 
  private:
   const ModalModel* model_ = nullptr;
   ModalStep flow_;
-  std::vector<float> roots_, inverse_roots_, rates_;
+  std::vector<float> roots_, inverse_roots_, rates_, energies_;
 };
 
 }  // namespace limber::internal
