@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "field/field_pairs.h"
@@ -47,6 +48,16 @@ struct ManifoldFinder::Impl {
   internal::FieldPairs fields;
   internal::ManifoldWorkers workers;
 
+  struct Measured {
+    Vec3 normal, p_a, p_b;  ///< world; points from the origin of a
+    double gap;
+  };
+  /// A kept point where it is, and the least that its gap comes to by the expected motion.
+  struct Touch {
+    Measured at;
+    double lowest;
+  };
+
   // Of the query under way.
   ContactQuery query;
   struct {
@@ -57,6 +68,8 @@ struct ManifoldFinder::Impl {
   std::vector<std::uint8_t> recycled;  ///< by pair
   struct {
     std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
+    std::vector<Touch> touches;
+    std::vector<std::pair<std::size_t, std::size_t>> touches_of;  ///< by pair: first and end
     std::vector<internal::SupportPlane> planes_a, planes_b;
     std::vector<Vec3> own_normals;  ///< of the pair whose planes are sought, into the body that they are sought for
   } seams;
@@ -93,19 +106,19 @@ struct ManifoldFinder::Impl {
                    const internal::PairQuery& query, internal::ManifoldWorker& worker);
   static void keep_inner_balls(const internal::FeatureContact& deepest, const internal::PairQuery& query,
                                internal::ManifoldWorker& worker);
-  struct Measured {
-    Vec3 normal, p_a, p_b;  ///< world; points from the origin of a
-    double gap;
-  };
   internal::FeatureContact feature_contact(const Measured& measured, const internal::KeptPoint& point,
                                            const BodyPair& pair) const;
   Measured measure(const internal::KeptPoint& point, const BodyPair& pair, internal::ManifoldWorker& worker) const;
   void level_seams();
-  Vec3 out_of_other(const internal::KeptPoint& point, const BodyPair& pair, Index body) const;
+  void list_touches(internal::ManifoldWorker& worker);
+  void list_touches(std::size_t pair, internal::ManifoldWorker& worker);
+  std::span<const Touch> touches_of(std::size_t pair) const {
+    const auto& [first, end] = seams.touches_of[pair];
+    return std::span(seams.touches).subspan(first, end - first);
+  }
   bool touches_along(const Vec3& out) const;
   void list_pairs_of_bodies();
-  void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes,
-                   internal::ManifoldWorker& worker);
+  void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
   RigidTransform smaller_in_larger(const internal::PairQuery& query, const RigidTransform& X_AB) const;
   double farthest(const internal::PairQuery& query) const;

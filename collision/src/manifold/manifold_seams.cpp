@@ -28,15 +28,35 @@ void ManifoldFinder::Impl::level_seams() {
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const BodyPair& pair = pairs[p];
     if (recycled[p] != 0 || graph.at(p).points.empty() || at(pair.a).modal || at(pair.b).modal) continue;
-    if (!listed) list_pairs_of_bodies();
+    if (!listed) list_pairs_of_bodies(), list_touches(*worker);
     listed = true;
-    find_planes(p, pair.a, seams.planes_a, *worker);
-    find_planes(p, pair.b, seams.planes_b, *worker);
+    find_planes(p, pair.a, seams.planes_a);
+    find_planes(p, pair.b, seams.planes_b);
     if (seams.planes_a.empty() && seams.planes_b.empty()) continue;
     PairQuery q = query_of(pair);
     q.planes_a = seams.planes_a, q.planes_b = seams.planes_b;
     make(graph.at(p), q, *worker);
+    list_touches(p, *worker);
   }
+}
+
+void ManifoldFinder::Impl::list_touches(ManifoldWorker& worker) {
+  seams.touches.clear();
+  seams.touches_of.resize(pairs.size());
+  for (std::size_t p = 0; p < pairs.size(); ++p) list_touches(p, worker);
+}
+
+/// Of what convex bodies touch.
+void ManifoldFinder::Impl::list_touches(std::size_t p, ManifoldWorker& worker) {
+  const Vec3 way = at(pairs[p].a).displacement - at(pairs[p].b).displacement;
+  seams.touches_of[p].first = seams.touches.size();
+  const bool matters = at(pairs[p].a).core() != nullptr || at(pairs[p].b).core() != nullptr;
+  for (const KeptPoint& point : graph.at(p).points) {
+    if (!matters) break;
+    const Measured m = measure(point, pairs[p], worker);
+    seams.touches.push_back({m, m.gap + std::min(0.0, m.normal.dot(way))});
+  }
+  seams.touches_of[p].second = seams.touches.size();
 }
 
 void ManifoldFinder::Impl::list_pairs_of_bodies() {
@@ -54,43 +74,34 @@ void ManifoldFinder::Impl::list_pairs_of_bodies() {
 
 /// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
 /// that one reaches, and along which not all of the pair's contacts are.
-void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes,
-                                       ManifoldWorker& worker) {
+void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes) {
   planes.clear();
   const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
   const ManifoldBody& me = at(body);
   if (me.core() == nullptr || at(other).half_space() != nullptr) return;
   const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
   const auto i = static_cast<std::size_t>(body);
+  const auto out_of_other = [&](const Touch& touch, std::size_t of) {
+    return pairs[of].a == body ? touch.at.normal : Vec3(-touch.at.normal);
+  };
   seams.own_normals.clear();
-  for (const KeptPoint& point : graph.at(p).points) seams.own_normals.push_back(out_of_other(point, pairs[p], body));
+  for (const Touch& touch : touches_of(p)) seams.own_normals.push_back(out_of_other(touch, p));
   for (std::size_t k = seams.first_pair_of[i]; k < seams.first_pair_of[i + 1]; ++k) {
     const std::size_t beside = seams.pairs_of[k];
     if (beside == p) continue;
-    const KeptPoint* last_point = nullptr;
-    Vec3 out = Vec3::Zero(), last = Vec3::Zero();
-    for (const KeptPoint& point : graph.at(beside).points) {
-      if (last_point == nullptr || last_point->turns_with_b != point.turns_with_b || last_point->normal != point.normal)
-        out = out_of_other(point, pairs[beside], body);
-      last_point = &point;
+    Vec3 last = Vec3::Zero();
+    for (const Touch& touch : touches_of(beside)) {
+      if (touch.lowest > tolerance) continue;
+      const Vec3 out = out_of_other(touch, beside);
       if ((out - last).squaredNorm() <= kSameNormal * kSameNormal) continue;  // contacts of a face
-      const Measured m = measure(point, pairs[beside], worker);
-      const ManifoldBody& ground = at(pairs[beside].a == body ? pairs[beside].b : pairs[beside].a);
-      if (m.gap + std::min(0.0, out.dot(me.displacement - ground.displacement)) > tolerance) continue;
       last = out;
       if (touches_along(out)) continue;
-      const double offset =
-          pairs[beside].a == body ? out.dot(m.p_b) : out.dot(m.p_a + at(pairs[beside].a).pose.p - me.pose.p);
+      const double offset = pairs[beside].a == body ? out.dot(touch.at.p_b)
+                                                    : out.dot(touch.at.p_a + at(pairs[beside].a).pose.p - me.pose.p);
       if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
         planes.push_back({me.turn.transpose() * out, offset, tolerance});
     }
   }
-}
-
-/// The normal of a contact, into a body of the pair, world.
-Vec3 ManifoldFinder::Impl::out_of_other(const KeptPoint& point, const BodyPair& pair, Index body) const {
-  const Vec3 normal = at(point.turns_with_b ? pair.b : pair.a).turn * point.normal;
-  return pair.a == body ? normal : Vec3(-normal);
 }
 
 bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {

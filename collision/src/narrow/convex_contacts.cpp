@@ -13,6 +13,13 @@ constexpr FeatureKey kNearestPoints = 3u << 30;
 
 ConvexSolid solid(std::span<const Vec3> points) { return {points, 0.0}; }
 
+// Whether a face of one of two boxes keeps them farther apart than that. @param h, k half extents of a, b
+bool boxes_are_apart(const Vec3& h, const Vec3& k, const RigidTransform& X_AB, double margin) {
+  const Mat3 R = to_matrix(X_AB.q), size = R.cwiseAbs();
+  return ((X_AB.p.cwiseAbs() - h - size * k).array() > margin).any() ||
+         (((R.transpose() * X_AB.p).cwiseAbs() - k - size.transpose() * h).array() > margin).any();
+}
+
 }  // namespace
 
 ConvexContacts::Range ConvexContacts::along(const Side& side, const Vec3& axis) {
@@ -54,6 +61,9 @@ void ConvexContacts::load(const ConvexCore& a, const ConvexCore& b, const RigidT
 
 void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
                           std::vector<FeatureContact>& contacts, const Passing& passing) {
+  if (a.half_extents[0] > 0.0 && b.half_extents[0] > 0.0 &&
+      boxes_are_apart(a.half_extents, b.half_extents, X_AB, margin + a.radius + b.radius))
+    return;
   load(a, b, X_AB, contacts);
   ground_ = passing.ground;
   const std::size_t face_tests = a.faces.size() * b.points.size() + b.faces.size() * a.points.size();
