@@ -12,6 +12,7 @@
 
 #include "limber/mesh/surface_mesh.h"
 #include "limber/model/asset.h"
+#include "limber/model/audio_gltf.h"
 #include "limber/model/morph_targets.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_model.h"
@@ -33,7 +34,7 @@ struct RingArguments {
 };
 
 struct Arguments {
-  std::string asset, frequencies, clips;
+  std::string asset, frequencies, clips, audio;
   RingArguments ring;
 };
 
@@ -426,6 +427,7 @@ void inspect(Program& program, const Arguments& a) {
   report_machine(asset, report);
   if (!a.frequencies.empty()) program.write_file(a.frequencies, frequencies_csv(asset));
   ring(program, a.ring, asset);
+  if (!a.audio.empty()) program.write_file(a.audio, audio_glb_bytes(asset));
   if (!a.clips.empty()) program.write_file(a.clips, make_mode_clips(asset.bodies));
 }
 
@@ -444,6 +446,10 @@ int main(int argc, char** argv) {
   program.options()
       .add_option("--clips", arguments.clips,
                   "write one short clip a mode for any glTF viewer: bodies with a modal skin bend by it")
+      ->type_name("FILE.glb");
+  program.options()
+      .add_option("--audio-gltf", arguments.audio,
+                  "write the bodies and what one hears of them by the draft glTF extension KHR_audio_rigid_bodies")
       ->type_name("FILE.glb");
   RingArguments& note = arguments.ring;
   program.options()

@@ -26,7 +26,7 @@ using nlohmann::json;
 constexpr int kVertexBuffer = 34962, kIndexBuffer = 34963;
 constexpr float kUnitTolerance = 5e-4f;  // what the Khronos validator grants unit vectors
 
-enum class Use { kVertexVectors, kTriangles, kTimes, kTranslation, kRotation, kScale, kWeights };
+enum class Use { kVertexVectors, kTriangles, kTimes, kTranslation, kRotation, kScale, kWeights, kScalars };
 
 Use use_of(GlbPath path) {
   switch (path) {
@@ -58,6 +58,8 @@ const char* name_of(Use use) {
       return "scale";
     case Use::kWeights:
       return "weights";
+    case Use::kScalars:
+      return "scalars";
   }
   return "";
 }
@@ -295,6 +297,10 @@ int GlbBuilder::add_times(std::span<const float> seconds) {
   return impl_->add_floats(seconds, 1, Use::kTimes, "SCALAR", 0);
 }
 
+int GlbBuilder::add_scalars(std::span<const float> numbers) {
+  return impl_->add_floats(numbers, 1, Use::kScalars, "SCALAR", 0);
+}
+
 int GlbBuilder::add_key_values(std::span<const float> values, GlbPath path) {
   switch (path) {
     case GlbPath::kTranslation:
@@ -391,6 +397,10 @@ int GlbBuilder::add_node(const GlbNode& node) {
   if (node.scale) {
     if (!(std::isfinite(*node.scale) && *node.scale > 0.0)) refuse(where + ".scale is not above 0 and finite");
     out["scale"] = {*node.scale, *node.scale, *node.scale};
+  }
+  if (!node.extensions.empty()) {
+    out["extensions"] = parse_object(node.extensions, where + ".extensions");
+    for (const auto& [name, unused] : out["extensions"].items()) impl_->extensions_used.insert(name);
   }
   impl_->put_extras(out, node.extras, where);
   impl_->nodes.push_back(std::move(out));

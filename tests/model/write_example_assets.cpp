@@ -8,6 +8,7 @@
 #include "example_model.h"
 #include "limber/core/file.h"
 #include "limber/model/asset.h"
+#include "limber/model/audio_gltf.h"
 #include "limber/model/morph_targets.h"
 
 namespace limber {
@@ -48,7 +49,9 @@ void write_examples(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   write_asset(folder / "two_bodies.glb", example::asset());
   write_asset(folder / "rigid.glb", {.bodies = {example::model(example::full_box("stone", 0))}, .provenance = {}});
-  write_asset(folder / "sounds.glb", sounding(example::asset()));
+  const Asset sounds = sounding(example::asset());
+  write_asset(folder / "sounds.glb", sounds);
+  write_file(folder / "audio.glb", audio_glb_bytes(sounds));
   for (const Index modes : {7, 64, 256}) {
     const auto model = example::model(example::box("bar", modes, 8));
     const std::string name = "bar_" + std::to_string(modes);

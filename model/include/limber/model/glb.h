@@ -72,6 +72,7 @@ struct GlbNode {
   std::optional<Quaternion> rotation{};  ///< unit
   std::optional<double> scale{};         ///< uniform, > 0
   std::string extras{};                  ///< a JSON object as text, or empty
+  std::string extensions{};              ///< the same, one key per extension; each is added to extensionsUsed
 };
 
 /// Property that a channel moves; it sets the number of values per key.
@@ -114,6 +115,9 @@ class GlbBuilder {
   int add_times(std::span<const float> seconds);
   /// Key values of an animation: all of the first key, then all of the second, ….
   int add_key_values(std::span<const float> values, GlbPath path);
+
+  /// Numbers that an extension names. @param numbers at least one, finite
+  int add_scalars(std::span<const float> numbers);
 
   /// Bytes that only an extension knows: a bufferView without accessor. @return the bufferView (its number, unlike an
   /// accessor's, counts every piece of binary data). @param bytes a multiple of 4, at least one
