@@ -37,8 +37,8 @@ ContactScene balls(Kind kind, int count, double spacing, Index modes) {
 }
 
 /// Each pass moves every body by about a millimetre, as a step does, and asks for the contacts.
-void measure_queries(benchmark::State& state, ContactScene scene, const ContactFinderOptions& options) {
-  ContactFinder finder(options);
+void measure_queries(benchmark::State& state, ContactScene scene) {
+  ContactFinder finder;
   scene.add_all_to(finder);
   std::vector<BodyState> states;
   std::vector<ContactPoint> contacts;
@@ -58,10 +58,8 @@ void measure_queries(benchmark::State& state, ContactScene scene, const ContactF
 
 /// range(0) bodies, range(1) spacing in cm, range(2) modes
 void many(benchmark::State& state, Kind kind) {
-  measure_queries(state,
-                  balls(kind, static_cast<int>(state.range(0)), 0.01 * static_cast<double>(state.range(1)),
-                        static_cast<Index>(state.range(2))),
-                  {});
+  measure_queries(state, balls(kind, static_cast<int>(state.range(0)), 0.01 * static_cast<double>(state.range(1)),
+                               static_cast<Index>(state.range(2))));
 }
 void many_scenes(benchmark::internal::Benchmark* b) {
   b->ArgNames({"bodies", "spacing_cm", "modes"});
@@ -76,14 +74,14 @@ BENCHMARK_CAPTURE(many, flexing, Kind::kFlexing)->Apply(many_scenes);
 BENCHMARK_CAPTURE(many, rigid, Kind::kRigid)->Apply(many_scenes);
 
 /// Balls, boxes and capsules in layers on a floor.
-void heap(benchmark::State& state) { measure_queries(state, testing::heap(static_cast<int>(state.range(0)), 16), {}); }
+void heap(benchmark::State& state) { measure_queries(state, testing::heap(static_cast<int>(state.range(0)), 16)); }
 BENCHMARK(heap)->ArgName("bodies")->Arg(100)->Arg(1000);
 
 /// All but every tenth body of the heap asleep.
 void heap_asleep(benchmark::State& state) {
   ContactScene scene = testing::heap(static_cast<int>(state.range(0)), 16);
   for (std::size_t i = 0; i < scene.asleep.size(); ++i) scene.asleep[i] = i % 10 != 5;
-  measure_queries(state, scene, {});
+  measure_queries(state, scene);
 }
 BENCHMARK(heap_asleep)->ArgName("bodies")->Arg(1000);
 

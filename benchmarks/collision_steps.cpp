@@ -3,7 +3,7 @@
 // Markdown: µs of all queries of one step, by the thread's own work, of three runs through the least for each query.
 //   collision_steps [SCENE [BUNNY.glb [BESIDE]]]     part of the names of the scenes wanted ("": all), the asset of the
 //   bunnies ("": without them); beside ContactFinder: fcl (if nothing is given), alone (nothing), or manifolds
-//   (ManifoldFinder, with all contacts that ContactFinder finds, not thinned; what game
+//   (ManifoldFinder, beside all contacts that ContactFinder finds; what game
 //   contact asks, once a step)
 // Figures: docs/reports/benchmarks.md.
 #include <algorithm>
@@ -90,12 +90,12 @@ class Recorder final : public ContactSource {
     double seconds = 1e30;
     std::size_t contacts = 0;
   };
-  template <class Source, class... Options>
-  std::vector<Cost> replay(const Options&... options) const {
+  template <class Source>
+  std::vector<Cost> replay() const {
     std::vector<Cost> costs(queries_.size());
     std::vector<ContactPoint> contacts;
     for (int pass = 0; pass < kPasses; ++pass) {
-      Source finder(options...);
+      Source finder;
       for (const auto& make : replayed_) make(finder);
       for (std::size_t q = 0; q < queries_.size(); ++q) {
         ContactQuery query = queries_[q].asked();
@@ -171,8 +171,7 @@ void run(const std::string& name, const Recorder& recorder, const std::vector<Ph
       ends.push_back(recorder.queries());
     }
   const bool manifolds = beside == Beside::kManifolds;
-  const std::vector<Recorder::Cost> costs =
-      recorder.replay<ContactFinder>(ContactFinderOptions{.clusters = {.max_points = manifolds ? 0 : 4}});
+  const std::vector<Recorder::Cost> costs = recorder.replay<ContactFinder>();
   const std::vector<Recorder::Cost> others = manifolds                    ? recorder.replay<ManifoldFinder>()
                                              : beside == Beside::kNothing ? costs
                                                                           : recorder.replay<FclContactSource>();

@@ -1,4 +1,4 @@
-// Contacts by distance fields beside ContactFinder's, unthinned, on the same states of a heap: time, and what of the
+// Contacts by distance fields beside ContactFinder's on the same states of a heap: time, and what of the
 // exact contacts the fields miss. The heap is made by moving bodies apart along the fields' own contacts and towards
 // the middle, so that what these miss is there more often than in a world. Prints Markdown.
 //   field_contacts BODIES STATES ASSET.glb…     assets take turns
@@ -31,8 +31,7 @@ constexpr double kMargin = 1e-3, kBends = 0.005;
 /// Bodies of a few models, bent and turned at random.
 class Heap {
  public:
-  Heap(const std::vector<std::shared_ptr<const ModalModel>>& models, int bodies)
-      : finder_({.clusters = {.max_points = 0}}) {
+  Heap(const std::vector<std::shared_ptr<const ModalModel>>& models, int bodies) {
     std::vector<std::shared_ptr<const Pointshell>> shells;
     for (const auto& model : models) {
       const double start = thread_seconds();

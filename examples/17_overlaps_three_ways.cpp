@@ -45,7 +45,7 @@ void tell(const char* name, limber::ContactSource& source, const std::shared_ptr
 int main(int argc, char** argv) try {
   const auto box = limber::read_asset(argc > 1 ? argv[1] : "box.glb").bodies.at(0);
   for (const double depth : {0.01, 0.05, 0.09}) {
-    limber::ContactFinder own, by_tets({.narrow_phase = {.normals = limber::tet_overlap_normals}});
+    limber::ContactFinder own, by_tets({.normals = limber::tet_overlap_normals});
     tell("limber", own, box, depth);
     tell("tetrahedra", by_tets, box, depth);
 #if LIMBER_HAS_FCL

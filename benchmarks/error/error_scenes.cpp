@@ -198,9 +198,9 @@ ErrorScene driven(ErrorScene scene, double times) {
 }
 
 std::string text(const ErrorSetting& s) {
-  return fmt::format("{} modes, step {:.6g} s, {}, {} contacts, residual {}, {}, mesh {}, drive {:g}{}", s.modes,
-                     s.step, s.method, s.contacts == 0 ? "all" : std::to_string(s.contacts), s.residual ? "on" : "off",
-                     s.basis, s.mesh, s.drive, s.substeps > 0 ? fmt::format(", game {}", s.substeps) : "");
+  return fmt::format("{} modes, step {:.6g} s, {}, residual {}, {}, mesh {}, drive {:g}{}", s.modes, s.step, s.method,
+                     s.residual ? "on" : "off", s.basis, s.mesh, s.drive,
+                     s.substeps > 0 ? fmt::format(", game {}", s.substeps) : "");
 }
 
 std::string scene_text(const ErrorScene& scene, const ErrorSetting& setting,

@@ -86,8 +86,7 @@ struct ErrorSetting {
   int modes = 40;
   double step = 1.0 / 240.0;             ///< s; divides kSlowestStep
   std::string method = "complementary";  ///< as in scene files
-  int contacts = 4;                      ///< kept of a patch; 0: all. Others than 4 are not told by scene files
-  int substeps = 0;                      ///< of ContactSolver::kGame, which takes contacts as it finds them; 0: kExact
+  int substeps = 0;                      ///< of ContactSolver::kGame; 0: kExact
   bool residual = true;                  ///< static answers of the modes left out, where loads act and bodies touch
   std::string basis = "float";           ///< or "half": shapes rounded to IEEE half precision
   int mesh = 1;                          ///< times as many cells along each axis

@@ -7,7 +7,6 @@
 #include "../cpu_time.h"
 #include "constants.h"
 #include "error_scenes.h"
-#include "limber/collision/contact_finder.h"
 #include "limber/core/error.h"
 #include "limber/precompute/bake.h"
 #include "limber/scene/scene_model.h"
@@ -109,10 +108,7 @@ class Playing {
         scene_(parse_scene(scene_text(scene, setting, [](const std::string& name) { return name + ".glb"; }),
                            scene.name, ".")),
         models_(make_models(scene_, baked.assets)),
-        player_(scene_, models_, scene_.steps),
-        own_finder_({.clusters = {.max_points = setting.contacts}}) {
-    if (scene.has_contact() && setting.substeps == 0 && setting.contacts != ContactClusterOptions{}.max_points)
-      choose_contacts();
+        player_(scene_, models_, scene_.steps) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       vertices_.push_back(compared_vertices(scene.bodies[i], *models_.of_body[i]));
     played_.motions.resize(scene.bodies.size());
@@ -137,13 +133,6 @@ class Playing {
   }
 
  private:
-  /// Before anything moves.
-  void choose_contacts() {
-    ContactOptions options = *scene_.contacts.options;
-    options.solver = ContactSolver::kExact;
-    player_.world().set_contact_source(&own_finder_, options);
-  }
-
   void note_step(double time) {
     const World& world = player_.world();
     played_.unsettled += world.constraint_report().solved ? 0 : 1;
@@ -185,7 +174,6 @@ class Playing {
   Scene scene_;
   SceneModels models_;
   ScenePlayer player_;
-  ContactFinder own_finder_;
   std::vector<std::vector<std::size_t>> vertices_;
   std::vector<float> drawn_;
   PlayedScene played_;

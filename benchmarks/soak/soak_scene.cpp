@@ -18,13 +18,6 @@ constexpr double kHookHeight = 1.6;                     // m, of the chain's fir
 constexpr double kLimit = 0.6;                          // rad, of the chain's last hinge
 constexpr int kHands = 2;
 
-/// Small steps take all contacts that there are.
-ContactFinderOptions finder_options(const ContactOptions& options) {
-  ContactFinderOptions finder;
-  if (options.solver == ContactSolver::kGame) finder.clusters.max_points = 0;
-  return finder;
-}
-
 /// Each vertex once, as a corner of a triangle.
 std::vector<SurfacePoint> vertices_of(const ModalSurface& surface) {
   std::vector<SurfacePoint> points(static_cast<std::size_t>(surface.vertices()));
@@ -40,7 +33,7 @@ std::vector<SurfacePoint> vertices_of(const ModalSurface& surface) {
 }  // namespace
 
 SoakScene::SoakScene(const SoakBodies& bodies, unsigned seed, const ContactOptions& options)
-    : finder_(finder_options(options)), random_(seed), hands_(kHands) {
+    : random_(seed), hands_(kHands) {
   world_.set_contact_source(&finder_, options);
   make_pit();
   add_loose(bodies);

@@ -105,23 +105,6 @@ struct FinderTuning {
   std::size_t pairs_per_chunk = 4, bodies_per_chunk = 64;  ///< for a thread at a time [1 to 1,000]; time alone. Steady.
 };
 
-/// Contacts of a patch, thinned to a few.
-struct ClusterTuning {
-  double normal_angle = 0.35;  ///< rad, 20°, between a contact and its patch's first [0.1 to 0.7]; by judgement
-  /// Part of the patch's extent within which contacts are as deep as the deepest [1e-5 to 1e-2]: what is pressed beside
-  /// it when bodies of some stiffness rest on each other. By judgement.
-  double deep = 1e-3;
-  double hysteresis = 0.9;  ///< part of the best choice's area that last time's must have [0.5 to 1]; by judgement
-  /// Spacings within which last time's contacts must cover a patch to be kept [1 to 2], as the header says; the sheets
-  /// of the benchmark change their contacts from step to step at 0.55.
-  double kept_spacing = 1.1;
-  /// How many more they may be than the best choice, per contact of it that covers the middle [0 to 1]. Steady.
-  double kept_surplus = 0.5;
-  /// Part of a patch's extent by which a contact may be farther than one that stands for it and still be pressed with
-  /// it in full; at twice of it not at all [1e-3 to 2e-2]: the depth of dents.
-  double pressed_with = 5e-3;
-};
-
 /// Bodies that come far, and the first time of impact.
 struct ImpactTuning {
   /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
@@ -176,7 +159,6 @@ struct CollisionTuning {
   ConvexTuning convex{};
   NarrowTuning narrow{};
   FinderTuning finder{};
-  ClusterTuning clusters{};
   ImpactTuning impact{};
   FieldTuning field{};
 };

@@ -80,8 +80,7 @@ void ContactOptions::validate() const {
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<PreparedContact> contacts;
-  std::vector<VertexShare> regions;  // of their sides
-  std::vector<double> shapes;        // of these
+  std::vector<VertexShare> corners;  // of their sides
   ContactHistory history;
   std::vector<RollingMemory> rolling_memory;  // by (a, b), of the last step
   Pool<PairContacts> pairs;
@@ -92,9 +91,7 @@ struct ContactSet::Impl {
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around);
-  void reserve_regions(const BodyStates& states, std::span<const ContactPoint> points);
-  void add_region(PreparedSide& side, const ContactSide& found);
-  void spread_shapes(PreparedSide& side);
+  void add_corners(PreparedSide& side);
 };
 
 void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around) {
@@ -106,8 +103,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   PreparedContact& contact = contacts.emplace_back();
   contact.id = point.id;
   contact.a = make_side(states, point.a, point.normal), contact.b = make_side(states, point.b, -point.normal);
-  add_region(contact.a, point.a);
-  add_region(contact.b, point.b);
+  add_corners(contact.a);
+  add_corners(contact.b);
   contact.axes = frame_along(point.normal);
   const double smaller = std::min(of_a.friction, of_b.friction);
   contact.friction = smaller > 0.0 ? std::sqrt(of_a.friction * of_b.friction) : 0.0;
@@ -125,42 +122,14 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
     contact.approach = approach(states, contact, around.gravity);
 }
 
-/// So that spans of them stay where they are.
-void ContactSet::Impl::reserve_regions(const BodyStates& states, std::span<const ContactPoint> points) {
-  std::size_t most = 0, most_shapes = 0;
-  for (const ContactPoint& point : points)
-    for (const ContactSide* side : {&point.a, &point.b}) {
-      most += std::max<std::size_t>(3, side->region.size());
-      if (!side->region.empty() && !states.is_static(side->body))
-        most_shapes += 3 * static_cast<std::size_t>(states.body(side->body).group->model().modes());
-    }
-  regions.clear(), shapes.clear();
-  regions.reserve(most), shapes.reserve(most_shapes);
-}
-
-/// The vertices that a contact's force is spread over, its point's own where it stands for no others.
-void ContactSet::Impl::add_region(PreparedSide& side, const ContactSide& found) {
+/// @pre there is room: spans of them stay where they are
+void ContactSet::Impl::add_corners(PreparedSide& side) {
   if (!yields(side)) return;
-  const std::size_t first = regions.size();
-  regions.insert(regions.end(), found.region.begin(), found.region.end());
-  const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
-  for (std::size_t c = 0; c < 3 && found.region.empty(); ++c)
-    if (side.at.weight[c] != 0.0) regions.push_back({.vertex = corners[c], .share = side.at.weight[c]});
-  side.region = std::span(regions).subspan(first);
-  if (!found.region.empty()) spread_shapes(side);
-}
-
-/// The modes' part of a contact, too, is that of its region.
-void ContactSet::Impl::spread_shapes(PreparedSide& side) {
-  const auto k = static_cast<std::size_t>(side.model->modes());
-  const std::size_t first = shapes.size();
-  shapes.resize(first + 3 * k, 0.0);
-  side.shapes = std::span(shapes).subspan(first);
-  for (const VertexShare& s : side.region)
-    for (std::size_t axis = 0; axis < 3 && k > 0; ++axis) {
-      const float* row = side.model->collision_rows().row(s.vertex, static_cast<int>(axis));
-      for (std::size_t i = 0; i < k; ++i) shapes[first + axis * k + i] += s.share * static_cast<double>(row[i]);
-    }
+  const std::size_t first = corners.size();
+  const Triangle& vertices = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
+  for (std::size_t c = 0; c < 3; ++c)
+    if (side.at.weight[c] != 0.0) corners.push_back({.vertex = vertices[c], .share = side.at.weight[c]});
+  side.corners = std::span(corners).subspan(first);
 }
 
 ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -181,7 +150,8 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
   s.history.reserve(bodies);
   s.dents.reserve(bodies);
-  s.reserve_regions(states, points);
+  s.corners.clear();
+  s.corners.reserve(6 * points.size());  // three of each side
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, surroundings);
   s.pairs.reuse(), s.rolling.reuse();
@@ -226,7 +196,7 @@ void ContactSet::press_dents(const BodyStates& states) {
       const PreparedSide& side = contact.side(s);
       if (!yields(side)) continue;
       const Quaternion q_BW = states.pose(side.body, StepTime::kStart).q.conjugate();
-      impl_->dents.press(side.body, side.region,
+      impl_->dents.press(side.body, side.corners,
                          side.turned_back(q_BW * (PreparedContact::sign(s) * contact.mean_force)));
     }
 }

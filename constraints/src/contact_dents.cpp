@@ -31,12 +31,12 @@ void ContactDents::reserve(std::size_t bodies) {
   loaded_.reserve(bodies_.size());
 }
 
-Vec3 ContactDents::displacement(const BodyStates& states, Index body, Region region) {
+Vec3 ContactDents::displacement(const BodyStates& states, Index body, Corners corners) {
   const Body& b = at(body);
   if (b.loads.empty()) return Vec3::Zero();
   const ResidualCompliance& compliance = compliance_of(states, body);
   Vec3 u = Vec3::Zero();
-  for (const VertexShare& s : region) u += s.share * displacement_in_body(compliance, b.loads, s.vertex);
+  for (const VertexShare& s : corners) u += s.share * displacement_in_body(compliance, b.loads, s.vertex);
   return u;
 }
 
@@ -46,15 +46,15 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
     b.made_in = &rows, b.making = rows.makings();
     b.gathers = true;
     b.rows.clear();
-    b.in_regions.clear();
+    b.of_rows.clear();
     b.vertices.clear();
     rows.add_stored_energy(energy(states, body));
   }
   b.rows.push_back(side);
-  find_answers(compliance_of(states, body), side.region, b);
+  find_answers(compliance_of(states, body), side.corners, b);
   for (const Rows& other : b.rows) {
     Mat3 answer = Mat3::Zero();
-    for (const VertexShare& s : other.region) answer += s.share * b.answer[b.in_regions(s.vertex)];
+    for (const VertexShare& s : other.corners) answer += s.share * b.answer[b.of_rows(s.vertex)];
     const Mat3 G = other.axes.transpose() * answer * side.axes;
     const bool itself = &other == &b.rows.back();
     // Both sides of one contact, where a body touches itself: each gives to the other's force as well.
@@ -65,20 +65,20 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
   }
 }
 
-/// Displacements of the vertices of all regions so far by a unit force on one of these.
-void ContactDents::find_answers(const ResidualCompliance& compliance, Region region, Body& b) {
-  for (const VertexShare& s : region)
-    if (b.in_regions(s.vertex) == b.vertices.size()) b.vertices.push_back(s.vertex);
+/// Displacements of the vertices of all sides so far by a unit force on one of these.
+void ContactDents::find_answers(const ResidualCompliance& compliance, Corners corners, Body& b) {
+  for (const VertexShare& s : corners)
+    if (b.of_rows(s.vertex) == b.vertices.size()) b.vertices.push_back(s.vertex);
   b.answer.assign(b.vertices.size(), Mat3::Zero());
   const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
-  for (const VertexShare& s : region) {
-    if (local) b.answer[b.in_regions(s.vertex)] += s.share * compliance.block(s.vertex, s.vertex);
+  for (const VertexShare& s : corners) {
+    if (local) b.answer[b.of_rows(s.vertex)] += s.share * compliance.block(s.vertex, s.vertex);
     for (std::size_t v = 0; v < b.vertices.size() && !local; ++v)
       b.answer[v] += s.share * compliance.block(b.vertices[v], s.vertex);
   }
 }
 
-void ContactDents::press(Index body, Region region, const Vec3& force) {
+void ContactDents::press(Index body, Corners corners, const Vec3& force) {
   Body& b = at(body);
   if (b.gathers) {
     b.gathers = false;
@@ -87,7 +87,7 @@ void ContactDents::press(Index body, Region region, const Vec3& force) {
   }
   b.pressed = true;
   if (force.isZero(0.0)) return;
-  for (const VertexShare& s : region) {
+  for (const VertexShare& s : corners) {
     const std::size_t number = b.of_loads(s.vertex);
     if (number == b.loads.size()) b.loads.push_back({.vertex = s.vertex});
     b.loads[number].force += s.share * force;

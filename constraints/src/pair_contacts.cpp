@@ -123,7 +123,7 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
       if (yields_[i])
-        dents_->press(side.body, side.region,
+        dents_->press(side.body, side.corners,
                       side.turned_back(turn_[i].conjugate() * (PreparedContact::sign(i) * contact.last_force)));
     }
   });
@@ -145,7 +145,7 @@ void PairContacts::begin(const BodyStates& states) {
       const PreparedSide& side = contact.side(i);
       if (yields_[i])
         dent +=
-            PreparedContact::sign(i) * (turn_[i] * side.turned(dents_->displacement(states, side.body, side.region)));
+            PreparedContact::sign(i) * (turn_[i] * side.turned(dents_->displacement(states, side.body, side.corners)));
     }
     contact.dent = contact.axes.transpose() * (dent + contact.compliance * contact.last_force);
   }
@@ -238,7 +238,7 @@ void PairContacts::add_flexibility(const BodyStates& states, Index first, Constr
       const PreparedSide& side = contact.side(i);
       Mat3 axes = PreparedContact::sign(i) * (R.transpose() * contact.axes);
       for (Index axis = 0; axis < 3; ++axis) axes.col(axis) = side.turned_back(axes.col(axis));
-      dents_->add_rows(states, side.body, {side.region, axes, first + static_cast<Index>(row), contact.rows()}, rows);
+      dents_->add_rows(states, side.body, {side.corners, axes, first + static_cast<Index>(row), contact.rows()}, rows);
     });
   }
 }

@@ -28,15 +28,20 @@ struct PointMotion {
   Vec3 place, velocity, bias;
 };
 
+/// The share of a contact's force that a vertex of the collision surface takes.
+struct VertexShare {
+  Index vertex = -1;
+  double share = 0.0;  // > 0
+};
+
 /// One side of a contact, prepared.
 struct PreparedSide {
   Index body = -1;
   const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
   SurfacePoint at{};
-  std::span<const VertexShare> region{};  // of its residual compliance; none where it has none
-  std::span<const double> shapes{};       // of the modes, the region's mean, 3 × k; none: those of the point
-  SkinMemory* skin = nullptr;             // null: the body bends by its modes alone
-  Mat3 turn = Mat3::Identity();           // with a skin: of what it yields beyond its modes, at the step's start
+  std::span<const VertexShare> corners{};  // with a residual compliance: the vertices that the point lies between
+  SkinMemory* skin = nullptr;              // null: the body bends by its modes alone
+  Mat3 turn = Mat3::Identity();            // with a skin: of what it yields beyond its modes, at the step's start
   Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
@@ -54,10 +59,10 @@ struct PreparedSide {
   /// How far what is there has come beyond that by rolling, by the end of the step.
   Vec3 rolled(const BodyStates& states, double step) const { return turn_of_step(states, body, step).cross(rim); }
   /// Body frame. @param z amplitudes
-  Vec3 place(std::span<const double> z) const { return model == nullptr ? rigid_point : shape(z).position(at, shapes); }
+  Vec3 place(std::span<const double> z) const { return model == nullptr ? rigid_point : shape(z).position(at); }
   /// Its velocity by the rates ż.
   Vec3 deforming(std::span<const double> z, std::span<const double> rates) const {
-    return shape(z).velocity(at, rates, shapes);
+    return shape(z).velocity(at, rates);
   }
   /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R J ż,
   /// [H03] equation 20; what J itself changes by is left out.
@@ -145,13 +150,13 @@ inline RowSide point_row(const BodyStates& states, StepTime when, const Prepared
   if (when == StepTime::kMiddle) {
     const Vec3 n_B = states.rotation(side.body, when).transpose() * n;
     if (side.skin == nullptr)
-      side.shape({}).add_force(side.at, n_B, modal, side.shapes);
+      side.shape({}).add_force(side.at, n_B, modal);
     else
       for (const auto& [shape, weight] : states.shapes_between(side.body))
-        shape.add_force(side.at, weight * n_B, modal, side.shapes);
+        shape.add_force(side.at, weight * n_B, modal);
   } else {
     const Vec3 n_B = states.pose(side.body, when).q.conjugate() * n;
-    side.shape(states.amplitudes(side.body, when)).add_force(side.at, n_B, modal, side.shapes);
+    side.shape(states.amplitudes(side.body, when)).add_force(side.at, n_B, modal);
   }
   return {row.body, row.linear, row.angular, modal};
 }

@@ -73,10 +73,7 @@ struct RoundsTuning {
   double slow = 0.25;           ///< an impulse that changes by more of its last change makes its row stiffer. [path]
   double stiffer = 0.1;         ///< and by this factor
   double newton_left = 0.03;    ///< of a tolerance, what Newton's method may leave of a round
-  int most_newton_steps = 100;  ///< in a step. [path] Bounds the work
-  /// Contacts solved for, each counted in each Newton step, after which rounds among contacts end. [path] Bounds the
-  /// work to a few milliseconds.
-  int most_solved = 12'000;
+  int most_newton_steps = 500;  ///< in a step. [path] Bounds the work
 };
 
 /// Newton's method on the midpoint of a step: joints, hands and limits.

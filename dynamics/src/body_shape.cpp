@@ -9,19 +9,6 @@ const ModalSurface& surface_of(const ModalModel& model, const SurfacePoint& at) 
   return at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
 }
 
-/// Three rows of k numbers, times k numbers.
-Vec3 product(std::span<const double> shapes, std::span<const double> z) {
-  Vec3 u = Vec3::Zero();
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    for (std::size_t i = 0; i < z.size(); ++i) u[static_cast<Index>(axis)] += shapes[axis * z.size() + i] * z[i];
-  return u;
-}
-
-void add_product(std::span<const double> shapes, const Vec3& f, std::span<double> g) {
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    for (std::size_t i = 0; i < g.size(); ++i) g[i] += shapes[axis * g.size() + i] * f[static_cast<Index>(axis)];
-}
-
 /// A vertex that has part in a point.
 struct Corner {
   SurfacePoint at;  // the vertex alone
@@ -81,55 +68,34 @@ std::span<const SkinInfluences> skin_influences(const ModalModel& model, Surface
   return surface == SurfacePoint::Surface::kCollision && model.data().collision ? skin.collision : skin.render;
 }
 
-Vec3 BodyShape::position(const SurfacePoint& at, std::span<const double> shapes) const {
-  if (skin_ == nullptr) {
-    if (shapes.empty()) return deformed_point(*model_, at, z_);
-    const ModalSurface& surface = surface_of(*model_, at);
-    const Triangle& corners = surface.triangles[static_cast<std::size_t>(at.triangle)];
-    Vec3 rest = Vec3::Zero();
-    for (std::size_t c = 0; c < 3; ++c)
-      rest += at.weight[c] * surface.rest[static_cast<std::size_t>(corners[c])].cast<double>();
-    return rest + product(shapes, z_);
-  }
+Vec3 BodyShape::position(const SurfacePoint& at) const {
+  if (skin_ == nullptr) return deformed_point(*model_, at, z_);
   const SkinPose& pose = handles();
-  const Vec3 mean = shapes.empty() ? Vec3(Vec3::Zero()) : product(shapes, z_);
   Vec3 sum = Vec3::Zero();
   for_corners(*model_, at, [&](const Corner& c) {
-    const Vec3 u = shapes.empty() ? displacement(*model_, c.at, z_) : mean;
-    sum += c.weight * pose.position(c.influences, c.rest, u);
+    sum += c.weight * pose.position(c.influences, c.rest, displacement(*model_, c.at, z_));
   });
   return sum;
 }
 
-Vec3 BodyShape::velocity(const SurfacePoint& at, std::span<const double> rates, std::span<const double> shapes) const {
-  if (skin_ == nullptr) return shapes.empty() ? displacement(*model_, at, rates) : product(shapes, rates);
+Vec3 BodyShape::velocity(const SurfacePoint& at, std::span<const double> rates) const {
+  if (skin_ == nullptr) return displacement(*model_, at, rates);
   const SkinPose& pose = differentiated();
   Vec3 sum = Vec3::Zero();
   for_corners(*model_, at, [&](const Corner& c) {
-    const Vec3 u = shapes.empty() ? displacement(*model_, c.at, z_) : product(shapes, z_);
-    const Vec3 v = shapes.empty() ? displacement(*model_, c.at, rates) : product(shapes, rates);
+    const Vec3 u = displacement(*model_, c.at, z_), v = displacement(*model_, c.at, rates);
     sum += c.weight * pose.velocity(c.influences, c.rest, u, v, rates);
   });
   return sum;
 }
 
-void BodyShape::add_force(const SurfacePoint& at, const Vec3& f_B, std::span<double> g,
-                          std::span<const double> shapes) const {
-  if (skin_ == nullptr) {
-    if (shapes.empty()) return add_modal_force(*model_, at, f_B, g);
-    return add_product(shapes, f_B, g);
-  }
+void BodyShape::add_force(const SurfacePoint& at, const Vec3& f_B, std::span<double> g) const {
+  if (skin_ == nullptr) return add_modal_force(*model_, at, f_B, g);
   const SkinPose& pose = differentiated();
-  Vec3 to_region = Vec3::Zero();
   for_corners(*model_, at, [&](const Corner& c) {
-    const Vec3 u = shapes.empty() ? displacement(*model_, c.at, z_) : product(shapes, z_);
-    const Vec3 turned = pose.add_rows(c.influences, c.rest, u, c.weight * f_B, g);
-    if (shapes.empty())
-      add_modal_force(*model_, c.at, turned, g);
-    else
-      to_region += turned;
+    const Vec3 u = displacement(*model_, c.at, z_);
+    add_modal_force(*model_, c.at, pose.add_rows(c.influences, c.rest, u, c.weight * f_B, g), g);
   });
-  if (!shapes.empty()) add_product(shapes, to_region, g);
 }
 
 Mat3 BodyShape::turn(const SurfacePoint& at) const {

@@ -96,13 +96,12 @@ TEST(ContactFinder, ContactsAreWhatTheContractSays) {
 
 TEST(ContactFinder, ManyBodiesTogetherHaveTheContactsOfEachPairAlone) {
   const ContactScene scene = heap(40);
-  const ContactFinderOptions all{.clusters = {.max_points = 0}};
-  ContactFinder finder(all);
+  ContactFinder finder;
   scene.add_all_to(finder);
   std::vector<ContactPoint> alone;
   for (std::size_t a = 0; a < scene.geometries.size(); ++a)
     for (std::size_t b = a + 1; b < scene.geometries.size(); ++b) {
-      ContactFinder pair(all);
+      ContactFinder pair;
       pair.add_body(static_cast<Index>(a), scene.geometries[a], {});
       pair.add_body(static_cast<Index>(b), scene.geometries[b], {});
       const auto contacts = contacts_of(pair, scene, kMargin);
@@ -204,7 +203,7 @@ TEST(ContactFinder, OnlySleepersBesideAwakeBodiesAreLookedAt) {
 
 TEST(ContactFinder, ContactsOfASleeperAreThoseItHadAwake) {
   ContactScene scene = heap(30);
-  ContactFinder finder({.clusters = {.max_points = 0}});
+  ContactFinder finder;
   scene.add_all_to(finder);
   const auto awake = contacts_of(finder, scene, kMargin);
   for (std::size_t i = 0; i < scene.asleep.size(); ++i) scene.asleep[i] = i % 2 == 0;
@@ -372,26 +371,6 @@ TEST(ContactFinder, IdsStayWhileABodySlidesAndBends) {
   EXPECT_GE(static_cast<double>(stayed), 0.97 * static_cast<double>(all));
 }
 
-TEST(ContactFinder, ThinnedContactsAreAmongAllAndHoldTheDeepestOfEachPair) {
-  const ContactScene scene = heap(60);
-  ContactFinder thinned, whole({.clusters = {.max_points = 0}});
-  scene.add_all_to(thinned);
-  scene.add_all_to(whole);
-  const auto few = contacts_of(thinned, scene, kMargin), all = contacts_of(whole, scene, kMargin);
-  EXPECT_LT(few.size(), all.size());
-  const auto all_ids = id_set(all);
-  for (const ContactPoint& c : few) EXPECT_TRUE(all_ids.contains(c.id));
-  EXPECT_EQ(pairs(few), pairs(all));
-  std::map<std::pair<Index, Index>, double> deepest_of_few, deepest_of_all;
-  for (const auto& [list, deepest] : {std::pair(&few, &deepest_of_few), std::pair(&all, &deepest_of_all)})
-    for (const ContactPoint& c : *list) {
-      const auto [entry, fresh] = deepest->try_emplace({c.a.body, c.b.body}, c.gap);
-      entry->second = std::min(entry->second, c.gap);
-    }
-  const double tolerance = internal::collision_tuning().clusters.deep * 2.0;  // of a patch's extent, which is below 2 m
-  for (const auto& [pair, gap] : deepest_of_all) EXPECT_LE(deepest_of_few.at(pair), gap + tolerance);
-}
-
 TEST(ContactFinder, WrongStatesAreRefusedByNameAndChangeNothing) {
   ContactScene scene;
   scene.add(HalfSpace{});
@@ -444,9 +423,6 @@ TEST(ContactFinder, WrongBodiesAreRefused) {
   EXPECT_THROW(finder.set_filter(0, {}), InvalidArgument);
   EXPECT_THROW(finder.exclude_pair(2, 2, true), InvalidArgument);
   EXPECT_THROW(finder.exclude_pair(2, 3, true), InvalidArgument);
-  EXPECT_THROW(ContactFinder({.spacing = 0.0}), InvalidArgument);
-  EXPECT_THROW(ContactFinder({.region_spacing = -1.0}), InvalidArgument);
-  EXPECT_THROW(ContactFinder({.clusters = {.max_points = -1}}), InvalidArgument);
 }
 
 }  // namespace

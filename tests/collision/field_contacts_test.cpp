@@ -566,7 +566,7 @@ TEST(FieldContacts, TheSideOfAFlushBoxDoesNotStopWhatSlidesOverIt) {
 TEST(FieldPairs, ManifoldFinderFindsByThemWhatItFindsByTriangles) {
   const testing::ContactScene heap = testing::heap(40);
   ManifoldFinder by_fields;
-  ContactFinder by_triangles({.clusters = {.max_points = 0}});
+  ContactFinder by_triangles;
   heap.add_all_to(by_fields), heap.add_all_to(by_triangles);
   const auto found = contacts_of(by_fields, heap, 1e-2), exact = contacts_of(by_triangles, heap, 1e-2);
   // Bodies of 1 m, three hundredths deep in each other: no pair that triangles have deep is missing.

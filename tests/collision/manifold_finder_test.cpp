@@ -88,7 +88,7 @@ ContactScene random_pairs(int pairs, unsigned seed, double apart) {
 TEST(ManifoldFinder, WhatOverlapsHasTheDeepestContactOfTheExactFinderAndNoOtherPairHasOne) {
   const ContactScene scene = random_pairs(testing::trials(400), 3, 1.2);
   ManifoldFinder finder;
-  ContactFinder exact({.clusters = {.max_points = 0}});
+  ContactFinder exact;
   scene.add_all_to(finder), scene.add_all_to(exact);
   constexpr double kMargin = 0.02;
   const auto found = by_pair(contacts_of(finder, scene, kMargin)), all = by_pair(contacts_of(exact, scene, kMargin));
@@ -126,7 +126,7 @@ TEST(ManifoldFinder, FacesKeepTheDeepestContactAndMostOfTheirSupport) {
     const Quaternion q = turned(0.0, 0.0, random.uniform(-3.0, 3.0)) * turned(random.uniform(-0.02, 0.02), 0.0, 0.0);
     scene.add(Box{{0.5, 0.4, 0.2}}, {q, {random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), 0.41}});
     ManifoldFinder finder;
-    ContactFinder exact({.clusters = {.max_points = 0}});
+    ContactFinder exact;
     scene.add_all_to(finder), scene.add_all_to(exact);
     const auto few = contacts_of(finder, scene, 0.05), all = contacts_of(exact, scene, 0.05);
     ASSERT_LE(few.size(), 4u);
@@ -340,7 +340,7 @@ TEST(ManifoldFinder, ThinBentBodiesHaveAllContactsByTriangles) {
     scene.add(BodyGeometry{.model = sheet, .shape = {}}, {random.pose(0.2).q, {0.02 * i, 0.0, 0.02 + 0.01 * i}},
               random.amplitudes(6, 0.005));
   ManifoldFinder finder;
-  ContactFinder exact({.clusters = {.max_points = 0}});
+  ContactFinder exact;
   scene.add_all_to(finder), scene.add_all_to(exact);
   const auto all = contacts_of(exact, scene, 0.01);
   const auto modal = [&](const ContactPoint& c) { return c.a.triangle >= 0 || c.b.triangle >= 0; };

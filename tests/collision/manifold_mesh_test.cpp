@@ -253,7 +253,7 @@ TEST(ManifoldMesh, OnBumpyGroundTheDeepestContactIsThatOfTheExactFinder) {
     scene.add(random_strip(-1.0, 1.0, 9, static_cast<unsigned>(trial), 0.04));
     const Shape shapes[]{Box{{0.3, 0.25, 0.2}}, Sphere{0.2}, Capsule{0.15, 0.2}};
     scene.add(shapes[trial % 3], {random.pose(1.0).q, {random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), 0.5}});
-    ContactFinder exact({.clusters = {.max_points = 0}});
+    ContactFinder exact;
     scene.add_all_to(exact);
     const auto gap_at = [&](ContactSource& finder) {
       double least = 0.5;

@@ -21,7 +21,7 @@ std::shared_ptr<const ModalModel> box_model(const Vec3& half) { return wavy_mode
 /// All contacts of a body that may move, at `place`, with what stands at the origin.
 std::vector<ContactPoint> contacts_with(const Shape& standing, std::shared_ptr<const ModalModel> moving,
                                         const Vec3& place, double reach, const Vec3& displacement = Vec3::Zero()) {
-  ContactFinder finder({.clusters = {.max_points = 0}});
+  ContactFinder finder;
   finder.add_body(0, {.model = {}, .shape = std::make_shared<const Shape>(standing)}, {});
   finder.add_body(1, {.model = std::move(moving), .shape = {}}, {});
   const std::array states{

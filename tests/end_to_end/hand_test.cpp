@@ -20,14 +20,15 @@ constexpr double kSide = 0.4, kMostForce = 3000.0, kFriction = 0.5;  // m; N alo
 const HandleOptions kLimitedHand{.max_force = kMostForce};
 const HandleOptions kSpringHand{.max_force = kMostForce, .stiffness = 4000.0, .damping = 60.0};
 
-std::shared_ptr<const ModalModel> rubber_box(bool residual) {
+std::shared_ptr<const ModalModel> rubber_box(bool residual, int cells) {
   BakeOptions o;
   o.materials = {{"*", {.youngs_modulus = 1e7, .poisson_ratio = 0.4, .density = 1100.0}}};
   o.analysis.modes = o.limits.max_modes = 12;
   o.residual.surface = residual;
   o.damping = RayleighDamping::from_ratio(0.03, 50.0, 500.0);
   Warnings warnings;
-  return bake({.name = "box", .mesh = tet_box(4, 4, 4, Vec3::Constant(kSide))}, o, warnings).asset.bodies[0];
+  return bake({.name = "box", .mesh = tet_box(cells, cells, cells, Vec3::Constant(kSide))}, o, warnings)
+      .asset.bodies[0];
 }
 
 /// A hand at the middle of a triangle, and the work that it could have done in a step.
@@ -64,7 +65,7 @@ void expect_push(const ContactEvent& event) {
 TEST(Hands, ContactsOfABoxThatIsLedPushAndDentItByTheirForces) {
   constexpr double kDent = 0.02, kSpeed = 10.0;
   const int steps = kSanitized ? 20 : 240;
-  const auto model = rubber_box(true);
+  const auto model = rubber_box(true, 3);
   const auto triangles = static_cast<Index>(model->collision().triangles.size());
   for (const HandleOptions& options : {kSpringHand, kLimitedHand}) {
     GroundedWorld scene(exactly({.friction = kFriction}));
@@ -88,7 +89,7 @@ TEST(Hands, ContactsOfABoxThatIsLedPushAndDentItByTheirForces) {
 TEST(Hands, LimitedOneDoesNoMoreWorkThanItsForceTimesItsWay) {
   constexpr double kReach = 0.45, kHeight = 0.8, kSpeed = 10.0, kApart = 1e-11;
   const int steps = kSanitized ? 10 : 300;
-  const auto model = rubber_box(false);
+  const auto model = rubber_box(false, 4);
   for (const bool touches : {false, true}) {
     GroundedWorld scene(exactly({.friction = kFriction}));
     World plain({.step = scene.world.options().step});

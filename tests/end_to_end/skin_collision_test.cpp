@@ -109,10 +109,10 @@ struct Fall {
   bool residual = false;
 };
 
-/// A bar bent up and let go, to fall back on a plane under it, without damping.
+/// A bar bent up and let go, to fall back on a plane under it, without damping: one swing.
 Release release_on_a_plane(const Fall& fall) {
   const double degrees = fall.degrees, steps_a_period = fall.steps_a_period;
-  const auto model = bar({.residual = fall.residual});
+  const auto model = bar({.residual = fall.residual, .cells = 10});
   ContactFinder finder;
   World world({.step = kPeriod / steps_a_period, .gravity = Vec3::Zero()});
   world.set_contact_source(&finder,
@@ -133,7 +133,7 @@ Release release_on_a_plane(const Fall& fall) {
   double last = start;
   const double ground = -0.05 - origin.z();
   std::vector<float> positions(3 * static_cast<std::size_t>(model->render().vertices()));
-  for (int i = 0; i < static_cast<int>(2.0 * steps_a_period); ++i) {
+  for (int i = 0; i < static_cast<int>(steps_a_period); ++i) {
     world.step();
     const double energy = world.energy(id).total();
     r.largest_gain = std::max(r.largest_gain, (energy - last) / start);
@@ -155,9 +155,8 @@ TEST(SkinnedSurfaces, ABarThatFallsBackOnAPlaneGainsNoEnergyAndDoesNotSinkIn) {
         const Release r = release_on_a_plane({.steps_a_period = steps, .friction = friction, .residual = residual});
         EXPECT_TRUE(r.pressed);
         EXPECT_LE(r.largest_gain, 1e-9);
-        // Points of a region that yields are deeper, up to 0.04.
         if (steps == 60.0) {
-          EXPECT_LE(r.deepest, !residual && friction == 0.0 ? 5e-4 : 0.05);
+          EXPECT_LE(r.deepest, 5e-4);
         }
       }
 }

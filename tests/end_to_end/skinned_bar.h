@@ -16,10 +16,11 @@ inline constexpr double kLength = 10.0;
 // First bending mode of the bar, s.
 inline constexpr double kPeriod = 60.0;
 
-inline TetMesh bar_mesh() { return mirrored_box(20, 2, 2, {kLength, 1.5, 1.0}); }
+inline TetMesh bar_mesh(int cells = 20) { return mirrored_box(cells, 2, 2, {kLength, 1.5, 1.0}); }
 
 struct BarOptions {
   bool held = true, skin = true, damped = false, residual = false;
+  int cells = 20;  // along it
 };
 
 /// A bar of kSoft along x, held at x = 0 or free, 20 modes, 16 handles.
@@ -33,7 +34,7 @@ inline std::shared_ptr<const ModalModel> bar(const BarOptions& options = {}) {
   if (options.damped) o.damping = RayleighDamping::from_ratio(1.0, 1.0 / kPeriod, 10.0 / kPeriod);
   if (options.held) o.fixed = {parse_node_selector("box:-0.1,-0.1,-0.1,0.001,2,2")};
   Warnings warnings;
-  return bake({.name = "bar", .mesh = bar_mesh()}, o, warnings).asset.bodies[0];
+  return bake({.name = "bar", .mesh = bar_mesh(options.cells)}, o, warnings).asset.bodies[0];
 }
 
 /// A vertex of the surface by its place in the input.

@@ -59,7 +59,7 @@ class Overlap {
   const World& world_;
   const std::vector<BodyId>& bodies_;
   Index ground_;
-  ContactFinder finder_{{.clusters = {.max_points = 0}}};
+  ContactFinder finder_;
   std::vector<BodyState> states_;
   std::vector<ContactPoint> contacts_;
 };

@@ -158,8 +158,8 @@ struct Found {
   std::vector<ContactPoint> limber, fcl;
 };
 Found find_both(const ContactScene& scene) {
-  ContactFinder finder({.narrow_phase = {.overlap = OverlapMethod::kNearestPoint}, .clusters = {.max_points = 0}});
-  FclContactSource source({.clusters = {.max_points = 0}});
+  ContactFinder finder({.overlap = OverlapMethod::kNearestPoint});
+  FclContactSource source;
   scene.add_all_to(finder);
   scene.add_all_to(source);
   return {testing::contacts_of(finder, scene, kOracleMargin), testing::contacts_of(source, scene, kOracleMargin)};

@@ -35,8 +35,7 @@ constexpr double kNudge = 0.01;        // by how much what drives a scene is cha
 /// All that is varied: each setting takes one of each.
 struct ErrorAxes {
   std::vector<std::string> methods{"complementary"}, residuals{"on"}, bases{"float"};
-  std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, contacts{4}, meshes{1},
-      substeps{0, 2, 4, 8, 16, 32};
+  std::vector<int> modes{1, 2, 5, 10, 20, 40, 80}, rates{60, 240, 960}, meshes{1}, substeps{0, 2, 4, 8, 16, 32};
   std::vector<double> drives{1.0};
 };
 
@@ -101,8 +100,6 @@ std::string method_of(const ErrorSetting& at) {
   std::string out = fmt::format("{:.0f} steps/s", 1.0 / at.step);
   const ErrorSetting usual;
   if (at.method != usual.method) out += ", " + at.method;
-  if (at.contacts != usual.contacts)
-    out += at.contacts == 0 ? ", all contacts" : fmt::format(", {} contacts", at.contacts);
   if (!at.residual) out += ", no residual";
   if (at.substeps > 0) out += fmt::format(", game {}", at.substeps);
   if (at.basis != usual.basis) out += ", " + at.basis;
@@ -146,26 +143,24 @@ std::vector<ErrorSetting> settings_of(const ErrorArguments& a) {
   for (const int mesh : a.axes.meshes)
     for (const std::string& basis : a.axes.bases)
       for (const std::string& residual : a.axes.residuals)
-        for (const int contacts : a.axes.contacts)
-          for (const int substeps : a.axes.substeps)
-            for (const std::string& method : a.axes.methods)
-              for (const double drive : a.axes.drives)
-                for (const int rate : a.axes.rates)
-                  for (const int modes : a.axes.modes)
-                    out.push_back({.modes = modes,
-                                   .step = 1.0 / rate,
-                                   .method = method,
-                                   .contacts = contacts,
-                                   .substeps = substeps,
-                                   .residual = residual == "on",
-                                   .basis = basis,
-                                   .mesh = mesh,
-                                   .drive = drive});
+        for (const int substeps : a.axes.substeps)
+          for (const std::string& method : a.axes.methods)
+            for (const double drive : a.axes.drives)
+              for (const int rate : a.axes.rates)
+                for (const int modes : a.axes.modes)
+                  out.push_back({.modes = modes,
+                                 .step = 1.0 / rate,
+                                 .method = method,
+                                 .substeps = substeps,
+                                 .residual = residual == "on",
+                                 .basis = basis,
+                                 .mesh = mesh,
+                                 .drive = drive});
   return out;
 }
 
 bool is_first_contact_rule(const ErrorSetting& at, const ErrorArguments& a) {
-  return at.method == a.axes.methods.front() && at.contacts == a.axes.contacts.front();
+  return at.method == a.axes.methods.front();
 }
 
 /// Whether no other setting makes the same run: rules of contact are the exact solver's, substeps those of what is
@@ -215,11 +210,11 @@ constexpr std::array<Column, 23> kColumns{{
 }};
 
 std::string csv_of(const std::vector<ErrorRow>& rows) {
-  std::string csv = "scene,line,modes,method,contacts,residual,basis,mesh,drive";
+  std::string csv = "scene,line,modes,method,residual,basis,mesh,drive";
   for (const auto& [name, value] : kColumns) csv += fmt::format(",{}", name);
   csv += '\n';
   for (const ErrorRow& r : rows) {
-    csv += fmt::format("{},\"{}\",{},{},{},{},{},{},{:g}", r.scene, r.method, r.at.modes, r.at.method, r.at.contacts,
+    csv += fmt::format("{},\"{}\",{},{},{},{},{},{:g}", r.scene, r.method, r.at.modes, r.at.method,
                        r.at.residual ? 1 : 0, r.at.basis, r.at.mesh, r.at.drive);
     for (const auto& [name, value] : kColumns) csv += fmt::format(",{:.6g}", value(r));
     csv += '\n';
@@ -228,9 +223,8 @@ std::string csv_of(const std::vector<ErrorRow>& rows) {
 }
 
 Json json_of(const ErrorRow& r) {
-  Json row{{"scene", r.scene},      {"line", r.method},          {"modes", r.at.modes},
-           {"method", r.at.method}, {"contacts", r.at.contacts}, {"residual", r.at.residual},
-           {"basis", r.at.basis},   {"mesh", r.at.mesh},         {"drive", r.at.drive}};
+  Json row{{"scene", r.scene},          {"line", r.method},    {"modes", r.at.modes}, {"method", r.at.method},
+           {"residual", r.at.residual}, {"basis", r.at.basis}, {"mesh", r.at.mesh},   {"drive", r.at.drive}};
   for (const auto& [name, value] : kColumns) row[name] = value(r);
   return row;
 }
@@ -312,7 +306,7 @@ ErrorParts parts_of(ErrorRuns& runs, const ErrorScene& scene, const ErrorSetting
   ErrorSetting fine = at;
   fine.step = 1.0 / kFinestRate;
   ErrorSetting best = fine;
-  if (scene.has_contact()) best.method = "complementary", best.contacts = 0;
+  if (scene.has_contact()) best.method = "complementary";
   ErrorSetting many = best;
   many.modes *= kManyModes;
   const PlayedScene seen = runs.play(scene, at), without_step = runs.play(scene, fine),
@@ -367,9 +361,7 @@ double share_of(const std::string& text) {
 }
 
 /// Settings that a scene file can hold.
-bool is_told_by_a_scene(const ErrorSetting& at) {
-  return at.substeps == 0 && at.modes > 0 && at.contacts == 4 && at.basis == "float";
-}
+bool is_told_by_a_scene(const ErrorSetting& at) { return at.substeps == 0 && at.modes > 0 && at.basis == "float"; }
 
 void write_settings(Program& program, ErrorRuns& runs, const ErrorArguments& a, const std::vector<ErrorRow>& rows) {
   const double target = share_of(a.target);
@@ -461,7 +453,6 @@ void declare_axes(CLI::App& app, ErrorArguments& a) {
   list("--steps-per-second", a.axes.rates, "a multiple of 30", "N,...")->check(CLI::Range(30, 1'000'000));
   list("--method", a.axes.methods, "how contact forces are found", "NAME,...")
       ->check(CLI::IsMember({"complementary", "gap_program", "velocity_program", "penalty"}));
-  list("--contacts", a.axes.contacts, "contacts kept of a patch; 0: all", "N,...")->check(CLI::Range(0, 1'000));
   list("--substeps", a.axes.substeps, "of contact, handles and joints by small steps; 0: the exact solver", "N,...")
       ->check(CLI::Range(0, 1'000));
   list("--residual", a.axes.residuals, "static answers of the modes left out", "on|off,...")

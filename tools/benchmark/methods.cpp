@@ -112,7 +112,7 @@ std::unique_ptr<ContactSource> make_finder(Finder finder) {
   if (finder == Finder::kFcl) return std::make_unique<FclContactSource>();
 #endif
   if (finder == Finder::kTets)
-    return std::make_unique<ContactFinder>(ContactFinderOptions{.narrow_phase = {.normals = tet_overlap_normals}});
+    return std::make_unique<ContactFinder>(NarrowPhaseOptions{.normals = tet_overlap_normals});
   return std::make_unique<ContactFinder>();
 }
 

@@ -298,8 +298,7 @@ std::vector<ReducedRow> run_reduced(Program& program, const PeersArguments& a, G
           program.progress().stage(fmt::format("{}, {} bodies of about {} vertices", scene, bodies, vertices));
         };
         program.progress().stage(scene);
-        add("limber", bar.surface.nodes.size(), run_limber(bar, run, false));
-        if (on_ground) add("limber, all contacts", bar.surface.nodes.size(), run_limber(bar, run, true));
+        add("limber", bar.surface.nodes.size(), run_limber(bar, run));
 #if LIMBER_HAS_BULLET
         add("Bullet, the surface alone", bar.surface.nodes.size(), run_bullet(bar.surface, run));
         if (vertices == 0) add("Bullet, all nodes and tets", bar.nodes.nodes.size(), run_bullet(bar.nodes, run));

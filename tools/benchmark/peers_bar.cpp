@@ -80,10 +80,8 @@ Bar make_bar(int modes, int vertices, double step) {
   return bar;
 }
 
-ReducedCost run_limber(const Bar& bar, const ReducedRun& run, bool all_contacts) {
-  ContactFinderOptions options;
-  if (all_contacts) options.clusters.max_points = 0;
-  ContactFinder finder(options);
+ReducedCost run_limber(const Bar& bar, const ReducedRun& run) {
+  ContactFinder finder;
   World world({.step = run.step, .gravity = run.on_ground ? Vec3(0.0, 0.0, -9.80665) : Vec3(Vec3::Zero())});
   if (run.on_ground) {
     world.set_contact_source(&finder, {.solver = ContactSolver::kExact});

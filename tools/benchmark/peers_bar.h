@@ -18,7 +18,6 @@ struct Bar {
 /// @param vertices about so many of the surface; 0: as it is drawn. @param step s
 Bar make_bar(int modes, int vertices, double step);
 
-/// @param all_contacts as many as Bullet has; else as limber thins them by itself
-ReducedCost run_limber(const Bar& bar, const ReducedRun& run, bool all_contacts);
+ReducedCost run_limber(const Bar& bar, const ReducedRun& run);
 
 }  // namespace limber::tools

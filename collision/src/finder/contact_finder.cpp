@@ -1,43 +1,52 @@
 #include "limber/collision/contact_finder.h"
 
-#include <algorithm>
-#include <cmath>
-#include <string>
+#include <memory>
+#include <variant>
+#include <vector>
 
 #include "finder/body_register.h"
 #include "finder/contact_id.h"
-#include "finder/contact_regions.h"
-#include "finder/found_body.h"
+#include "finder/geometry_cache.h"
+#include "finder/surface_pool.h"
 #include "finder/worker_pool.h"
 #include "finder/world_bounds.h"
 #include "tuning.h"
 
 namespace limber {
 
-using internal::contact_id;
-using internal::ContactRegions;
-using internal::FoundBody;
 using internal::ModalGeometry;
-using internal::RegionSide;
-using internal::Worker;
 using internal::world_box;
 using internal::world_half_space;
+
+namespace {
+
+struct FoundBody {
+  bool present = false;
+  std::shared_ptr<const ModalGeometry> modal{};  ///< one of the two
+  std::shared_ptr<const RigidGeometry> rigid{};
+  bool placed_asleep = false;  ///< as its place in the broad phase was made
+
+  Index modes() const { return modal ? modal->surface->modes() : 0; }
+  bool is_half_space() const { return rigid && std::holds_alternative<HalfSpace>(rigid->shape()); }
+};
+
+/// What one thread works with.
+struct Worker {
+  explicit Worker(const NarrowPhaseOptions& options) : narrow(options) {}
+  NarrowPhase narrow;
+  internal::SurfacePool pool;
+  DeformedSurface root;  ///< for boxes of whole bodies
+};
 using Workers = internal::WorkerPool<Worker>;
 
-void ContactFinderOptions::validate() const {
-  clusters.validate();
-  for (const auto& [name, value] : {std::pair("spacing", spacing), std::pair("region_spacing", region_spacing)})
-    if (!(value > 0.0))
-      throw InvalidArgument("ContactFinderOptions: " + std::string(name) + " is " + std::to_string(value) +
-                            ", expected above 0");
-}
+}  // namespace
 
 struct ContactFinder::Impl {
-  explicit Impl(const ContactFinderOptions& o) : options(o) { options.validate(); }
+  explicit Impl(const NarrowPhaseOptions& o) : options(o) {}
 
-  ContactFinderOptions options;
+  NarrowPhaseOptions options;
   internal::GeometryCache geometries;
-  internal::BodyRegister<internal::FoundBody> bodies{"ContactFinder"};
+  internal::BodyRegister<FoundBody> bodies{"ContactFinder"};
   Workers workers;
 
   // Of the query under way.
@@ -45,26 +54,17 @@ struct ContactFinder::Impl {
   std::vector<Index> to_place;
   std::vector<Aabb> boxes;  ///< by entry of to_place
   std::vector<BodyPair> pairs;
-  struct Found {
-    std::vector<ContactPoint> contacts;
-    internal::ContactRegions regions;
-  };
-  std::vector<Found> found;          ///< by chunk of pairs
-  internal::ContactRegions regions;  ///< what contacts' regions are kept in
-
-  internal::KeptIds kept;  ///< of the last query
+  std::vector<std::vector<ContactPoint>> found;  ///< by chunk of pairs
 
   const BodyState& state(Index body) const { return query.states[static_cast<std::size_t>(body)]; }
 
   void find_near_pairs(Jobs& jobs);
   void make_boxes(Jobs& jobs);
-  void make_box(std::size_t entry, internal::Worker& worker);
+  void make_box(std::size_t entry, Worker& worker);
   void place();
   void find_in_pairs(Jobs& jobs);
-  void find_in_pair(const BodyPair& pair, internal::Worker& worker, Found& into) const;
-  internal::RegionSide region_side(Index body) const;
-  CollisionBody collision_body(Index body, internal::Worker& worker) const;
-  ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
+  void find_in_pair(const BodyPair& pair, Worker& worker, std::vector<ContactPoint>& contacts) const;
+  CollisionBody collision_body(Index body, Worker& worker) const;
   void gather(std::vector<ContactPoint>& contacts);
 };
 
@@ -135,21 +135,8 @@ CollisionBody ContactFinder::Impl::collision_body(Index index, Worker& worker) c
   return result;
 }
 
-ContactSpacing ContactFinder::Impl::spacing(const BodyPair& pair, bool by_regions) const {
-  const FoundBody &a = bodies[pair.a], &b = bodies[pair.b];
-  if (a.modes() == 0 && b.modes() == 0) return {};
-  if (by_regions) return {.share = options.region_spacing};
-  return {.length = options.spacing * std::min(a.diagonal, b.diagonal)};
-}
-
-RegionSide ContactFinder::Impl::region_side(Index index) const {
-  const FoundBody& body = bodies[index];
-  if (!body.modal || !body.modal->surface->model()->data().residual_compliance) return {};
-  return {body.modal->surface.get(), state(index).pose.q};
-}
-
-void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Found& into) const {
-  std::vector<ContactPoint>& contacts = into.contacts;
+void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker,
+                                       std::vector<ContactPoint>& contacts) const {
   const std::size_t first = contacts.size();
   const CollisionBody a = collision_body(pair.a, worker);
   if (pair.a == pair.b) {
@@ -159,20 +146,14 @@ void ContactFinder::Impl::find_in_pair(const BodyPair& pair, Worker& worker, Fou
     const double together = (s.displacement - t.displacement).norm() + s.reach + t.reach;
     worker.narrow.find_contacts(a, collision_body(pair.b, worker), query.margin + together, query.origin, contacts);
   }
-  for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = contact_id(pair, contacts[c].id);
-  const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
-  const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
-  worker.clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept.of(pair), shares);
-  worker.regions.find(worker.clusters, shares, sides, into.regions);
-  into.regions.counts.reserve(contacts.capacity());
-  into.regions.counts.resize(contacts.size(), {0, 0});
+  internal::name_contacts(pair, contacts, first);
 }
 
 void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
   const std::size_t per_chunk = internal::collision_tuning().finder.pairs_per_chunk;
   const std::size_t chunks = (pairs.size() + per_chunk - 1) / per_chunk;
   if (found.size() < chunks) found.resize(chunks);
-  for (Found& part : found) part.contacts.clear(), part.regions.clear();
+  for (std::vector<ContactPoint>& part : found) part.clear();
   jobs.parallel_for(chunks, 1, [this, per_chunk](std::size_t begin, std::size_t end) {
     const Workers::Lease worker(workers);
     for (std::size_t p = begin * per_chunk; p < std::min(end * per_chunk, pairs.size()); ++p)
@@ -182,17 +163,10 @@ void ContactFinder::Impl::find_in_pairs(Jobs& jobs) {
 
 void ContactFinder::Impl::gather(std::vector<ContactPoint>& contacts) {
   contacts.clear();
-  regions.clear();
-  regions.counts.reserve(contacts.capacity());
-  for (const Found& part : found) {
-    contacts.insert(contacts.end(), part.contacts.begin(), part.contacts.end());
-    regions.append(part.regions);
-  }
-  regions.give_to(contacts);
-  kept.keep(contacts);
+  for (const std::vector<ContactPoint>& part : found) contacts.insert(contacts.end(), part.begin(), part.end());
 }
 
-ContactFinder::ContactFinder(const ContactFinderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ContactFinder::ContactFinder(const NarrowPhaseOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ContactFinder::~ContactFinder() = default;
 ContactFinder::ContactFinder(ContactFinder&&) noexcept = default;
 ContactFinder& ContactFinder::operator=(ContactFinder&&) noexcept = default;
@@ -201,13 +175,10 @@ void ContactFinder::add_body(Index body, const BodyGeometry& geometry, const Col
   Impl& m = *impl_;
   m.bodies.check_new(body, geometry);
   FoundBody fresh{.present = true};
-  if (geometry.model) {
+  if (geometry.model)
     fresh.modal = m.geometries.get(geometry.model, geometry.skin);
-    fresh.diagonal = 2.0 * fresh.modal->surface->rest_bounds().half_extents().norm();
-  } else {
+  else
     fresh.rigid = m.geometries.get(geometry.shape);
-    fresh.diagonal = 2.0 * fresh.rigid->bounds().half_extents().norm();
-  }
   m.bodies.add(body, std::move(fresh), filter);
 }
 
@@ -217,12 +188,7 @@ void ContactFinder::set_filter(Index body, const CollisionFilter& filter) { impl
 
 void ContactFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodies.exclude_pair(a, b, excluded); }
 
-void ContactFinder::save_state(StateWriter& state) const { state(impl_->kept.pairs, impl_->kept.ids); }
-
-void ContactFinder::restore_state(StateReader& state) {
-  state(impl_->kept.pairs, impl_->kept.ids);
-  impl_->bodies.forget_places();
-}
+void ContactFinder::restore_state(StateReader&) { impl_->bodies.forget_places(); }
 
 void ContactFinder::find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) {
   Impl& m = *impl_;

@@ -8,7 +8,7 @@
 // B from bounds on the accelerations of points that turn and bend, F from what is bounded as a whole: skins, and bodies
 // that turn far within the stretch. Nodes and triangles are compared along sixteen directions at once; branch and bound
 // finds the least time. From a gap g the next is O(g²): few advancements. Derivation: docs/derivations/collision.md,
-// section 6.
+// section 5.
 //
 // Surfaces are their triangles, two-sided, whether or not they bound a solid; balls and capsules are solid. Triangles
 // of one body against itself are not looked at.

@@ -22,13 +22,13 @@ void write_axis(const Vec3& v, float* to) {
   for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
 }
 
-/// nᵀG n of a side's region: what it yields to a force along n alone, m/N.
+/// nᵀG n of a side's corners: what it yields to a force along n alone, m/N.
 double yield_of(const PreparedSide& side, const Vec3& n) {
   const ResidualCompliance& compliance = *side.model->data().residual_compliance;
   const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
   Mat3 sum = Mat3::Zero();
-  for (const VertexShare& v : side.region)
-    for (const VertexShare& w : side.region)
+  for (const VertexShare& v : side.corners)
+    for (const VertexShare& w : side.corners)
       if (!local || v.vertex == w.vertex) sum += v.share * w.share * compliance.block(v.vertex, w.vertex);
   return n.dot(sum * n);
 }
@@ -40,7 +40,7 @@ void write_mode_rows(const BodyStates& states, const GameBody& body, const Prepa
   if (body.modes == nullptr || side.model == nullptr) return;
   const std::vector<float>& roots = body.modes->roots();
   const Mat3 axes_B = body.start.R.transpose() * axes;
-  if (side.skin == nullptr && side.shapes.empty()) {
+  if (side.skin == nullptr) {
     const VertexRows& vertices = side.model->collision_rows();
     const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
     ModePoint point{.roots = roots.data(), .blocks = roots.size() / 8};
@@ -55,7 +55,7 @@ void write_mode_rows(const BodyStates& states, const GameBody& body, const Prepa
   modal = modal.first(static_cast<std::size_t>(side.model->modes()));
   for (Index axis = 0; axis < 3; ++axis) {
     std::ranges::fill(modal, 0.0);
-    side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes_B.col(axis), modal, side.shapes);
+    side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes_B.col(axis), modal);
     for (std::size_t m = 0; m < modal.size(); ++m)
       rows[3 * (m / 8) + static_cast<std::size_t>(axis)].v[m % 8] = static_cast<float>(modal[m]) * roots[m];
   }
@@ -180,7 +180,7 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
     const auto number = static_cast<std::size_t>(side.body);
     if (!states.is_static(side.body) && number < options.thickness.size())
       thinnest = std::min(thinnest, options.thickness[number]);
-    if (options.residual_compliance && !side.region.empty())
+    if (options.residual_compliance && !side.corners.empty())
       yields += yield_of(
           side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() * contact.axes.col(0)));
   }

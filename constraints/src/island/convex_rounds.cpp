@@ -33,8 +33,7 @@ void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
     if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return;
-    const bool tired = report.newton_steps * static_cast<int>(units_.size()) >= kConstraintsTuning.rounds.most_solved;
-    if (report.iterations > step.part.options.max_iterations || (step.contacts_alone && tired)) break;
+    if (report.iterations > step.part.options.max_iterations) break;
     const ConvexContactOptions within{
         .tolerance = kConstraintsTuning.rounds.newton_left,
         .max_iterations = kConstraintsTuning.rounds.most_newton_steps - report.newton_steps};

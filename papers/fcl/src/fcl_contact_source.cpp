@@ -10,17 +10,14 @@
 #include "fcl_body.h"
 #include "fcl_touches.h"
 #include "finder/contact_id.h"
-#include "finder/contact_regions.h"
-#include "finder/found_body.h"
+#include "finder/geometry_cache.h"
 #include "finder/world_bounds.h"
 #include "limber/core/error.h"
 
 namespace limber {
 
-using internal::ContactRegions;
 using internal::FclBody;
 using internal::FclPlace;
-using internal::RegionSide;
 
 namespace {
 
@@ -44,14 +41,6 @@ bool finite(std::span<const double> numbers) {
 
 }  // namespace
 
-void FclContactOptions::validate() const {
-  clusters.validate();
-  for (const auto& [name, value] : {std::pair("spacing", spacing), std::pair("region_spacing", region_spacing)})
-    if (!(value > 0.0))
-      throw InvalidArgument("FclContactOptions: " + std::string(name) + " is " + std::to_string(value) +
-                            ", expected above 0");
-}
-
 struct FclContactSource::Impl {
   struct Known {
     std::unique_ptr<FclBody> fcl{};
@@ -60,8 +49,6 @@ struct FclContactSource::Impl {
     bool placed = false;         ///< the broad phase holds it
     bool placed_asleep = false;  ///< as it lies there
   };
-
-  explicit Impl(const FclContactOptions& o) : options(o), clusters(o.clusters) { options.validate(); }
 
   bool contains(Index body) const {
     return body >= 0 && static_cast<std::size_t>(body) < bodies.size() && at(body).fcl != nullptr;
@@ -89,18 +76,13 @@ struct FclContactSource::Impl {
   void find_pairs();
   void add_pair(Index a, Index b);
   double reach(const BodyPair& pair) const;
-  RegionSide region_side(Index body) const;
-  ContactSpacing spacing(const BodyPair& pair, bool by_regions) const;
   void find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts);
 
-  FclContactOptions options;
   internal::GeometryCache geometries;
   std::vector<Known> bodies;
   Manager manager;
   std::vector<Object*> moved;  ///< whose boxes changed
   std::set<Index> planes;
-  ContactClusters clusters;
-  internal::RegionFinder region_finder;
   internal::FclTouches touches;
 
   struct Query {
@@ -108,10 +90,7 @@ struct FclContactSource::Impl {
     double margin = 0.0;
     Vec3 origin = Vec3::Zero();
     std::vector<BodyPair> pairs;
-    ContactRegions regions;
   } query;  ///< under way
-
-  internal::KeptIds kept;  ///< of the last query's contacts
 };
 
 void FclContactSource::Impl::check(Index body) const {
@@ -194,31 +173,13 @@ double FclContactSource::Impl::reach(const BodyPair& pair) const {
   return query.margin + (s.displacement - t.displacement).norm() + s.reach + t.reach;
 }
 
-RegionSide FclContactSource::Impl::region_side(Index body) const {
-  const auto* modal = at(body).fcl->modal();
-  if (modal == nullptr || !modal->surface->model()->data().residual_compliance) return {};
-  return {modal->surface.get(), state(body).pose.q};
-}
-
-ContactSpacing FclContactSource::Impl::spacing(const BodyPair& pair, bool by_regions) const {
-  const FclBody &a = *at(pair.a).fcl, &b = *at(pair.b).fcl;
-  if (a.modes() == 0 && b.modes() == 0) return {};
-  if (by_regions) return {.share = options.region_spacing};
-  return {.length = options.spacing * std::min(a.diagonal(), b.diagonal())};
-}
-
 void FclContactSource::Impl::find_in_pair(const BodyPair& pair, std::vector<ContactPoint>& contacts) {
   const std::size_t first = contacts.size();
   touches.find(*at(pair.a).fcl, *at(pair.b).fcl, reach(pair), query.origin, contacts);
-  for (std::size_t c = first; c < contacts.size(); ++c) contacts[c].id = internal::contact_id(pair, contacts[c].id);
-  const std::array<RegionSide, 2> sides{region_side(pair.a), region_side(pair.b)};
-  const ContactShares shares = internal::shares_for(sides, pair.a == pair.b);
-  clusters.reduce(contacts, first, spacing(pair, shares != ContactShares::kNone), kept.of(pair), shares);
-  region_finder.find(clusters, shares, sides, query.regions);
-  query.regions.counts.resize(contacts.size(), {0, 0});
+  internal::name_contacts(pair, contacts, first);
 }
 
-FclContactSource::FclContactSource(const FclContactOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+FclContactSource::FclContactSource() : impl_(std::make_unique<Impl>()) {}
 FclContactSource::~FclContactSource() = default;
 FclContactSource::FclContactSource(FclContactSource&&) noexcept = default;
 FclContactSource& FclContactSource::operator=(FclContactSource&&) noexcept = default;
@@ -277,17 +238,11 @@ void FclContactSource::find_contacts(const ContactQuery& query, std::vector<Cont
   m.find_pairs();
   clock.lap(Stage::kBroadPhase, static_cast<std::int64_t>(m.query.pairs.size()));
   contacts.clear();
-  m.query.regions.clear();
   for (const BodyPair& pair : m.query.pairs) m.find_in_pair(pair, contacts);
-  m.query.regions.give_to(contacts);
-  m.kept.keep(contacts);
   clock.lap(Stage::kNarrowPhase, static_cast<std::int64_t>(contacts.size()));
 }
 
-void FclContactSource::save_state(StateWriter& state) const { state(impl_->kept.pairs, impl_->kept.ids); }
-
-void FclContactSource::restore_state(StateReader& state) {
-  state(impl_->kept.pairs, impl_->kept.ids);
+void FclContactSource::restore_state(StateReader&) {
   for (Impl::Known& known : impl_->bodies) known.placed_asleep = false;
 }
 

@@ -9,34 +9,18 @@
 ///   finder.find_contacts({.states = states, .margin = 1e-3}, contacts, serial_jobs());
 ///
 /// A query takes a box about each awake body from its amplitudes alone, O(k); pairs of near boxes (BroadPhase); all
-/// contacts of each pair (NarrowPhase), with vertices made only where the two are near; and of each patch the few
-/// contacts that carry the same forces and torques (ContactClusters). Bodies that sleep cost nothing until one that is
-/// awake comes near. A model or shape that many bodies share is made ready once. docs/collision.md tells it in full.
+/// contacts of each pair (NarrowPhase), with vertices made only where the two are near. Bodies that sleep cost nothing
+/// until one that is awake comes near. A model or shape that many bodies share is made ready once. docs/collision.md
+/// tells it in full.
 #pragma once
 
 #include <memory>
 
-#include "limber/collision/contact_clusters.h"
 #include "limber/collision/deformed_surface.h"
 #include "limber/collision/narrow_phase.h"
 #include "limber/dynamics/contact_source.h"
 
 namespace limber {
-
-struct ContactFinderOptions {
-  /// Depth and normal of overlaps. kRestDepth needs a volume block of the body that a vertex is in.
-  NarrowPhaseOptions narrow_phase{};
-  /// How contacts are thinned; {.max_points = 0} gives all.
-  ContactClusterOptions clusters{};
-  /// Where a body deforms: no contact is left out that is farther from those kept of its patch than this share of the
-  /// smaller body's diagonal at rest; > 0. Smaller ones follow a bent surface more closely, with more contacts. Two
-  /// rigid bodies keep the corners of each patch alone.
-  double spacing = 0.125;
-  /// In its place where one of the two has a residual compliance, so that contacts stand for regions: a share of the
-  /// patch's extent; > 0. A flat face needs few contacts then, and a small patch keeps its own.
-  double region_spacing = 0.3;
-  void validate() const;  ///< @throws InvalidArgument naming the field and its value
-};
 
 /// Used by one thread at a time; it spreads the work over the Jobs of the query itself.
 ///
@@ -50,8 +34,8 @@ struct ContactFinderOptions {
 /// that two contacts of different pairs have the same one with probability 2⁻⁶⁴.
 class ContactFinder final : public ContactSource {
  public:
-  /// @throws InvalidArgument see ContactFinderOptions::validate()
-  explicit ContactFinder(const ContactFinderOptions& options = {});
+  /// @param options of overlaps. OverlapMethod::kRestDepth needs a volume block of the body that a vertex is in
+  explicit ContactFinder(const NarrowPhaseOptions& options = {});
   ~ContactFinder() override;
   ContactFinder(ContactFinder&&) noexcept;
   ContactFinder& operator=(ContactFinder&&) noexcept;
@@ -61,8 +45,6 @@ class ContactFinder final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  /// The ids of the last query's contacts: which of a patch are kept depends on them.
-  void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;
 
  private:

@@ -7,15 +7,14 @@
 /// what sticks does not creep. Both points of a contact are carried along by their bodies, deformation included; of
 /// round surfaces (ContactSide::radius) the centre is, and slip counts rolling. The normal stays as it was found.
 ///
-/// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. A contact that stands for
-/// a region (ContactSide::region, shares w_r(v) of vertices v) spreads its force over it and yields by the mean of it:
+/// *Residual compliance* G (residual_compliance.h): what the modes that were left out yield. A contact r gives shares
+/// w_r(v) of its force, its barycentric weights, to the corners v of its triangle and yields by their mean:
 ///
 ///   G_rs = Σ_vw w_r(v) G_vw w_s(w),
 ///
-/// symmetric and positive semidefinite, for all contacts of a body among each other. Of the modes, too, it sees the
-/// mean Σ_v w_r(v) U_v, so that all of the body answers to one load; the frame feels the force at the point. The
-/// residual displacement is a state of the body: what its last step pressed its vertices with, in its own frame
-/// (DentLoad), with the energy ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
+/// symmetric and positive semidefinite, for all contacts of a body among each other. The residual displacement is a
+/// state of the body: what its last step pressed its vertices with, in its own frame (DentLoad), with the energy
+/// ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
 /// *Contact compliance* c: contacts of bodies that flex may yield by themselves, which makes the shares of a
 /// load among redundant contacts unique for island solvers that need it (ContactOptions::compliance).

@@ -23,9 +23,9 @@
 /// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in
 /// place of 2.
 ///
-/// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 100 Newton steps for contacts,
-/// and 12,000 contacts solved for, each counted in each of them, where contacts act alone). A step that ends by one of
-/// these limits keeps the best impulses found, or the motion found where there are none: IslandStatus::kLimit.
+/// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 500 Newton steps for contacts).
+/// A step that ends by one of these limits keeps the best impulses found, or the motion found where there are none:
+/// IslandStatus::kLimit.
 ///
 /// A step is taken in halves down to 64ths where joints and handles alone act on free bodies and it does not settle. If
 /// that does not help, bodies turn and shift as the rows ask but do not bend in the rest of the step; if
@@ -49,7 +49,7 @@ namespace limber {
 struct IslandOptions {
   double step = 1.0 / 60.0;     ///< s; that of all groups
   Vec3 gravity = Vec3::Zero();  ///< m/s², world
-  int max_iterations = 30;      ///< of Newton's method on true gaps; ≥ 1
+  int max_iterations = 100;     ///< of Newton's method on true gaps; ≥ 1
   bool guard_energy = true;     ///< 4 above
   /// Nothing but constraints and held forces has changed the members' velocities since their last step, and the rows
   /// are the same: what joints alone lose to the method is then given back.

@@ -18,7 +18,7 @@ enum class Stage : std::uint8_t {
   kBookkeeping,  ///< what begins and ends a step, sleep, events. Unit: step
   kLookAhead,    ///< how far bodies may come within the step. Unit: body awake
   kBroadPhase,   ///< boxes about bodies, pairs of near ones. Unit: near pair
-  kNarrowPhase,  ///< contacts of near pairs, thinned. Unit: contact kept
+  kNarrowPhase,  ///< contacts of near pairs. Unit: contact
   kRows,         ///< contacts, joints and handles as rows; islands. Unit: row
   kAdvance,      ///< bodies without constraints, exactly. Unit: body
   kSolve,        ///< forces of the rows, predicted motions, energy guard. Unit: row

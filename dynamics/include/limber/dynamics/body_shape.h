@@ -61,14 +61,12 @@ class BodyShape {
   const SkinPose& handles() const { return skin_->at(z_); }
   const SkinPose& differentiated() const { return skin_->differentiated(z_); }
 
-  // A point's place and motion, in the body frame. If `shapes` are given they take the place of U there, 3 × k, row by
-  // row: the mean of a region about the point.
-  Vec3 position(const SurfacePoint& at, std::span<const double> shapes = {}) const;
+  // A point's place and motion, in the body frame.
+  Vec3 position(const SurfacePoint& at) const;
   /// J ż, m/s.
-  Vec3 velocity(const SurfacePoint& at, std::span<const double> rates, std::span<const double> shapes = {}) const;
+  Vec3 velocity(const SurfacePoint& at, std::span<const double> rates) const;
   /// g += Jᵀ f. @param f_B force (N) or impulse (N·s)
-  void add_force(const SurfacePoint& at, const Vec3& f_B, std::span<double> g,
-                 std::span<const double> shapes = {}) const;
+  void add_force(const SurfacePoint& at, const Vec3& f_B, std::span<double> g) const;
   /// Rotation of small displacements beside the modes, such as a residual one, from the rest shape: 1 without a skin.
   Mat3 turn(const SurfacePoint& at) const;
 

@@ -73,12 +73,6 @@ struct ContactQuery {
   StageTimes* times = nullptr;  ///< a source may add what it spends on its stages; null: nobody asks
 };
 
-/// The share of a contact's force that a vertex of the collision surface takes.
-struct VertexShare {
-  Index vertex = -1;
-  double share = 0.0;  ///< > 0
-};
-
 /// One body's side of a contact.
 struct ContactSide {
   Index body = -1;
@@ -90,10 +84,6 @@ struct ContactSide {
   /// body turns, what it touches with is another point of it, always this far from the ball's centre against the
   /// normal.
   double radius = 0.0;
-  /// For a contact that stands for others of its patch, on bodies with a residual compliance: the vertices that its
-  /// force is spread over; shares sum to 1. The frame feels it at the point nevertheless. None: it acts at the
-  /// point alone. Kept by the source until its next query.
-  std::span<const VertexShare> region{};
 };
 
 /// Two points that are, or may come, together:  gap = normal · (p_a − p_b), negative where the bodies overlap.

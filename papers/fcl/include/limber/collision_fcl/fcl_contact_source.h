@@ -13,17 +13,9 @@
 
 #include <memory>
 
-#include "limber/collision/contact_clusters.h"
 #include "limber/dynamics/contact_source.h"
 
 namespace limber {
-
-struct FclContactOptions {
-  ContactClusterOptions clusters{};  ///< how contacts are thinned; {.max_points = 0} gives all
-  double spacing = 0.125;            ///< as ContactFinderOptions
-  double region_spacing = 0.3;       ///< as ContactFinderOptions
-  void validate() const;             ///< @throws InvalidArgument naming the field and its value
-};
 
 /// What is a contact: of each vertex (of balls and capsules: centre and ends, with a radius) the local minima of its
 /// distance to the other body, or, inside a solid, the nearest point that its own surface can leave by; and each pair
@@ -37,8 +29,7 @@ struct FclContactOptions {
 /// a margin or reach that is negative or not finite, and `states` that do not reach to every body.
 class FclContactSource final : public ContactSource {
  public:
-  /// @throws InvalidArgument see FclContactOptions::validate()
-  explicit FclContactSource(const FclContactOptions& options = {});
+  FclContactSource();
   ~FclContactSource() override;
   FclContactSource(FclContactSource&&) noexcept;
   FclContactSource& operator=(FclContactSource&&) noexcept;
@@ -48,7 +39,6 @@ class FclContactSource final : public ContactSource {
   void set_filter(Index body, const CollisionFilter& filter) override;
   void exclude_pair(Index a, Index b, bool excluded) override;
   void find_contacts(const ContactQuery& query, std::vector<ContactPoint>& contacts, Jobs& jobs) override;
-  void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;
 
  private:

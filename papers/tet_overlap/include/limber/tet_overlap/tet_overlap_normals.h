@@ -12,7 +12,7 @@
 /// For compact overlaps. Where a patch wraps around (a ball in a close cup) one normal cannot free all of it, and
 /// depths along it are long at the sides: there OverlapMethod::kRestDepth is the better choice.
 ///
-///   ContactFinder finder({.narrow_phase = {.normals = tet_overlap_normals}});
+///   ContactFinder finder({.normals = tet_overlap_normals});
 #pragma once
 
 #include <memory>
