@@ -50,12 +50,6 @@ std::span<const double> BodyStates::rates(Index body, StepTime when) const {
   return when == StepTime::kStart ? b.group->rates(b.slot) : b.group->predicted_rates(b.slot);
 }
 
-const ExactMotion* FreeMotions::of(Index body) const {
-  const auto found = std::ranges::lower_bound(members, body);
-  return found != members.end() && *found == body ? &motions[static_cast<std::size_t>(found - members.begin())]
-                                                  : nullptr;
-}
-
 Vec3 BodyStates::velocity(Index body, StepTime when) const {
   if (is_static(body)) return Vec3::Zero();
   const ConstrainedBody& b = this->body(body);

@@ -9,29 +9,10 @@
 namespace limber {
 namespace {
 
-/// A vertex of a surface, or what is round.
-bool is_pointed(const PreparedSide& side) {
-  return is_round(side) || (side.model != nullptr && std::ranges::count(side.at.weight, 0.0) == 2);
-}
-
-/// A point within a triangle of a surface, or a rigid shape with faces.
-bool has_face(const PreparedSide& side) {
-  return !is_round(side) && (side.model == nullptr || std::ranges::count(side.at.weight, 0.0) == 0);
-}
-
 /// Where a side touches, at a step's end or in its middle.
 Vec3 place(const BodyStates& states, StepTime when, const PreparedSide& side) {
   if (when != StepTime::kMiddle) return side.position(states, when);
   return 0.5 * (side.position(states, StepTime::kStart) + side.position(states, StepTime::kEnd));
-}
-
-/// How closely a gap can be met: by the arms of its points a and b, and their place.
-double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
-                     const Vec3& b) {
-  double arms = 0.0;
-  if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
-  if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
-  return distance_tolerance(internal::kConstraintsTuning.rows.contact_tolerance, arms, a);
 }
 
 /// Of the place where both forces act, that of a side's point: the other's is 1 less.
@@ -43,16 +24,6 @@ double share_of_place(const PreparedContact& contact, std::size_t side) {
 /// Where both forces act. What is round touches at its own point, wherever that of the other has gone.
 Vec3 point_of_action(const PreparedContact& contact, const Vec3& a, const Vec3& b) {
   return share_of_place(contact, 0) * a + share_of_place(contact, 1) * b;
-}
-
-/// ṅ of a normal that is that of a face: it turns with the frame of the body whose face it is. Of edges, and between
-/// two rigid shapes or two round ones, which one's it is cannot be told from the points: 0.
-Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
-  const PreparedSide* owner = nullptr;
-  if (is_pointed(contact.a) && has_face(contact.b)) owner = &contact.b;
-  if (is_pointed(contact.b) && has_face(contact.a)) owner = &contact.a;
-  return owner != nullptr ? states.angular_velocity(owner->body, StepTime::kStart).cross(contact.axes.col(0))
-                          : Vec3(Vec3::Zero());
 }
 
 double reduced_mass(const BodyStates& states, const PreparedContact& contact) {
@@ -91,23 +62,6 @@ void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<doubl
     if (!start) slip += contact.a.rolled(states, step_) - contact.b.rolled(states, step_);
     for (int t = 1; t < 3; ++t) gaps[row + static_cast<std::size_t>(t)] = contact.axes.col(t).dot(slip) + dent[t];
   });
-}
-
-/// Of the gap n·d, d from b's point to a's: n·d̈ + 2 ṅ·ḋ + n̈·d, of what slides along an axis e: e·d̈. At a touch d is
-/// along n, by the radii of what is round, and n̈·n = −|ṅ|².
-void PairContacts::bias_accelerations(const BodyStates& states, std::span<double> bias) const {
-  visit_rows([&](const PreparedContact& contact, std::size_t row) {
-    const PointMotion a = contact.a.motion(states), b = contact.b.motion(states);
-    const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact);
-    for (Index axis = 0; axis < contact.rows(); ++axis)
-      bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(a.bias - b.bias);
-    bias[row] += 2.0 * turn.dot(a.velocity - b.velocity) - turn.squaredNorm() * n.dot(a.place - b.place);
-  });
-}
-
-double PairContacts::next_touch(const BodyStates& states, const FreeMotions& motions, double within) {
-  for (const PreparedContact& contact : contacts_) within = touch(states, motions, contact, within);
-  return within;
 }
 
 void PairContacts::slid(std::span<const double> slip) {
@@ -192,33 +146,6 @@ void PairContacts::add_force_derivative(const BodyStates& states, std::span<cons
       }
     }
   });
-}
-
-double PairContacts::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
-                           double within) {
-  constexpr const internal::TouchTuning& tuning = internal::kConstraintsTuning.touches;
-  const Vec3 n = contact.axes.col(0);
-  Vec3 a, b, velocity_a, velocity_b;
-  const auto gap = [&](double time) {
-    passage_[0].find(states, motions, contact.a, time, a, velocity_a);
-    passage_[1].find(states, motions, contact.b, time, b, velocity_b);
-    return n.dot(a - b);
-  };
-  double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
-  const double least = gap_tolerance(states, StepTime::kStart, contact, a, b);
-  if (!(gap_open > least && gap_closed < 0.0)) return within;
-  for (int i = 0; i < tuning.touch_halvings && closed - open > tuning.touch_closed * within; ++i) {
-    // Secants from both ends close in from one side alone: every third step halves.
-    const double part = i % 3 == 2 ? 0.5
-                                   : std::clamp(gap_open / (gap_open - gap_closed), tuning.touch_least_part,
-                                                1.0 - tuning.touch_least_part);
-    const double between = open + part * (closed - open), seen = gap(between);
-    (seen > 0.0 ? open : closed) = between;
-    (seen > 0.0 ? gap_open : gap_closed) = seen;
-    if (seen > 0.0 && seen <= least) break;
-  }
-  gap(open);
-  return n.dot(velocity_b - velocity_a) > tuning.speed ? open : within;
 }
 
 void PairContacts::add_compliance(Index first, ConstraintRows& rows) const {

@@ -16,13 +16,12 @@ namespace limber {
 class PairContacts final : public Constraint {
  public:
   void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents);
+  std::span<const PreparedContact> contacts() const { return contacts_; }
 
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
   void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) override;
   void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const override;
-  void bias_accelerations(const BodyStates& states, std::span<double> bias) const override;
   bool is_contact() const override { return true; }
-  double next_touch(const BodyStates& states, const FreeMotions& motions, double within) override;
   void slid(std::span<const double> slip) override;
   void accept(const BodyStates&, std::span<const double> impulses) override;
   void add_force_derivative(const BodyStates& states, std::span<const double> impulses,
@@ -49,9 +48,6 @@ class PairContacts final : public Constraint {
   /// apart they would press against each other without bound.
   bool is_caught() const;
 
-  /// When a contact that is open closes, not too slowly; `within` if it does not before.
-  double touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact, double within);
-
   /// Each contact by itself: what keeps loads that could be shared in many ways from wandering between contacts.
   void add_compliance(Index first, ConstraintRows& rows) const;
 
@@ -69,7 +65,6 @@ class PairContacts final : public Constraint {
   double step_ = 0.0;
   double compliance_ = 0.0;                   // of each contact of bodies that flex, m/N
   std::array<std::vector<double>, 2> modal_;  // scratch by side, as what follows
-  std::array<Passage, 2> passage_;
 };
 
 }  // namespace limber

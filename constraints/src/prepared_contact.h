@@ -10,7 +10,7 @@
 #include "limber/constraints/constraint.h"
 #include "limber/dynamics/body_shape.h"
 #include "limber/dynamics/contact_source.h"
-#include "limber/dynamics/exact_motion.h"
+#include "tuning.h"
 
 namespace limber {
 
@@ -161,24 +161,14 @@ inline RowSide point_row(const BodyStates& states, StepTime when, const Prepared
   return {row.body, row.linear, row.angular, modal};
 }
 
-/// The place and velocity of a side's point at some time, from its body's free motion.
-struct Passage {
-  MotionState state;
-
-  void find(const BodyStates& states, const FreeMotions& motions, const PreparedSide& side, double time, Vec3& place,
-            Vec3& velocity) {
-    const ExactMotion* motion = motions.of(side.body);
-    if (motion == nullptr) {
-      place = side.position(states, StepTime::kStart);
-      velocity = Vec3::Zero();
-      return;
-    }
-    motion->evaluate(time, state);
-    place = state.pose * side.place(state.amplitudes) + side.rim;
-    velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
-    if (side.model != nullptr) velocity += state.pose.q * side.deforming(state.amplitudes, state.rates);
-  }
-};
+/// How closely a gap can be met: by the arms of its points a and b, and their place.
+inline double gap_tolerance(const BodyStates& states, StepTime when, const PreparedContact& contact, const Vec3& a,
+                            const Vec3& b) {
+  double arms = 0.0;
+  if (!states.is_static(contact.a.body)) arms += (a - states.origin(contact.a.body, when)).norm();
+  if (!states.is_static(contact.b.body)) arms += (b - states.origin(contact.b.body, when)).norm();
+  return distance_tolerance(internal::kConstraintsTuning.rows.contact_tolerance, arms, a);
+}
 
 /// From where they touch to the nearer of the origins of those that move.
 inline double shorter_arm(const BodyStates& states, const PreparedContact& contact) {

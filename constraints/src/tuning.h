@@ -42,16 +42,6 @@ struct RowTuning {
   double rests_within = 2.0;
 };
 
-/// Steps that are cut where bodies touch, by [H03]'s velocity program.
-struct TouchTuning {
-  double speed = 0.25;             ///< m/s: what comes together more slowly cuts no step. [path]
-  int most_cuts = 4;               ///< of a step. [path] Bounds the work
-  double shortest_part = 1e-3;     ///< of the step: no cut makes a part that is shorter. [path]
-  int touch_halvings = 60;         ///< of the search for a touch: more than the digits of a double. [path]
-  double touch_closed = 1e-12;     ///< of the way through the step: where that search ends
-  double touch_least_part = 1e-3;  ///< of the bracket, from either end, that a secant may come to
-};
-
 /// The parts that a step is taken in.
 struct PartTuning {
   /// Of the step: parts are halved down to this where joints do not come together. [path] By judgement: below, what is
@@ -136,7 +126,6 @@ struct SmallStepTuning {
 
 struct ConstraintsTuning {
   RowTuning rows{};
-  TouchTuning touches{};
   PartTuning parts{};
   RoundsTuning rounds{};
   MidpointTuning midpoint{};

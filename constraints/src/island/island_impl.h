@@ -15,10 +15,8 @@
 
 namespace limber::internal {
 
-/// Whether a step is to be cut at a time within what is left of it: parts are never shorter than a thousandth of it.
-inline bool is_part(double time, double left, double whole_step) {
-  return std::min(time, left - time) > kConstraintsTuning.touches.shortest_part * whole_step;
-}
+/// Whether nothing is to come part way into the step, or at its end.
+bool has_no_dates(const StepPart& part);
 
 /// How far a step has come.
 struct StepInParts {
@@ -27,7 +25,7 @@ struct StepInParts {
   IslandReport report;  // of the parts taken
   double left = 0.0;    // s, with the part
   double length = 0.0;  // s, of a part, where the step is divided
-  bool may_cut = false, divides = false, gives_up = false;
+  bool divides = false, gives_up = false;
 };
 
 /// All of a step but how the impulses of one part are found.
@@ -45,8 +43,8 @@ class IslandParts : public IslandSolver {
   virtual void write_slip(std::span<double>) const {}
   /// Whether find() may be asked for the same part begun more slowly.
   virtual bool may_repeat() const { return true; }
-  /// When within the rest of a step a constraint wants that cut, s from now.
-  virtual double wanted_cut(Constraint&, const BodyStates&, const FreeMotions&, double within) { return within; }
+  /// How much of what is left of a step the next part is to take, s. @param cuts of the step so far
+  virtual double next_cut(const StepPart& part, int /*cuts*/) { return part.left; }
 
   /// Makes step_ the part at hand. @param contacts_react as IslandStep::begin()
   void begin(const StepPart& part, bool contacts_react);
@@ -61,7 +59,6 @@ class IslandParts : public IslandSolver {
   void begin_times(bool timed);
   void find_cut();
   void find_divided();
-  double next_cut(const StepPart& part);
   void find_impulses();
   void commit(const StepPart& part, const IslandReport& done, IslandReport& report);
 
@@ -72,7 +69,6 @@ class IslandParts : public IslandSolver {
 
   IslandEnergy energy_;
   std::vector<double> slip_, impulses_;  // by row
-  std::vector<ExactMotion> motions_;     // of the members, where a step may be cut
   StepInParts parts_;                    // the step at hand
   StageTimes times_;                     // of the step at hand
   StageClock clock_;

@@ -6,9 +6,7 @@
 #include "island_impl.h"
 
 namespace limber::internal {
-namespace {
 
-/// Whether nothing is to come part way into the step, or at its end.
 bool has_no_dates(const StepPart& part) {
   return std::ranges::all_of(part.members, [&](Index member) {
     const auto& [group, slot, pose] = part.table[static_cast<std::size_t>(member)];
@@ -16,16 +14,7 @@ bool has_no_dates(const StepPart& part) {
   });
 }
 
-/// Whether a step may be cut where bodies touch: free ones that nothing but contacts acts on.
-bool allows_cuts(const StepPart& part) {
-  return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->is_contact(); }) &&
-         std::ranges::all_of(part.members,
-                             [&](Index member) {
-                               const ConstrainedBody& body = part.table[static_cast<std::size_t>(member)];
-                               return body.group->frame_constants().motion == FrameMotion::kFree;
-                             }) &&
-         has_no_dates(part);
-}
+namespace {
 
 /// Whether a step may be taken in parts where it does not settle.
 bool may_divide(const StepPart& part) {
@@ -51,7 +40,6 @@ IslandReport IslandParts::step(std::span<const ConstrainedBody> table, std::span
   at.part = whole_step(table, members, constraints, options);
   at.report = {.bodies = static_cast<int>(members.size())};
   at.left = at.length = options.step;
-  at.may_cut = allows_cuts(at.part);
   at.divides = may_divide(at.part);
   at.gives_up = false;
   begin_times(options.timed);
@@ -74,14 +62,12 @@ void IslandParts::begin_times(bool timed) {
   clock_ = StageClock(timed ? &times_ : nullptr);
 }
 
-/// What is left, or up to where bodies touch.
+/// What is left, or up to where the solver wants it cut.
 void IslandParts::find_cut() {
   StepPart& part = parts_.part;
   part.last_resort = true;
-  const bool cuts = parts_.may_cut && parts_.report.attempts.cuts() < kConstraintsTuning.touches.most_cuts;
   part.options.step = part.left = parts_.left;
-  const double time = cuts ? next_cut(part) : parts_.left;
-  if (is_part(time, parts_.left, part.whole_step)) part.options.step = time;
+  part.options.step = next_cut(part, parts_.report.attempts.cuts());
   part.ends = part.options.step == parts_.left;
   parts_.done = find_guarded(part);
   parts_.done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
@@ -105,19 +91,6 @@ void IslandParts::find_divided() {
                       kConstraintsTuning.parts.last_part * kConstraintsTuning.parts.shortest_divided * part.whole_step;
   }
   parts_.done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
-}
-
-/// The first time at which a constraint wants the step cut; all of the part where none does.
-double IslandParts::next_cut(const StepPart& part) {
-  double left = part.options.step;
-  if (motions_.size() < part.members.size()) motions_.resize(part.members.size());
-  for (std::size_t i = 0; i < part.members.size(); ++i) {
-    const ConstrainedBody& body = part.table[static_cast<std::size_t>(part.members[i])];
-    body.group->predict_motion(body.slot, body.group->own_gravity(body.slot, part.options.gravity), left, motions_[i]);
-  }
-  const FreeMotions free{part.members, std::span(motions_).first(part.members.size())};
-  for (Constraint* constraint : part.constraints) left = wanted_cut(*constraint, BodyStates(part.table), free, left);
-  return left;
 }
 
 /// Impulses and slip_, by row.

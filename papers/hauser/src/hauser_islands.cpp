@@ -3,6 +3,23 @@
 #include <algorithm>
 
 namespace limber::internal {
+namespace {
+
+constexpr int kMostCuts = 4;            // of a step. Bounds the work
+constexpr double kShortestPart = 1e-3;  // of the step: no cut makes a part that is shorter
+
+/// Whether a step may be cut where bodies touch: free ones that nothing but contacts acts on.
+bool allows_cuts(const StepPart& part) {
+  return std::ranges::all_of(part.constraints, [](const Constraint* c) { return c->is_contact(); }) &&
+         std::ranges::all_of(part.members,
+                             [&](Index member) {
+                               const ConstrainedBody& body = part.table[static_cast<std::size_t>(member)];
+                               return body.group->frame_constants().motion == FrameMotion::kFree;
+                             }) &&
+         has_no_dates(part);
+}
+
+}  // namespace
 
 IslandReport ProgramIslands::find(const StepPart& part) {
   const bool by_velocities = rule_.method == ContactMethod::kVelocityProgram;
@@ -20,9 +37,20 @@ IslandReport ProgramIslands::find(const StepPart& part) {
 }
 
 /// The velocity program acts at the touch.
-double ProgramIslands::wanted_cut(Constraint& constraint, const BodyStates& states, const FreeMotions& free,
-                                  double within) {
-  return rule_.method == ContactMethod::kVelocityProgram ? constraint.next_touch(states, free, within) : within;
+double ProgramIslands::next_cut(const StepPart& part, int cuts) {
+  if (rule_.method != ContactMethod::kVelocityProgram || cuts >= kMostCuts || !allows_cuts(part)) return part.left;
+  double time = part.left;
+  motions_.resize(std::max(motions_.size(), part.members.size()));
+  for (std::size_t i = 0; i < part.members.size(); ++i) {
+    const ConstrainedBody& body = part.table[static_cast<std::size_t>(part.members[i])];
+    body.group->predict_motion(body.slot, part.options.gravity, time, motions_[i]);
+  }
+  const FreeMotions free{part.members, std::span(motions_).first(part.members.size())};
+  for (const Constraint* constraint : part.constraints)
+    if (const auto* contacts = dynamic_cast<const PairContacts*>(constraint))
+      time = times_.next(*contacts, BodyStates(part.table), free, time);
+  const bool is_part = std::min(time, part.left - time) > kShortestPart * part.whole_step;
+  return is_part ? time : part.left;
 }
 
 IslandReport HauserIslands::step(std::span<const ConstrainedBody> table, std::span<const Index> members,

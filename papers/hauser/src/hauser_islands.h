@@ -9,6 +9,7 @@
 #include "penalty_contact.h"
 #include "row_newton.h"
 #include "touch_program.h"
+#include "touch_times.h"
 
 namespace limber::internal {
 
@@ -22,13 +23,15 @@ class ProgramIslands final : public IslandParts {
   IslandReport find(const StepPart& part) override;
   void taken() override { programs_->add(found_); }
   bool may_repeat() const override { return rule_.method != ContactMethod::kVelocityProgram; }
-  double wanted_cut(Constraint& constraint, const BodyStates& states, const FreeMotions& free, double within) override;
+  double next_cut(const StepPart& part, int cuts) override;
 
  private:
   ContactRule rule_;
   std::shared_ptr<ProgramReport> programs_;  // of all steps taken
   ProgramReport found_;                      // of the part at hand
   TouchProgram touch_;
+  TouchTimes times_;
+  std::vector<ExactMotion> motions_;  // of the members, where a step may be cut
   RowNewton newton_;
 };
 

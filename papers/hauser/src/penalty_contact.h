@@ -24,14 +24,8 @@ class PenaltyContact final : public Constraint {
                             ForceDerivative& sum) const override {
     contact_->add_force_derivative(states, impulses, sum);
   }
-  void bias_accelerations(const BodyStates& states, std::span<double> bias) const override {
-    contact_->bias_accelerations(states, bias);
-  }
   bool is_contact() const override { return contact_->is_contact(); }
   bool may_be_divided() const override { return contact_->may_be_divided(); }
-  double next_touch(const BodyStates& states, const FreeMotions& free, double within) override {
-    return contact_->next_touch(states, free, within);
-  }
   void slid(std::span<const double> slip) override { contact_->slid(slip); }
   void accept(const BodyStates& states, std::span<const double> impulses) override {
     contact_->accept(states, impulses);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "touch_times.h"
+
 namespace limber::internal {
 namespace {
 
@@ -87,12 +89,14 @@ double TouchProgram::speed(const IslandStep& step, const HeldReaction& reaction,
 /// What rows accelerate by without forces: J̇v, and what the turning of the bodies themselves makes of their frames,
 /// α = I⁻¹(−ω × I ω).
 void TouchProgram::find_bias(const IslandStep& step) {
-  bias_.resize(step.size());
+  bias_.assign(step.size(), 0.0);
   const BodyStates states(step.part.table);
   for (std::size_t i = 0; i < step.part.constraints.size(); ++i) {
+    const auto* contacts = dynamic_cast<const PairContacts*>(step.part.constraints[i]);
+    if (contacts == nullptr) continue;
     const auto begin = static_cast<std::size_t>(step.first_row[i]),
                end = static_cast<std::size_t>(step.first_row[i + 1]);
-    step.part.constraints[i]->bias_accelerations(states, std::span(bias_).subspan(begin, end - begin));
+    bias_accelerations(*contacts, states, std::span(bias_).subspan(begin, end - begin));
   }
   for (std::size_t row = 0; row < bias_.size(); ++row)
     step.for_bodies(row, [&](const ConstraintRows::Side& side, Index local, bool) {

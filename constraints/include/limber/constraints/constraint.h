@@ -2,12 +2,10 @@
 /// What puts rows into an island: handles, joints, contacts, or your own.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <span>
 
 #include "limber/constraints/constraint_rows.h"
-#include "limber/dynamics/exact_motion.h"
 
 namespace limber {
 
@@ -43,14 +41,6 @@ class BodyStates {
 
  private:
   std::span<const ConstrainedBody> table_;
-};
-
-/// How the bodies of an island would go through the rest of a step if nothing touched them.
-struct FreeMotions {
-  std::span<const Index> members;        ///< bodies, ascending
-  std::span<const ExactMotion> motions;  ///< one for each
-  /// Null: the body stands still.
-  const ExactMotion* of(Index body) const;
 };
 
 /// A step, or a part of one.
@@ -95,17 +85,11 @@ class Constraint {
   /// Derivatives of what the rows' impulses do to the bodies by the rows of the step's middle: Newton's method gets
   /// along without where forces are small. @param impulses of the rows
   virtual void add_force_derivative(const BodyStates&, std::span<const double> /*impulses*/, ForceDerivative&) const {}
-  /// J̇v of the rows at the step's start, in their order: what the gaps' rates change by while the bodies keep their
-  /// velocities. For solvers that work with accelerations; contacts alone have it. @param bias as many numbers
-  virtual void bias_accelerations(const BodyStates&, std::span<double> bias) const { std::ranges::fill(bias, 0.0); }
-  /// Whether it is contact: an island of nothing else may have its step cut where bodies touch. Each part is then a
-  /// step for the functions here.
+  /// Whether it is contact.
   virtual bool is_contact() const { return false; }
   /// Whether islands of free bodies and nothing but such constraints may have a step that does not settle taken in
   /// shorter parts, each a step for the functions here.
   virtual bool may_be_divided() const { return false; }
-  /// When within the rest of a step it comes to touch, faster than what counts as an impact; `within`: not at all.
-  virtual double next_touch(const BodyStates&, const FreeMotions&, double within) { return within; }
   /// Before accept(): how far contacts that press slid, m, in their normal rows; 0 where forces did not come at the
   /// step's start.
   virtual void slid(std::span<const double> /*slip*/) {}

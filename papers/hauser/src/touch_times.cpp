@@ -1,0 +1,99 @@
+#include "touch_times.h"
+
+#include <algorithm>
+
+namespace limber::internal {
+namespace {
+
+constexpr double kImpactSpeed = 0.25;  // m/s: what comes together more slowly cuts no step
+constexpr int kMostHalvings = 60;      // of the search for a touch: more than the digits of a double
+constexpr double kClosed = 1e-12;      // of the way through the step: where that search ends
+constexpr double kLeastPart = 1e-3;    // of the bracket, from either end, that a secant may come to
+
+/// A vertex of a surface, or what is round.
+bool is_pointed(const PreparedSide& side) {
+  return is_round(side) || (side.model != nullptr && std::ranges::count(side.at.weight, 0.0) == 2);
+}
+
+/// A point within a triangle of a surface, or a rigid shape with faces.
+bool has_face(const PreparedSide& side) {
+  return !is_round(side) && (side.model == nullptr || std::ranges::count(side.at.weight, 0.0) == 0);
+}
+
+/// ṅ of a normal that is that of a face: it turns with the frame of the body whose face it is. Of edges, and between
+/// two rigid shapes or two round ones, which one's it is cannot be told from the points: 0.
+Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
+  const PreparedSide* owner = nullptr;
+  if (is_pointed(contact.a) && has_face(contact.b)) owner = &contact.b;
+  if (is_pointed(contact.b) && has_face(contact.a)) owner = &contact.a;
+  return owner != nullptr ? states.angular_velocity(owner->body, StepTime::kStart).cross(contact.axes.col(0))
+                          : Vec3(Vec3::Zero());
+}
+
+}  // namespace
+
+const ExactMotion* FreeMotions::of(Index body) const {
+  const auto at = std::lower_bound(members.begin(), members.end(), body);
+  if (at == members.end() || *at != body) return nullptr;
+  return &motions[static_cast<std::size_t>(at - members.begin())];
+}
+
+void TouchTimes::Passage::find(const BodyStates& states, const FreeMotions& motions, const PreparedSide& side,
+                               double time) {
+  const ExactMotion* motion = motions.of(side.body);
+  if (motion == nullptr) {
+    place = side.position(states, StepTime::kStart);
+    velocity = Vec3::Zero();
+    return;
+  }
+  motion->evaluate(time, state);
+  place = state.pose * side.place(state.amplitudes) + side.rim;
+  velocity = state.velocity + state.angular_velocity.cross(place - state.pose.p);
+  if (side.model != nullptr) velocity += state.pose.q * side.deforming(state.amplitudes, state.rates);
+}
+
+double TouchTimes::next(const PairContacts& contacts, const BodyStates& states, const FreeMotions& motions,
+                        double within) {
+  for (const PreparedContact& contact : contacts.contacts()) within = touch(states, motions, contact, within);
+  return within;
+}
+
+double TouchTimes::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
+                         double within) {
+  const Vec3 n = contact.axes.col(0);
+  auto& [a, b] = passage_;
+  const auto gap = [&](double time) {
+    a.find(states, motions, contact.a, time);
+    b.find(states, motions, contact.b, time);
+    return n.dot(a.place - b.place);
+  };
+  double open = 0.0, closed = within, gap_open = gap(open), gap_closed = gap(closed);
+  const double least = gap_tolerance(states, StepTime::kStart, contact, a.place, b.place);
+  if (!(gap_open > least && gap_closed < 0.0)) return within;
+  for (int i = 0; i < kMostHalvings && closed - open > kClosed * within; ++i) {
+    // Secants from both ends close in from one side alone: every third step halves.
+    const double part = i % 3 == 2 ? 0.5 : std::clamp(gap_open / (gap_open - gap_closed), kLeastPart, 1.0 - kLeastPart);
+    const double between = open + part * (closed - open), seen = gap(between);
+    (seen > 0.0 ? open : closed) = between;
+    (seen > 0.0 ? gap_open : gap_closed) = seen;
+    if (seen > 0.0 && seen <= least) break;
+  }
+  gap(open);
+  return n.dot(b.velocity - a.velocity) > kImpactSpeed ? open : within;
+}
+
+/// Of the gap n·d, d from b's point to a's: n·d̈ + 2 ṅ·ḋ + n̈·d, of what slides along an axis e: e·d̈. At a touch d is
+/// along n, by the radii of what is round, and n̈·n = −|ṅ|².
+void bias_accelerations(const PairContacts& contacts, const BodyStates& states, std::span<double> bias) {
+  std::size_t row = 0;
+  for (const PreparedContact& contact : contacts.contacts()) {
+    const PointMotion a = contact.a.motion(states), b = contact.b.motion(states);
+    const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact);
+    for (Index axis = 0; axis < contact.rows(); ++axis)
+      bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(a.bias - b.bias);
+    bias[row] += 2.0 * turn.dot(a.velocity - b.velocity) - turn.squaredNorm() * n.dot(a.place - b.place);
+    row += static_cast<std::size_t>(contact.rows());
+  }
+}
+
+}  // namespace limber::internal
