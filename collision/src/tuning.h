@@ -1,6 +1,6 @@
 /// @file
-/// Numbers of the collision module that choose a path, a tolerance or a preference, all of them and each once. Each has
-/// its meaning, its unit where it has one, a sensible range in brackets and what it rests on.
+/// Numbers of the collision module that choose a path, a tolerance or a preference, all of them, each once; [path] and
+/// scripts/count: those that choose a path or cap one. Each has meaning, unit, a sensible range and what it rests on.
 /// tuning_collision (benchmarks/) halves and doubles each and tells how contacts change. "Steady" below: nothing moves.
 ///
 /// Bounds of round-off, which follow from the arithmetic, and sizes of buffers stand where they are used.
@@ -32,70 +32,70 @@ struct BroadTuning {
 /// Convex rigid shapes, and the distance of two hulls.
 struct ConvexTuning {
   /// Part of a hull's size up to which a point lies on a face [1e-14 to 1e-6]: far above round-off, far below any
-  /// corner that is meant. Steady.
+  /// corner that is meant. Steady. [path]
   double hull_thickness = 1e-10;
-  /// Length of the difference of two unit normals or directions that are one [1e-12 to 1e-4]; the same argument.
+  /// Length of the difference of two unit normals or directions that are one [1e-12 to 1e-4]; so too. [path]
   /// Steady.
   double hull_same_direction = 1e-7;
-  /// Sine below which two lines are parallel [1e-15 to 1e-11]: what is lost is their length times this. Steady.
+  /// Sine below which two lines are parallel [1e-15 to 1e-11]: lost is their length times this. [path] Steady.
   double parallel_lines = 1e-13;
   /// GJK: part of the squared distance that a step must gain [some round-offs, 2.2e-16 each]. Steady.
   double gjk_progress = 1e-15;
-  /// GJK: steps at most [≥ 64]. Polytopes take as many as they have features; round-off may make the last repeat.
+  /// GJK: most steps [≥ 64]. [path] Polytopes take as many as they have features; round-off may make the last repeat.
   /// Steady.
   int gjk_iterations = 128;
-  /// Cosine with a face's normal, 14°, from which faces meet rather than an edge or a corner [7° to 30°]. By judgement:
+  /// Cosine with a face's normal, 14°, from which faces meet, not an edge or a corner [7° to 30°]. [path] By judgement:
   /// 76 of 11,696 contacts come or go at half the angle, none gets another depth.
   double face_alignment = 0.97;
   /// Cosine by which a face of a must fit the normal better to be the reference [1e-8 to 1e-3]: flush faces are told
   /// apart by round-off, and with the reference the ids of all contacts change (NarrowPhase.BricksThatLieFlush...).
-  /// Steady.
+  /// Steady. [path]
   double reference_preference = 1e-4;
   /// Edges decide the direction of least depth where their depth is below this part of the faces' [0.9 to 1]: faces
-  /// give steadier contacts. By judgement.
+  /// give steadier contacts. By judgement. [path]
   double edge_preference = 0.95;
-  /// Sine of two edges below which their cross product is no axis [1e-12 to 1e-4]: faces bound that direction. Steady.
+  /// Sine of two edges below which their cross product is no axis [1e-12 to 1e-4]: faces bound it. [path] Steady.
   double least_cross = 1e-8;
   /// Faces of each times corners of the other up to which their planes are asked first, before the distance is searched
   /// for [100 to 1,000]: boxes have 96. Decides time alone.
   std::size_t most_face_tests = 400;
-  double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]; by judgement
+  double side_by_side = 0.17;  ///< sine, 10°, up to which capsules touch along their length [0.05 to 0.3]. [path]
 };
 
 /// Surfaces made of triangles. "Edges at hand" are the shortest ones around a vertex and of the face it meets.
 struct NarrowTuning {
-  /// Part of the edges at hand below which features touch [1e-3 to 0.05]: there faces that lie on each other give the
+  /// Part of the edges at hand below which features touch [1e-3 to 0.05]. [path] There faces on each other give the
   /// normal, as the direction between two points is noise. Half of it turns the corners of flush boxes sideways.
   double touching = 0.01;
-  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]; at half, boxes tilted by as
+  double flat = 0.02;  ///< sine, 1.1°, up to which faces lie on each other [0.01 to 0.1]. [path] Half: boxes tilted as
                        ///< much have sideways normals
-  /// Sine, 12°, by which a surface may lean against a contact's normal that counts as its own [0.1 to 0.4]. Steady.
+  /// Sine, 12°, by which a surface may lean against a contact's normal of its own [0.1 to 0.4]. [path] Steady.
   double leaning = 0.2;
   /// Sine, 30°, from which a surface runs through the plane of its contact [15° to 60°]. Steady; at
-  /// 90°, which is never, flush boxes are pushed out sideways.
+  /// 90°, which is never, flush boxes are pushed out sideways. [path]
   double steep = 0.5;
   /// Part of the edges at hand by which a plane may have been passed and still keeps bodies apart [1e-6 to 1e-3]:
-  /// floors of boxes need not be level to the last bit. Seams that are farther off than this stop what slides.
+  /// floors of boxes need not be level to the last bit. Seams that are farther off than this stop what slides. [path]
   double passed = 1e-4;
   /// How far a direction may lean out of a crease's normal cone, per unit of |inward₁ + inward₂|: 12° at a right angle,
   /// 17° on a knife's edge, 0 on a plane [0 to 0.3]. Rocking bodies keep the crossings of their outlines. By judgement:
-  /// with 0 the contacts are the local minima alone.
+  /// with 0 the contacts are the local minima alone. [path]
   double rocking = 0.15;
-  double leads_into = 1e-3;  ///< sine at which a direction leads from a face's rim into it [1e-6 to 1e-2]. Steady.
+  double leads_into = 1e-3;  ///< sine at which a direction leads from a face's rim into it [1e-6 to 1e-2]. [path]
   /// Part of the edges at hand up to which bodies with flush sides are freed along other faces [0.1 to 1]: deeper, the
-  /// nearest side is the way out. By judgement.
+  /// nearest side is the way out. By judgement. [path]
   double aligned_depth = 0.5;
   /// Cosine, 26°, with a way out of a loop of intersection within which a crossing of edges goes that way [13° to 40°].
-  /// By judgement: bars laid across each other rest on all four crossings.
+  /// By judgement: bars laid across each other rest on all four crossings. [path]
   double same_way = 0.9;
-  double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. Steady.
-  /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. Steady.
+  double directionless = 1e3;  ///< round-offs of a length below which a direction is noise [10 to 1e6]. [path]
+  /// Sine below which touching edges are parallel and their ends make the contacts [1e-6 to 1e-2]. [path]
   double parallel_touching = 1e-4;
-  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. Steady.
-  int rest_depth_steps = 16;  ///< tetrahedra walked to carry a point back to the rest shape [≥ 8]. Steady.
+  double grazing = 1e-9;      ///< cosine with a face's normal below which a ray goes by [1e-12 to 1e-6]. [path]
+  int rest_depth_steps = 16;  ///< tetrahedra walked to carry a point back to the rest shape [≥ 8]. [path]
   double least_stretch =
-      1e-6;  ///< det F up to which a tetrahedron is flat and carries nothing [1e-12 to 1e-3]. Steady.
-  /// Part of its area below which a patch's area vector is round-off [1e-12 to 1e-2]. Steady.
+      1e-6;  ///< det F up to which a tetrahedron is flat and carries nothing [1e-12 to 1e-3]. [path] Steady.
+  /// Part of its area below which a patch's area vector is round-off [1e-12 to 1e-2]. [path] Steady.
   double least_patch = 1e-6;
 };
 
@@ -110,9 +110,9 @@ struct ImpactTuning {
   /// Part of the thinner body's thickness at which bodies that come far touch [1e-4 to 1e-2]: what goes by farther off
   /// meets nothing.
   double touch = 1e-3;
-  int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]: bounds its time
+  int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]. [path] Bounds its time
   /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
-  /// followed to its end counts as touching there. Steady.
+  /// followed to its end counts as touching there. Steady. [path]
   int looks_on_the_way = 64;
   double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
   /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
@@ -124,7 +124,7 @@ struct ImpactTuning {
   /// is not known of the motion is more than a part [0.1 to 1] of the least gap seen.
   int visits_of_a_look = 48;
   double fine_doubt = 0.25;
-  int most_advancements = 128;  ///< of a pair of surfaces, like `looks_on_the_way` [64 to 1,000]. Steady.
+  int most_advancements = 128;  ///< of a pair of surfaces, like `looks_on_the_way` [64 to 1,000]. [path]
   /// What comes later than this part [0.5 to 0.95] of the best time seen is left for the next look.
   double worth_a_look = 0.9;
 };
@@ -133,24 +133,24 @@ struct ImpactTuning {
 struct FieldTuning {
   int cells = 48;  ///< of the grid of distances, along its longest side [24 to 96]
   /// Part of a surface's area that may bound walls thinner than two cells [0 to 0.2]; with more the body is left to
-  /// triangles.
+  /// triangles. [path]
   double thin_area = 0.1;
   int lattice_cells = 8,
       least_lattice_cells = 3;   ///< of displacements, along the longest side and the others [4 to 16]
   double lattice_beyond = 0.04;  ///< by which part of the longest side the lattice goes beyond the surface [0 to 0.2]
   /// Sine of the angle at which the surface turns outwards at an edge, up to which the edge touches no other [0 to
-  /// 0.1].
+  /// 0.1]. [path]
   double least_turn = 1e-3;
   /// Displacements up to this part of a cell are not undone before the field is asked [0.25 to 1]; up to that of the
-  /// longest side in one step, above in two [0.01 to 0.05].
+  /// longest side in one step, above in two [0.01 to 0.05]. [path] for each
   double carried_from = 0.5, carried_once = 0.02;
   /// Part of a cell that the field may be off by [0.5 to 0.9]: so much it is at the corner of a box that lies in the
-  /// middle of a cell, 0.3 at its edges.
+  /// middle of a cell, 0.3 at its edges. [path]
   double slack = 0.5;
-  /// Sine, 64°, by which a vertex's surface may lean back from the plane that it is to leave a body by [0.7 to 0.95].
+  /// Sine, 64°, by which a vertex's surface may lean back from the plane by which it leaves [0.7 to 0.95]. [path]
   double leaning = 0.9;
-  double least_patch = 0.1;   ///< part of its area below which a patch's area vector is no direction [0.01 to 0.3]
-  double deepest_exit = 2.0;  ///< of its deepest nearest point, how far a patch's way out may lead [1.4 to 4]
+  double least_patch = 0.1;   ///< of its area below which a patch's area vector is no direction [0.01 to 0.3] [path]
+  double deepest_exit = 2.0;  ///< of its deepest nearest point: a patch's longest way out [1.4 to 4]. [path]
 };
 
 struct CollisionTuning {
