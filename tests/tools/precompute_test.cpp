@@ -339,6 +339,38 @@ TEST_F(Precompute, SkinIsBakedOnDemandAndTold) {
   EXPECT_LT(with("--skin")["spread"].get<double>(), three["spread"].get<double>());
 }
 
+// A bar of glass that falls rings at the frequency of a free beam, in the file of its note too.
+TEST_F(Precompute, SoundIsBakedOnDemandToldAndHeard) {
+  testing::write_obj(folder / "bar.obj", boundary_surface(testing::tet_box(1, 1, 1, {0.2, 0.02, 0.01})).surface);
+  const Json silent = report({"bar.obj", "--material", "glass", "--modes", "2"});
+  EXPECT_TRUE(silent["bodies"][0]["sound"].is_null());
+  const Json heard = report({"bar.obj", "--material", "glass", "--modes", "2", "--sound"});
+  EXPECT_EQ(heard["frequencies_hz"], silent["frequencies_hz"]);
+  const Json& sound = heard["bodies"][0]["sound"];
+  EXPECT_EQ(sound["modes"], sound["audible"]);
+  EXPECT_EQ(sound["frequencies_hz"][0], heard["frequencies_hz"][0]);
+  EXPECT_GT(sound["frequencies_hz"][1], 10e3);
+  EXPECT_LT(sound["frequencies_hz"][1], 20e3);
+  EXPECT_NEAR(sound["loss_factors"][1].get<double>(), 0.0013, 1e-12);
+  const Json few = report({"bar.obj", "--material", "glass", "--modes", "2", "--sound=3", "--loss-factor", "0.01"});
+  EXPECT_EQ(few["bodies"][0]["sound"]["modes"], 3);
+  EXPECT_EQ(few["warnings"].size(), 1u);
+
+  const auto size_of = [&](const char* file) { return fs::file_size(folder / file); };
+  const ProgramResult ring = testing::run_program(
+      "limber-inspect", {"asset.glb", "--ring", "note.wav", "--ring-vertex", "1", "--ring-seconds", "0.5"},
+      folder / "");
+  EXPECT_EQ(ring.exit_code, 0) << ring.err;
+  EXPECT_LE(size_of("note.wav"), 58u + 24000 * 4);
+  write_file(folder / "scene.json", R"({"step": 0.005, "steps": 100, "assets": {"bar": "asset.glb"},
+    "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "bar", "asset": "bar", "position": [0, 0, 0.1]}]})");
+  const ProgramResult scene =
+      testing::run_program("limber-simulate", {"scene.json", "--sound", "scene.wav"}, folder / "");
+  EXPECT_EQ(scene.exit_code, 0) << scene.err;
+  EXPECT_GE(size_of("scene.wav"), 58u + 24000 * 2 * 4);
+}
+
 TEST_F(Precompute, BodiesThatTurnAboutAPointGetNoSkin) {
   write_gmsh(folder / "cube.msh", testing::tet_box(2, 1.0));
   const Json r = report({"cube.msh", "--material", "nylon", "--modes", "3", "--fix", "nodes:0", "--skin"});
