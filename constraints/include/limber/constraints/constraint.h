@@ -83,7 +83,7 @@ class Constraint {
   /// then gives, at its end without. @param gaps as many numbers
   virtual void gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const = 0;
   /// Derivatives of what the rows' impulses do to the bodies by the rows of the step's middle: Newton's method gets
-  /// along without where forces are small. @param impulses of the rows
+  /// along without where forces are small. The numbers are the impulses of the rows.
   virtual void add_force_derivative(const BodyStates&, std::span<const double> /*impulses*/, ForceDerivative&) const {}
   /// Whether it is contact.
   virtual bool is_contact() const { return false; }

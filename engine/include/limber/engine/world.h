@@ -418,7 +418,7 @@ class World {
   /// Motor, drive and friction of one coordinate.
   void set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation);
   JointView joint(JointId id) const;
-  /// Lets a joint break: at the end of a step in which |JointView::lock_force| is larger it is removed.
+  /// Lets a joint break: at the end of a step in which JointView::lock_force is larger it is removed.
   /// @param newtons > 0; infinite, as it is at first: nothing breaks it
   void set_joint_strength(JointId id, double newtons);
   double joint_strength(JointId id) const;
