@@ -95,7 +95,9 @@ function(limber_add_program name)
 endfunction()
 
 # limber_add_precompiled(name HEADERS <...> LINK ... [OPTIONS ...]): large headers that many programs include, parsed once. A
-# program takes them by target_precompile_headers(program REUSE_FROM name); its own compile options must be the same.
+# program takes them by target_precompile_headers(program REUSE_FROM name); its own compile options must be the same. Headers of
+# other projects only: the compiler knows a precompiled header's files by their bytes, a compiler cache by their tokens, so a comment
+# that changes in a cached one defeats `#pragma once`.
 function(limber_add_precompiled name)
   cmake_parse_arguments(arg "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
   if(arg_UNPARSED_ARGUMENTS)

@@ -61,7 +61,7 @@ double TouchTimes::next(const PairContacts& contacts, const BodyStates& states, 
 double TouchTimes::touch(const BodyStates& states, const FreeMotions& motions, const PreparedContact& contact,
                          double within) {
   const Vec3 n = contact.axes.col(0);
-  auto& [a, b] = passage_;
+  Passage &a = passage_[0], &b = passage_[1];
   const auto gap = [&](double time) {
     a.find(states, motions, contact.a, time);
     b.find(states, motions, contact.b, time);
