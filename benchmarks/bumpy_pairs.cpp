@@ -1,6 +1,6 @@
-// How two bodies with dents and ears come to rest on each other: one lies on the ground, turned at random, the other
-// one, turned at random, is dropped on it from half a metre. Prints Markdown: how deep they overlap at most and after
-// four seconds, steps that do not settle, and what a step takes. Figures: docs/reports/contact.md.
+// How two bodies with indentations and ears come to rest on each other: one lies on the ground, turned at random, the
+// other one, turned at random, is dropped on it from half a metre. Prints Markdown: how deep they overlap at most and
+// after four seconds, steps that do not settle, and what a step takes. Figures: docs/reports/contact.md.
 //   bumpy_pairs ASSET.glb [PAIRS [HERTZ]]     20 pairs at 60 steps a second
 //   bumpy_pairs ASSET.glb heap [BODIES]       a tower of 27, four in a layer, that falls in a heap: a line a second
 #include <algorithm>

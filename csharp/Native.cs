@@ -819,7 +819,7 @@ public static class Native {
   [DllImport(Library)]
   public static extern Result limber_world_point_velocity(IntPtr world, BodyId id, SurfacePoint at, out Vec3 velocity);
   [DllImport(Library)]
-  public static extern Result limber_world_point_dent(IntPtr world, BodyId id, SurfacePoint at, out Vec3 displacement);
+  public static extern Result limber_world_point_indentation(IntPtr world, BodyId id, SurfacePoint at, out Vec3 displacement);
   [DllImport(Library)]
   public static extern ulong limber_world_state_hash(IntPtr world);
   [DllImport(Library)]
@@ -899,7 +899,7 @@ public static class Native {
   [DllImport(Library)]
   public static extern Result limber_world_list_joints(IntPtr world, IntPtr ids, UIntPtr capacity, out UIntPtr count);
   [DllImport(Library)]
-  public static extern Result limber_world_set_apart(IntPtr world, BodyId a, BodyId b, Bool apart);
+  public static extern Result limber_world_ignore_collision(IntPtr world, BodyId a, BodyId b, Bool ignore);
   [DllImport(Library)]
   public static extern Result limber_world_set_joint_actuation(IntPtr world, JointId id, int coordinate, ref Actuation actuation);
   [DllImport(Library)]

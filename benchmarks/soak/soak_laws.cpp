@@ -7,17 +7,17 @@
 namespace limber::testing {
 namespace {
 
-constexpr double kImpulseDigits = 1e-6;  // of Σ m g Δt
-constexpr double kHandDigits = 1e-6;     // of the largest force
-constexpr double kDentDigits = 1e-3;     // of the bound: compliances are stored in single precision
-constexpr double kRise = 1e-2;           // of Σ m g size
+constexpr double kImpulseDigits = 1e-6;      // of Σ m g Δt
+constexpr double kHandDigits = 1e-6;         // of the largest force
+constexpr double kIndentationDigits = 1e-3;  // of the bound: compliances are stored in single precision
+constexpr double kRise = 1e-2;               // of Σ m g size
 
 bool is_finite(const SoakStep& step) {
   const auto contact_is = [](const ContactEvent& c) { return c.impulse.allFinite() && c.normal.allFinite(); };
   const auto hand_is = [](const SeenHand& h) { return h.force.allFinite() && std::isfinite(h.work); };
-  const auto dent_is = [](const SeenDent& d) { return std::isfinite(d.largest); };
+  const auto indentation_is = [](const SeenIndentation& d) { return std::isfinite(d.largest); };
   return step.finite && std::isfinite(step.energy) && std::ranges::all_of(step.contacts, contact_is) &&
-         std::ranges::all_of(step.hands, hand_is) && std::ranges::all_of(step.dents, dent_is);
+         std::ranges::all_of(step.hands, hand_is) && std::ranges::all_of(step.indentations, indentation_is);
 }
 
 void see_contacts(const SoakStep& step, double& push, double& cone) {
@@ -30,14 +30,14 @@ void see_contacts(const SoakStep& step, double& push, double& cone) {
   }
 }
 
-double see_dents(const SoakStep& step) {
+double see_indentations(const SoakStep& step) {
   double worst = 0.0;
-  for (const SeenDent& dent : step.dents) {
+  for (const SeenIndentation& indentation : step.indentations) {
     double force = 0.0;
     for (const ContactEvent& contact : step.contacts)
-      if (contact.a == dent.body || contact.b == dent.body) force += contact.impulse.norm() / step.length;
-    const double bound = (1.0 + kDentDigits) * dent.compliance * force;
-    if (dent.largest > 0.0) worst = std::max(worst, dent.largest / bound);
+      if (contact.a == indentation.body || contact.b == indentation.body) force += contact.impulse.norm() / step.length;
+    const double bound = (1.0 + kIndentationDigits) * indentation.compliance * force;
+    if (indentation.largest > 0.0) worst = std::max(worst, indentation.largest / bound);
   }
   return worst;
 }
@@ -61,8 +61,8 @@ const char* name(SoakLaw law) {
       return "cone";
     case SoakLaw::kHandForce:
       return "hand force";
-    case SoakLaw::kDent:
-      return "dent";
+    case SoakLaw::kIndentation:
+      return "indentation";
     case SoakLaw::kEnergy:
       return "energy";
   }
@@ -84,7 +84,7 @@ SoakShares shares_of_laws(const SoakStep& step) {
   }
   see_contacts(step, share(SoakLaw::kPush), share(SoakLaw::kCone));
   share(SoakLaw::kHandForce) = see_hands(step);
-  share(SoakLaw::kDent) = see_dents(step);
+  share(SoakLaw::kIndentation) = see_indentations(step);
   share(SoakLaw::kEnergy) = (step.energy - step.energy_before - work_of(step.hands)) / (kRise * step.energy_scale);
   return out;
 }

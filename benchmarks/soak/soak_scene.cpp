@@ -45,8 +45,8 @@ SoakScene::SoakScene(const SoakBodies& bodies, unsigned seed, const ContactOptio
     seen_.weight += data.mass * world_.options().gravity.norm();
     seen_.energy_scale += data.mass * world_.options().gravity.norm() * kBoxSize;
     if (!data.residual_compliance) continue;
-    dented_.push_back({id, vertices_of(world_.model(id).collision())});
-    dents_.push_back({.body = static_cast<Index>(id.index), .compliance = largest_compliance(world_.model(id))});
+    indented_.push_back({id, vertices_of(world_.model(id).collision())});
+    indentations_.push_back({.body = static_cast<Index>(id.index), .compliance = largest_compliance(world_.model(id))});
   }
   seen_.length = world_.options().step;
   seen_.friction = options.friction;
@@ -131,7 +131,7 @@ const SoakStep& SoakScene::step() {
   world_.step();
   seconds_ = thread_seconds() - begin;
   see_hands();
-  see_dents();
+  see_indentations();
   seen_.contacts = world_.contact_events();
   seen_.finite = all_finite();
   seen_.energy = energy();
@@ -148,13 +148,13 @@ void SoakScene::see_hands() {
   seen_.hands = seen_hands_;
 }
 
-void SoakScene::see_dents() {
-  for (std::size_t i = 0; i < dents_.size(); ++i) {
-    dents_[i].largest = 0.0;
-    for (const SurfacePoint& vertex : dented_[i].vertices)
-      dents_[i].largest = std::max(dents_[i].largest, world_.dent(dented_[i].id, vertex).norm());
+void SoakScene::see_indentations() {
+  for (std::size_t i = 0; i < indentations_.size(); ++i) {
+    indentations_[i].largest = 0.0;
+    for (const SurfacePoint& vertex : indented_[i].vertices)
+      indentations_[i].largest = std::max(indentations_[i].largest, world_.indentation(indented_[i].id, vertex).norm());
   }
-  seen_.dents = dents_;
+  seen_.indentations = indentations_;
 }
 
 bool SoakScene::all_finite() const {

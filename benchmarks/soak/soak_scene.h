@@ -36,7 +36,7 @@ class SoakScene {
     Vec3 target = Vec3::Zero(), goal = Vec3::Zero();
   };
 
-  struct Dented {
+  struct Indented {
     BodyId id{};
     std::vector<SurfacePoint> vertices;
   };
@@ -50,7 +50,7 @@ class SoakScene {
   void guide(Hand& hand);
   void take_hold(Hand& hand);
   void see_hands();
-  void see_dents();
+  void see_indentations();
   bool all_finite() const;
   double energy() const;
 
@@ -60,8 +60,8 @@ class SoakScene {
   std::vector<BodyId> bodies_;
   std::vector<JointId> joints_;
   std::vector<Hand> hands_;
-  std::vector<SeenDent> dents_;
-  std::vector<Dented> dented_;  // of `dents_`
+  std::vector<SeenIndentation> indentations_;
+  std::vector<Indented> indented_;  // of `indentations_`
   std::vector<SeenHand> seen_hands_;
   SoakStep seen_;
   double seconds_ = 0.0;

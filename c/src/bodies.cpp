@@ -302,9 +302,10 @@ limber_result limber_world_point_velocity(const limber_world* world, limber_body
   return guarded([&] { required(velocity, "velocity") = to_c(world_of(world).velocity(to_cpp(id), to_cpp(at))); });
 }
 
-limber_result limber_world_point_dent(const limber_world* world, limber_body_id id, limber_surface_point at,
-                                      limber_vec3* displacement) {
-  return guarded([&] { required(displacement, "displacement") = to_c(world_of(world).dent(to_cpp(id), to_cpp(at))); });
+limber_result limber_world_point_indentation(const limber_world* world, limber_body_id id, limber_surface_point at,
+                                             limber_vec3* displacement) {
+  return guarded(
+      [&] { required(displacement, "displacement") = to_c(world_of(world).indentation(to_cpp(id), to_cpp(at))); });
 }
 
 }  // extern "C"

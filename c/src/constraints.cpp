@@ -175,8 +175,8 @@ limber_result limber_world_list_joints(const limber_world* world, limber_joint_i
   });
 }
 
-limber_result limber_world_set_apart(limber_world* world, limber_body_id a, limber_body_id b, bool apart) {
-  return guarded([&] { world_of(world).set_apart(to_cpp(a), to_cpp(b), apart); });
+limber_result limber_world_ignore_collision(limber_world* world, limber_body_id a, limber_body_id b, bool ignore) {
+  return guarded([&] { world_of(world).ignore_collision(to_cpp(a), to_cpp(b), ignore); });
 }
 
 limber_result limber_world_set_joint_actuation(limber_world* world, limber_joint_id id, int coordinate,

@@ -13,7 +13,7 @@ void ConstraintRows::clear() {
 }
 
 /// Rows are written where they stay: a copy of what was written a moment ago would wait for it.
-Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowLaw& law) {
+Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowParameters& law) {
   row(add(a, b)).law = law;
   return size() - 1;
 }

@@ -86,7 +86,7 @@ struct ContactSet::Impl {
   Pool<PairContacts> pairs;
   Pool<RollingResistance> rolling;
   std::vector<Constraint*> constraints;
-  ContactDents dents;
+  ContactIndentations indentations;
   std::vector<Index> touched;  // scratch of finish()
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
@@ -149,7 +149,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   for (const ContactPoint& point : points)
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
   s.history.reserve(bodies);
-  s.dents.reserve(bodies);
+  s.indentations.reserve(bodies);
   s.corners.clear();
   s.corners.reserve(6 * points.size());  // three of each side
   for (const ContactPoint& point : points)
@@ -161,7 +161,7 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
     PairContacts& pair = s.pairs.next();
     const std::span<PreparedContact> of_pair = std::span(s.contacts).subspan(begin, i - begin);
-    pair.set(of_pair, s.options, s.dents);
+    pair.set(of_pair, s.options, s.indentations);
     s.constraints.push_back(&pair);
     s.resist_rolling(states, of_pair);
     begin = i;
@@ -186,18 +186,18 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
 
 std::span<PreparedContact> ContactSet::prepared() { return impl_->contacts; }
 
-void ContactSet::press_dents(const BodyStates& states) {
+void ContactSet::press_indentations(const BodyStates& states) {
   if (!impl_->options.residual_compliance) return;
   for (const PreparedContact& contact : impl_->contacts)
     for (std::size_t s = 0; s < 2; ++s)
-      if (yields(contact.side(s))) impl_->dents.renew(contact.side(s).body);
+      if (yields(contact.side(s))) impl_->indentations.renew(contact.side(s).body);
   for (const PreparedContact& contact : impl_->contacts)
     for (std::size_t s = 0; s < 2; ++s) {
       const PreparedSide& side = contact.side(s);
       if (!yields(side)) continue;
       const Quaternion q_BW = states.pose(side.body, StepTime::kStart).q.conjugate();
-      impl_->dents.press(side.body, side.corners,
-                         side.turned_back(q_BW * (PreparedContact::sign(s) * contact.mean_force)));
+      impl_->indentations.press(side.body, side.corners,
+                                side.turned_back(q_BW * (PreparedContact::sign(s) * contact.mean_force)));
     }
 }
 
@@ -210,7 +210,7 @@ void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
     for (const PreparedSide* side : {&contact.a, &contact.b})
       if (yields(*side)) s.touched.push_back(side->body);
   s.history.finish(s.contacts, asleep, some_woke);
-  s.dents.finish(asleep, s.touched);
+  s.indentations.finish(asleep, s.touched);
   const auto wakes = [&](const auto& m) { return !rests(asleep, m.a, m.b); };
   std::erase_if(s.rolling_memory, wakes);
   for (const auto& rolling : s.rolling.used())
@@ -230,31 +230,33 @@ void ContactSet::clear() {
   impl_->constraints.clear();
   impl_->history.clear();
   impl_->rolling_memory.clear();
-  impl_->dents.clear();
+  impl_->indentations.clear();
 }
 
 void ContactSet::save_state(StateWriter& state) const {
   const Impl& s = *impl_;
-  state(s.options, s.history, s.rolling_memory, s.dents);
+  state(s.options, s.history, s.rolling_memory, s.indentations);
 }
 
 void ContactSet::restore_state(StateReader& state) {
   Impl& s = *impl_;
   s.contacts.clear();
   s.constraints.clear();
-  state(s.options, s.history, s.rolling_memory, s.dents);
-  s.dents.list_loaded();
-  s.history.find_energies(s.dents.bodies());
+  state(s.options, s.history, s.rolling_memory, s.indentations);
+  s.indentations.list_loaded();
+  s.history.find_energies(s.indentations.bodies());
 }
 
-void ContactSet::forget(Index body) { impl_->dents.forget(body); }
+void ContactSet::forget(Index body) { impl_->indentations.forget(body); }
 
-std::span<const DentLoad> ContactSet::dent_loads(Index body) const { return impl_->dents.loads(body); }
+std::span<const IndentationLoad> ContactSet::indentation_loads(Index body) const {
+  return impl_->indentations.loads(body);
+}
 
-double ContactSet::dent_energy(const BodyStates& states, Index body) const {
-  // Contacts of small steps have springs of their own; dents are what their mean force shows.
+double ContactSet::indentation_energy(const BodyStates& states, Index body) const {
+  // Contacts of small steps have springs of their own; indentations are what their mean force shows.
   const bool by_springs = impl_->options.solver == ContactSolver::kGame;
-  return (by_springs ? 0.0 : impl_->dents.energy(states, body)) + impl_->history.energy(body);
+  return (by_springs ? 0.0 : impl_->indentations.energy(states, body)) + impl_->history.energy(body);
 }
 
 }  // namespace limber

@@ -59,11 +59,11 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
   for (std::size_t i = 0; i < options_.directions.size(); ++i) {
     const Vec3& n = options_.directions[i];
     const double gap = n.dot(p - target);
-    RowLaw law{.lower = -step * options_.max_force,
-               .upper = step * options_.max_force,
-               .tolerance = distance_tolerance(internal::kConstraintsTuning.rows.hand_tolerance, arm, p),
-               .digits = digits_of(arm + p.norm() + target.norm()),
-               .last_force = last_force_[i]};
+    RowParameters law{.lower = -step * options_.max_force,
+                      .upper = step * options_.max_force,
+                      .tolerance = distance_tolerance(internal::kConstraintsTuning.rows.hand_tolerance, arm, p),
+                      .digits = digits_of(arm + p.norm() + target.norm()),
+                      .last_force = last_force_[i]};
     law.gap = gap;
     law.prescribed_displacement = n.dot(then_ - target);
     law.end_rate = n.dot(then_ - now_) / step;

@@ -265,7 +265,7 @@ JointConstraint::Direction JointConstraint::mean_direction(const Placement& star
 
 // Rows of one step ----------------------------------------------------------------------------------------------------
 
-void JointConstraint::write_law(const RowPlan& plan, double gap, RowLaw& law) const {
+void JointConstraint::write_law(const RowPlan& plan, double gap, RowParameters& law) const {
   law.gap = gap;
   if (plan.law >= Law::kMotor) return write_actuation_law(plan, gap, law);
   const double recovery = internal::kConstraintsTuning.rows.joint_recovery_speed * step_;
@@ -274,7 +274,7 @@ void JointConstraint::write_law(const RowPlan& plan, double gap, RowLaw& law) co
   if (plan.law == Law::kLimit) law.lower = 0.0, law.offset = std::min(0.0, gap + recovery);
 }
 
-void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowLaw& law) const {
+void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowParameters& law) const {
   const JointActuation& act = actuation(plan.coordinate);
   law.goes_on = true;
   law.last_force = force_.actuation[actuator(plan)];
@@ -331,7 +331,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
     const bool distance = is_distance(plan);
     FrameMeasure of_a, of_b;
     if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at.place, plan), of_a, of_b);
-    RowLaw& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
+    RowParameters& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
     const double gap = this->gap(at.place, plan);
     write_law(plan, gap, law);
     law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;

@@ -35,10 +35,11 @@ double reduced_mass(const BodyStates& states, const PreparedContact& contact) {
 
 }  // namespace
 
-void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents) {
+void PairContacts::set(std::span<PreparedContact> contacts, const ContactOptions& options,
+                       ContactIndentations& indentations) {
   contacts_ = contacts;
   options_ = &options;
-  dents_ = &dents;
+  indentations_ = &indentations;
   const PreparedContact& first = contacts.front();
   flexes_ = flexes(first.a) || flexes(first.b);
   yields_ = {options.residual_compliance && yields(first.a), options.residual_compliance && yields(first.b)};
@@ -55,12 +56,13 @@ void PairContacts::add_rows(const BodyStates& states, StepTime when, double step
 void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
   const bool start = when == StepTime::kStart;
   visit_rows([&](const PreparedContact& contact, std::size_t row) {
-    const Vec3 apart = contact.apart(states, when), dent = start ? contact.dent : Vec3(Vec3::Zero());
-    gaps[row] = contact.axes.col(0).dot(apart) + dent[0];
+    const Vec3 apart = contact.apart(states, when), indentation = start ? contact.indentation : Vec3(Vec3::Zero());
+    gaps[row] = contact.axes.col(0).dot(apart) + indentation[0];
     if (contact.friction == 0.0) return;
     Vec3 slip = apart - contact.offset;
     if (!start) slip += contact.a.rolled(states, step_) - contact.b.rolled(states, step_);
-    for (int t = 1; t < 3; ++t) gaps[row + static_cast<std::size_t>(t)] = contact.axes.col(t).dot(slip) + dent[t];
+    for (int t = 1; t < 3; ++t)
+      gaps[row + static_cast<std::size_t>(t)] = contact.axes.col(t).dot(slip) + indentation[t];
   });
 }
 
@@ -77,8 +79,8 @@ void PairContacts::accept(const BodyStates&, std::span<const double> impulses) {
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
       if (yields_[i])
-        dents_->press(side.body, side.corners,
-                      side.turned_back(turn_[i].conjugate() * (PreparedContact::sign(i) * contact.last_force)));
+        indentations_->press(side.body, side.corners,
+                             side.turned_back(turn_[i].conjugate() * (PreparedContact::sign(i) * contact.last_force)));
     }
   });
 }
@@ -94,14 +96,14 @@ void PairContacts::begin(const BodyStates& states) {
         side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
   compliance_ = options_->compliance > 0.0 && flexes_ ? compliance(states) : 0.0;
   for (PreparedContact& contact : contacts_) {
-    Vec3 dent = Vec3::Zero();
+    Vec3 indentation = Vec3::Zero();
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
       if (yields_[i])
-        dent +=
-            PreparedContact::sign(i) * (turn_[i] * side.turned(dents_->displacement(states, side.body, side.corners)));
+        indentation += PreparedContact::sign(i) *
+                       (turn_[i] * side.turned(indentations_->displacement(states, side.body, side.corners)));
     }
-    contact.dent = contact.axes.transpose() * (dent + contact.compliance * contact.last_force);
+    contact.indentation = contact.axes.transpose() * (indentation + contact.compliance * contact.last_force);
   }
   caught_ = flexes_ && is_caught();
 }
@@ -165,7 +167,8 @@ void PairContacts::add_flexibility(const BodyStates& states, Index first, Constr
       const PreparedSide& side = contact.side(i);
       Mat3 axes = PreparedContact::sign(i) * (R.transpose() * contact.axes);
       for (Index axis = 0; axis < 3; ++axis) axes.col(axis) = side.turned_back(axes.col(axis));
-      dents_->add_rows(states, side.body, {side.corners, axes, first + static_cast<Index>(row), contact.rows()}, rows);
+      indentations_->add_rows(states, side.body, {side.corners, axes, first + static_cast<Index>(row), contact.rows()},
+                              rows);
     });
   }
 }
@@ -177,9 +180,9 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
   const double tolerance = gap_tolerance(states, when, contact, a, b);
   for (Index axis = 0; axis < contact.rows(); ++axis) {
     const Vec3 n = contact.axes.col(axis);
-    RowLaw law{.tolerance = tolerance, .contact = true};
+    RowParameters law{.tolerance = tolerance, .contact = true};
     if (axis == 0) {
-      const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.dent[0] : 0.0);
+      const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.indentation[0] : 0.0);
       const double recovery = caught_
                                   ? 0.0
                                   : std::min(internal::kConstraintsTuning.rows.overlap_recovery * std::max(0.0, -gap),
@@ -191,7 +194,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.friction = contact.friction;
       law.shift = contact.friction * contact.slip;
     } else {
-      law.offset = contact.dent[axis];
+      law.offset = contact.indentation[axis];
       law.slides = true;
       law.goes_on = true;
     }

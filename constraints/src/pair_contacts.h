@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "contact_dents.h"
+#include "contact_indentations.h"
 #include "limber/constraints/contact_constraint.h"
 #include "prepared_contact.h"
 
@@ -15,7 +15,7 @@ namespace limber {
 
 class PairContacts final : public Constraint {
  public:
-  void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactDents& dents);
+  void set(std::span<PreparedContact> contacts, const ContactOptions& options, ContactIndentations& indentations);
   std::span<const PreparedContact> contacts() const { return contacts_; }
 
   std::array<Index, 2> bodies() const override { return {contacts_.front().a.body, contacts_.front().b.body}; }
@@ -58,7 +58,7 @@ class PairContacts final : public Constraint {
 
   std::span<PreparedContact> contacts_;
   const ContactOptions* options_ = nullptr;
-  ContactDents* dents_ = nullptr;
+  ContactIndentations* indentations_ = nullptr;
   std::array<bool, 2> yields_{};      // by side, whether its body has a residual compliance that is to be used
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool flexes_ = false, caught_ = false;

@@ -90,12 +90,12 @@ struct PreparedContact {
   double approach = 0.0;        // m/s, as ContactEvent::approach
   Vec3 offset = Vec3::Zero();   // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
-  Vec3 last_force = Vec3::Zero();  // world, on a, N
-  Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone
-  double compliance = 0.0;         // what the contact yielded to it by itself, m/N
-  double slip = 0.0;               // beyond what its spring gave, m
-  Vec3 dent = Vec3::Zero();        // what the bodies yield at the step's start along the axes, m
-  Vec3 impulse = Vec3::Zero();     // of this step, world, on a
+  Vec3 last_force = Vec3::Zero();   // world, on a, N
+  Vec3 mean_force = Vec3::Zero();   // the same over the step; of small steps alone
+  double compliance = 0.0;          // what the contact yielded to it by itself, m/N
+  double slip = 0.0;                // beyond what its spring gave, m
+  Vec3 indentation = Vec3::Zero();  // what the bodies yield at the step's start along the axes, m
+  Vec3 impulse = Vec3::Zero();      // of this step, world, on a
 
   /// Its rows: along the normal, and along the tangents where it has friction.
   Index rows() const { return friction == 0.0 ? 1 : 3; }

@@ -41,7 +41,7 @@ void ResidualFactor::factor(Body& body, std::span<const ConstraintRows::Flexibil
     S.row(i)[j] += g.value;
     if (i != j) S.row(j)[i] += g.value;
   }
-  cholesky_.factor(S, n, internal::kConstraintsTuning.rows.dent_pivot);
+  cholesky_.factor(S, n, internal::kConstraintsTuning.rows.indentation_pivot);
   body.rank = cholesky_.rank();
   body.values.resize(n * body.rank);
   for (std::size_t c = 0; c < body.rank; ++c)

@@ -33,8 +33,9 @@ struct RowTuning {
   double opposed_normals = -0.5;
   /// Part of ContactOptions::compliance left beside a residual compliance, which shares loads by itself.
   double compliance_beside_residual = 1.0 / 30.0;
-  /// Part of the largest pivot below which dents of different contacts are one. Far below what each contact yields.
-  double dent_pivot = 1e-10;
+  /// Part of the largest pivot below which indentations of different contacts are one. Far below what each contact
+  /// yields.
+  double indentation_pivot = 1e-10;
   /// manipulate(): directions of the matrix below this part of its largest are not in its range. [path]
   double manipulation_rank = 1e-11;
   double manipulation_tolerance = 1e-13;  ///< places are met when they change by less of the distances at hand

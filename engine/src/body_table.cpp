@@ -22,7 +22,7 @@ Index BodyTable::group_of(std::shared_ptr<const ModalModel> model, double step) 
     const ModalModel& known = made->model();
     const bool skinned = known.data().skin.has_value();
     found->bodies = std::move(made);
-    if (known.data().residual_compliance) found->dented = std::make_unique<DentedSurface>(known);
+    if (known.data().residual_compliance) found->indented = std::make_unique<IndentedSurface>(known);
     if (skinned) found->skin = std::make_unique<GroupSkin>(known);
     if (half_precision_ && !skinned) found->half = std::make_unique<const HalfBasis>(known.render().basis);
   }
@@ -78,8 +78,8 @@ bool BodyTable::shows(const Entry& e) const {
   return meets && e.parts.empty() && (e.shape || group(e).model().data().touchable);
 }
 
-bool BodyTable::any_dented() const {
-  return std::ranges::any_of(groups_, [](const ModelGroup& group) { return group.dented != nullptr; });
+bool BodyTable::any_indented() const {
+  return std::ranges::any_of(groups_, [](const ModelGroup& group) { return group.indented != nullptr; });
 }
 
 void BodyTable::set_step_length(double step) {

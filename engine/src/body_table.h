@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "dented_surface.h"
 #include "group_skin.h"
+#include "indented_surface.h"
 #include "limber/core/jobs.h"
 #include "limber/dynamics/body_group.h"
 #include "limber/dynamics/contact_source.h"
@@ -40,10 +40,10 @@ class BodyTable {
   };
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {
-    std::unique_ptr<BodyGroup> bodies;      // null where the last body of a model was removed
-    std::unique_ptr<DentedSurface> dented;  // null where nothing dents its bodies
-    std::unique_ptr<GroupSkin> skin;        // null where the model has none
-    std::unique_ptr<const HalfBasis> half;  // null where none is kept
+    std::unique_ptr<BodyGroup> bodies;          // null where the last body of a model was removed
+    std::unique_ptr<IndentedSurface> indented;  // null where nothing indentations its bodies
+    std::unique_ptr<GroupSkin> skin;            // null where the model has none
+    std::unique_ptr<const HalfBasis> half;      // null where none is kept
   };
 
   /// @param half_precision keeps the drawn shapes in half precision too, of models without a skin
@@ -106,8 +106,8 @@ class BodyTable {
   /// Whether its turning and its modes feel each other's inertia.
   bool coupled(const Entry& e) const { return e.group >= 0 && group(e).coupled(e.slot); }
 
-  /// Whether contacts may press dents into any of them.
-  bool any_dented() const;
+  /// Whether contacts may press indentations into any of them.
+  bool any_indented() const;
 
   /// @param step s
   void set_step_length(double step);

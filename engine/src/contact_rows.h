@@ -43,7 +43,7 @@ inline void add_memory_to(StateHash& hash, const ContactSet& contacts, std::size
     }
   for (const RollingMemory& rolling : contacts.rolling()) hash.add(rolling.moment);
   for (std::size_t body = 0; body < bodies; ++body)
-    for (const DentLoad& load : contacts.dent_loads(static_cast<Index>(body))) hash.add(load.force);
+    for (const IndentationLoad& load : contacts.indentation_loads(static_cast<Index>(body))) hash.add(load.force);
 }
 
 }  // namespace limber::internal

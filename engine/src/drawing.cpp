@@ -21,27 +21,29 @@ void require_fraction(double s, const char* function) {
 
 }  // namespace
 
-void Drawing::keep_dents(const StepPath& path) {
-  if (!bodies_->any_dented()) return;
-  dents_before_.resize(bodies_->size());
-  for (std::size_t i = 0; i < dents_before_.size(); ++i) {
-    const std::span<const DentLoad> loads = path.dent_loads(static_cast<Index>(i));
-    dents_before_[i].assign(loads.begin(), loads.end());
+void Drawing::keep_indentations(const StepPath& path) {
+  if (!bodies_->any_indented()) return;
+  indentations_before_.resize(bodies_->size());
+  for (std::size_t i = 0; i < indentations_before_.size(); ++i) {
+    const std::span<const IndentationLoad> loads = path.indentation_loads(static_cast<Index>(i));
+    indentations_before_[i].assign(loads.begin(), loads.end());
   }
 }
 
 void Drawing::forget(Index body) {
-  if (static_cast<std::size_t>(body) < dents_before_.size()) dents_before_[static_cast<std::size_t>(body)].clear();
+  if (static_cast<std::size_t>(body) < indentations_before_.size())
+    indentations_before_[static_cast<std::size_t>(body)].clear();
 }
 
 void Drawing::save_state(StateWriter& state) const {
-  const std::vector<DentLoad> none;
-  for (std::size_t i = 0; i < bodies_->size(); ++i) state(i < dents_before_.size() ? dents_before_[i] : none);
+  const std::vector<IndentationLoad> none;
+  for (std::size_t i = 0; i < bodies_->size(); ++i)
+    state(i < indentations_before_.size() ? indentations_before_[i] : none);
 }
 
 void Drawing::restore_state(StateReader& state) {
-  dents_before_.resize(bodies_->size());
-  for (std::vector<DentLoad>& loads : dents_before_) state(loads);
+  indentations_before_.resize(bodies_->size());
+  for (std::vector<IndentationLoad>& loads : indentations_before_) state(loads);
 }
 
 /// Amplitudes between the last two states.
@@ -89,20 +91,20 @@ const SkinPose* Drawing::skin_at(const Entry& e, const double* z) const {
   return skin == nullptr ? nullptr : &skin->at({z, static_cast<std::size_t>(group.model().modes())});
 }
 
-std::span<const DentLoad> Drawing::dents_before(BodyId id) const {
-  if (id.index >= dents_before_.size()) return {};
-  return dents_before_[id.index];
+std::span<const IndentationLoad> Drawing::indentations_before(BodyId id) const {
+  if (id.index >= indentations_before_.size()) return {};
+  return indentations_before_[id.index];
 }
 
-bool Drawing::is_dented(BodyId id, double s, const StepPath& path) const {
-  return !path.dent_loads(static_cast<Index>(id.index)).empty() || (s < 1.0 && !dents_before(id).empty());
+bool Drawing::is_indented(BodyId id, double s, const StepPath& path) const {
+  return !path.indentation_loads(static_cast<Index>(id.index)).empty() || (s < 1.0 && !indentations_before(id).empty());
 }
 
 /// Checks what is to be drawn, orders it by model, and makes room.
 void Drawing::prepare(std::span<const DrawTarget> targets, double s, const StepPath& path) {
   std::vector<Drawn>& drawn = scratch_.drawn;
   drawn.clear();
-  std::size_t amplitudes = 0, dents = 0;
+  std::size_t amplitudes = 0, indentations = 0;
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const DrawTarget& target = targets[i];
     const Entry& e = bodies_->entry(target.id, "reconstruct");
@@ -117,20 +119,20 @@ void Drawing::prepare(std::span<const DrawTarget> targets, double s, const StepP
     const bool half = error <= target.tolerance;
     drawn.push_back({e.group, half, modes_to_draw(e, target.tolerance - (half ? error : 0.0), s), i});
     amplitudes += static_cast<std::size_t>(model.modes());
-    if (is_dented(target.id, s, path)) dents += numbers;
+    if (is_indented(target.id, s, path)) indentations += numbers;
   }
   if (scratch_.amplitudes.size() < amplitudes) scratch_.amplitudes.resize(amplitudes);
-  if (scratch_.dents.size() < dents) scratch_.dents.resize(dents);
+  if (scratch_.indentations.size() < indentations) scratch_.indentations.resize(indentations);
   std::sort(drawn.begin(), drawn.end(), [](const Drawn& a, const Drawn& b) {
     return std::tie(a.group, a.half, a.modes, a.target) < std::tie(b.group, b.half, b.modes, b.target);
   });
 }
 
-/// Poses, amplitudes and dents of what has been prepared.
+/// Poses, amplitudes and indentations of what has been prepared.
 void Drawing::list_targets(std::span<const DrawTarget> targets, double s, const Vec3& origin, const StepPath& path) {
   scratch_.targets.clear();
   double* amplitudes = scratch_.amplitudes.data();
-  float* dents = scratch_.dents.data();
+  float* indentations = scratch_.indentations.data();
   for (const Drawn& d : scratch_.drawn) {
     const DrawTarget& target = targets[d.target];
     const Entry& e = (*bodies_)[static_cast<Index>(target.id.index)];
@@ -144,12 +146,12 @@ void Drawing::list_targets(std::span<const DrawTarget> targets, double s, const 
                                 .modes = d.modes,
                                 .skin = skin_at(e, amplitudes)});
     amplitudes += bodies_->group(e).model().modes();
-    if (!is_dented(target.id, s, path)) continue;
-    bodies_->model_group(e).dented->displacements(dents_before(target.id),
-                                                  path.dent_loads(static_cast<Index>(target.id.index)), s,
-                                                  {dents, target.positions.size()});
-    scratch_.targets.back().displacement = dents;
-    dents += target.positions.size();
+    if (!is_indented(target.id, s, path)) continue;
+    bodies_->model_group(e).indented->displacements(indentations_before(target.id),
+                                                    path.indentation_loads(static_cast<Index>(target.id.index)), s,
+                                                    {indentations, target.positions.size()});
+    scratch_.targets.back().displacement = indentations;
+    indentations += target.positions.size();
   }
 }
 

@@ -15,11 +15,11 @@ class Drawing {
  public:
   explicit Drawing(const BodyTable& bodies) : bodies_(&bodies) {}
 
-  // Dents before the last step.
-  /// Before each step. @param path whose contacts press dents, here and below
-  void keep_dents(const StepPath& path);
+  // Indentations before the last step.
+  /// Before each step. @param path whose contacts press indentations, here and below
+  void keep_indentations(const StepPath& path);
   void forget(Index body);
-  void forget_all() { dents_before_.clear(); }
+  void forget_all() { indentations_before_.clear(); }
   void save_state(StateWriter& state) const;
   void restore_state(StateReader& state);
 
@@ -44,7 +44,7 @@ class Drawing {
   struct Scratch {
     std::vector<Drawn> drawn;  // by model
     std::vector<double> amplitudes;
-    std::vector<float> dents;
+    std::vector<float> indentations;
     std::vector<ReconstructionTarget> targets;  // as `drawn`
   };
   template <class Real>
@@ -53,14 +53,15 @@ class Drawing {
   double half_precision_error(const Entry& e, double tolerance, double s) const;
   Index modes_to_draw(const Entry& e, double tolerance, double s) const;
   const SkinPose* skin_at(const Entry& e, const double* z) const;
-  std::span<const DentLoad> dents_before(BodyId id) const;
-  bool is_dented(BodyId id, double s, const StepPath& path) const;
+  std::span<const IndentationLoad> indentations_before(BodyId id) const;
+  bool is_indented(BodyId id, double s, const StepPath& path) const;
   void prepare(std::span<const DrawTarget> targets, double s, const StepPath& path);
   void list_targets(std::span<const DrawTarget> targets, double s, const Vec3& origin, const StepPath& path);
   void draw_models(Jobs& jobs);
 
   const BodyTable* bodies_;
-  std::vector<std::vector<DentLoad>> dents_before_;  // what pressed dents into each body before the last step
+  std::vector<std::vector<IndentationLoad>>
+      indentations_before_;  // what pressed indentations into each body before the last step
   Scratch scratch_;
 };
 

@@ -14,8 +14,8 @@
 #include "sensor_stage.h"
 #include "sleep_stage.h"
 #include "step_events.h"
-#include "step_parts.h"
 #include "step_path.h"
+#include "substeps.h"
 #include "world_time.h"
 
 namespace limber::internal {
@@ -29,7 +29,7 @@ class Snapshot {
     BodyTable& bodies;
     ConstraintStage& constraints;
     SleepStage& sleep;
-    StepParts& parts;
+    Substeps& parts;
     StepEvents& events;
     JointBreaks& breaks;
     SensorStage& sensors;

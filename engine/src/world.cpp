@@ -304,7 +304,7 @@ void World::step() {
   Impl& m = *impl_;
   StageClock clock(m.last.times);
   m.last.report = {};
-  m.drawing.keep_dents(m.paths.in_force());
+  m.drawing.keep_indentations(m.paths.in_force());
   if (m.paths.registry.source() != nullptr) m.last.events.begin();
   for (int part = 0; part < m.parts.count(); ++part) {
     m.bodies.set_within_step(part > 0);

@@ -199,12 +199,12 @@ void World::set_joint_strength(JointId id, double newtons) {
 double World::joint_strength(JointId id) const { return named(impl_->constraints, id, "joint_strength").strength; }
 std::span<const JointBreak> World::joint_breaks() const { return impl_->last.breaks.events(); }
 
-void World::set_apart(BodyId a, BodyId b, bool apart) {
+void World::ignore_collision(BodyId a, BodyId b, bool ignore) {
   Impl& m = *impl_;
-  m.bodies.entry(a, "set_apart"), m.bodies.entry(b, "set_apart");
-  if (a == b) throw InvalidArgument("World::set_apart: both bodies are the same");
+  m.bodies.entry(a, "ignore_collision"), m.bodies.entry(b, "ignore_collision");
+  if (a == b) throw InvalidArgument("World::ignore_collision: both bodies are the same");
   const auto [first, second] = std::minmax({static_cast<Index>(a.index), static_cast<Index>(b.index)});
-  if (!m.paths.registry.set_excluded(first, second, apart)) return;
+  if (!m.paths.registry.set_excluded(first, second, ignore)) return;
   m.sleep.wake(first), m.sleep.wake(second);
 }
 

@@ -8,7 +8,7 @@
 //   Drawing           surfaces between two steps
 //   Snapshot          all of it as bytes, and back
 //
-// StepParts stands between a step and its substeps. World's own
+// Substeps stands between a step and its substeps. World's own
 // functions, which check what they are given, are in world.cpp (bodies, time, loads), world_constraints.cpp and
 // world_state.cpp.
 #pragma once
@@ -25,7 +25,7 @@
 #include "sleep_stage.h"
 #include "snapshot.h"
 #include "step_events.h"
-#include "step_parts.h"
+#include "substeps.h"
 #include "world_time.h"
 
 namespace limber {
@@ -70,7 +70,7 @@ struct World::Impl {
   internal::SleepStage sleep;
   internal::ContactPaths paths;
   internal::Drawing drawing;
-  internal::StepParts parts;
+  internal::Substeps parts;
   internal::WorldTime time;
   LastStep last;
 };

@@ -7,7 +7,7 @@ namespace {
 
 using Entry = internal::BodyTable::Entry;
 using internal::ConstraintStage;
-using internal::DentedSurface;
+using internal::IndentedSurface;
 using internal::require_count;
 using internal::require_finite;
 using internal::require_pose;
@@ -122,15 +122,16 @@ Vec3 World::velocity(BodyId id, const SurfacePoint& at) const {
   return impl_->bodies.group(e).velocity(e.slot, at);
 }
 
-Vec3 World::dent(BodyId id, const SurfacePoint& at) const {
-  const Entry& e = impl_->bodies.entry(id, "dent");
+Vec3 World::indentation(BodyId id, const SurfacePoint& at) const {
+  const Entry& e = impl_->bodies.entry(id, "indentation");
   const BodyGroup& group = impl_->bodies.group(e);
   validate(group.model(), at);
-  const DentedSurface* dented = impl_->bodies.model_group(e).dented.get();
-  if (dented == nullptr) return Vec3::Zero();
-  Vec3 dent = dented->displacement(impl_->paths.in_force().dent_loads(static_cast<Index>(id.index)), at);
-  if (group.skinned(e.slot)) dent = group.shape(e.slot).turn(at) * dent;
-  return group.frame(e.slot).pose().q * dent;
+  const IndentedSurface* indented = impl_->bodies.model_group(e).indented.get();
+  if (indented == nullptr) return Vec3::Zero();
+  Vec3 indentation =
+      indented->displacement(impl_->paths.in_force().indentation_loads(static_cast<Index>(id.index)), at);
+  if (group.skinned(e.slot)) indentation = group.shape(e.slot).turn(at) * indentation;
+  return group.frame(e.slot).pose().q * indentation;
 }
 
 std::uint64_t World::state_hash() const {

@@ -27,7 +27,7 @@ Machine add_machine(World& world, const Asset& asset, const MachinePlacement& pl
     for (std::size_t c = 0; c < joint.coordinates.size(); ++c)
       world.set_joint_actuation(machine.joints.back(), static_cast<int>(c), joint.coordinates[c]);
   }
-  for (const auto& [a, b] : asset.apart) world.set_apart(body(a), body(b), true);
+  for (const auto& [a, b] : asset.apart) world.ignore_collision(body(a), body(b), true);
   return machine;
 }
 

@@ -56,7 +56,7 @@ class GroundedIsland : public Island {
   /// With what the contacts store.
   double energy() const {
     double sum = Island::energy();
-    for (const Index body : members) sum += contacts.dent_energy(states(), body);
+    for (const Index body : members) sum += contacts.indentation_energy(states(), body);
     return sum;
   }
   /// Of all contacts in the last step, on the bodies.

@@ -12,7 +12,7 @@ namespace {
 struct Rebound {
   double speed = 0.0;           // of the mass centre afterwards, away from the wall
   double contact_time = 0.0;    // from the touch to the end of the last step with a force
-  double highest_energy = 0.0;  // at the end of any step, by that at first; dents included
+  double highest_energy = 0.0;  // at the end of any step, by that at first; indentations included
 };
 
 /// @param phase of the touch within a step: 0 at its start

@@ -117,8 +117,8 @@ TEST(SkinnedReconstruct, IsWhatThePoseSaysOfEachVertexOnEveryInstructionSet) {
                                             << " modes, " << count << " instances");
           const SkinnedSurface s(vertices, modes, 9);
           SkinnedInstances instances(s, count, true);
-          const std::vector<float> dents(3 * s.surface.rest.size(), 0.3f);
-          if (count > 1) instances.targets[1].displacement = dents.data();
+          const std::vector<float> indentations(3 * s.surface.rest.size(), 0.3f);
+          if (count > 1) instances.targets[1].displacement = indentations.data();
           reconstruct(s.surface, SkinTiles(s.skin.render), instances.targets);
           for (const ReconstructionTarget& t : instances.targets)
             for (Index v = 0; v < vertices; ++v) {

@@ -1,5 +1,5 @@
-// Hands that lead baked bodies: contacts only push, dents are those of forces at hand, and no hand does more work than
-// its largest force times the way of its point.
+// Hands that lead baked bodies: contacts only push, indentations are those of forces at hand, and no hand does more
+// work than its largest force times the way of its point.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,9 +47,9 @@ struct Hand {
   HandleId id;
 };
 
-double largest_dent(const World& world, BodyId body, Index triangles) {
+double largest_indentation(const World& world, BodyId body, Index triangles) {
   double largest = 0.0;
-  for (Index t = 0; t < triangles; ++t) largest = std::max(largest, world.dent(body, {.triangle = t}).norm());
+  for (Index t = 0; t < triangles; ++t) largest = std::max(largest, world.indentation(body, {.triangle = t}).norm());
   return largest;
 }
 
@@ -61,9 +61,9 @@ void expect_push(const ContactEvent& event) {
 }
 
 /// A box on the ground that a hand drags, turns over and puts down. A force of 1e4 N, three hands' and the weight,
-/// makes dents of a centimetre in it.
+/// makes indentations of a centimetre in it.
 TEST(Hands, ContactsOfABoxThatIsLedPushAndDentItByTheirForces) {
-  constexpr double kDent = 0.02, kSpeed = 10.0;
+  constexpr double kIndentation = 0.02, kSpeed = 10.0;
   const int steps = kSanitized ? 20 : 240;
   const auto model = rubber_box(true, 3);
   const auto triangles = static_cast<Index>(model->collision().triangles.size());
@@ -78,7 +78,7 @@ TEST(Hands, ContactsOfABoxThatIsLedPushAndDentItByTheirForces) {
       hand.lead(world, {0.5 * std::sin(0.05 * i), 0.3 * std::sin(0.031 * i), 0.15 * (1.0 - std::cos(0.04 * i))});
       world.step();
       for (const ContactEvent& event : world.contact_events()) expect_push(event);
-      ASSERT_LT(largest_dent(world, box, triangles), kDent);
+      ASSERT_LT(largest_indentation(world, box, triangles), kIndentation);
       ASSERT_LT(world.body(box).velocity.norm(), kSpeed);
     }
   }

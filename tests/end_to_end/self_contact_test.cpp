@@ -73,7 +73,7 @@ struct Strip {
         if (std::abs(input.z() - kInner) > 1e-6) continue;
         SurfacePoint at{.triangle = static_cast<Index>(t), .weight = {0.0, 0.0, 0.0}};
         at.weight[c] = 1.0;
-        const Vec3 now = world.position(body, at) + world.dent(body, at) + origin;
+        const Vec3 now = world.position(body, at) + world.indentation(body, at) + origin;
         if (now.x() > 0.0 && now.x() < kArm) least = std::min(least, now.z() + kInner);
       }
     return least;

@@ -74,7 +74,7 @@ TEST(WorldContact, EnergyOfBoxesThatFallOnEachOtherNeverRises) {
   EXPECT_LT(largest_rise(world, boxes, 180), kRise * 3.0 * model->data().mass * kGravity * kSampleSize);
 }
 
-/// Dents stay with the material, whatever contacts come and go; what they store is counted.
+/// Indentations stay with the material, whatever contacts come and go; what they store is counted.
 TEST(WorldContact, EnergyNeverRisesWhereBodiesWithResidualComplianceSlideAndRoll) {
   constexpr double kRise = 1e-6;
   const auto model = sample_model({.modes = 6, .dropped = 14, .lowest_hz = 20.0});

@@ -275,13 +275,14 @@ TEST(GameContact, ResidualComplianceYieldsByItsForce) {
     for (const ContactEvent& event : scene.world.contact_events()) EXPECT_GE(event.impulse.dot(event.normal), 0.0);
   }
   Vec3 impulse = Vec3::Zero();
-  double dent = 0.0;
+  double indentation = 0.0;
   for (const ContactEvent& event : scene.world.contact_events()) impulse += event.impulse;
-  for (Index t = 0; t < 12; ++t) dent = std::max(dent, scene.world.dent(box, {.triangle = t}).norm());
+  for (Index t = 0; t < 12; ++t)
+    indentation = std::max(indentation, scene.world.indentation(box, {.triangle = t}).norm());
   const double weight = model->data().mass * kGravity;
   EXPECT_NEAR(impulse.norm() * 60.0, weight, 0.01 * weight);
-  EXPECT_GT(dent, 0.0);
-  EXPECT_LT(dent, 0.5 * kSize);
+  EXPECT_GT(indentation, 0.0);
+  EXPECT_LT(indentation, 0.5 * kSize);
   EXPECT_LT(scene.world.body(box).velocity.norm(), 1e-3);
 }
 

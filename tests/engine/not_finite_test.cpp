@@ -223,7 +223,7 @@ void offer_state(Offers& all) {
                    [=](Offered& o, double bad) { o.world.set_node_displacements(o.body, nodes, spoilt(bad)); });
   all.emplace_back("position", [](Offered& o, double bad) { o.world.position(o.body, point_with(bad)); });
   all.emplace_back("velocity", [](Offered& o, double bad) { o.world.velocity(o.body, point_with(bad)); });
-  all.emplace_back("dent", [](Offered& o, double bad) { o.world.dent(o.body, point_with(bad)); });
+  all.emplace_back("indentation", [](Offered& o, double bad) { o.world.indentation(o.body, point_with(bad)); });
 }
 
 void offer_drawing(Offers& all) {

@@ -11,7 +11,7 @@
 namespace limber::testing {
 
 /// All contacts of the bodies of a world with the ground and with each other as they stand now: found anew and not
-/// thinned, dents included.
+/// thinned, indentations included.
 class Overlap {
  public:
   struct Depth {
@@ -41,7 +41,7 @@ class Overlap {
     finder_.find_contacts({.states = states_, .margin = 0.0}, contacts_, serial_jobs());
     Depth most;
     for (const ContactPoint& contact : contacts_) {
-      const double depth = -contact.gap - contact.normal.dot(dent_of(contact.a) - dent_of(contact.b));
+      const double depth = -contact.gap - contact.normal.dot(indentation_of(contact.a) - indentation_of(contact.b));
       double& of_kind = contact.a.body == ground_ || contact.b.body == ground_ ? most.ground : most.between;
       of_kind = std::max(of_kind, depth);
     }
@@ -49,10 +49,10 @@ class Overlap {
   }
 
  private:
-  Vec3 dent_of(const ContactSide& side) const {
+  Vec3 indentation_of(const ContactSide& side) const {
     for (const BodyId id : bodies_)
       if (static_cast<Index>(id.index) == side.body)
-        return world_.dent(id, {.triangle = side.triangle, .weight = side.weight});
+        return world_.indentation(id, {.triangle = side.triangle, .weight = side.weight});
     return Vec3::Zero();  // the ground
   }
 

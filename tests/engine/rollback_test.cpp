@@ -205,8 +205,8 @@ TEST(Rollback, AnotherWorldTakesTheState) {
 TEST(Rollback, DrawingAfterwardsIsTheSame) {
   GroundedWorld scene;
   drop_boxes(scene, 2, 6);
-  const auto dented = sample_model({.modes = 6, .dropped = 14, .decay = 10.0});
-  const BodyId body = scene.world.add_body(dented, {.pose = {{}, {3.0, 0.0, depth_below_origin(*dented) + 0.01}}});
+  const auto indented = sample_model({.modes = 6, .dropped = 14, .decay = 10.0});
+  const BodyId body = scene.world.add_body(indented, {.pose = {{}, {3.0, 0.0, depth_below_origin(*indented) + 0.01}}});
   scene.step(30);
   const auto drawn = [&] {
     std::vector<float> positions(3 * static_cast<std::size_t>(scene.world.model(body).render().vertices()));

@@ -184,8 +184,8 @@ TEST(ContactRun, TheMethodOfTheFileIsTheOneThatActs) {
   // The penalty's springs give way under the weight: n of them by m g/(n k), k = m (2πν)².
   const std::string soft = R"("contact": {"method": "penalty", "penalty_frequency": 5, "recovery_speed": 0},)" +
                            kGround + "," + bodies(block_at("b", "[0, 0, 0.5]"));
-  const double dent = kGravity / (34.0 * std::pow(2.0 * std::numbers::pi * 5.0, 2));
-  EXPECT_NEAR(end_of(play(rigid(soft)), "b").z(), 0.5 - dent, 1e-3 * dent);
+  const double indentation = kGravity / (34.0 * std::pow(2.0 * std::numbers::pi * 5.0, 2));
+  EXPECT_NEAR(end_of(play(rigid(soft)), "b").z(), 0.5 - indentation, 1e-3 * indentation);
 }
 #endif
 

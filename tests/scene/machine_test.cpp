@@ -88,11 +88,11 @@ TEST(Machine, PairsOfTheAssetHaveNoContacts) {
     return false;
   };
   EXPECT_FALSE(touch());
-  world.set_apart(machine.bodies[2], machine.bodies[1], false);
+  world.ignore_collision(machine.bodies[2], machine.bodies[1], false);
   EXPECT_TRUE(touch()) << "they overlap by half";
-  world.set_apart(machine.bodies[2], machine.bodies[1], true);
+  world.ignore_collision(machine.bodies[2], machine.bodies[1], true);
   EXPECT_FALSE(touch());
-  EXPECT_THROW(world.set_apart(machine.bodies[0], machine.bodies[0], true), InvalidArgument);
+  EXPECT_THROW(world.ignore_collision(machine.bodies[0], machine.bodies[0], true), InvalidArgument);
 }
 
 TEST(Machine, UntiedItFallsAsOneThing) {

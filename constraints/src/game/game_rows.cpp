@@ -135,7 +135,7 @@ void GameRows::scale_turns() {
 }
 
 void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields) {
-  const RowLaw& law = made_.row(static_cast<Index>(i)).law;
+  const RowParameters& law = made_.row(static_cast<Index>(i)).law;
   const double h = length_;
   GameRow& row = rows_.emplace_back(GameRow{.lower = law.lower / h,
                                             .upper = law.upper / h,

@@ -65,7 +65,7 @@ SmallStepReport SmallStepSolver::step(const SmallStepProblem& problem, Jobs& job
   report.solved = m.contacts.meet_law() && m.constraints.all_finite() && m.bodies.all_finite();
   m.contacts.end_step(m.bodies.plan());
   m.bodies.end_step();
-  if (problem.contacts != nullptr) problem.contacts->press_dents(states);
+  if (problem.contacts != nullptr) problem.contacts->press_indentations(states);
   return report;
 }
 

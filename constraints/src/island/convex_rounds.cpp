@@ -112,7 +112,7 @@ void ConvexRounds::fill_units(const IslandStep& step) {
   for (double& weight : root_) weight = std::sqrt(weight);
   fill_rows(step);
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const RowLaw& law = step.law(units_[u].first);
+    const RowParameters& law = step.law(units_[u].first);
     const Vec3 response = contacts_.response(u);
     const double moved = law.radius > 0.0 ? response.mean() : response[0];
     units_[u].response = moved;
@@ -147,7 +147,7 @@ void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
 void ConvexRounds::begin_units(const IslandStep& step) {
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
-    const RowLaw& law = step.law(unit.first);
+    const RowParameters& law = step.law(unit.first);
     for (std::size_t r = 0; r < unit.rows; ++r) {
       const auto axis = static_cast<int>(r);
       unit.impulse[axis] = step.length() * step.reaction[unit.first + r];
@@ -172,7 +172,7 @@ void ConvexRounds::take_impulses(IslandStep& step) {
 
 /// The natural residual |F − P(F − u/ρ)| ρ, ρ what an impulse moves its own gap by: a distance, 0 where the impulse is
 /// the law's at the gap u.
-double ConvexRounds::distance_from_law(const Unit& unit, const RowLaw& law, const ContactPotential& potential,
+double ConvexRounds::distance_from_law(const Unit& unit, const RowParameters& law, const ContactPotential& potential,
                                        Vec3 gap) {
   ContactPotential natural = potential;
   natural.compliance = std::max(unit.response, std::numeric_limits<double>::min());
@@ -188,7 +188,7 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
   Distance distance;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
-    const RowLaw& law = step.law(unit.first);
+    const RowParameters& law = step.law(unit.first);
     Vec3 open = open_gap(step, unit);
     distance.moved = first_round ? kUnbounded : std::max(distance.moved, (open - unit.end).norm() / law.tolerance);
     unit.end = open;
@@ -210,7 +210,7 @@ Vec3 ConvexRounds::open_gap(const IslandStep& step, const Unit& unit) {
   Vec3 open = Vec3::Zero();
   for (std::size_t r = 0; r < unit.rows; ++r)
     open[static_cast<int>(r)] =
-        step.gap[unit.first + r] - step.law(unit.first + r).offset + dent_of(step, unit.first + r);
+        step.gap[unit.first + r] - step.law(unit.first + r).offset + indentation_of(step, unit.first + r);
   return open;
 }
 
@@ -218,7 +218,7 @@ Vec3 ConvexRounds::open_gap(const IslandStep& step, const Unit& unit) {
 double ConvexRounds::largest_distance(const IslandStep& step) {
   double largest = 0.0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const RowLaw& law = step.law(units_[u].first);
+    const RowParameters& law = step.law(units_[u].first);
     Vec3 open = open_gap(step, units_[u]);
     if (law.friction > 0.0) open[0] += law.friction * open.tail<2>().norm();
     largest = std::max(largest, distance_from_law(units_[u], law, contacts_.potential(u), open) / law.tolerance);
@@ -232,7 +232,7 @@ void ConvexRounds::stiffen(const IslandStep& step) {
   constexpr const RoundsTuning& tuning = kConstraintsTuning.rounds;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
-    const RowLaw& law = step.law(unit.first);
+    const RowParameters& law = step.law(unit.first);
     if (law.compliance > 0.0) continue;
     double& c = contacts_.potential(u).compliance;
     const double changed = (step.contacts_alone ? unit.response : c) * (contacts_.impulse(u) - unit.anchor).norm();
@@ -293,7 +293,7 @@ bool ConvexRounds::press_early(IslandStep& step) const {
 }
 
 /// What the bodies yield beyond their modes, in a row's gap.
-double ConvexRounds::dent_of(const IslandStep& step, std::size_t row) {
+double ConvexRounds::indentation_of(const IslandStep& step, std::size_t row) {
   double sum = 0.0;
   step.for_bodies(row, [&](const ConstraintRows::Side&, Index local, bool) {
     const std::span<const double> columns = residual_.row(local, row);

@@ -44,11 +44,12 @@ class ConvexRounds {
   void fill_values(const IslandStep& step, Write&& write);
   void begin_units(const IslandStep& step);
   void take_impulses(IslandStep& step);
-  static double distance_from_law(const Unit& unit, const RowLaw& law, const ContactPotential& potential, Vec3 gap);
+  static double distance_from_law(const Unit& unit, const RowParameters& law, const ContactPotential& potential,
+                                  Vec3 gap);
   Distance find_starts(const IslandStep& step, bool first_round);
   double largest_distance(const IslandStep& step);
   Vec3 open_gap(const IslandStep& step, const Unit& unit);
-  double dent_of(const IslandStep& step, std::size_t row);
+  double indentation_of(const IslandStep& step, std::size_t row);
   void stiffen(const IslandStep& step);
   bool press_early(IslandStep& step) const;
   void advance_units(const IslandStep& step);

@@ -1,7 +1,7 @@
 #include "../tuning.h"
 #include "convex_rounds.h"
 #include "island_impl.h"
-#include "mean_newton.h"
+#include "midpoint_newton.h"
 
 namespace limber {
 namespace internal {
@@ -18,7 +18,7 @@ class DefaultIslandSolver final : public IslandParts {
   void find_mean(IslandReport& done);
 
   ConvexRounds rounds_;
-  MeanNewton mean_;
+  MidpointNewton mean_;
 };
 
 IslandReport DefaultIslandSolver::find(const StepPart& part) {

@@ -21,7 +21,7 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
 }
 
 /// Whether bodies lie still on a row of one sign: closed, and slower than what held forces make of rest in a step.
-bool rests(const RowLaw& law, double gap, const HeldReaction::Motion& held) {
+bool rests(const RowParameters& law, double gap, const HeldReaction::Motion& held) {
   const double open = gap - law.offset, within = kConstraintsTuning.rows.rests_within * law.tolerance;
   const bool closed = (law.lower < 0.0 || open <= within) && (law.upper > 0.0 || open >= -within);
   return closed && std::abs(held.speed) <= held.speed_of_a_step;
@@ -87,7 +87,7 @@ bool HeldReaction::bound_rows(const IslandStep& step, StepTime when) {
   bool any = false, rested = false;  // the normal row of the contact at hand
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const RowLaw& law = rows.row(i).law;
+    const RowParameters& law = rows.row(i).law;
     if (step.convex && law.contact) continue;
     const Motion held = motion_of(step, when, i);
     const bool lies = rests(law, step.gap[at], held);

@@ -69,15 +69,15 @@ void IslandStep::take_middle(bool middle) {
   begin_early();
 }
 
-bool IslandStep::any_law(bool (*holds)(const RowLaw&)) const {
+bool IslandStep::any_law(bool (*holds)(const RowParameters&)) const {
   for (Index i = 0; i < rows.size(); ++i)
     if (holds(rows.row(i).law)) return true;
   return false;
 }
 
 void IslandStep::find_kind(bool contacts_react) {
-  contacts_alone = !any_law([](const RowLaw& law) { return !law.contact; });
-  touches = any_law([](const RowLaw& law) { return law.contact; });
+  contacts_alone = !any_law([](const RowParameters& law) { return !law.contact; });
+  touches = any_law([](const RowParameters& law) { return law.contact; });
   mean = !contacts_react && !touches;
   convex = !contacts_react && !mean;
   skinned = false;
@@ -178,11 +178,12 @@ void IslandStep::follow_bending() {
 
 /// By the way to where the bodies were predicted last.
 void IslandStep::bend_rows() {
-  linearise(StepTime::kMiddle, mean_rows);
+  linearise(StepTime::kMiddle, midpoint_rows);
   for (Index i = 0; i < rows.size(); ++i)
     for (std::size_t side = 0; side < 2; ++side) {
       const Index local = bodies.local(rows.row(i).sides[side].body);
-      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot)) rows.take_modal(mean_rows, i, side);
+      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot))
+        rows.take_modal(midpoint_rows, i, side);
     }
 }
 

@@ -13,13 +13,13 @@
 
 namespace limber::internal {
 
-inline bool is_equality(const RowLaw& law) {
+inline bool is_equality(const RowParameters& law) {
   return !law.slides && law.lower == -kUnbounded && law.upper == kUnbounded;
 }
 /// Rows of the contact whose normal row this is, or of the vector whose first row it is.
-inline Index contact_rows(const RowLaw& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
+inline Index contact_rows(const RowParameters& first) { return first.friction > 0.0 || first.radius > 0.0 ? 3 : 1; }
 /// Where its impulse stays, or theirs.
-inline ContactPotential set_of(const RowLaw& first) {
+inline ContactPotential set_of(const RowParameters& first) {
   using Set = ContactPotential::Set;
   if (first.radius > 0.0) return {.set = Set::kBall, .bound = first.radius};
   if (first.friction > 0.0) return {.set = Set::kCone, .bound = first.friction};
@@ -71,14 +71,14 @@ struct IslandLoads {
 struct IslandStep {
   StepPart part;
   IslandBodies bodies;
-  ConstraintRows rows, end_rows, mean_rows;  // linearised at the start, at the predicted end and in the middle
-  std::vector<Index> first_row;              // per constraint, and the end
-  bool convex = false;                       // in rounds: with contacts
-  bool contacts_alone = false;               // among the rows
-  bool skinned = false;                      // some bodies bend by their modal skins
-  bool mean = false;                         // joints and the like: impulses act by the rows of the middle of the step
-  bool touches = false;                      // some rows are contacts
-  double theta = 1.0;                        // the part of f that frames get at the start; the rest at the end
+  ConstraintRows rows, end_rows, midpoint_rows;  // linearised at the start, at the predicted end and in the middle
+  std::vector<Index> first_row;                  // per constraint, and the end
+  bool convex = false;                           // in rounds: with contacts
+  bool contacts_alone = false;                   // among the rows
+  bool skinned = false;                          // some bodies bend by their modal skins
+  bool mean = false;     // joints and the like: impulses act by the rows of the middle of the step
+  bool touches = false;  // some rows are contacts
+  double theta = 1.0;    // the part of f that frames get at the start; the rest at the end
   std::vector<double> start_gap, gap;
   std::vector<double> f;                       // N·s, beside the reactions
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
@@ -95,14 +95,14 @@ struct IslandStep {
   void take_middle(bool middle);
   double length() const { return part.options.step; }
   std::size_t size() const { return f.size(); }
-  const RowLaw& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
+  const RowParameters& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
   /// Those of its rows.
   std::span<const double> of_constraint(std::span<const double> by_row, std::size_t constraint) const {
     const auto begin = static_cast<std::size_t>(first_row[constraint]),
                end = static_cast<std::size_t>(first_row[constraint + 1]);
     return by_row.subspan(begin, end - begin);
   }
-  bool any_law(bool (*holds)(const RowLaw&)) const;
+  bool any_law(bool (*holds)(const RowParameters&)) const;
   /// What the world's gravity is to a body.
   Vec3 gravity_of(Index local) const {
     return bodies.body(local).group->own_gravity(bodies.body(local).slot, part.options.gravity);

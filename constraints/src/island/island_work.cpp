@@ -25,17 +25,17 @@ double given(const IslandStep& step, std::size_t row) {
 
 /// A hand, a motor or a spring whose force is at its limit: what it moves does not go where it is wanted.
 bool is_at_limit(const IslandStep& step, std::size_t row) {
-  const RowLaw& law = step.law(row);
+  const RowParameters& law = step.law(row);
   constexpr double kAlmost = 1.0 - 1e-9;  // reactions and impulses are added up
   const double impulse = step.f[row] + step.length() * step.reaction[row];
   return law.lower < 0.0 && (law.prescribed_displacement != 0.0 || law.stiffness > 0.0) &&
          (impulse <= kAlmost * law.lower || impulse >= kAlmost * law.upper);
 }
 
-/// The force times the way of its point. RowLaw::prescribed_displacement is that way where a spring keeps its length,
-/// or where a hard row's gap is met.
+/// The force times the way of its point. RowParameters::prescribed_displacement is that way where a spring keeps its
+/// length, or where a hard row's gap is met.
 double limited_work(const IslandStep& step, std::size_t row) {
-  const RowLaw& law = step.law(row);
+  const RowParameters& law = step.law(row);
   const double missed = step.gap[row] - (law.stiffness > 0.0 ? step.start_gap[row] : law.offset);
   return force(step, row) * (law.prescribed_displacement + missed);
 }
@@ -56,7 +56,7 @@ double recovery_work(const IslandStep& step) {
 double agent_work(const IslandStep& step) {
   double work = step.rows.stored_energy() + recovery_work(step);
   for (std::size_t i = 0; i < step.size(); ++i) {
-    const RowLaw& law = step.law(i);
+    const RowParameters& law = step.law(i);
     if (is_at_limit(step, i)) {
       work += limited_work(step, i);
       continue;
@@ -90,9 +90,9 @@ double load_work(const IslandStep& step) {
 }
 
 bool is_workless(const IslandStep& step) {
-  if (step.rows.stored_energy() > 0.0) return false;  // dents that let go
+  if (step.rows.stored_energy() > 0.0) return false;  // indentations that let go
   for (std::size_t i = 0; i < step.size(); ++i) {
-    const RowLaw& law = step.law(i);
+    const RowParameters& law = step.law(i);
     if (step.touch_impulse[i] != 0.0) return false;
     if (step.f[i] == 0.0 && step.reaction[i] == 0.0) continue;
     if (!is_equality(law) || law.compliance > 0.0 || law.prescribed_displacement != 0.0) return false;

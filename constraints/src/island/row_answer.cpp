@@ -8,7 +8,7 @@ namespace limber::internal {
 namespace {
 
 /// Of a row or a contact, beside others: a set whose impulse stays as it is wherever gaps let it.
-bool stays(const RowLaw& law, const Vec3& impulse, const Vec3& off, double response) {
+bool stays(const RowParameters& law, const Vec3& impulse, const Vec3& off, double response) {
   ContactPotential set = set_of(law);
   set.compliance = response;
   return set.natural(off, impulse) == impulse;
@@ -16,7 +16,7 @@ bool stays(const RowLaw& law, const Vec3& impulse, const Vec3& off, double respo
 
 }  // namespace
 
-void RowAnswer::begin(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem) {
+void RowAnswer::begin(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem) {
   rows_.clear();
   takes_part_.assign(impulses.size(), 0), within_.assign(impulses.size(), 0);
   for (std::size_t i = 0; i < impulses.size(); ++i)
@@ -32,7 +32,7 @@ void RowAnswer::add(std::size_t first, std::size_t count) {
   }
 }
 
-bool RowAnswer::extend(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem) {
+bool RowAnswer::extend(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem) {
   const std::size_t before = rows_.size();
   step.for_units([&](std::size_t first, std::size_t count) {
     if (takes_part_[first] != 0) return;
@@ -50,8 +50,8 @@ bool RowAnswer::extend(const IslandStep& step, std::span<const double> impulses,
   return rows_.size() > before;
 }
 
-void RowAnswer::solve(const IslandStep& step, std::span<const double> impulses, MeanProblem& problem,
-                      const MeanMotion& motion) {
+void RowAnswer::solve(const IslandStep& step, std::span<const double> impulses, MidpointProblem& problem,
+                      const MidpointMotion& motion) {
   problem.reduce(step, motion, rows_, A_);
   problem.find_open(motion, rows_, open_);
   scale_.resize(open_.size()), change_.resize(open_.size());
@@ -63,8 +63,8 @@ void RowAnswer::solve(const IslandStep& step, std::span<const double> impulses, 
   find_within(step);
 }
 
-bool RowAnswer::solve_again(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem,
-                            const MeanMotion& motion) {
+bool RowAnswer::solve_again(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem,
+                            const MidpointMotion& motion) {
   problem.find_open(motion, rows_, open_);
   meet(impulses);
   return !find_within(step);
@@ -78,7 +78,7 @@ void RowAnswer::factor(const IslandStep& step) {
   const auto m = static_cast<Eigen::Index>(equalities_);
   double off = 0.0;
   for (Eigen::Index i = 0; i < m; ++i) {
-    const RowLaw& law = step.law(static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]));
+    const RowParameters& law = step.law(static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]));
     off = std::max(off, std::abs(open_[i]) / (tuning.lengths * law.tolerance));
   }
   const double damping = std::clamp(tuning.damping_of_gaps * off, tuning.least_damping, tuning.most_damping);
@@ -99,7 +99,7 @@ std::span<double> RowAnswer::solve_equalities(std::span<double> x) {
 }
 
 /// What is left between the rows with bounds where those without are met.
-void RowAnswer::find_equilibrium(const IslandStep& step, const MeanProblem& problem) {
+void RowAnswer::find_equilibrium(const IslandStep& step, const MidpointProblem& problem) {
   const auto m = static_cast<Eigen::Index>(equalities_), n = static_cast<Eigen::Index>(rows_.size()) - m;
   const auto A = A_.view();
   auto answers = answers_.resize(n, m);
@@ -114,7 +114,7 @@ void RowAnswer::find_equilibrium(const IslandStep& step, const MeanProblem& prob
   equilibrium_.clear();
   for (std::size_t i = equalities_, count = 1; i < rows_.size(); i += count) {
     const auto row = static_cast<std::size_t>(rows_[i]);
-    const RowLaw& law = step.law(row);
+    const RowParameters& law = step.law(row);
     count = static_cast<std::size_t>(contact_rows(law));
     ContactPotential set = set_of(law);
     set.compliance = problem.response(row);
@@ -151,7 +151,7 @@ bool RowAnswer::find_within(const IslandStep& step) {
   bool changed = false;
   for (std::size_t i = equalities_, count = 1; i < rows_.size(); i += count) {
     const auto first = static_cast<std::size_t>(rows_[i]);
-    const RowLaw& law = step.law(first);
+    const RowParameters& law = step.law(first);
     count = static_cast<std::size_t>(contact_rows(law));
     Vec3 f = Vec3::Zero();
     for (std::size_t r = 0; r < count; ++r) f[static_cast<int>(r)] = bounded_[i - equalities_ + r];

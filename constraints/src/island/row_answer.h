@@ -6,7 +6,7 @@
 
 #include "limber/solvers/damped_least_squares.h"
 #include "limber/solvers/row_equilibrium.h"
-#include "mean_problem.h"
+#include "midpoint_problem.h"
 
 namespace limber::internal {
 
@@ -15,16 +15,17 @@ namespace limber::internal {
 class RowAnswer {
  public:
   /// Chooses the rows that take part: those without bounds, those that exert something, and those that are to.
-  void begin(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem);
+  void begin(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem);
   /// Finds Δ, and which rows are within their bounds.
-  void solve(const IslandStep& step, std::span<const double> impulses, MeanProblem& problem, const MeanMotion& motion);
+  void solve(const IslandStep& step, std::span<const double> impulses, MidpointProblem& problem,
+             const MidpointMotion& motion);
   /// Finds Δ by the matrices of the last solve(). @return whether the same rows are within their bounds
-  bool solve_again(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem,
-                   const MeanMotion& motion);
+  bool solve_again(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem,
+                   const MidpointMotion& motion);
   /// Δ by row that takes part.
   const RowVector& change() const { return change_; }
   /// Rows take part, too, that leave their bounds by what the others do. @return whether there are any
-  bool extend(const IslandStep& step, std::span<const double> impulses, const MeanProblem& problem);
+  bool extend(const IslandStep& step, std::span<const double> impulses, const MidpointProblem& problem);
   /// In ascending order of when they came to take part.
   std::span<const Index> rows() const { return rows_; }
   /// By row of the island: whether it is within its bounds.
@@ -34,7 +35,7 @@ class RowAnswer {
   void add(std::size_t first, std::size_t count);
   bool find_within(const IslandStep& step);
   void factor(const IslandStep& step);
-  void find_equilibrium(const IslandStep& step, const MeanProblem& problem);
+  void find_equilibrium(const IslandStep& step, const MidpointProblem& problem);
   void meet(std::span<const double> impulses);
   std::span<double> solve_equalities(std::span<double> rows);
 

@@ -9,13 +9,13 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-bool in_cone(const RowLaw& law) { return law.slides || law.friction > 0.0; }
+bool in_cone(const RowParameters& law) { return law.slides || law.friction > 0.0; }
 
 }  // namespace
 
 void BoundedRows::sort(const IslandStep& step) {
   order_.clear(), friction_.clear();
-  const auto take = [&](bool (*belongs)(const RowLaw&)) {
+  const auto take = [&](bool (*belongs)(const RowParameters&)) {
     for (Index i = 0; i < step.rows.size(); ++i)
       if (belongs(step.rows.row(i).law)) order_.push_back(i);
   };
@@ -24,7 +24,7 @@ void BoundedRows::sort(const IslandStep& step) {
   take(in_cone);
   for (std::size_t i = first_bounded_; i < order_.size(); i += 3)
     friction_.push_back(step.law(static_cast<std::size_t>(order_[i])).friction);
-  take([](const RowLaw& law) { return !is_equality(law) && !in_cone(law); });
+  take([](const RowParameters& law) { return !is_equality(law) && !in_cone(law); });
 }
 
 void BoundedRows::assemble(const IslandStep& step, std::span<const double> J, std::span<const double> metric) {
@@ -71,7 +71,7 @@ SolveStatus BoundedRows::solve_bounded(const IslandStep& step, const ContactRule
   for (std::vector<double>* v : {&bounded_.lower, &bounded_.upper, &bounded_.gap_before, &bounded_.F}) v->resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = static_cast<std::size_t>(order_[first_bounded_ + i]);
-    const RowLaw& law = step.law(at);
+    const RowParameters& law = step.law(at);
     bounded_.F[i] = F[at];
     bounded_.lower[i] = law.lower, bounded_.upper[i] = law.upper;
     bounded_.gap_before[i] = step.start_gap[at] - law.offset;

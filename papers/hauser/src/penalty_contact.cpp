@@ -27,7 +27,7 @@ void PenaltyContact::add_rows(const BodyStates& states, StepTime when, double st
   gaps_.resize(static_cast<std::size_t>(rows.size() - first));
   contact_->gaps(states, when, gaps_);
   for (Index i = first; i < rows.size(); ++i) {
-    RowLaw& law = rows.row(i).law;
+    RowParameters& law = rows.row(i).law;
     if (!law.contact || law.slides) continue;
     const double mass = reduced_mass(states, rows.row(i)), omega = 2.0 * std::numbers::pi * frequency_;
     law.make_spring(mass * omega * omega, 2.0 * damping_ * mass * omega, step,

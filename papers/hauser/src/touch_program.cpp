@@ -54,7 +54,7 @@ void TouchProgram::choose_touching(const IslandStep& step, const HeldReaction& r
   touching_.clear(), mu_.clear();
   for (const bool with_friction : {true, false})
     for (Index i = 0; i < step.rows.size(); ++i) {
-      const RowLaw& law = step.rows.row(i).law;
+      const RowParameters& law = step.rows.row(i).law;
       if (!law.contact || law.slides || (law.friction > 0.0) != with_friction) continue;
       if (step.gap[static_cast<std::size_t>(i)] > kClosed * law.tolerance) continue;
       const double allowed = reaction.motion_of(step, StepTime::kStart, i).speed_of_a_step;
@@ -154,7 +154,7 @@ void TouchProgram::apply(IslandStep& step) {
 
 void TouchProgram::hold_forces(ConstraintRows& rows, double length) const {
   for (Index i = 0; i < rows.size(); ++i) {
-    RowLaw& law = rows.row(i).law;
+    RowParameters& law = rows.row(i).law;
     if (!law.contact) continue;
     const double impulse = length * force_[static_cast<std::size_t>(i)];
     law = {.offset = law.offset, .lower = impulse, .upper = impulse, .tolerance = law.tolerance, .contact = true};

@@ -184,7 +184,7 @@ void ScenePlayer::Impl::add_joints() {
     for (std::size_t c = 0; c < j.coordinates.size(); ++c)
       world.set_joint_actuation(joints.back(), static_cast<int>(c), j.coordinates[c]);
   }
-  for (const auto& [a, b] : scene.contacts.apart) world.set_apart(body_named(a), body_named(b), true);
+  for (const auto& [a, b] : scene.contacts.apart) world.ignore_collision(body_named(a), body_named(b), true);
 }
 
 void ScenePlayer::Impl::plan_loads() {

@@ -87,8 +87,9 @@ LIMBER_API limber_result limber_world_remove_joint(limber_world* world, limber_j
 LIMBER_API bool limber_world_contains_joint(const limber_world* world, limber_joint_id id);
 LIMBER_API limber_result limber_world_list_joints(const limber_world* world, limber_joint_id* ids, size_t capacity,
                                                   size_t* count);
-/// Whether two bodies have contacts with each other, as far as no joint keeps them from it: they do at first.
-LIMBER_API limber_result limber_world_set_apart(limber_world* world, limber_body_id a, limber_body_id b, bool apart);
+/// Whether two bodies have no contacts with each other even where no joint keeps them from it; they have at first.
+LIMBER_API limber_result limber_world_ignore_collision(limber_world* world, limber_body_id a, limber_body_id b,
+                                                       bool ignore);
 
 /// What acts along one coordinate; forces in N or N·m, velocities in m/s or rad/s. All are 0 by default.
 typedef struct limber_actuation {

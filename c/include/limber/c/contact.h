@@ -23,7 +23,7 @@ typedef struct limber_contact_options {
   double friction;           ///< μ ≥ 0 of bodies without their own; default 0.5
   double rolling_friction;   ///< ≥ 0, coefficient of rolling resistance of balls and capsules; default 0
   double recovery_speed;     ///< of the exact solver, m/s, ≥ 0: the same as push_speed; default 0.05
-  bool residual_compliance;  ///< dents, where models have it; default true
+  bool residual_compliance;  ///< indentations, where models have it; default true
   double compliance;         ///< ≥ 0: ContactOptions::compliance; default 0
 } limber_contact_options;
 LIMBER_API limber_contact_options limber_default_contact_options(void);

@@ -222,9 +222,9 @@ LIMBER_API limber_result limber_world_point_position(const limber_world* world, 
                                                      limber_surface_point at, limber_vec3* position);
 LIMBER_API limber_result limber_world_point_velocity(const limber_world* world, limber_body_id id,
                                                      limber_surface_point at, limber_vec3* velocity);
-/// The displacement of a surface point beyond the modes, where contacts dent it, world, m.
-LIMBER_API limber_result limber_world_point_dent(const limber_world* world, limber_body_id id, limber_surface_point at,
-                                                 limber_vec3* displacement);
+/// The displacement of a surface point beyond the modes, where contacts indentation it, world, m.
+LIMBER_API limber_result limber_world_point_indentation(const limber_world* world, limber_body_id id,
+                                                        limber_surface_point at, limber_vec3* displacement);
 
 /// Hash of all that the next step depends on: two worlds with the same calls behind them have the same. 0 for NULL.
 LIMBER_API uint64_t limber_world_state_hash(const limber_world* world);

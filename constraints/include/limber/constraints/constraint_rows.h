@@ -35,7 +35,7 @@ struct RowSide {
 };
 
 /// How a row is to be met.
-struct RowLaw {
+struct RowParameters {
   double gap = 0.0;            ///< when the row was made, for solvers that do not ask again
   double offset = 0.0;         ///< wanted gap at the step's end, in the gap's unit
   double compliance = 0.0;     ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
@@ -79,14 +79,14 @@ struct RowLaw {
   }
 };
 
-/// RowLaw::digits of what is computed from numbers of a size, in some roundings.
+/// RowParameters::digits of what is computed from numbers of a size, in some roundings.
 inline double digits_of(double size) {
   constexpr double kRoundings = 16.0 * std::numeric_limits<double>::epsilon();
   return kRoundings * size + std::numeric_limits<double>::min();
 }
 
-/// RowLaw::tolerance of a distance: a part of the lengths that it depends on, and what is lost of it to the digits of
-/// its place in the world.
+/// RowParameters::tolerance of a distance: a part of the lengths that it depends on, and what is lost of it to the
+/// digits of its place in the world.
 inline double distance_tolerance(double part, double length, const Vec3& place) {
   return part * length + digits_of(place.norm());
 }
@@ -101,7 +101,7 @@ class ConstraintRows {
   };
   struct Row {
     std::array<Side, 2> sides;
-    RowLaw law;
+    RowParameters law;
   };
 
   /// Coupled compliance of two rows, beyond what the modes show: gap_i += G f_j/Δt, gap_j += G f_i/Δt.
@@ -115,7 +115,7 @@ class ConstraintRows {
   /// How often they have been cleared: rows made since belong together.
   std::uint64_t makings() const { return makings_; }
   /// @return the row's index. Copies the modal parts. Two sides of one body become one, their sum.
-  Index add(const RowSide& a, const RowSide& b, const RowLaw& law);
+  Index add(const RowSide& a, const RowSide& b, const RowParameters& law);
   /// The same with the law that a row has by itself, for whoever writes it in its place.
   Index add(const RowSide& a, const RowSide& b);
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values

@@ -13,14 +13,14 @@
 ///   G_rs = Σ_vw w_r(v) G_vw w_s(w),
 ///
 /// symmetric and positive semidefinite, for all contacts of a body among each other. The residual displacement is a
-/// state of the body: what its last step pressed its vertices with, in its own frame (DentLoad), with the energy
+/// state of the body: what its last step pressed its vertices with, in its own frame (IndentationLoad), with the energy
 /// ½ FᵀG F. Slip counts from there, and what it makes up for is no overlap.
 ///
 /// *Contact compliance* c: contacts of bodies that flex may yield by themselves, which makes the shares of a
 /// load among redundant contacts unique for island solvers that need it (ContactOptions::compliance).
 ///
-/// *Overlap* at the start, what dents leave of it, shrinks by a fifth a step, at most at `recovery_speed`; that is work
-/// done on the island, bounded by what lifts it at that speed.
+/// *Overlap* at the start, what indentations leave of it, shrinks by a fifth a step, at most at `recovery_speed`; that
+/// is work done on the island, bounded by what lifts it at that speed.
 ///
 /// Only options throw, InvalidArgument. What to expect: docs/contact.md.
 #pragma once
@@ -139,7 +139,7 @@ struct RollingMemory {
 };
 
 /// What the contacts of the last step pressed on a vertex with: the source of a body's residual displacement.
-struct DentLoad {
+struct IndentationLoad {
   Index vertex = -1;          ///< of the collision surface
   Vec3 force = Vec3::Zero();  ///< body frame, N
 
@@ -169,7 +169,7 @@ class ContactSet {
 
   /// What small steps answer, and what they press: for SmallStepSolver.
   std::span<PreparedContact> prepared();
-  void press_dents(const BodyStates& states);
+  void press_indentations(const BodyStates& states);
 
   /// Books what the step did: after the islands' steps, before the next update().
   /// @param asleep by body: whether it sleeps. Its contacts were not given to update(): they are remembered as they
@@ -186,9 +186,9 @@ class ContactSet {
   /// Pairs that resisted rolling in the last step, ordered by (a, b).
   std::span<const RollingMemory> rolling() const;
   /// The forces behind a body's residual displacement, as the last step left them.
-  std::span<const DentLoad> dent_loads(Index body) const;
+  std::span<const IndentationLoad> indentation_loads(Index body) const;
   /// The energy in a body's residual and contact compliance, ½ FᵀG F and ½ c F², J: beside that of its modes.
-  double dent_energy(const BodyStates& states, Index body) const;
+  double indentation_energy(const BodyStates& states, Index body) const;
   const ContactOptions& options() const;
   /// A body that is removed: its residual displacement goes with it.
   void forget(Index body);

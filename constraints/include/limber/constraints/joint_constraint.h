@@ -137,8 +137,8 @@ class JointConstraint final : public Constraint {
   void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
   bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
   static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
-  void write_law(const RowPlan& plan, double gap, RowLaw& law) const;
-  void write_actuation_law(const RowPlan& plan, double gap, RowLaw& law) const;
+  void write_law(const RowPlan& plan, double gap, RowParameters& law) const;
+  void write_actuation_law(const RowPlan& plan, double gap, RowParameters& law) const;
 
   MaterialFrame a_, b_;
   JointSpec spec_;

@@ -411,9 +411,9 @@ class World {
   JointId add_joint(BodyId a, BodyId b, const JointSpec& spec, const JointAttachment& on_a = {},
                     const JointAttachment& on_b = {}, bool collide_connected = false);
   void remove_joint(JointId id);
-  /// Whether two bodies have contacts with each other, as far as no joint keeps them from it: parts of a machine that
-  /// are drawn into each other have none. They do at first. @throws InvalidArgument if a and b are the same
-  void set_apart(BodyId a, BodyId b, bool apart);
+  /// Whether two bodies have no contacts with each other even where no joint keeps them from it: parts of a machine
+  /// that are drawn into each other. They have contacts at first. @throws InvalidArgument if a and b are the same
+  void ignore_collision(BodyId a, BodyId b, bool ignore = true);
   bool contains(JointId id) const;
   /// Motor, drive and friction of one coordinate.
   void set_joint_actuation(JointId id, int coordinate, const JointActuation& actuation);
@@ -484,7 +484,7 @@ class World {
   /// (residual_compliance.h), beyond the modes. Drawn surfaces show it, position() and velocity() do not. Zero where
   /// the model has no residual compliance or ContactOptions::residual_compliance is off. A point of the render surface
   /// goes with the point of the collision surface that was nearest at rest.
-  Vec3 dent(BodyId id, const SurfacePoint& at) const;
+  Vec3 indentation(BodyId id, const SurfacePoint& at) const;
 
   // Queries ----------------------------------------------------------------------------------------------------------
   // Of bodies as they are now, moved and bent: limber/collision/spatial_index.h tells what each gives, and throws. They
@@ -519,8 +519,8 @@ class World {
   /// body bends by its modal skin.
   void interpolated_amplitudes(BodyId id, double interpolation, std::span<float> amplitudes) const;
   /// z_i/s_i, one per mode: weights of the morph targets of the asset (docs/formats/asset.md), as a glTF viewer takes
-  /// them. Base and targets, weighted and moved by the pose, are what reconstruct() draws, but for dents and of bodies
-  /// without a modal skin.
+  /// them. Base and targets, weighted and moved by the pose, are what reconstruct() draws, but for indentations and of
+  /// bodies without a modal skin.
   void interpolated_weights(BodyId id, double interpolation, std::span<float> weights) const;
   /// Whether the body bends by its model's modal skin.
   bool has_modal_skin(BodyId id) const;

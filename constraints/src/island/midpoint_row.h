@@ -12,7 +12,7 @@ namespace limber::internal {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-struct MeanRow {
+struct MidpointRow {
   struct Side {
     Index body = -1;  // of the island; −1: none
     Vector6 force = Vector6::Zero(), gap = Vector6::Zero();

@@ -1,4 +1,4 @@
-#include "mean_newton.h"
+#include "midpoint_newton.h"
 #include "../tuning.h"
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <utility>
 
 namespace limber::internal {
-SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
+SolveStatus MidpointNewton::solve(IslandStep& step, IslandReport& report, bool bends) {
   bends_ = bends;
   begin(step);
   const SolveStatus status = iterate(step, report);
@@ -16,7 +16,7 @@ SolveStatus MeanNewton::solve(IslandStep& step, IslandReport& report, bool bends
   return status;
 }
 
-SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
+SolveStatus MidpointNewton::iterate(IslandStep& step, IslandReport& report) {
   bool first = report.iterations == 0;
   for (int i = 0; i < kConstraintsTuning.midpoint.most_iterations;) {
     motion_.place(step);
@@ -41,7 +41,7 @@ SolveStatus MeanNewton::iterate(IslandStep& step, IslandReport& report) {
 
 /// Where something presses all impulses and what is held come at the step's start: anew from the impulses at hand.
 /// Contacts that let go again in this are too few to matter. @return whether they did not yet
-bool MeanNewton::presses_early(IslandStep& step) {
+bool MidpointNewton::presses_early(IslandStep& step) {
   if (step.loads.all_early) return false;
   for (std::size_t i = 0; i < impulses_.size(); ++i)
     if (step.law(i).contact && impulses_[i] + change_.impulses[static_cast<Eigen::Index>(i)] != 0.0) {
@@ -56,7 +56,7 @@ bool MeanNewton::presses_early(IslandStep& step) {
   return false;
 }
 
-void MeanNewton::move(const IslandStep& step) {
+void MidpointNewton::move(const IslandStep& step) {
   const double part = motion_.part_of(change_.motion);
   motion_.move(change_.motion, change_.load, part);
   step.for_units([&](std::size_t first, std::size_t count) {
@@ -75,12 +75,12 @@ void MeanNewton::move(const IslandStep& step) {
 }
 
 /// From where the last step's forces would take the bodies.
-void MeanNewton::begin(IslandStep& step) {
+void MidpointNewton::begin(IslandStep& step) {
   motion_.begin(step, bends_);
   forget_forces(step);
   motion_.write_place(free_);
   for (std::size_t i = 0; i < impulses_.size(); ++i) {
-    const RowLaw& law = step.law(i);
+    const RowParameters& law = step.law(i);
     impulses_[i] = std::clamp(step.length() * law.last_force, law.lower, law.upper);
     within_[i] = impulses_[i] > law.lower && impulses_[i] < law.upper ? 1 : 0;
   }
@@ -88,13 +88,13 @@ void MeanNewton::begin(IslandStep& step) {
   motion_.write_place(guess_);
 }
 
-void MeanNewton::forget_matrix() {
+void MidpointNewton::forget_matrix() {
   linear_ = false;
   secants_.clear();
 }
 
 /// To free flight.
-void MeanNewton::forget_forces(const IslandStep& step) {
+void MidpointNewton::forget_forces(const IslandStep& step) {
   forget_matrix();
   impulses_.resize(step.size()), within_.resize(step.size());
   for (std::size_t i = 0; i < impulses_.size(); ++i)
@@ -104,18 +104,18 @@ void MeanNewton::forget_forces(const IslandStep& step) {
 
 /// Whether the last step's forces tell too little: Newton's first step from there is no small part of what forces do.
 /// Bodies that whip would be led to other motions than those that are next to free flight, which break up later.
-bool MeanNewton::free_is_nearer() const {
+bool MidpointNewton::free_is_nearer() const {
   const auto first = change_.size.head(free_.size());
   return !(first.norm() <= kConstraintsTuning.midpoint.forces_lead * (guess_ + first - free_).norm());
 }
 
-void MeanNewton::finish(IslandStep& step) {
+void MidpointNewton::finish(IslandStep& step) {
   std::ranges::copy(impulses_, step.f.begin());
   motion_.finish(step, impulses_);
   velocities_.meet_rows(step, within_);
 }
 
-void MeanNewton::write_slip(const IslandStep& step, std::span<double> slip) const {
+void MidpointNewton::write_slip(const IslandStep& step, std::span<double> slip) const {
   if (!step.loads.all_early) return;
   for (std::size_t i = 0; i < impulses_.size(); ++i)
     if (step.law(i).friction > 0.0 && impulses_[i] > 0.0)
@@ -124,7 +124,7 @@ void MeanNewton::write_slip(const IslandStep& step, std::span<double> slip) cons
 
 /// To change_: Newton's step from where things are, by the matrix of an earlier place while that does. @return whether
 /// there is a step
-bool MeanNewton::improve(const IslandStep& step) {
+bool MidpointNewton::improve(const IslandStep& step) {
   repeated_ = linear_ && repeat(step);
   if (repeated_) return true;
   secants_.clear();
@@ -141,7 +141,7 @@ bool MeanNewton::improve(const IslandStep& step) {
 }
 
 /// The same by the matrix at hand. @return whether it will do
-bool MeanNewton::repeat(const IslandStep& step) {
+bool MidpointNewton::repeat(const IslandStep& step) {
   problem_.aim(motion_);
   const bool same = answer_.solve_again(step, impulses_, problem_, motion_);
   take(step);
@@ -151,7 +151,7 @@ bool MeanNewton::repeat(const IslandStep& step) {
   return true;
 }
 
-void MeanNewton::take(const IslandStep& step) {
+void MidpointNewton::take(const IslandStep& step) {
   problem_.answer(motion_, answer_.rows(), answer_.change(), change_);
   const Eigen::Index n = change_.motion.size();
   const Vector& gaps = problem_.gap_change();
@@ -163,7 +163,7 @@ void MeanNewton::take(const IslandStep& step) {
 }
 
 /// By tolerances.
-double MeanNewton::size() const {
+double MidpointNewton::size() const {
   const Eigen::Index gaps = change_.size.size() - change_.motion.size();
   return std::max(motion_.size_of(change_.motion),
                   kConstraintsTuning.midpoint.lengths * change_.size.tail(gaps).cwiseAbs().maxCoeff());

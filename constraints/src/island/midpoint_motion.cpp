@@ -1,4 +1,4 @@
-#include "mean_motion.h"
+#include "midpoint_motion.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -44,16 +44,16 @@ void keep(const Mat3& projection, Rows&& rows) {
 }  // namespace
 
 /// (1 − (1 − s)[τ]): of what acts, in the equation of the turn.
-Mat3 MeanMotion::late(const Vec3& turn) const { return Mat3::Identity() - (1.0 - share_) * cross_matrix(turn); }
+Mat3 MidpointMotion::late(const Vec3& turn) const { return Mat3::Identity() - (1.0 - share_) * cross_matrix(turn); }
 
 /// By what holds the body to its line: m in (1 + ½[τ]) I τ/Δt = L₀ + s (1 − (1 − s)[τ])(L₁ − L₀ + m), across the line.
-Vec3 MeanMotion::parent_moment(const Body& b, const Vec3& after) const {
+Vec3 MidpointMotion::parent_moment(const Body& b, const Vec3& after) const {
   const Vec3 spin = b.inertia * b.turn / length_, left = (spin + 0.5 * b.turn.cross(spin) - b.momentum) / share_;
   const Vec3 moment = late(b.turn).inverse() * left - (after - b.momentum);
   return moment - b.loose * moment;
 }
 
-void MeanMotion::begin(IslandStep& step, bool bends) {
+void MidpointMotion::begin(IslandStep& step, bool bends) {
   const double h = step.length();
   bodies_.clear(), carried_.clear();
   length_ = h, bends_ = bends;
@@ -90,7 +90,7 @@ void MeanMotion::begin(IslandStep& step, bool bends) {
   }
 }
 
-void MeanMotion::guess(const IslandStep& step, std::span<const double> impulses) {
+void MidpointMotion::guess(const IslandStep& step, std::span<const double> impulses) {
   sum_impulses(step.rows, step.bodies, impulses);
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];
@@ -110,8 +110,8 @@ void MeanMotion::guess(const IslandStep& step, std::span<const double> impulses)
 }
 
 /// To impulse_ and moment_.
-void MeanMotion::sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies,
-                              std::span<const double> impulses) {
+void MidpointMotion::sum_impulses(const ConstraintRows& rows, const IslandBodies& bodies,
+                                  std::span<const double> impulses) {
   impulse_.assign(bodies_.size(), Vec3::Zero()), moment_.assign(bodies_.size(), Vec3::Zero());
   for (Index i = 0; i < rows.size(); ++i)
     for (const ConstraintRows::Side& side : rows.row(i).sides)
@@ -121,7 +121,7 @@ void MeanMotion::sum_impulses(const ConstraintRows& rows, const IslandBodies& bo
       }
 }
 
-void MeanMotion::begin_carried(const IslandStep& step, Index local, Body& body) {
+void MidpointMotion::begin_carried(const IslandStep& step, Index local, Body& body) {
   const ConstrainedBody& at = step.bodies.body(local);
   const FrameConstants& c = at.group->frame_constants();
   const RigidFrame& start = at.group->frame(at.slot);
@@ -151,7 +151,7 @@ void MeanMotion::begin_carried(const IslandStep& step, Index local, Body& body) 
 }
 
 /// (1 + ½[τ])⁻¹(1 + ¼τ²) = 1 + ¼ττᵀ − ½[τ] takes what turns the body at the end to a change of τ.
-void MeanMotion::turn_about_line(Body& body) {
+void MidpointMotion::turn_about_line(Body& body) {
   Carried& carried = carried_[static_cast<std::size_t>(body.carried)];
   const Vec3 half = 0.5 * carried.angle * carried.line;
   const Quaternion turn = Quaternion{1.0, half.x(), half.y(), half.z()} * carried.turn;
@@ -168,14 +168,14 @@ void MeanMotion::turn_about_line(Body& body) {
   body.easy = body.loose / along.dot(body.inertia * along);
 }
 
-Quaternion MeanMotion::attitude(const IslandStep& step, Index local) const {
+Quaternion MidpointMotion::attitude(const IslandStep& step, Index local) const {
   const Vec3 half = 0.5 * bodies_[static_cast<std::size_t>(local)].turn;
   const ConstrainedBody& at = step.bodies.body(local);
   return normalized(normalized(Quaternion{1.0, half.x(), half.y(), half.z()}) * at.group->frame(at.slot).pose().q);
 }
 
 /// The body's frame where it is at the end. Of one with fixed nodes, its momentum with it.
-RigidFrame MeanMotion::end_of(IslandStep& step, Index local, const Vec3& angular_momentum) const {
+RigidFrame MidpointMotion::end_of(IslandStep& step, Index local, const Vec3& angular_momentum) const {
   const Body& b = bodies_[static_cast<std::size_t>(local)];
   const ConstrainedBody& at = step.bodies.body(local);
   const FrameConstants& c = at.group->frame_constants();
@@ -191,7 +191,7 @@ RigidFrame MeanMotion::end_of(IslandStep& step, Index local, const Vec3& angular
 
 /// What the modes feel of a frame that its parent carries: the field as it does its work on them, and of a body on a
 /// line that a turning parent carries the mean of both ends, at its mean rate.
-FrameExcitation MeanMotion::excitation_of(const IslandStep& step, Index local, const RigidFrame& end) const {
+FrameExcitation MidpointMotion::excitation_of(const IslandStep& step, Index local, const RigidFrame& end) const {
   const Body& b = bodies_[static_cast<std::size_t>(local)];
   const Carried& carried = carried_[static_cast<std::size_t>(b.carried)];
   const ConstrainedBody& at = step.bodies.body(local);
@@ -210,7 +210,7 @@ FrameExcitation MeanMotion::excitation_of(const IslandStep& step, Index local, c
   return excitation;
 }
 
-void MeanMotion::predict(IslandStep& step, Index local, const RigidFrame& end) {
+void MidpointMotion::predict(IslandStep& step, Index local, const RigidFrame& end) {
   const Body& b = bodies_[static_cast<std::size_t>(local)];
   const ConstrainedBody& at = step.bodies.body(local);
   if (!bends_) return at.group->predict_rest(at.slot, end);
@@ -219,7 +219,7 @@ void MeanMotion::predict(IslandStep& step, Index local, const RigidFrame& end) {
                     step.bodies.modal_step(local));
 }
 
-void MeanMotion::place(IslandStep& step) {
+void MidpointMotion::place(IslandStep& step) {
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];
     predict(step, local, end_of(step, local, b.momentum));
@@ -232,27 +232,27 @@ void MeanMotion::place(IslandStep& step) {
   }
   step.measure(StepTime::kEnd, step.gap);
   step.linearise(StepTime::kEnd, step.end_rows);
-  step.linearise(StepTime::kMiddle, step.mean_rows);
+  step.linearise(StepTime::kMiddle, step.midpoint_rows);
 }
 
-void MeanMotion::take_rows(const IslandStep& step, std::vector<MeanRow>& rows) const {
-  rows.resize(static_cast<std::size_t>(step.mean_rows.size()));
-  for (Index i = 0; i < step.mean_rows.size(); ++i)
+void MidpointMotion::take_rows(const IslandStep& step, std::vector<MidpointRow>& rows) const {
+  rows.resize(static_cast<std::size_t>(step.midpoint_rows.size()));
+  for (Index i = 0; i < step.midpoint_rows.size(); ++i)
     for (std::size_t s = 0; s < 2; ++s) {
-      const ConstraintRows::Side &middle = step.mean_rows.row(i).sides[s], &end = step.end_rows.row(i).sides[s];
-      MeanRow::Side& side = rows[static_cast<std::size_t>(i)].sides[s];
+      const ConstraintRows::Side &middle = step.midpoint_rows.row(i).sides[s], &end = step.end_rows.row(i).sides[s];
+      MidpointRow::Side& side = rows[static_cast<std::size_t>(i)].sides[s];
       side.body = step.bodies.local(middle.body);
       if (side.body < 0) continue;
       const Body& b = bodies_[static_cast<std::size_t>(side.body)];
       side.force << share_ * middle.linear, share_ * (late(b.turn) * middle.angular);
       side.gap << end.linear, (end.angular - 0.5 * b.turn.cross(end.angular)) / (1.0 + 0.25 * b.turn.squaredNorm());
-      side.modal_force = step.mean_rows.modal(middle), side.modal_gap = step.end_rows.modal(end);
+      side.modal_force = step.midpoint_rows.modal(middle), side.modal_gap = step.end_rows.modal(end);
       if (b.carried >= 0) side.force << Vec3::Zero(), b.kept * Vec3(side.force.tail<3>());
     }
 }
 
-bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const double> impulses, Vector& residual,
-                               Vector& modal) {
+bool MidpointMotion::find_residual(std::span<const MidpointRow> rows, std::span<const double> impulses,
+                                   Vector& residual, Vector& modal) {
   residual.resize(6 * count()), terms_.resize(2 * count());
   modal = load_;
   for (Index local = 0; local < count(); ++local) {
@@ -267,7 +267,7 @@ bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const do
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double p = impulses[i];
     if (p == 0.0) continue;
-    rows[i].for_sides([&](const MeanRow::Side& side) {
+    rows[i].for_sides([&](const MidpointRow::Side& side) {
       residual.segment<6>(6 * side.body) -= p * side.force;
       terms_[2 * side.body] += std::abs(p) * side.force.head<3>().norm();
       terms_[2 * side.body + 1] += std::abs(p) * side.force.tail<3>().norm();
@@ -290,13 +290,13 @@ bool MeanMotion::find_residual(std::span<const MeanRow> rows, std::span<const do
   return met;
 }
 
-void MeanMotion::find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K) {
+void MidpointMotion::find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K) {
   struct Sum final : ForceDerivative {
     const IslandStep& step;
-    MeanMotion& motion;
+    MidpointMotion& motion;
     const std::vector<Body>& bodies;
     Matrix& K;
-    Sum(const IslandStep& s, MeanMotion& m, Matrix& k) : step(s), motion(m), bodies(m.bodies_), K(k) {}
+    Sum(const IslandStep& s, MidpointMotion& m, Matrix& k) : step(s), motion(m), bodies(m.bodies_), K(k) {}
     void add_bending(Index body, const Vec3& impulse, std::span<const Vec3> shapes) override {
       const Index i = step.bodies.local(body);
       if (i < 0 || shapes.empty()) return;
@@ -329,8 +329,8 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
         (b.inertia + 0.5 * (cross_matrix(b.turn) * b.inertia - cross_matrix(b.inertia * b.turn))) / h -
         share_ * (1.0 - share_) * cross_matrix(b.torque);
   }
-  for (Index i = 0; i < step.mean_rows.size(); ++i)
-    for (const ConstraintRows::Side& side : step.mean_rows.row(i).sides)
+  for (Index i = 0; i < step.midpoint_rows.size(); ++i)
+    for (const ConstraintRows::Side& side : step.midpoint_rows.row(i).sides)
       if (const Index local = step.bodies.local(side.body); local >= 0)
         K.block<3, 3>(6 * local + 3, 6 * local + 3) -=
             share_ * (1.0 - share_) * impulses[static_cast<std::size_t>(i)] * cross_matrix(side.angular);
@@ -348,7 +348,7 @@ void MeanMotion::find_derivative(const IslandStep& step, std::span<const double>
 }
 
 /// Of the moment that the field exerts, by turning and bending, and of what the modes get of it by turning.
-void MeanMotion::find_field_derivative(const IslandStep& step, Index local, Matrix& K) {
+void MidpointMotion::find_field_derivative(const IslandStep& step, Index local, Matrix& K) {
   const Body& b = bodies_[static_cast<std::size_t>(local)];
   const auto& [group, slot, pose] = step.bodies.body(local);
   const Mat3 field = cross_matrix(carried_[static_cast<std::size_t>(b.carried)].field),
@@ -366,7 +366,7 @@ void MeanMotion::find_field_derivative(const IslandStep& step, Index local, Matr
 }
 
 /// What parents hold does not change: of the equations of bodies with fixed nodes those of free turns are left.
-void MeanMotion::hold_carried(Matrix& K) {
+void MidpointMotion::hold_carried(Matrix& K) {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     if (b.carried < 0) continue;
@@ -378,7 +378,7 @@ void MeanMotion::hold_carried(Matrix& K) {
   }
 }
 
-void MeanMotion::condense(const Vector& modal_residual, Vector& residual) const {
+void MidpointMotion::condense(const Vector& modal_residual, Vector& residual) const {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     residual.segment<3>(6 * local + 3).noalias() -=
@@ -386,7 +386,7 @@ void MeanMotion::condense(const Vector& modal_residual, Vector& residual) const 
   }
 }
 
-void MeanMotion::condense(Matrix& K, std::span<MeanRow> rows) {
+void MidpointMotion::condense(Matrix& K, std::span<MidpointRow> rows) {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const Index turn = 6 * local + 3;
@@ -397,8 +397,8 @@ void MeanMotion::condense(Matrix& K, std::span<MeanRow> rows) {
       bend_.col(k) *= response_[k];
     }
   }
-  for (MeanRow& row : rows)
-    for (MeanRow::Side& side : row.sides) {
+  for (MidpointRow& row : rows)
+    for (MidpointRow::Side& side : row.sides) {
       if (side.body < 0) continue;
       const Index first = first_mode(side.body);
       for (std::size_t k = 0; k < side.modal_force.size(); ++k) {
@@ -408,10 +408,10 @@ void MeanMotion::condense(Matrix& K, std::span<MeanRow> rows) {
     }
 }
 
-double MeanMotion::through_modes(const MeanRow& i, const MeanRow& j) const {
+double MidpointMotion::through_modes(const MidpointRow& i, const MidpointRow& j) const {
   double sum = 0.0;
-  i.for_sides([&](const MeanRow::Side& measured) {
-    j.for_sides([&](const MeanRow::Side& pushed) {
+  i.for_sides([&](const MidpointRow::Side& measured) {
+    j.for_sides([&](const MidpointRow::Side& pushed) {
       if (measured.body != pushed.body) return;
       const double* response = response_.data() + first_mode(measured.body);
       for (std::size_t k = 0; k < measured.modal_gap.size(); ++k)
@@ -421,7 +421,7 @@ double MeanMotion::through_modes(const MeanRow& i, const MeanRow& j) const {
   return sum;
 }
 
-void MeanMotion::add_turned(const Vector& change, Vector& load) const {
+void MidpointMotion::add_turned(const Vector& change, Vector& load) const {
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     load.segment(b.first_mode, b.modes) +=
@@ -429,9 +429,9 @@ void MeanMotion::add_turned(const Vector& change, Vector& load) const {
   }
 }
 
-double MeanMotion::mobility(const MeanRow& row) const {
+double MidpointMotion::mobility(const MidpointRow& row) const {
   double sum = 0.0;
-  row.for_sides([&](const MeanRow::Side& side) {
+  row.for_sides([&](const MidpointRow::Side& side) {
     const Body& b = bodies_[static_cast<std::size_t>(side.body)];
     const Vec3 turned = side.gap.tail<3>(), moment = side.force.tail<3>();
     sum += side.force.head<3>().norm() * side.gap.head<3>().norm() / b.mass +
@@ -440,7 +440,7 @@ double MeanMotion::mobility(const MeanRow& row) const {
   return length_ * sum;
 }
 
-double MeanMotion::force_to_inertia(const Matrix& K) const {
+double MidpointMotion::force_to_inertia(const Matrix& K) const {
   double largest = 0.0;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
@@ -450,7 +450,7 @@ double MeanMotion::force_to_inertia(const Matrix& K) const {
   return largest;
 }
 
-void MeanMotion::move(const Vector& change, const Vector& load, double how_much) {
+void MidpointMotion::move(const Vector& change, const Vector& load, double how_much) {
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];
     if (b.carried >= 0 && !carried_[static_cast<std::size_t>(b.carried)].line.isZero(0.0)) {
@@ -465,7 +465,7 @@ void MeanMotion::move(const Vector& change, const Vector& load, double how_much)
   load_ += how_much * load;
 }
 
-void MeanMotion::write_place(Vector& to) const {
+void MidpointMotion::write_place(Vector& to) const {
   to.resize(6 * count());
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
@@ -473,13 +473,13 @@ void MeanMotion::write_place(Vector& to) const {
   }
 }
 
-void MeanMotion::write_relative(const Vector& change, Eigen::Ref<Vector> to) const {
+void MidpointMotion::write_relative(const Vector& change, Eigen::Ref<Vector> to) const {
   for (Index local = 0; local < count(); ++local)
     to.segment<6>(6 * local) << part(change, local, 0) / bodies_[static_cast<std::size_t>(local)].size,
         part(change, local, 1);
 }
 
-double MeanMotion::size_of(const Vector& change) const {
+double MidpointMotion::size_of(const Vector& change) const {
   double largest = 0.0;
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
@@ -491,7 +491,7 @@ double MeanMotion::size_of(const Vector& change) const {
   return largest;
 }
 
-double MeanMotion::part_of(const Vector& change) const {
+double MidpointMotion::part_of(const Vector& change) const {
   double whole = 1.0;
   for (Index local = 0; local < count(); ++local) {
     const double turn = part(change, local, 1).norm(),
@@ -501,9 +501,9 @@ double MeanMotion::part_of(const Vector& change) const {
   return whole;
 }
 
-void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
+void MidpointMotion::finish(IslandStep& step, std::span<const double> impulses) {
   const double h = step.length();
-  sum_impulses(step.mean_rows, step.bodies, impulses);
+  sum_impulses(step.midpoint_rows, step.bodies, impulses);
   for (Index local = 0; local < count(); ++local) {
     const Body& b = bodies_[static_cast<std::size_t>(local)];
     const ConstrainedBody& at = step.bodies.body(local);
@@ -521,7 +521,7 @@ void MeanMotion::finish(IslandStep& step, std::span<const double> impulses) {
   }
 }
 
-void MeanMotion::stay(IslandStep& step) {
+void MidpointMotion::stay(IslandStep& step) {
   begin(step, false);
   for (Index local = 0; local < count(); ++local) {
     Body& b = bodies_[static_cast<std::size_t>(local)];

@@ -1,6 +1,6 @@
-// How the dents that contacts press into a body beyond its kept modes (residual_compliance.h) show on what is drawn:
-// the collision surface moves by G f, and each vertex of the render surface with the point of it that was nearest at
-// rest.
+// How the indentations that contacts press into a body beyond its kept modes (residual_compliance.h) show on what is
+// drawn: the collision surface moves by G f, and each vertex of the render surface with the point of it that was
+// nearest at rest.
 #pragma once
 
 #include <array>
@@ -13,16 +13,17 @@
 namespace limber::internal {
 
 /// Of one model. Not for two threads at a time.
-class DentedSurface {
+class IndentedSurface {
  public:
   /// Looks up all vertices of the render surface. @pre the model has a residual compliance, and outlives this
-  explicit DentedSurface(const ModalModel& model);
+  explicit IndentedSurface(const ModalModel& model);
 
   /// Displacement of every vertex of the render surface, body frame, m; linear in the loads.
   /// @param before, now loads of two states, of which (1 − s) and s parts count
-  void displacements(std::span<const DentLoad> before, std::span<const DentLoad> now, double s, std::span<float> d);
+  void displacements(std::span<const IndentationLoad> before, std::span<const IndentationLoad> now, double s,
+                     std::span<float> d);
   /// Of one material point, body frame, m. @pre it is valid
-  Vec3 displacement(std::span<const DentLoad> loads, const SurfacePoint& at) const;
+  Vec3 displacement(std::span<const IndentationLoad> loads, const SurfacePoint& at) const;
 
  private:
   /// A point of the collision surface by its vertices.
@@ -31,10 +32,10 @@ class DentedSurface {
     std::array<float, 3> weight{};
   };
   void find_places();
-  void add_forces(std::span<const DentLoad> loads, double part);
+  void add_forces(std::span<const IndentationLoad> loads, double part);
   void move_vertices();
   Place place(Index render_vertex) const;
-  Vec3 displacement(std::span<const DentLoad> loads, Index vertex) const;
+  Vec3 displacement(std::span<const IndentationLoad> loads, Index vertex) const;
 
   const ModalModel* model_;
   std::vector<Place> places_;   // by render vertex; none where the render surface is what touches

@@ -10,10 +10,10 @@
 
 namespace limber::internal {
 
-class EndVelocities {
+class VelocityProjection {
  public:
-  /// Brings the predicted velocities to J v = RowLaw::end_rate, of all rows that hold: by impulses that can only take
-  /// energy but for what drives the rows. Springs and dampers that are stiff over the step take their part of the
+  /// Brings the predicted velocities to J v = RowParameters::end_rate, of all rows that hold: by impulses that can only
+  /// take energy but for what drives the rows. Springs and dampers that are stiff over the step take their part of the
   /// motion, those that are not almost nothing.
   /// Impulses of the step's middle and these together stay within the bounds of hands, springs, motors and friction.
   /// Contacts take no part.

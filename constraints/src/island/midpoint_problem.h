@@ -8,25 +8,25 @@
 #include <vector>
 
 #include "limber/solvers/unsymmetric_factor.h"
-#include "mean_change.h"
+#include "midpoint_change.h"
 
 namespace limber::internal {
 
-class MeanProblem {
+class MidpointProblem {
  public:
   /// Measures what is left of all equations where the bodies have been placed. @return whether they are met to their
   /// digits
-  bool measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses);
+  bool measure(const IslandStep& step, MidpointMotion& motion, std::span<const double> impulses);
   /// After measure(): all derivatives where the bodies are. @return whether there is an answer
-  bool linearise(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses);
+  bool linearise(const IslandStep& step, MidpointMotion& motion, std::span<const double> impulses);
   /// After measure(): the residual of the bodies by the derivatives of the last linearise().
-  void aim(const MeanMotion& motion);
+  void aim(const MidpointMotion& motion);
   /// A for some rows. All rows with γ must be among them.
-  void reduce(const IslandStep& step, const MeanMotion& motion, std::span<const Index> rows, RowMatrix& A);
+  void reduce(const IslandStep& step, const MidpointMotion& motion, std::span<const Index> rows, RowMatrix& A);
   /// Of the same rows, after aim().
-  void find_open(const MeanMotion& motion, std::span<const Index> rows, RowVector& open) const;
+  void find_open(const MidpointMotion& motion, std::span<const Index> rows, RowVector& open) const;
   /// What ΔQ of these rows makes of everything. @param to but for its size
-  void answer(const MeanMotion& motion, std::span<const Index> rows, const RowVector& change, MeanChange& to);
+  void answer(const MidpointMotion& motion, std::span<const Index> rows, const RowVector& change, MidpointChange& to);
 
   /// Whether contacts meet their law to their tolerance, as measured last.
   bool touches_law() const { return worst_contact_ <= 1.0; }
@@ -43,16 +43,16 @@ class MeanProblem {
   void find_off(const IslandStep& step, std::span<const double> impulses);
   double distance_from_law(const IslandStep& step, std::size_t first, std::size_t count,
                            std::span<const double> impulses) const;
-  void find_responses(const IslandStep& step, const MeanMotion& motion);
+  void find_responses(const IslandStep& step, const MidpointMotion& motion);
   bool is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
-              const MeanMotion& motion);
-  void stiffen(const IslandStep& step, const MeanMotion& motion);
+              const MidpointMotion& motion);
+  void stiffen(const IslandStep& step, const MidpointMotion& motion);
   void add_flexibility(const IslandStep& step, std::span<const Index> rows, Eigen::Ref<Matrix> to);
-  const MeanRow& at(Index row) const { return rows_[static_cast<std::size_t>(row)]; }
+  const MidpointRow& at(Index row) const { return rows_[static_cast<std::size_t>(row)]; }
   double gap_of(Index row, const Vector& x) const;
-  static double bent(const MeanMotion& motion, const MeanRow& row, const Vector& load);
+  static double bent(const MidpointMotion& motion, const MidpointRow& row, const Vector& load);
 
-  std::vector<MeanRow> rows_, now_;  // where the derivatives are of, and where the bodies are
+  std::vector<MidpointRow> rows_, now_;  // where the derivatives are of, and where the bodies are
   Vector residual_, modal_residual_, off_;
   double worst_contact_ = 0.0;    // what is left of their law, by tolerance
   Vector stiffness_;              // γ

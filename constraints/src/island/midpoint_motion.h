@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "island_step.h"
-#include "mean_row.h"
+#include "midpoint_row.h"
 
 namespace limber::internal {
 
@@ -64,7 +64,7 @@ class RowVector {
   std::vector<double> memory_;
 };
 
-class MeanMotion {
+class MidpointMotion {
  public:
   /// The step without impulses, modes free. @param bends whether modes move at all in this step
   void begin(IslandStep& step, bool bends);
@@ -76,24 +76,25 @@ class MeanMotion {
   /// in the middle.
   void place(IslandStep& step);
   /// The rows, as they were linearised last.
-  void take_rows(const IslandStep& step, std::vector<MeanRow>& rows) const;
+  void take_rows(const IslandStep& step, std::vector<MidpointRow>& rows) const;
   /// What impulses leave of the equations above, six numbers a body, N·s and N·m·s; and of the modal loads.
   /// @param impulses by row
   /// @return whether the bodies' are met, to their digits or MidpointTuning::met of the tolerance of places
-  bool find_residual(std::span<const MeanRow> rows, std::span<const double> impulses, Vector& residual, Vector& modal);
+  bool find_residual(std::span<const MidpointRow> rows, std::span<const double> impulses, Vector& residual,
+                     Vector& modal);
   /// Its derivative by (d, τ) of all bodies; and how moments follow bending, modal loads turning, by body: bend and
   /// turned, 3 × modes.
   void find_derivative(const IslandStep& step, std::span<const double> impulses, Matrix& K);
   /// What modes that follow make of the matrices of Newton's step.
-  void condense(Matrix& K, std::span<MeanRow> rows);
+  void condense(Matrix& K, std::span<MidpointRow> rows);
   /// And of the residual by what is left of the modal loads: after condense(), until the next one.
   void condense(const Vector& modal_residual, Vector& residual) const;
   /// Adds to the modal loads what turning makes of them.
   void add_turned(const Vector& change, Vector& load) const;
   /// What an impulse moves the row's own gap by through the frames, where they bear no forces, > 0.
-  double mobility(const MeanRow& row) const;
+  double mobility(const MidpointRow& row) const;
   /// Gaps of row i that impulses on row j make through the modes.
-  double through_modes(const MeanRow& i, const MeanRow& j) const;
+  double through_modes(const MidpointRow& i, const MidpointRow& j) const;
   /// How much larger the parts of K by forces are than those by inertia.
   double force_to_inertia(const Matrix& K) const;
   /// What a unit of modal load makes of the amplitudes.

@@ -1,4 +1,4 @@
-#include "dented_surface.h"
+#include "indented_surface.h"
 
 #include <algorithm>
 
@@ -6,14 +6,14 @@
 
 namespace limber::internal {
 
-DentedSurface::DentedSurface(const ModalModel& model) : model_(&model) {
+IndentedSurface::IndentedSurface(const ModalModel& model) : model_(&model) {
   const auto vertices = static_cast<std::size_t>(model.collision().vertices());
   forces_.resize(vertices, Vec3::Zero());
   moved_.resize(vertices);
   if (model.data().collision) find_places();
 }
 
-void DentedSurface::find_places() {
+void IndentedSurface::find_places() {
   const ModalSurface& touching = model_->collision();
   std::vector<Vec3> rest;
   for (const Vec3f& x : touching.rest) rest.push_back(x.cast<double>());
@@ -26,8 +26,8 @@ void DentedSurface::find_places() {
   }
 }
 
-void DentedSurface::displacements(std::span<const DentLoad> before, std::span<const DentLoad> now, double s,
-                                  std::span<float> d) {
+void IndentedSurface::displacements(std::span<const IndentationLoad> before, std::span<const IndentationLoad> now,
+                                    double s, std::span<float> d) {
   add_forces(before, 1.0 - s);
   add_forces(now, s);
   move_vertices();
@@ -43,9 +43,9 @@ void DentedSurface::displacements(std::span<const DentLoad> before, std::span<co
   }
 }
 
-void DentedSurface::add_forces(std::span<const DentLoad> loads, double part) {
+void IndentedSurface::add_forces(std::span<const IndentationLoad> loads, double part) {
   if (part == 0.0) return;
-  for (const DentLoad& load : loads) {
+  for (const IndentationLoad& load : loads) {
     Vec3& force = forces_[static_cast<std::size_t>(load.vertex)];
     if (force.isZero(0.0)) pressed_.push_back(load.vertex);
     force += part * load.force;
@@ -55,7 +55,7 @@ void DentedSurface::add_forces(std::span<const DentLoad> loads, double part) {
 }
 
 /// Under the forces gathered, which are then forgotten.
-void DentedSurface::move_vertices() {
+void IndentedSurface::move_vertices() {
   const ResidualCompliance& compliance = *model_->data().residual_compliance;
   std::ranges::fill(moved_, Vec3f(Vec3f::Zero()));
   const auto move = [&](Index vertex, Index by) {
@@ -73,18 +73,19 @@ void DentedSurface::move_vertices() {
   pressed_.clear();
 }
 
-DentedSurface::Place DentedSurface::place(Index render_vertex) const {
+IndentedSurface::Place IndentedSurface::place(Index render_vertex) const {
   if (!places_.empty()) return places_[static_cast<std::size_t>(render_vertex)];
   return {{render_vertex, render_vertex, render_vertex}, {1.0f, 0.0f, 0.0f}};
 }
 
-Vec3 DentedSurface::displacement(std::span<const DentLoad> loads, Index vertex) const {
+Vec3 IndentedSurface::displacement(std::span<const IndentationLoad> loads, Index vertex) const {
   Vec3 u = Vec3::Zero();
-  for (const DentLoad& load : loads) u += model_->data().residual_compliance->block(vertex, load.vertex) * load.force;
+  for (const IndentationLoad& load : loads)
+    u += model_->data().residual_compliance->block(vertex, load.vertex) * load.force;
   return u;
 }
 
-Vec3 DentedSurface::displacement(std::span<const DentLoad> loads, const SurfacePoint& at) const {
+Vec3 IndentedSurface::displacement(std::span<const IndentationLoad> loads, const SurfacePoint& at) const {
   const bool drawn = at.surface == SurfacePoint::Surface::kRender;
   const ModalSurface& surface = drawn ? model_->render() : model_->collision();
   const Triangle& t = surface.triangles[static_cast<std::size_t>(at.triangle)];

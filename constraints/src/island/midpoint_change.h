@@ -6,27 +6,27 @@
 #include <array>
 
 #include "../tuning.h"
-#include "mean_motion.h"
+#include "midpoint_motion.h"
 
 namespace limber::internal {
 
-struct MeanChange {
+struct MidpointChange {
   Vector motion, load, impulses;  // of (d, τ) by body, of all modal loads, and by row
   Vector size;                    // what it changes, all in parts of a length and radians
 
-  void add(const MeanChange& other, double factor) {
+  void add(const MidpointChange& other, double factor) {
     motion += factor * other.motion, load += factor * other.load, impulses += factor * other.impulses;
     size += factor * other.size;
   }
 };
 
-class MeanSecants {
+class MidpointSecants {
  public:
   void clear() { count_ = 0; }
   /// Of the last step; unbounded where none is remembered.
   double size() const { return count_ == 0 ? kUnbounded : steps_[count_ - 1].size.norm(); }
   /// @param step by the same matrix as those that are remembered @return whether there is one by which to go on
-  bool correct(MeanChange& step) const {
+  bool correct(MidpointChange& step) const {
     if (count_ == 0) return true;
     if (count_ == kMost) return false;
     for (std::size_t j = 0; j + 1 < count_; ++j) step.add(steps_[j + 1], along(j, step));
@@ -35,15 +35,15 @@ class MeanSecants {
     step.add(step, 1.0 / left - 1.0);
     return true;
   }
-  void remember(const MeanChange& step) { steps_[count_++] = step; }
+  void remember(const MidpointChange& step) { steps_[count_++] = step; }
 
  private:
   static constexpr std::size_t kMost = kConstraintsTuning.midpoint.most_secants;
-  double along(std::size_t j, const MeanChange& step) const {
+  double along(std::size_t j, const MidpointChange& step) const {
     return steps_[j].size.dot(step.size) / steps_[j].size.squaredNorm();
   }
 
-  std::array<MeanChange, kMost> steps_;
+  std::array<MidpointChange, kMost> steps_;
   std::size_t count_ = 0;
 };
 

@@ -1,11 +1,11 @@
-#include "end_velocities.h"
+#include "velocity_projection.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace limber::internal {
 
-void EndVelocities::meet_rows(IslandStep& step, std::span<const char> active) {
+void VelocityProjection::meet_rows(IslandStep& step, std::span<const char> active) {
   IslandBodies& bodies = step.bodies;
   bodies.place(StepTime::kEnd);
   metric_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
@@ -13,7 +13,7 @@ void EndVelocities::meet_rows(IslandStep& step, std::span<const char> active) {
   rows_.clear(), off_.clear(), compliance_.clear();
   bool met = true;
   for (std::size_t i = 0; i < step.size(); ++i) {
-    const RowLaw& law = step.law(i);
+    const RowParameters& law = step.law(i);
     if (law.contact) continue;  // they press from the step's start: velocities are what closes their gaps
     if (!is_equality(law) && (active[i] == 0 || step.f[i] == 0.0)) continue;
     const double yields = law.compliance > 0.0 ? compliance_of(step, i) : 0.0;
@@ -25,7 +25,7 @@ void EndVelocities::meet_rows(IslandStep& step, std::span<const char> active) {
   if (!met) solve(step);
 }
 
-void EndVelocities::solve(IslandStep& step) {
+void VelocityProjection::solve(IslandStep& step) {
   const std::size_t n = metric_.size();
   J_.assign(rows_.size() * n, 0.0);
   for (std::size_t i = 0; i < rows_.size(); ++i) write_row(step, rows_[i], std::span(J_).subspan(i * n, n));
@@ -35,7 +35,7 @@ void EndVelocities::solve(IslandStep& step) {
   if (!are_within_bounds(step)) solve_within_bounds();
   impulses_.assign(step.size(), 0.0);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const RowLaw& law = step.law(rows_[i]);
+    const RowParameters& law = step.law(rows_[i]);
     impulses_[rows_[i]] = found_[i];
     step.end_work += found_[i] * law.end_rate;
     if (!(law.compliance > 0.0)) step.end_impulse[rows_[i]] = found_[i];
@@ -46,11 +46,11 @@ void EndVelocities::solve(IslandStep& step) {
 /// With the impulses in the middle of the step: a limited hand, spring or motor, or friction, exerts no more at its
 /// end. Stops keep what came to them within the step, whatever that takes: chains with heavy ends would whip on from
 /// them.
-bool EndVelocities::are_within_bounds(const IslandStep& step) {
+bool VelocityProjection::are_within_bounds(const IslandStep& step) {
   lower_.clear(), upper_.clear();
   bool within = true;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const RowLaw& law = step.law(rows_[i]);
+    const RowParameters& law = step.law(rows_[i]);
     const bool stop = law.lower == 0.0;
     lower_.push_back(stop ? -kUnbounded : law.lower - step.f[rows_[i]]);
     upper_.push_back(law.upper - step.f[rows_[i]]);
@@ -59,7 +59,7 @@ bool EndVelocities::are_within_bounds(const IslandStep& step) {
   return within;
 }
 
-void EndVelocities::solve_within_bounds() {
+void VelocityProjection::solve_within_bounds() {
   const std::size_t n = metric_.size();
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     found_[i] = std::clamp(found_[i], lower_[i], upper_[i]);
@@ -71,7 +71,7 @@ void EndVelocities::solve_within_bounds() {
 
 /// Springs that are stiff yield: with κ = Δt a/c, a what an impulse changes the rate by, c the compliance, by
 /// a (1 + κ)/κ². @return unbounded where nothing moves the row
-double EndVelocities::compliance_of(const IslandStep& step, std::size_t row) {
+double VelocityProjection::compliance_of(const IslandStep& step, std::size_t row) {
   const std::size_t n = metric_.size();
   row_.assign(n, 0.0);
   write_row(step, row, row_);
@@ -82,7 +82,7 @@ double EndVelocities::compliance_of(const IslandStep& step, std::size_t row) {
 }
 
 /// J of the end. @param J zeros, one per degree of freedom
-void EndVelocities::write_row(const IslandStep& step, std::size_t row, std::span<double> J) {
+void VelocityProjection::write_row(const IslandStep& step, std::size_t row, std::span<double> J) {
   for (const ConstraintRows::Side& side : step.end_rows.row(static_cast<Index>(row)).sides)
     if (const Index local = step.bodies.local(side.body); local >= 0)
       step.bodies.response(local).add_row(side.linear, side.angular, step.end_rows.modal(side),
@@ -90,7 +90,7 @@ void EndVelocities::write_row(const IslandStep& step, std::size_t row, std::span
 }
 
 /// J of the end times the velocities there.
-double EndVelocities::rate(const IslandStep& step, Index row) {
+double VelocityProjection::rate(const IslandStep& step, Index row) {
   double sum = 0.0;
   for (const ConstraintRows::Side& side : step.end_rows.row(row).sides) {
     const Index local = step.bodies.local(side.body);
@@ -105,7 +105,7 @@ double EndVelocities::rate(const IslandStep& step, Index row) {
   return sum;
 }
 
-void EndVelocities::give(IslandStep& step, std::span<const double> impulses) {
+void VelocityProjection::give(IslandStep& step, std::span<const double> impulses) {
   step.loads.clear(step.bodies);
   step.loads.add(step.bodies, step.end_rows, impulses, 1.0, 1.0);
   for (Index local = 0; local < step.bodies.count(); ++local) {

@@ -1,4 +1,4 @@
-#include "contact_dents.h"
+#include "contact_indentations.h"
 
 #include <algorithm>
 
@@ -9,10 +9,10 @@ const ResidualCompliance& compliance_of(const BodyStates& states, Index body) {
   return *states.body(body).group->model().data().residual_compliance;
 }
 
-Vec3 displacement_in_body(const ResidualCompliance& compliance, std::span<const DentLoad> loads, Index vertex) {
+Vec3 displacement_in_body(const ResidualCompliance& compliance, std::span<const IndentationLoad> loads, Index vertex) {
   const bool local = compliance.form() == ResidualCompliance::Form::kLocal;
   Vec3 u = Vec3::Zero();
-  for (const DentLoad& load : loads)
+  for (const IndentationLoad& load : loads)
     if (!local || load.vertex == vertex) u += compliance.block(vertex, load.vertex) * load.force;
   return u;
 }
@@ -26,12 +26,12 @@ std::size_t VertexNumbers::operator()(Index vertex) {
   return known_[v].number;
 }
 
-void ContactDents::reserve(std::size_t bodies) {
+void ContactIndentations::reserve(std::size_t bodies) {
   if (bodies_.size() < bodies) bodies_.resize(bodies);
   loaded_.reserve(bodies_.size());
 }
 
-Vec3 ContactDents::displacement(const BodyStates& states, Index body, Corners corners) {
+Vec3 ContactIndentations::displacement(const BodyStates& states, Index body, Corners corners) {
   const Body& b = at(body);
   if (b.loads.empty()) return Vec3::Zero();
   const ResidualCompliance& compliance = compliance_of(states, body);
@@ -40,7 +40,7 @@ Vec3 ContactDents::displacement(const BodyStates& states, Index body, Corners co
   return u;
 }
 
-void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
+void ContactIndentations::add_rows(const BodyStates& states, Index body, const Rows& side, ConstraintRows& rows) {
   Body& b = at(body);
   if (b.made_in != &rows || b.making != rows.makings()) {
     b.made_in = &rows, b.making = rows.makings();
@@ -66,7 +66,7 @@ void ContactDents::add_rows(const BodyStates& states, Index body, const Rows& si
 }
 
 /// Displacements of the vertices of all sides so far by a unit force on one of these.
-void ContactDents::find_answers(const ResidualCompliance& compliance, Corners corners, Body& b) {
+void ContactIndentations::find_answers(const ResidualCompliance& compliance, Corners corners, Body& b) {
   for (const VertexShare& s : corners)
     if (b.of_rows(s.vertex) == b.vertices.size()) b.vertices.push_back(s.vertex);
   b.answer.assign(b.vertices.size(), Mat3::Zero());
@@ -78,7 +78,7 @@ void ContactDents::find_answers(const ResidualCompliance& compliance, Corners co
   }
 }
 
-void ContactDents::press(Index body, Corners corners, const Vec3& force) {
+void ContactIndentations::press(Index body, Corners corners, const Vec3& force) {
   Body& b = at(body);
   if (b.gathers) {
     b.gathers = false;
@@ -94,7 +94,7 @@ void ContactDents::press(Index body, Corners corners, const Vec3& force) {
   }
 }
 
-void ContactDents::finish(std::span<const char> asleep, std::span<const Index> touched) {
+void ContactIndentations::finish(std::span<const char> asleep, std::span<const Index> touched) {
   stirred_.assign(loaded_.begin(), loaded_.end());
   stirred_.insert(stirred_.end(), touched.begin(), touched.end());
   std::ranges::sort(stirred_);
@@ -111,30 +111,30 @@ void ContactDents::finish(std::span<const char> asleep, std::span<const Index> t
   }
 }
 
-void ContactDents::list_loaded() {
+void ContactIndentations::list_loaded() {
   loaded_.clear();
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     if (!bodies_[i].loads.empty()) loaded_.push_back(static_cast<Index>(i));
 }
 
-void ContactDents::forget(Index body) {
+void ContactIndentations::forget(Index body) {
   if (static_cast<std::size_t>(body) < bodies_.size()) at(body) = {};
 }
 
-void ContactDents::clear() {
+void ContactIndentations::clear() {
   bodies_.clear();
   loaded_.clear();
 }
 
-std::span<const DentLoad> ContactDents::loads(Index body) const {
+std::span<const IndentationLoad> ContactIndentations::loads(Index body) const {
   if (static_cast<std::size_t>(body) >= bodies_.size()) return {};
   return at(body).loads;
 }
 
-double ContactDents::energy(const BodyStates& states, Index body) const {
-  const std::span<const DentLoad> loads = this->loads(body);
+double ContactIndentations::energy(const BodyStates& states, Index body) const {
+  const std::span<const IndentationLoad> loads = this->loads(body);
   double energy = 0.0;
-  for (const DentLoad& load : loads)
+  for (const IndentationLoad& load : loads)
     energy += 0.5 * load.force.dot(displacement_in_body(compliance_of(states, body), loads, load.vertex));
   return energy;
 }

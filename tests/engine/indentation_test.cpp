@@ -52,7 +52,7 @@ double largest_height_between(const std::vector<float>& a, const std::vector<flo
 
 /// A box of 6 modes whose other 14 answer as residual compliance looks like one with all 20. (In height: nothing holds
 /// it sideways. Forces act where the modes take their points, so softer boxes differ by what that is off.)
-TEST(Dents, ShowWhatTheDroppedModesWould) {
+TEST(Indentations, ShowWhatTheDroppedModesWould) {
   // m: positions of half a metre in single precision, and what a contact yields by itself (1e-4 g Δt²).
   constexpr double kFloat = 2e-7, kGive = 3e-7;
   constexpr double kHz = 10.0;
@@ -65,13 +65,13 @@ TEST(Dents, ShowWhatTheDroppedModesWould) {
   EXPECT_GT(lowest(few.scene.world, few.body), -kFloat - kGive);
 }
 
-/// What is drawn, less what the modes show, is dent(), between two states too.
-TEST(Dents, AreWhatIsDrawnBesideTheModes) {
+/// What is drawn, less what the modes show, is indentation(), between two states too.
+TEST(Indentations, AreWhatIsDrawnBesideTheModes) {
   constexpr double kFloat = 2e-7;
   Lying lying(sample_model(few_modes(kSoft)));
   World& world = lying.scene.world;
-  lying.scene.step(3);  // still coming down on its dents
-  const auto dent_of = [&](Index vertex) {
+  lying.scene.step(3);  // still coming down on its indentations
+  const auto indentation_of = [&](Index vertex) {
     const ModalSurface& surface = world.model(lying.body).render();
     SurfacePoint at{.surface = SurfacePoint::Surface::kRender, .weight = {0.0, 0.0, 0.0}};
     while (surface.triangles[static_cast<std::size_t>(at.triangle)][0] != vertex &&
@@ -80,12 +80,12 @@ TEST(Dents, AreWhatIsDrawnBesideTheModes) {
       ++at.triangle;
     for (std::size_t i = 0; i < 3; ++i)
       at.weight[i] = surface.triangles[static_cast<std::size_t>(at.triangle)][i] == vertex ? 1.0 : 0.0;
-    return std::pair<Vec3, Vec3>(world.position(lying.body, at), world.dent(lying.body, at));
+    return std::pair<Vec3, Vec3>(world.position(lying.body, at), world.indentation(lying.body, at));
   };
   std::vector<std::pair<Vec3, Vec3>> before, now;
-  for (Index v = 0; v < 8; ++v) before.push_back(dent_of(v));
+  for (Index v = 0; v < 8; ++v) before.push_back(indentation_of(v));
   world.step();
-  for (Index v = 0; v < 8; ++v) now.push_back(dent_of(v));
+  for (Index v = 0; v < 8; ++v) now.push_back(indentation_of(v));
   const std::vector<float> newest = lying.drawn(), between = lying.drawn(0.25);
   double deepest = 0.0, change = 0.0;
   for (std::size_t v = 0; v < 8; ++v) {
@@ -102,7 +102,7 @@ TEST(Dents, AreWhatIsDrawnBesideTheModes) {
 }
 
 /// A render surface of its own goes with the surface that touches.
-TEST(Dents, MoveARenderSurfaceWithTheCollisionSurface) {
+TEST(Indentations, MoveARenderSurfaceWithTheCollisionSurface) {
   ModalModelData data = sample_model_data(few_modes(kSoft));
   data.collision = sample_model_data(few_modes(kSoft)).render;
   Lying separate(std::make_shared<const ModalModel>(std::move(data))), one(sample_model(few_modes(kSoft)));
@@ -110,22 +110,22 @@ TEST(Dents, MoveARenderSurfaceWithTheCollisionSurface) {
   EXPECT_LT(farthest_apart(separate.drawn(), one.drawn()), 1e-7);
 }
 
-TEST(Dents, GoWithTheirBodyAndWithTheContacts) {
+TEST(Indentations, GoWithTheirBodyAndWithTheContacts) {
   Lying lying(sample_model(few_modes(kSoft)));
   World& world = lying.scene.world;
   const SurfacePoint at{.weight = {1.0, 0.0, 0.0}};
   lying.scene.step(60);
-  EXPECT_GT(world.dent(lying.body, at).norm(), 1e-6);
+  EXPECT_GT(world.indentation(lying.body, at).norm(), 1e-6);
   world.remove_body(lying.body);
   lying.body = world.add_body(sample_model(few_modes(kSoft)), {.pose = {{}, {0.0, 0.0, 5.0}}});  // in the other's place
-  EXPECT_EQ(world.dent(lying.body, at), Vec3(Vec3::Zero()));
+  EXPECT_EQ(world.indentation(lying.body, at), Vec3(Vec3::Zero()));
   const std::vector<float> newest = lying.drawn(), between = lying.drawn(0.5);
   EXPECT_EQ(newest, between);
   const BodyId plain = world.add_body(sample_model({}));
-  EXPECT_EQ(world.dent(plain, at), Vec3(Vec3::Zero()));
+  EXPECT_EQ(world.indentation(plain, at), Vec3(Vec3::Zero()));
 }
 
-TEST(Dents, AreDrawnWithoutAllocationOnceWarm) {
+TEST(Indentations, AreDrawnWithoutAllocationOnceWarm) {
   Lying lying(sample_model(few_modes(kSoft)));
   lying.scene.step(60);
   std::vector<float> positions = lying.drawn(0.5), normals(positions.size());

@@ -7,7 +7,7 @@
 //
 // A contact gives shares w(v) of its force to the corners of its triangle and is moved by the mean Σ_v w(v) u_v of
 // their displacements. This is a state of the body, not of its contacts: it turns with the body, and where contacts
-// come and go or slide on to other triangles, each of them finds the dent that is there.
+// come and go or slide on to other triangles, each of them finds the indentation that is there.
 //
 // Forces are found in the next step: all contacts of a body yield to each other, whichever body they are with.
 #pragma once
@@ -39,7 +39,7 @@ class VertexNumbers {
   std::size_t count_ = 0;
 };
 
-class ContactDents {
+class ContactIndentations {
  public:
   using Corners = std::span<const VertexShare>;
 
@@ -71,7 +71,7 @@ class ContactDents {
   void forget(Index body);
   void clear();
 
-  std::span<const DentLoad> loads(Index body) const;
+  std::span<const IndentationLoad> loads(Index body) const;
   /// J. @pre the body's model is the one that was pressed
   double energy(const BodyStates& states, Index body) const;
 
@@ -88,7 +88,7 @@ class ContactDents {
       return std::tie(s.loads);
     }
 
-    std::vector<DentLoad> loads;
+    std::vector<IndentationLoad> loads;
     VertexNumbers of_loads;
     std::vector<Rows> rows;  // of the part of a step at hand, which may be done again, with others
     const ConstraintRows* made_in = nullptr;

@@ -12,9 +12,9 @@
 
 namespace limber::internal {
 
-class StepParts {
+class Substeps {
  public:
-  StepParts(ConstraintStage& constraints, int parts, double step)
+  Substeps(ConstraintStage& constraints, int parts, double step)
       : constraints_(&constraints), parts_(parts), step_(step) {}
 
   int count() const { return parts_; }

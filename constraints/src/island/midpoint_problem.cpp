@@ -1,4 +1,4 @@
-#include "mean_problem.h"
+#include "midpoint_problem.h"
 #include "../tuning.h"
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 namespace limber::internal {
 
-bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
+bool MidpointProblem::measure(const IslandStep& step, MidpointMotion& motion, std::span<const double> impulses) {
   motion.take_rows(step, now_);
   bool met = motion.find_residual(now_, impulses, residual_, modal_residual_);
   find_off(step, impulses);
@@ -18,7 +18,7 @@ bool MeanProblem::measure(const IslandStep& step, MeanMotion& motion, std::span<
   return met;
 }
 
-void MeanProblem::find_off(const IslandStep& step, std::span<const double> impulses) {
+void MidpointProblem::find_off(const IslandStep& step, std::span<const double> impulses) {
   off_.resize(static_cast<Eigen::Index>(now_.size()));
   for (std::size_t i = 0; i < now_.size(); ++i)
     off_[static_cast<Eigen::Index>(i)] = step.gap[i] - step.law(i).offset + step.law(i).compliance * impulses[i];
@@ -30,11 +30,11 @@ void MeanProblem::find_off(const IslandStep& step, std::span<const double> impul
 
 /// By responses as they were measured last. Of a soft row with compliance c the force is off, too: the share a/(a + c)
 /// of its distance is that of the gap, with a what an impulse moves the gap by.
-double MeanProblem::largest_distance(const IslandStep& step, std::span<const double> impulses) {
+double MidpointProblem::largest_distance(const IslandStep& step, std::span<const double> impulses) {
   find_off(step, impulses);
   double largest = 0.0;
   step.for_units([&](std::size_t first, std::size_t count) {
-    const RowLaw& law = step.law(first);
+    const RowParameters& law = step.law(first);
     const double moved = 1.0 - law.compliance / response_[first];
     largest = std::max(largest,
                        moved * distance_from_law(step, first, count, impulses) / std::max(law.tolerance, law.digits));
@@ -43,9 +43,9 @@ double MeanProblem::largest_distance(const IslandStep& step, std::span<const dou
 }
 
 /// The natural residual, a distance, as in rounds.
-double MeanProblem::distance_from_law(const IslandStep& step, std::size_t first, std::size_t count,
-                                      std::span<const double> impulses) const {
-  const RowLaw& law = step.law(first);
+double MidpointProblem::distance_from_law(const IslandStep& step, std::size_t first, std::size_t count,
+                                          std::span<const double> impulses) const {
+  const RowParameters& law = step.law(first);
   Vec3 impulse = Vec3::Zero(), open = Vec3::Zero();
   for (std::size_t r = 0; r < count; ++r) {
     impulse[static_cast<int>(r)] = impulses[first + r];
@@ -58,9 +58,9 @@ double MeanProblem::distance_from_law(const IslandStep& step, std::size_t first,
 }
 
 /// Whether the law is met, with the modes where they are wanted.
-bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count, std::span<const double> impulses,
-                         const MeanMotion& motion) {
-  const RowLaw& law = step.law(first);
+bool MidpointProblem::is_met(const IslandStep& step, std::size_t first, std::size_t count,
+                             std::span<const double> impulses, const MidpointMotion& motion) {
+  const RowParameters& law = step.law(first);
   const double least = std::max(law.digits, kConstraintsTuning.midpoint.met * law.tolerance);
   bool bent_as_wanted = true;
   for (std::size_t r = 0; r < count; ++r)
@@ -71,7 +71,7 @@ bool MeanProblem::is_met(const IslandStep& step, std::size_t first, std::size_t 
 }
 
 /// Where the bodies are.
-void MeanProblem::find_responses(const IslandStep& step, const MeanMotion& motion) {
+void MidpointProblem::find_responses(const IslandStep& step, const MidpointMotion& motion) {
   response_.resize(now_.size());
   for (std::size_t i = 0; i < now_.size(); ++i)
     response_[i] = motion.mobility(now_[i]) + motion.through_modes(now_[i], now_[i]) + step.law(i).compliance;
@@ -84,7 +84,7 @@ void MeanProblem::find_responses(const IslandStep& step, const MeanMotion& motio
   });
 }
 
-bool MeanProblem::linearise(const IslandStep& step, MeanMotion& motion, std::span<const double> impulses) {
+bool MidpointProblem::linearise(const IslandStep& step, MidpointMotion& motion, std::span<const double> impulses) {
   rows_ = now_;
   motion.find_derivative(step, impulses, K_);
   motion.condense(K_, rows_);
@@ -95,7 +95,7 @@ bool MeanProblem::linearise(const IslandStep& step, MeanMotion& motion, std::spa
   return std::isfinite(stopped_.sum());
 }
 
-void MeanProblem::aim(const MeanMotion& motion) {
+void MidpointProblem::aim(const MidpointMotion& motion) {
   motion.condense(modal_residual_, residual_);
   stopped_ = -residual_;
   factor_.solve(numbers(stopped_), 1);
@@ -104,17 +104,17 @@ void MeanProblem::aim(const MeanMotion& motion) {
 /// Rows without bounds stand in as springs γ for what they hold: forces that pull a body away from its place, as a
 /// pushed rod's do, would else make its matrix singular. With a the gap that an impulse on the row alone makes, γ is
 /// 1/a and more where forces are large.
-void MeanProblem::stiffen(const IslandStep& step, const MeanMotion& motion) {
+void MidpointProblem::stiffen(const IslandStep& step, const MidpointMotion& motion) {
   const Eigen::Index m = off_.size();
   stiffness_.setZero(m);
   const double harder = 1.0 + motion.force_to_inertia(K_);
   for (Eigen::Index i = 0; i < m; ++i) {
-    const MeanRow& row = rows_[static_cast<std::size_t>(i)];
+    const MidpointRow& row = rows_[static_cast<std::size_t>(i)];
     const double by_frames = motion.mobility(row), a = by_frames + motion.through_modes(row, row);
     if (!(by_frames > 0.0) || !is_equality(step.law(static_cast<std::size_t>(i)))) continue;
     stiffness_[i] = harder / a;
-    row.for_sides([&](const MeanRow::Side& pushed) {
-      row.for_sides([&](const MeanRow::Side& measured) {
+    row.for_sides([&](const MidpointRow::Side& pushed) {
+      row.for_sides([&](const MidpointRow::Side& measured) {
         K_.block<6, 6>(6 * pushed.body, 6 * measured.body).noalias() +=
             stiffness_[i] * pushed.force * measured.gap.transpose();
       });
@@ -123,16 +123,16 @@ void MeanProblem::stiffen(const IslandStep& step, const MeanMotion& motion) {
 }
 
 /// E x of one row.
-double MeanProblem::gap_of(Index row, const Vector& x) const {
+double MidpointProblem::gap_of(Index row, const Vector& x) const {
   double sum = 0.0;
-  at(row).for_sides([&](const MeanRow::Side& side) { sum += side.gap.dot(x.segment<6>(6 * side.body)); });
+  at(row).for_sides([&](const MidpointRow::Side& side) { sum += side.gap.dot(x.segment<6>(6 * side.body)); });
   return sum;
 }
 
 /// What modal loads make of a row's gap.
-double MeanProblem::bent(const MeanMotion& motion, const MeanRow& row, const Vector& load) {
+double MidpointProblem::bent(const MidpointMotion& motion, const MidpointRow& row, const Vector& load) {
   double sum = 0.0;
-  row.for_sides([&](const MeanRow::Side& side) {
+  row.for_sides([&](const MidpointRow::Side& side) {
     const Index first = motion.first_mode(side.body);
     for (std::size_t k = 0; k < side.modal_gap.size(); ++k) {
       const Index mode = first + static_cast<Index>(k);
@@ -142,16 +142,17 @@ double MeanProblem::bent(const MeanMotion& motion, const MeanRow& row, const Vec
   return sum;
 }
 
-void MeanProblem::reduce(const IslandStep& step, const MeanMotion& motion, std::span<const Index> rows, RowMatrix& to) {
+void MidpointProblem::reduce(const IslandStep& step, const MidpointMotion& motion, std::span<const Index> rows,
+                             RowMatrix& to) {
   const auto m = static_cast<Eigen::Index>(rows.size());
   auto moved = moved_.resize(K_.rows(), m), made = made_.resize(m, m), through = through_.resize(m, m),
        A = to.resize(m, m);
   moved.setZero(), made.setZero();
   for (Eigen::Index j = 0; j < m; ++j)
-    at(rows[j]).for_sides([&](const MeanRow::Side& side) { moved.block<6, 1>(6 * side.body, j) += side.force; });
+    at(rows[j]).for_sides([&](const MidpointRow::Side& side) { moved.block<6, 1>(6 * side.body, j) += side.force; });
   factor_.solve(moved_.numbers(), rows.size());
   for (Eigen::Index i = 0; i < m; ++i)
-    at(rows[i]).for_sides([&](const MeanRow::Side& side) {
+    at(rows[i]).for_sides([&](const MidpointRow::Side& side) {
       made.row(i).noalias() += side.gap.transpose() * moved.middleRows<6>(6 * side.body);
     });
   for (Eigen::Index i = 0; i < m; ++i) {
@@ -166,7 +167,7 @@ void MeanProblem::reduce(const IslandStep& step, const MeanMotion& motion, std::
 }
 
 /// What bodies yield beyond their modes.
-void MeanProblem::add_flexibility(const IslandStep& step, std::span<const Index> rows, Eigen::Ref<Matrix> to) {
+void MidpointProblem::add_flexibility(const IslandStep& step, std::span<const Index> rows, Eigen::Ref<Matrix> to) {
   if (step.rows.flexibility().empty()) return;
   place_.assign(now_.size(), -1);
   for (std::size_t k = 0; k < rows.size(); ++k) place_[static_cast<std::size_t>(rows[k])] = static_cast<Index>(k);
@@ -178,7 +179,7 @@ void MeanProblem::add_flexibility(const IslandStep& step, std::span<const Index>
   }
 }
 
-void MeanProblem::find_open(const MeanMotion& motion, std::span<const Index> rows, RowVector& to) const {
+void MidpointProblem::find_open(const MidpointMotion& motion, std::span<const Index> rows, RowVector& to) const {
   const auto m = static_cast<Eigen::Index>(rows.size());
   auto open = to.resize(m);
   for (Eigen::Index i = 0; i < m; ++i)
@@ -186,8 +187,8 @@ void MeanProblem::find_open(const MeanMotion& motion, std::span<const Index> row
   for (Eigen::Index j = 0; j < m; ++j) open -= stiffness_[rows[j]] * gap_of(rows[j], stopped_) * through_.view().col(j);
 }
 
-void MeanProblem::answer(const MeanMotion& motion, std::span<const Index> rows, const RowVector& change,
-                         MeanChange& to) {
+void MidpointProblem::answer(const MidpointMotion& motion, std::span<const Index> rows, const RowVector& change,
+                             MidpointChange& to) {
   const Eigen::Index m = off_.size();
   to.motion = stopped_;
   to.motion.noalias() += moved_.view() * change.view();
@@ -197,7 +198,7 @@ void MeanProblem::answer(const MeanMotion& motion, std::span<const Index> rows, 
   for (std::size_t j = 0; j < rows.size(); ++j) {
     const double by = change[static_cast<Eigen::Index>(j)] - stiffness_[rows[j]] * gap_change_[rows[j]];
     to.impulses[rows[j]] = by;
-    at(rows[j]).for_sides([&](const MeanRow::Side& side) {
+    at(rows[j]).for_sides([&](const MidpointRow::Side& side) {
       const Index first = motion.first_mode(side.body);
       for (std::size_t k = 0; k < side.modal_force.size(); ++k)
         to.load[first + static_cast<Index>(k)] += by * side.modal_force[k];

@@ -1,4 +1,4 @@
-#include "step_parts.h"
+#include "substeps.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 
 namespace limber::internal {
 
-void StepParts::hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W) {
+void Substeps::hold_force(Index body, const SurfacePoint& at, const Vec3& newtons_W) {
   if (parts_ > 1) forces_.push_back({body, at, newtons_W, 0, 0.0});
 }
 
-bool StepParts::keep_impulse(Index body, const SurfacePoint& at, const Vec3& newton_seconds_W, double delay) {
+bool Substeps::keep_impulse(Index body, const SurfacePoint& at, const Vec3& newton_seconds_W, double delay) {
   const int part = std::min(static_cast<int>(delay / length()), parts_ - 1);
   if (part == 0) return true;
   const double rest = std::clamp(delay - part * length(), 0.0, std::nextafter(length(), 0.0));
@@ -19,23 +19,23 @@ bool StepParts::keep_impulse(Index body, const SurfacePoint& at, const Vec3& new
   return false;
 }
 
-void StepParts::lead(Index body, const KinematicFrame& target) {
+void Substeps::lead(Index body, const KinematicFrame& target) {
   forget_frame(body);
   const ConstrainedBody& at = constraints_->states().body(body);
   leads_.push_back({body, at.group->frame(at.slot).parent(), target});
 }
 
-void StepParts::forget_frame(Index body) {
+void Substeps::forget_frame(Index body) {
   std::erase_if(leads_, [&](const Lead& lead) { return lead.body == body; });
 }
 
-void StepParts::forget(Index body) {
+void Substeps::forget(Index body) {
   forget_frame(body);
   for (std::vector<Load>* loads : {&forces_, &impulses_})
     std::erase_if(*loads, [&](const Load& load) { return load.body == body; });
 }
 
-void StepParts::begin(int part) {
+void Substeps::begin(int part) {
   const BodyStates states = constraints_->states();
   const auto at = [&](Index body) -> const ConstrainedBody& { return states.body(body); };
   const double done = static_cast<double>(part + 1) / parts_;
@@ -53,7 +53,7 @@ void StepParts::begin(int part) {
 }
 
 /// Targets go straight to where they are at the step's end.
-void StepParts::lead_handles(int part) {
+void Substeps::lead_handles(int part) {
   const std::vector<ConstraintStage::Entry>& entries = constraints_->entries();
   if (part == 0) {
     handles_.clear();
@@ -70,7 +70,7 @@ void StepParts::lead_handles(int part) {
   }
 }
 
-void StepParts::finish() {
+void Substeps::finish() {
   forces_.clear();
   impulses_.clear();
   leads_.clear();

@@ -6,14 +6,14 @@
 
 #include <vector>
 
-#include "end_velocities.h"
-#include "mean_change.h"
-#include "mean_problem.h"
+#include "midpoint_change.h"
+#include "midpoint_problem.h"
 #include "row_answer.h"
+#include "velocity_projection.h"
 
 namespace limber::internal {
 
-class MeanNewton {
+class MidpointNewton {
  public:
   /// Finds step.f and predicts the step under it. Where that is not found nothing is predicted that could be taken.
   /// @param bends whether modes move in this step
@@ -37,15 +37,15 @@ class MeanNewton {
   void move(const IslandStep& step);
   void finish(IslandStep& step);
 
-  MeanMotion motion_;
-  MeanProblem problem_;
+  MidpointMotion motion_;
+  MidpointProblem problem_;
   RowAnswer answer_;
-  EndVelocities velocities_;
+  VelocityProjection velocities_;
   std::vector<double> impulses_;
   std::vector<char> within_;  // by row: whether its impulse is within its bounds
   Vector free_, guess_;       // where bodies would be in free flight, and under the last step's forces
-  MeanChange change_;
-  MeanSecants secants_;  // of the steps by one matrix
+  MidpointChange change_;
+  MidpointSecants secants_;  // of the steps by one matrix
   bool bends_ = true;
   bool linear_ = false, repeated_ = false;  // there is a matrix; the last step was by that of an earlier place
 };
