@@ -12,6 +12,7 @@
 #include <memory>
 #include <vector>
 
+#include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/model/asset.h"
 #include "limber/sound/radiation.h"

@@ -41,7 +41,7 @@ class BodyTable {
   /// All bodies of one model, with what looking ahead and drawing need of it.
   struct ModelGroup {
     std::unique_ptr<BodyGroup> bodies;          // null where the last body of a model was removed
-    std::unique_ptr<IndentedSurface> indented;  // null where nothing indentations its bodies
+    std::unique_ptr<IndentedSurface> indented;  // null where nothing indents its bodies
     std::unique_ptr<GroupSkin> skin;            // null where the model has none
     std::unique_ptr<const HalfBasis> half;      // null where none is kept
   };

@@ -51,7 +51,7 @@ class StepPath {
 
   /// A body that is removed: what its contacts remember goes with it.
   void forget(Index body) { rows_.set.forget(body); }
-  /// The forces that indentation a body's collision surface beyond its modes, as the last substep left them.
+  /// The forces that indent a body's collision surface beyond its modes, as the last substep left them.
   std::span<const IndentationLoad> indentation_loads(Index body) const { return rows_.set.indentation_loads(body); }
   /// Energy that a body's contacts store, beside that of its modes, J.
   double stored_energy(Index body) const { return rows_.set.indentation_energy(constraints_->states(), body); }

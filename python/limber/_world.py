@@ -504,9 +504,9 @@ class World:
         """Joints that broke in the last step; they exist no more."""
         return [Joint(self, event.joint) for event in self._list("limber_joint_break", lib.limber_world_joint_breaks)]
 
-    def ignore_collision(self, a: Body, b: Body, apart: bool = True) -> None:
+    def ignore_collision(self, a: Body, b: Body, ignore: bool = True) -> None:
         """Whether two bodies have no contacts with each other."""
-        check(lib.limber_world_ignore_collision(self._pointer, a._id, b._id, apart))
+        check(lib.limber_world_ignore_collision(self._pointer, a._id, b._id, ignore))
 
     # Time
 

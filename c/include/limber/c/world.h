@@ -222,7 +222,7 @@ LIMBER_API limber_result limber_world_point_position(const limber_world* world, 
                                                      limber_surface_point at, limber_vec3* position);
 LIMBER_API limber_result limber_world_point_velocity(const limber_world* world, limber_body_id id,
                                                      limber_surface_point at, limber_vec3* velocity);
-/// The displacement of a surface point beyond the modes, where contacts indentation it, world, m.
+/// The displacement of a surface point beyond the modes, where contacts indent it, world, m.
 LIMBER_API limber_result limber_world_point_indentation(const limber_world* world, limber_body_id id,
                                                         limber_surface_point at, limber_vec3* displacement);
 
