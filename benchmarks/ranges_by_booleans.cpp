@@ -13,6 +13,7 @@
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Surface_mesh.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -136,7 +137,9 @@ Verdict judge(const Motion& motion, double told, double most, double unit, doubl
     exact = false;
     if (i % kStride == 0 && motion.depth(t) > tolerance) return Verdict::kWide;
   }
-  if (!std::isinf(told) && !motion.overlap(told + std::copysign(kExact * unit, told)) && apart) return Verdict::kNarrow;
+  const auto overlap_beyond = [&](double by) { return motion.overlap(told + std::copysign(by * unit, told)); };
+  const auto close = {1e-3 * kExact, 1e-2 * kExact, 1e-1 * kExact, kExact};  // it may be short
+  if (apart && !std::isinf(told) && std::none_of(close.begin(), close.end(), overlap_beyond)) return Verdict::kNarrow;
   return exact ? Verdict::kExact : Verdict::kWithinTolerance;
 }
 
