@@ -270,6 +270,17 @@ TEST_F(AssemblyProgram, LinearElementsThatAreTooStiffAreToldWithTheError) {
   EXPECT_EQ(warnings("quadratic"), "");
 }
 
+/// A carriage in a rail without stops, and a wheel on an axle that nothing holds.
+TEST_F(AssemblyProgram, OpenSlidesAndPartsThatHangOnNothingAreToldInALineEach) {
+  ASSERT_EQ(testing::run_program("make_assembly", {"dovetail", "--out", "m.obj"}, folder_).exit_code, 0);
+  const ProgramResult r = testing::run_program(
+      "limber-precompute", {"m.obj", "--auto-joints", "--material", "nylon", "--rigid", "*", "-o", "m.glb"}, folder_);
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, HasSubstr("nothing stops \"carriage\" on \"rail\""));
+  EXPECT_THAT(r.err, HasSubstr("components \"axle\" and \"wheel\" hang on nothing"));
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 2) << r.err;
+}
+
 TEST_F(AssemblyProgram, WhatIsWrongIsOneLineAndNothingIsWritten) {
   const auto refused = [&](const std::vector<std::string>& arguments, int code, const std::string& holds) {
     const ProgramResult r = precompute(arguments);
@@ -281,6 +292,8 @@ TEST_F(AssemblyProgram, WhatIsWrongIsOneLineAndNothingIsWritten) {
   refused({"--auto-joints", "--joints", "lamp.joints.json", "--material", "nylon"}, 2, "twice");
   refused({"--scene", "lamp.json", "--material", "nylon"}, 2, "--auto-joints");
   refused({"--joints", "none.json", "--material", "nylon"}, 1, "none.json");
+  write_file(folder_ / "m.json", R"({"wing": "steel", "*": "nylon"})");
+  refused({"--joints", "lamp.joints.json", "--materials", "m.json"}, 1, "no component \"wing\"");
   refused({"--joints", "lamp.joints.json", "--material", "nylon", "--rigid", "wing"}, 2, "wing");
   refused({"--joints", "lamp.joints.json", "--material", "nylon", "--ground", "base", "--ground", "wing"}, 2, "wing");
 }

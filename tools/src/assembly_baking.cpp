@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -180,6 +181,41 @@ std::vector<std::string> fallers(const JointsFile& joints, const std::vector<std
   return names;
 }
 
+/// "a", "b" and "c"
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  return text;
+}
+
+void warn_of_fallers(const JointsFile& joints, const std::vector<std::string>& ground, Warnings& warnings) {
+  std::vector<std::string> names;
+  for (const std::string& name : fallers(joints, ground)) names.push_back("\"" + name + "\"");
+  if (names.empty()) return;
+  warnings.push_back(
+      (names.size() == 1 ? "component " + names[0] + " hangs" : "components " + listed(names) + " hang") +
+      " on nothing that stands still and will fall; hold parts by --ground NAME, or give the joints that "
+      "are missing by --joints");
+}
+
+/// Parts that run off what they slide on.
+void warn_of_open_slides(const JointsFile& joints, Warnings& warnings) {
+  std::vector<std::string> names;
+  for (const JointRecord& joint : joints.joints) {
+    const bool slides = joint.joint.type == JointType::kPrismatic ||
+                        (joint.joint.type == JointType::kCylindrical && joint.joint.pitch == 0.0);
+    const Interval& way = joint.joint.limits.translation[0];
+    if (!slides || !joint.limits_known || (std::isfinite(way.low) && std::isfinite(way.high))) continue;
+    const auto name = [&](Index i) { return "\"" + joints.components[static_cast<std::size_t>(i)].name + "\""; };
+    names.push_back(name(joint.b) + " on " + name(joint.a));
+  }
+  if (names.empty()) return;
+  warnings.push_back(
+      "nothing stops " + listed(names) + (names.size() == 1 ? ", which slides" : ", which slide") +
+      " off at an end; limber-joints writes a joints file in which translation gets limits, for --joints");
+}
+
 /// Lengths of a joint times a factor.
 JointSpec scaled(JointSpec joint, double factor) {
   joint.frame.origin *= factor;
@@ -252,6 +288,10 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
   for (const std::string& name : options.rigid)
     if (name != "*") component_named(joined.assembly, name);
   for (const std::string& name : options.ground) component_named(joined.assembly, name);
+  for (const auto& [name, material] : bake_options.materials)
+    if (name != "*" && std::ranges::none_of(joined.assembly.components,
+                                            [&name = name](const Component& part) { return part.name == name; }))
+      throw InputError("materials: there is no component \"" + name + "\"");
   joined.joints.components.clear();  // in the assembly's order
   for (const Component& part : joined.assembly.components)
     joined.joints.components.push_back({.name = part.name, .faces = part.faces});
@@ -266,10 +306,8 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
   }
   add_joints(joined, options, baked.asset);
   add_apart(joined.assembly, jobs, baked.asset);
-  if (!options.free)
-    for (const std::string& name : fallers(baked.joints, grounded(baked.joints, options)))
-      program.warnings().push_back("component \"" + name +
-                                   "\" hangs on nothing that stands still and falls; --ground holds more of them");
+  if (!options.free) warn_of_fallers(baked.joints, grounded(baked.joints, options), program.warnings());
+  if (options.joints_file.empty()) warn_of_open_slides(baked.joints, program.warnings());
   return baked;
 }
 

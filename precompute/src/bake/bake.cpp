@@ -87,8 +87,7 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
   options.validate();
   if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
   TetMesh mesh = input.mesh;
-  const auto materials =
-      internal::assign_regions(mesh, options.materials, options.regions, input.named_faces, warnings);
+  const auto materials = internal::assign_regions(mesh, options.materials, options.regions, input.named_faces);
   auto fixed = selected_flags(input.mesh, options.fixed);
   auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);

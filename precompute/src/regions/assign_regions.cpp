@@ -31,19 +31,27 @@ bool has_name(const GroupedSurface& faces, const std::string& name) {
   });
 }
 
+std::string told(const std::vector<Region>& regions) {
+  std::string text;
+  for (const Region& r : regions)
+    text += (text.empty() ? "" : ", ") + (r.name.empty() ? std::to_string(r.tag) : "\"" + r.name + "\"");
+  return text.empty() ? "none" : text;
+}
+
 /// Names of the table that are no region of the mesh but faces of its surface become regions below these.
+/// @throws InputError of a name that is neither
 std::vector<MaterialRegion> with_named_faces(const TetMesh& mesh, const MaterialTable& table,
                                              std::span<const MaterialRegion> shapes,
-                                             const std::optional<GroupedSurface>& faces, Warnings& warnings) {
+                                             const std::optional<GroupedSurface>& faces) {
   std::vector<MaterialRegion> all;
   for (const auto& [name, material] : table) {
     const auto is_meant = [&name = name](const Region& r) { return is_name_of(r, name); };
     if (name == "*" || std::any_of(mesh.regions.begin(), mesh.regions.end(), is_meant)) continue;
-    if (faces && has_name(*faces, name))
-      all.push_back({.name = name, .shape = NearFaces{.name = name}, .material = material});
-    else
-      warnings.push_back("materials: the mesh has no region \"" + name + "\"" +
-                         (faces ? ", and its surface no faces of that name" : ""));
+    if (!faces || !has_name(*faces, name))
+      throw InputError("materials: the mesh has no region \"" + name + "\"" +
+                       (faces ? ", and its surface no faces of that name" : "") +
+                       "; its regions: " + told(mesh.regions));
+    all.push_back({.name = name, .shape = NearFaces{.name = name}, .material = material});
   }
   all.insert(all.end(), shapes.begin(), shapes.end());
   return all;
@@ -139,10 +147,10 @@ void check_none_is_empty(std::span<const MaterialRegion> shapes, std::span<const
 }  // namespace
 
 std::vector<Material> assign_regions(TetMesh& mesh, const MaterialTable& table, std::span<const MaterialRegion> shapes,
-                                     const std::optional<GroupedSurface>& faces, Warnings& warnings) {
+                                     const std::optional<GroupedSurface>& faces) {
   for (const auto& [name, material] : table) material.validate("material of \"" + name + "\"");
   for (const MaterialRegion& r : shapes) r.validate();
-  const std::vector<MaterialRegion> all = with_named_faces(mesh, table, shapes, faces, warnings);
+  const std::vector<MaterialRegion> all = with_named_faces(mesh, table, shapes, faces);
   const std::vector<Vec3> points = centroids(mesh);
   const std::vector<int> holders = last_holders(points, all, faces);
   check_none_is_empty(all, holders);
