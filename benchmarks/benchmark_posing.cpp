@@ -99,7 +99,8 @@ Vec3 extreme(const limber::JointedModel& model, Index part, const Vec3& way) {
 }
 
 void run(const Case& c, bool paper, double tolerance) {
-  limber::PosingSession session(c.model, {.tolerance = tolerance}, paper ? limber::penalty_poses() : nullptr);
+  limber::PosingSession session(c.model, {.tolerance = tolerance, .starts = 0},
+                                paper ? limber::penalty_poses() : nullptr);
   for (const Index p : c.soft) session.set_part(p, {.cells = limber::Subdivision::kUniform, .cell_size = c.cell});
   if (c.pinned >= 0) session.set_pinned(c.pinned, true);
   const Vec3 grip = furthest(c.model, c.pulled);

@@ -19,6 +19,7 @@ void PosingOptions::validate() const {
                           ", expected a finite number >= 0");
   if (max_iterations < 1)
     throw InvalidArgument("PosingOptions.max_iterations: is " + std::to_string(max_iterations) + ", expected >= 1");
+  if (starts < 0) throw InvalidArgument("PosingOptions.starts: is " + std::to_string(starts) + ", expected >= 0");
 }
 
 std::string_view to_string(PoseResult::Status status) {

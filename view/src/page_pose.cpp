@@ -47,7 +47,7 @@ Mat3 axes_for(const JointSpec& joint, JointType type) {
 
 struct PagePose::Impl {
   explicit Impl(JointedModel model, std::string told)
-      : session(std::move(model), {.max_iterations = kIterations}), name(std::move(told)) {
+      : session(std::move(model), {.max_iterations = kIterations, .starts = 0}), name(std::move(told)) {
     for (const ModelPart& part : session.model().parts)
       for (const Index t : part.triangles)
         for (const Index v : session.model().surface.triangles[static_cast<std::size_t>(t)])

@@ -6,6 +6,7 @@
 
 #include "limber/core/error.h"
 #include "pose_transfer.h"
+#include "solver/pose_starts.h"
 
 namespace limber::internal {
 namespace {
@@ -24,6 +25,7 @@ constexpr double kFirstDamping = 0.125, kDampingFactor = 4.0, kLeastDamping = 1e
 constexpr double kNewtonSteps = 2.0;    // that a pose takes with a matrix just made
 constexpr int kShortenings = 2;         // of a step by a matrix that was made for an earlier pose
 constexpr double kLeastEnergy = 1e-12;  // of a step's decrease: what later ones are not worth
+constexpr int kStartsToChooseFrom = 8;  // for each that is tried
 constexpr double kGauge = 1e-12;        // prefers no turn where handles leave it open
 
 std::vector<bool> interface_bodies(const PoseStructure& structure) {
@@ -421,7 +423,32 @@ bool PoseSolver::is_sure(const Pose& pose, double value) const {
   return !misses(pose, value) && (factor_.whole || handle_error(pose) <= options_.tolerance * structure_->size);
 }
 
+/// Steps from the pose at hand; where these leave a handle away although nothing is strained, steps from other poses
+/// that joints allow, those of the lowest energy first, until a handle is met.
 PoseResult PoseSolver::solve(Pose& pose) {
+  using Status = PoseResult::Status;
+  PoseResult result = descend(pose, options_.max_iterations);
+  if (result.status == Status::kInfeasible || options_.starts == 0 || !misses(pose, result.energy)) return result;
+  const PoseStarts starts(*structure_);
+  std::vector<std::pair<double, int>> order;
+  for (int i = 1; i <= kStartsToChooseFrom * options_.starts; ++i) order.emplace_back(energy(starts.start(pose, i)), i);
+  std::sort(order.begin(), order.end());
+  int left = options_.max_iterations;
+  for (int i = 0; i < options_.starts && left > 0; ++i) {
+    Pose trial = starts.start(pose, order[static_cast<std::size_t>(i)].second);
+    PoseResult tried = descend(trial, left);
+    result.iterations += tried.iterations, left -= tried.iterations;
+    if (tried.status != Status::kConverged || misses(trial, tried.energy)) continue;
+    tried.iterations = result.iterations, tried.initial_energy = result.initial_energy;
+    pose = std::move(trial);
+    return tried;
+  }
+  factor_.age = kAnew;  // the matrix is of another pose
+  return result;
+}
+
+/// Steps from a pose to where they end. @param pose unchanged if it is kInfeasible
+PoseResult PoseSolver::descend(Pose& pose, int most_iterations) {
   using Status = PoseResult::Status;
   PoseResult result;
   Pose trial = pose;
@@ -448,7 +475,7 @@ PoseResult PoseSolver::solve(Pose& pose) {
   start_with_rigid_motion(trial);
   double value = energy(trial);
   Status status = Status::kIterationLimit;
-  while (status == Status::kIterationLimit && result.iterations < options_.max_iterations) {
+  while (status == Status::kIterationLimit && result.iterations < most_iterations) {
     const Step done = step(trial, value);
     ++result.iterations;
     result.last_step = done.moved;

@@ -41,7 +41,8 @@ class PoseSolver {
   /// The structure must outlive the solver.
   PoseSolver(const PoseStructure& structure, const PosingOptions& options, std::vector<HandleTerm> handles);
 
-  /// @param pose in: where to begin; out: no worse. Unchanged if it is kInfeasible.
+  /// @param pose in: where to begin; out: no worse. Unchanged if it is kInfeasible. Where handles are not met although
+  /// nothing is strained, further starts are tried (PosingOptions::starts).
   PoseResult solve(Pose& pose);
 
   /// New targets, in the order of the handles.
@@ -60,6 +61,7 @@ class PoseSolver {
     double moved = 0.0;  // a point at most, of the size
     enum class Outcome { kTaken, kRejected, kLast } outcome = Outcome::kTaken;
   };
+  PoseResult descend(Pose& pose, int most_iterations);
   void start_with_rigid_motion(Pose& pose) const;
   bool make_feasible(Pose& pose, VectorX& correction);
   void bring_along(const VectorX& interface, VectorX& all, Pose& pose);

@@ -23,14 +23,17 @@ struct PosingOptions {
   double tolerance = 1e-8;         ///< of the diagonal: converged when a step moves no point further; > 0
   double energy_tolerance = 1e-7;  ///< of the energy: or when it promises to lower it by no more; ≥ 0
   int max_iterations = 200;        ///< of one solve(); ≥ 1
-  void validate() const;           ///< @throws InvalidArgument naming the field and its value
+  /// Poses to begin from anew where a handle is not met although nothing is strained, in max_iterations more at most;
+  /// ≥ 0. 0 follows a drag in small steps, which should not jump to another branch.
+  int starts = 16;
+  void validate() const;  ///< @throws InvalidArgument naming the field and its value
 };
 
 struct PoseResult {
   enum class Status {
     kConverged,     ///< a minimum: one of the two tolerances was met
     kLocalMinimum,  ///< a minimum, and a handle is further off than the tolerance although nothing is strained: out of
-                    ///< reach, or met by a pose that no steady decrease leads to from here
+                    ///< reach, or met by a pose that no steady decrease leads to from here or from the starts tried
     kIterationLimit,  ///< max_iterations were done; the pose is feasible, and better than the one before
     kStalled,         ///< no step lowers the energy any further: round-off, or a kink where a limit begins
     kInfeasible,      ///< joints, limits and pins contradict each other: the pose is the one before
